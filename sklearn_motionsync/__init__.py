@@ -1,0 +1,33 @@
+"""Several recordings of the same movement, on one clock.
+
+>>> from sklearn.pipeline import make_pipeline
+>>> from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
+>>> from sklearn_motionsync.datasets import make_bending
+>>> bending = make_bending(random_state=0)
+>>> pipe = make_pipeline(
+...     DirectionCosines(bending.skeleton), ASpace(0.95), DenseSynchronizer(), ActionModel()
+... ).fit(bending.data)
+>>> pipe.predict(bending.data[:3]).tolist()
+[1, 1, 1]
+"""
+
+from . import datasets
+from .action_model import ActionModel
+from .aspace import ASpace
+from .posture import DirectionCosines, Skeleton
+from .sequences import to_frame, to_sequences
+from .synchronizer import DenseSynchronizer, LinearSynchronizer
+
+__version__ = "0.1.0.dev0"
+
+__all__ = [
+    "ASpace",
+    "ActionModel",
+    "DenseSynchronizer",
+    "DirectionCosines",
+    "LinearSynchronizer",
+    "Skeleton",
+    "datasets",
+    "to_frame",
+    "to_sequences",
+]

@@ -1,0 +1,46 @@
+"""Settings and data all tests share."""
+
+import os
+from pathlib import Path
+
+# Must be set before scipy is imported, for scikit-learn's array API checks.
+os.environ.setdefault("SCIPY_ARRAY_API", "1")
+
+import numpy as np
+import pytest
+
+from sklearn_motionsync import ASpace, DirectionCosines
+from sklearn_motionsync.datasets import load_performances, make_bending
+
+REAL_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def real_data():
+    """The folder of real motion capture, which is not part of the repository."""
+    if not REAL_DATA.is_dir():
+        pytest.skip("the real motion capture is not beside the repository (../shared/data)")
+    return REAL_DATA
+
+
+@pytest.fixture(scope="session")
+def bends(real_data):
+    """The 24 real bends of four actors: joint positions."""
+    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    chosen = np.flatnonzero(bunch.target == "depositFloorR")
+    bunch.data = [bunch.data[i] for i in chosen]
+    for name in ("target", "actor", "take", "frame_rate"):
+        bunch[name] = bunch[name][chosen]
+    return bunch
+
+
+@pytest.fixture(scope="session")
+def bending():
+    return make_bending(random_state=0)
+
+
+@pytest.fixture(scope="session")
+def bending_aspace(bending):
+    """The bending performances as points of their aSpace."""
+    postures = DirectionCosines(bending.skeleton).fit_transform(bending.data)
+    return ASpace().fit_transform(postures)

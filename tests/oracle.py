@@ -1,0 +1,59 @@
+"""Slow and obvious versions of the matching. They share no code with the package."""
+
+import itertools
+
+import numpy as np
+
+
+def path_cost(x, y, path, costs, mu, subframes):
+    """Cost of one path of positions: the sum as it stands in the paper (Eq. 12)."""
+    total = 0.0
+    for p, q in enumerate(path):
+        step = subframes if p == 0 else q - path[p - 1]
+        b, g, phi = costs[step]
+        total += x[p] @ x[p] + b * (y[q] @ y[q]) - g * (x[p] @ y[q])
+        total += 0.0 if p == 0 else mu * phi
+    return total
+
+
+def all_paths(n_frames, steps, subframes, max_disparity):
+    """Every path with pinned ends that stays in the band."""
+    last = (n_frames - 1) * subframes
+    for taken in itertools.product(steps, repeat=n_frames - 1):
+        path = np.concatenate([[0], np.cumsum(taken)]).astype(int)
+        offsets = path - subframes * np.arange(n_frames)
+        if path[-1] == last and np.abs(offsets).max() <= max_disparity * subframes:
+            yield path
+
+
+def brute_force(x, y, costs, mu, subframes, max_disparity):
+    """Smallest cost, and every path that has it but for rounding."""
+    paths = list(all_paths(len(x), sorted(costs), subframes, max_disparity))
+    totals = np.array([path_cost(x, y, path, costs, mu, subframes) for path in paths])
+    best = totals.min()
+    near = totals <= best + 1e-9 * max(1.0, abs(best))
+    return best, [tuple(path) for path, is_near in zip(paths, near, strict=True) if is_near]
+
+
+def plain_loops(x, y, costs, mu, subframes, max_disparity):
+    """Smallest cost by the recurrence of Eq. 16, one cell at a time."""
+    n_frames, last = len(x), (len(x) - 1) * subframes
+    reach = max_disparity * subframes
+
+    def local(p, q, step):
+        b, g, _ = costs[step]
+        return x[p] @ x[p] + b * (y[q] @ y[q]) - g * (x[p] @ y[q])
+
+    row = {0: local(0, 0, subframes)}
+    for p in range(1, n_frames):
+        new = {}
+        for q in range(max(0, p * subframes - reach), min(last, p * subframes + reach) + 1):
+            ways = [
+                row[q - step] + local(p, q, step) + mu * costs[step][2]
+                for step in costs
+                if q - step in row
+            ]
+            if ways:
+                new[q] = min(ways)
+        row = new
+    return row[last]

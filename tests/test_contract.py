@@ -1,0 +1,441 @@
+"""What every public estimator owes its users, whatever it computes."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn import clone, config_context
+from sklearn.exceptions import NotFittedError
+from sklearn.pipeline import make_pipeline
+from sklearn.utils import estimator_checks
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    Skeleton,
+    to_frame,
+    to_sequences,
+)
+
+N_JOINTS = 15
+WIDTH = 3 * N_JOINTS
+
+ROW_ESTIMATORS = [ASpace(), LinearSynchronizer(), DenseSynchronizer(), ActionModel()]
+ESTIMATORS = [DirectionCosines(Skeleton.paper()), *ROW_ESTIMATORS]
+TRANSFORMERS = [e for e in ESTIMATORS if hasattr(e, "transform")]
+
+EXTRA_CHECKS = [
+    "check_dataframe_column_names_consistency",
+    "check_param_validation",
+    "check_transformer_get_feature_names_out",
+    "check_transformer_get_feature_names_out_pandas",
+    "check_set_output_transform",
+    "check_set_output_transform_pandas",
+    "check_global_output_transform_pandas",
+    "check_set_output_transform_polars",
+    "check_global_set_output_transform_polars",
+]
+
+
+def by_name(value):
+    return type(value).__name__ if hasattr(value, "get_params") else None
+
+
+@parametrize_with_checks(ROW_ESTIMATORS)
+def test_scikit_learn_checks(estimator, check):
+    check(estimator)
+
+
+# The output checks give arrays to estimators fitted on frames on purpose.
+@pytest.mark.filterwarnings("ignore:X does not have valid feature names:UserWarning")
+@pytest.mark.filterwarnings("ignore:X has feature names, but:UserWarning")
+@pytest.mark.parametrize(
+    ("estimator", "name"),
+    [
+        (estimator, name)
+        for estimator in ROW_ESTIMATORS
+        for name in EXTRA_CHECKS
+        if hasattr(estimator, "transform") or "transform" not in name
+    ],
+    ids=by_name,
+)
+def test_scikit_learn_checks_outside_the_list(estimator, name):
+    getattr(estimator_checks, name)(type(estimator).__name__, clone(estimator))
+
+
+# -- collections: every kind is the same thing ------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def performances():
+    """Six performances of equal length, so that they can be a 3-D array, and a model's input."""
+    return make_performances(6)
+
+
+def make_performances(n, n_frames=30):
+    rng = np.random.RandomState(0)
+    t = np.linspace(0, 1, n_frames)[:, np.newaxis]
+    base = rng.uniform(-1, 1, (1, WIDTH)) + np.sin(2 * t + rng.uniform(0, 6, (1, WIDTH)))
+    return [base + 0.1 * rng.standard_normal(base.shape) for _ in range(n)]
+
+
+NAMES = Skeleton.paper().column_names
+KINDS = {
+    "list": list,
+    "tuple": tuple,
+    "array": np.stack,
+    "object": lambda X: object_array(X),
+    "object of equal shapes": lambda X: np.array(X, dtype=object),
+    "frames": lambda X: [pd.DataFrame(x, columns=NAMES) for x in X],
+    "nested lists": lambda X: [x.tolist() for x in X],
+    "multiindex": lambda X: to_frame(X, columns=NAMES),
+    "read-only": lambda X: [read_only(x) for x in X],
+    "column order": lambda X: [np.asfortranarray(x) for x in X],
+}
+
+
+def object_array(X):
+    out = np.empty(len(X), dtype=object)
+    out[:] = X
+    return out
+
+
+def read_only(x):
+    x = x.copy()
+    x.flags.writeable = False
+    return x
+
+
+def outputs(estimator, X):
+    """Everything a fitted estimator says of performances, as a list of plain arrays."""
+    answers = []
+    if hasattr(estimator, "transform"):
+        answers += [np.asarray(x) for x in estimator.transform(X)]
+    if hasattr(estimator, "match"):
+        answers += list(estimator.match(X))
+    if hasattr(estimator, "score_samples"):
+        answers += [estimator.score_samples(X), estimator.predict(X), np.array(estimator.score(X))]
+    return answers
+
+
+def assert_same(answers, expected):
+    assert len(answers) == len(expected)
+    for a, b in zip(answers, expected, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_collection_gives_equal_results(estimator, kind, performances):
+    expected = outputs(clone(estimator).fit(performances), performances)
+    X = KINDS[kind](performances)
+    fitted = clone(estimator).fit(X)
+    assert_same(outputs(fitted, X), expected)
+    assert fitted.n_features_in_ == WIDTH
+    named = kind in ("frames", "multiindex")
+    assert hasattr(fitted, "feature_names_in_") is named
+    if named:
+        assert list(fitted.feature_names_in_) == NAMES
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
+def test_input_is_never_written_to(estimator, performances):
+    before = [x.copy() for x in performances]
+    fitted = clone(estimator).fit(performances)
+    outputs(fitted, performances)
+    for x, y in zip(performances, before, strict=True):
+        np.testing.assert_array_equal(x, y)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
+def test_output_is_not_a_view_of_the_input(estimator, performances):
+    if hasattr(estimator, "transform"):
+        for out in clone(estimator).fit(performances).transform(performances):
+            assert not any(np.shares_memory(out, x) for x in performances)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
+def test_answers_leave_the_estimator_as_it_was(estimator, performances):
+    fitted = clone(estimator).fit(performances)
+    before = pickle.dumps(fitted.__dict__)
+    outputs(fitted, performances[:3])
+    assert pickle.dumps(fitted.__dict__) == before
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
+def test_pickle_clone_and_refit(estimator, performances):
+    fitted = clone(estimator).fit(performances)
+    expected = outputs(fitted, performances)
+    assert_same(outputs(pickle.loads(pickle.dumps(fitted)), performances), expected)
+    assert_same(outputs(clone(fitted).fit(performances), performances), expected)
+    fitted.fit(performances[::-1])
+    assert_same(outputs(fitted.fit(performances), performances), expected)
+
+
+@pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
+def test_fit_transform_is_fit_then_transform(estimator, performances):
+    once = clone(estimator).fit_transform(performances)
+    twice = clone(estimator).fit(performances).transform(performances)
+    assert_same(list(once), list(twice))
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
+def test_subsets_and_order_do_not_matter(estimator, performances):
+    """What is said of a performance depends on no other performance."""
+    fitted = clone(estimator).fit(performances)
+    whole = outputs(fitted, performances)
+    last = outputs(fitted, performances[-1:])
+    backwards = outputs(fitted, performances[::-1])
+    if hasattr(estimator, "transform"):
+        np.testing.assert_allclose(last[0], whole[len(performances) - 1], rtol=1e-12)
+        np.testing.assert_allclose(backwards[0], whole[len(performances) - 1], rtol=1e-12)
+    else:
+        np.testing.assert_allclose(last[0][0], whole[0][-1], rtol=1e-12)
+        np.testing.assert_allclose(backwards[0], whole[0][::-1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
+def test_posture_level_gives_the_kind_back(estimator, performances):
+    fitted = clone(estimator).fit(performances)
+    out = fitted.transform(np.stack(performances))
+    assert isinstance(out, np.ndarray)
+    assert out.ndim == 3
+    out = fitted.transform(performances)
+    if hasattr(estimator, "n_frames"):
+        assert out.shape == (6, fitted.n_frames_, WIDTH)
+    else:
+        assert isinstance(out, list)
+        one = fitted.transform(performances[0])
+        np.testing.assert_allclose(one, out[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("estimator", "given"),
+    [
+        (estimator, given)
+        for estimator in ESTIMATORS
+        for given in ("float32", "float64", "float16", "int32", "bool")
+        # Coordinates that are 0 or 1 make limbs without length.
+        if not (given == "bool" and isinstance(estimator, DirectionCosines))
+    ],
+    ids=by_name,
+)
+def test_dtype(estimator, given, performances):
+    used = "float32" if given == "float32" else "float64"
+    X = [x > 0 if given == "bool" else (100 * x).astype(given) for x in performances]
+    fitted = clone(estimator).fit(X)
+    for name in ("components_", "mean_", "pattern_", "variance_", "limb_lengths_"):
+        if hasattr(fitted, name):
+            assert getattr(fitted, name).dtype == used, name
+    if hasattr(fitted, "transform"):
+        assert all(x.dtype == used for x in fitted.transform(X))
+    if given == "float32":
+        double = clone(estimator).fit([x.astype(float) for x in X])
+        single, double = outputs(fitted, X), outputs(double, [x.astype(float) for x in X])
+        for a, b in zip(single, double, strict=True):
+            np.testing.assert_allclose(a, b, rtol=2e-3, atol=2e-3 * np.abs(b).max())
+
+
+# -- pandas in and out ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
+@pytest.mark.parametrize("kind", ["list", "array", "frames", "multiindex"])
+@pytest.mark.parametrize("how", ["local", "global"])
+def test_pandas_output_of_collections(estimator, kind, how, performances):
+    X = KINDS[kind](performances)
+    plain = clone(estimator).fit(X).transform(X)
+    if how == "local":
+        out = clone(estimator).set_output(transform="pandas").fit_transform(X)
+    else:
+        with config_context(transform_output="pandas"):
+            out = clone(estimator).fit_transform(X)
+    assert isinstance(out, pd.DataFrame)
+    assert out.index.names == ["performance", "frame"]
+    assert list(out.columns) == list(clone(estimator).fit(X).get_feature_names_out())
+    for frame, expected in zip(to_sequences(out), plain, strict=True):
+        np.testing.assert_array_equal(frame, expected)
+
+
+def test_pandas_output_keeps_the_labels(performances):
+    X = to_frame(performances, performances=list("abcdef"), columns=NAMES)
+    out = ASpace(2).set_output(transform="pandas").fit_transform(X)
+    assert out.index.equals(X.index)
+    out = DenseSynchronizer(n_frames=20).set_output(transform="pandas").fit_transform(X)
+    assert list(out.index.unique(0)) == list("abcdef")
+    assert list(out.loc["b"].index) == list(range(20))
+
+
+def test_pandas_through_a_pipeline(performances):
+    pipe = make_pipeline(*(clone(e) for e in (*TRANSFORMERS[:2], DenseSynchronizer(), ActionModel())))
+    plain = clone(pipe).fit(performances).score_samples(performances)
+    with config_context(transform_output="pandas"):
+        framed = clone(pipe).fit(performances).score_samples(performances)
+    np.testing.assert_array_equal(plain, framed)
+
+
+@pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
+def test_polars_output_of_a_collection_is_refused(estimator, performances):
+    fitted = clone(estimator).fit(performances).set_output(transform="polars")
+    with pytest.raises(ValueError, match="pandas"):
+        fitted.transform(performances)
+
+
+# -- bad input --------------------------------------------------------------------------
+
+
+def with_bad(X, i, change):
+    X = [x.copy() for x in X]
+    X[i] = change(X[i])
+    return X
+
+
+def put(value):
+    def change(x):
+        x[3, 2] = value
+        return x
+
+    return change
+
+
+BAD = {
+    "NaN": (put(np.nan), r"Performance 4, frame 3, feature 2 is NaN"),
+    "infinity": (put(np.inf), r"Performance 4, frame 3, feature 2 is infinity"),
+    "empty": (lambda x: x[:0], r"Performance 4 has shape \(0, 45\); .* at least 2 frames"),
+    "one frame": (lambda x: x[:1], r"Performance 4 has shape \(1, 45\); .* at least 2 frames"),
+    "no features": (lambda x: x[:, :0], r"Performance 4 has (shape|0 features)"),
+    "wrong width": (lambda x: x[:, 1:], r"Performance 4 has 44 features .* performance 0 has 45"),
+    "one dimension": (lambda x: x[:, 0], r"Performance 4 has shape \(30,\), expected \(n_frames"),
+    "three dimensions": (lambda x: x[None], r"Performance 4 has shape \(1, 30, 45\), expected"),
+    "text": (lambda x: x.astype(str).astype(object) + "?", r"Performance 4 is not a numeric array"),
+    "complex": (lambda x: x + 1j, r"Performance 4: complex data"),
+    "None": (lambda x: None, r"Performance 4 "),
+    "masked": (lambda x: np.ma.masked_less(x, 0), r"Performance 4 has masked values"),
+    "other names": (
+        lambda x: pd.DataFrame(x, columns=NAMES[::-1]),
+        r"Performance 4 has the columns .* performance 0 has None",
+    ),
+}
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
+@pytest.mark.parametrize("fault", BAD)
+@pytest.mark.parametrize("when", ["fit", "after"])
+def test_a_bad_performance_is_named(estimator, fault, when, performances):
+    change, message = BAD[fault]
+    bad = with_bad(performances, 4, change)
+    estimator = clone(estimator)
+    if when == "fit":
+        with pytest.raises(ValueError, match=message):
+            estimator.fit(bad)
+        return
+    estimator.fit(performances)
+    with pytest.raises(ValueError, match=message):
+        outputs(estimator, bad)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
+@pytest.mark.parametrize(
+    ("X", "message"),
+    [
+        ([], "0 performances"),
+        (np.empty((0, 10, WIDTH)), "0 performances"),
+        ({"a": np.zeros((3, WIDTH))}, "got dict"),
+        ((x for x in [np.zeros((3, WIDTH))]), "got generator"),
+        (np.zeros((2, 3, 4, 5)), r"shape \(2, 3, 4, 5\)"),
+        ("performances", "got str"),
+        ([np.zeros(3), np.zeros(4)], r"x\[:, np.newaxis\]"),
+        (np.zeros(5), "[Ee]xpected 2D array"),
+    ],
+    ids=str,
+)
+def test_what_is_no_collection_is_refused(estimator, X, message):
+    with pytest.raises(ValueError, match=message):
+        clone(estimator).fit(X)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
+def test_width_must_be_that_of_fit(estimator, performances):
+    fitted = clone(estimator).fit(performances)
+    with pytest.raises(ValueError, match=r"Performance 0 has 42 features a frame.*expecting 45"):
+        outputs(fitted, [x[:, 3:] for x in performances])
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
+def test_names_must_be_those_of_fit(estimator, performances):
+    frames = KINDS["frames"](performances)
+    fitted = clone(estimator).fit(frames)
+    with pytest.raises(ValueError, match="feature names should match"):
+        outputs(fitted, [x[NAMES[::-1]] for x in frames])
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
+def test_unfitted(estimator, performances):
+    with pytest.raises(NotFittedError):
+        outputs(clone(estimator), performances)
+
+
+@pytest.mark.parametrize(
+    "estimator", [LinearSynchronizer(), DenseSynchronizer(), ActionModel()], ids=by_name
+)
+def test_sequence_level_estimators_keep_to_the_kind_of_fit(estimator, performances):
+    fitted = clone(estimator).fit(performances)
+    with pytest.raises(ValueError, match=r"wrap one sequence as \[X\]"):
+        outputs(fitted, performances[0])
+    rows = np.stack([x[:, 0] for x in performances])
+    fitted.fit(rows)
+    assert fitted.n_features_in_ == 30
+    with pytest.raises(ValueError, match="was fitted on a 2-D array"):
+        outputs(fitted, performances)
+
+
+@pytest.mark.parametrize("estimator", [LinearSynchronizer(), DenseSynchronizer()], ids=by_name)
+def test_rows_are_univariate_sequences(estimator, performances):
+    rows = np.stack([x[:, 0] for x in performances])
+    columns = [x[:, :1] for x in performances]
+    expected = clone(estimator).fit(columns).transform(columns)[:, :, 0]
+    np.testing.assert_array_equal(clone(estimator).fit(rows).transform(rows), expected)
+
+
+# -- DirectionCosines, whose width its skeleton fixes: scikit-learn's demands, written out --
+
+
+@pytest.mark.filterwarnings("ignore:X does not have valid feature names:UserWarning")
+@pytest.mark.parametrize("reference", ["heading", "parent", "world"])
+def test_direction_cosines_on_rows(reference, performances):
+    X = performances[0]
+    estimator = DirectionCosines(Skeleton.paper(), reference)
+    params = estimator.get_params()
+    assert estimator.fit(X) is estimator
+    assert estimator.get_params() == params
+    assert estimator.n_features_in_ == WIDTH
+    out = estimator.transform(X)
+    assert out.shape == (30, 37)
+    np.testing.assert_array_equal(clone(estimator).fit_transform(X), out)
+    np.testing.assert_array_equal(clone(estimator).fit(X, y=np.zeros(30)).transform(X), out)
+    np.testing.assert_allclose(estimator.transform(X[::-1]), out[::-1], rtol=1e-12)
+    np.testing.assert_array_equal(estimator.transform(X.tolist()), out)
+    frame = pd.DataFrame(X, columns=NAMES, index=[f"i{k}" for k in range(30)])
+    framed = clone(estimator).set_output(transform="pandas").fit_transform(frame)
+    assert list(framed.index) == list(frame.index)
+    assert list(framed.columns) == list(estimator.get_feature_names_out())
+    np.testing.assert_array_equal(framed, out)
+    for bad in (X[:, :-1], X[0], np.where(np.eye(30, WIDTH), np.nan, X), X + 1j, X[:0]):
+        with pytest.raises(ValueError):  # noqa: PT011 - scikit-learn's own messages
+            clone(estimator).fit(bad)
+    with pytest.raises(ValueError, match="44"):
+        estimator.transform(X[:, :-1])
+
+
+@pytest.mark.parametrize(
+    "params", [{"reference": "sideways"}, {"reference": None}, {"skeleton": "acclaim"}]
+)
+def test_direction_cosines_validates_its_parameters(params, performances):
+    estimator = DirectionCosines(Skeleton.paper()).set_params(**params)
+    with pytest.raises(ValueError, match=f"The '{next(iter(params))}' parameter"):
+        estimator.fit(performances)

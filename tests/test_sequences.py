@@ -1,0 +1,79 @@
+"""Frames to lists and back; what the contract tests of the estimators do not reach."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sklearn_motionsync import to_frame, to_sequences
+
+
+@pytest.fixture
+def frame():
+    index = pd.MultiIndex.from_tuples(
+        [("b", 0), ("b", 1), ("a", 3), ("a", 5), ("a", 9)], names=["trial", "t"]
+    )
+    return pd.DataFrame({"x": [1.0, 2, 3, 4, 5], "y": [5.0, 4, 3, 2, 1]}, index=index)
+
+
+def test_to_sequences_keeps_order_names_and_frames(frame):
+    first, second = to_sequences(frame)
+    assert first["x"].tolist() == [1, 2]
+    assert second.index.tolist() == [3, 5, 9]
+    assert list(second.columns) == ["x", "y"]
+
+
+def test_interleaved_rows_are_sorted_out(frame):
+    mixed = frame.iloc[[2, 0, 3, 1, 4]]
+    first, second = to_sequences(mixed)
+    assert first["x"].tolist() == [3, 4, 5]
+    assert second["x"].tolist() == [1, 2]
+
+
+def test_round_trip(frame):
+    back = to_frame(to_sequences(frame), performances=["b", "a"])
+    pd.testing.assert_frame_equal(back, frame.rename_axis(["performance", "frame"]))
+
+
+def test_round_trip_of_arrays():
+    X = [np.arange(6.0).reshape(3, 2), np.ones((2, 2))]
+    df = to_frame(X)
+    assert df.index.names == ["performance", "frame"]
+    for a, b in zip(to_sequences(df), X, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_gaps_travel():
+    """Frames are where gaps are filled, so the way there must not refuse them."""
+    assert np.isnan(to_frame([np.array([[1.0], [np.nan]])]).iloc[1, 0])
+
+
+@pytest.mark.parametrize(
+    ("df", "message"),
+    [
+        (pd.DataFrame({"x": [1.0]}), r"an index of 1 level\(s\)"),
+        (np.zeros((3, 2)), "got ndarray"),
+    ],
+    ids=["flat", "array"],
+)
+def test_to_sequences_wants_two_levels(df, message):
+    with pytest.raises(ValueError, match=message):
+        to_sequences(df)
+
+
+@pytest.mark.parametrize("rows", [[0, 1, 3, 2, 4], [0, 1, 2, 2, 4]], ids=["back", "twice"])
+def test_frames_must_increase(frame, rows):
+    with pytest.raises(ValueError, match="frames of performance 'a' do not increase"):
+        to_sequences(frame.iloc[rows])
+
+
+@pytest.mark.parametrize("labels", [["a"], ["a", "a"], ["a", "b", "c"]])
+def test_labels_must_fit(labels):
+    with pytest.raises(ValueError, match="2 different labels"):
+        to_frame([np.zeros((2, 1))] * 2, performances=labels)
+
+
+def test_to_frame_wants_a_collection():
+    with pytest.raises(ValueError, match=r"Wrap one performance as \[X\]"):
+        to_frame(np.zeros((3, 2)))
+    with pytest.raises(ValueError, match="0 performances"):
+        to_frame([])
