@@ -14,8 +14,9 @@
 from . import datasets
 from .action_model import ActionModel
 from .aspace import ASpace
-from .posture import DirectionCosines, Skeleton
+from .posture import DirectionCosines
 from .sequences import to_frame, to_sequences
+from .skeleton import Skeleton
 from .synchronizer import DenseSynchronizer, LinearSynchronizer
 
 __version__ = "0.1.0.dev0"

@@ -3,7 +3,12 @@
 from numbers import Integral
 
 import numpy as np
-from sklearn.base import BaseEstimator, ClassNamePrefixFeaturesOutMixin, TransformerMixin, _fit_context
+from sklearn.base import (
+    BaseEstimator,
+    ClassNamePrefixFeaturesOutMixin,
+    TransformerMixin,
+    _fit_context,
+)
 from sklearn.decomposition import PCA
 from sklearn.utils._param_validation import Interval, RealNotInt
 from sklearn.utils.validation import check_is_fitted
@@ -55,7 +60,7 @@ class ASpace(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
     >>> import numpy as np
     >>> from sklearn_motionsync import ASpace
     >>> t = np.linspace(0, 1, 50)
-    >>> performances = [np.column_stack([t, 2 * t, 0 * t]), np.column_stack([t**2, 2 * t**2, 0 * t])]
+    >>> performances = [np.column_stack([x, 2 * x, 0 * x]) for x in (t, t**2)]
     >>> aspace = ASpace(0.95).fit(performances)
     >>> aspace.n_components_
     1
@@ -96,11 +101,13 @@ class ASpace(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
         arrays = check_performances(self, X, reset=True, level="posture").arrays
         postures = np.concatenate(arrays) if len(arrays) > 1 else arrays[0]
         if len(postures) < 2:
-            raise ValueError("ASpace needs at least 2 postures to see how they vary, got n_samples = 1.")
+            raise ValueError(
+                "ASpace needs at least 2 postures to see how they vary, got n_samples=1."
+            )
         most = min(postures.shape)
         if isinstance(self.n_components, Integral) and self.n_components > most:
             raise ValueError(
-                f"n_components={self.n_components} is more than the {postures.shape[0]} postures of "
+                f"n_components={self.n_components} is more than the {len(postures)} postures of "
                 f"{postures.shape[1]} features can span; use at most {most}, or a share of the "
                 "variance such as 0.95."
             )
@@ -112,7 +119,9 @@ class ASpace(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
         self.mean_ = pca.mean_
         self.explained_variance_ = variance[:b]
         whole = variance.sum()
-        self.explained_variance_ratio_ = variance[:b] / whole if whole > 0 else np.zeros_like(variance[:b])
+        self.explained_variance_ratio_ = (
+            variance[:b] / whole if whole > 0 else np.zeros_like(variance[:b])
+        )
         self.residual_variance_ = float(variance[b:].sum())
         self.n_components_ = b
         return self
@@ -131,7 +140,9 @@ class ASpace(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
         check_is_fitted(self)
         performances = check_performances(self, X, reset=False, level="posture")
         components = self.components_.T
-        arrays = [((a - self.mean_) @ components).astype(a.dtype, copy=False) for a in performances.arrays]
+        arrays = [
+            ((a - self.mean_) @ components).astype(a.dtype, copy=False) for a in performances.arrays
+        ]
         return restore(self, performances, arrays)
 
     def inverse_transform(self, X):
@@ -147,7 +158,10 @@ class ASpace(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
         """
         check_is_fitted(self)
         performances = check_transformed(self, X, self.n_components_)
-        arrays = [(a @ self.components_ + self.mean_).astype(a.dtype, copy=False) for a in performances.arrays]
+        arrays = [
+            (a @ self.components_ + self.mean_).astype(a.dtype, copy=False)
+            for a in performances.arrays
+        ]
         names = getattr(self, "feature_names_in_", range(self.n_features_in_))
         return restore(self, performances, arrays, columns=names)
 

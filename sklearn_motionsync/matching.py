@@ -187,7 +187,7 @@ class Trellis:
         path reaches stay infinite: the windows first only grow, over cells never
         written, then only shrink, reading inside the row before.
         """
-        n_bases, n_frames, _ = bases.shape
+        n_bases = len(bases)
         centre, pairs = self.width + self._pad, right.shape[1] * n_bases
         states = np.full((keep, 2 * centre + 1, pairs), np.inf, dtype=bases.dtype)
         scratch = np.empty((2, 2 * self.width + 1, pairs), dtype=bases.dtype)

@@ -1,9 +1,5 @@
-"""Joint positions to postures (Eq. 1): Skeleton and DirectionCosines."""
+"""DirectionCosines: from joint positions to postures (Eq. 1)."""
 
-import os
-import re
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +8,7 @@ from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from .sequences import check_performances, check_transformed, restore
+from .skeleton import LANDMARKS, Skeleton
 
 __all__ = ["DirectionCosines", "Skeleton"]
 
@@ -47,214 +44,6 @@ LIMBS = {
     "right_forearm": _Limb("right_elbow", "right_wrist", "right_arm", _RIGHT),
 }
 _LIMB_NAMES = list(LIMBS)
-
-# The fifteen joints of the body model and the parent of each.
-_PAPER_PARENTS = {
-    "pelvis": None,
-    "neck": "pelvis",
-    "head": "neck",
-    **{
-        f"{side}_{joint}": parent if parent in ("neck", "pelvis") else f"{side}_{parent}"
-        for side in ("left", "right")
-        for joint, parent in (
-            ("shoulder", "neck"),
-            ("elbow", "shoulder"),
-            ("wrist", "elbow"),
-            ("hip", "pelvis"),
-            ("knee", "hip"),
-            ("ankle", "knee"),
-        )
-    },
-}
-_LANDMARKS = list(_PAPER_PARENTS)
-
-_ACCLAIM = {
-    "root": None,
-    **{"lhipjoint": "root", "rhipjoint": "root", "lowerback": "root"},
-    **{"lfemur": "lhipjoint", "ltibia": "lfemur", "lfoot": "ltibia", "ltoes": "lfoot"},
-    **{"rfemur": "rhipjoint", "rtibia": "rfemur", "rfoot": "rtibia", "rtoes": "rfoot"},
-    **{"upperback": "lowerback", "thorax": "upperback", "lowerneck": "thorax"},
-    **{"lclavicle": "thorax", "rclavicle": "thorax"},
-    **{"upperneck": "lowerneck", "head": "upperneck"},
-    **{"lhumerus": "lclavicle", "lradius": "lhumerus", "lwrist": "lradius"},
-    **{"lhand": "lwrist", "lthumb": "lwrist", "lfingers": "lhand"},
-    **{"rhumerus": "rclavicle", "rradius": "rhumerus", "rwrist": "rradius"},
-    **{"rhand": "rwrist", "rthumb": "rwrist", "rfingers": "rhand"},
-}
-# An Acclaim joint is the far end of the bone of that name.
-_ACCLAIM_LANDMARKS = {
-    "pelvis": "root",
-    "neck": "thorax",
-    "head": "head",
-    **{
-        f"{side}_{landmark}": side[0] + bone
-        for side in ("left", "right")
-        for landmark, bone in (
-            ("shoulder", "clavicle"),
-            ("elbow", "humerus"),
-            ("wrist", "radius"),
-            ("hip", "hipjoint"),
-            ("knee", "femur"),
-            ("ankle", "tibia"),
-        )
-    },
-}
-
-_KINECT = {
-    "HipCenter": None,
-    "Spine": "HipCenter",
-    "ShoulderCenter": "Spine",
-    "Head": "ShoulderCenter",
-    **{"ShoulderLeft": "ShoulderCenter", "ElbowLeft": "ShoulderLeft"},
-    **{"WristLeft": "ElbowLeft", "HandLeft": "WristLeft"},
-    **{"ShoulderRight": "ShoulderCenter", "ElbowRight": "ShoulderRight"},
-    **{"WristRight": "ElbowRight", "HandRight": "WristRight"},
-    **{"HipLeft": "HipCenter", "KneeLeft": "HipLeft"},
-    **{"AnkleLeft": "KneeLeft", "FootLeft": "AnkleLeft"},
-    **{"HipRight": "HipCenter", "KneeRight": "HipRight"},
-    **{"AnkleRight": "KneeRight", "FootRight": "AnkleRight"},
-}
-_KINECT_LANDMARKS = {
-    "pelvis": "HipCenter",
-    "neck": "ShoulderCenter",
-    "head": "Head",
-    **{
-        f"{side}_{landmark}": landmark.capitalize() + side.capitalize()
-        for side in ("left", "right")
-        for landmark in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-    },
-}
-
-# Names of the joint at each landmark in files whose joints are the near ends of the
-# bones, the likeliest first.
-_SYNONYMS = {
-    "pelvis": ("pelvis", "hips", "hip", "hipcenter", "midhip", "root"),
-    "neck": ("neck", "neck1", "necktwist01", "shouldercenter", "spineshoulder", "thorax"),
-    "head": ("head",),
-    "shoulder": ("upperarm", "uparm", "arm", "shoulder"),
-    "elbow": ("elbow", "forearm", "lowerarm", "lowarm"),
-    "wrist": ("wrist", "hand"),
-    "hip": ("thigh", "upleg", "upperleg", "hip", "hipjoint"),
-    "knee": ("knee", "calf", "leg", "lowerleg", "lowleg", "shin"),
-    "ankle": ("ankle", "foot"),
-}
-
-
-@dataclass(frozen=True)
-class Skeleton:
-    """Which joints the positions hold, how they hang together, and which are the body's.
-
-    Parameters
-    ----------
-    joints : sequence of str
-        Names of the joints, in the order of the columns: joint j has the columns
-        ``3 j``, ``3 j + 1``, ``3 j + 2`` (x, y, z).
-    parents : sequence of int
-        Index of each joint's parent, -1 for the root. Used to draw bones.
-    landmarks : mapping of str to str, default=None
-        The joint at each of the fifteen landmarks of the paper's body model:
-        ``pelvis``, ``neck``, ``head`` and ``left_``/``right_`` ``shoulder``, ``elbow``,
-        ``wrist``, ``hip``, ``knee``, ``ankle``. By default it is guessed from the names.
-    up : {"y", "z"}, default="y"
-        The vertical axis of the positions.
-
-    Raises
-    ------
-    ValueError
-        If lengths disagree, a name comes twice, a parent does not exist, or a landmark
-        is missing or names no joint.
-
-    Examples
-    --------
-    >>> from sklearn_motionsync import Skeleton
-    >>> skeleton = Skeleton.acclaim()
-    >>> len(skeleton.joints), skeleton.landmarks["left_knee"]
-    (31, 'lfemur')
-    """
-
-    joints: tuple
-    parents: tuple
-    landmarks: Mapping | None = None
-    up: str = "y"
-
-    def __post_init__(self):
-        joints = tuple(str(j) for j in self.joints)
-        parents = tuple(int(p) for p in self.parents)
-        if len(joints) != len(parents) or len(set(joints)) != len(joints):
-            raise ValueError(
-                f"A skeleton needs different joint names and one parent each, got {len(joints)} "
-                f"names ({len(set(joints))} different) and {len(parents)} parents."
-            )
-        if any(not -1 <= p < len(joints) or p == i for i, p in enumerate(parents)):
-            raise ValueError(f"parents must be other joints' indices, or -1; got {parents}.")
-        if self.up not in ("y", "z"):
-            raise ValueError(f"up must be 'y' or 'z', got {self.up!r}.")
-        landmarks = _guess_landmarks(joints) if self.landmarks is None else dict(self.landmarks)
-        missing = [name for name in _LANDMARKS if landmarks.get(name) not in joints]
-        if missing:
-            raise ValueError(
-                f"No joint stands for the landmarks {missing}; give landmarks={{...}} with one of "
-                f"the joints {list(joints)} for each."
-            )
-        object.__setattr__(self, "joints", joints)
-        object.__setattr__(self, "parents", parents)
-        object.__setattr__(self, "landmarks", {name: landmarks[name] for name in _LANDMARKS})
-
-    @classmethod
-    def paper(cls):
-        """The paper's fifteen joints."""
-        return cls._of(_PAPER_PARENTS, {name: name for name in _LANDMARKS})
-
-    @classmethod
-    def acclaim(cls):
-        """The 31 joints of HDM05 and of CMU's ASF/AMC files."""
-        return cls._of(_ACCLAIM, _ACCLAIM_LANDMARKS)
-
-    @classmethod
-    def kinect(cls):
-        """The 20 joints of the first Kinect."""
-        return cls._of(_KINECT, _KINECT_LANDMARKS)
-
-    @classmethod
-    def from_names(cls, joints, parents, up="y"):
-        """A ready skeleton if the names are one's, otherwise landmarks guessed from names."""
-        for known in (cls.acclaim(), cls.kinect(), cls.paper()):
-            if set(known.joints) <= set(joints):
-                return cls(joints, parents, known.landmarks, up)
-        return cls(joints, parents, None, up)
-
-    @classmethod
-    def _of(cls, parents, landmarks):
-        joints = list(parents)
-        return cls(joints, [joints.index(p) if p else -1 for p in parents.values()], landmarks)
-
-    @property
-    def bones(self):
-        """Pairs (parent, joint) of joint indices."""
-        return [(p, j) for j, p in enumerate(self.parents) if p >= 0]
-
-    @property
-    def column_names(self):
-        """Names of the position columns, ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, ..."""
-        return [f"{joint}_{axis}" for joint in self.joints for axis in "xyz"]
-
-
-def _guess_landmarks(joints):
-    """The joint of each landmark that can be told from the names."""
-    # A prefix that a program gave to every joint but perhaps the root is no part of a name.
-    prefix = re.match(r"(.*[^A-Za-z0-9])?", os.path.commonprefix(joints[1:])).group()
-    plain = {re.sub(r"[^a-z0-9]", "", j.removeprefix(prefix).lower()): j for j in reversed(joints)}
-    found = {}
-    for landmark in _LANDMARKS:
-        side, _, part = landmark.rpartition("_")
-        forms = ("{side}{part}", "{part}{side}", "{side[0]}{part}", "{part}{side[0]}")
-        names = [
-            form.format(side=side, part=synonym)
-            for synonym in _SYNONYMS[part]
-            for form in (forms if side else ("{part}",))
-        ]
-        found |= {landmark: plain[name] for name in names[::-1] if name in plain}
-    return found
 
 
 class DirectionCosines(TransformerMixin, BaseEstimator):
@@ -380,7 +169,8 @@ class DirectionCosines(TransformerMixin, BaseEstimator):
         lengths = np.asarray(self.limb_lengths_ if limb_lengths is None else limb_lengths)
         if lengths.shape != (len(LIMBS),):
             raise ValueError(
-                f"limb_lengths needs one length for each of {_LIMB_NAMES}, got shape {lengths.shape}."
+                f"limb_lengths needs one length for each of {_LIMB_NAMES}, got shape "
+                f"{lengths.shape}."
             )
         performances = check_transformed(self, X, 1 + 3 * len(LIMBS))
         arrays = [self._positions(a, lengths.astype(a.dtype)) for a in performances.arrays]
@@ -419,7 +209,7 @@ class DirectionCosines(TransformerMixin, BaseEstimator):
     def _landmarks(self, positions):
         """(n_frames, 15, 3) positions of the landmarks, y up."""
         joints = self.skeleton.joints
-        columns = [joints.index(self.skeleton.landmarks[name]) for name in _LANDMARKS]
+        columns = [joints.index(self.skeleton.landmarks[name]) for name in LANDMARKS]
         points = positions.reshape(len(positions), -1, 3)[:, columns]
         if self.skeleton.up == "z":
             points = np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1)
@@ -437,15 +227,15 @@ class DirectionCosines(TransformerMixin, BaseEstimator):
                 f"{[self.skeleton.landmarks[j] for j in LIMBS[name][:2]]} coincide. Repair the "
                 "frame, or choose other landmarks."
             )
-        height = points[:, _LANDMARKS.index("pelvis"), 1]
-        ankles = [_LANDMARKS.index(f"{side}_ankle") for side in ("left", "right")]
+        height = points[:, LANDMARKS.index("pelvis"), 1]
+        ankles = [LANDMARKS.index(f"{side}_ankle") for side in ("left", "right")]
         floor = points[:, ankles, 1].min()
         u = (height - floor) / _leg_length(np.median(lengths, axis=0))
         cosines = limbs / lengths[:, :, np.newaxis]
         if self.reference != "world":
             cosines = _turn(cosines, _heading(cosines[:, 0]))
         if self.reference == "parent":
-            cosines = _to_parents(cosines)
+            cosines = _along_parents(cosines)
         return np.column_stack([u, cosines.reshape(len(u), -1)])
 
     def _positions(self, postures, lengths):
@@ -454,7 +244,7 @@ class DirectionCosines(TransformerMixin, BaseEstimator):
         norm = np.linalg.norm(cosines, axis=2, keepdims=True)
         cosines = cosines / np.where(norm > 0, norm, 1)
         if self.reference == "parent":
-            cosines = _from_parents(cosines)
+            cosines = _along_parents(cosines, inverse=True)
         limb = dict(zip(LIMBS, np.moveaxis(cosines * lengths[:, np.newaxis], 1, 0), strict=True))
         at = {"pelvis": np.zeros_like(limb["hip"])}
         at["pelvis"][:, 1] = postures[:, 0] * _leg_length(lengths)
@@ -466,18 +256,20 @@ class DirectionCosines(TransformerMixin, BaseEstimator):
             for part in ("thigh", "leg", "arm", "forearm"):
                 start, end, _, _ = LIMBS[f"{side}_{part}"]
                 at[end] = at[start] + limb[f"{side}_{part}"]
-        return np.concatenate([at[name] for name in _LANDMARKS], axis=1)
+        return np.concatenate([at[name] for name in LANDMARKS], axis=1)
 
 
 def _limbs(points):
     """(n_frames, 12, 3) limb vectors of (n_frames, 15, 3) landmarks."""
-    start, end = ([_LANDMARKS.index(limb[k]) for limb in LIMBS.values()] for k in (0, 1))
+    start, end = ([LANDMARKS.index(limb[k]) for limb in LIMBS.values()] for k in (0, 1))
     return points[:, end] - points[:, start]
 
 
 def _leg_length(lengths):
     """Length of the stretched leg, the mean of both sides."""
-    parts = [lengths[_LIMB_NAMES.index(f"{s}_{p}")] for s in ("left", "right") for p in ("thigh", "leg")]
+    parts = [
+        lengths[_LIMB_NAMES.index(f"{s}_{p}")] for s in ("left", "right") for p in ("thigh", "leg")
+    ]
     return sum(parts) / 2
 
 
@@ -511,17 +303,8 @@ def _swing(rest, direction):
     return rotation.transpose(0, 2, 1)
 
 
-def _to_parents(cosines):
-    """Cosines along the body's axes to cosines along the parent limbs' axes."""
-    return _along_parents(cosines, inverse=False)
-
-
-def _from_parents(cosines):
-    """The way back from ``_to_parents``."""
-    return _along_parents(cosines, inverse=True)
-
-
-def _along_parents(cosines, inverse):
+def _along_parents(cosines, *, inverse=False):
+    """From cosines along the body's axes to those along the parent limbs' axes, or back."""
     frames, out = {}, np.empty_like(cosines)
     for i, (name, limb) in enumerate(LIMBS.items()):
         given = cosines[:, i : i + 1]

@@ -298,9 +298,7 @@ def _check_rows(estimator, X, *, reset, level):
 def _check_members(sequences, *, finite=True):
     """Arrays of one dtype, and the column names they share (None without names)."""
     if len(sequences) == 0:
-        raise ValueError(
-            f"Found 0 performances (n_samples=0), at least 1 is needed. {_ACCEPTED}."
-        )
+        raise ValueError(f"Found 0 performances (n_samples=0), at least 1 is needed. {_ACCEPTED}.")
     arrays = [_as_matrix(i, x) for i, x in enumerate(sequences)]
     names = _column_names(sequences[0])
     width = arrays[0].shape[1]

@@ -25,7 +25,11 @@ class _Synchronizer(TransformerMixin, BaseEstimator):
 
     _parameter_constraints: dict = {
         "n_frames": [Interval(Integral, 2, None, closed="left"), None],
-        "pattern": [StrOptions({"median"}), Interval(Integral, 0, None, closed="left"), "array-like"],
+        "pattern": [
+            StrOptions({"median"}),
+            Interval(Integral, 0, None, closed="left"),
+            "array-like",
+        ],
     }
 
     @_fit_context(prefer_skip_nested_validation=True)

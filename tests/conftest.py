@@ -8,7 +8,6 @@ os.environ.setdefault("SCIPY_ARRAY_API", "1")
 
 import numpy as np
 import pytest
-
 from sklearn_motionsync import ASpace, DirectionCosines
 from sklearn_motionsync.datasets import load_performances, make_bending
 

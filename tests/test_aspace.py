@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from sklearn_motionsync import ASpace
 
 
@@ -39,9 +38,7 @@ def test_residual_variance_is_the_reconstruction_error(postures):
     aspace = ASpace(2).fit(postures)
     back = aspace.inverse_transform(aspace.transform(postures))
     error = np.concatenate(back) - np.concatenate(postures)
-    np.testing.assert_allclose(
-        np.square(error).sum() / (len(error) - 1), aspace.residual_variance_
-    )
+    np.testing.assert_allclose(np.square(error).sum() / (len(error) - 1), aspace.residual_variance_)
 
 
 def test_inverse_is_exact_when_nothing_is_left_out(postures):

@@ -10,7 +10,6 @@ from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
 from sklearn.utils import estimator_checks
 from sklearn.utils.estimator_checks import parametrize_with_checks
-
 from sklearn_motionsync import (
     ActionModel,
     ASpace,
@@ -272,7 +271,9 @@ def test_pandas_output_keeps_the_labels(performances):
 
 
 def test_pandas_through_a_pipeline(performances):
-    pipe = make_pipeline(*(clone(e) for e in (*TRANSFORMERS[:2], DenseSynchronizer(), ActionModel())))
+    pipe = make_pipeline(
+        *(clone(e) for e in (*TRANSFORMERS[:2], DenseSynchronizer(), ActionModel()))
+    )
     plain = clone(pipe).fit(performances).score_samples(performances)
     with config_context(transform_output="pandas"):
         framed = clone(pipe).fit(performances).score_samples(performances)

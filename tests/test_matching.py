@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-
-from oracle import brute_force, path_cost, plain_loops
 from sklearn_motionsync import matching
 from sklearn_motionsync.matching import StepTable, Trellis, step_table
+
+from oracle import brute_force, path_cost, plain_loops
 
 
 def posture_costs(max_rate, subframes):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from sklearn_motionsync import DirectionCosines, Skeleton
 from sklearn_motionsync.datasets import make_bending
 
@@ -191,7 +190,15 @@ def test_landmarks_are_guessed_from_names(real_data):
 
 
 def test_landmarks_of_common_names():
-    left = ["LeftUpLeg", "LeftLeg", "LeftFoot", "LeftShoulder", "LeftArm", "LeftForeArm", "LeftHand"]
+    left = [
+        "LeftUpLeg",
+        "LeftLeg",
+        "LeftFoot",
+        "LeftShoulder",
+        "LeftArm",
+        "LeftForeArm",
+        "LeftHand",
+    ]
     joints = ["Hips", "Spine", "Neck", "Head", *left, *(n.replace("Left", "Right") for n in left)]
     skeleton = Skeleton(joints, [-1] + [0] * (len(joints) - 1))
     assert skeleton.landmarks["left_shoulder"] == "LeftArm"

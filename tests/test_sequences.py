@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-
 from sklearn_motionsync import to_frame, to_sequences
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from sklearn.utils import Bunch
 
-from ..posture import Skeleton
+from ..skeleton import Skeleton
 
 _NEEDED = ("positions", "offsets", "label", "actor", "take", "fps", "joints", "parents")
 
@@ -59,11 +59,7 @@ def load_performances(path):
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"There is no archive at {path}; give the path of a .npz file.")
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            fields = {name: archive[name] for name in _NEEDED if name in archive.files}
-    except (zipfile.BadZipFile, ValueError, EOFError, OSError, AttributeError) as error:
-        raise ValueError(f"{path} cannot be read as a NumPy .npz archive: {error}.") from error
+    fields = _read_fields(path)
     _check_fields(path, fields)
     positions, offsets = fields["positions"], fields["offsets"]
     joints, parents = fields["joints"].tolist(), fields["parents"].tolist()
@@ -73,7 +69,7 @@ def load_performances(path):
         skeleton = None
     frames = positions.reshape(len(positions), -1)
     return Bunch(
-        data=[frames[a:b] for a, b in zip(offsets[:-1], offsets[1:], strict=True)],
+        data=np.split(frames, offsets[1:-1]),
         target=fields["label"].astype(str),
         actor=fields["actor"].astype(str),
         take=fields["take"].astype(str),
@@ -81,6 +77,16 @@ def load_performances(path):
         skeleton=skeleton,
         frame_rate=np.asarray(fields["fps"], dtype=np.float64),
     )
+
+
+def _read_fields(path):
+    if not zipfile.is_zipfile(path):
+        raise ValueError(f"{path} cannot be read as a NumPy .npz archive: it is no zip file.")
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            return {name: archive[name] for name in _NEEDED if name in archive.files}
+    except (zipfile.BadZipFile, ValueError, EOFError, OSError) as error:
+        raise ValueError(f"{path} cannot be read as a NumPy .npz archive: {error}.") from error
 
 
 def _check_fields(path, fields):

@@ -7,7 +7,7 @@ from scipy.interpolate import PchipInterpolator
 from sklearn.utils import Bunch, check_random_state
 from sklearn.utils._param_validation import Interval, validate_params
 
-from ..posture import Skeleton
+from ..skeleton import Skeleton
 
 # When the five moments come, in shares of the action.
 _KEYFRAMES = {

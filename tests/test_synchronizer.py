@@ -1,0 +1,281 @@
+"""Synchronisers: the clock, the pattern, the warp, and known truth."""
+
+import numpy as np
+import pytest
+from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
+
+from oracle import plain_loops
+
+BOTH = [LinearSynchronizer, DenseSynchronizer]
+
+
+def curve(phase):
+    """A closed curve in space that never passes a point twice at the same speed."""
+    return np.column_stack([np.cos(3 * phase), np.sin(4 * phase), phase**2])
+
+
+def warped(n_frames, power):
+    return curve(np.linspace(0, 1, n_frames) ** power)
+
+
+@pytest.fixture(scope="module")
+def warps():
+    return [warped(n, power) for n, power in ((60, 1.0), (80, 1.2), (50, 0.85), (70, 1.1))]
+
+
+def keyframe_errors(sync, X, keyframes):
+    """Frames between where a key-frame of the pattern lands and where it is."""
+    n, frames = sync.pattern_index_, np.arange(sync.n_frames_)
+    on_clock = [k * (sync.n_frames_ - 1) / (len(x) - 1) for k, x in zip(keyframes, X, strict=True)]
+    times = sync.match(X).times
+    return np.array(
+        [
+            np.abs(np.interp(on_clock[n], frames, t) - k)
+            for m, (t, k) in enumerate(zip(times, on_clock, strict=True))
+            if m != n
+        ]
+    )
+
+
+# -- the clock --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_default_clock_is_the_median_length(estimator, warps):
+    sync = estimator().fit(warps)
+    assert sync.n_frames_ == 65
+    assert sync.transform(warps).shape == (4, 65, 3)
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_given_clock(estimator, warps):
+    assert estimator(n_frames=30).fit_transform(warps).shape == (4, 30, 3)
+    assert estimator(n_frames=2).fit_transform(warps).shape == (4, 2, 3)
+
+
+def test_linear_normalisation_is_linear_interpolation(warps):
+    out = LinearSynchronizer(n_frames=33).fit_transform(warps)
+    for x, y in zip(warps, out, strict=True):
+        old, new = np.linspace(0, 1, len(x)), np.linspace(0, 1, 33)
+        expected = np.column_stack([np.interp(new, old, column) for column in x.T])
+        np.testing.assert_allclose(y, expected, atol=1e-12)
+
+
+def test_frames_that_need_no_interpolation_stay_as_they_are(warps):
+    out = LinearSynchronizer(n_frames=60).fit_transform(warps[:1])
+    np.testing.assert_array_equal(out[0], warps[0])
+
+
+# -- the pattern ------------------------------------------------------------------------
+
+
+def test_median_is_the_smallest_sum_of_distances(warps):
+    P, smoothness, reach = 40, 0.1, 10
+    sync = DenseSynchronizer(P, smoothness=smoothness, max_offset=0.25).fit(warps)
+    X = LinearSynchronizer(P).fit_transform(warps)
+    centred = X - X.mean(axis=(0, 1))
+    mu = smoothness * np.square(centred).sum(axis=2).mean()
+    np.testing.assert_allclose(sync.mu_, mu)
+    costs = {s: (1.0, 2.0, abs(s - 1.0)) for s in (0, 1, 2)}
+    D = [[plain_loops(x, y, costs, mu, 1, reach) for y in centred] for x in centred]
+    np.testing.assert_allclose(sync.global_distances_, np.sum(D, axis=1), rtol=1e-9)
+    assert sync.pattern_index_ == np.argmin(np.sum(D, axis=1))
+    np.testing.assert_array_equal(sync.pattern_, X[sync.pattern_index_])
+    match = sync.match(warps)
+    np.testing.assert_allclose(match.distances, D[sync.pattern_index_], rtol=1e-9, atol=1e-9)
+
+
+def test_linear_median_is_the_smallest_sum_of_distances(warps):
+    sync = LinearSynchronizer(40).fit(warps)
+    X = sync.transform(warps)
+    D = np.square(X[:, None] - X[None]).sum(axis=(2, 3))
+    np.testing.assert_allclose(sync.global_distances_, D.sum(axis=1))
+    np.testing.assert_allclose(sync.match(warps).distances, D[sync.pattern_index_], atol=1e-9)
+    assert sync.pattern_index_ == np.argmin(D.sum(axis=1))
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_the_pattern_keeps_its_own_pace(estimator, warps):
+    sync = estimator(n_frames=40).fit(warps)
+    offsets, times, distances = sync.match([warps[sync.pattern_index_]])
+    assert not offsets.any()
+    np.testing.assert_array_equal(times[0], np.arange(40))
+    assert distances[0] < 1e-9
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_pattern_by_index_or_array(estimator, warps):
+    by_index = estimator(n_frames=40, pattern=2).fit(warps)
+    assert by_index.pattern_index_ == 2
+    assert np.isnan(by_index.global_distances_).all()
+    by_array = estimator(pattern=by_index.pattern_).fit(warps)
+    assert by_array.n_frames_ == 40
+    assert by_array.pattern_index_ is None
+    np.testing.assert_array_equal(by_array.transform(warps), by_index.transform(warps))
+    by_list = estimator(pattern=by_index.pattern_.tolist(), n_frames=20).fit(warps)
+    assert by_list.pattern_.shape == (20, 3)
+
+
+def test_pattern_of_univariate_rows():
+    rows = np.stack([np.sin(np.linspace(0, 3, 30) ** p) for p in (1, 1.1, 0.9)])
+    sync = DenseSynchronizer(pattern=rows[1]).fit(rows)
+    np.testing.assert_array_equal(sync.pattern_[:, 0], rows[1])
+    np.testing.assert_array_equal(sync.transform(rows)[1], rows[1])
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+def test_one_performance_is_its_own_median(estimator, warps):
+    sync = estimator().fit(warps[:1])
+    assert sync.pattern_index_ == 0
+    np.testing.assert_allclose(sync.global_distances_, [0], atol=1e-9)
+    np.testing.assert_array_equal(sync.transform(warps[:1])[0], warps[0])
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_identical_performances(dtype):
+    """Rounding must not decide between performances that are the same."""
+    x = (1e3 * np.pi + np.random.default_rng(0).standard_normal((50, 16))).astype(dtype)
+    sync = DenseSynchronizer().fit([x] * 5)
+    assert sync.pattern_index_ == 0
+    np.testing.assert_array_equal(sync.transform([x] * 5), [x] * 5)
+
+
+def test_constant_performances_keep_their_pace():
+    X = [np.ones((n, 2)) for n in (10, 15, 20)]
+    sync = DenseSynchronizer().fit(X)
+    assert not sync.match(X).offsets.any()
+    assert sync.mu_ == 0
+    np.testing.assert_array_equal(sync.transform(X), np.ones((3, 15, 2)))
+
+
+# -- the warp ---------------------------------------------------------------------------
+
+
+def test_transform_samples_at_the_matched_times(warps):
+    sync = DenseSynchronizer(40, subframes=3).fit(warps)
+    times = sync.match(warps).times
+    for x, y, tau in zip(warps, sync.transform(warps), times, strict=True):
+        old = np.linspace(0, 39, len(x))
+        expected = np.column_stack([np.interp(tau, old, column) for column in x.T])
+        np.testing.assert_allclose(y, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("subframes", [1, 4])
+@pytest.mark.parametrize("max_offset", [0, 0.1, 1])
+def test_warps_are_pinned_monotone_and_bounded(subframes, max_offset, warps):
+    sync = DenseSynchronizer(40, max_offset=max_offset, subframes=subframes, max_rate=3).fit(warps)
+    offsets, times, _ = sync.match(warps)
+    np.testing.assert_array_equal(times, np.arange(40) + offsets)
+    assert (times[:, 0] == 0).all()
+    assert (times[:, -1] == 39).all()
+    rates = np.diff(times)
+    assert rates.min() >= 0
+    assert rates.max() <= 3
+    assert np.abs(offsets).max() <= max_offset * 40
+
+
+def test_no_offset_is_linear_normalisation(warps):
+    dense = DenseSynchronizer(40, max_offset=0).fit(warps)
+    linear = LinearSynchronizer(40).fit(warps)
+    assert dense.pattern_index_ == linear.pattern_index_
+    np.testing.assert_array_equal(dense.transform(warps), linear.transform(warps))
+
+
+@pytest.mark.parametrize(("subframes", "error"), [(1, 0.6), (4, 0.2)])
+def test_a_known_warp_is_found(subframes, error):
+    """x_m(t) = curve(t^1.2) meets x_n(t) = curve(t) at tau = t^(1 / 1.2)."""
+    P = 101
+    t = np.linspace(0, 1, P)
+    sync = DenseSynchronizer(P, pattern=0, smoothness=1e-4, subframes=subframes)
+    found = sync.fit([curve(t), curve(t**1.2)]).match([curve(t**1.2)]).times[0]
+    assert np.abs(found - 100 * t ** (1 / 1.2)).mean() < error
+
+
+def test_keyframes_of_bending_are_hit_five_times_more_closely(bending, bending_aspace):
+    linear, dense = (
+        keyframe_errors(s.fit(bending_aspace), bending_aspace, bending.keyframes).mean()
+        for s in (LinearSynchronizer(100), DenseSynchronizer(100))
+    )
+    assert linear > 4
+    assert 5 * dense < linear
+
+
+def test_new_performances_are_put_on_the_learnt_clock(bending, bending_aspace):
+    sync = DenseSynchronizer(100).fit(bending_aspace[:30])
+    together = sync.match(bending_aspace[30:])
+    one = sync.match(bending_aspace[33:34])
+    np.testing.assert_array_equal(one.offsets[0], together.offsets[3])
+    times = np.interp(
+        bending.keyframes[33] * 99 / (len(bending.data[33]) - 1), one.times[0], np.arange(100)
+    )
+    pattern = bending.keyframes[sync.pattern_index_]
+    pattern = pattern * 99 / (len(bending.data[sync.pattern_index_]) - 1)
+    assert np.abs(times - pattern).mean() < 2
+
+
+def test_smoothness_is_a_pure_number(warps):
+    """Units and offsets of the features change nothing."""
+    a = DenseSynchronizer(40).fit(warps)
+    b = DenseSynchronizer(40).fit([1000 * x + 5e4 for x in warps])
+    np.testing.assert_allclose(b.mu_, 1e6 * a.mu_)
+    assert a.pattern_index_ == b.pattern_index_
+    X, Y = warps, [1000 * x + 5e4 for x in warps]
+    np.testing.assert_array_equal(a.match(X).offsets, b.match(Y).offsets)
+
+
+def test_more_smoothness_is_smoother(warps):
+    changes = [
+        np.abs(np.diff(DenseSynchronizer(40, smoothness=s).fit(warps).match(warps).offsets)).sum()
+        for s in (0, 0.1, 1, 1000)
+    ]
+    assert changes == sorted(changes, reverse=True)
+    assert changes[-1] == 0
+
+
+# -- bad input --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("estimator", BOTH)
+@pytest.mark.parametrize(
+    ("pattern", "message"),
+    [
+        (4, "pattern=4 is out of range: there are 4 performances, the last has index 3"),
+        (np.zeros((10, 2)), r"must have shape \(n_frames, 3\).*got \(10, 2\)"),
+        (np.zeros((1, 3)), "at least 2"),
+        (np.full((10, 3), np.nan), "NaN"),
+        ([["a", "b", "c"]] * 3, "could not convert"),
+        ("mean", "'pattern' parameter"),
+        (-1, "'pattern' parameter"),
+        (1.5, "'pattern' parameter"),
+    ],
+)
+def test_impossible_patterns(estimator, pattern, message, warps):
+    with pytest.raises(ValueError, match=message):
+        estimator(pattern=pattern).fit(warps)
+
+
+@pytest.mark.parametrize(
+    "params",
+    [
+        {"n_frames": 1},
+        {"n_frames": 10.5},
+        {"cost": "dtw"},
+        {"smoothness": -1},
+        {"smoothness": np.nan},
+        {"max_offset": 1.5},
+        {"max_offset": -0.1},
+        {"max_rate": 0.5},
+        {"subframes": 0},
+    ],
+    ids=str,
+)
+def test_nonsense_parameters(params, warps):
+    name = next(iter(params))
+    with pytest.raises(ValueError, match=f"'{name}' parameter"):
+        DenseSynchronizer(**params).fit(warps)
+
+
+@pytest.mark.parametrize("max_rate", [np.inf, np.nan])
+def test_a_rate_must_be_a_number(max_rate, warps):
+    with pytest.raises(ValueError, match="max_rate"):
+        DenseSynchronizer(max_rate=max_rate).fit(warps)
