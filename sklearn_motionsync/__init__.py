@@ -11,9 +11,10 @@
 [1, 1, 1]
 """
 
-from . import datasets
+from . import datasets, metrics
 from .action_model import ActionModel
 from .aspace import ASpace
+from .keyframes import KeyframeSynchronizer
 from .posture import DirectionCosines
 from .sequences import to_frame, to_sequences
 from .skeleton import Skeleton
@@ -26,9 +27,11 @@ __all__ = [
     "ActionModel",
     "DenseSynchronizer",
     "DirectionCosines",
+    "KeyframeSynchronizer",
     "LinearSynchronizer",
     "Skeleton",
     "datasets",
+    "metrics",
     "to_frame",
     "to_sequences",
 ]

@@ -62,11 +62,20 @@ class StepTable(NamedTuple):
 def step_table(cost="posture", max_rate=2, subframes=1):
     """Build the step table of a cost.
 
+    ==========  =====  ===========  =============
+    cost        b_s    g_s          phi
+    ==========  =====  ===========  =============
+    posture     1      2            abs(rho - 1)
+    velocity    1      2            (rho - 1)^2
+    elastic     rho    2 sqrt(rho)  (rho - 1)^2
+    ==========  =====  ===========  =============
+
+    The two penalties agree on the rates 0, 1 and 2 of Eq. 16.
+
     Parameters
     ----------
-    cost : {"posture"}, default="posture"
-        ``"posture"`` is the squared distance between aSpace points with
-        ``phi(rho) = |rho - 1|``; with the other defaults exactly Eqs. 12 and 16.
+    cost : {"posture", "velocity", "elastic"}, default="posture"
+        ``"posture"`` with the other defaults is exactly Eqs. 12 and 16.
     max_rate : float, default=2
         Largest local rate; 2 is the limit that follows from Eq. 13.
     subframes : int, default=1
@@ -76,16 +85,22 @@ def step_table(cost="posture", max_rate=2, subframes=1):
     -------
     StepTable
     """
-    if cost != "posture":
-        raise ValueError(f"cost={cost!r} is unknown; the costs are ['posture'].")
     steps = np.arange(int(np.floor(max_rate * subframes)) + 1)
     steps = steps[np.argsort(np.abs(steps - subframes), kind="stable")]
+    rates = steps / subframes
     ones = np.ones(len(steps))
-    return StepTable(steps, ones, 2 * ones, np.abs(steps / subframes - 1), subframes)
+    if cost == "posture":
+        return StepTable(steps, ones, 2 * ones, np.abs(rates - 1), subframes)
+    penalty = np.square(rates - 1)
+    if cost == "velocity":
+        return StepTable(steps, ones, 2 * ones, penalty, subframes)
+    if cost == "elastic":
+        return StepTable(steps, rates, 2 * np.sqrt(rates), penalty, subframes)
+    raise ValueError(f"cost={cost!r} is unknown; use 'posture', 'velocity' or 'elastic'.")
 
 
 class Match(NamedTuple):
-    """Optimal paths of a set of sequences to one base.
+    """Warps of a set of sequences to one base.
 
     Attributes
     ----------
@@ -94,7 +109,7 @@ class Match(NamedTuple):
     times : ndarray, shape (n_sequences, P)
         ``tau(p) = p + Delta(p)``, non-decreasing, ``tau(0) = 0``, ``tau(P-1) = P-1``.
     distances : ndarray, shape (n_sequences,)
-        The synchronisation distance ``D_{n,m}`` of Eq. 12.
+        The synchronisation distance ``D_{n,m}`` of Eq. 12, of the path straight to the base.
     """
 
     offsets: np.ndarray

@@ -15,6 +15,7 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
+    KeyframeSynchronizer,
     LinearSynchronizer,
     Skeleton,
     to_frame,
@@ -24,7 +25,8 @@ from sklearn_motionsync import (
 N_JOINTS = 15
 WIDTH = 3 * N_JOINTS
 
-ROW_ESTIMATORS = [ASpace(), LinearSynchronizer(), DenseSynchronizer(), ActionModel()]
+SYNCHRONIZERS = [LinearSynchronizer(), KeyframeSynchronizer(), DenseSynchronizer()]
+ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, ActionModel()]
 ESTIMATORS = [DirectionCosines(Skeleton.paper()), *ROW_ESTIMATORS]
 TRANSFORMERS = [e for e in ESTIMATORS if hasattr(e, "transform")]
 
@@ -381,9 +383,7 @@ def test_unfitted(estimator, performances):
         outputs(clone(estimator), performances)
 
 
-@pytest.mark.parametrize(
-    "estimator", [LinearSynchronizer(), DenseSynchronizer(), ActionModel()], ids=by_name
-)
+@pytest.mark.parametrize("estimator", [*SYNCHRONIZERS, ActionModel()], ids=by_name)
 def test_sequence_level_estimators_keep_to_the_kind_of_fit(estimator, performances):
     fitted = clone(estimator).fit(performances)
     with pytest.raises(ValueError, match=r"wrap one sequence as \[X\]"):
@@ -395,7 +395,7 @@ def test_sequence_level_estimators_keep_to_the_kind_of_fit(estimator, performanc
         outputs(fitted, performances)
 
 
-@pytest.mark.parametrize("estimator", [LinearSynchronizer(), DenseSynchronizer()], ids=by_name)
+@pytest.mark.parametrize("estimator", SYNCHRONIZERS, ids=by_name)
 def test_rows_are_univariate_sequences(estimator, performances):
     rows = np.stack([x[:, 0] for x in performances])
     columns = [x[:, :1] for x in performances]

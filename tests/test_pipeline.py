@@ -70,13 +70,13 @@ def test_grid_search(people):
     assert search.predict(people.data[:3]).shape == (3,)
 
 
-def test_dense_beats_linear_on_actors_not_seen(people):
+def test_dense_beats_linear_on_actors_not_seen(bends):
     """Synchronised performances of new people are more probable under the model."""
 
     def score(synchronizer):
-        pipe = make_pipe(people.skeleton, synchronizer)
+        pipe = make_pipe(bends.skeleton, synchronizer)
         cv = GroupKFold(4)
-        return cross_val_score(pipe, people.data, groups=people.actor, cv=cv).mean()
+        return cross_val_score(pipe, bends.data, groups=bends.actor, cv=cv).mean()
 
     assert score(DenseSynchronizer(60)) > score(LinearSynchronizer(60))
 

@@ -1,0 +1,216 @@
+"""The common clock: what every synchronizer does alike (Eqs. 6, 7, 18)."""
+
+from numbers import Integral
+
+import numpy as np
+from sklearn.base import BaseEstimator, TransformerMixin, _fit_context
+from sklearn.utils._param_validation import Interval, StrOptions
+from sklearn.utils.validation import check_is_fitted
+
+from .sequences import check_performances, restore
+
+
+class Synchronizer(TransformerMixin, BaseEstimator):
+    """What all synchronizers share: clock, pattern, and warping along matched times.
+
+    A subclass compares performances (``_global_distances``) and matches them to the pattern
+    (``_match``); it may learn something before (``_prepare``) and after (``_learn``) the
+    pattern is chosen. ``extra`` is what it takes besides performances.
+    """
+
+    _parameter_constraints: dict = {
+        "n_frames": [Interval(Integral, 2, None, closed="left"), None],
+        "pattern": [
+            StrOptions({"median"}),
+            Interval(Integral, 0, None, closed="left"),
+            "array-like",
+        ],
+    }
+
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X, y=None):
+        """Choose the pattern, the performance whose clock all others will follow.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+        y : ignored
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        ValueError
+            If the input breaks the contract, or the pattern does not exist or fit.
+        """
+        return self._fit(check_performances(self, X, reset=True, level="sequence").arrays)
+
+    def transform(self, X):
+        """Warp performances onto the clock of the pattern (Eq. 18).
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P, n_features)
+            ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
+            ``set_output(transform="pandas")``.
+        """
+        check_is_fitted(self)
+        return self._warp(check_performances(self, X, reset=False, level="sequence"))
+
+    def match(self, X):
+        """Match performances to the pattern.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+
+        Returns
+        -------
+        Match
+            ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
+            the pattern, both on performances linearly normalised to its length (Eq. 7), and
+            ``distances``, shape (n_sequences,). tau is non-decreasing, ``tau(0) = 0``,
+            ``tau(P-1) = P-1``.
+        """
+        check_is_fitted(self)
+        return self._match(check_performances(self, X, reset=False, level="sequence").arrays)
+
+    def _fit(self, arrays, **extra):
+        given = self._given_pattern(arrays)
+        self.n_frames_ = self._choose_n_frames(arrays, given)
+        on_clock = self._normalise(arrays, np.arange(self.n_frames_))
+        self._prepare(arrays, on_clock, **extra)
+        median = isinstance(self.pattern, str)
+        if median or self._compares_all:
+            self.global_distances_ = self._global_distances(arrays, on_clock)
+        else:
+            self.global_distances_ = np.full(len(arrays), np.nan)
+        self.pattern_index_ = None if median or given is not None else int(self.pattern)
+        if median:
+            rounding = self._rounding(on_clock)
+            self.pattern_index_ = _first_smallest(self.global_distances_, rounding)
+        source = arrays[self.pattern_index_] if given is None else given
+        self.pattern_ = self._normalise([source], np.arange(self.n_frames_))[0]
+        self._learn(arrays, on_clock, source)
+        return self
+
+    def _warp(self, performances, **extra):
+        times = self._match(performances.arrays, **extra).times
+        out = self._sample(performances.arrays, times)
+        if performances.kind == "rows":
+            return out[:, :, 0]
+        return restore(self, performances, out, frames=range(self.n_frames_))
+
+    # Whether the global distances are needed even if the pattern is given.
+    _compares_all = False
+
+    def _prepare(self, arrays, on_clock):
+        pass
+
+    def _learn(self, arrays, on_clock, source):
+        pass
+
+    def get_feature_names_out(self, input_features=None):
+        """Names of the outputs: the features of a frame; for 2-D input, one name a frame.
+
+        Parameters
+        ----------
+        input_features : array-like of str, default=None
+            Names of the features, by default those seen in ``fit``, or x0, x1, ...
+
+        Returns
+        -------
+        ndarray of str
+        """
+        check_is_fitted(self)
+        names = getattr(self, "feature_names_in_", None)
+        if input_features is not None:
+            if len(input_features) != self.n_features_in_:
+                raise ValueError(
+                    "input_features should have length equal to number of features "
+                    f"({self.n_features_in_}), got {len(input_features)}."
+                )
+            if names is not None and not np.array_equal(names, input_features):
+                raise ValueError("input_features is not equal to feature_names_in_.")
+            names = input_features
+        if self._fitted_on_rows:
+            names = [f"{type(self).__name__.lower()}{p}" for p in range(self.n_frames_)]
+        elif names is None:
+            names = [f"x{i}" for i in range(self.n_features_in_)]
+        return np.asarray(names, dtype=object)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.three_d_array = True
+        tags.transformer_tags.preserves_dtype = ["float64", "float32"]
+        return tags
+
+    def _given_pattern(self, arrays):
+        """The pattern as an array, if that is what was given; indices are checked."""
+        pattern = self.pattern
+        if isinstance(pattern, str):
+            return None
+        if isinstance(pattern, Integral):
+            if pattern >= len(arrays):
+                raise ValueError(
+                    f"pattern={pattern} is out of range: there are {len(arrays)} performances, the "
+                    f"last has index {len(arrays) - 1}."
+                )
+            return None
+        pattern = np.asarray(pattern, dtype=arrays[0].dtype)
+        pattern = pattern[:, np.newaxis] if pattern.ndim == 1 else pattern
+        width = arrays[0].shape[1]
+        if pattern.ndim != 2 or len(pattern) < 2 or pattern.shape[1] != width:
+            raise ValueError(
+                f"A pattern given as an array must have shape (n_frames, {width}) with at least 2 "
+                f"frames, like the performances; got {pattern.shape}."
+            )
+        if not np.isfinite(pattern).all():
+            raise ValueError("The pattern has NaN or infinite values; interpolate its gaps.")
+        return pattern
+
+    def _choose_n_frames(self, arrays, given):
+        if self.n_frames is not None:
+            return int(self.n_frames)
+        if given is not None:
+            return len(given)
+        return int(np.median([len(a) for a in arrays]))
+
+    def _normalise(self, arrays, times):
+        """Linear normalisation (Eq. 7): every performance at the same times of its course."""
+        return self._sample(arrays, np.broadcast_to(times, (len(arrays), len(times))))
+
+    def _sample(self, arrays, times):
+        """Performances at times in pattern frames, linear between their own frames (Eq. 18)."""
+        out = np.empty((len(arrays), times.shape[1], arrays[0].shape[1]), dtype=arrays[0].dtype)
+        for i, x in enumerate(arrays):
+            # In this order a whole number of frames stays whole.
+            at = times[i] * (len(x) - 1) / (self.n_frames_ - 1)
+            left = np.minimum(at.astype(np.intp), len(x) - 2)
+            weight = (at - left).astype(x.dtype)[:, np.newaxis]
+            out[i] = x[left] * (1 - weight) + x[left + 1] * weight
+        return out
+
+    def _rounding(self, on_clock):
+        """How far rounding can move a global distance."""
+        energy = np.square(on_clock - on_clock.mean(axis=(0, 1))).sum(dtype=np.float64)
+        return 8 * np.finfo(on_clock.dtype).eps * energy
+
+
+def _first_smallest(values, rounding):
+    """The first index whose value is the smallest but for rounding."""
+    return int(np.flatnonzero(values <= values.min() + rounding)[0])
+
+
+def distances_to_all(on_clock):
+    """``sum_m |x_n - x_m|^2`` for every n: N |x_n - mean|^2 and a constant, without pairs."""
+    deviations = (on_clock - on_clock.mean(axis=0)).reshape(len(on_clock), -1)
+    squares = np.einsum("ij,ij->i", deviations, deviations, dtype=np.float64)
+    return len(on_clock) * squares + squares.sum()

@@ -1,0 +1,54 @@
+"""What the costs compare: the posture, how it moves, or its elastic square root."""
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+__all__ = ["cost_features", "smooth"]
+
+# Standard deviation of the Gaussian under which velocities are taken, as a share of the
+# clip: benchmarks/accuracy.py, flat from 0.02 to 0.05 on real people.
+SMOOTHING = 0.03
+
+
+def cost_features(on_clock, cost, subframes=1, smoothing=SMOOTHING):
+    """Features of normalised sequences that a cost compares.
+
+    Parameters
+    ----------
+    on_clock : ndarray, shape (n_sequences, Q, n_features)
+        Linearly normalised sequences, ``subframes`` positions a frame.
+    cost : {"posture", "velocity", "elastic"}
+        ``"posture"``: the points themselves. ``"velocity"``: their derivative by the frame,
+        smoothed. ``"elastic"``: the velocity divided by the square root of its length, whose
+        squared distance is the Fisher-Rao distance.
+    subframes : int, default=1
+    smoothing : float, default=0.03
+        Width of the smoothing, as a share of the clip.
+
+    Returns
+    -------
+    ndarray, shape (n_sequences, Q, n_features)
+    """
+    if cost == "posture":
+        return on_clock
+    velocity = smooth(on_clock, smoothing * (on_clock.shape[1] - 1), order=1) * subframes
+    if cost == "velocity":
+        return velocity
+    speed = np.linalg.norm(velocity, axis=2, keepdims=True)
+    return velocity / np.sqrt(np.maximum(speed, np.finfo(speed.dtype).tiny))
+
+
+def smooth(on_clock, sigma, order=0):
+    """Gaussian filter along time, or its derivative by the sample.
+
+    Beyond the ends a sequence is continued by its own point reflection, so that a
+    movement cut off in full swing keeps its velocity at the cut.
+    """
+    reach = min(int(np.ceil(4 * sigma)) + 1, on_clock.shape[1] - 1)
+    continued = np.pad(
+        on_clock, ((0, 0), (reach, reach), (0, 0)), mode="reflect", reflect_type="odd"
+    )
+    # Below a third of a sample the derivative of a Gaussian is no derivative any more.
+    sigma = max(sigma, 1 / 3)
+    filtered = gaussian_filter1d(continued, sigma, axis=1, order=order, mode="nearest")
+    return filtered[:, reach:-reach]
