@@ -1,79 +1,319 @@
-"""How closely key moments are hit, by smoothness: synthetic bending and real clips.
+"""How accurate: known warps and real people, against other packages.
 
-    python benchmarks/accuracy.py ARCHIVE
+    pip install . dtaidistance tslearn gdtw fdasrsf aeon
+    python benchmarks/accuracy.py DATA_FOLDER
 
-ARCHIVE is hdm05_positions.npz; without it only the synthetic part is run.
+DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect/utkinect_positions.npz; without it
+only known warps are run. Every peer is fed postures and velocities (smoothed as ours) and is
+reported at the best of its settings, for each number of each cell by itself; ours have one
+setting for all. Peers that are
+not installed are left out. Prints Markdown.
 """
 
+import importlib.metadata
 import sys
+import time
+import warnings
+from pathlib import Path
 
 import numpy as np
+import peers
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
+from sklearn.model_selection import GroupKFold
+from sklearn_motionsync import (
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    __version__,
+)
 from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.features import SMOOTHING, cost_features, smooth
+from sklearn_motionsync.metrics import timing_error
 
 P = 100
-METHODS = {
-    "linear": lambda **kw: LinearSynchronizer(P, **kw),
-    **{
-        f"dense, smoothness {s}": lambda s=s, **kw: DenseSynchronizer(P, smoothness=s, **kw)
-        for s in (0.001, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
-    },
+PAPER = {
+    "cost": "posture",
+    "max_rate": 2,
+    "subframes": 1,
+    "consensus": 0,
+    "warp_smoothing": 0,
+    "refine": False,
 }
-# Action, joint, axis, and which extreme of it: the same moment in every clip.
+OURS = {
+    "linear normalisation": lambda **kw: LinearSynchronizer(P, **kw),
+    "the paper's method": lambda **kw: DenseSynchronizer(P, **PAPER, **kw),
+    "`DenseSynchronizer()`": lambda **kw: DenseSynchronizer(P, **kw),
+    "`consensus=0`": lambda **kw: DenseSynchronizer(P, consensus=0, **kw),
+    "`velocity_smoothing=0.1`": lambda **kw: DenseSynchronizer(P, velocity_smoothing=0.1, **kw),
+    '`cost="elastic"`': lambda **kw: DenseSynchronizer(P, cost="elastic", **kw),
+    "`refine=True` (single source)": lambda **kw: DenseSynchronizer(P, refine=True, **kw),
+    "`warp_smoothing=0`": lambda **kw: DenseSynchronizer(P, warp_smoothing=0, **kw),
+    "`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw),
+}
+
+# -- known warps ------------------------------------------------------------------------
+
+CELLS = [
+    (lowest, highest, noise)
+    for lowest, highest in ((0.5, 2.0), (0.75, 1.35))
+    for noise in (0.005, 0.05, 0.2)
+]
+
+
+def random_warp(rng, lowest, highest):
+    """tau on [0, 1] with rates between the two."""
+    t = np.linspace(0, 1, 2001)
+    while True:
+        wave = sum(
+            rng.standard_normal() / k * np.sin(np.pi * k * t + rng.uniform(0, 2 * np.pi))
+            for k in (1, 2, 3)
+        )
+        wave = np.tanh(1.5 * wave)
+        rate = np.where(wave > 0, highest, 1 / lowest) ** wave
+        tau = np.concatenate([[0], np.cumsum((rate[1:] + rate[:-1]) / 2)])
+        tau /= tau[-1]
+        rates = np.diff(tau) * (len(t) - 1)
+        if rates.min() >= lowest and rates.max() <= highest:
+            return t, tau
+
+
+def known_warps(seed, lowest, highest, noise, n=8, n_features=16, gain=0.05):
+    """Warped copies of a random movement, and the time of each that shows what copy 0 shows."""
+    rng = np.random.default_rng(seed)
+    waves = np.arange(1, 7)[:, np.newaxis]
+    size = rng.standard_normal((n_features, 6)) / np.arange(1, 7) ** 0.7
+    shift = rng.uniform(0, 2 * np.pi, (n_features, 6, 1))
+
+    def movement(phase):
+        return np.einsum("fk,fkt->tf", size, np.sin(np.pi * waves * phase + shift))
+
+    frames = np.linspace(0, 1, P)
+    spread = movement(np.linspace(0, 1, 400)).std()
+    X, truth = [], []
+    for m in range(n):
+        t, tau = random_warp(rng, lowest, highest) if m else (np.linspace(0, 1, 2001),) * 2
+        x = movement(np.interp(frames, tau, t))
+        gains = 1 + gain * rng.standard_normal(n_features) if m else 1
+        X.append(x * gains + noise * spread * rng.standard_normal(x.shape))
+        truth.append(np.interp(frames, t, tau) * (P - 1))
+    return X, np.array(truth)
+
+
+def known_table():
+    """Mean error in frames of 100, copy 0 against the others, four random sets a cell."""
+    sets = {cell: [known_warps(seed, *cell) for seed in range(4)] for cell in CELLS}
+
+    def row(times_of):
+        return [
+            np.mean([timing_error(times_of(X)[1:], truth[1:]) for X, truth in sets[cell]])
+            for cell in CELLS
+        ]
+
+    rows = {name: row(lambda X, m=m: ours_to(m, X, 0)) for name, m in OURS.items()}
+    rows |= best_of_peers(lambda align, kind: row(lambda X: peer_to(align, kind, X, 0)))
+    header = [f"{low}-{high}, noise {noise:.1%}" for low, high, noise in CELLS]
+    print_table("known warps: rates, noise", header, rows, show_mean)
+
+
+# -- real people ------------------------------------------------------------------------
+
 EVENTS = {
-    "pelvis": ("depositFloorR", "root", 1, np.argmin),
-    "hand": ("depositFloorR", "rhand", 1, np.argmin),
-    "ankle": ("elbowToKnee1RepsLelbowStart", "rtibia", 1, np.argmax),
+    # archive, action, joint, extreme of its height: the same moment in every clip
+    "bend, lowest pelvis": ("hdm05", "depositFloorR", "root", np.argmin),
+    "bend, lowest hand": ("hdm05", "depositFloorR", "rhand", np.argmin),
+    "elbow to knee, highest ankle": ("hdm05", "elbowToKnee1RepsLelbowStart", "rtibia", np.argmax),
+    "grab high, highest hand": ("hdm05", "grabHighR", "rhand", np.argmax),
+    "hop, highest ankle": ("hdm05", "hopBothLegs1hops", "rtibia", np.argmax),
+    "sneak, highest ankle": ("hdm05", "sneak2StepsLStart", "rtibia", np.argmax),
+    "Kinect pick up, lowest hand": ("utkinect", "pickUp", "HandRight", np.argmin),
 }
+ALL_PAIRS = list(EVENTS)[:3]
 
 
-def errors_to(n, times, moments):
-    """Frames between where the moments of n land in every other performance, and where they are."""
-    landed = np.array([np.interp(moments[n], np.arange(P), t) for t in times])
-    return np.abs(np.delete(landed - moments, n, axis=0))
+class Clips:
+    """The clips of an event: points of their aSpace, when it happens, who performs."""
+
+    _archives: dict = {}
+
+    def __init__(self, folder, archive, action, joint, extreme):
+        if archive not in self._archives:
+            path = folder / archive / f"{archive}_positions.npz"
+            self._archives[archive] = load_performances(path)
+        bunch = self._archives[archive]
+        chosen = np.flatnonzero(bunch.target == action)
+        clips = [bunch.data[i] for i in chosen]
+        column = 3 * bunch.joints.index(joint) + 1
+        heights = [x[:, column].astype(float) for x in clips]
+        self.moments = np.array(
+            [extreme(gaussian_filter1d(h, 0.015 * len(h))) / (len(h) - 1) for h in heights]
+        ) * (P - 1)
+        self.actors = bunch.actor[chosen]
+        postures = DirectionCosines(bunch.skeleton).fit_transform(clips)
+        self.X = [x.astype(float) for x in ASpace().fit_transform(postures)]
+
+    def errors(self, n, times, others):
+        """Frames between where the moment of n lands in others, and where it is."""
+        landed = np.array([np.interp(self.moments[n], np.arange(P), tau) for tau in times])
+        return np.abs(landed - self.moments[others])
+
+    def all_pairs(self, times_to):
+        """Errors of all ordered pairs."""
+        everyone = np.arange(len(self.X))
+        errors = [np.delete(self.errors(n, times_to(self.X, n), everyone), n) for n in everyone]
+        return np.concatenate(errors)
+
+    def held_out_actors(self, make):
+        """Errors on actors that had no part in the choice of pattern and exemplars."""
+        errors = []
+        for train, test in self.folds():
+            sync = make().fit([self.X[i] for i in train])
+            times = sync.match([self.X[i] for i in test]).times
+            errors.append(self.errors(train[sync.pattern_index_], times, test))
+        return np.concatenate(errors)
+
+    def held_out_pairs(self, align, kind):
+        """The same for a peer: from our pattern to the held-out clips."""
+        features, errors = peer_features(self.X, kind), []
+        for train, test in self.folds():
+            sync = DenseSynchronizer(P).fit([self.X[i] for i in train])
+            n = train[sync.pattern_index_]
+            times = [align(features[n], features[i]) for i in test]
+            errors.append(self.errors(n, times, test))
+        return np.concatenate(errors)
+
+    def folds(self):
+        folds = min(4, len(set(self.actors)))
+        return GroupKFold(folds).split(self.X, groups=self.actors)
 
 
-def on_clock(frames, X):
-    return np.array([f * (P - 1) / (len(x) - 1) for f, x in zip(frames, X, strict=True)])
+def real_table(folder):
+    """All ordered pairs."""
+    clips = {}
+    for name in ALL_PAIRS:
+        clips[name] = Clips(folder, *EVENTS[name])
+
+    def row(times_to):
+        done, cells = {}, []
+        for name in ALL_PAIRS:
+            # Two events of one action are judged on the same warps.
+            action = EVENTS[name][1]
+            if action not in done:
+                X = clips[name].X
+                done[action] = [times_to(X, n) for n in range(len(X))]
+            cells.append(clips[name].all_pairs(lambda X, n, a=action: done[a][n]))
+        return cells
+
+    rows = {name: row(lambda X, n, m=m: ours_to(m, X, n)) for name, m in OURS.items()}
+    rows |= best_of_peers(lambda align, kind: row(lambda X, n: peer_to(align, kind, X, n)))
+    header = [f"{name} ({len(clips[name].X)} clips)" for name in ALL_PAIRS]
+    print_table("all ordered pairs", header, rows, show_errors)
 
 
-def synthetic(make, n_sets=12):
-    """Mean error, and the smallest and mean improvement on linear normalisation."""
-    errors = []
-    for seed in range(n_sets):
-        bunch = make_bending(random_state=seed)
-        X = ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(bunch.data))
-        sync = make().fit(X)
-        moments = on_clock(bunch.keyframes, X)
-        errors.append(errors_to(sync.pattern_index_, sync.match(X).times, moments).mean())
-    return np.array(errors)
+def actor_table(folder):
+    """GroupKFold by actor."""
+    clips = {name: Clips(folder, *event) for name, event in EVENTS.items()}
+    rows = {name: [c.held_out_actors(make) for c in clips.values()] for name, make in OURS.items()}
+    rows |= best_of_peers(
+        lambda align, kind: [c.held_out_pairs(align, kind) for c in clips.values()]
+    )
+    print_table("held-out actors", list(clips), rows, show_errors)
 
 
-def real(make, bunch, action, joint, axis, extreme):
-    """Mean and median over all ordered pairs."""
-    chosen = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == action]
-    column = 3 * bunch.joints.index(joint) + axis
-    smooth = [gaussian_filter1d(x[:, column].astype(float), 0.015 * len(x)) for x in chosen]
-    X = ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(chosen))
-    moments = on_clock([extreme(s) for s in smooth], X)
-    errors = [errors_to(n, make(pattern=n).fit(X).match(X).times, moments) for n in range(len(X))]
-    return f"{np.mean(errors):.2f} / {np.median(errors):.2f}"
+def misfit_table(folder):
+    """What refine="auto" goes by."""
+    print("\n| data | misfit | refines |\n|---|---|---|")
+    cases = {f"known warps {cell}": known_warps(0, *cell)[0] for cell in CELLS}
+    for style in (1.0, 4.0):
+        bunch = make_bending(24, style=style, random_state=0)
+        postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+        cases[f"make_bending, style {style:g}"] = ASpace().fit_transform(postures)
+    if folder is not None:
+        cases |= {name: Clips(folder, *event).X for name, event in EVENTS.items()}
+        elbow = Clips(folder, *EVENTS["elbow to knee, highest ankle"])
+        for actor in sorted(set(elbow.actors)):
+            own = [x for x, a in zip(elbow.X, elbow.actors, strict=True) if a == actor]
+            cases[f"elbow to knee, actor {actor} alone"] = own
+    for name, X in cases.items():
+        sync = DenseSynchronizer(P).fit(X)
+        print(f"| {name} | {sync.misfit_:.4f} | {'yes' if sync.refines_ else 'no'} |")
+
+
+# -- shared -----------------------------------------------------------------------------
+
+
+def ours_to(make, X, n):
+    return make(pattern=n).fit(X).match(X).times
+
+
+def peer_features(X, kind):
+    on_clock = LinearSynchronizer(P).fit_transform(X)
+    on_clock = on_clock - on_clock.mean(axis=(0, 1))
+    if kind == "velocity":
+        return cost_features(on_clock, "velocity")
+    return smooth(on_clock, SMOOTHING * (P - 1)) if kind == "smoothed" else on_clock
+
+
+def peer_to(align, kind, X, n):
+    features = peer_features(X, kind)
+    clock = np.arange(P, dtype=float)
+    return np.array([align(features[n], y) if m != n else clock for m, y in enumerate(features)])
+
+
+def best_of_peers(row):
+    """Rows of the installed peers: every cell holds one result a setting."""
+    rows = {}
+    for label in peers.PEERS:
+        if peers.installed(label) is None:
+            print(f"{label} is not installed", file=sys.stderr)
+            continue
+        found = []
+        for text, kind, align in peers.settings(label):
+            start = time.perf_counter()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                found.append(row(align, kind))
+            seconds = time.perf_counter() - start
+            print(f"{label}, {text}: {seconds:.0f} s", file=sys.stderr, flush=True)
+        rows[label] = list(zip(*found, strict=True))
+    return rows
+
+
+def show_mean(settings):
+    return f"{min(settings):.3f}"
+
+
+def show_errors(settings):
+    """Mean / median / share beyond five frames, each the best of the settings by itself."""
+    mean = min(np.mean(errors) for errors in settings)
+    median = min(np.median(errors) for errors in settings)
+    gross = min(np.mean(errors > 5) for errors in settings)
+    return f"{mean:.2f} / {median:.2f} / {gross:.0%}"
+
+
+def print_table(corner, header, rows, show):
+    """Markdown; a cell holds a tuple with one value a setting, or a single value."""
+    print(f"\n| {corner} | " + " | ".join(header) + " |")
+    print("|---|" + "---|" * len(header))
+    for name, cells in rows.items():
+        texts = [show(cell if isinstance(cell, tuple) else (cell,)) for cell in cells]
+        print(f"| {name} | " + " | ".join(texts) + " |", flush=True)
 
 
 def main():
-    """Print the table in Markdown."""
-    bunch = load_performances(sys.argv[1]) if len(sys.argv) > 1 else None
-    events = EVENTS if bunch else {}
-    print("| | " + " | ".join(["bending, mean", "times better than linear (min)", *events]) + " |")
-    print("|---|" + "---|" * (2 + len(events)))
-    linear = synthetic(METHODS["linear"])
-    for name, make in METHODS.items():
-        errors = synthetic(make)
-        gain = linear / errors
-        cells = [f"{errors.mean():.2f}", f"{linear.mean() / errors.mean():.1f} ({gain.min():.1f})"]
-        cells += [real(make, bunch, *event) for event in events.values()]
-        print(f"| {name} | " + " | ".join(cells) + " |")
+    """Print the tables."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+    versions = {"sklearn_motionsync": __version__}
+    for label in peers.PEERS:
+        versions[peers.PEERS[label][0]] = peers.installed(label)
+    for name in ("numpy", "scipy", "scikit-learn"):
+        versions[name] = importlib.metadata.version(name)
+    print(", ".join(f"{name} {version}" for name, version in versions.items() if version))
+    misfit_table(folder)
+    known_table()
+    if folder is not None:
+        actor_table(folder)
+        real_table(folder)
 
 
 if __name__ == "__main__":

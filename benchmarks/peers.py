@@ -11,9 +11,11 @@ import numpy as np
 
 
 def _from_pairs(pairs, n_frames):
+    """Mean partner of each frame; frames without one, as derivatives have at the ends, between."""
     pairs = np.asarray(pairs)
-    count = np.bincount(pairs[:, 0], minlength=n_frames)
-    return np.bincount(pairs[:, 0], weights=pairs[:, 1], minlength=n_frames) / count
+    frames = np.unique(pairs[:, 0])
+    partners = [pairs[pairs[:, 0] == frame, 1].mean() for frame in frames]
+    return np.interp(np.arange(n_frames), frames, partners)
 
 
 def tslearn_dtw(radius=None):
@@ -77,7 +79,9 @@ def aeon_path(name, **options):
     function = getattr(aeon.distances, f"{name}_alignment_path")
 
     def align(x, y):
-        return _from_pairs(function(x.T.copy(), y.T.copy(), **options)[0], len(x))
+        pairs = np.asarray(function(x.T.copy(), y.T.copy(), **options)[0])
+        # The derivative of a sequence lacks its first and last frame.
+        return _from_pairs(pairs + (name == "ddtw"), len(x))
 
     return align
 
@@ -107,7 +111,7 @@ PEERS = {
         ],
         BOTH,
     ),
-    "fdasrsf SRVF": ("fdasrsf", fdasrsf_srvf, [{}, {"lam": 0.01}], ("posture", "smoothed")),
+    "fdasrsf SRVF": ("fdasrsf", fdasrsf_srvf, [{}], ("posture", "smoothed")),
     "aeon DTW": ("aeon", aeon_path, [{"name": "dtw", "window": 0.25}], BOTH),
     "aeon derivative DTW": ("aeon", aeon_path, [{"name": "ddtw"}], ("posture", "smoothed")),
     "aeon ADTW": (

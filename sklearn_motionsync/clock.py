@@ -86,10 +86,10 @@ class Synchronizer(TransformerMixin, BaseEstimator):
         given = self._given_pattern(arrays)
         self.n_frames_ = self._choose_n_frames(arrays, given)
         on_clock = self._normalise(arrays, np.arange(self.n_frames_))
-        self._prepare(arrays, on_clock, **extra)
+        features = self._prepare(arrays, on_clock, **extra)
         median = isinstance(self.pattern, str)
         if median or self._compares_all:
-            self.global_distances_ = self._global_distances(arrays, on_clock)
+            self.global_distances_ = self._global_distances(arrays, features)
         else:
             self.global_distances_ = np.full(len(arrays), np.nan)
         self.pattern_index_ = None if median or given is not None else int(self.pattern)
@@ -112,7 +112,8 @@ class Synchronizer(TransformerMixin, BaseEstimator):
     _compares_all = False
 
     def _prepare(self, arrays, on_clock):
-        pass
+        """What ``_global_distances`` is to compare."""
+        return on_clock
 
     def _learn(self, arrays, on_clock, source):
         pass

@@ -5,8 +5,8 @@ from scipy.ndimage import gaussian_filter1d
 
 __all__ = ["cost_features", "smooth"]
 
-# Standard deviation of the Gaussian under which velocities are taken, as a share of the
-# clip: benchmarks/accuracy.py, flat from 0.02 to 0.05 on real people.
+# Standard deviation of a Gaussian, as a share of the clip, that leaves the movement of people
+# and takes away the noise of motion capture: docs/method.md, flat from 0.02 to 0.05.
 SMOOTHING = 0.03
 
 

@@ -161,14 +161,13 @@ class KeyframeSynchronizer(Synchronizer):
 
     def _prepare(self, arrays, on_clock, keyframes):
         self._knots = self._given_knots(arrays, keyframes) if self._given else None
+        if not self._given:
+            return on_clock
+        # On the mean key-frames all performances are comparable, as on one clock.
+        return self._sample(arrays, self._between(self._knots.mean(axis=0), self._knots))
 
-    def _global_distances(self, arrays, on_clock):
-        matched = on_clock
-        if self._given:
-            # On the mean key-frames all performances are comparable, as on one clock.
-            mean = self._knots.mean(axis=0)
-            matched = self._sample(arrays, self._between(mean, self._knots))
-        return distances_to_all(matched)
+    def _global_distances(self, arrays, features):
+        return distances_to_all(features)
 
     def _learn(self, arrays, on_clock, source):
         if self._given and self.pattern_index_ is not None:

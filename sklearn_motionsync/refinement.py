@@ -23,6 +23,8 @@ _LONGEST_STEP = 1.5
 _SHORTEST_STEP = 0.01
 # Gains are drawn towards 1 with this share of a feature's mean energy.
 _RIDGE = 0.01
+# Narrowest Gaussian that is one on a grid of frames.
+_LEAST_SIGMA = 0.35
 _SMOOTHINGS = (0.0, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04)
 
 
@@ -42,10 +44,9 @@ def choose_smoothing(on_clock):
     best, chosen = np.inf, 0.0
     for sigma in (share * (n_frames - 1) for share in _SMOOTHINGS):
         # No smoothing at all leaves no residual to judge by: a little stands in for it.
-        used = max(sigma, 0.35)
+        used = max(sigma, _LEAST_SIGMA)
         residual = np.square(on_clock - smooth(on_clock, used)).sum(dtype=np.float64)
-        weights = np.exp(-0.5 * (np.arange(-20, 21) / used) ** 2)
-        score = residual / (1 - 1 / weights.sum()) ** 2
+        score = residual / (1 - _gaussian(used).max()) ** 2
         if score < best:
             best, chosen = score, sigma
     return chosen
@@ -63,16 +64,23 @@ def misfit(base, moving, times):
     Returns
     -------
     ndarray, shape (n_sequences,)
-        The energy of the residuals after fitting a gain and an offset to every feature,
-        smoothed so that noise averages out, over that of the base.
+        The slow part of the energy of the residuals, after fitting a gain and an offset to
+        every feature, less what white noise puts there, over the energy of the base.
     """
     residuals = np.empty_like(moving)
     for residual, x, tau in zip(residuals, moving, times, strict=True):
         matched = follow(x.T, np.tile(tau, (x.shape[1], 1))).T
         residual[:] = base - _fit_gain(base, matched)[0]
-    residuals = smooth(residuals, SMOOTHING * (len(base) - 1))
+    sigma = max(SMOOTHING * (len(base) - 1), _LEAST_SIGMA)
+    slow = smooth(residuals, sigma)
+    # White noise leaves this share of its energy in the slow part, which is not misfit.
+    kernel = _gaussian(sigma)
+    left = np.square(kernel).sum()
+    share = left / (1 - 2 * kernel.max() + left)
+    fast_energy = np.square(residuals - slow).sum(axis=(1, 2))
+    slow_energy = np.square(slow).sum(axis=(1, 2)) - share * fast_energy
     energy = np.square(base - base.mean(axis=0)).sum()
-    return np.square(residuals).sum(axis=(1, 2)) / energy if energy > 0 else np.zeros(len(moving))
+    return np.maximum(slow_energy, 0) / energy if energy > 0 else np.zeros(len(moving))
 
 
 def refine_warps(base, moving, times, reach):
@@ -129,6 +137,13 @@ def refine_warps(base, moving, times, reach):
             if np.abs(step).max() < _SHORTEST_STEP:
                 break
     return refined
+
+
+def _gaussian(sigma):
+    """Weights of a Gaussian filter."""
+    reach = int(np.ceil(4 * sigma))
+    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
+    return weights / weights.sum()
 
 
 def _fit_gain(base, matched):

@@ -11,7 +11,14 @@ from sklearn_motionsync.refinement import choose_smoothing
 
 from oracle import brute_force, plain_loops
 
-PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0, "refine": False}
+PAPER = {
+    "cost": "posture",
+    "max_rate": 2,
+    "subframes": 1,
+    "consensus": 0,
+    "warp_smoothing": 0,
+    "refine": False,
+}
 P = 100
 
 
@@ -74,7 +81,13 @@ def test_elastic_equals_an_oracle_of_its_own():
     sub = 2
     fine = np.stack([[np.interp(np.arange(89) / 2, np.arange(45), c) for c in x.T] for x in X])
     q = np.stack([slow_elastic(x, sub, 0.03 * 88) for x in fine.transpose(0, 2, 1)])
-    settings = {"max_rate": 3, "subframes": sub, "consensus": 0, "refine": False}
+    settings = {
+        "max_rate": 3,
+        "subframes": sub,
+        "consensus": 0,
+        "warp_smoothing": 0,
+        "refine": False,
+    }
     sync = DenseSynchronizer(
         cost="elastic", pattern=0, smoothness=0.1, max_offset=0.2, **settings
     ).fit(X)

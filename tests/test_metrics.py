@@ -207,7 +207,13 @@ def test_only_hidden_features_see_through_over_warping():
     rng = np.random.default_rng(0)
     X = [rng.standard_normal((60, 6)) for _ in range(8)]
     sync = DenseSynchronizer(
-        cost="posture", smoothness=0, max_rate=2, subframes=1, consensus=0, refine=False
+        cost="posture",
+        smoothness=0,
+        max_rate=2,
+        subframes=1,
+        consensus=0,
+        warp_smoothing=0,
+        refine=False,
     ).fit(X)
     assert SpreadScorer()(sync, X) > -0.8
     assert FeatureHoldoutScorer()(sync, X) < -0.95

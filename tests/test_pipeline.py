@@ -108,7 +108,13 @@ def assert_figures(folder):
 
 def test_example_on_the_embedded_data(monkeypatch, capsys, tmp_path):
     out = run_example(monkeypatch, capsys, "--output", tmp_path)
-    for words in ("40 of bending", "median performance", "spread, dense", "time a pair"):
+    for words in (
+        "40 of bending",
+        "median performance",
+        "spread, dense",
+        "key-frames missed",
+        "a pair",
+    ):
         assert words in out
     assert_figures(tmp_path)
 
