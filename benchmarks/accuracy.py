@@ -32,14 +32,7 @@ from sklearn_motionsync.features import SMOOTHING, cost_features, smooth
 from sklearn_motionsync.metrics import timing_error
 
 P = 100
-PAPER = {
-    "cost": "posture",
-    "max_rate": 2,
-    "subframes": 1,
-    "consensus": 0,
-    "warp_smoothing": 0,
-    "refine": False,
-}
+PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
 OURS = {
     "linear normalisation": lambda **kw: LinearSynchronizer(P, **kw),
     "the paper's method": lambda **kw: DenseSynchronizer(P, **PAPER, **kw),

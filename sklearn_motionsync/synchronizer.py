@@ -102,8 +102,8 @@ class DenseSynchronizer(Synchronizer):
     6. ``transform`` samples performances at ``tau(p) = p + Delta(p)`` (Eq. 18).
 
     The paper's exact method is ``DenseSynchronizer(cost="posture", max_rate=2, subframes=1,
-    consensus=0, warp_smoothing=0, refine=False)``. For repeated trials of a single source that
-    are known to be such, use ``refine=True``.
+    consensus=0)``. For repeated trials of a single source that are known to be such, use
+    ``refine=True``.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ class DenseSynchronizer(Synchronizer):
         divided by the square root of its speed, with weights that make the distance (of
         Fisher and Rao) independent of how either sequence is timed. ``"posture"``: where the
         point is, as in the paper.
-    smoothness : float, default=0.01
+    smoothness : float, default=0.003
         Weight of the changes of pace, a pure number: ``mu`` is ``smoothness`` times the
         mean squared norm of the compared features over the training set.
     max_offset : float, default=0.25
@@ -125,21 +125,24 @@ class DenseSynchronizer(Synchronizer):
     max_rate : float, default=4
         Largest local rate of a path; 2 is the limit of Eq. 13. The vote and the refinement
         may exceed it.
-    subframes : int, default=2
-        Positions a frame at which a path may stand; 1 in the paper.
+    subframes : int, default=1
+        Positions a frame at which a path may stand. More than 1 serves direct paths
+        (``consensus=0``); the vote, its smoothing and the refinement are finer anyway.
     velocity_smoothing : float, default=0.03
         Standard deviation of the Gaussian under which velocities are taken, as a share of the
         clip, so that it does not depend on the frame rate; beyond its ends a clip is
         continued by its point reflection. Noisy sensors want more: 0.1 for the Kinect.
     consensus : int, default=8
-        How many exemplars vote on a warp; 0 for the direct path only, as in the paper.
+        How many exemplars vote on a warp; 0 for the direct path only, as in the paper, which
+        is then neither smoothed nor, unless ``refine=True``, refined.
     warp_smoothing : float, default=0.02
         Standard deviation of the Gaussian under which the offsets are smoothed after the
-        vote, as a share of the clip; 0 for not at all, as in the paper. More makes
-        smoother synchronised movements and hits key moments less closely.
+        vote, as a share of the clip. More makes smoother synchronised movements and hits
+        key moments less closely.
     refine : "auto" or bool, default="auto"
-        Whether to refine warps by the postures. ``"auto"`` does so if the postures of the
-        training set, matched without, leave a misfit of less than 7 % of their variance.
+        Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and
+        the postures of the training set, matched without, leave a misfit of less than 7 % of
+        their variance.
 
     Attributes
     ----------
@@ -158,7 +161,7 @@ class DenseSynchronizer(Synchronizer):
         Indices of the performances that vote.
     misfit_ : float
         Median share of the pattern's variance that matched postures leave, smoothed so that
-        noise does not count; NaN unless ``refine="auto"``.
+        noise does not count; NaN unless ``refine="auto"`` had to find out.
     refines_ : bool
         Whether warps are refined.
     n_features_in_ : int
@@ -215,10 +218,10 @@ class DenseSynchronizer(Synchronizer):
         n_frames=None,
         pattern="median",
         cost="velocity",
-        smoothness=0.01,
+        smoothness=0.003,
         max_offset=0.25,
         max_rate=4,
-        subframes=2,
+        subframes=1,
         velocity_smoothing=0.03,
         consensus=8,
         warp_smoothing=0.02,
@@ -282,12 +285,15 @@ class DenseSynchronizer(Synchronizer):
         chosen = self._features([source, *(arrays[k] for k in self.exemplars_)])
         self._bases = chosen[:, :: self.subframes].copy()
         self._to_exemplars = self._paths(self._bases[0], chosen[1:])[1]
-        self.misfit_, self.refines_ = np.nan, bool(self.refine)
-        if self.refine:
-            self._smoothing = choose_smoothing(on_clock)
-        if isinstance(self.refine, str):
-            self.misfit_ = self._measure_misfit(arrays, on_clock)
+        self.misfit_ = np.nan
+        if self.refine == "auto":
+            if self.consensus > 0:
+                self.misfit_ = self._measure_misfit(arrays, on_clock)
             self.refines_ = self.misfit_ < _LARGEST_MISFIT
+        else:
+            self.refines_ = bool(self.refine)
+        if self.refines_:
+            self._smoothing = choose_smoothing(on_clock)
 
     def _measure_misfit(self, arrays, on_clock):
         """Median misfit of the performances, or of evenly spaced ones of many."""
@@ -312,6 +318,8 @@ class DenseSynchronizer(Synchronizer):
         """Distances of the direct paths, and smoothed times after the vote of the exemplars."""
         moving = self._features(arrays)
         distances, direct = self._paths(self._bases[0], moving)
+        if self.consensus == 0:
+            return distances, direct
         times = direct
         if len(self.exemplars_):
             routes = np.stack([self._paths(base, moving)[1] for base in self._bases[1:]])

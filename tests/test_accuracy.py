@@ -11,14 +11,7 @@ from sklearn_motionsync.refinement import choose_smoothing
 
 from oracle import brute_force, plain_loops
 
-PAPER = {
-    "cost": "posture",
-    "max_rate": 2,
-    "subframes": 1,
-    "consensus": 0,
-    "warp_smoothing": 0,
-    "refine": False,
-}
+PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
 P = 100
 
 
@@ -85,8 +78,6 @@ def test_elastic_equals_an_oracle_of_its_own():
         "max_rate": 3,
         "subframes": sub,
         "consensus": 0,
-        "warp_smoothing": 0,
-        "refine": False,
     }
     sync = DenseSynchronizer(
         cost="elastic", pattern=0, smoothness=0.1, max_offset=0.2, **settings

@@ -212,8 +212,6 @@ def test_only_hidden_features_see_through_over_warping():
         max_rate=2,
         subframes=1,
         consensus=0,
-        warp_smoothing=0,
-        refine=False,
     ).fit(X)
     assert SpreadScorer()(sync, X) > -0.8
     assert FeatureHoldoutScorer()(sync, X) < -0.95

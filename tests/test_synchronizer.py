@@ -8,14 +8,7 @@ from oracle import plain_loops
 
 BOTH = [LinearSynchronizer, DenseSynchronizer]
 # The settings at which DenseSynchronizer is the paper's method.
-PAPER = {
-    "cost": "posture",
-    "max_rate": 2,
-    "subframes": 1,
-    "consensus": 0,
-    "warp_smoothing": 0,
-    "refine": False,
-}
+PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
 
 
 def curve(phase):
