@@ -24,12 +24,13 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
+    KeyframeSynchronizer,
     LinearSynchronizer,
     __version__,
 )
 from sklearn_motionsync.datasets import load_performances, make_bending
 from sklearn_motionsync.features import SMOOTHING, cost_features, smooth
-from sklearn_motionsync.metrics import timing_error
+from sklearn_motionsync.metrics import group_timing_error, keyframe_error, timing_error
 
 P = 100
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
@@ -232,6 +233,29 @@ def misfit_table(folder):
         print(f"| {name} | {sync.misfit_:.4f} | {'yes' if sync.refines_ else 'no'} |")
 
 
+def bending_table():
+    """make_bending, four random sets: key-frames missed, and timing error without a pattern."""
+    given = "`KeyframeSynchronizer`, true key-frames"
+    makers = {name: OURS[name] for name in list(OURS)[:4]}
+    makers |= {given: lambda: KeyframeSynchronizer(P)}
+    makers |= {"`KeyframeSynchronizer`, found ones": lambda: KeyframeSynchronizer(P)}
+    rows = {name: ([], []) for name in makers}
+    for seed in range(4):
+        bunch = make_bending(random_state=seed)
+        postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+        X, lengths = ASpace().fit_transform(postures), [len(x) for x in bunch.data]
+        for name, make in makers.items():
+            known = {"keyframes": bunch.keyframes} if name == given else {}
+            sync = make().fit(X, **known)
+            times, n = sync.match(X, **known).times, sync.pattern_index_
+            pattern = bunch.keyframes[n] * (P - 1) / (lengths[n] - 1)
+            rows[name][0].append(keyframe_error(times, bunch.keyframes, pattern, lengths))
+            rows[name][1].append(group_timing_error(times, bunch.times))
+    header = ["key-frames missed by", "timing error of the group"]
+    cells = {name: [np.mean(values) for values in row] for name, row in rows.items()}
+    print_table("make_bending", header, cells, show_mean)
+
+
 # -- shared -----------------------------------------------------------------------------
 
 
@@ -303,6 +327,7 @@ def main():
         versions[name] = importlib.metadata.version(name)
     print(", ".join(f"{name} {version}" for name, version in versions.items() if version))
     misfit_table(folder)
+    bending_table()
     known_table()
     if folder is not None:
         actor_table(folder)
