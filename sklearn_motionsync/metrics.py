@@ -10,6 +10,7 @@ from sklearn.utils import check_random_state
 
 from .clock import Synchronizer
 from .consensus import follow
+from .sequences import check_performances
 
 __all__ = [
     "FeatureHoldoutScorer",
@@ -309,7 +310,20 @@ _SPREADS = {
 }
 
 
-class SpreadScorer:
+class _SpreadMeasure:
+    """Which measure a scorer takes, and its sign: greater scores are better."""
+
+    def __init__(self, spread):
+        if spread not in _SPREADS:
+            raise ValueError(f"spread={spread!r} is unknown; use one of {list(_SPREADS)}.")
+        self.spread = spread
+
+    def _score(self, before, after):
+        measure, sign = _SPREADS[self.spread]
+        return sign * measure(before, after)
+
+
+class SpreadScorer(_SpreadMeasure):
     """Scorer of a synchronizer, or of a pipeline with one: how alike it makes performances.
 
     Parameters
@@ -335,9 +349,7 @@ class SpreadScorer:
     """
 
     def __init__(self, spread="least_squares"):
-        if spread not in _SPREADS:
-            raise ValueError(f"spread={spread!r} is unknown; use one of {list(_SPREADS)}.")
-        self.spread = spread
+        super().__init__(spread)
 
     def __call__(self, estimator, X, y=None):
         """Score a fitted estimator on performances.
@@ -352,20 +364,18 @@ class SpreadScorer:
         -------
         float
         """
-        synchronizer, features = _split(estimator, X)
-        measure, sign = _SPREADS[self.spread]
-        clock = np.arange(synchronizer.n_frames_)
-        before = synchronizer._normalise(features, clock)
-        after = synchronizer._sample(features, synchronizer.match(features).times)
-        return sign * measure(before, after)
+        synchronizer, arrays = _split(estimator, X)
+        before = synchronizer._normalise(arrays, np.arange(synchronizer.n_frames_))
+        after = synchronizer._sample(arrays, synchronizer._match(arrays).times)
+        return self._score(before, after)
 
 
-class FeatureHoldoutScorer:
+class FeatureHoldoutScorer(_SpreadMeasure):
     """Scorer that aligns on some features and judges by the others.
 
     Features are dealt into ``n_folds`` hands. For each hand a clone of the synchronizer is
-    fitted without it, and its warps are judged by the spread of the hand alone. Warping more than
-    the time tells does not help features that had no say.
+    fitted without it, to a median pattern, and its warps are judged by the spread of the hand
+    alone. Warping more than the time tells does not help features that had no say.
 
     Parameters
     ----------
@@ -391,9 +401,7 @@ class FeatureHoldoutScorer:
     """
 
     def __init__(self, spread="least_squares", n_folds=3, random_state=0):
-        if spread not in _SPREADS:
-            raise ValueError(f"spread={spread!r} is unknown; use one of {list(_SPREADS)}.")
-        self.spread = spread
+        super().__init__(spread)
         self.n_folds = n_folds
         self.random_state = random_state
 
@@ -410,24 +418,23 @@ class FeatureHoldoutScorer:
         -------
         float
         """
-        synchronizer, features = _split(estimator, X)
-        n_features = features[0].shape[1]
+        synchronizer, arrays = _split(estimator, X)
+        n_features = arrays[0].shape[1]
         if not 2 <= self.n_folds <= n_features:
             raise ValueError(
                 f"n_folds={self.n_folds} must be between 2 and the {n_features} features there are."
             )
-        measure, sign = _SPREADS[self.spread]
         dealt = check_random_state(self.random_state).permutation(n_features)
         scores = []
         for held in np.array_split(dealt, self.n_folds):
             shown = np.setdiff1d(dealt, held)
-            blind = clone(synchronizer).set_params(n_frames=synchronizer.n_frames_)
-            times = blind.fit([x[:, shown] for x in features]).match(
-                [x[:, shown] for x in features]
+            blind = clone(synchronizer).set_params(
+                n_frames=synchronizer.n_frames_, pattern="median"
             )
-            hidden = [x[:, held] for x in features]
+            seen, hidden = ([x[:, part] for x in arrays] for part in (shown, held))
+            times = blind.fit(seen).match(seen).times
             before = blind._normalise(hidden, np.arange(blind.n_frames_))
-            scores.append(sign * measure(before, blind._sample(hidden, times.times)))
+            scores.append(self._score(before, blind._sample(hidden, times)))
         return float(np.mean(scores))
 
 
@@ -437,7 +444,7 @@ def _split(estimator, X):
     for i, (_, step) in enumerate(steps):
         if isinstance(step, Synchronizer):
             features = estimator[:i].transform(X) if i else X
-            return step, [np.asarray(x) for x in features]
+            return step, check_performances(step, features, reset=False, level="sequence").arrays
     raise ValueError(
         f"There is no synchronizer in {type(estimator).__name__}; its steps are {steps}."
     )

@@ -78,7 +78,11 @@ def test_random_state_decides():
     assert a.data[1].shape != c.data[1].shape or not np.allclose(a.data[1], c.data[1])
 
 
-@pytest.mark.parametrize("params", [{"n_performances": 0}, {"noise": -1}, {"n_frames": 3}], ids=str)
+@pytest.mark.parametrize(
+    "params",
+    [{"n_performances": 0}, {"noise": -1}, {"n_frames": 3}, {"style": np.nan}, {"frame_rate": 0}],
+    ids=str,
+)
 def test_nonsense_parameters(params):
     with pytest.raises(ValueError, match=f"'{next(iter(params))}' parameter"):
         make_bending(**params)

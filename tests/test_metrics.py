@@ -202,6 +202,17 @@ def test_spread_scorer_is_the_ratio(bending_aspace):
     np.testing.assert_allclose(SpreadScorer()(sync, bending_aspace), -expected)
 
 
+def test_scorers_take_every_kind_of_input(bending_aspace):
+    rows = np.stack([np.sin(np.linspace(0, 3, 30) ** p) for p in (1, 1.1, 0.9)])
+    columns = list(rows[:, :, np.newaxis])
+    scores = [SpreadScorer()(DenseSynchronizer().fit(X), X) for X in (rows, columns)]
+    assert scores[0] == scores[1]
+    by_index = DenseSynchronizer(40, pattern=30).fit(bending_aspace)
+    by_array = DenseSynchronizer(40, pattern=bending_aspace[30]).fit(bending_aspace)
+    few = bending_aspace[:6]
+    assert FeatureHoldoutScorer()(by_index, few) == FeatureHoldoutScorer()(by_array, few)
+
+
 def test_only_hidden_features_see_through_over_warping():
     """Features of pure noise: warping lowers their spread, but not that of the others."""
     rng = np.random.default_rng(0)

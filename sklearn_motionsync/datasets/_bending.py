@@ -5,7 +5,6 @@ from numbers import Integral, Real
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from sklearn.utils import Bunch, check_random_state
-from sklearn.utils._param_validation import Interval, validate_params
 
 from ..skeleton import Skeleton
 
@@ -43,19 +42,6 @@ _ANGLES = {
 }
 
 
-@validate_params(
-    {
-        "n_performances": [Interval(Integral, 1, None, closed="left")],
-        "n_frames": [Interval(Integral, 10, None, closed="left")],
-        "n_actors": [Interval(Integral, 1, None, closed="left")],
-        "style": [Interval(Real, 0, None, closed="left")],
-        "warp": [Interval(Real, 0, None, closed="left")],
-        "noise": [Interval(Real, 0, None, closed="left")],
-        "frame_rate": [Interval(Real, 0, None, closed="neither")],
-        "random_state": ["random_state"],
-    },
-    prefer_skip_nested_validation=True,
-)
 def make_bending(
     n_performances=40,
     *,
@@ -111,6 +97,11 @@ def make_bending(
         target, actor, take : ndarray of str (n_performances,)
         frame_rate : float
 
+    Raises
+    ------
+    ValueError
+        If a parameter is out of its range; the message names it.
+
     Examples
     --------
     >>> from sklearn_motionsync.datasets import make_bending
@@ -118,6 +109,21 @@ def make_bending(
     >>> [x.shape[1] for x in bunch.data], bunch.keyframes.shape
     ([45, 45, 45], (3, 5))
     """
+    for name, value, kind, least in (
+        ("n_performances", n_performances, Integral, 1),
+        ("n_frames", n_frames, Integral, 10),
+        ("n_actors", n_actors, Integral, 1),
+        ("style", style, Real, 0),
+        ("warp", warp, Real, 0),
+        ("noise", noise, Real, 0),
+        ("frame_rate", frame_rate, Real, np.finfo(float).tiny),
+    ):
+        if not isinstance(value, kind) or not least <= value < np.inf:
+            what = "a whole number" if kind is Integral else "a number"
+            raise ValueError(
+                f"The '{name}' parameter of make_bending must be {what}, at least {least}; got "
+                f"{value!r}."
+            )
     random_state = check_random_state(random_state)
     actors = [_draw_actor(random_state, style) for _ in range(n_actors)]
     moments = np.array(list(_KEYFRAMES.values()))
