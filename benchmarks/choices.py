@@ -38,6 +38,18 @@ def times_to_all(X, **params):
     )
 
 
+def rematched_to_mean(X, rounds):
+    """The usual alternative to a vote: match again to the mean of the synchronised set."""
+    result = []
+    for n in range(len(X)):
+        sync = DenseSynchronizer(P, pattern=n, consensus=0).fit(X)
+        for _ in range(rounds):
+            mean = sync.transform(X).mean(axis=0)
+            sync = DenseSynchronizer(P, pattern=mean, consensus=0).fit(X)
+        result.append(sync.match(X).times)
+    return np.array(result)
+
+
 def health(X, times):
     """Stand-still, hurry, spread of velocities."""
     linear, rates = LinearSynchronizer(P).fit(X), np.diff(times)
@@ -46,7 +58,7 @@ def health(X, times):
     return f"{(rates < 0.1).mean():.0%} | {(rates > 2).mean():.0%} | {np.mean(spread):.2f}"
 
 
-def row(label, clips, **params):
+def row(label, clips, times_to_all=times_to_all, **params):
     """One line of the table."""
     cells, done = [], {}
     for name in ALL_PAIRS:
@@ -75,6 +87,9 @@ def main():
         matching._RATE_WEIGHT = weight
         row(f"w = {weight}", clips)
     matching._RATE_WEIGHT = default
+    for rounds in (1, 3):
+        label = f"no vote, re-matched to the running mean, rounds: {rounds}"
+        row(label, clips, rematched_to_mean, rounds=rounds)
 
 
 if __name__ == "__main__":
