@@ -90,8 +90,9 @@ class DenseSynchronizer(Synchronizer):
 
            sum_p |x_n(p) - x_m(p + Delta(p))|^2 + mu sum_p phi(rate)
 
-       with both ends pinned and the local rate between 0 and ``max_rate``. x is the
-       velocity by default: people differ in where the body is more than in how it moves.
+       with both ends pinned and the local rate between 0 and ``max_rate``. By default
+       velocities stand in for the points x (see ``cost``): people differ in where the body
+       is more than in how it moves.
     3. The pattern is the performance with the smallest global distance
        ``C_n = sum_m D_{n,m}`` (Eq. 19), the "median" one.
     4. Consensus: the time of the pattern reaches a performance straight, or by way of
@@ -113,7 +114,8 @@ class DenseSynchronizer(Synchronizer):
     pattern : "median", int or array (n_frames, n_features), default="median"
         The median performance, one chosen by its index, or another one.
     cost : {"velocity", "elastic", "posture"}, default="velocity"
-        What is compared. ``"velocity"``: how the point moves. ``"elastic"``: its velocity
+        What is compared. ``"velocity"``: how the point moves; at the local rate rho,
+        ``v_n`` with ``(0.8 + 0.2 rho) v_m``. ``"elastic"``: its velocity
         divided by the square root of its speed, with weights that make the distance (of
         Fisher and Rao) independent of how either sequence is timed. ``"posture"``: where the
         point is, as in the paper.
