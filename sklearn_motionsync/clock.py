@@ -7,15 +7,16 @@ from sklearn.base import BaseEstimator, TransformerMixin, _fit_context
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
+from .median import Median, first_smallest
 from .sequences import check_performances, restore
 
 
 class Synchronizer(TransformerMixin, BaseEstimator):
     """What all synchronizers share: clock, pattern, and warping along matched times.
 
-    A subclass compares performances (``_global_distances``) and matches them to the pattern
-    (``_match``); it may learn something before (``_prepare``) and after (``_learn``) the
-    pattern is chosen. ``extra`` is what it takes besides performances.
+    A subclass matches performances to the pattern (``_match``); it may choose the median in a way
+    of its own (``_choose_median``), and learn something before (``_prepare``) and after
+    (``_learn``). ``extra`` is what it takes besides performances.
     """
 
     _parameter_constraints: dict = {
@@ -83,22 +84,28 @@ class Synchronizer(TransformerMixin, BaseEstimator):
         return self._match(check_performances(self, X, reset=False, level="sequence").arrays)
 
     def _fit(self, arrays, **extra):
+        try:
+            return self._fit_clock(arrays, **extra)
+        except BaseException:
+            # Half a fit is none: whatever stopped it, the estimator is not fitted.
+            for name in [name for name in vars(self) if name.endswith("_")]:
+                delattr(self, name)
+            raise
+
+    def _fit_clock(self, arrays, **extra):
         given = self._given_pattern(arrays)
         self.n_frames_ = self._choose_n_frames(arrays, given)
         on_clock = self._normalise(arrays, np.arange(self.n_frames_))
         features = self._prepare(arrays, on_clock, **extra)
-        median = isinstance(self.pattern, str)
-        if median or self._compares_all:
-            self.global_distances_ = self._global_distances(arrays, features)
-        else:
-            self.global_distances_ = np.full(len(arrays), np.nan)
-        self.pattern_index_ = None if median or given is not None else int(self.pattern)
-        if median:
-            rounding = self._rounding(on_clock)
-            self.pattern_index_ = _first_smallest(self.global_distances_, rounding)
+        wanted = isinstance(self.pattern, str)
+        median = self._choose_median(on_clock, features, wanted)
+        self.global_distances_ = median.distances
+        self.pattern_index_ = median.index if wanted else None
+        if not wanted and given is None:
+            self.pattern_index_ = int(self.pattern)
         source = arrays[self.pattern_index_] if given is None else given
         self.pattern_ = self._normalise([source], np.arange(self.n_frames_))[0]
-        self._learn(arrays, on_clock, source)
+        self._learn(arrays, on_clock, source, median.estimates)
         return self
 
     def _warp(self, performances, **extra):
@@ -108,14 +115,19 @@ class Synchronizer(TransformerMixin, BaseEstimator):
             return out[:, :, 0]
         return restore(self, performances, out, frames=range(self.n_frames_))
 
-    # Whether the global distances are needed even if the pattern is given.
-    _compares_all = False
-
     def _prepare(self, arrays, on_clock):
-        """What ``_global_distances`` is to compare."""
+        """What performances are to be compared by."""
         return on_clock
 
-    def _learn(self, arrays, on_clock, source):
+    def _choose_median(self, on_clock, features, wanted):
+        """The median performance (Eq. 19); or only what else is needed of it if not wanted."""
+        if not wanted:
+            unknown = np.full(len(features), np.nan)
+            return Median(None, unknown, unknown, False, 0)
+        sums = distances_to_all(features)
+        return Median(first_smallest(sums, self._rounding(on_clock)), sums, sums, True, 0)
+
+    def _learn(self, arrays, on_clock, source, estimates):
         pass
 
     def get_feature_names_out(self, input_features=None):
@@ -203,11 +215,6 @@ class Synchronizer(TransformerMixin, BaseEstimator):
         """How far rounding can move a global distance."""
         energy = np.square(on_clock - on_clock.mean(axis=(0, 1))).sum(dtype=np.float64)
         return 8 * np.finfo(on_clock.dtype).eps * energy
-
-
-def _first_smallest(values, rounding):
-    """The first index whose value is the smallest but for rounding."""
-    return int(np.flatnonzero(values <= values.min() + rounding)[0])
 
 
 def distances_to_all(on_clock):

@@ -7,7 +7,7 @@ from sklearn.base import _fit_context
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
-from .clock import Synchronizer, distances_to_all
+from .clock import Synchronizer
 from .features import SMOOTHING, smooth
 from .matching import Match
 from .sequences import check_performances
@@ -166,10 +166,7 @@ class KeyframeSynchronizer(Synchronizer):
         # On the mean key-frames all performances are comparable, as on one clock.
         return self._sample(arrays, self._between(self._knots.mean(axis=0), self._knots))
 
-    def _global_distances(self, arrays, features):
-        return distances_to_all(features)
-
-    def _learn(self, arrays, on_clock, source):
+    def _learn(self, arrays, on_clock, source, estimates):
         if self._given and self.pattern_index_ is not None:
             self.keyframes_ = self._knots[self.pattern_index_]
         else:

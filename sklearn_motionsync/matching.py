@@ -20,17 +20,21 @@ Invariants the code relies on:
   contiguous slice for all moving sequences together.
 """
 
+import itertools
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 __all__ = ["Match", "StepTable", "Trellis", "step_table"]
 
-# Sizes of one tile of pairs: what a row needs stays in the second-level cache, and
-# a matrix product has enough rows to be worth calling. Constants, so that no
-# result can depend on the number of workers or on the memory of the machine.
-_TILE_BYTES = 1 << 20
-_TILE_SEQUENCES = 64
+# Sizes of one tile of pairs: the rows stay in the second-level cache, the matrix product of a
+# row stays below the size from which OpenBLAS packs its operands (1.0 against 0.7 ns a cell), and
+# it has enough columns. Constants, so that no result can depend on the number of workers or
+# on the memory of the machine.
+_TILE_PRODUCT = 1_000_000
+_TILE_BASES = 48
+# Samples of a single base that share one product.
 _PRODUCT_ROWS = 16
 
 # w of the velocity cost, from the measurement in docs/method.md.
@@ -139,11 +143,11 @@ class Trellis:
     def __init__(self, table, mu, max_disparity):
         self.table = table
         self.width = max_disparity * table.subframes
-        self._groups, self._group_of_step = _group_steps(table, mu)
-        self._penalties = mu * table.penalty
+        self._groups, group_of_step = _group_steps(table, mu)
+        self._of_step = np.stack([mu * table.penalty, table.moving, table.inner])
         self._slopes = table.steps - table.subframes
         self._pad = int(np.abs(self._slopes).max())
-        self._unit_group = self._group_of_step[self._slopes == 0][0]
+        self._unit_group = group_of_step[self._slopes == 0][0]
 
     def distances(self, bases, moving):
         """Cost of the best path for every ordered pair.
@@ -157,44 +161,58 @@ class Trellis:
         -------
         ndarray, shape (n_bases, n_moving)
         """
-        n_frames = bases.shape[1]
         out = np.empty((len(bases), len(moving)), dtype=bases.dtype)
-        for columns in _tiles(len(moving), _TILE_SEQUENCES):
-            right = _right_factor(moving[columns])
-            size = _TILE_BYTES // (8 * right.shape[1] * (2 * self.width + 1))
-            for rows in _tiles(len(bases), max(1, size)):
-                states = self._forward(bases[rows], right, keep=2)
-                best = states[(n_frames - 1) % 2, self.width + self._pad]
-                out[rows, columns] = best.reshape(right.shape[1], -1).T
-        return np.maximum(out, 0, out=out)
+        for rows, columns, bundle in self._bundles(bases, moving):
+            states = bundle.states(2)
+            for _ in bundle.advance(states):
+                pass
+            out[rows, columns] = bundle.cost(states)
+        return out
 
-    def paths(self, base, moving):
-        """Best paths of many sequences to one base.
+    def paths(self, bases, moving, max_bytes=1 << 29):
+        """Best path for every ordered pair.
 
         Parameters
         ----------
-        base : ndarray, shape (P, n_features)
+        bases : ndarray, shape (n_bases, P, n_features)
         moving : ndarray, shape (n_moving, Q, n_features)
+        max_bytes : int, default=2 ** 29
+            Above this the rows of the trellis are not all kept but computed twice.
 
         Returns
         -------
-        distances : ndarray, shape (n_moving,)
-        disparities : ndarray of int, shape (n_moving, P)
+        distances : ndarray, shape (n_bases, n_moving)
+        disparities : ndarray of int32, shape (n_bases, n_moving, P)
             ``d(p)`` in sub-positions; ``d(0) = d(P-1) = 0``.
         """
-        n_frames = len(base)
-        distances = np.empty(len(moving), dtype=base.dtype)
-        disparities = np.empty((len(moving), n_frames), dtype=np.intp)
-        for columns in _tiles(len(moving), _TILE_SEQUENCES):
+        shape = len(bases), len(moving)
+        distances = np.empty(shape, dtype=bases.dtype)
+        disparities = np.empty((*shape, bases.shape[1]), dtype=np.int32)
+        for rows, columns, bundle in self._bundles(bases, moving):
+            distances[rows, columns], disparities[rows, columns] = bundle.paths(max_bytes)
+        return distances, disparities
+
+    def tiles(self, n_bases, n_moving, n_features):
+        """Slices of bases and of moving sequences that cover all pairs.
+
+        What a pair costs depends in its last bit on the tile it is computed in: work is
+        to be divided between tiles only.
+        """
+        cells = max(1, _TILE_PRODUCT // ((2 * self.width + 1) * (n_features + 2)))
+        for rows in _slices(n_bases, min(cells, _TILE_BASES)):
+            for columns in _slices(n_moving, max(1, cells // (rows.stop - rows.start))):
+                yield rows, columns
+
+    def cells(self, moving):
+        """Cells of the trellis of one pair."""
+        return (moving.shape[1] // self.table.subframes) * (2 * self.width + 1)
+
+    def _bundles(self, bases, moving):
+        for rows, columns in self.tiles(len(bases), *moving.shape[::2]):
             right = _right_factor(moving[columns])
-            states = self._forward(base[np.newaxis], right, keep=n_frames)
-            distances[columns] = states[-1, self.width + self._pad]
-            disparities[columns] = self._backward(states, base, right)
-        return np.maximum(distances, 0, out=distances), disparities
+            yield rows, columns, _Bundle(self, bases[rows], right)
 
-    # -- forward: the recurrence, Eq. 16 --------------------------------------
-
-    def _windows(self, n_frames):
+    def windows(self, n_frames):
         """Lowest and highest disparity, at every sample, of a pinned path in the band."""
         p = np.arange(n_frames)
         down, up = self.table.subframes, int(self._slopes.max())
@@ -202,100 +220,157 @@ class Trellis:
         high = np.minimum(self.width, np.minimum(up * p, down * p[::-1]))
         return low.tolist(), high.tolist()
 
-    def _forward(self, bases, right, keep):
-        """Rows ``S(p, .)`` of the recurrence, in a ring of ``keep`` rows.
 
-        The shape is (keep, 2 * (width + pad) + 1, n_moving * n_bases). Cells that no
-        path reaches stay infinite: the windows first only grow, over cells never
-        written, then only shrink, reading inside the row before.
+class _Bundle:
+    """The pairs of one tile, whose rows are computed together.
+
+    A row holds the disparities of all pairs, flat: (2 * (width + pad) + 1, n_moving,
+    n_bases), with ``pad`` cells at both sides for the steps that leave the band.
+    """
+
+    def __init__(self, trellis, bases, right):
+        self.trellis, self.bases, self.right = trellis, bases, right
+        self.n_frames, self.n_bases = bases.shape[1], len(bases)
+        self.pairs = right.shape[1] * self.n_bases
+        self.centre = trellis.width + trellis._pad
+        self.left = _left_factor(bases, trellis._groups)
+        self.low, self.high = trellis.windows(self.n_frames)
+
+    def states(self, n_rows):
+        """Rows of cells that no path has reached."""
+        cells = (2 * self.centre + 1) * self.pairs
+        return np.full((n_rows, cells), np.inf, dtype=self.bases.dtype)
+
+    def cost(self, states):
+        """Costs of the best paths, from the last row."""
+        at = self.centre * self.pairs
+        best = states[(self.n_frames - 1) % len(states), at : at + self.pairs]
+        return np.maximum(best, 0).reshape(-1, self.n_bases).T
+
+    # -- forward: the recurrence, Eq. 16 --------------------------------------
+
+    def advance(self, states, first=0, last=None):
+        """Compute the rows ``S(p, .)`` from ``first`` on, before ``last``, in a ring of rows.
+
+        Yields every p when its row is there. If ``first`` is not 0 its row must be there already.
+        Cells that no path reaches stay infinite: the windows first only grow, over
+        cells never written, then only shrink, reading inside the row before.
         """
-        n_bases = len(bases)
-        centre, pairs = self.width + self._pad, right.shape[1] * n_bases
-        states = np.full((keep, 2 * centre + 1, pairs), np.inf, dtype=bases.dtype)
-        scratch = np.empty((2, 2 * self.width + 1, pairs), dtype=bases.dtype)
-        for p, low, high, local in self._local_costs(bases, right):
-            start, length = centre + low, high - low + 1
-            new = states[p % keep, start : start + length]
+        groups, pairs, keep = self.trellis._groups, self.pairs, len(states)
+        scratch = np.empty((2, (2 * self.trellis.width + 1) * pairs), dtype=states.dtype)
+        last = self.n_frames if last is None else last
+        costs = self._costs_of_samples if self.n_bases > 1 else self._costs_of_blocks
+        for p, local in costs(first, last):
+            start = (self.centre + self.low[p]) * pairs
+            stop = (self.centre + self.high[p] + 1) * pairs
+            new = states[p % keep, start:stop]
             if p == 0:
-                new[...] = local[self._unit_group]
-                continue
-            old = states[(p - 1) % keep]
-            trial, level = scratch[:, :length]
-            for i, group in enumerate(self._groups):
-                target = trial if i else new
-                _best_step(old, start, group.levels, target, level)
-                target += local[i]
-                if i:
-                    np.minimum(new, target, out=new)
-        return states
+                unit = self.trellis._unit_group
+                np.subtract(local[unit], groups[unit].penalty, out=new)
+            elif p > first:
+                old = states[(p - 1) % keep]
+                trial, level = scratch[:, : stop - start]
+                for i, group in enumerate(groups):
+                    target = trial if i else new
+                    _best_step(old, start, stop, pairs, group.levels, target, level)
+                    target += local[i]
+                    if i:
+                        np.minimum(new, target, out=new)
+            yield p
 
-    def _local_costs(self, bases, right):
-        """Yield ``p, low, high, costs``; costs is (n_groups, window, n_moving * n_bases).
+    def _costs_of_samples(self, first, last):
+        """Yield ``p`` and the costs of its window, one flat array a group: a product a sample."""
+        sub, n_groups = self.trellis.table.subframes, len(self.trellis._groups)
+        n_factors = self.right.shape[2]
+        widest = (2 * self.trellis.width + 1) * self.pairs
+        room = np.empty(n_groups * widest, dtype=self.bases.dtype)
+        for p in range(first, last):
+            window = self.right[p * sub + self.low[p] : p * sub + self.high[p] + 1]
+            factor = window.reshape(-1, n_factors)
+            costs = room[: n_groups * len(factor) * self.n_bases].reshape(n_groups, -1)
+            products = costs.reshape(n_groups, -1, self.n_bases)
+            np.matmul(factor, self.left[p], out=products)
+            yield p, costs
 
-        They come from matrix products: many bases fill one for each sample,
-        for a single base a block of samples does.
-        """
-        n_bases, n_frames, _ = bases.shape
-        sub, n_groups, n_factors = self.table.subframes, len(self._groups), right.shape[2]
-        left = self._left_factor(bases)
-        lows, highs = self._windows(n_frames)
-        block = 1 if n_bases > 1 else _PRODUCT_ROWS
-        for start in range(0, n_frames, block):
-            samples = range(start, min(start + block, n_frames))
-            first = min(p * sub + lows[p] for p in samples)
-            last = max(p * sub + highs[p] for p in samples)
-            factor = right[first : last + 1].reshape(-1, n_factors)
-            if n_bases > 1:
-                costs = np.matmul(factor, left[start].transpose(0, 2, 1))
-            else:
-                costs = left[start : samples.stop].reshape(-1, n_factors) @ factor.T
-            costs = costs.reshape(len(samples), n_groups, last - first + 1, -1)
-            for p in samples:
-                at = p * sub - first
-                local = costs[p - start, :, at + lows[p] : at + highs[p] + 1]
-                yield p, lows[p], highs[p], local
-
-    def _left_factor(self, bases):
-        """(P, n_groups, n_bases, n_factors): times the right factor, the local costs."""
-        frames = bases.transpose(1, 0, 2)
-        n_frames, n_bases, n_features = frames.shape
-        left = np.empty((n_frames, len(self._groups), n_bases, n_features + 2), bases.dtype)
-        for i, group in enumerate(self._groups):
-            left[:, i, :, :-2] = -group.inner * frames
-            left[:, i, :, -2] = group.moving
-        left[..., -1] = np.einsum("pnk,pnk->pn", frames, frames)[:, np.newaxis]
-        return left
+    def _costs_of_blocks(self, first, last):
+        """The same for a single base: a product a block of samples."""
+        sub, n_groups = self.trellis.table.subframes, len(self.trellis._groups)
+        n_factors = self.right.shape[2]
+        for start in range(first, last, _PRODUCT_ROWS):
+            # Whole blocks even if their end is not asked for: equal products, equal bits.
+            stop = min(start + _PRODUCT_ROWS, self.n_frames)
+            lowest = min(p * sub + self.low[p] for p in range(start, stop))
+            highest = max(p * sub + self.high[p] for p in range(start, stop))
+            factor = self.right[lowest : highest + 1].reshape(-1, n_factors)
+            left = self.left[start:stop].reshape(-1, n_factors)
+            costs = np.matmul(left, factor.T).reshape(stop - start, n_groups, -1)
+            for p in range(start, min(stop, last)):
+                at = p * sub - lowest
+                low, high = at + self.low[p], at + self.high[p] + 1
+                yield p, costs[p - start, :, low * self.pairs : high * self.pairs]
 
     # -- backward: the path, Eq. 17 -------------------------------------------
 
-    def _backward(self, states, base, right):
-        """Read the paths back from the kept rows: at each sample, the step that won."""
-        n_frames, _, n_moving = states.shape
-        centre, sequence = self.width + self._pad, np.arange(n_moving)
-        back = self._slopes[:, np.newaxis] * n_moving
-        penalties = self._penalties.astype(base.dtype)[:, np.newaxis]
-        left = self._left_factor(base[np.newaxis])[:, :, 0]
-        at = np.empty((n_frames, n_moving), dtype=np.intp)
-        at[-1] = centre * n_moving + sequence
-        for p in range(n_frames - 1, 0, -1):
-            value = states[p - 1].ravel().take(at[p] - back) + penalties
-            if len(self._groups) > 1:
-                q = p * self.table.subframes + at[p] // n_moving - centre
-                value += (left[p] @ right[q, sequence].T)[self._group_of_step]
+    def paths(self, max_bytes):
+        """Costs and disparities of the best paths.
+
+        If not all rows may be kept, every ``length``-th is, and the rows between two of them
+        are computed again, from the last to the first.
+        """
+        n_frames, length = self.n_frames, self.n_frames
+        if self.states(1).nbytes * n_frames > max_bytes:
+            length = _PRODUCT_ROWS * math.ceil(math.sqrt(n_frames) / _PRODUCT_ROWS)
+        states = self.states(n_frames if length >= n_frames else 2)
+        kept = {}
+        for p in self.advance(states):
+            if length < n_frames and p % length == 0:
+                kept[p] = states[p % 2].copy()
+        cost = self.cost(states)
+        at = np.empty((n_frames, self.pairs), dtype=np.intp)
+        at[-1] = self.centre * self.pairs + np.arange(self.pairs)
+        for first in range(0, n_frames, length)[::-1]:
+            last = min(first + length, n_frames)
+            if kept:
+                states = self.states(length)
+                states[first % length] = kept.pop(first)
+                for _ in self.advance(states, first, last):
+                    pass
+            self._retrace(states, at, first, last)
+        disparities = (at // self.pairs - self.centre).T
+        return cost, disparities.reshape(-1, self.n_bases, n_frames).swapaxes(0, 1)
+
+    def _retrace(self, states, at, first, last):
+        """Follow the paths from the row ``last`` to ``first``: at each sample, the step that won."""
+        trellis, pairs = self.trellis, self.pairs
+        several = len(trellis._groups) > 1
+        back = trellis._slopes[:, np.newaxis] * pairs
+        dtype = states.dtype
+        penalties, weight, inner = trellis._of_step.astype(dtype)[:, :, np.newaxis]
+        moving, base = np.divmod(np.arange(pairs), self.n_bases)
+        for p in range(min(last, self.n_frames - 1), first, -1):
+            value = states[(p - 1) % len(states)].take(at[p] - back)
+            value += penalties
+            if several:
+                q = p * trellis.table.subframes + at[p] // pairs - self.centre
+                y, x = self.right[q, moving], self.bases[base, p]
+                value += weight * y[:, -2]
+                value -= inner * np.einsum("ik,ik->i", x, y[:, :-2])
             at[p - 1] = at[p] - back[value.argmin(axis=0), 0]
-        return (at // n_moving - centre).T
 
 
-def _tiles(n, size):
-    """Slices of at most ``size`` items that cover ``n`` of them."""
-    return [slice(start, min(start + size, n)) for start in range(0, n, size)]
+def _slices(n, size):
+    """Slices that cover ``n`` items: as few as can be of at most ``size``, of even sizes."""
+    count = -(-n // size)
+    edges = [i * n // count for i in range(count + 1)] if count else []
+    return [slice(start, stop) for start, stop in itertools.pairwise(edges)]
 
 
 class _Group(NamedTuple):
-    """Steps whose local cost is the same, by falling penalty."""
+    """Steps whose local cost is the same; what their penalties have in common belongs to it."""
 
     moving: float
     inner: float
+    penalty: float
     levels: list
 
 
@@ -307,23 +382,24 @@ def _group_steps(table, mu):
     slopes = table.steps - table.subframes
     groups = []
     for i, (moving, inner) in enumerate(unique):
-        penalties = mu * table.penalty[group_of_step == i]
+        mine = group_of_step == i
+        penalties = mu * table.penalty[mine]
+        least = penalties.min()
         levels = [
-            (float(value), slopes[group_of_step == i][penalties == value].tolist())
+            (float(value - least), slopes[mine][penalties == value].tolist())
             for value in np.unique(penalties)[::-1]
         ]
-        groups.append(_Group(moving, inner, levels))
+        groups.append(_Group(moving, inner, float(least), levels))
     return groups, group_of_step
 
 
-def _best_step(old, start, levels, out, scratch):
+def _best_step(old, start, stop, pairs, levels, out, scratch):
     """``min_s S(p-1, d - k_s) + mu phi_s`` over the steps of one group, into ``out``.
 
     ``levels`` come by falling penalty, so the free steps need no addition.
     """
-    length = len(out)
     for j, (penalty, slopes) in enumerate(levels):
-        views = [old[start - k : start - k + length] for k in slopes]
+        views = [old[start - k * pairs : stop - k * pairs] for k in slopes]
         if j and penalty == 0:
             for view in views:
                 np.minimum(out, view, out=out)
@@ -343,9 +419,22 @@ def _best_step(old, start, levels, out, scratch):
 
 def _right_factor(moving):
     """(Q, n_moving, n_features + 2): x_m(q), |x_m(q)|^2 and 1."""
-    frames = moving.transpose(1, 0, 2)
-    right = np.empty((*frames.shape[:2], frames.shape[2] + 2), dtype=moving.dtype)
-    right[..., :-2] = frames
-    np.einsum("qmk,qmk->qm", frames, frames, out=right[..., -2])
+    n_moving, n_positions, n_features = moving.shape
+    right = np.empty((n_positions, n_moving, n_features + 2), dtype=moving.dtype)
+    right[..., :-2] = moving.transpose(1, 0, 2)
+    np.einsum("mqk,mqk->qm", moving, moving, out=right[..., -2])
     right[..., -1] = 1
     return right
+
+
+def _left_factor(bases, groups):
+    """(P, n_groups, n_features + 2, n_bases): times the right factor, the local costs."""
+    n_bases, n_frames, n_features = bases.shape
+    left = np.empty((n_frames, len(groups), n_features + 2, n_bases), dtype=bases.dtype)
+    frames = bases.transpose(1, 2, 0)
+    energy = np.einsum("npk,npk->pn", bases, bases)
+    for i, group in enumerate(groups):
+        np.multiply(frames, -group.inner, out=left[:, i, :-2])
+        left[:, i, -2] = group.moving
+        np.add(energy, group.penalty, out=left[:, i, -1])
+    return left

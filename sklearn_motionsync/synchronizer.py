@@ -1,20 +1,28 @@
 """Putting performances on one clock (Eqs. 7-19)."""
 
+from functools import partial
 from numbers import Integral, Real
 
 import numpy as np
+from sklearn.utils import check_random_state, gen_batches
 from sklearn.utils._param_validation import Interval, StrOptions
 
-from .clock import Synchronizer, distances_to_all
-from .consensus import choose_exemplars, vote
-from .features import cost_features, smooth
+from .clock import Synchronizer
+from .consensus import choose_exemplars
+from .features import cost_features
 from .matching import Match, Trellis, step_table
-from .refinement import choose_smoothing, misfit, refine_warps
+from .median import estimate_distances, search_median, sum_all
+from .refinement import choose_smoothing
+from .warping import Warper
+from .work import CallbackSupportMixin, Progress, run
 
 __all__ = ["DenseSynchronizer", "LinearSynchronizer"]
 
-# Bases handled between two looks at the result: bounds the memory of all pairs.
-_BASES_AT_ONCE = 256
+# Up to so many performances all pairs are compared: see docs/scaling.md.
+_EXHAUSTIVE = 100
+# Sizes of a portion of warping: worth sending away, and small enough to be shared out.
+_PORTION_CELLS = 50_000_000
+_PORTION_SEQUENCES = 64
 
 # Sets of repeated trials leave 0.0001 to 0.02 (0.07 with 4 features and 20 % noise), sets of people
 # 0.09 and more, single people 0.05 and more; there refining begins to help
@@ -70,9 +78,6 @@ class LinearSynchronizer(Synchronizer):
         self.n_frames = n_frames
         self.pattern = pattern
 
-    def _global_distances(self, arrays, features):
-        return distances_to_all(features)
-
     def _match(self, arrays):
         clock = np.arange(self.n_frames_, dtype=np.float64)
         on_clock = self._normalise(arrays, clock)
@@ -81,7 +86,7 @@ class LinearSynchronizer(Synchronizer):
         return Match(np.zeros_like(times), times, distances)
 
 
-class DenseSynchronizer(Synchronizer):
+class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
     """Synchronise performances by dense matching to the median one.
 
     1. Normalise all performances linearly to ``P`` frames (Eq. 7).
@@ -110,7 +115,8 @@ class DenseSynchronizer(Synchronizer):
     ----------
     n_frames : int, default=None
         ``P``, frames of the common clock; by default the median length of the performances,
-        or the length of a pattern given as an array. Time and memory grow with its square.
+        or the length of a pattern given as an array. Time grows with its square, as
+        ``max_offset`` is a share of it.
     pattern : "median", int or array (n_frames, n_features), default="median"
         The median performance, one chosen by its index, or another one.
     cost : {"velocity", "elastic", "posture"}, default="velocity"
@@ -145,6 +151,17 @@ class DenseSynchronizer(Synchronizer):
         Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and
         the postures of the training set, matched without, leave a misfit of less than 7 % of
         their variance.
+    search : {"auto", "exhaustive", "sampled"}, default="auto"
+        How the median is found. ``"exhaustive"``: by all ``N (N - 1)`` matches. ``"sampled"``: by
+        matches with random references, as few as it takes to be sure; see ``certified_``.
+        ``"auto"``: exhaustively up to 100 performances.
+    random_state : int, RandomState instance or None, default=0
+        Draws the references of a sampled search. The default makes equal input give equal results.
+    n_jobs : int, default=None
+        How many jobs share the matches, in ``fit``, ``transform`` and ``match``. None means 1 unless in a
+        ``joblib.parallel_config`` context, -1 all cores. Results are the same to the last bit.
+    verbose : int, default=0
+        Above 0, print how far a long job is, at most once a second.
 
     Attributes
     ----------
@@ -155,8 +172,15 @@ class DenseSynchronizer(Synchronizer):
     n_frames_ : int
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
-        ``C_n`` of Eq. 19 for every performance; NaN if neither pattern nor consensus
-        needed them.
+        ``C_n`` of Eq. 19 where it is exact: for every performance after an exhaustive search, for
+        the best few after a sampled one; NaN for the others.
+    certified_ : bool
+        Whether the pattern is the median of Eq. 19: known from all matches, or because a paired
+        test rejected every other performance, all tests together erring with a probability of
+        1 %. False if the pattern was given, or a sampled search ran out of the matches
+        it may spend: 9 % of all, or 100 a performance if that is more.
+    n_matches_ : int
+        Matches made to choose the pattern and the exemplars.
     mu_ : float
         The absolute weight of the changes of pace.
     exemplars_ : ndarray of int
@@ -213,6 +237,10 @@ class DenseSynchronizer(Synchronizer):
         "consensus": [Interval(Integral, 0, None, closed="left")],
         "warp_smoothing": [Interval(Real, 0, 1, closed="both")],
         "refine": [StrOptions({"auto"}), "boolean"],
+        "search": [StrOptions({"auto", "exhaustive", "sampled"})],
+        "random_state": ["random_state"],
+        "n_jobs": [Integral, None],
+        "verbose": ["verbose"],
     }
 
     def __init__(
@@ -228,6 +256,10 @@ class DenseSynchronizer(Synchronizer):
         consensus=8,
         warp_smoothing=0.02,
         refine="auto",
+        search="auto",
+        random_state=0,
+        n_jobs=None,
+        verbose=0,
     ):
         self.n_frames = n_frames
         self.pattern = pattern
@@ -240,16 +272,34 @@ class DenseSynchronizer(Synchronizer):
         self.consensus = consensus
         self.warp_smoothing = warp_smoothing
         self.refine = refine
+        self.search = search
+        self.random_state = random_state
+        self.n_jobs = n_jobs
+        self.verbose = verbose
 
-    @property
-    def _compares_all(self):
-        return self.consensus > 0
+    def _fit(self, arrays):
+        with Progress(self, self.verbose) as self._progress:
+            try:
+                return super()._fit(arrays)
+            finally:
+                del self._progress
 
     def _prepare(self, arrays, on_clock):
         # Centred features keep the inner products of the trellis small.
-        self._centre = on_clock.mean(axis=(0, 1))
-        features = self._features(arrays)
-        self.mu_ = float(self.smoothness * np.square(features).sum(axis=2).mean(dtype=np.float64))
+        centre = on_clock.mean(axis=(0, 1))
+        positions = self._positions(arrays, on_clock) - centre
+        features = cost_features(positions, self.cost, self.subframes, self.velocity_smoothing)
+        energy = np.einsum("npk,npk->", features, features, dtype=np.float64)
+        self.mu_ = float(self.smoothness * energy / np.prod(features.shape[:2]))
+        table = step_table(self.cost, self.max_rate, self.subframes)
+        self._warper = Warper(
+            trellis=Trellis(table, self.mu_, self._reach),
+            cost=self.cost,
+            velocity_smoothing=self.velocity_smoothing,
+            centre=centre,
+            reach=self._reach,
+            warp_smoothing=self.warp_smoothing,
+        )
         return features
 
     @property
@@ -258,35 +308,46 @@ class DenseSynchronizer(Synchronizer):
         reach = int(np.floor(self.max_offset * self.n_frames_ * (1 + 1e-12)))
         return min(reach, self.n_frames_ - 1)
 
-    def _trellis(self):
-        table = step_table(self.cost, self.max_rate, self.subframes)
-        return Trellis(table, self.mu_, self._reach)
-
-    def _features(self, arrays):
-        """What is compared, of every performance, at every sub-position."""
+    def _positions(self, arrays, on_clock=None):
+        """All performances at every sub-position of the common clock."""
+        if self.subframes == 1 and on_clock is not None:
+            return on_clock
         n_positions = (self.n_frames_ - 1) * self.subframes + 1
-        positions = self._normalise(arrays, np.arange(n_positions) / self.subframes)
-        return cost_features(
-            positions - self._centre, self.cost, self.subframes, self.velocity_smoothing
-        )
+        return self._normalise(arrays, np.arange(n_positions) / self.subframes)
 
-    def _global_distances(self, arrays, features):
-        trellis, bases = self._trellis(), features[:, :: self.subframes]
-        sums = [
-            trellis.distances(bases[i : i + _BASES_AT_ONCE], features).sum(axis=1, dtype=np.float64)
-            for i in range(0, len(bases), _BASES_AT_ONCE)
-        ]
-        return np.concatenate(sums)
+    def _choose_median(self, on_clock, features, wanted):
+        n, rounding = len(features), self._rounding(on_clock)
+        compare = partial(self._compare, features)
+        random_state = check_random_state(self.random_state)
+        if not wanted and self.consensus == 0:
+            median = super()._choose_median(on_clock, features, wanted)
+        elif self.search == "exhaustive" or (self.search == "auto" and n <= _EXHAUSTIVE):
+            median = sum_all(compare, n, rounding)
+        elif wanted:
+            median = search_median(compare, n, rounding, random_state)
+        else:
+            median = estimate_distances(compare, n, random_state)
+        self.n_matches_ = median.n_matches
+        self.certified_ = median.certified and wanted
+        return median
 
-    def _learn(self, arrays, on_clock, source):
+    def _compare(self, features, bases, moving):
+        """Yield the synchronisation distances of all pairs, tile by tile."""
+        trellis = self._warper.trellis
+        tiles = list(trellis.tiles(len(bases), len(moving), features.shape[2]))
+        cells = max(1, len(bases) * len(moving) // max(1, len(tiles))) * trellis.cells(features)
+        batches = gen_batches(len(tiles), max(1, _PORTION_CELLS // cells))
+        portions = [(features, bases, moving, tiles[batch]) for batch in batches]
+        step = self._progress.stage("comparing performances", len(portions))
+        for blocks in run(self._warper.distances, portions, n_jobs=self.n_jobs, step=step):
+            yield from blocks
+
+    def _learn(self, arrays, on_clock, source, estimates):
         self.exemplars_ = np.empty(0, dtype=np.intp)
         if self.consensus > 0:
-            self.exemplars_ = choose_exemplars(
-                self.global_distances_, self.consensus, self.pattern_index_
-            )
-        chosen = self._features([source, *(arrays[k] for k in self.exemplars_)])
-        self._bases = chosen[:, :: self.subframes].copy()
-        self._to_exemplars = self._paths(self._bases[0], chosen[1:])[1]
+            self.exemplars_ = choose_exemplars(estimates, self.consensus, self.pattern_index_)
+        chosen = self._positions([source, *(arrays[k] for k in self.exemplars_)])
+        self._warper = self._warper.with_pattern(self.pattern_, chosen, self.consensus > 0)
         self.misfit_ = np.nan
         if self.refine == "auto":
             if self.consensus > 0:
@@ -295,7 +356,7 @@ class DenseSynchronizer(Synchronizer):
         else:
             self.refines_ = bool(self.refine)
         if self.refines_:
-            self._smoothing = choose_smoothing(on_clock)
+            self._warper = self._warper._replace(noise_width=choose_smoothing(on_clock))
 
     def _measure_misfit(self, arrays, on_clock):
         """Median misfit of the performances, or of evenly spaced ones of many."""
@@ -303,44 +364,21 @@ class DenseSynchronizer(Synchronizer):
         if len(others) == 0:
             return 0.0
         some = others[:: -(-len(others) // _MISFIT_SAMPLE)]
-        times = self._vote([arrays[i] for i in some])[1]
-        return float(np.median(misfit(self.pattern_, on_clock[some], times)))
+        positions = self._positions([arrays[i] for i in some], on_clock[some])
+        results = self._in_portions(self._warper.misfits, positions, self._progress, "misfit")
+        return float(np.median(np.concatenate(results)))
 
     def _match(self, arrays):
-        distances, times = self._vote(arrays)
-        if self.refines_:
-            on_clock = self._normalise(arrays, np.arange(self.n_frames_))
-            curves = np.concatenate([self.pattern_[np.newaxis], on_clock])
-            if self._smoothing > 0:
-                curves = smooth(curves, self._smoothing)
-            times = refine_warps(curves[0], curves[1:], times, self._reach)
+        with Progress(self, self.verbose, fits=False) as progress:
+            warps = self._warper.warps
+            results = self._in_portions(warps, self._positions(arrays), progress, "warping")
+        distances, times = (np.concatenate(parts) for parts in zip(*results, strict=True))
         return Match(times - np.arange(self.n_frames_), times, distances)
 
-    def _vote(self, arrays):
-        """Distances of the direct paths, and smoothed times after the vote of the exemplars."""
-        moving = self._features(arrays)
-        distances, direct = self._paths(self._bases[0], moving)
-        if self.consensus == 0:
-            return distances, direct
-        times = direct
-        if len(self.exemplars_):
-            routes = np.stack([self._paths(base, moving)[1] for base in self._bases[1:]])
-            times = vote(direct, self._to_exemplars, routes)
-        times = self._smooth_warps(times)
-        # A path without any distance is right: the pattern keeps its own pace.
-        rounding = 64 * np.finfo(moving.dtype).eps * np.square(self._bases[0]).sum()
-        return distances, np.where((distances <= rounding)[:, np.newaxis], direct, times)
-
-    def _smooth_warps(self, times):
-        """Warps whose offsets are smoothed and in the band, pinned and non-decreasing."""
-        frames, sigma = np.arange(self.n_frames_), self.warp_smoothing * (self.n_frames_ - 1)
-        offsets = times - frames
-        if sigma > 1 / 3:
-            offsets = smooth(offsets[:, :, np.newaxis], sigma)[:, :, 0]
-            offsets[:, [0, -1]] = 0
-        times = frames + np.clip(offsets, -self._reach, self._reach)
-        return np.maximum.accumulate(np.clip(times, 0, self.n_frames_ - 1), axis=1)
-
-    def _paths(self, base, moving):
-        distances, disparities = self._trellis().paths(base, moving)
-        return distances, np.arange(self.n_frames_) + disparities / self.subframes
+    def _in_portions(self, function, positions, progress, name):
+        """Results of a function of the warper for portions of all performances."""
+        cells = len(self._warper.bases) * self._warper.trellis.cells(positions)
+        size = int(np.clip(_PORTION_CELLS // cells, 1, _PORTION_SEQUENCES))
+        portions = [(positions, rows) for rows in gen_batches(len(positions), size)]
+        step = progress.stage(name, len(portions))
+        return list(run(function, portions, n_jobs=self.n_jobs, step=step))

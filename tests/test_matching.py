@@ -61,14 +61,14 @@ def test_equals_every_admissible_path(case, make_costs, whole, dtype):
     distances = trellis.distances(bases, moving)
     assert distances.dtype == dtype
     close = {"rtol": 1e-10, "atol": 1e-12} if dtype == np.float64 else {"rtol": 1e-4, "atol": 1e-4}
+    from_paths, disparities = trellis.paths(bases, moving)
+    np.testing.assert_allclose(from_paths, distances, **close)
     for n, base in enumerate(bases):
-        from_paths, disparities = trellis.paths(base, moving)
-        np.testing.assert_allclose(from_paths, distances[n], **close)
         for m, sequence in enumerate(moving):
             x, y = base.astype(float), sequence.astype(float)
             best, paths = brute_force(x, y, costs, mu, subframes, reach)
             np.testing.assert_allclose(distances[n, m], best, **close)
-            path = disparities[m] + subframes * np.arange(n_frames)
+            path = disparities[n, m] + subframes * np.arange(n_frames)
             if dtype == np.float64:
                 assert tuple(path) in paths
             else:
@@ -100,8 +100,8 @@ def test_ties_keep_the_pace():
     """Between paths of equal cost the diagonal wins: standing still says nothing of time."""
     still = np.zeros((1, 9, 2))
     for mu in (0.0, 1.0):
-        distances, disparities = Trellis(step_table(), mu, 4).paths(still[0], still)
-        assert distances[0] == 0
+        distances, disparities = Trellis(step_table(), mu, 4).paths(still, still)
+        assert distances == 0
         assert not disparities.any()
 
 
@@ -109,8 +109,8 @@ def test_ties_keep_the_pace():
 def test_paths_are_pinned_monotone_and_in_the_band(subframes):
     bases, moving = draw(np.random.default_rng(2), 4, 50, subframes)
     table = step_table("posture", max_rate=3, subframes=subframes)
-    _, disparities = Trellis(table, 0.01, 7).paths(bases[0], moving)
-    assert (disparities[:, [0, -1]] == 0).all()
+    _, disparities = Trellis(table, 0.01, 7).paths(bases, moving)
+    assert (disparities[..., [0, -1]] == 0).all()
     assert np.abs(disparities).max() <= 7 * subframes
     steps = np.diff(disparities) + subframes
     assert steps.min() >= 0
@@ -122,12 +122,12 @@ def test_tiles_do_not_change_the_answer(n_bases, monkeypatch):
     bases, moving = draw(np.random.default_rng(3), n_bases, 30, n_features=4)
     trellis = Trellis(step_table(), 0.5, 8)
     whole = trellis.distances(bases, moving)
-    _, paths = trellis.paths(bases[0], moving)
-    monkeypatch.setattr(matching, "_TILE_BYTES", 1)
-    monkeypatch.setattr(matching, "_TILE_SEQUENCES", 2)
+    _, paths = trellis.paths(bases, moving)
+    monkeypatch.setattr(matching, "_TILE_PRODUCT", 1)
+    monkeypatch.setattr(matching, "_TILE_BASES", 2)
     monkeypatch.setattr(matching, "_PRODUCT_ROWS", 3)
     np.testing.assert_allclose(trellis.distances(bases, moving), whole, rtol=1e-12)
-    np.testing.assert_array_equal(trellis.paths(bases[0], moving)[1], paths)
+    np.testing.assert_array_equal(trellis.paths(bases, moving)[1], paths)
 
 
 def test_inputs_may_be_read_only_and_are_not_written():
@@ -136,6 +136,6 @@ def test_inputs_may_be_read_only_and_are_not_written():
     bases.flags.writeable = moving.flags.writeable = False
     trellis = Trellis(step_table(), 0.5, 4)
     trellis.distances(bases, moving)
-    trellis.paths(bases[0], moving)
+    trellis.paths(bases, moving)
     np.testing.assert_array_equal(bases, copies[0])
     np.testing.assert_array_equal(moving, copies[1])

@@ -1,0 +1,127 @@
+"""From performances on the common clock to their warps: match, vote, smooth, refine."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .consensus import vote
+from .features import cost_features, smooth
+from .matching import Trellis
+from .refinement import misfit, refine_warps
+
+__all__ = ["Warper"]
+
+
+class Warper(NamedTuple):
+    """All it takes to warp performances to a pattern, in portions and in other processes.
+
+    Attributes
+    ----------
+    trellis : Trellis
+    cost : str
+    velocity_smoothing : float
+    centre : ndarray, shape (n_features,)
+        Mean posture of the training set.
+    reach : int
+        Largest offset, in frames.
+    warp_smoothing : float
+    bases : ndarray, shape (1 + n_exemplars, P, n_features)
+        Features of the pattern and of the exemplars.
+    to_exemplars : ndarray, shape (n_exemplars, P)
+        Times of the pattern on the clocks of the exemplars.
+    votes : bool
+        Whether direct paths are voted on and smoothed.
+    pattern : ndarray, shape (P, n_features)
+        Postures, to refine by.
+    noise_width : float or None
+        Smoothing of postures before refining, in frames; None if warps are not refined.
+    """
+
+    trellis: Trellis
+    cost: str
+    velocity_smoothing: float
+    centre: np.ndarray
+    reach: int
+    warp_smoothing: float
+    bases: np.ndarray | None = None
+    to_exemplars: np.ndarray | None = None
+    votes: bool = False
+    pattern: np.ndarray | None = None
+    noise_width: float | None = None
+
+    @property
+    def subframes(self):
+        """Positions a frame."""
+        return self.trellis.table.subframes
+
+    def features(self, positions):
+        """What is compared, at every position: (n_sequences, Q, n_features)."""
+        return cost_features(
+            positions - self.centre, self.cost, self.subframes, self.velocity_smoothing
+        )
+
+    def with_pattern(self, pattern, chosen, votes):
+        """The warper to a pattern, given it and its exemplars at all positions."""
+        features = self.features(chosen)
+        # A copy: the whole of the features is not to be kept alive.
+        bases = features[:, :: self.subframes].copy()
+        self = self._replace(bases=bases, votes=votes, pattern=pattern)
+        times = self._paths(bases[:1], features[1:])[1][0]
+        return self._replace(to_exemplars=times)
+
+    def distances(self, features, bases, moving, tiles):
+        """Synchronisation distances ``D_{n,m}`` of the tiles of the pairs of two index arrays."""
+        return [
+            (rows, columns, self._tile(features, bases[rows], moving[columns]))
+            for rows, columns in tiles
+        ]
+
+    def _tile(self, features, bases, moving):
+        return self.trellis.distances(features[bases, :: self.subframes], features[moving])
+
+    def warps(self, positions, rows):
+        """Distances of the direct paths to the pattern, and times ``tau``, of some performances."""
+        positions = positions[rows]
+        distances, times = self._voted(positions)
+        if self.noise_width is not None:
+            curves = np.concatenate([self.pattern[np.newaxis], positions[:, :: self.subframes]])
+            if self.noise_width > 0:
+                curves = smooth(curves, self.noise_width)
+            times = refine_warps(curves[0], curves[1:], times, self.reach)
+        return distances, times
+
+    def misfits(self, positions, rows):
+        """Misfits of matched postures, before any refinement."""
+        positions = positions[rows]
+        times = self._voted(positions)[1]
+        return misfit(self.pattern, positions[:, :: self.subframes], times)
+
+    def _voted(self, positions):
+        """Distances of the direct paths, and smoothed times after the vote of the exemplars."""
+        moving = self.features(positions)
+        distances, routes = self._paths(self.bases, moving)
+        distances, times = distances[0], routes[0]
+        if not self.votes:
+            return distances, times
+        direct = times
+        if len(self.to_exemplars):
+            times = vote(direct, self.to_exemplars, routes[1:])
+        times = self._smoothed(times)
+        # A path without any distance is right: the pattern keeps its own pace.
+        rounding = 64 * np.finfo(moving.dtype).eps * np.square(self.bases[0]).sum()
+        return distances, np.where((distances <= rounding)[:, np.newaxis], direct, times)
+
+    def _smoothed(self, times):
+        """Warps whose offsets are smoothed and in the band, pinned and non-decreasing."""
+        n_frames = times.shape[1]
+        frames, sigma = np.arange(n_frames), self.warp_smoothing * (n_frames - 1)
+        offsets = times - frames
+        if sigma > 1 / 3:
+            offsets = smooth(offsets[:, :, np.newaxis], sigma)[:, :, 0]
+            offsets[:, [0, -1]] = 0
+        times = frames + np.clip(offsets, -self.reach, self.reach)
+        return np.maximum.accumulate(np.clip(times, 0, n_frames - 1), axis=1)
+
+    def _paths(self, bases, moving):
+        distances, disparities = self.trellis.paths(bases, moving)
+        return distances, np.arange(bases.shape[1]) + disparities / self.subframes

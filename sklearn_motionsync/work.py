@@ -1,0 +1,128 @@
+"""Work in fixed portions: on one core, on many, or on a cluster, with progress.
+
+What a portion holds never depends on how many workers there are, and within a portion the
+linear algebra runs on one thread: so results are equal to the last bit however they are computed.
+"""
+
+import functools
+import time
+
+from joblib import effective_n_jobs
+from sklearn.utils.parallel import Parallel, delayed
+from threadpoolctl import ThreadpoolController
+
+try:
+    from sklearn.callback import CallbackSupportMixin
+except ImportError:  # scikit-learn before 1.9
+
+    class CallbackSupportMixin:
+        """No callbacks."""
+
+
+__all__ = ["CallbackSupportMixin", "Progress", "run"]
+
+# Seconds between two lines of a verbose estimator.
+_INTERVAL = 1.0
+
+
+def run(function, portions, *, n_jobs=None, step=None):
+    """Yield ``function(*portion)`` for every portion, in order.
+
+    Parameters
+    ----------
+    function : callable
+        Something that can be pickled, if there are several jobs.
+    portions : list of tuples
+        Arguments. Large arrays among them reach other processes as read-only memory maps.
+    n_jobs : int, default=None
+        As everywhere in scikit-learn: None means 1, unless ``joblib.parallel_config`` says otherwise.
+    step : callable, default=None
+        Called after every portion.
+    """
+    results = _results(function, portions, n_jobs)
+    for result in results:
+        if step is not None:
+            step()
+        yield result
+
+
+def _results(function, portions, n_jobs):
+    if len(portions) < 2 or effective_n_jobs(n_jobs) == 1:
+        return (_on_one_thread(function, portion) for portion in portions)
+    try:
+        parallel = Parallel(n_jobs=n_jobs, return_as="generator")
+    except ValueError:
+        # Some backends can only hand over all results at once.
+        parallel = Parallel(n_jobs=n_jobs)
+    return parallel(delayed(_on_one_thread)(function, portion) for portion in portions)
+
+
+def _on_one_thread(function, portion):
+    with _thread_pools().limit(limits=1, user_api="blas"):
+        return function(*portion)
+
+
+@functools.cache
+def _thread_pools():
+    return ThreadpoolController()
+
+
+class Progress:
+    """How far a long job of an estimator is: printed if verbose, and told to its callbacks.
+
+    A context manager; ``stage`` begins the next part of the job and gives the function to call
+    after each of its portions.
+
+    Parameters
+    ----------
+    estimator : estimator
+        Its callbacks are told if ``fits``.
+    verbose : int
+        Above 0 prints at most one line a second.
+    fits : bool, default=True
+        Callbacks only belong to ``fit``.
+    """
+
+    def __init__(self, estimator, verbose, fits=True):
+        self._estimator, self._verbose = estimator, verbose
+        self._tells = fits and hasattr(estimator, "_init_callback_context")
+        self._tasks = []
+
+    def __enter__(self):
+        if self._tells:
+            root = self._estimator._init_callback_context(max_subtasks=None)
+            self._tasks.append(root.call_on_fit_task_begin(estimator=self._estimator))
+        return self
+
+    def __exit__(self, kind, error, traceback):
+        while self._tasks and kind is None:
+            self._tasks.pop().call_on_fit_task_end(estimator=self._estimator)
+
+    def stage(self, name, n_portions):
+        """Begin a stage of so many portions."""
+        stage = None
+        if self._tells:
+            while len(self._tasks) > 1:
+                self._tasks.pop().call_on_fit_task_end(estimator=self._estimator)
+            stage = self._tasks[0].subcontext(task_name=name, max_subtasks=n_portions)
+            self._tasks.append(stage.call_on_fit_task_begin(estimator=self._estimator))
+        begin = printed = time.perf_counter()
+        done = 0
+
+        def step():
+            nonlocal done, printed
+            done += 1
+            if stage is not None:
+                leaf = stage.subcontext(task_name="portion")
+                leaf.call_on_fit_task_begin(estimator=self._estimator)
+                leaf.call_on_fit_task_end(estimator=self._estimator)
+            now = time.perf_counter()
+            if self._verbose > 0 and (now - printed >= _INTERVAL or done == n_portions):
+                printed = now
+                print(
+                    f"[{type(self._estimator).__name__}] {name}: {100 * done // n_portions:3d} %, "
+                    f"{now - begin:.1f} s",
+                    flush=True,
+                )
+
+        return step
