@@ -98,7 +98,7 @@ class Synchronizer(TransformerMixin, BaseEstimator):
         on_clock = self._normalise(arrays, np.arange(self.n_frames_))
         features = self._prepare(arrays, on_clock, **extra)
         wanted = isinstance(self.pattern, str)
-        median = self._choose_median(on_clock, features, wanted)
+        median = self._choose_median(features, wanted)
         self.global_distances_ = median.distances
         self.pattern_index_ = median.index if wanted else None
         if not wanted and given is None:
@@ -119,13 +119,13 @@ class Synchronizer(TransformerMixin, BaseEstimator):
         """What performances are to be compared by."""
         return on_clock
 
-    def _choose_median(self, on_clock, features, wanted):
+    def _choose_median(self, features, wanted):
         """The median performance (Eq. 19); or only what else is needed of it if not wanted."""
         if not wanted:
             unknown = np.full(len(features), np.nan)
             return Median(None, unknown, unknown, False, 0)
         sums = distances_to_all(features)
-        return Median(first_smallest(sums, self._rounding(on_clock)), sums, sums, True, 0)
+        return Median(first_smallest(sums, rounding_of(features)), sums, sums, True, 0)
 
     def _learn(self, arrays, on_clock, source, estimates):
         pass
@@ -197,24 +197,42 @@ class Synchronizer(TransformerMixin, BaseEstimator):
         return int(np.median([len(a) for a in arrays]))
 
     def _normalise(self, arrays, times):
-        """Linear normalisation (Eq. 7): every performance at the same times of its course."""
-        return self._sample(arrays, np.broadcast_to(times, (len(arrays), len(times))))
+        """Linear normalisation (Eq. 7): every performance at even times, as many as frames or more."""
+        out = np.empty((len(arrays), len(times), arrays[0].shape[1]), dtype=arrays[0].dtype)
+        places = {}
+        for x, result in zip(arrays, out, strict=True):
+            if len(x) == len(times) == self.n_frames_:
+                result[:] = x
+                continue
+            if len(x) not in places:
+                places[len(x)] = self._places(times, x)
+            _interpolate(x, *places[len(x)], result)
+        return out
 
     def _sample(self, arrays, times):
         """Performances at times in pattern frames, linear between their own frames (Eq. 18)."""
         out = np.empty((len(arrays), times.shape[1], arrays[0].shape[1]), dtype=arrays[0].dtype)
-        for i, x in enumerate(arrays):
-            # In this order a whole number of frames stays whole.
-            at = times[i] * (len(x) - 1) / (self.n_frames_ - 1)
-            left = np.minimum(at.astype(np.intp), len(x) - 2)
-            weight = (at - left).astype(x.dtype)[:, np.newaxis]
-            out[i] = x[left] * (1 - weight) + x[left + 1] * weight
+        for x, tau, result in zip(arrays, times, out, strict=True):
+            _interpolate(x, *self._places(tau, x), result)
         return out
 
-    def _rounding(self, on_clock):
-        """How far rounding can move a global distance."""
-        energy = np.square(on_clock - on_clock.mean(axis=(0, 1))).sum(dtype=np.float64)
-        return 8 * np.finfo(on_clock.dtype).eps * energy
+    def _places(self, times, x):
+        """Frames of a performance before times of the common clock, and how far beyond."""
+        # In this order a whole number of frames stays whole.
+        at = times * (len(x) - 1) / (self.n_frames_ - 1)
+        left = np.minimum(at.astype(np.intp), len(x) - 2)
+        return left, (at - left).astype(x.dtype)[:, np.newaxis]
+
+
+def _interpolate(x, left, weight, out):
+    np.add(x[left] * (1 - weight), x[left + 1] * weight, out=out)
+
+
+def rounding_of(values):
+    """How far rounding can move a global distance of such sequences."""
+    deviations = values - values.mean(axis=(0, 1))
+    energy = np.einsum("npk,npk->", deviations, deviations, dtype=np.float64)
+    return 8 * np.finfo(values.dtype).eps * energy
 
 
 def distances_to_all(on_clock):

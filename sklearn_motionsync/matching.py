@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["Match", "StepTable", "Trellis", "step_table"]
+__all__ = ["Match", "StepTable", "Trellis", "even_slices", "step_table"]
 
 # Sizes of one tile of pairs: the rows stay in the second-level cache, the matrix product of a
 # row stays below the size from which OpenBLAS packs its operands (1.0 against 0.7 ns a cell), and
@@ -34,6 +34,8 @@ __all__ = ["Match", "StepTable", "Trellis", "step_table"]
 # on the memory of the machine.
 _TILE_PRODUCT = 1_000_000
 _TILE_BASES = 48
+# Fewer bases than this make thin products: a single one is better, if its row is long.
+_FEW_BASES, _LONG_ROW = 8, 1024
 # Samples of a single base that share one product.
 _PRODUCT_ROWS = 16
 
@@ -198,9 +200,13 @@ class Trellis:
         What a pair costs depends in its last bit on the tile it is computed in: work is
         to be divided between tiles only.
         """
-        cells = max(1, _TILE_PRODUCT // ((2 * self.width + 1) * (n_features + 2)))
-        for rows in _slices(n_bases, min(cells, _TILE_BASES)):
-            for columns in _slices(n_moving, max(1, cells // (rows.stop - rows.start))):
+        band = 2 * self.width + 1
+        cells = max(1, _TILE_PRODUCT // (band * (n_features + 2)))
+        n_rows = min(cells, _TILE_BASES)
+        if min(n_rows, n_bases) < _FEW_BASES and band * min(cells, n_moving) >= _LONG_ROW:
+            n_rows = 1
+        for rows in even_slices(n_bases, n_rows):
+            for columns in even_slices(n_moving, max(1, cells // (rows.stop - rows.start))):
                 yield rows, columns
 
     def cells(self, moving):
@@ -215,9 +221,9 @@ class Trellis:
     def windows(self, n_frames):
         """Lowest and highest disparity, at every sample, of a pinned path in the band."""
         p = np.arange(n_frames)
-        down, up = self.table.subframes, int(self._slopes.max())
-        low = np.maximum(-self.width, np.maximum(-down * p, -up * p[::-1]))
-        high = np.minimum(self.width, np.minimum(up * p, down * p[::-1]))
+        down, up = self.table.subframes * p, int(self._slopes.max()) * p
+        low = -np.minimum(self.width, np.minimum(down, up[::-1]))
+        high = np.minimum(self.width, np.minimum(up, down[::-1]))
         return low.tolist(), high.tolist()
 
 
@@ -256,26 +262,25 @@ class _Bundle:
         Cells that no path reaches stay infinite: the windows first only grow, over
         cells never written, then only shrink, reading inside the row before.
         """
-        groups, pairs, keep = self.trellis._groups, self.pairs, len(states)
+        pairs, rows, keep = self.pairs, list(states), len(states)
+        plan = [_plan(group, pairs, states.dtype) for group in self.trellis._groups]
         scratch = np.empty((2, (2 * self.trellis.width + 1) * pairs), dtype=states.dtype)
         last = self.n_frames if last is None else last
         costs = self._costs_of_samples if self.n_bases > 1 else self._costs_of_blocks
         for p, local in costs(first, last):
             start = (self.centre + self.low[p]) * pairs
             stop = (self.centre + self.high[p] + 1) * pairs
-            new = states[p % keep, start:stop]
+            new, old = rows[p % keep][start:stop], rows[(p - 1) % keep]
             if p == 0:
                 unit = self.trellis._unit_group
-                np.subtract(local[unit], groups[unit].penalty, out=new)
+                np.subtract(local[unit], self.trellis._groups[unit].penalty, out=new)
             elif p > first:
-                old = states[(p - 1) % keep]
-                trial, level = scratch[:, : stop - start]
-                for i, group in enumerate(groups):
-                    target = trial if i else new
-                    _best_step(old, start, stop, pairs, group.levels, target, level)
-                    target += local[i]
-                    if i:
-                        np.minimum(new, target, out=new)
+                best = _best_step(old, start, stop, plan[0], new, scratch[1])
+                np.add(best, local[0], out=new)
+                for levels, cost in zip(plan[1:], local[1:], strict=True):
+                    trial = scratch[0, : stop - start]
+                    best = _best_step(old, start, stop, levels, trial, scratch[1])
+                    np.minimum(new, np.add(best, cost, out=trial), out=new)
             yield p
 
     def _costs_of_samples(self, first, last):
@@ -340,25 +345,28 @@ class _Bundle:
         return cost, disparities.reshape(-1, self.n_bases, n_frames).swapaxes(0, 1)
 
     def _retrace(self, states, at, first, last):
-        """Follow the paths from the row ``last`` to ``first``: at each sample, the step that won."""
+        """Follow the paths back from row ``last`` to ``first``: the step that won each time."""
         trellis, pairs = self.trellis, self.pairs
         several = len(trellis._groups) > 1
-        back = trellis._slopes[:, np.newaxis] * pairs
-        dtype = states.dtype
-        penalties, weight, inner = trellis._of_step.astype(dtype)[:, :, np.newaxis]
+        shift = trellis._slopes * pairs
+        back = shift[:, np.newaxis]
+        penalties, weight, inner = trellis._of_step.astype(states.dtype)[:, :, np.newaxis]
         moving, base = np.divmod(np.arange(pairs), self.n_bases)
-        for p in range(min(last, self.n_frames - 1), first, -1):
-            value = states[(p - 1) % len(states)].take(at[p] - back)
+        start = min(last, self.n_frames - 1)
+        here = at[start]
+        for p in range(start, first, -1):
+            value = states[(p - 1) % len(states)].take(here - back)
             value += penalties
             if several:
-                q = p * trellis.table.subframes + at[p] // pairs - self.centre
+                q = p * trellis.table.subframes + here // pairs - self.centre
                 y, x = self.right[q, moving], self.bases[base, p]
                 value += weight * y[:, -2]
                 value -= inner * np.einsum("ik,ik->i", x, y[:, :-2])
-            at[p - 1] = at[p] - back[value.argmin(axis=0), 0]
+            here = here - shift.take(value.argmin(axis=0))
+            at[p - 1] = here
 
 
-def _slices(n, size):
+def even_slices(n, size):
     """Slices that cover ``n`` items: as few as can be of at most ``size``, of even sizes."""
     count = -(-n // size)
     edges = [i * n // count for i in range(count + 1)] if count else []
@@ -393,28 +401,30 @@ def _group_steps(table, mu):
     return groups, group_of_step
 
 
-def _best_step(old, start, stop, pairs, levels, out, scratch):
-    """``min_s S(p-1, d - k_s) + mu phi_s`` over the steps of one group, into ``out``.
+def _plan(group, pairs, dtype):
+    """The levels of a group for flat rows; arrays spare NumPy the conversion of numbers."""
+    return [
+        (np.array(penalty, dtype) if penalty else None, [k * pairs for k in slopes])
+        for penalty, slopes in group.levels
+    ]
 
-    ``levels`` come by falling penalty, so the free steps need no addition.
+
+def _best_step(old, start, stop, levels, out, scratch):
+    """``min_s S(p-1, d - k_s) + mu phi_s`` over the steps of one group.
+
+    ``levels`` come by falling penalty; what all steps have in common is not in them. The
+    result is in ``out``, or in ``old`` itself where there is nothing to compute.
     """
-    for j, (penalty, slopes) in enumerate(levels):
-        views = [old[start - k * pairs : stop - k * pairs] for k in slopes]
-        if j and penalty == 0:
-            for view in views:
-                np.minimum(out, view, out=out)
-            continue
-        target = scratch if j else out
-        if len(views) == 1:
-            np.add(views[0], penalty, out=target)
-        else:
-            np.minimum(views[0], views[1], out=target)
-            for view in views[2:]:
-                np.minimum(target, view, out=target)
-            if penalty:
-                target += penalty
-        if j:
-            np.minimum(out, target, out=out)
+    best = None
+    for penalty, (shift, *others) in levels:
+        view = old[start - shift : stop - shift]
+        target = out if best is None else scratch[: stop - start]
+        for other in others:
+            view = np.minimum(view, old[start - other : stop - other], out=target)
+        if penalty is not None:
+            view = np.add(view, penalty, out=target)
+        best = view if best is None else np.minimum(best, view, out=out)
+    return best
 
 
 def _right_factor(moving):

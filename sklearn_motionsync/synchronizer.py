@@ -4,13 +4,13 @@ from functools import partial
 from numbers import Integral, Real
 
 import numpy as np
-from sklearn.utils import check_random_state, gen_batches
+from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
 
-from .clock import Synchronizer
+from .clock import Synchronizer, rounding_of
 from .consensus import choose_exemplars
 from .features import cost_features
-from .matching import Match, Trellis, step_table
+from .matching import Match, Trellis, even_slices, step_table
 from .median import estimate_distances, search_median, sum_all
 from .refinement import choose_smoothing
 from .warping import Warper
@@ -158,8 +158,9 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
     random_state : int, RandomState instance or None, default=0
         Draws the references of a sampled search. The default makes equal input give equal results.
     n_jobs : int, default=None
-        How many jobs share the matches, in ``fit``, ``transform`` and ``match``. None means 1 unless in a
-        ``joblib.parallel_config`` context, -1 all cores. Results are the same to the last bit.
+        How many jobs share the matches, in ``fit``, ``transform`` and ``match``. None means 1
+        unless in a ``joblib.parallel_config`` context, -1 all cores. Results are the same to the
+        last bit.
     verbose : int, default=0
         Above 0, print how far a long job is, at most once a second.
 
@@ -315,18 +316,17 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
         n_positions = (self.n_frames_ - 1) * self.subframes + 1
         return self._normalise(arrays, np.arange(n_positions) / self.subframes)
 
-    def _choose_median(self, on_clock, features, wanted):
-        n, rounding = len(features), self._rounding(on_clock)
+    def _choose_median(self, features, wanted):
+        n, rounding = len(features), rounding_of(features)
         compare = partial(self._compare, features)
-        random_state = check_random_state(self.random_state)
         if not wanted and self.consensus == 0:
-            median = super()._choose_median(on_clock, features, wanted)
+            median = super()._choose_median(features, wanted)
         elif self.search == "exhaustive" or (self.search == "auto" and n <= _EXHAUSTIVE):
             median = sum_all(compare, n, rounding)
         elif wanted:
-            median = search_median(compare, n, rounding, random_state)
+            median = search_median(compare, n, rounding, check_random_state(self.random_state))
         else:
-            median = estimate_distances(compare, n, random_state)
+            median = estimate_distances(compare, n, check_random_state(self.random_state))
         self.n_matches_ = median.n_matches
         self.certified_ = median.certified and wanted
         return median
@@ -336,7 +336,7 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
         trellis = self._warper.trellis
         tiles = list(trellis.tiles(len(bases), len(moving), features.shape[2]))
         cells = max(1, len(bases) * len(moving) // max(1, len(tiles))) * trellis.cells(features)
-        batches = gen_batches(len(tiles), max(1, _PORTION_CELLS // cells))
+        batches = even_slices(len(tiles), max(1, _PORTION_CELLS // cells))
         portions = [(features, bases, moving, tiles[batch]) for batch in batches]
         step = self._progress.stage("comparing performances", len(portions))
         for blocks in run(self._warper.distances, portions, n_jobs=self.n_jobs, step=step):
@@ -378,7 +378,7 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
     def _in_portions(self, function, positions, progress, name):
         """Results of a function of the warper for portions of all performances."""
         cells = len(self._warper.bases) * self._warper.trellis.cells(positions)
-        size = int(np.clip(_PORTION_CELLS // cells, 1, _PORTION_SEQUENCES))
-        portions = [(positions, rows) for rows in gen_batches(len(positions), size)]
+        size = min(max(1, _PORTION_CELLS // cells), _PORTION_SEQUENCES)
+        portions = [(positions, rows) for rows in even_slices(len(positions), size)]
         step = progress.stage(name, len(portions))
         return list(run(function, portions, n_jobs=self.n_jobs, step=step))

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from sklearn import get_config
 
 from .consensus import vote
 from .features import cost_features, smooth
@@ -123,5 +124,6 @@ class Warper(NamedTuple):
         return np.maximum.accumulate(np.clip(times, 0, n_frames - 1), axis=1)
 
     def _paths(self, bases, moving):
-        distances, disparities = self.trellis.paths(bases, moving)
+        max_bytes = get_config()["working_memory"] * 2**20 // 2
+        distances, disparities = self.trellis.paths(bases, moving, max_bytes)
         return distances, np.arange(bases.shape[1]) + disparities / self.subframes

@@ -35,7 +35,8 @@ def run(function, portions, *, n_jobs=None, step=None):
     portions : list of tuples
         Arguments. Large arrays among them reach other processes as read-only memory maps.
     n_jobs : int, default=None
-        As everywhere in scikit-learn: None means 1, unless ``joblib.parallel_config`` says otherwise.
+        As everywhere in scikit-learn: None means 1, unless ``joblib.parallel_config`` says
+        otherwise.
     step : callable, default=None
         Called after every portion.
     """
