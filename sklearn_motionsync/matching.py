@@ -36,6 +36,8 @@ _TILE_PRODUCT = 1_000_000
 _TILE_BASES = 48
 # Fewer bases than this make thin products: a single one is better, if its row is long.
 _FEW_BASES, _LONG_ROW = 8, 1024
+# Cells of a trellis so small that NumPy's calls cost more than its arithmetic.
+_SMALL_TABLE = 20_000
 # Samples of a single base that share one product.
 _PRODUCT_ROWS = 16
 
@@ -350,6 +352,8 @@ class _Bundle:
         several = len(trellis._groups) > 1
         shift = trellis._slopes * pairs
         back = shift[:, np.newaxis]
+        if not several and len(states) == self.n_frames and states.size <= _SMALL_TABLE:
+            return self._look_up(states, at, shift)
         penalties, weight, inner = trellis._of_step.astype(states.dtype)[:, :, np.newaxis]
         moving, base = np.divmod(np.arange(pairs), self.n_bases)
         start = min(last, self.n_frames - 1)
@@ -364,6 +368,18 @@ class _Bundle:
                 value -= inner * np.einsum("ik,ik->i", x, y[:, :-2])
             here = here - shift.take(value.argmin(axis=0))
             at[p - 1] = here
+
+    def _look_up(self, states, at, shift):
+        """The same for a small trellis: the winning steps of all its cells, then a walk."""
+        edge = self.trellis._pad * self.pairs
+        cells = np.arange(edge, states.shape[1] - edge)
+        values = states[:-1].take(cells - shift[:, np.newaxis], axis=1)
+        values += self.trellis._of_step[0].astype(states.dtype)[:, np.newaxis]
+        steps = shift.take(values.argmin(axis=1))
+        for pair, here in enumerate(at[-1].tolist()):
+            for p in range(len(steps) - 1, -1, -1):
+                here -= steps.item(p, here - edge)
+                at[p, pair] = here
 
 
 def even_slices(n, size):

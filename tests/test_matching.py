@@ -1,5 +1,7 @@
 """The trellis against versions that share no code with it."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from sklearn_motionsync import matching
@@ -117,17 +119,64 @@ def test_paths_are_pinned_monotone_and_in_the_band(subframes):
     assert steps.max() <= 3 * subframes
 
 
+TABLES = [step_table(), step_table("velocity", max_rate=4, subframes=2)]
+
+
+@pytest.mark.parametrize("table", TABLES, ids=["one group", "several"])
 @pytest.mark.parametrize("n_bases", [1, 2, 5])
-def test_tiles_do_not_change_the_answer(n_bases, monkeypatch):
-    bases, moving = draw(np.random.default_rng(3), n_bases, 30, n_features=4)
-    trellis = Trellis(step_table(), 0.5, 8)
+def test_tiles_do_not_change_the_answer(n_bases, table, monkeypatch):
+    bases, moving = draw(np.random.default_rng(3), n_bases, 30, table.subframes, n_features=4)
+    trellis = Trellis(table, 0.5, 8)
     whole = trellis.distances(bases, moving)
     _, paths = trellis.paths(bases, moving)
     monkeypatch.setattr(matching, "_TILE_PRODUCT", 1)
     monkeypatch.setattr(matching, "_TILE_BASES", 2)
+    monkeypatch.setattr(matching, "_LONG_ROW", 1)
     monkeypatch.setattr(matching, "_PRODUCT_ROWS", 3)
+    monkeypatch.setattr(matching, "_SMALL_TABLE", 0)
     np.testing.assert_allclose(trellis.distances(bases, moving), whole, rtol=1e-12)
     np.testing.assert_array_equal(trellis.paths(bases, moving)[1], paths)
+
+
+@pytest.mark.parametrize("table", TABLES, ids=["one group", "several"])
+@pytest.mark.parametrize("n_bases", [1, 3])
+@pytest.mark.parametrize("n_frames", [2, 16, 17, 150])
+def test_rows_that_are_not_kept_are_computed_again(n_frames, n_bases, table):
+    """Little memory, the same bits."""
+    bases, moving = draw(np.random.default_rng(3), n_bases, n_frames, table.subframes)
+    trellis = Trellis(table, 0.5, min(40, n_frames - 1))
+    distances, paths = trellis.paths(bases, moving)
+    few_distances, few_paths = trellis.paths(bases, moving, max_bytes=0)
+    np.testing.assert_array_equal(few_distances, distances)
+    np.testing.assert_array_equal(few_paths, paths)
+
+
+@pytest.mark.parametrize("sizes", [(1, 1), (3, 100), (50, 7), (97, 203)])
+@pytest.mark.parametrize("reach", [5, 25, 900])
+def test_tiles_cover_every_pair_once_and_are_tiles_themselves(sizes, reach):
+    trellis = Trellis(step_table(), 0.5, reach)
+    count = np.zeros(sizes, dtype=int)
+    for rows, columns in trellis.tiles(*sizes, n_features=16):
+        count[rows, columns] += 1
+        shape = count[rows, columns].shape
+        alone = list(trellis.tiles(*shape, n_features=16))
+        assert alone == [(slice(0, shape[0]), slice(0, shape[1]))]
+    assert (count == 1).all()
+
+
+def test_memory_grows_with_the_band_not_with_the_square():
+    """4000 frames in a band of 81: a full matrix of float64 would take 128 MB."""
+    bases, moving = draw(np.random.default_rng(5), 1, 4000, n_features=3)
+    trellis = Trellis(step_table(), 0.5, 40)
+    tracemalloc.start()
+    trellis.paths(bases, moving[:1])
+    everything = tracemalloc.get_traced_memory()[1]
+    tracemalloc.reset_peak()
+    trellis.paths(bases, moving[:1], max_bytes=0)
+    little = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert everything < 5e6
+    assert little < 1e6
 
 
 def test_inputs_may_be_read_only_and_are_not_written():
