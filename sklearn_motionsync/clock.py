@@ -125,7 +125,8 @@ class Synchronizer(TransformerMixin, BaseEstimator):
             unknown = np.full(len(features), np.nan)
             return Median(None, unknown, unknown, False, 0)
         sums = distances_to_all(features)
-        return Median(first_smallest(sums, rounding_of(features)), sums, sums, True, 0)
+        rounding = rounding_of(features - features.mean(axis=(0, 1)))
+        return Median(first_smallest(sums, rounding), sums, sums, True, 0)
 
     def _learn(self, arrays, on_clock, source, estimates):
         pass
@@ -197,10 +198,11 @@ class Synchronizer(TransformerMixin, BaseEstimator):
         return int(np.median([len(a) for a in arrays]))
 
     def _normalise(self, arrays, times):
-        """Linear normalisation (Eq. 7): every performance at even times, as many as frames or more."""
+        """Linear normalisation (Eq. 7): every performance at the same times of its course."""
         out = np.empty((len(arrays), len(times), arrays[0].shape[1]), dtype=arrays[0].dtype)
         places = {}
         for x, result in zip(arrays, out, strict=True):
+            # As many times as frames on the clock are its frames.
             if len(x) == len(times) == self.n_frames_:
                 result[:] = x
                 continue
@@ -228,11 +230,10 @@ def _interpolate(x, left, weight, out):
     np.add(x[left] * (1 - weight), x[left + 1] * weight, out=out)
 
 
-def rounding_of(values):
-    """How far rounding can move a global distance of such sequences."""
-    deviations = values - values.mean(axis=(0, 1))
+def rounding_of(deviations):
+    """How far rounding can move a global distance of such sequences, given without their mean."""
     energy = np.einsum("npk,npk->", deviations, deviations, dtype=np.float64)
-    return 8 * np.finfo(values.dtype).eps * energy
+    return 8 * np.finfo(deviations.dtype).eps * energy
 
 
 def distances_to_all(on_clock):

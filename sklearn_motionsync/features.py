@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import gaussian_filter1d
+from sklearn import get_config
 
 __all__ = ["cost_features", "smooth"]
 
@@ -34,7 +35,8 @@ def cost_features(on_clock, cost, subframes=1, smoothing=SMOOTHING):
     """
     if cost == "posture":
         return on_clock
-    velocity = smooth(on_clock, smoothing * (on_clock.shape[1] - 1), order=1) * subframes
+    velocity = smooth(on_clock, smoothing * (on_clock.shape[1] - 1), order=1)
+    velocity *= subframes
     if cost == "velocity":
         return velocity
     speed = np.linalg.norm(velocity, axis=2, keepdims=True)
@@ -47,6 +49,18 @@ def smooth(on_clock, sigma, order=0):
     Beyond the ends a sequence is continued by its own point reflection, so that a
     movement cut off in full swing keeps its velocity at the cut.
     """
+    n_sequences = len(on_clock)
+    out = np.empty_like(on_clock)
+    # Half a dozen copies of what is handled at a time.
+    room = get_config()["working_memory"] * 2**20 // 6
+    size = max(1, room * n_sequences // max(1, on_clock.nbytes))
+    for start in range(0, n_sequences, size):
+        rows = slice(start, start + size)
+        out[rows] = _smooth(on_clock[rows], sigma, order)
+    return out
+
+
+def _smooth(on_clock, sigma, order):
     reach = min(int(np.ceil(4 * sigma)) + 1, on_clock.shape[1] - 1)
     continued = np.pad(
         on_clock, ((0, 0), (reach, reach), (0, 0)), mode="reflect", reflect_type="odd"

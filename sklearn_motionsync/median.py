@@ -19,7 +19,7 @@ _REFERENCES = 32
 # Probability, at most, that any rejection in a search is an error.
 _ERROR = 0.01
 # Matches a search may spend: this share of all, but at least so many a performance.
-_SHARE, _EACH = 0.09, 100
+_SHARE, _EACH = 0.09, 150
 
 
 class Median(NamedTuple):
@@ -80,7 +80,7 @@ def search_median(compare, n, rounding, random_state):
     estimates, distances = np.zeros(n), np.full(n, np.nan)
     budget, spent, certified = max(_SHARE * n * n, _EACH * n), 0, True
     seen, rounds = min(_REFERENCES, n), int(np.ceil(np.log2(max(n / _REFERENCES, 1)))) + 1
-    for left in range(rounds, 0, -1):
+    while True:
         more = references[table.shape[1] : seen]
         spent += len(alive) * len(more)
         table = np.hstack([table, _matrix(compare, alive, more)])
@@ -90,12 +90,11 @@ def search_median(compare, n, rounding, random_state):
         if seen == n:
             break
         keep = _not_worse(paired, means.argmin(), n, rounds, rounding)
-        affordable = (budget - spent - n) / (max(left - 1, 1) * min(seen, n - seen))
+        # Half of what is left for one round; what the last one needs is never touched.
+        affordable = (budget - spent) / (2 * min(seen, n - seen))
         if keep.sum() > max(affordable, 2):
             certified = False
-            order = np.argsort(np.where(keep, means, np.inf), kind="stable")
-            keep = np.zeros_like(keep)
-            keep[order[: max(int(affordable), 2)]] = True
+            keep = _best(np.where(keep, means, np.inf), max(int(affordable), 2), rounding / n)
         alive, table = alive[keep], table[keep]
         seen = n if len(alive) == 1 else min(2 * seen, n)
     distances[alive] = estimates[alive] = table.sum(axis=1)
@@ -118,6 +117,12 @@ def _matrix(compare, bases, moving):
 def _paired(table, alive, references):
     """The matches of each performance with all references but itself."""
     return np.ma.array(table, mask=alive[:, np.newaxis] == references)
+
+
+def _best(values, count, rounding):
+    """Which values are the smallest; of those that differ by rounding only the first ones."""
+    order = np.argsort(np.maximum(values, values.min() + rounding), kind="stable")
+    return np.isin(np.arange(len(values)), order[:count])
 
 
 def _not_worse(paired, leader, n, rounds, rounding):

@@ -4,6 +4,7 @@ from functools import partial
 from numbers import Integral, Real
 
 import numpy as np
+from joblib import effective_n_jobs
 from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
 
@@ -22,7 +23,7 @@ __all__ = ["DenseSynchronizer", "LinearSynchronizer"]
 _EXHAUSTIVE = 100
 # Sizes of a portion of warping: worth sending away, and small enough to be shared out.
 _PORTION_CELLS = 50_000_000
-_PORTION_SEQUENCES = 64
+_PORTION_SEQUENCES = 256
 
 # Sets of repeated trials leave 0.0001 to 0.02 (0.07 with 4 features and 20 % noise), sets of people
 # 0.09 and more, single people 0.05 and more; there refining begins to help
@@ -179,7 +180,7 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
         Whether the pattern is the median of Eq. 19: known from all matches, or because a paired
         test rejected every other performance, all tests together erring with a probability of
         1 %. False if the pattern was given, or a sampled search ran out of the matches
-        it may spend: 9 % of all, or 100 a performance if that is more.
+        it may spend: 9 % of all, or 150 a performance if that is more.
     n_matches_ : int
         Matches made to choose the pattern and the exemplars.
     mu_ : float
@@ -336,10 +337,14 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
         trellis = self._warper.trellis
         tiles = list(trellis.tiles(len(bases), len(moving), features.shape[2]))
         cells = max(1, len(bases) * len(moving) // max(1, len(tiles))) * trellis.cells(features)
-        batches = even_slices(len(tiles), max(1, _PORTION_CELLS // cells))
+        # Which tiles go together makes no difference to the results: a few portions a worker.
+        few = -(-len(tiles) // (4 * effective_n_jobs(self.n_jobs)))
+        batches = even_slices(len(tiles), max(1, min(few, _PORTION_CELLS // cells)))
         portions = [(features, bases, moving, tiles[batch]) for batch in batches]
-        step = self._progress.stage("comparing performances", len(portions))
-        for blocks in run(self._warper.distances, portions, n_jobs=self.n_jobs, step=step):
+        name = f"comparing {len(bases)} with {len(moving)} performances"
+        step = self._progress.stage(name, len(portions))
+        compare = self._warper.distances
+        for blocks in run(compare, portions, n_jobs=self.n_jobs, prefer="threads", step=step):
             yield from blocks
 
     def _learn(self, arrays, on_clock, source, estimates):
@@ -365,7 +370,9 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
             return 0.0
         some = others[:: -(-len(others) // _MISFIT_SAMPLE)]
         positions = self._positions([arrays[i] for i in some], on_clock[some])
-        results = self._in_portions(self._warper.misfits, positions, self._progress, "misfit")
+        results = self._in_portions(
+            self._warper.misfits, positions, self._progress, "measuring the misfit"
+        )
         return float(np.median(np.concatenate(results)))
 
     def _match(self, arrays):

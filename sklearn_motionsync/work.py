@@ -25,7 +25,7 @@ __all__ = ["CallbackSupportMixin", "Progress", "run"]
 _INTERVAL = 1.0
 
 
-def run(function, portions, *, n_jobs=None, step=None):
+def run(function, portions, *, n_jobs=None, prefer=None, step=None):
     """Yield ``function(*portion)`` for every portion, in order.
 
     Parameters
@@ -37,24 +37,27 @@ def run(function, portions, *, n_jobs=None, step=None):
     n_jobs : int, default=None
         As everywhere in scikit-learn: None means 1, unless ``joblib.parallel_config`` says
         otherwise.
+    prefer : {"threads", "processes"}, default=None
+        Threads, unless the user chose a backend, are good for portions that spend their time
+        in long NumPy calls.
     step : callable, default=None
         Called after every portion.
     """
-    results = _results(function, portions, n_jobs)
+    results = _results(function, portions, n_jobs, prefer)
     for result in results:
         if step is not None:
             step()
         yield result
 
 
-def _results(function, portions, n_jobs):
+def _results(function, portions, n_jobs, prefer):
     if len(portions) < 2 or effective_n_jobs(n_jobs) == 1:
         return (_on_one_thread(function, portion) for portion in portions)
     try:
-        parallel = Parallel(n_jobs=n_jobs, return_as="generator")
+        parallel = Parallel(n_jobs=n_jobs, prefer=prefer, return_as="generator")
     except ValueError:
         # Some backends can only hand over all results at once.
-        parallel = Parallel(n_jobs=n_jobs)
+        parallel = Parallel(n_jobs=n_jobs, prefer=prefer)
     return parallel(delayed(_on_one_thread)(function, portion) for portion in portions)
 
 

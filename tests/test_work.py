@@ -1,0 +1,232 @@
+"""Work shared out: equal bits everywhere, progress, and interruption."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pytest
+import sklearn
+import sklearn_motionsync
+from sklearn.exceptions import NotFittedError
+from sklearn.utils.validation import check_is_fitted
+from sklearn_motionsync import DenseSynchronizer
+from sklearn_motionsync.warping import Warper
+from sklearn_motionsync.work import Progress, run
+
+SETTINGS = {
+    "paper": {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0},
+    "defaults": {},
+    "refined": {"refine": True, "subframes": 2, "consensus": 3},
+}
+
+
+@pytest.fixture(scope="module")
+def walks():
+    """So many that fitting samples and warping takes several portions."""
+    rng = np.random.default_rng(0)
+    return [np.cumsum(rng.standard_normal((n, 5)), axis=0) for n in rng.integers(30, 40, size=300)]
+
+
+def bits(sync, X):
+    """All that fitting and warping give, byte for byte."""
+    match = sync.match(X)
+    results = [sync.global_distances_, sync.pattern_, sync.exemplars_, sync.transform(X), *match]
+    return [np.asarray(result).tobytes() for result in results]
+
+
+@pytest.fixture(scope="module", params=SETTINGS)
+def reference(request, walks):
+    settings = SETTINGS[request.param]
+    return settings, bits(DenseSynchronizer(**settings).fit(walks), walks)
+
+
+@pytest.mark.parametrize("backend", [None, "threading", "loky"])
+@pytest.mark.parametrize("n_jobs", [2, 3])
+def test_equal_bits_for_any_jobs_and_backend(walks, reference, n_jobs, backend):
+    settings, expected = reference
+    context = {} if backend is None else {"backend": backend}
+    with joblib.parallel_config(**context):
+        sync = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(walks)
+        assert bits(sync, walks) == expected
+
+
+@pytest.mark.parametrize("working_memory", [0, 1])
+def test_equal_bits_with_little_memory(walks, reference, working_memory):
+    settings, expected = reference
+    with sklearn.config_context(working_memory=working_memory):
+        assert bits(DenseSynchronizer(**settings).fit(walks), walks) == expected
+
+
+def test_equal_bits_whatever_the_blas_threads(walks, reference):
+    threadpoolctl = pytest.importorskip("threadpoolctl")
+    settings, expected = reference
+    for limits in (1, 2):
+        with threadpoolctl.threadpool_limits(limits=limits):
+            assert bits(DenseSynchronizer(**settings).fit(walks), walks) == expected
+
+
+def test_fit_runs_on_a_dask_cluster(walks, monkeypatch):
+    """Two worker processes share the matches, and give the bits of a single one."""
+    distributed = pytest.importorskip("distributed")
+    package = Path(sklearn_motionsync.__file__).parents[1]
+    monkeypatch.setenv("PYTHONPATH", f"{package}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+    expected = bits(DenseSynchronizer().fit(walks), walks)
+    cluster = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with distributed.LocalCluster(**cluster) as local, distributed.Client(local) as client:
+        workers = set(client.run(os.getpid).values())
+        with distributed.get_task_stream(client), joblib.parallel_config(backend="dask"):
+            sync = DenseSynchronizer().fit(walks)
+            ran_fit = {task["worker"] for task in client.get_task_stream()}
+            warped = bits(sync, walks)
+        loaded = client.run(lambda: "sklearn_motionsync.matching" in sys.modules)
+        assert os.getpid() not in workers
+        assert len(workers) == len(ran_fit) == 2
+        assert all(loaded.values())
+    assert warped == expected
+
+
+# -- the workshop itself ------------------------------------------------------------------
+
+
+def square(x):
+    return x * x
+
+
+@pytest.mark.parametrize("n_jobs", [None, 1, 2])
+@pytest.mark.parametrize("n_portions", [0, 1, 5])
+def test_run_keeps_the_order_and_counts(n_jobs, n_portions):
+    steps = []
+    portions = [(i,) for i in range(n_portions)]
+    results = run(square, portions, n_jobs=n_jobs, prefer="threads", step=lambda: steps.append(1))
+    assert list(results) == [i * i for i in range(n_portions)]
+    assert len(steps) == n_portions
+
+
+def test_backends_that_give_no_results_one_by_one():
+    with joblib.parallel_config(backend="multiprocessing"):
+        assert list(run(square, [(1,), (2,), (3,)], n_jobs=2)) == [1, 4, 9]
+
+
+# -- progress -------------------------------------------------------------------------------
+
+
+def test_verbose_tells_how_far_it_is(walks, capsys):
+    DenseSynchronizer().fit(walks).transform(walks)
+    assert capsys.readouterr().out == ""
+    DenseSynchronizer(verbose=1).fit(walks).transform(walks)
+    lines = capsys.readouterr().out.splitlines()
+    assert all(line.startswith("[DenseSynchronizer] ") for line in lines)
+    assert "comparing 300 with 32 performances: 100 %" in lines[0]
+    assert "measuring the misfit: 100 %" in lines[-2]
+    assert "warping: 100 %" in lines[-1]
+
+
+def test_verbose_prints_at_most_a_line_a_second(capsys, monkeypatch):
+    clock = iter(np.arange(0, 100, 0.3))
+    monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
+    with Progress(DenseSynchronizer(), verbose=1, fits=False) as progress:
+        step = progress.stage("stage", 10)
+        for _ in range(10):
+            step()
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split("%")[0].split(":")[1].strip() for line in lines] == ["40", "80", "100"]
+
+
+def test_callbacks_of_scikit_learn_see_every_portion(walks):
+    pytest.importorskip("sklearn.callback", reason="callbacks came with scikit-learn 1.9")
+
+    class Recorder:
+        def __init__(self):
+            self.open, self.seen = [], []
+
+        def setup(self, estimator, context):
+            self.seen.append("setup")
+
+        def on_fit_task_begin(self, estimator, context):
+            self.open.append(context.task_name)
+
+        def on_fit_task_end(self, estimator, context):
+            assert self.open.pop() == context.task_name
+            self.seen.append(context.task_name)
+
+        def teardown(self, estimator, context):
+            self.seen.append("teardown")
+
+    recorder = Recorder()
+    sync = DenseSynchronizer().set_callbacks(recorder).fit(walks)
+    assert recorder.seen[0] == "setup"
+    assert recorder.seen[-2:] == ["fit", "teardown"]
+    assert "comparing 300 with 32 performances" in recorder.seen
+    assert recorder.seen.count("portion") >= 3
+    assert recorder.open == []
+    seen = len(recorder.seen)
+    sync.transform(walks[:2])
+    assert len(recorder.seen) == seen
+
+
+# -- interruption -----------------------------------------------------------------------------
+
+
+def test_an_interrupted_fit_leaves_no_half_fitted_estimator(walks, monkeypatch):
+    sync = DenseSynchronizer().fit(walks[:20])
+    calls = []
+
+    def interrupted(self, *args):
+        calls.append(1)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Warper, "misfits", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        sync.fit(walks)
+    assert calls
+    with pytest.raises(NotFittedError):
+        check_is_fitted(sync)
+    monkeypatch.undo()
+    assert sync.fit(walks[:20]).n_frames_ > 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_ctrl_c_leaves_at_once(n_jobs):
+    """Hours of work, interrupted after a moment."""
+    script = f"""
+        import time
+        import numpy as np
+        from sklearn.exceptions import NotFittedError
+        from sklearn_motionsync import DenseSynchronizer
+        X = np.random.default_rng(0).standard_normal((3000, 200, 8))
+        sync = DenseSynchronizer(search="exhaustive", n_jobs={n_jobs})
+        try:
+            print("begin", flush=True)
+            sync.fit(X)
+        except KeyboardInterrupt:
+            try:
+                sync.transform(X[:1])
+            except NotFittedError:
+                print("unfitted", flush=True)
+    """
+    root = Path(sklearn_motionsync.__file__).parents[1]
+    process = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(script)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(root)},
+    )
+    try:
+        assert process.stdout.readline() == "begin\n"
+        time.sleep(3)
+        process.send_signal(signal.SIGINT)
+        interrupted = time.perf_counter()
+        assert process.stdout.readline() == "unfitted\n"
+        assert process.wait(timeout=10) == 0
+        assert time.perf_counter() - interrupted < 5
+    finally:
+        process.kill()
+        process.stdout.close()
+        process.wait()
