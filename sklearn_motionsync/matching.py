@@ -152,6 +152,7 @@ class Trellis:
         self._slopes = table.steps - table.subframes
         self._pad = int(np.abs(self._slopes).max())
         self._unit_group = group_of_step[self._slopes == 0][0]
+        self._windows = {}
 
     def distances(self, bases, moving):
         """Cost of the best path for every ordered pair.
@@ -222,11 +223,14 @@ class Trellis:
 
     def windows(self, n_frames):
         """Lowest and highest disparity, at every sample, of a pinned path in the band."""
+        if n_frames in self._windows:
+            return self._windows[n_frames]
         p = np.arange(n_frames)
         down, up = self.table.subframes * p, int(self._slopes.max()) * p
         low = -np.minimum(self.width, np.minimum(down, up[::-1]))
         high = np.minimum(self.width, np.minimum(up, down[::-1]))
-        return low.tolist(), high.tolist()
+        self._windows = {n_frames: (low.tolist(), high.tolist())}
+        return self._windows[n_frames]
 
 
 class _Bundle:
@@ -243,6 +247,9 @@ class _Bundle:
         self.centre = trellis.width + trellis._pad
         self.left = _left_factor(bases, trellis._groups)
         self.low, self.high = trellis.windows(self.n_frames)
+        # Where the window of every sample is in a flat row.
+        self.starts = [(self.centre + low) * self.pairs for low in self.low]
+        self.stops = [(self.centre + high + 1) * self.pairs for high in self.high]
 
     def states(self, n_rows):
         """Rows of cells that no path has reached."""
@@ -269,9 +276,9 @@ class _Bundle:
         scratch = np.empty((2, (2 * self.trellis.width + 1) * pairs), dtype=states.dtype)
         last = self.n_frames if last is None else last
         costs = self._costs_of_samples if self.n_bases > 1 else self._costs_of_blocks
+        starts, stops, rest = self.starts, self.stops, plan[1:]
         for p, local in costs(first, last):
-            start = (self.centre + self.low[p]) * pairs
-            stop = (self.centre + self.high[p] + 1) * pairs
+            start, stop = starts[p], stops[p]
             new, old = rows[p % keep][start:stop], rows[(p - 1) % keep]
             if p == 0:
                 unit = self.trellis._unit_group
@@ -279,10 +286,10 @@ class _Bundle:
             elif p > first:
                 best = _best_step(old, start, stop, plan[0], new, scratch[1])
                 np.add(best, local[0], out=new)
-                for levels, cost in zip(plan[1:], local[1:], strict=True):
+                for i, levels in enumerate(rest, 1):
                     trial = scratch[0, : stop - start]
                     best = _best_step(old, start, stop, levels, trial, scratch[1])
-                    np.minimum(new, np.add(best, cost, out=trial), out=new)
+                    np.minimum(new, np.add(best, local[i], out=trial), out=new)
             yield p
 
     def _costs_of_samples(self, first, last):
