@@ -7,8 +7,12 @@ from sklearn.base import BaseEstimator, TransformerMixin, _fit_context
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
+from .matching import even_slices
 from .median import Median, first_smallest
 from .sequences import check_performances, restore
+
+# Performances sampled together: bounds the memory of what stands in between.
+_SAMPLED_AT_ONCE = 64
 
 
 class Synchronizer(TransformerMixin, BaseEstimator):
@@ -199,35 +203,29 @@ class Synchronizer(TransformerMixin, BaseEstimator):
 
     def _normalise(self, arrays, times):
         """Linear normalisation (Eq. 7): every performance at the same times of its course."""
-        out = np.empty((len(arrays), len(times), arrays[0].shape[1]), dtype=arrays[0].dtype)
-        places = {}
-        for x, result in zip(arrays, out, strict=True):
-            # As many times as frames on the clock are its frames.
-            if len(x) == len(times) == self.n_frames_:
-                result[:] = x
-                continue
-            if len(x) not in places:
-                places[len(x)] = self._places(times, x)
-            _interpolate(x, *places[len(x)], result)
-        return out
+        # As many times as frames on the clock are its frames.
+        if len(times) == self.n_frames_ and all(len(x) == self.n_frames_ for x in arrays):
+            return np.stack(arrays)
+        return self._sample(arrays, np.broadcast_to(times, (len(arrays), len(times))))
 
     def _sample(self, arrays, times):
         """Performances at times in pattern frames, linear between their own frames (Eq. 18)."""
         out = np.empty((len(arrays), times.shape[1], arrays[0].shape[1]), dtype=arrays[0].dtype)
-        for x, tau, result in zip(arrays, times, out, strict=True):
-            _interpolate(x, *self._places(tau, x), result)
+        for rows in even_slices(len(arrays), _SAMPLED_AT_ONCE):
+            self._sample_some(arrays[rows], times[rows], out[rows])
         return out
 
-    def _places(self, times, x):
-        """Frames of a performance before times of the common clock, and how far beyond."""
+    def _sample_some(self, arrays, times, out):
+        last = np.array([len(x) for x in arrays])[:, np.newaxis] - 1
         # In this order a whole number of frames stays whole.
-        at = times * (len(x) - 1) / (self.n_frames_ - 1)
-        left = np.minimum(at.astype(np.intp), len(x) - 2)
-        return left, (at - left).astype(x.dtype)[:, np.newaxis]
-
-
-def _interpolate(x, left, weight, out):
-    np.add(x[left] * (1 - weight), x[left + 1] * weight, out=out)
+        at = times * last / (self.n_frames_ - 1)
+        left = np.minimum(at.astype(np.intp), last - 1)
+        weight = (at - left).astype(out.dtype)[:, :, np.newaxis]
+        frames = np.concatenate(arrays)
+        left += np.cumsum(last + 1)[:, np.newaxis] - (last + 1)
+        np.multiply(frames[left], 1 - weight, out=out)
+        left += 1
+        out += frames[left] * weight
 
 
 def rounding_of(deviations):

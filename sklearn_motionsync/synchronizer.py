@@ -175,7 +175,7 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
         ``C_n`` of Eq. 19 where it is exact: for every performance after an exhaustive search, for
-        the best few after a sampled one; NaN for the others.
+        the best few after a sampled one; NaN for the others, and if nobody needed them.
     certified_ : bool
         Whether the pattern is the median of Eq. 19: known from all matches, or because a paired
         test rejected every other performance, all tests together erring with a probability of
@@ -320,7 +320,8 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
     def _choose_median(self, features, wanted):
         n, rounding = len(features), rounding_of(features)
         compare = partial(self._compare, features)
-        if not wanted and self.consensus == 0:
+        if not wanted and (self.consensus == 0 or n <= self.consensus):
+            # None of them, or all, are exemplars.
             median = super()._choose_median(features, wanted)
         elif self.search == "exhaustive" or (self.search == "auto" and n <= _EXHAUSTIVE):
             median = sum_all(compare, n, rounding)
