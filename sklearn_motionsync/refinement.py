@@ -70,10 +70,8 @@ def misfit(base, moving, times):
         The slow part of the energy of the residuals, after fitting a gain and an offset to
         every feature, less what white noise puts there, over the energy of the base.
     """
-    residuals = np.empty_like(moving)
-    for residual, x, tau in zip(residuals, moving, times, strict=True):
-        matched = follow(x.T, np.tile(tau, (x.shape[1], 1))).T
-        residual[:] = base - _fit_gain(base, matched)[0]
+    matched = follow(moving.swapaxes(1, 2), times[:, np.newaxis]).swapaxes(1, 2)
+    residuals = base - _fit_gain(base, matched)[0]
     sigma = max(SMOOTHING * (len(base) - 1), _LEAST_SIGMA)
     slow = smooth(residuals, sigma)
     # White noise leaves this share of its energy in the slow part, which is not misfit.
@@ -114,32 +112,49 @@ def refine_warps(base, moving, times, reach):
     n_frames, n_features = base.shape
     if n_frames < 5:
         return times
-    band, border = _curvature(n_frames)
     frames = np.arange(n_frames)
     low, high = np.maximum(frames - reach, 0), np.minimum(frames + reach, n_frames - 1)
     rounding = np.square(16 * np.finfo(base.dtype).eps) * np.square(base).mean()
-    curves = [CubicSpline(frames, x) for x in moving]
+    splines = CubicSpline(frames, moving, axis=1).c.astype(moving.dtype)
     refined = times.astype(np.float64)
-    for curve, tau in zip(curves, refined, strict=True):
-        tangent = curve.derivative()
-        for _ in range(_ITERATIONS):
-            fitted, gain = _fit_gain(base, curve(tau))
-            slope, residual = gain * tangent(tau), base - fitted
-            noise = np.square(residual).sum() / (n_frames * n_features)
-            pull = np.square(slope).sum(axis=1)[1:-1]
-            if noise <= rounding or not pull.any():
-                break
-            stiffness = noise * (n_frames / _RATE_CHANGE) ** 2
-            stiffness = max(stiffness, 1e-9 * pull.mean())
-            system = stiffness * band
-            system[-1] += pull
-            target = pull * tau[1:-1] + (slope * residual).sum(axis=1)[1:-1] - stiffness * border
-            step = solveh_banded(system, target) - tau[1:-1]
-            tau[1:-1] += np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
-            np.maximum.accumulate(np.clip(tau, low, high, out=tau), out=tau)
-            if np.abs(step).max() < _SHORTEST_STEP:
-                break
+    active = np.arange(len(moving))
+    for _ in range(_ITERATIONS):
+        values, tangents = _evaluate(splines, active, refined[active])
+        fitted, gain = _fit_gain(base, values)
+        slope, residual = gain * tangents, base - fitted
+        noise = np.square(residual).sum(axis=(1, 2)) / (n_frames * n_features)
+        pull = np.square(slope).sum(axis=2)[:, 1:-1]
+        going = (noise > rounding) & pull.any(axis=1)
+        active, noise, pull = active[going], noise[going], pull[going]
+        if len(active) == 0:
+            break
+        push = (slope[going] * residual[going]).sum(axis=2)[:, 1:-1]
+        stiffness = np.maximum(noise * (n_frames / _RATE_CHANGE) ** 2, 1e-9 * pull.mean(axis=1))
+        steps = _solve(refined[active, 1:-1], pull, push, stiffness)
+        tau = refined[active]
+        tau[:, 1:-1] += np.clip(steps, -_LONGEST_STEP, _LONGEST_STEP)
+        refined[active] = np.maximum.accumulate(np.clip(tau, low, high), axis=1)
+        active = active[np.abs(steps).max(axis=1) >= _SHORTEST_STEP]
     return refined
+
+
+def _evaluate(splines, active, times):
+    """Cubic splines on whole frames, and their derivatives, each at times of its own."""
+    left = np.clip(times.astype(np.intp), 0, splines.shape[1] - 1)
+    x = (times - left).astype(splines.dtype)[:, :, np.newaxis]
+    a, b, c, d = splines[:, left, active[:, np.newaxis]]
+    return ((a * x + b) * x + c) * x + d, (3 * a * x + 2 * b) * x + c
+
+
+def _solve(inner, pull, push, stiffness):
+    """Steps of all warps: their systems, one below the other, are a single banded one."""
+    n_frames = inner.shape[1] + 2
+    band, border = _curvature(n_frames)
+    system = band[:, np.newaxis] * stiffness[:, np.newaxis]
+    system[-1] += pull
+    target = pull * inner + push - stiffness[:, np.newaxis] * border
+    solved = solveh_banded(system.reshape(3, -1), target.ravel())
+    return solved.reshape(inner.shape) - inner
 
 
 def _gaussian(sigma):
@@ -150,13 +165,16 @@ def _gaussian(sigma):
 
 
 def _fit_gain(base, matched):
-    """``g * matched + o``, and ``g``: least squares, gains drawn a little towards 1."""
-    x, y = base - base.mean(axis=0), matched - matched.mean(axis=0)
-    energy = np.square(y).sum(axis=0)
-    ridge = _RIDGE * energy.mean()
-    if ridge == 0:
-        return np.broadcast_to(base.mean(axis=0), base.shape), np.ones(base.shape[1])
-    gain = ((x * y).sum(axis=0) + ridge) / (energy + ridge)
+    """``g * matched + o``, and ``g``: least squares, gains drawn a little towards 1.
+
+    ``matched`` is (n_sequences, P, n_features), ``g`` (n_sequences, 1, n_features).
+    """
+    x, y = base - base.mean(axis=0), matched - matched.mean(axis=1, keepdims=True)
+    energy = np.square(y).sum(axis=1, keepdims=True)
+    ridge = _RIDGE * energy.mean(axis=2, keepdims=True)
+    # Nothing moves: any gain fits.
+    ridge[ridge == 0] = 1
+    gain = ((x * y).sum(axis=1, keepdims=True) + ridge) / (energy + ridge)
     return gain * y + base.mean(axis=0), gain
 
 
