@@ -24,6 +24,7 @@ import time
 from functools import partial
 from pathlib import Path
 
+import joblib
 import numpy as np
 import sklearn_motionsync
 from sklearn.pipeline import make_pipeline
@@ -390,9 +391,16 @@ def workers(peers):
     for name, settings, n in (("defaults", {}, 600), ("the paper's settings", PAPER, 1200)):
         X, _ = walks(n=n)
         settings = {**settings, "search": "exhaustive"}
+        shared = fit(X, n_jobs=2, **settings)
+
+        def in_processes(shared=shared):
+            with joblib.parallel_config(backend="loky"):
+                return shared()
+
         jobs = {
             "1 worker": fit(X, **settings),
-            "2 workers, as it comes": fit(X, n_jobs=2, **settings),
+            "`n_jobs=2`: threads": shared,
+            "`n_jobs=2`: processes, already running": in_processes,
         }
         compare(f"Workers: `fit` of {n} performances, {name}, exhaustive", jobs, rounds=3)
 

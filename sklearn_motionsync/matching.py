@@ -273,7 +273,7 @@ class _Bundle:
         """
         pairs, rows, keep = self.pairs, list(states), len(states)
         plan = [_plan(group, pairs, states.dtype) for group in self.trellis._groups]
-        scratch = np.empty((2, (2 * self.trellis.width + 1) * pairs), dtype=states.dtype)
+        room, level = np.empty((2, (2 * self.trellis.width + 1) * pairs), dtype=states.dtype)
         last = self.n_frames if last is None else last
         costs = self._costs_of_samples if self.n_bases > 1 else self._costs_of_blocks
         starts, stops, rest = self.starts, self.stops, plan[1:]
@@ -284,11 +284,11 @@ class _Bundle:
                 unit = self.trellis._unit_group
                 np.subtract(local[unit], self.trellis._groups[unit].penalty, out=new)
             elif p > first:
-                best = _best_step(old, start, stop, plan[0], new, scratch[1])
+                best = _best_step(old, start, stop, plan[0], new, level)
                 np.add(best, local[0], out=new)
                 for i, levels in enumerate(rest, 1):
-                    trial = scratch[0, : stop - start]
-                    best = _best_step(old, start, stop, levels, trial, scratch[1])
+                    trial = room[: stop - start]
+                    best = _best_step(old, start, stop, levels, trial, level)
                     np.minimum(new, np.add(best, local[i], out=trial), out=new)
             yield p
 
@@ -313,15 +313,16 @@ class _Bundle:
         for start in range(first, last, _PRODUCT_ROWS):
             # Whole blocks even if their end is not asked for: equal products, equal bits.
             stop = min(start + _PRODUCT_ROWS, self.n_frames)
-            lowest = min(p * sub + self.low[p] for p in range(start, stop))
-            highest = max(p * sub + self.high[p] for p in range(start, stop))
+            # The ends of the windows never move back.
+            lowest = start * sub + self.low[start]
+            highest = (stop - 1) * sub + self.high[stop - 1]
             factor = self.right[lowest : highest + 1].reshape(-1, n_factors)
             left = self.left[start:stop].reshape(-1, n_factors)
             costs = np.matmul(left, factor.T).reshape(stop - start, n_groups, -1)
-            for p in range(start, min(stop, last)):
-                at = p * sub - lowest
-                low, high = at + self.low[p], at + self.high[p] + 1
-                yield p, costs[p - start, :, low * self.pairs : high * self.pairs]
+            for p, rows in zip(range(start, min(stop, last)), costs, strict=False):
+                # From disparities to places in the block.
+                shift = (p * sub - lowest - self.centre) * self.pairs
+                yield p, rows[:, self.starts[p] + shift : self.stops[p] + shift]
 
     # -- backward: the path, Eq. 17 -------------------------------------------
 
