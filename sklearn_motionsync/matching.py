@@ -21,10 +21,11 @@ Invariants the code relies on:
 """
 
 import itertools
-import math
 from typing import NamedTuple
 
 import numpy as np
+
+from .bundle import Bundle, group_steps, right_factor
 
 __all__ = ["Match", "StepTable", "Trellis", "even_slices", "step_table"]
 
@@ -36,10 +37,6 @@ _TILE_PRODUCT = 1_000_000
 _TILE_BASES = 48
 # Fewer bases than this make thin products: a single one is better, if its row is long.
 _FEW_BASES, _LONG_ROW = 8, 1024
-# Cells of a trellis so small that NumPy's calls cost more than its arithmetic.
-_SMALL_TABLE = 20_000
-# Samples of a single base that share one product.
-_PRODUCT_ROWS = 16
 
 # w of the velocity cost, from the measurement in docs/method.md.
 _RATE_WEIGHT = 0.2
@@ -147,11 +144,13 @@ class Trellis:
     def __init__(self, table, mu, max_disparity):
         self.table = table
         self.width = max_disparity * table.subframes
-        self._groups, group_of_step = _group_steps(table, mu)
-        self._of_step = np.stack([mu * table.penalty, table.moving, table.inner])
-        self._slopes = table.steps - table.subframes
-        self._pad = int(np.abs(self._slopes).max())
-        self._unit_group = group_of_step[self._slopes == 0][0]
+        self.groups, group_of_step = group_steps(table, mu)
+        # Of every step: its penalty, and the weights of |x_m|^2 and of the inner product.
+        self.of_step = np.stack([mu * table.penalty, table.moving, table.inner])
+        # By how much it changes the disparity; ``pad`` cells at both ends of a row hold infinity.
+        self.slopes = table.steps - table.subframes
+        self.pad = int(np.abs(self.slopes).max())
+        self.unit_group = group_of_step[self.slopes == 0][0]
         self._windows = {}
 
     def distances(self, bases, moving):
@@ -218,176 +217,19 @@ class Trellis:
 
     def _bundles(self, bases, moving):
         for rows, columns in self.tiles(len(bases), *moving.shape[::2]):
-            right = _right_factor(moving[columns])
-            yield rows, columns, _Bundle(self, bases[rows], right)
+            right = right_factor(moving[columns])
+            yield rows, columns, Bundle(self, bases[rows], right)
 
     def windows(self, n_frames):
         """Lowest and highest disparity, at every sample, of a pinned path in the band."""
         if n_frames in self._windows:
             return self._windows[n_frames]
         p = np.arange(n_frames)
-        down, up = self.table.subframes * p, int(self._slopes.max()) * p
+        down, up = self.table.subframes * p, int(self.slopes.max()) * p
         low = -np.minimum(self.width, np.minimum(down, up[::-1]))
         high = np.minimum(self.width, np.minimum(up, down[::-1]))
         self._windows = {n_frames: (low.tolist(), high.tolist())}
         return self._windows[n_frames]
-
-
-class _Bundle:
-    """The pairs of one tile, whose rows are computed together.
-
-    A row holds the disparities of all pairs, flat: (2 * (width + pad) + 1, n_moving,
-    n_bases), with ``pad`` cells at both sides for the steps that leave the band.
-    """
-
-    def __init__(self, trellis, bases, right):
-        self.trellis, self.bases, self.right = trellis, bases, right
-        self.n_frames, self.n_bases = bases.shape[1], len(bases)
-        self.pairs = right.shape[1] * self.n_bases
-        self.centre = trellis.width + trellis._pad
-        self.left = _left_factor(bases, trellis._groups)
-        self.low, self.high = trellis.windows(self.n_frames)
-        # Where the window of every sample is in a flat row.
-        self.starts = [(self.centre + low) * self.pairs for low in self.low]
-        self.stops = [(self.centre + high + 1) * self.pairs for high in self.high]
-
-    def states(self, n_rows):
-        """Rows of cells that no path has reached."""
-        cells = (2 * self.centre + 1) * self.pairs
-        return np.full((n_rows, cells), np.inf, dtype=self.bases.dtype)
-
-    def cost(self, states):
-        """Costs of the best paths, from the last row."""
-        at = self.centre * self.pairs
-        best = states[(self.n_frames - 1) % len(states), at : at + self.pairs]
-        return np.maximum(best, 0).reshape(-1, self.n_bases).T
-
-    # -- forward: the recurrence, Eq. 16 --------------------------------------
-
-    def advance(self, states, first=0, last=None):
-        """Compute the rows ``S(p, .)`` from ``first`` on, before ``last``, in a ring of rows.
-
-        Yields every p when its row is there. If ``first`` is not 0 its row must be there already.
-        Cells that no path reaches stay infinite: the windows first only grow, over
-        cells never written, then only shrink, reading inside the row before.
-        """
-        pairs, rows, keep = self.pairs, list(states), len(states)
-        plan = [_plan(group, pairs, states.dtype) for group in self.trellis._groups]
-        room, level = np.empty((2, (2 * self.trellis.width + 1) * pairs), dtype=states.dtype)
-        last = self.n_frames if last is None else last
-        costs = self._costs_of_samples if self.n_bases > 1 else self._costs_of_blocks
-        starts, stops, rest = self.starts, self.stops, plan[1:]
-        for p, local in costs(first, last):
-            start, stop = starts[p], stops[p]
-            new, old = rows[p % keep][start:stop], rows[(p - 1) % keep]
-            if p == 0:
-                unit = self.trellis._unit_group
-                np.subtract(local[unit], self.trellis._groups[unit].penalty, out=new)
-            elif p > first:
-                best = _best_step(old, start, stop, plan[0], new, level)
-                np.add(best, local[0], out=new)
-                for i, levels in enumerate(rest, 1):
-                    trial = room[: stop - start]
-                    best = _best_step(old, start, stop, levels, trial, level)
-                    np.minimum(new, np.add(best, local[i], out=trial), out=new)
-            yield p
-
-    def _costs_of_samples(self, first, last):
-        """Yield ``p`` and the costs of its window, one flat array a group: a product a sample."""
-        sub, n_groups = self.trellis.table.subframes, len(self.trellis._groups)
-        n_factors = self.right.shape[2]
-        widest = (2 * self.trellis.width + 1) * self.pairs
-        room = np.empty(n_groups * widest, dtype=self.bases.dtype)
-        for p in range(first, last):
-            window = self.right[p * sub + self.low[p] : p * sub + self.high[p] + 1]
-            factor = window.reshape(-1, n_factors)
-            costs = room[: n_groups * len(factor) * self.n_bases].reshape(n_groups, -1)
-            products = costs.reshape(n_groups, -1, self.n_bases)
-            np.matmul(factor, self.left[p], out=products)
-            yield p, costs
-
-    def _costs_of_blocks(self, first, last):
-        """The same for a single base: a product a block of samples."""
-        sub, n_groups = self.trellis.table.subframes, len(self.trellis._groups)
-        n_factors = self.right.shape[2]
-        for start in range(first, last, _PRODUCT_ROWS):
-            # Whole blocks even if their end is not asked for: equal products, equal bits.
-            stop = min(start + _PRODUCT_ROWS, self.n_frames)
-            # The ends of the windows never move back.
-            lowest = start * sub + self.low[start]
-            highest = (stop - 1) * sub + self.high[stop - 1]
-            factor = self.right[lowest : highest + 1].reshape(-1, n_factors)
-            left = self.left[start:stop].reshape(-1, n_factors)
-            costs = np.matmul(left, factor.T).reshape(stop - start, n_groups, -1)
-            for p, rows in zip(range(start, min(stop, last)), costs, strict=False):
-                # From disparities to places in the block.
-                shift = (p * sub - lowest - self.centre) * self.pairs
-                yield p, rows[:, self.starts[p] + shift : self.stops[p] + shift]
-
-    # -- backward: the path, Eq. 17 -------------------------------------------
-
-    def paths(self, max_bytes):
-        """Costs and disparities of the best paths.
-
-        If not all rows may be kept, every ``length``-th is, and the rows between two of them
-        are computed again, from the last to the first.
-        """
-        n_frames, length = self.n_frames, self.n_frames
-        if self.states(1).nbytes * n_frames > max_bytes:
-            length = _PRODUCT_ROWS * math.ceil(math.sqrt(n_frames) / _PRODUCT_ROWS)
-        states = self.states(n_frames if length >= n_frames else 2)
-        kept = {}
-        for p in self.advance(states):
-            if length < n_frames and p % length == 0:
-                kept[p] = states[p % 2].copy()
-        cost = self.cost(states)
-        at = np.empty((n_frames, self.pairs), dtype=np.intp)
-        at[-1] = self.centre * self.pairs + np.arange(self.pairs)
-        for first in range(0, n_frames, length)[::-1]:
-            last = min(first + length, n_frames)
-            if kept:
-                states = self.states(length)
-                states[first % length] = kept.pop(first)
-                for _ in self.advance(states, first, last):
-                    pass
-            self._retrace(states, at, first, last)
-        disparities = (at // self.pairs - self.centre).T
-        return cost, disparities.reshape(-1, self.n_bases, n_frames).swapaxes(0, 1)
-
-    def _retrace(self, states, at, first, last):
-        """Follow the paths back from row ``last`` to ``first``: the step that won each time."""
-        trellis, pairs = self.trellis, self.pairs
-        several = len(trellis._groups) > 1
-        shift = trellis._slopes * pairs
-        back = shift[:, np.newaxis]
-        if not several and len(states) == self.n_frames and states.size <= _SMALL_TABLE:
-            return self._look_up(states, at, shift)
-        penalties, weight, inner = trellis._of_step.astype(states.dtype)[:, :, np.newaxis]
-        moving, base = np.divmod(np.arange(pairs), self.n_bases)
-        start = min(last, self.n_frames - 1)
-        here = at[start]
-        for p in range(start, first, -1):
-            value = states[(p - 1) % len(states)].take(here - back)
-            value += penalties
-            if several:
-                q = p * trellis.table.subframes + here // pairs - self.centre
-                y, x = self.right[q, moving], self.bases[base, p]
-                value += weight * y[:, -2]
-                value -= inner * np.einsum("ik,ik->i", x, y[:, :-2])
-            here = here - shift.take(value.argmin(axis=0))
-            at[p - 1] = here
-
-    def _look_up(self, states, at, shift):
-        """The same for a small trellis: the winning steps of all its cells, then a walk."""
-        edge = self.trellis._pad * self.pairs
-        cells = np.arange(edge, states.shape[1] - edge)
-        values = states[:-1].take(cells - shift[:, np.newaxis], axis=1)
-        values += self.trellis._of_step[0].astype(states.dtype)[:, np.newaxis]
-        steps = shift.take(values.argmin(axis=1))
-        for pair, here in enumerate(at[-1].tolist()):
-            for p in range(len(steps) - 1, -1, -1):
-                here -= steps.item(p, here - edge)
-                at[p, pair] = here
 
 
 def even_slices(n, size):
@@ -395,80 +237,3 @@ def even_slices(n, size):
     count = -(-n // size)
     edges = [i * n // count for i in range(count + 1)] if count else []
     return [slice(start, stop) for start, stop in itertools.pairwise(edges)]
-
-
-class _Group(NamedTuple):
-    """Steps whose local cost is the same; what their penalties have in common belongs to it."""
-
-    moving: float
-    inner: float
-    penalty: float
-    levels: list
-
-
-def _group_steps(table, mu):
-    """Groups of steps of equal weights, and the group of every step."""
-    weights = np.column_stack([table.moving, table.inner])
-    unique, group_of_step = np.unique(weights, axis=0, return_inverse=True)
-    group_of_step = group_of_step.ravel()
-    slopes = table.steps - table.subframes
-    groups = []
-    for i, (moving, inner) in enumerate(unique):
-        mine = group_of_step == i
-        penalties = mu * table.penalty[mine]
-        least = penalties.min()
-        levels = [
-            (float(value - least), slopes[mine][penalties == value].tolist())
-            for value in np.unique(penalties)[::-1]
-        ]
-        groups.append(_Group(moving, inner, float(least), levels))
-    return groups, group_of_step
-
-
-def _plan(group, pairs, dtype):
-    """The levels of a group for flat rows; arrays spare NumPy the conversion of numbers."""
-    return [
-        (np.array(penalty, dtype) if penalty else None, [k * pairs for k in slopes])
-        for penalty, slopes in group.levels
-    ]
-
-
-def _best_step(old, start, stop, levels, out, scratch):
-    """``min_s S(p-1, d - k_s) + mu phi_s`` over the steps of one group.
-
-    ``levels`` come by falling penalty; what all steps have in common is not in them. The
-    result is in ``out``, or in ``old`` itself where there is nothing to compute.
-    """
-    best = None
-    for penalty, (shift, *others) in levels:
-        view = old[start - shift : stop - shift]
-        target = out if best is None else scratch[: stop - start]
-        for other in others:
-            view = np.minimum(view, old[start - other : stop - other], out=target)
-        if penalty is not None:
-            view = np.add(view, penalty, out=target)
-        best = view if best is None else np.minimum(best, view, out=out)
-    return best
-
-
-def _right_factor(moving):
-    """(Q, n_moving, n_features + 2): x_m(q), |x_m(q)|^2 and 1."""
-    n_moving, n_positions, n_features = moving.shape
-    right = np.empty((n_positions, n_moving, n_features + 2), dtype=moving.dtype)
-    right[..., :-2] = moving.transpose(1, 0, 2)
-    np.einsum("mqk,mqk->qm", moving, moving, out=right[..., -2])
-    right[..., -1] = 1
-    return right
-
-
-def _left_factor(bases, groups):
-    """(P, n_groups, n_features + 2, n_bases): times the right factor, the local costs."""
-    n_bases, n_frames, n_features = bases.shape
-    left = np.empty((n_frames, len(groups), n_features + 2, n_bases), dtype=bases.dtype)
-    frames = bases.transpose(1, 2, 0)
-    energy = np.einsum("npk,npk->pn", bases, bases)
-    for i, group in enumerate(groups):
-        np.multiply(frames, -group.inner, out=left[:, i, :-2])
-        left[:, i, -2] = group.moving
-        np.add(energy, group.penalty, out=left[:, i, -1])
-    return left

@@ -4,7 +4,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from sklearn_motionsync import matching
+from sklearn_motionsync import bundle, matching
 from sklearn_motionsync.matching import StepTable, Trellis, step_table
 
 from oracle import brute_force, path_cost, plain_loops
@@ -54,7 +54,9 @@ CASES = [
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("whole", [False, True], ids=["reals", "ties"])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_equals_every_admissible_path(case, make_costs, whole, dtype):
+@pytest.mark.parametrize("narrow_cells", [0, 30_000], ids=["wide", "narrow"])
+def test_equals_every_admissible_path(case, make_costs, whole, dtype, narrow_cells, monkeypatch):
+    monkeypatch.setattr(bundle, "_NARROW_CELLS", narrow_cells)
     n_frames, max_rate, subframes, reach, mu = case
     costs = make_costs(max_rate, subframes)
     bases, moving = draw(np.random.default_rng(n_frames), 3, n_frames, subframes, whole=whole)
@@ -132,8 +134,8 @@ def test_tiles_do_not_change_the_answer(n_bases, table, monkeypatch):
     monkeypatch.setattr(matching, "_TILE_PRODUCT", 1)
     monkeypatch.setattr(matching, "_TILE_BASES", 2)
     monkeypatch.setattr(matching, "_LONG_ROW", 1)
-    monkeypatch.setattr(matching, "_PRODUCT_ROWS", 3)
-    monkeypatch.setattr(matching, "_SMALL_TABLE", 0)
+    monkeypatch.setattr(bundle, "_PRODUCT_ROWS", 3)
+    monkeypatch.setattr(bundle, "_NARROW_CELLS", 0)
     np.testing.assert_allclose(trellis.distances(bases, moving), whole, rtol=1e-12)
     np.testing.assert_array_equal(trellis.paths(bases, moving)[1], paths)
 
@@ -141,8 +143,9 @@ def test_tiles_do_not_change_the_answer(n_bases, table, monkeypatch):
 @pytest.mark.parametrize("table", TABLES, ids=["one group", "several"])
 @pytest.mark.parametrize("n_bases", [1, 3])
 @pytest.mark.parametrize("n_frames", [2, 16, 17, 150])
-def test_rows_that_are_not_kept_are_computed_again(n_frames, n_bases, table):
+def test_rows_that_are_not_kept_are_computed_again(n_frames, n_bases, table, monkeypatch):
     """Little memory, the same bits."""
+    monkeypatch.setattr(bundle, "_NARROW_CELLS", 0)
     bases, moving = draw(np.random.default_rng(3), n_bases, n_frames, table.subframes)
     trellis = Trellis(table, 0.5, min(40, n_frames - 1))
     distances, paths = trellis.paths(bases, moving)

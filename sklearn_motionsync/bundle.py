@@ -1,0 +1,323 @@
+"""The rows of the trellis for a bundle of pairs (Eqs. 16 and 17): the inner loop of the matching.
+
+What the code relies on:
+
+- A row ``S(p, .)`` looks only at the row before it, so it is computed for all offsets and all
+  pairs of the bundle at once.
+- Rows are flat, the offset first and the pair last: the cells before a step are one slice.
+- Local costs are matrix products of a left factor (the bases) and a right one (the moving
+  sequences). Steps of equal weights form a group and share one; penalties that a whole group
+  pays are in the product.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+
+__all__ = ["Bundle", "group_steps", "right_factor"]
+
+# Cells, for each group of steps, of a bundle so small that NumPy's calls cost more than its
+# arithmetic; pairs so few that Python's steps cost less than NumPy's.
+_NARROW_CELLS = 30_000
+_FEW_PAIRS = 2
+# Samples of a single base that share one product.
+_PRODUCT_ROWS = 16
+
+
+class Bundle:
+    """The pairs of one tile, whose rows are computed together.
+
+    A row holds the disparities of all pairs, flat: (2 * (width + pad) + 1, n_moving,
+    n_bases), with ``pad`` cells at both sides for the steps that leave the band.
+    """
+
+    def __init__(self, trellis, bases, right):
+        self.trellis, self.bases, self.right = trellis, bases, right
+        self.n_frames, self.n_bases = bases.shape[1], len(bases)
+        self.pairs = right.shape[1] * self.n_bases
+        self.centre = trellis.width + trellis.pad
+        self.left = _left_factor(bases, trellis.groups)
+        self.low, self.high = trellis.windows(self.n_frames)
+        # Where the window of every sample is in a flat row.
+        self.starts = [(self.centre + low) * self.pairs for low in self.low]
+        self.stops = [(self.centre + high + 1) * self.pairs for high in self.high]
+
+    def states(self, n_rows):
+        """Rows of cells that no path has reached."""
+        cells = (2 * self.centre + 1) * self.pairs
+        return np.full((n_rows, cells), np.inf, dtype=self.bases.dtype)
+
+    def cost(self, states):
+        """Costs of the best paths, from the last row."""
+        at = self.centre * self.pairs
+        best = states[(self.n_frames - 1) % len(states), at : at + self.pairs]
+        return np.maximum(best, 0).reshape(-1, self.n_bases).T
+
+    # -- forward: the recurrence, Eq. 16 --------------------------------------
+
+    def advance(self, states, first=0, last=None):
+        """Compute the rows ``S(p, .)`` from ``first`` on, before ``last``, in a ring of rows.
+
+        Yields every p when its row is there. If ``first`` is not 0 its row must be there already.
+        Cells that no path reaches stay infinite: the windows first only grow, over
+        cells never written, then only shrink, reading inside the row before.
+        """
+        pairs, rows, keep = self.pairs, list(states), len(states)
+        plan = [_plan(group, pairs, states.dtype) for group in self.trellis.groups]
+        room, level = np.empty((2, (2 * self.trellis.width + 1) * pairs), dtype=states.dtype)
+        last = self.n_frames if last is None else last
+        costs = self._costs_of_samples if self.n_bases > 1 else self._costs_of_blocks
+        starts, stops, rest = self.starts, self.stops, plan[1:]
+        for p, local in costs(first, last):
+            start, stop = starts[p], stops[p]
+            new, old = rows[p % keep][start:stop], rows[(p - 1) % keep]
+            if p == 0:
+                unit = self.trellis.unit_group
+                np.subtract(local[unit], self.trellis.groups[unit].penalty, out=new)
+            elif p > first:
+                best = _best_step(old, start, stop, plan[0], new, level)
+                np.add(best, local[0], out=new)
+                for i, levels in enumerate(rest, 1):
+                    trial = room[: stop - start]
+                    best = _best_step(old, start, stop, levels, trial, level)
+                    np.minimum(new, np.add(best, local[i], out=trial), out=new)
+            yield p
+
+    def _costs_of_samples(self, first, last):
+        """Yield ``p`` and the costs of its window, one flat array a group: a product a sample."""
+        sub, n_groups = self.trellis.table.subframes, len(self.trellis.groups)
+        n_factors = self.right.shape[2]
+        widest = (2 * self.trellis.width + 1) * self.pairs
+        room = np.empty(n_groups * widest, dtype=self.bases.dtype)
+        for p in range(first, last):
+            window = self.right[p * sub + self.low[p] : p * sub + self.high[p] + 1]
+            factor = window.reshape(-1, n_factors)
+            costs = room[: n_groups * len(factor) * self.n_bases].reshape(n_groups, -1)
+            products = costs.reshape(n_groups, -1, self.n_bases)
+            np.matmul(factor, self.left[p], out=products)
+            yield p, costs
+
+    def _costs_of_blocks(self, first, last):
+        """The same for a single base: a product a block of samples."""
+        sub, n_groups = self.trellis.table.subframes, len(self.trellis.groups)
+        n_factors = self.right.shape[2]
+        for start in range(first, last, _PRODUCT_ROWS):
+            # Whole blocks even if their end is not asked for: equal products, equal bits.
+            stop = min(start + _PRODUCT_ROWS, self.n_frames)
+            # The ends of the windows never move back.
+            lowest = start * sub + self.low[start]
+            highest = (stop - 1) * sub + self.high[stop - 1]
+            factor = self.right[lowest : highest + 1].reshape(-1, n_factors)
+            left = self.left[start:stop].reshape(-1, n_factors)
+            costs = np.matmul(left, factor.T).reshape(stop - start, n_groups, -1)
+            for p, rows in zip(range(start, min(stop, last)), costs, strict=False):
+                # From disparities to places in the block.
+                shift = (p * sub - lowest - self.centre) * self.pairs
+                yield p, rows[:, self.starts[p] + shift : self.stops[p] + shift]
+
+    # -- backward: the path, Eq. 17 -------------------------------------------
+
+    def paths(self, max_bytes):
+        """Costs and disparities of the best paths.
+
+        If not all rows may be kept, every ``length``-th is, and the rows between two of them
+        are computed again, from the last to the first.
+        """
+        if self._is_narrow():
+            return self._narrow_paths()
+        n_frames, length = self.n_frames, self.n_frames
+        if self.states(1).nbytes * n_frames > max_bytes:
+            length = _PRODUCT_ROWS * math.ceil(math.sqrt(n_frames) / _PRODUCT_ROWS)
+        states = self.states(n_frames if length >= n_frames else 2)
+        kept = {}
+        for p in self.advance(states):
+            if length < n_frames and p % length == 0:
+                kept[p] = states[p % 2].copy()
+        cost = self.cost(states)
+        at = np.empty((n_frames, self.pairs), dtype=np.intp)
+        at[-1] = self.centre * self.pairs + np.arange(self.pairs)
+        for first in range(0, n_frames, length)[::-1]:
+            last = min(first + length, n_frames)
+            if kept:
+                states = self.states(length)
+                states[first % length] = kept.pop(first)
+                for _ in self.advance(states, first, last):
+                    pass
+            self._retrace(states, at, first, last)
+        return cost, self._disparities(at // self.pairs - self.centre)
+
+    def _retrace(self, states, at, first, last):
+        """Follow the paths back from row ``last`` to ``first``: the step that won each time."""
+        trellis, pairs = self.trellis, self.pairs
+        several = len(trellis.groups) > 1
+        shift = trellis.slopes * pairs
+        back = shift[:, np.newaxis]
+        penalties, weight, inner = trellis.of_step.astype(states.dtype)[:, :, np.newaxis]
+        moving, base = np.divmod(np.arange(pairs), self.n_bases)
+        start = min(last, self.n_frames - 1)
+        here = at[start]
+        for p in range(start, first, -1):
+            value = states[(p - 1) % len(states)].take(here - back)
+            value += penalties
+            if several:
+                q = p * trellis.table.subframes + here // pairs - self.centre
+                y, x = self.right[q, moving], self.bases[base, p]
+                value += weight * y[:, -2]
+                value -= inner * np.einsum("ik,ik->i", x, y[:, :-2])
+            here = here - shift.take(value.argmin(axis=0))
+            at[p - 1] = here
+
+    # -- narrow: few pairs and many groups, where calls cost more than arithmetic --------
+
+    def _is_narrow(self):
+        """Whether all steps of all rows may be laid out, each step a group of its own."""
+        trellis = self.trellis
+        n_steps = len(trellis.table.steps)
+        consecutive = n_steps == trellis.table.steps.max() + 1
+        cells = self.n_frames * (2 * trellis.width + 1) * self.pairs
+        return consecutive and cells <= _NARROW_CELLS * len(trellis.groups)
+
+    def _narrow_paths(self):
+        """Costs and disparities of the best paths: two calls a row, and one for all products.
+
+        The band is computed whole: what lies outside the sequences is never on a winning path.
+        """
+        trellis, pairs = self.trellis, self.pairs
+        ways, states = self._ways(), self.states(self.n_frames)
+        edge, item = trellis.pad * pairs, states.itemsize
+        # S(p - 1, d - k) of every cell, step by step.
+        before = as_strided(
+            states[:, edge + trellis.table.subframes * pairs :],
+            shape=ways.shape,
+            strides=(states.strides[0], -pairs * item, item),
+            writeable=False,
+        )
+        rows = states[:, edge : states.shape[1] - edge]
+        middle = slice(trellis.width * pairs, (trellis.width + 1) * pairs)
+        rows[0, middle] = ways[0, trellis.table.subframes, middle]
+        for p in range(1, self.n_frames):
+            way = np.add(ways[p], before[p - 1], out=ways[p])
+            np.minimum.reduce(way, axis=0, out=rows[p])
+        return self.cost(states), self._narrow_walk(ways)
+
+    def _ways(self):
+        """Local costs, with the penalty, of every step to every cell: (P, n_steps, cells)."""
+        table, width = self.trellis.table, self.trellis.width
+        n_moving, n_factors = self.right.shape[1:]
+        moving, inner, penalty = self.trellis.of_step[[1, 2, 0]][:, np.argsort(table.steps)]
+        groups = [_Group(*step, None) for step in zip(moving, inner, penalty, strict=True)]
+        left = _left_factor(self.bases, groups)
+        right = np.pad(self.right, ((width, width), (0, 0), (0, 0)))
+        windows = as_strided(
+            right,
+            shape=(self.n_frames, 1, (2 * width + 1) * n_moving, n_factors),
+            strides=(table.subframes * right.strides[0], 0, *right.strides[1:]),
+            writeable=False,
+        )
+        ways = np.matmul(windows, left).reshape(self.n_frames, len(groups), -1)
+        # The first sample is reached by no step, so it pays no penalty.
+        ways[0] -= penalty[:, np.newaxis]
+        return ways
+
+    def _narrow_walk(self, ways):
+        """Disparities: at each sample the first of the best steps."""
+        order, (n_frames, _, n_cells) = self.trellis.table.steps, ways.shape
+        shift = self.trellis.slopes * self.pairs
+        here = self.trellis.width * self.pairs + np.arange(self.pairs)
+        at = np.empty((n_frames, self.pairs), dtype=np.intp)
+        at[-1] = here
+        if self.pairs <= _FEW_PAIRS:
+            won = shift.take(ways[:, order].argmin(axis=1))
+            for pair, cell in enumerate(here.tolist()):
+                for p in range(n_frames - 1, 0, -1):
+                    cell -= won.item(p, cell)
+                    at[p - 1, pair] = cell
+        else:
+            choices = (order * n_cells)[:, np.newaxis]
+            for p in range(n_frames - 1, 0, -1):
+                here = here - shift.take(ways[p].ravel().take(here + choices).argmin(axis=0))
+                at[p - 1] = here
+        return self._disparities(at // self.pairs - self.trellis.width)
+
+    def _disparities(self, at):
+        """(n_bases, n_moving, P) from (P, pairs)."""
+        return at.T.reshape(-1, self.n_bases, self.n_frames).swapaxes(0, 1)
+
+
+class _Group(NamedTuple):
+    """Steps whose local cost is the same; what their penalties have in common belongs to it."""
+
+    moving: float
+    inner: float
+    penalty: float
+    levels: list
+
+
+def group_steps(table, mu):
+    """Groups of steps of equal weights, and the group of every step."""
+    weights = np.column_stack([table.moving, table.inner])
+    unique, group_of_step = np.unique(weights, axis=0, return_inverse=True)
+    group_of_step = group_of_step.ravel()
+    slopes = table.steps - table.subframes
+    groups = []
+    for i, (moving, inner) in enumerate(unique):
+        mine = group_of_step == i
+        penalties = mu * table.penalty[mine]
+        least = penalties.min()
+        levels = [
+            (float(value - least), slopes[mine][penalties == value].tolist())
+            for value in np.unique(penalties)[::-1]
+        ]
+        groups.append(_Group(moving, inner, float(least), levels))
+    return groups, group_of_step
+
+
+def _plan(group, pairs, dtype):
+    """The levels of a group for flat rows; arrays spare NumPy the conversion of numbers."""
+    return [
+        (np.array(penalty, dtype) if penalty else None, [k * pairs for k in slopes])
+        for penalty, slopes in group.levels
+    ]
+
+
+def _best_step(old, start, stop, levels, out, scratch):
+    """``min_s S(p-1, d - k_s) + mu phi_s`` over the steps of one group.
+
+    ``levels`` come by falling penalty; what all steps have in common is not in them. The
+    result is in ``out``, or in ``old`` itself where there is nothing to compute.
+    """
+    best = None
+    for penalty, (shift, *others) in levels:
+        view = old[start - shift : stop - shift]
+        target = out if best is None else scratch[: stop - start]
+        for other in others:
+            view = np.minimum(view, old[start - other : stop - other], out=target)
+        if penalty is not None:
+            view = np.add(view, penalty, out=target)
+        best = view if best is None else np.minimum(best, view, out=out)
+    return best
+
+
+def right_factor(moving):
+    """(Q, n_moving, n_features + 2): x_m(q), |x_m(q)|^2 and 1."""
+    n_moving, n_positions, n_features = moving.shape
+    right = np.empty((n_positions, n_moving, n_features + 2), dtype=moving.dtype)
+    right[..., :-2] = moving.transpose(1, 0, 2)
+    np.einsum("mqk,mqk->qm", moving, moving, out=right[..., -2])
+    right[..., -1] = 1
+    return right
+
+
+def _left_factor(bases, groups):
+    """(P, n_groups, n_features + 2, n_bases): times the right factor, the local costs."""
+    n_bases, n_frames, n_features = bases.shape
+    left = np.empty((n_frames, len(groups), n_features + 2, n_bases), dtype=bases.dtype)
+    frames = bases.transpose(1, 2, 0)
+    energy = np.einsum("npk,npk->pn", bases, bases)
+    for i, group in enumerate(groups):
+        np.multiply(frames, -group.inner, out=left[:, i, :-2])
+        left[:, i, -2] = group.moving
+        np.add(energy, group.penalty, out=left[:, i, -1])
+    return left
