@@ -10,6 +10,7 @@ What the code relies on:
   pays are in the product.
 """
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -38,11 +39,11 @@ class Bundle:
         self.n_frames, self.n_bases = bases.shape[1], len(bases)
         self.pairs = right.shape[1] * self.n_bases
         self.centre = trellis.width + trellis.pad
-        self.left = _left_factor(bases, trellis.groups)
-        self.low, self.high = trellis.windows(self.n_frames)
-        # Where the window of every sample is in a flat row.
-        self.starts = [(self.centre + low) * self.pairs for low in self.low]
-        self.stops = [(self.centre + high + 1) * self.pairs for high in self.high]
+
+    @functools.cached_property
+    def left(self):
+        """The left factor of the bases."""
+        return _left_factor(self.bases, self.trellis.groups)
 
     def states(self, n_rows):
         """Rows of cells that no path has reached."""
@@ -69,9 +70,11 @@ class Bundle:
         room, level = np.empty((2, (2 * self.trellis.width + 1) * pairs), dtype=states.dtype)
         last = self.n_frames if last is None else last
         costs = self._costs_of_samples if self.n_bases > 1 else self._costs_of_blocks
-        starts, stops, rest = self.starts, self.stops, plan[1:]
-        for p, local in costs(first, last):
-            start, stop = starts[p], stops[p]
+        lows, highs = self.trellis.windows(self.n_frames)
+        rest = plan[1:]
+        for p, local in costs(first, last, lows, highs):
+            start = (self.centre + lows[p]) * pairs
+            stop = (self.centre + highs[p] + 1) * pairs
             new, old = rows[p % keep][start:stop], rows[(p - 1) % keep]
             if p == 0:
                 unit = self.trellis.unit_group
@@ -85,21 +88,21 @@ class Bundle:
                     np.minimum(new, np.add(best, local[i], out=trial), out=new)
             yield p
 
-    def _costs_of_samples(self, first, last):
+    def _costs_of_samples(self, first, last, lows, highs):
         """Yield ``p`` and the costs of its window, one flat array a group: a product a sample."""
         sub, n_groups = self.trellis.table.subframes, len(self.trellis.groups)
         n_factors = self.right.shape[2]
         widest = (2 * self.trellis.width + 1) * self.pairs
         room = np.empty(n_groups * widest, dtype=self.bases.dtype)
         for p in range(first, last):
-            window = self.right[p * sub + self.low[p] : p * sub + self.high[p] + 1]
+            window = self.right[p * sub + lows[p] : p * sub + highs[p] + 1]
             factor = window.reshape(-1, n_factors)
             costs = room[: n_groups * len(factor) * self.n_bases].reshape(n_groups, -1)
             products = costs.reshape(n_groups, -1, self.n_bases)
             np.matmul(factor, self.left[p], out=products)
             yield p, costs
 
-    def _costs_of_blocks(self, first, last):
+    def _costs_of_blocks(self, first, last, lows, highs):
         """The same for a single base: a product a block of samples."""
         sub, n_groups = self.trellis.table.subframes, len(self.trellis.groups)
         n_factors = self.right.shape[2]
@@ -107,15 +110,15 @@ class Bundle:
             # Whole blocks even if their end is not asked for: equal products, equal bits.
             stop = min(start + _PRODUCT_ROWS, self.n_frames)
             # The ends of the windows never move back.
-            lowest = start * sub + self.low[start]
-            highest = (stop - 1) * sub + self.high[stop - 1]
+            lowest = start * sub + lows[start]
+            highest = (stop - 1) * sub + highs[stop - 1]
             factor = self.right[lowest : highest + 1].reshape(-1, n_factors)
             left = self.left[start:stop].reshape(-1, n_factors)
             costs = np.matmul(left, factor.T).reshape(stop - start, n_groups, -1)
             for p, rows in zip(range(start, min(stop, last)), costs, strict=False):
-                # From disparities to places in the block.
-                shift = (p * sub - lowest - self.centre) * self.pairs
-                yield p, rows[:, self.starts[p] + shift : self.stops[p] + shift]
+                at = p * sub - lowest
+                low, high = at + lows[p], at + highs[p] + 1
+                yield p, rows[:, low * self.pairs : high * self.pairs]
 
     # -- backward: the path, Eq. 17 -------------------------------------------
 

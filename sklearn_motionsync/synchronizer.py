@@ -91,7 +91,7 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
     """Synchronise performances by dense matching to the median one.
 
     1. Normalise all performances linearly to ``P`` frames (Eq. 7).
-    2. Match every ordered pair: dynamic programming finds the offsets Delta(p) that
+    2. Match ordered pairs: dynamic programming finds the offsets Delta(p) that
        minimise the synchronisation distance ``D_{n,m}`` (Eqs. 12-17)::
 
            sum_p |x_n(p) - x_m(p + Delta(p))|^2 + mu sum_p phi(rate)
@@ -100,7 +100,8 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
        velocities stand in for the points x (see ``cost``): people differ in where the body
        is more than in how it moves.
     3. The pattern is the performance with the smallest global distance
-       ``C_n = sum_m D_{n,m}`` (Eq. 19), the "median" one.
+       ``C_n = sum_m D_{n,m}`` (Eq. 19), the "median" one; among more than 100 it is found
+       by a part of all matches (see ``search``).
     4. Consensus: the time of the pattern reaches a performance straight, or by way of
        one of ``consensus`` exemplars, typical performances of the training set; the median
        of these routes outvotes a path that took a wrong valley. It is then smoothed.
