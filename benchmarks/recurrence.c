@@ -12,12 +12,13 @@
               int P, int K, int D, REAL mu)                                                    \
     {                                                                                          \
         const int width = 2 * D + 1;                                                           \
-        REAL *rows = malloc(sizeof(REAL) * 3 * (width + 2));                                   \
+        const int pitch = (width + 2 + 15) / 16 * 16;                                          \
+        REAL *rows = aligned_alloc(64, sizeof(REAL) * 3 * pitch);                              \
         for (int a = 0; a < n; a++)                                                            \
             for (int b = 0; b < n; b++) {                                                      \
-                REAL *old = rows, *new = rows + width + 2;                                     \
-                REAL *restrict cost = rows + 2 * (width + 2);                                  \
-                for (int i = 0; i < 2 * (width + 2); i++)                                      \
+                REAL *old = rows, *new = rows + pitch;                                         \
+                REAL *restrict cost = rows + 2 * pitch;                                        \
+                for (int i = 0; i < 2 * pitch; i++)                                            \
                     rows[i] = INFINITY;                                                        \
                 for (int p = 0; p < P; p++) {                                                  \
                     int low = -D, high = D;                                                    \
