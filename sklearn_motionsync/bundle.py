@@ -20,8 +20,10 @@ from numpy.lib.stride_tricks import as_strided
 __all__ = ["Bundle", "group_steps", "right_factor"]
 
 # Cells, for each group of steps, of a bundle so small that NumPy's calls cost more than its
-# arithmetic; pairs so few that Python's steps cost less than NumPy's.
+# arithmetic, and at most so many ways into them; pairs so few that Python's steps cost less
+# than NumPy's.
 _NARROW_CELLS = 30_000
+_NARROW_WAYS = 1_000_000
 _FEW_PAIRS = 2
 # Samples of a single base that share one product.
 _PRODUCT_ROWS = 16
@@ -180,7 +182,8 @@ class Bundle:
         n_steps = len(trellis.table.steps)
         consecutive = n_steps == trellis.table.steps.max() + 1
         cells = self.n_frames * (2 * trellis.width + 1) * self.pairs
-        return consecutive and cells <= _NARROW_CELLS * len(trellis.groups)
+        few = cells <= _NARROW_CELLS * len(trellis.groups) and cells * n_steps <= _NARROW_WAYS
+        return consecutive and few
 
     def _narrow_paths(self):
         """Costs and disparities of the best paths: two calls a row, and one for all products.

@@ -222,14 +222,16 @@ class Trellis:
 
     def windows(self, n_frames):
         """Lowest and highest disparity, at every sample, of a pinned path in the band."""
-        if n_frames in self._windows:
-            return self._windows[n_frames]
+        known = self._windows.get(n_frames)
+        if known is not None:
+            return known
         p = np.arange(n_frames)
         down, up = self.table.subframes * p, int(self.slopes.max()) * p
         low = -np.minimum(self.width, np.minimum(down, up[::-1]))
         high = np.minimum(self.width, np.minimum(up, down[::-1]))
-        self._windows = {n_frames: (low.tolist(), high.tolist())}
-        return self._windows[n_frames]
+        windows = low.tolist(), high.tolist()
+        self._windows = {n_frames: windows}
+        return windows
 
 
 def even_slices(n, size):
