@@ -45,7 +45,8 @@ class Bundle:
     @functools.cached_property
     def left(self):
         """The left factor of the bases."""
-        return _left_factor(self.bases, self.trellis.groups)
+        weights = [(group.moving, group.inner, group.penalty) for group in self.trellis.groups]
+        return _left_factor(self.bases, *zip(*weights, strict=True))
 
     def states(self, n_rows):
         """Rows of cells that no path has reached."""
@@ -213,16 +214,16 @@ class Bundle:
         table, width = self.trellis.table, self.trellis.width
         n_moving, n_factors = self.right.shape[1:]
         moving, inner, penalty = self.trellis.of_step[[1, 2, 0]][:, np.argsort(table.steps)]
-        groups = [_Group(*step, None) for step in zip(moving, inner, penalty, strict=True)]
-        left = _left_factor(self.bases, groups)
-        right = np.pad(self.right, ((width, width), (0, 0), (0, 0)))
+        left = _left_factor(self.bases, moving, inner, penalty)
+        right = np.zeros((len(self.right) + 2 * width, n_moving, n_factors), self.right.dtype)
+        right[width : width + len(self.right)] = self.right
         windows = as_strided(
             right,
             shape=(self.n_frames, 1, (2 * width + 1) * n_moving, n_factors),
             strides=(table.subframes * right.strides[0], 0, *right.strides[1:]),
             writeable=False,
         )
-        ways = np.matmul(windows, left).reshape(self.n_frames, len(groups), -1)
+        ways = np.matmul(windows, left).reshape(self.n_frames, len(penalty), -1)
         # The first sample is reached by no step, so it pays no penalty.
         ways[0] -= penalty[:, np.newaxis]
         return ways
@@ -316,14 +317,17 @@ def right_factor(moving):
     return right
 
 
-def _left_factor(bases, groups):
-    """(P, n_groups, n_features + 2, n_bases): times the right factor, the local costs."""
+def _left_factor(bases, moving, inner, penalty):
+    """(P, n_groups, n_features + 2, n_bases): times the right factor, the local costs.
+
+    Given the weights of |x_m|^2 and of the inner product, and the penalty, of every group.
+    """
     n_bases, n_frames, n_features = bases.shape
-    left = np.empty((n_frames, len(groups), n_features + 2, n_bases), dtype=bases.dtype)
-    frames = bases.transpose(1, 2, 0)
-    energy = np.einsum("npk,npk->pn", bases, bases)
-    for i, group in enumerate(groups):
-        np.multiply(frames, -group.inner, out=left[:, i, :-2])
-        left[:, i, -2] = group.moving
-        np.add(energy, group.penalty, out=left[:, i, -1])
+    shape = n_frames, len(moving), n_features + 2, n_bases
+    left = np.empty(shape, dtype=bases.dtype)
+    frames, energy = bases.transpose(1, 2, 0), np.einsum("npk,npk->pn", bases, bases)
+    moving, inner, penalty = np.asarray([moving, inner, penalty], dtype=bases.dtype)
+    np.multiply(frames[:, np.newaxis], -inner[:, np.newaxis, np.newaxis], out=left[:, :, :-2])
+    left[:, :, -2] = moving[:, np.newaxis]
+    np.add(energy[:, np.newaxis], penalty[:, np.newaxis], out=left[:, :, -1])
     return left

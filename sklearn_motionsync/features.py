@@ -62,9 +62,9 @@ def smooth(on_clock, sigma, order=0):
 
 def _smooth(on_clock, sigma, order):
     reach = min(int(np.ceil(4 * sigma)) + 1, on_clock.shape[1] - 1)
-    continued = np.pad(
-        on_clock, ((0, 0), (reach, reach), (0, 0)), mode="reflect", reflect_type="odd"
-    )
+    before = 2 * on_clock[:, :1] - on_clock[:, reach:0:-1]
+    after = 2 * on_clock[:, -1:] - on_clock[:, -2 : -reach - 2 : -1]
+    continued = np.concatenate([before, on_clock, after], axis=1)
     # Below a third of a sample the derivative of a Gaussian is no derivative any more.
     sigma = max(sigma, 1 / 3)
     if sigma > _WIDE:
