@@ -41,6 +41,7 @@ class Bundle:
         self.n_frames, self.n_bases = bases.shape[1], len(bases)
         self.pairs = right.shape[1] * self.n_bases
         self.centre = trellis.width + trellis.pad
+        self.row_cells = (2 * self.centre + 1) * self.pairs
 
     @functools.cached_property
     def left(self):
@@ -50,8 +51,7 @@ class Bundle:
 
     def states(self, n_rows):
         """Rows of cells that no path has reached."""
-        cells = (2 * self.centre + 1) * self.pairs
-        return np.full((n_rows, cells), np.inf, dtype=self.bases.dtype)
+        return np.full((n_rows, self.row_cells), np.inf, dtype=self.bases.dtype)
 
     def cost(self, states):
         """Costs of the best paths, from the last row."""
@@ -134,7 +134,7 @@ class Bundle:
         if self._is_narrow():
             return self._narrow_paths()
         n_frames, length = self.n_frames, self.n_frames
-        if self.states(1).nbytes * n_frames > max_bytes:
+        if self.row_cells * n_frames * self.bases.itemsize > max_bytes:
             length = _PRODUCT_ROWS * math.ceil(math.sqrt(n_frames) / _PRODUCT_ROWS)
         states = self.states(n_frames if length >= n_frames else 2)
         kept = {}
@@ -175,7 +175,7 @@ class Bundle:
             here = here - shift.take(value.argmin(axis=0))
             at[p - 1] = here
 
-    # -- narrow: few pairs and many groups, where calls cost more than arithmetic --------
+    # -- narrow: so few cells that calls cost more than arithmetic -----------------------
 
     def _is_narrow(self):
         """Whether all steps of all rows may be laid out, each step a group of its own."""

@@ -52,8 +52,8 @@ def smooth(on_clock, sigma, order=0):
     n_sequences = len(on_clock)
     out = np.empty_like(on_clock)
     # Half a dozen copies of what is handled at a time.
-    room = get_config()["working_memory"] * 2**20 // 6
-    size = max(1, room * n_sequences // max(1, on_clock.nbytes))
+    room = get_config()["working_memory"] * 2**20 / 6
+    size = max(1, int(room * n_sequences / max(1, on_clock.nbytes)))
     for start in range(0, n_sequences, size):
         rows = slice(start, start + size)
         out[rows] = _smooth(on_clock[rows], sigma, order)

@@ -29,10 +29,9 @@ from .bundle import Bundle, group_steps, right_factor
 
 __all__ = ["Match", "StepTable", "Trellis", "even_slices", "step_table"]
 
-# Sizes of one tile of pairs: the rows stay in the second-level cache, the matrix product of a
-# row stays below the size from which OpenBLAS packs its operands (1.0 against 0.7 ns a cell), and
-# it has enough columns. Constants, so that no result can depend on the number of workers or
-# on the memory of the machine.
+# Sizes of one tile of pairs: the matrix product of a row stays below the size from which OpenBLAS
+# packs its operands (1.0 against 0.7 ns a cell), and has enough columns. Constants, so that no
+# result can depend on the number of workers or on the memory of the machine.
 _TILE_PRODUCT = 1_000_000
 _TILE_BASES = 48
 # Fewer bases than this make thin products: a single one is better, if its row is long.

@@ -14,7 +14,7 @@ from scipy.special import stdtrit
 
 __all__ = ["Median", "estimate_distances", "first_smallest", "search_median", "sum_all"]
 
-# References of the first round; 8 and 16 reject the median now and then under the budget.
+# References of the first round: enough for a paired t test of anybody against the leader.
 _REFERENCES = 32
 # Probability, at most, that any rejection in a search is an error.
 _ERROR = 0.01

@@ -354,7 +354,8 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
         if self.consensus > 0:
             self.exemplars_ = choose_exemplars(estimates, self.consensus, self.pattern_index_)
         chosen = self._positions([source, *(arrays[k] for k in self.exemplars_)])
-        self._warper = self._warper.with_pattern(self.pattern_, chosen, self.consensus > 0)
+        portion = self.pattern_, chosen, self.consensus > 0
+        (self._warper,) = run(self._warper.with_pattern, [portion])
         self.misfit_ = np.nan
         if self.refine == "auto":
             if self.consensus > 0:

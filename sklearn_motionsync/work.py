@@ -1,7 +1,8 @@
 """Work in fixed portions: on one core, on many, or on a cluster, with progress.
 
-What a portion holds never depends on how many workers there are, and within a portion the
-linear algebra runs on one thread: so results are equal to the last bit however they are computed.
+What is computed together, in one tile of pairs or one set of warps, never depends on how many
+workers there are, and the linear algebra of a portion runs on one thread: so results are equal to
+the last bit however the portions are shared out.
 """
 
 import functools

@@ -8,14 +8,17 @@ import textwrap
 import time
 from pathlib import Path
 
+import distributed
 import joblib
 import numpy as np
 import pytest
 import sklearn
 import sklearn_motionsync
+import threadpoolctl
 from sklearn.exceptions import NotFittedError
 from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import DenseSynchronizer
+from sklearn_motionsync.matching import Trellis
 from sklearn_motionsync.warping import Warper
 from sklearn_motionsync.work import Progress, run
 
@@ -56,7 +59,7 @@ def test_equal_bits_for_any_jobs_and_backend(walks, reference, n_jobs, backend):
         assert bits(sync, walks) == expected
 
 
-@pytest.mark.parametrize("working_memory", [0, 1])
+@pytest.mark.parametrize("working_memory", [0, 0.3, 1])
 def test_equal_bits_with_little_memory(walks, reference, working_memory):
     settings, expected = reference
     with sklearn.config_context(working_memory=working_memory):
@@ -64,16 +67,34 @@ def test_equal_bits_with_little_memory(walks, reference, working_memory):
 
 
 def test_equal_bits_whatever_the_blas_threads(walks, reference):
-    threadpoolctl = pytest.importorskip("threadpoolctl")
     settings, expected = reference
     for limits in (1, 2):
         with threadpoolctl.threadpool_limits(limits=limits):
             assert bits(DenseSynchronizer(**settings).fit(walks), walks) == expected
 
 
+def test_all_matching_runs_on_one_blas_thread(walks, monkeypatch):
+    """Also what is not worth sharing out: its bits must not depend on the cores there are."""
+    seen, method = [], {name: getattr(Trellis, name) for name in ("distances", "paths")}
+
+    def watched(name):
+        def call(self, *args):
+            pools = threadpoolctl.threadpool_info()
+            seen.append((name, {p["num_threads"] for p in pools if p["user_api"] == "blas"}))
+            return method[name](self, *args)
+
+        return call
+
+    for name in method:
+        monkeypatch.setattr(Trellis, name, watched(name))
+    with threadpoolctl.threadpool_limits(limits=2):
+        DenseSynchronizer().fit(walks[:20]).transform(walks[:3])
+    assert {name for name, _ in seen} == {"distances", "paths"}
+    assert all(threads == {1} for _, threads in seen)
+
+
 def test_fit_runs_on_a_dask_cluster(walks, monkeypatch):
     """Two worker processes share the matches, and give the bits of a single one."""
-    distributed = pytest.importorskip("distributed")
     package = Path(sklearn_motionsync.__file__).parents[1]
     monkeypatch.setenv("PYTHONPATH", f"{package}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
     expected = bits(DenseSynchronizer().fit(walks), walks)
