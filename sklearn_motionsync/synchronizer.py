@@ -10,7 +10,6 @@ from sklearn.utils._param_validation import Interval, StrOptions
 
 from .clock import Synchronizer, rounding_of
 from .consensus import choose_exemplars
-from .features import cost_features
 from .matching import Match, Trellis, even_slices, step_table
 from .median import estimate_distances, search_median, sum_all
 from .refinement import choose_smoothing
@@ -289,20 +288,19 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
 
     def _prepare(self, arrays, on_clock):
         # Centred features keep the inner products of the trellis small.
-        centre = on_clock.mean(axis=(0, 1))
-        positions = self._positions(arrays, on_clock) - centre
-        features = cost_features(positions, self.cost, self.subframes, self.velocity_smoothing)
-        energy = np.einsum("npk,npk->", features, features, dtype=np.float64)
-        self.mu_ = float(self.smoothness * energy / np.prod(features.shape[:2]))
-        table = step_table(self.cost, self.max_rate, self.subframes)
-        self._warper = Warper(
-            trellis=Trellis(table, self.mu_, self._reach),
+        warper = Warper(
             cost=self.cost,
+            subframes=self.subframes,
             velocity_smoothing=self.velocity_smoothing,
-            centre=centre,
+            centre=on_clock.mean(axis=(0, 1)),
             reach=self._reach,
             warp_smoothing=self.warp_smoothing,
         )
+        features = warper.features(self._positions(arrays, on_clock))
+        energy = np.einsum("npk,npk->", features, features, dtype=np.float64)
+        self.mu_ = float(self.smoothness * energy / np.prod(features.shape[:2]))
+        table = step_table(self.cost, self.max_rate, self.subframes)
+        self._warper = warper._replace(trellis=Trellis(table, self.mu_, self._reach))
         return features
 
     @property

@@ -18,14 +18,16 @@ class Warper(NamedTuple):
 
     Attributes
     ----------
-    trellis : Trellis
     cost : str
+    subframes : int
+        Positions a frame.
     velocity_smoothing : float
     centre : ndarray, shape (n_features,)
         Mean posture of the training set.
     reach : int
         Largest offset, in frames.
     warp_smoothing : float
+    trellis : Trellis
     bases : ndarray, shape (1 + n_exemplars, P, n_features)
         Features of the pattern and of the exemplars.
     to_exemplars : ndarray, shape (n_exemplars, P)
@@ -38,22 +40,18 @@ class Warper(NamedTuple):
         Smoothing of postures before refining, in frames; None if warps are not refined.
     """
 
-    trellis: Trellis
     cost: str
+    subframes: int
     velocity_smoothing: float
     centre: np.ndarray
     reach: int
     warp_smoothing: float
+    trellis: Trellis | None = None
     bases: np.ndarray | None = None
     to_exemplars: np.ndarray | None = None
     votes: bool = False
     pattern: np.ndarray | None = None
     noise_width: float | None = None
-
-    @property
-    def subframes(self):
-        """Positions a frame."""
-        return self.trellis.table.subframes
 
     def features(self, positions):
         """What is compared, at every position: (n_sequences, Q, n_features)."""

@@ -100,15 +100,19 @@ class Progress:
         return self
 
     def __exit__(self, kind, error, traceback):
-        while self._tasks and kind is None:
+        if kind is None:
+            self._end_tasks(0)
+
+    def _end_tasks(self, depth):
+        """End the tasks that were begun within this depth, the last one first."""
+        while len(self._tasks) > depth:
             self._tasks.pop().call_on_fit_task_end(estimator=self._estimator)
 
     def stage(self, name, n_portions):
         """Begin a stage of so many portions."""
         stage = None
         if self._tells:
-            while len(self._tasks) > 1:
-                self._tasks.pop().call_on_fit_task_end(estimator=self._estimator)
+            self._end_tasks(1)
             stage = self._tasks[0].subcontext(task_name=name, max_subtasks=n_portions)
             self._tasks.append(stage.call_on_fit_task_begin(estimator=self._estimator))
         begin = printed = time.perf_counter()
