@@ -69,8 +69,9 @@ def synchronise(bunch, n_frames=100):
     dense = DenseSynchronizer(n_frames)
     start = time.perf_counter()
     dense.fit(points)
-    seconds = time.perf_counter() - start
+    fitted = time.perf_counter()
     synchronised = dense.transform(points)
+    warped = time.perf_counter()
     model = ActionModel().fit(synchronised)
     return {
         "cosines": cosines,
@@ -80,7 +81,8 @@ def synchronise(bunch, n_frames=100):
         "dense": dense,
         "synchronised": synchronised,
         "model": model,
-        "seconds": seconds,
+        "fit_seconds": fitted - start,
+        "warp_seconds": warped - fitted,
     }
 
 
@@ -122,6 +124,8 @@ def report(bunch, result):
     n = len(lengths)
     order = np.argsort(dense.global_distances_)
     margin = dense.global_distances_[order[1]] / dense.global_distances_[order[0]] - 1
+    # Among many performances, only the best few are compared with all others.
+    lead = f"{margin:.1%} below the next" if np.isfinite(margin) else "the others: rejected sooner"
     raw = spread(result["points"])
     median = dense.pattern_index_
     rows = [
@@ -139,7 +143,7 @@ def report(bunch, result):
             f"number {median} (actor {bunch.actor[median]}, take {bunch.take[median]})",
             "-",
         ),
-        ("its global distance", f"{margin:.1%} below the next", "-"),
+        ("its global distance", lead, "-"),
         ("refined by postures", "yes" if dense.refines_ else "no: styles differ", "-"),
         ("spread before", f"{raw:.3f}", "-"),
         ("spread, linear", f"{spread(result['linear']):.3f}", "-"),
@@ -150,9 +154,9 @@ def report(bunch, result):
             "-",
         ),
         *key_frame_rows(bunch, result),
-        ("time of fit, all pairs", f"{1e3 * result['seconds']:.0f} ms", "-"),
-        ("the same, a pair", f"{1e3 * result['seconds'] / n**2:.3f} ms", "15 ms"),
-        ("the same, all to one base", f"{1e3 * result['seconds'] / n:.1f} ms", "600 ms"),
+        ("time of fit", f"{1e3 * result['fit_seconds']:.0f} ms", "-"),
+        ("the same, a match", f"{1e3 * result['fit_seconds'] / dense.n_matches_:.3f} ms", "15 ms"),
+        ("time of warping all", f"{1e3 * result['warp_seconds']:.0f} ms", "600 ms"),
     ]
     width = max(len(value) for _, value, _ in rows)
     print(f"{'':28s} {'here':{width}s}  paper")

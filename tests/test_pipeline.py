@@ -113,7 +113,7 @@ def test_example_on_the_embedded_data(monkeypatch, capsys, tmp_path):
         "median performance",
         "spread, dense",
         "key-frames missed",
-        "a pair",
+        "time of warping all",
     ):
         assert words in out
     assert_figures(tmp_path)
