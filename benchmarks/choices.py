@@ -15,6 +15,7 @@ import numpy as np
 from accuracy import ALL_PAIRS, EVENTS, Clips, P
 from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer, matching
 from sklearn_motionsync.metrics import sobolev_least_squares
+from sklearn_motionsync.sampling import sample
 
 CHOICES = {
     "smoothness": [0.001, 0.003, 0.01, 0.03, 0.1],
@@ -54,7 +55,7 @@ def health(X, times):
     """Stand-still, hurry, spread of velocities."""
     linear, rates = LinearSynchronizer(P).fit(X), np.diff(times)
     before = linear.transform(X)
-    spread = [sobolev_least_squares(before, linear._sample(X, tau)) for tau in times]
+    spread = [sobolev_least_squares(before, sample(X, tau, P)) for tau in times]
     return f"{(rates < 0.1).mean():.0%} | {(rates > 2).mean():.0%} | {np.mean(spread):.2f}"
 
 

@@ -11,9 +11,15 @@
 [1, 1, 1]
 """
 
-from . import datasets, metrics
+from . import datasets, display, metrics
 from .action_model import ActionModel
 from .aspace import ASpace
+from .display import (
+    ActionModelDisplay,
+    SkeletonDisplay,
+    SynchronizationDisplay,
+    TrellisDisplay,
+)
 from .keyframes import KeyframeSynchronizer
 from .posture import DirectionCosines
 from .sequences import to_frame, to_sequences
@@ -25,12 +31,17 @@ __version__ = "0.1.0.dev0"
 __all__ = [
     "ASpace",
     "ActionModel",
+    "ActionModelDisplay",
     "DenseSynchronizer",
     "DirectionCosines",
     "KeyframeSynchronizer",
     "LinearSynchronizer",
     "Skeleton",
+    "SkeletonDisplay",
+    "SynchronizationDisplay",
+    "TrellisDisplay",
     "datasets",
+    "display",
     "metrics",
     "to_frame",
     "to_sequences",

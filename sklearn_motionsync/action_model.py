@@ -9,6 +9,7 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
+from .notebook import DocumentedMixin
 from .sequences import check_performances
 
 __all__ = ["ActionModel"]
@@ -18,7 +19,7 @@ __all__ = ["ActionModel"]
 _VARIANCE_FLOOR = 1e-9
 
 
-class ActionModel(BaseEstimator):
+class ActionModel(DocumentedMixin, BaseEstimator):
     """What an action looks like at every instant, and how much people vary there.
 
     1. The mean performance and the variance of every posture, over synchronised

@@ -13,12 +13,13 @@ from sklearn.decomposition import PCA
 from sklearn.utils._param_validation import Interval, RealNotInt
 from sklearn.utils.validation import check_is_fitted
 
+from .notebook import DocumentedMixin
 from .sequences import check_performances, check_transformed, restore
 
 __all__ = ["ASpace"]
 
 
-class ASpace(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
+class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
     """The space of an action: principal components of all its postures.
 
     1. Pool the postures of all performances and diagonalise their covariance (Eq. 3).

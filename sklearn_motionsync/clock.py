@@ -7,15 +7,13 @@ from sklearn.base import BaseEstimator, TransformerMixin, _fit_context
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from .matching import even_slices
 from .median import Median, first_smallest
+from .notebook import DocumentedMixin
+from .sampling import sample
 from .sequences import check_performances, restore
 
-# Performances sampled together: bounds the memory of what stands in between.
-_SAMPLED_AT_ONCE = 64
 
-
-class Synchronizer(TransformerMixin, BaseEstimator):
+class Synchronizer(DocumentedMixin, TransformerMixin, BaseEstimator):
     """What all synchronizers share: clock, pattern, and warping along matched times.
 
     A subclass matches performances to the pattern (``_match``); it may choose the median in a way
@@ -113,8 +111,7 @@ class Synchronizer(TransformerMixin, BaseEstimator):
         return self
 
     def _warp(self, performances, **extra):
-        times = self._match(performances.arrays, **extra).times
-        out = self._sample(performances.arrays, times)
+        out = self._match(performances.arrays, **extra).warp(performances.arrays)
         if performances.kind == "rows":
             return out[:, :, 0]
         return restore(self, performances, out, frames=range(self.n_frames_))
@@ -201,31 +198,20 @@ class Synchronizer(TransformerMixin, BaseEstimator):
             return len(given)
         return int(np.median([len(a) for a in arrays]))
 
+    def _find_pattern(self, arrays):
+        """The index of the pattern among performances; None if it is not one of them."""
+        index = self.pattern_index_
+        if index is None or index >= len(arrays):
+            return None
+        same = self._normalise([arrays[index]], np.arange(self.n_frames_))[0]
+        return index if np.array_equal(same, self.pattern_) else None
+
     def _normalise(self, arrays, times):
         """Linear normalisation (Eq. 7): every performance at the same times of its course."""
         # As many times as frames on the clock are its frames.
         if len(times) == self.n_frames_ and all(len(x) == self.n_frames_ for x in arrays):
             return np.stack(arrays)
-        return self._sample(arrays, np.broadcast_to(times, (len(arrays), len(times))))
-
-    def _sample(self, arrays, times):
-        """Performances at times in pattern frames, linear between their own frames (Eq. 18)."""
-        out = np.empty((len(arrays), times.shape[1], arrays[0].shape[1]), dtype=arrays[0].dtype)
-        for rows in even_slices(len(arrays), _SAMPLED_AT_ONCE):
-            self._sample_some(arrays[rows], times[rows], out[rows])
-        return out
-
-    def _sample_some(self, arrays, times, out):
-        last = np.array([len(x) for x in arrays])[:, np.newaxis] - 1
-        # In this order a whole number of frames stays whole.
-        at = times * last / (self.n_frames_ - 1)
-        left = np.minimum(at.astype(np.intp), last - 1)
-        weight = (at - left).astype(out.dtype)[:, :, np.newaxis]
-        frames = np.concatenate(arrays)
-        left += np.cumsum(last + 1)[:, np.newaxis] - (last + 1)
-        np.multiply(frames[left], 1 - weight, out=out)
-        left += 1
-        out += frames[left] * weight
+        return sample(arrays, np.broadcast_to(times, (len(arrays), len(times))), self.n_frames_)
 
 
 def rounding_of(deviations):

@@ -9,7 +9,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from .clock import Synchronizer
 from .features import SMOOTHING, smooth
-from .matching import Match
+from .sampling import Match, sample
 from .sequences import check_performances
 
 __all__ = ["KeyframeSynchronizer"]
@@ -164,7 +164,8 @@ class KeyframeSynchronizer(Synchronizer):
         if not self._given:
             return on_clock
         # On the mean key-frames all performances are comparable, as on one clock.
-        return self._sample(arrays, self._between(self._knots.mean(axis=0), self._knots))
+        times = self._between(self._knots.mean(axis=0), self._knots)
+        return sample(arrays, times, self.n_frames_)
 
     def _learn(self, arrays, on_clock, source, estimates):
         if self._given and self.pattern_index_ is not None:
@@ -186,7 +187,9 @@ class KeyframeSynchronizer(Synchronizer):
         else:
             knots = self._given_knots(arrays, keyframes, len(self.keyframes_))
         times = self._between(self.keyframes_, knots)
-        distances = np.square(self._sample(arrays, times) - self.pattern_).sum(axis=(1, 2))
+        distances = np.square(sample(arrays, times, self.n_frames_) - self.pattern_).sum(
+            axis=(1, 2)
+        )
         return Match(times - np.arange(self.n_frames_), times, distances)
 
     def _between(self, knots, others):

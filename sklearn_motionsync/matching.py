@@ -27,7 +27,7 @@ import numpy as np
 
 from .bundle import Bundle, group_steps, right_factor
 
-__all__ = ["Match", "StepTable", "Trellis", "even_slices", "step_table"]
+__all__ = ["StepTable", "Trellis", "even_slices", "step_table"]
 
 # Sizes of one tile of pairs: the matrix product of a row stays below the size from which OpenBLAS
 # packs its operands (1.0 against 0.7 ns a cell), and has enough columns. Constants, so that no
@@ -108,24 +108,6 @@ def step_table(cost="posture", max_rate=2, subframes=1):
     if cost == "elastic":
         return StepTable(steps, rates, 2 * np.sqrt(rates), penalty, subframes)
     raise ValueError(f"cost={cost!r} is unknown; use 'posture', 'velocity' or 'elastic'.")
-
-
-class Match(NamedTuple):
-    """Warps of a set of sequences to one base.
-
-    Attributes
-    ----------
-    offsets : ndarray, shape (n_sequences, P)
-        ``Delta(p)``, in frames of the base.
-    times : ndarray, shape (n_sequences, P)
-        ``tau(p) = p + Delta(p)``, non-decreasing, ``tau(0) = 0``, ``tau(P-1) = P-1``.
-    distances : ndarray, shape (n_sequences,)
-        The synchronisation distance ``D_{n,m}`` of Eq. 12, of the path straight to the base.
-    """
-
-    offsets: np.ndarray
-    times: np.ndarray
-    distances: np.ndarray
 
 
 class Trellis:

@@ -7,6 +7,7 @@ from sklearn.base import BaseEstimator, TransformerMixin, _fit_context
 from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.validation import check_is_fitted
 
+from .notebook import DocumentedMixin
 from .sequences import check_performances, check_transformed, restore
 from .skeleton import LANDMARKS, Skeleton
 
@@ -46,7 +47,7 @@ LIMBS = {
 _LIMB_NAMES = list(LIMBS)
 
 
-class DirectionCosines(TransformerMixin, BaseEstimator):
+class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
     """Postures of 37 parameters from joint positions (Eq. 1).
 
     A posture is the height of the pelvis and, for each of twelve limbs, the cosines of the
@@ -233,7 +234,7 @@ class DirectionCosines(TransformerMixin, BaseEstimator):
         u = (height - floor) / _leg_length(np.median(lengths, axis=0))
         cosines = limbs / lengths[:, :, np.newaxis]
         if self.reference != "world":
-            cosines = _turn(cosines, _heading(cosines[:, 0]))
+            cosines = _turn(cosines, heading(cosines[:, 0]))
         if self.reference == "parent":
             cosines = _along_parents(cosines)
         return np.column_stack([u, cosines.reshape(len(u), -1)])
@@ -273,7 +274,7 @@ def _leg_length(lengths):
     return sum(parts) / 2
 
 
-def _heading(hip):
+def heading(hip):
     """Frames (n_frames, 3, 3), rows x to the left along the hips, y up, z forward."""
     x = hip * np.array([1, 0, 1], dtype=hip.dtype)
     length = np.linalg.norm(x, axis=1, keepdims=True)

@@ -10,9 +10,10 @@ from sklearn.utils._param_validation import Interval, StrOptions
 
 from .clock import Synchronizer, rounding_of
 from .consensus import choose_exemplars
-from .matching import Match, Trellis, even_slices, step_table
+from .matching import Trellis, even_slices, step_table
 from .median import estimate_distances, search_median, sum_all
 from .refinement import choose_smoothing
+from .sampling import Match
 from .warping import Warper
 from .work import CallbackSupportMixin, Progress, run
 
@@ -382,6 +383,10 @@ class DenseSynchronizer(CallbackSupportMixin, Synchronizer):
             results = self._in_portions(warps, self._positions(arrays), progress, "warping")
         distances, times = (np.concatenate(parts) for parts in zip(*results, strict=True))
         return Match(times - np.arange(self.n_frames_), times, distances)
+
+    def _disparity_space(self, array):
+        """The disparity space of the pattern and one performance, for drawing (Fig. 2)."""
+        return self._warper.disparity_space(self._positions([array]))
 
     def _in_portions(self, function, positions, progress, name):
         """Results of a function of the warper for portions of all performances."""

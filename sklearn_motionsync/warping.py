@@ -68,6 +68,21 @@ class Warper(NamedTuple):
         times = self._paths(bases[:1], features[1:])[1][0]
         return self._replace(to_exemplars=times)
 
+    def disparity_space(self, positions):
+        """E(p, d) of the pattern and one performance at the pattern's rate (Eq. 12), and the path.
+
+        Returns costs (P, n_offsets), NaN where no path may pass, the offsets and the path, in
+        frames.
+        """
+        (base, *_), (moving,) = self.bases, self.features(positions)
+        n_frames, width, sub = len(base), self.trellis.width, self.subframes
+        costs = np.full((n_frames, 2 * width + 1), np.nan)
+        for p, (low, high) in enumerate(zip(*self.trellis.windows(n_frames), strict=True)):
+            window = moving[p * sub + low : p * sub + high + 1]
+            costs[p, width + low : width + high + 1] = np.square(base[p] - window).sum(axis=1)
+        path = self._paths(self.bases[:1], moving[np.newaxis])[1][0, 0]
+        return costs, np.arange(-width, width + 1) / sub, path - np.arange(n_frames)
+
     def distances(self, features, bases, moving, tiles):
         """Synchronisation distances ``D_{n,m}`` of the tiles of the pairs of two index arrays."""
         return [

@@ -1,0 +1,431 @@
+"""Stick figures: strips of postures, samples of a model (Fig. 4), and people moving in step."""
+
+import numpy as np
+
+from .action_model import ActionModel
+from .clock import Synchronizer
+from .drawing import COLORS, panels, pyplot
+from .posture import DirectionCosines, heading
+from .sampling import sample
+from .sequences import to_sequences
+from .skeleton import Skeleton
+from .steps import find_step, reach_synchronizer
+
+__all__ = ["SkeletonDisplay"]
+
+# Performances side by side in a moving picture, if not chosen; panels in one row of a strip.
+_FEW_PERFORMANCES, _PANELS_A_ROW = 6, 6
+# Resolution of moving pictures: every one of them is kept in the notebook.
+_MOVING_DPI = 64
+# Between two stick figures, in heights of the tallest.
+_SPACING = 0.7
+
+
+class SkeletonDisplay:
+    """Stick figures of joint positions: strips of postures, or performances in motion.
+
+    Make one with `from_positions`, `from_postures` (strips), `from_model` (Fig. 4),
+    `from_estimator` or `from_predictions` (performances before and after synchronisation, to
+    `animate`). Left limbs are blue, right ones orange. People are turned to face the same way
+    at first, and stand where they stood.
+
+    Parameters
+    ----------
+    scenes : list of list of ndarray (n_frames_i, n_joints, 3)
+        For each panel its performances: joint positions in axes of which the second is vertical.
+    skeleton : Skeleton
+        Joints and bones.
+    titles : list of str
+        One a panel.
+    durations : list of list of float, default=None
+        How long each performance of each panel takes, in frames; by default as many frames
+        as it has, less one.
+    labels : list of str, default=None
+        Names under the performances of a panel, which then stand side by side instead of in one
+        place.
+
+    Attributes
+    ----------
+    figure_ : Figure
+    axes_ : list of Axes
+    bones_ : list of dict
+        For each panel the LineCollections of the ``"left"``, ``"middle"`` and ``"right"`` bones.
+    heads_ : list of Line2D
+
+    Examples
+    --------
+    >>> from sklearn_motionsync import SkeletonDisplay
+    >>> from sklearn_motionsync.datasets import make_bending
+    >>> bunch = make_bending(3, random_state=0)
+    >>> display = SkeletonDisplay.from_positions(bunch.data[0], bunch.skeleton, frames=5)
+    >>> len(display.axes_)
+    5
+    """
+
+    def __init__(self, scenes, skeleton, titles, *, durations=None, labels=None):
+        self.scenes = scenes
+        self.skeleton = skeleton
+        self.titles = titles
+        self.durations = durations
+        self.labels = labels
+
+    @classmethod
+    def from_positions(cls, X, skeleton, *, frames=6, ax=None, **view):
+        """Draw a strip of postures of one performance, or of synchronised ones over each other.
+
+        Parameters
+        ----------
+        X : array-like, shape (n_frames, 3 * n_joints), or (n_sequences, n_frames, 3 * n_joints)
+            Joint positions.
+        skeleton : Skeleton
+        frames : int or list of int, default=6
+            How many, evenly spaced from the first to the last, or which ones.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
+        **view : azimuth
+            See `plot`.
+
+        Returns
+        -------
+        SkeletonDisplay
+        """
+        performances = [_upright(x, skeleton, i) for i, x in enumerate(_as_performances(X))]
+        n_frames = min(len(x) for x in performances)
+        if np.ndim(frames) == 0:
+            frames = np.linspace(0, n_frames - 1, int(frames)).round()
+        frames = [int(frame) for frame in frames]
+        if not frames or min(frames) < 0 or max(frames) >= n_frames:
+            raise ValueError(f"frames must be from 0 to {n_frames - 1}, got {frames}.")
+        placed = [_placed(x, skeleton) for x in performances]
+        scenes = [[x[[frame]] for x in placed] for frame in frames]
+        titles = [f"frame {frame}" for frame in frames]
+        return cls(scenes, skeleton, titles).plot(ax, **view)
+
+    @classmethod
+    def from_postures(cls, X, cosines, *, frames=6, ax=None, **view):
+        """Draw a strip of postures given by their direction cosines.
+
+        Parameters
+        ----------
+        X : array-like, shape (n_frames, 37), or (n_sequences, n_frames, 37)
+            Postures.
+        cosines : DirectionCosines
+            Fitted; knows how long the limbs are.
+        frames, ax, **view : as for `from_positions`
+
+        Returns
+        -------
+        SkeletonDisplay
+        """
+        positions = [cosines.inverse_transform(np.asarray(x)) for x in _as_performances(X)]
+        return cls.from_positions(positions, Skeleton.paper(), frames=frames, ax=ax, **view)
+
+    @classmethod
+    def from_model(
+        cls, estimator, *, frames=(0.1, 0.4), n_samples=12, random_state=0, ax=None, **view
+    ):
+        """Draw mean postures of a model, and postures that it accepts (Fig. 4).
+
+        Parameters
+        ----------
+        estimator : Pipeline
+            Fitted, from `DirectionCosines` to an `ActionModel`; the steps before the
+            synchronizer need ``inverse_transform``.
+        frames : list of int or float, default=(0.1, 0.4)
+            Frames of the model; fractions below 1 are shares of the action.
+        n_samples : int, default=12
+            Accepted postures a frame.
+        random_state : int, RandomState instance or None, default=0
+        ax, **view : as for `from_positions`
+
+        Returns
+        -------
+        SkeletonDisplay
+        """
+        _, model = find_step(estimator, ActionModel, "ActionModel")
+        space, _ = _before_synchronizer(estimator)
+        last = model.n_frames_ - 1
+        # The floor is the lowest that the mean performance ever reaches.
+        floor = np.asarray(space.inverse_transform(model.mean_))[:, 1::3].min()
+        frames = [round(f * last) if isinstance(f, float) and f < 1 else int(f) for f in frames]
+        scenes, titles = [], []
+        for frame in frames:
+            samples = model.sample(n_samples, frame=frame, random_state=random_state)
+            accepted = model.accepts(samples, frame)
+            for points in (model.mean_[[frame]], samples[accepted]):
+                positions = np.asarray(space.inverse_transform(points))
+                scenes.append([x.reshape(1, -1, 3) - [0, floor, 0] for x in positions])
+            titles += [f"frame {frame}\nmean posture", f"frame {frame}\n{sum(accepted)} samples"]
+        return cls(scenes, Skeleton.paper(), titles).plot(ax, **view)
+
+    @classmethod
+    def from_estimator(cls, estimator, X, *, performances=None, ax=None, **view):
+        """Performances as they were recorded, above the same ones synchronised.
+
+        Parameters
+        ----------
+        estimator : Pipeline
+            Fitted, from `DirectionCosines` to a synchronizer or further.
+        X : list of arrays (n_frames_i, 3 * n_joints)
+            Joint positions.
+        performances : list of int, default=None
+            Which of them to draw; by default the pattern, if it is one of them, and others up to
+            six in all.
+        ax, **view : as for `plot`
+
+        Returns
+        -------
+        SkeletonDisplay
+            At the beginning; see `animate`.
+        """
+        synchronizer, arrays = reach_synchronizer(estimator, X)
+        _, cosines = _before_synchronizer(estimator)
+        match = synchronizer._match(arrays)
+        pattern = synchronizer._find_pattern(arrays)
+        if performances is None:
+            others = [i for i in range(len(arrays)) if i != pattern]
+            performances = ([] if pattern is None else [pattern]) + others
+            performances = performances[:_FEW_PERFORMANCES]
+        return cls.from_predictions(
+            [_as_performances(X)[i] for i in performances],
+            match.times[performances],
+            cosines.skeleton,
+            names=[f"{i} (pattern)" if i == pattern else str(i) for i in performances],
+            ax=ax,
+            **view,
+        )
+
+    @classmethod
+    def from_predictions(cls, X, times, skeleton, *, names=None, ax=None, **view):
+        """The same for warps that are there already, whoever made them.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, 3 * n_joints)
+            Joint positions.
+        times : array-like, shape (n_sequences, P)
+            tau(p) from 0 to P - 1, such as ``synchronizer.match(points).times``.
+        skeleton : Skeleton
+        names : list of str, default=None
+            What stands under the performances; by default their numbers.
+        ax, **view : as for `plot`
+
+        Returns
+        -------
+        SkeletonDisplay
+        """
+        X, times = _as_performances(X), np.asarray(times, dtype=np.float64)
+        if times.ndim != 2 or len(times) != len(X):
+            raise ValueError(
+                f"times must have shape (n_sequences, P), one row for each of the {len(X)} "
+                f"performances; got {times.shape}."
+            )
+        raw = [_placed(_upright(x, skeleton, i), skeleton) for i, x in enumerate(X)]
+        flat = [x.reshape(len(x), -1) for x in raw]
+        warped = sample(flat, times, times.shape[1])
+        warped = warped.reshape(*warped.shape[:2], -1, 3)
+        lengths = [len(x) - 1 for x in raw]
+        return cls(
+            [raw, list(warped)],
+            skeleton,
+            ["as recorded: each at its own pace", "synchronised: all on one clock"],
+            durations=[lengths, [float(np.median(lengths))] * len(raw)],
+            labels=[str(i) for i in range(len(raw))] if names is None else list(names),
+        ).plot(ax, **view)
+
+    def plot(self, ax=None, *, at=0.0, azimuth=-60):
+        """Draw.
+
+        Parameters
+        ----------
+        ax : Axes or array-like of Axes, default=None
+            One of a figure's subplots is divided into the panels; or one axes a panel. None
+            makes a figure.
+        at : float in [0, 1], default=0.0
+            When, as a share of the time until the longest performance ends.
+        azimuth : float, default=-60
+            Where the viewer stands, in degrees: 0 before the people, who face the viewer, 90 on
+            their left, -90 on their right.
+
+        Returns
+        -------
+        self
+        """
+        drawn = [[_on_screen(x, azimuth) for x in scene] for scene in self.scenes]
+        if self.labels is not None:
+            gap = _SPACING * max(np.ptp(x[..., 1]) for x in drawn[0])
+            drawn = [[x + [i * gap, 0] for i, x in enumerate(scene)] for scene in drawn]
+        n_cols = 1 if self.labels is not None else min(len(drawn), _PANELS_A_ROW)
+        n_rows = -(-len(drawn) // n_cols)
+        everything = np.concatenate([x.reshape(-1, 2) for scene in drawn for x in scene])
+        low, high = everything.min(axis=0), everything.max(axis=0)
+        width, height = high - low
+        # Panels of one scale, so wide that the figure is 8 to 11 inches.
+        scale = min(9 / (n_cols * width), 3.0 / height)
+        size = (max(4, n_cols * width * scale + 0.6), n_rows * (height * scale + 0.6) + 0.3)
+        spots = [divmod(i, n_cols) for i in range(len(drawn))]
+        self.figure_, self.axes_ = panels(ax, spots, n_rows, n_cols, size)
+        self._drawn, self.bones_, self.heads_ = drawn, [], []
+        for axis, title, scene in zip(self.axes_, self.titles, drawn, strict=True):
+            self._prepare(axis, title, scene, low, high)
+        self._show(at)
+        return self
+
+    def animate(self, ax=None, *, seconds=5.0, fps=15, azimuth=-60):
+        """The performances in motion, which a notebook plays.
+
+        Parameters
+        ----------
+        ax, azimuth : as for `plot`
+        seconds : float, default=5.0
+            Until the longest performance ends.
+        fps : int, default=15
+            Pictures a second; each takes some 70 kB of a notebook.
+
+        Returns
+        -------
+        Animation
+            Shown by a notebook as its last value; ``to_jshtml()`` gives the HTML, ``save(path)``
+            a file.
+        """
+        from matplotlib.animation import FuncAnimation
+
+        class Playable(FuncAnimation):
+            """Plays in a notebook without further ado."""
+
+            def to_jshtml(self, *args, **kwargs):
+                with pyplot().rc_context({"savefig.dpi": _MOVING_DPI}):
+                    return super().to_jshtml(*args, **kwargs)
+
+            def _repr_html_(self):
+                return self.to_jshtml()
+
+        self.plot(ax, azimuth=azimuth)
+        count = max(2, round(seconds * fps))
+        moving = Playable(
+            self.figure_.get_figure(root=True),
+            lambda k: self._show(k / (count - 1)),
+            frames=count,
+            interval=1000 / fps,
+            blit=False,
+        )
+        # A notebook would show the figure a second time, standing still.
+        if ax is None:
+            pyplot().close(self.figure_)
+        return moving
+
+    def _prepare(self, axis, title, scene, low, high):
+        from matplotlib.collections import LineCollection
+
+        alpha = 1.0 if self.labels is not None or len(scene) == 1 else 0.45
+        width = 2.2 if alpha == 1 else 1.1
+        sides = {}
+        for side in ("middle", "left", "right"):
+            lines = LineCollection([], colors=COLORS[side], linewidths=width, alpha=alpha)
+            lines.set_capstyle("round")
+            sides[side] = axis.add_collection(lines, autolim=False)
+        self.bones_.append(sides)
+        style = {"color": COLORS["middle"], "alpha": alpha, "markersize": 3 * width}
+        self.heads_ += axis.plot([], [], "o", **style)
+        margin = 0.05 * (high - low)
+        axis.set_xlim(low[0] - margin[0], high[0] + margin[0])
+        axis.set_ylim(low[1] - margin[1], high[1] + margin[1])
+        axis.set_aspect("equal")
+        axis.set_title(title, fontsize="medium")
+        axis.set_yticks([])
+        axis.set_xticks([])
+        axis.spines[:].set_visible(False)
+        axis.axhline(0, color="0.6", linewidth=1, zorder=0)
+        if self.labels is not None:
+            feet = [x[0, self._landmark("pelvis"), 0] for x in scene]
+            axis.set_xticks(feet, self.labels)
+            axis.tick_params(length=0)
+
+    def _landmark(self, name):
+        return self.skeleton.joints.index(self.skeleton.landmarks[name])
+
+    def _show(self, at):
+        """Put all stick figures where they are after a share of the time; the artists."""
+        durations = self.durations
+        if durations is None:
+            durations = [[len(x) - 1 for x in scene] for scene in self._drawn]
+        longest = max(max(of_scene) for of_scene in durations)
+        head, bones = self._landmark("head"), _bones_by_side(self.skeleton)
+        artists = []
+        for i, (scene, taking) in enumerate(zip(self._drawn, durations, strict=True)):
+            shares = [min(1.0, at * longest / d) if d > 0 else 0.0 for d in taking]
+            bodies = [
+                x[round(share * (len(x) - 1))] for x, share in zip(scene, shares, strict=True)
+            ]
+            for side, lines in self.bones_[i].items():
+                lines.set_segments([body[list(bone)] for body in bodies for bone in bones[side]])
+                artists.append(lines)
+            self.heads_[i].set_data(np.array([body[head] for body in bodies]).T)
+            artists.append(self.heads_[i])
+        return artists
+
+
+def _as_performances(X):
+    """Performances one by one, of a list, a 3-D array, a frame of many or a single one."""
+    if getattr(getattr(X, "index", None), "nlevels", 1) == 2:
+        return to_sequences(X)
+    return [X] if getattr(X, "ndim", None) == 2 else list(X)
+
+
+def _before_synchronizer(estimator):
+    """The steps of a pipeline before its synchronizer, and the DirectionCosines among them."""
+    before, _ = find_step(estimator, Synchronizer, "synchronizer")
+    if before is None:
+        raise ValueError(
+            "Stick figures need a pipeline that begins with DirectionCosines; for a synchronizer "
+            "by itself use from_predictions with the joint positions."
+        )
+    return before, find_step(before, DirectionCosines, "DirectionCosines")[1]
+
+
+def _upright(x, skeleton, i):
+    """(n_frames, n_joints, 3) of (n_frames, 3 n_joints), with the second axis vertical."""
+    x = np.asarray(x, dtype=np.float64)
+    if x.ndim != 2 or x.shape[1] != 3 * len(skeleton.joints):
+        raise ValueError(
+            f"Performance {i} has shape {x.shape}, but the positions of the skeleton's "
+            f"{len(skeleton.joints)} joints are (n_frames, {3 * len(skeleton.joints)})."
+        )
+    x = x.reshape(len(x), -1, 3)
+    return np.stack([x[..., 0], x[..., 2], -x[..., 1]], axis=-1) if skeleton.up == "z" else x
+
+
+def _placed(x, skeleton):
+    """A performance turned to face forward at first, above the origin, its lowest joint at 0."""
+    at = [
+        skeleton.joints.index(skeleton.landmarks[name])
+        for name in ("left_hip", "right_hip", "pelvis")
+    ]
+    hip = x[:1, at[0]] - x[:1, at[1]]
+    turn = heading(hip / max(np.linalg.norm(hip), np.finfo(float).tiny))[0]
+    origin = x[0, at[2]] * [1, 0, 1]
+    origin[1] = np.nanmin(x[..., 1])
+    return (x - origin) @ turn.T
+
+
+def _on_screen(x, azimuth):
+    """(n_frames, n_joints, 2) places across and up, as seen from far away at eye level."""
+    a = np.deg2rad(azimuth)
+    across = x @ np.array([np.cos(a), 0, -np.sin(a)])
+    return np.stack([across, x[..., 1]], axis=-1)
+
+
+def _bones_by_side(skeleton):
+    """Bones by the side of the body they hang on: below a hip or shoulder, or in the middle."""
+    side_of = {}
+    for side in ("left", "right"):
+        for landmark in ("hip", "shoulder"):
+            side_of[skeleton.joints.index(skeleton.landmarks[f"{side}_{landmark}"])] = side
+    bones = {"left": [], "middle": [], "right": []}
+    for parent, joint in skeleton.bones:
+        above, seen = joint, set()
+        while above >= 0 and above not in side_of and above not in seen:
+            seen.add(above)
+            above = skeleton.parents[above]
+        bones[side_of.get(above, "middle")].append((parent, joint))
+    return bones
