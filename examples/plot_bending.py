@@ -1,15 +1,14 @@
 """
-Bending down, by many people, on one clock
-==========================================
+Bending down, by many people, on one clock (Figs. 3 and 4)
+==========================================================
 
-From joint positions to a model of an action: the postures of all performances become
-points of an aSpace, dense matching puts them on the clock of the median performance, and what
-they have in common is learnt. The figures are those of the paper: the first dimensions of
-the aSpace before and after (Fig. 3), and mean and sampled postures (Fig. 4).
+From joint positions to a model of an action: the postures of all performances become points of an
+aSpace, dense matching puts them on the clock of the median performance, and what they have in
+common is learnt. The figures are the paper's third and fourth.
 
-Without arguments the embedded data set is used. For an archive of real performances::
-
-    python examples/plot_bending.py --data hdm05_positions.npz --action depositFloorR
+By default the performances are the embedded synthetic ones. As a script it also takes an archive
+of real ones, ``python examples/plot_bending.py --data hdm05_positions.npz --action
+depositFloorR``.
 """
 
 import argparse
@@ -18,21 +17,32 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
+    ActionModelDisplay,
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
+    KeyframeSynchronizer,
     LinearSynchronizer,
-    Skeleton,
+    SkeletonDisplay,
+    SynchronizationDisplay,
 )
 from sklearn_motionsync.datasets import load_performances, make_bending
 from sklearn_motionsync.metrics import keyframe_error, sobolev_least_squares
 
+parser = argparse.ArgumentParser(description="Synchronise and model performances of an action.")
+parser.add_argument("--data", help="archive of performances (.npz); by default synthetic ones")
+parser.add_argument("--action", help="which action of the archive")
+parser.add_argument("--output", default=".", help="folder of the figures")
+options, _ = parser.parse_known_args()  # a notebook has arguments of its own
+
 # %%
 # The performances
 # ----------------
-# Lists of arrays, one a performance, each with its own number of frames.
+# A list of arrays, one a performance, each with its own number of frames. Each row holds x, y
+# and z of every joint.
 
 
 def read_performances(path=None, action=None):
@@ -54,225 +64,133 @@ def read_performances(path=None, action=None):
     return bunch
 
 
+bunch = read_performances(options.data, options.action)
+lengths = [len(x) for x in bunch.data]
+print(f"{len(bunch.data)} performances of {min(lengths)} to {max(lengths)} frames")
+
 # %%
 # From performances to a model
 # ----------------------------
+# Four steps: postures (Eq. 1), their principal components (Eqs. 3 to 5), one clock (Eqs. 7 to
+# 19), and what the action looks like at every frame of it. ``pipe.fit(bunch.data)`` would do
+# all of them; here the third is timed by itself.
 
-
-def synchronise(bunch, n_frames=100):
-    """The four steps, one after the other so that each can be looked at."""
-    cosines = DirectionCosines(bunch.skeleton).fit(bunch.data)
-    postures = cosines.transform(bunch.data)
-    aspace = ASpace(0.95).fit(postures)
-    points = aspace.transform(postures)
-    linear = LinearSynchronizer(n_frames).fit(points)
-    dense = DenseSynchronizer(n_frames)
-    start = time.perf_counter()
-    dense.fit(points)
-    fitted = time.perf_counter()
-    synchronised = dense.transform(points)
-    warped = time.perf_counter()
-    model = ActionModel().fit(synchronised)
-    return {
-        "cosines": cosines,
-        "aspace": aspace,
-        "points": points,
-        "linear": linear.transform(points),
-        "dense": dense,
-        "synchronised": synchronised,
-        "model": model,
-        "fit_seconds": fitted - start,
-        "warp_seconds": warped - fitted,
-    }
-
+pipe = make_pipeline(
+    DirectionCosines(bunch.skeleton), ASpace(0.95), DenseSynchronizer(n_frames=100), ActionModel()
+)
+cosines, aspace, dense, model = (step for _, step in pipe.steps)
+points = aspace.fit_transform(cosines.fit_transform(bunch.data))
+start = time.perf_counter()
+dense.fit(points)
+fitted = time.perf_counter()
+synchronised = dense.transform(points)
+warped = time.perf_counter()
+model.fit(synchronised)
+pipe
 
 # %%
 # The report
 # ----------
+# Beside the figures of the paper, where it gives any.
 
 
 def spread(performances):
     """RMS distance from the mean of the performances still running at each frame."""
-    longest = max(len(x) for x in performances)
     total = count = 0
-    for frame in range(longest):
+    for frame in range(max(len(x) for x in performances)):
         now = np.array([x[frame] for x in performances if len(x) > frame])
         total += np.square(now - now.mean(axis=0)).sum()
         count += len(now)
     return np.sqrt(total / count)
 
 
-def key_frame_rows(bunch, result):
-    """How closely known key-frames are hit, if they are known."""
-    if "keyframes" not in bunch:
-        return []
-    linear = LinearSynchronizer(result["dense"].n_frames_).fit(result["points"])
-    lengths, rows = [len(x) for x in bunch.data], []
-    for name, synchronizer in (("linear", linear), ("dense", result["dense"])):
-        n = synchronizer.pattern_index_
-        on_clock = bunch.keyframes[n] * (synchronizer.n_frames_ - 1) / (lengths[n] - 1)
-        times = synchronizer.match(result["points"]).times
-        error = keyframe_error(times, bunch.keyframes, on_clock, lengths)
-        rows.append((f"key-frames missed by, {name}", f"{error:.2f} frames", "-"))
-    return rows
+def missed_by(synchronizer):
+    """How far known key-frames are missed."""
+    n = synchronizer.pattern_index_
+    on_clock = bunch.keyframes[n] * (synchronizer.n_frames_ - 1) / (lengths[n] - 1)
+    return keyframe_error(synchronizer.match(points).times, bunch.keyframes, on_clock, lengths)
 
 
-def report(bunch, result):
-    """Print what was found, beside the figures of the paper."""
-    lengths = [len(x) for x in bunch.data]
-    aspace, dense = result["aspace"], result["dense"]
-    n = len(lengths)
-    order = np.argsort(dense.global_distances_)
-    margin = dense.global_distances_[order[1]] / dense.global_distances_[order[0]] - 1
-    # Among many performances, only the best few are compared with all others.
-    lead = f"{margin:.1%} below the next" if np.isfinite(margin) else "the others: rejected sooner"
-    raw = spread(result["points"])
-    median = dense.pattern_index_
-    rows = [
-        ("performances", f"{n} of {bunch.target[0]}", "40 of bending"),
-        ("actors", f"{len(set(bunch.actor))}", "-"),
-        (
-            "frames (min / median / max)",
-            f"{min(lengths)} / {np.median(lengths):.0f} / {max(lengths)}",
-            "100 on average",
-        ),
-        ("eigenvectors b", f"{aspace.n_components_}", "16"),
-        ("variance kept", f"{aspace.explained_variance_ratio_.sum():.1%}", "95%"),
-        (
-            "median performance",
-            f"number {median} (actor {bunch.actor[median]}, take {bunch.take[median]})",
-            "-",
-        ),
-        ("its global distance", lead, "-"),
-        ("refined by postures", "yes" if dense.refines_ else "no: styles differ", "-"),
-        ("spread before", f"{raw:.3f}", "-"),
-        ("spread, linear", f"{spread(result['linear']):.3f}", "-"),
-        ("spread, dense", f"{spread(result['synchronised']):.3f}", "-"),
-        (
-            "spread of velocity, dense",
-            f"{sobolev_least_squares(result['linear'], result['synchronised']):.0%} of linear",
-            "-",
-        ),
-        *key_frame_rows(bunch, result),
-        ("time of fit", f"{1e3 * result['fit_seconds']:.0f} ms", "-"),
-        ("the same, a match", f"{1e3 * result['fit_seconds'] / dense.n_matches_:.3f} ms", "15 ms"),
-        ("time of warping all", f"{1e3 * result['warp_seconds']:.0f} ms", "600 ms"),
+linear = LinearSynchronizer(n_frames=100).fit(points)
+stretched = linear.transform(points)
+calmer = sobolev_least_squares(stretched, synchronised)
+median = dense.pattern_index_
+order = np.argsort(dense.global_distances_)
+margin = dense.global_distances_[order[1]] / dense.global_distances_[order[0]] - 1
+# Among many performances, only the best few are compared with all others.
+lead = f"{margin:.1%} below the next" if np.isfinite(margin) else "the others: rejected sooner"
+rows = [
+    ("performances", f"{len(points)} of {bunch.target[0]}", "40 of bending"),
+    ("actors", f"{len(set(bunch.actor))}", "-"),
+    ("frames, shortest", f"{min(lengths)}", "-"),
+    ("frames, median", f"{np.median(lengths):.0f}", "100 on average"),
+    ("frames, longest", f"{max(lengths)}", "-"),
+    ("eigenvectors b", f"{aspace.n_components_}", "16"),
+    ("variance kept", f"{aspace.explained_variance_ratio_.sum():.1%}", "95%"),
+    ("median performance", f"{median} ({bunch.actor[median]}, take {bunch.take[median]})", "-"),
+    ("its global distance", lead, "-"),
+    ("refined by postures", "yes" if dense.refines_ else "no: styles differ", "-"),
+    ("spread before", f"{spread(points):.3f}", "-"),
+    ("spread, linear", f"{spread(stretched):.3f}", "-"),
+    ("spread, dense", f"{spread(synchronised):.3f}", "-"),
+    ("spread of velocity, dense", f"{calmer:.0%} of linear", "-"),
+]
+if "keyframes" in bunch:
+    rows += [
+        ("key-frames missed, linear", f"{missed_by(linear):.2f} frames", "-"),
+        ("key-frames missed, dense", f"{missed_by(dense):.2f} frames", "-"),
     ]
-    width = max(len(value) for _, value, _ in rows)
-    print(f"{'':28s} {'here':{width}s}  paper")
-    for name, value, paper in rows:
-        print(f"{name:28s} {value:{width}s}  {paper}")
-
+rows += [
+    ("time of fit", f"{1e3 * (fitted - start):.0f} ms", "-"),
+    ("the same, a match", f"{1e3 * (fitted - start) / dense.n_matches_:.3f} ms", "15 ms"),
+    ("time of warping all", f"{1e3 * (warped - fitted):.0f} ms", "600 ms"),
+]
+width = max(len(value) for _, value, _ in rows)
+print(f"{'':28s} {'here':{width}s}  paper")
+for name, value, paper in rows:
+    print(f"{name:28s} {value:{width}s}  {paper}")
 
 # %%
 # Fig. 3: the first dimensions of the aSpace
 # -------------------------------------------
+# As recorded; synchronised, the median performance in black; by hand, where key-frames are
+# known: stretched evenly between them; and the learnt model. The dense matching knows nothing
+# of the key-frames.
 
-
-def draw_dimensions(result):
-    """Performances before and after, and the learnt model with its envelope."""
-    n_dims = min(4, result["aspace"].n_components_)
-    figure, axes = plt.subplots(
-        n_dims, 3, figsize=(11, 2.1 * n_dims), sharey="row", squeeze=False, layout="constrained"
-    )
-    model = result["model"]
-    lower, upper = model.envelope()
-    columns = [("Performances", result["points"]), ("Synchronised", result["synchronised"])]
-    for row, axis_row in enumerate(axes):
-        for axis, (title, performances) in zip(axis_row[:2], columns, strict=True):
-            for x in performances:
-                axis.plot(x[:, row], color="C0", alpha=0.35, linewidth=0.8)
-            axis.set_title(title if row == 0 else "")
-        pattern = result["dense"].pattern_[:, row]
-        axis_row[1].plot(pattern, color="black", linewidth=1.4, label="median performance")
-        model_axis = axis_row[2]
-        for x in result["synchronised"]:
-            model_axis.plot(x[:, row], "--", color="C0", alpha=0.3, linewidth=0.6)
-        frames = np.arange(model.n_frames_)
-        label = f"mean ± {model.n_std:g} std"
-        model_axis.fill_between(frames, lower[:, row], upper[:, row], color="0.85", label=label)
-        for bound in (lower, upper):
-            model_axis.plot(bound[:, row], color="black", linewidth=0.8)
-        model_axis.plot(model.mean_[:, row], color="C3", linewidth=1.8, label="mean")
-        model_axis.set_title("Model" if row == 0 else "")
-        axis_row[0].set_ylabel(f"aSpace {row + 1}")
-    for axis in axes[-1]:
-        axis.set_xlabel("frame")
-    axes[0, 1].legend(loc="best", fontsize="small")
-    axes[0, 2].legend(loc="best", fontsize="small")
-    return figure
-
+n_dims = min(4, aspace.n_components_)
+dimensions, axes = plt.subplots(
+    n_dims, 4, figsize=(12, 2.1 * n_dims), sharey="row", squeeze=False, layout="constrained"
+)
+SynchronizationDisplay.from_estimator(
+    pipe, bunch.data, features=range(n_dims), warps=False, ax=axes[:, :2]
+)
+by_hand = KeyframeSynchronizer(n_frames=100).fit_transform(points, keyframes=bunch.get("keyframes"))
+for row, axis in enumerate(axes[:, 2]):
+    axis.plot(by_hand[:, :, row].T, color="#009E73", alpha=0.5, linewidth=0.9)
+given = "given" if "keyframes" in bunch else "found"
+axes[0, 2].set_title(f"with key-frames\n{given}, 5 in each", fontsize="medium")
+axes[-1, 2].set_xlabel("frame of its pattern")
+shown = ActionModelDisplay.from_estimator(pipe, bunch.data, features=range(n_dims), ax=axes[:, 3])
+shown.axes_[0].get_legend().remove()
+shown.axes_[0].set_title("the model\nmean, three standard deviations", fontsize="medium")
+for axis in shown.axes_[:-1]:
+    axis.set_xlabel("")
+for axis in shown.axes_:
+    axis.set_ylabel("")
 
 # %%
 # Fig. 4: mean postures, and postures that the model accepts
 # -----------------------------------------------------------
+# The model draws each dimension of the aSpace by itself, within three standard deviations of the
+# mean at that frame.
 
-
-def draw_postures(result, frames=(0.1, 0.4, 0.6), n_samples=12):
-    """Stick figures at some shares of the action: the mean, and random accepted postures."""
-    model, aspace, cosines = result["model"], result["aspace"], result["cosines"]
-    frames = [round(share * (model.n_frames_ - 1)) for share in frames]
-
-    def positions(points):
-        return cosines.inverse_transform(aspace.inverse_transform(points))
-
-    figure, axes = plt.subplots(
-        1, 2 * len(frames), figsize=(11, 3.6), sharex=True, sharey=True, layout="constrained"
-    )
-    for frame, (mean_axis, sample_axis) in zip(frames, axes.reshape(-1, 2), strict=True):
-        mean = positions(model.mean_[[frame]])
-        draw_body(mean_axis, mean[0], linewidth=2.2)
-        mean_axis.set_title(f"frame {frame}\nmean posture", fontsize="medium")
-        samples = model.sample(n_samples, frame=frame, random_state=frame)
-        for posture in positions(samples):
-            draw_body(sample_axis, posture, linewidth=0.8, alpha=0.5)
-        accepted = model.accepts(samples, frame).sum()
-        sample_axis.set_title(f"frame {frame}\n{accepted} accepted samples", fontsize="medium")
-    axes[0].set_ylabel("height (unit of the recording)")
-    for axis in axes:
-        axis.set_aspect("equal")
-        axis.set_xticks([])
-    handles = [plt.Line2D([], [], color=c, label=n) for n, c in SIDES.items()]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize="small")
-    return figure
-
-
-SIDES = {"left": "C0", "middle": "0.3", "right": "C1"}
-
-
-def draw_body(axis, positions, **style):
-    """A stick figure of the fifteen joints, seen half from the side."""
-    skeleton = Skeleton.paper()
-    x, y, z = positions.reshape(-1, 3).T
-    across = 0.8 * z - 0.6 * x
-    for a, b in skeleton.bones:
-        side = skeleton.joints[b].split("_")[0]
-        color = SIDES[side if side in SIDES else "middle"]
-        axis.plot([across[a], across[b]], [y[a], y[b]], color=color, **style)
-
+postures = SkeletonDisplay.from_model(pipe, frames=(0.1, 0.4, 0.6)).figure_
 
 # %%
-# All of it
-# ---------
 
-
-def main(arguments=None):
-    """Print the report and write the figures."""
-    parser = argparse.ArgumentParser(description="Synchronise and model performances of an action.")
-    parser.add_argument("--data", help="archive of performances (.npz); by default synthetic ones")
-    parser.add_argument("--action", help="which action of the archive")
-    parser.add_argument("--output", default=".", help="folder of the figures")
-    options = parser.parse_args(arguments)
-    bunch = read_performances(options.data, options.action)
-    result = synchronise(bunch)
-    report(bunch, result)
-    output = Path(options.output)
-    output.mkdir(parents=True, exist_ok=True)
-    for name, draw in (("dimensions", draw_dimensions), ("postures", draw_postures)):
-        path = output / f"bending_{name}.png"
-        draw(result).savefig(path, dpi=120)
-        print(f"figure written: {path}")
-
-
-if __name__ == "__main__":
-    main()
+output = Path(options.output)
+output.mkdir(parents=True, exist_ok=True)
+for name, figure in (("dimensions", dimensions), ("postures", postures)):
+    path = output / f"bending_{name}.png"
+    figure.savefig(path, dpi=120)
+    print(f"figure written: {path.name}")

@@ -75,6 +75,9 @@ class SynchronizationDisplay:
         self.pattern_index = pattern_index
         self.groups = groups
 
+    def __repr__(self):
+        return f"SynchronizationDisplay({len(self.before)} performances, {self.feature_names})"
+
     @classmethod
     def from_estimator(cls, estimator, X, *, features=None, groups=None, warps=True, ax=None):
         """Draw what a fitted synchronizer, or a pipeline with one, does to performances.
@@ -281,6 +284,9 @@ class TrellisDisplay:
         self.warp = warp
         self.names = names
 
+    def __repr__(self):
+        return f"TrellisDisplay({self.names[1]} matched to {self.names[0]})"
+
     @classmethod
     def from_estimator(cls, estimator, X, *, performance=0, ax=None, colorbar=True):
         """Draw the disparity space of the pattern and one performance.
@@ -413,6 +419,9 @@ class ActionModelDisplay:
         self.feature_names = feature_names
         self.n_std = n_std
         self.performances = performances
+
+    def __repr__(self):
+        return f"ActionModelDisplay({self.feature_names})"
 
     @classmethod
     def from_estimator(cls, estimator, X=None, *, features=None, ax=None):

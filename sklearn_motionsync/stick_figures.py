@@ -69,6 +69,9 @@ class SkeletonDisplay:
         self.durations = durations
         self.labels = labels
 
+    def __repr__(self):
+        return f"SkeletonDisplay({len(self.scenes)} panels)"
+
     @classmethod
     def from_positions(cls, X, skeleton, *, frames=6, ax=None, **view):
         """Draw a strip of postures of one performance, or of synchronised ones over each other.
@@ -82,7 +85,7 @@ class SkeletonDisplay:
             How many, evenly spaced from the first to the last, or which ones.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        **view : azimuth
+        **view : at, azimuth
             See `plot`.
 
         Returns
@@ -260,11 +263,15 @@ class SkeletonDisplay:
         everything = np.concatenate([x.reshape(-1, 2) for scene in drawn for x in scene])
         low, high = everything.min(axis=0), everything.max(axis=0)
         width, height = high - low
-        # Panels of one scale, so wide that the figure is 8 to 11 inches.
-        scale = min(9 / (n_cols * width), 3.0 / height)
-        size = (max(4, n_cols * width * scale + 0.6), n_rows * (height * scale + 0.6) + 0.3)
+        # All panels have one scale, which makes figures of about 10 inches.
+        scale = min(9.5 / (1.1 * n_cols * width), 3 / height)
+        size = n_cols * (1.1 * width * scale + 0.15), n_rows * (1.1 * height * scale + 0.75)
         spots = [divmod(i, n_cols) for i in range(len(drawn))]
+        before = getattr(self, "axes_", [])
         self.figure_, self.axes_ = panels(ax, spots, n_rows, n_cols, size)
+        for axis in self.axes_:
+            if axis in before:
+                axis.clear()
         self._drawn, self.bones_, self.heads_ = drawn, [], []
         for axis, title, scene in zip(self.axes_, self.titles, drawn, strict=True):
             self._prepare(axis, title, scene, low, high)
@@ -276,11 +283,13 @@ class SkeletonDisplay:
 
         Parameters
         ----------
-        ax, azimuth : as for `plot`
+        ax : Axes or array-like of Axes, default=None
+            As for `plot`; by default where the display was drawn last.
         seconds : float, default=5.0
             Until the longest performance ends.
         fps : int, default=15
             Pictures a second; each takes some 70 kB of a notebook.
+        azimuth : as for `plot`
 
         Returns
         -------
@@ -298,21 +307,22 @@ class SkeletonDisplay:
                     return super().to_jshtml(*args, **kwargs)
 
             def _repr_html_(self):
-                return self.to_jshtml()
+                html = self.to_jshtml()
+                # Else the notebook shows the figure once more, standing still.
+                if ax is None:
+                    pyplot().close(figure)
+                return html
 
-        self.plot(ax, azimuth=azimuth)
+        self.plot(getattr(self, "axes_", None) if ax is None else ax, azimuth=azimuth)
+        figure = self.figure_.get_figure(root=True)
         count = max(2, round(seconds * fps))
-        moving = Playable(
-            self.figure_.get_figure(root=True),
+        return Playable(
+            figure,
             lambda k: self._show(k / (count - 1)),
             frames=count,
             interval=1000 / fps,
             blit=False,
         )
-        # A notebook would show the figure a second time, standing still.
-        if ax is None:
-            pyplot().close(self.figure_)
-        return moving
 
     def _prepare(self, axis, title, scene, low, high):
         from matplotlib.collections import LineCollection

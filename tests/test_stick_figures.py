@@ -185,7 +185,7 @@ def test_the_same_from_known_warps(bunch, pipe):
 def test_an_animation_plays_from_the_first_to_the_last_frame(bunch, pipe):
     display = SkeletonDisplay.from_estimator(pipe, bunch.data, performances=[0, 1])
     animation = display.animate(seconds=1, fps=4)
-    heads = []
+    number, heads = display.figure_.number, []
     for k in range(4):
         animation._func(k)
         heads.append(np.array(display.heads_[0].get_data()).T)
@@ -195,13 +195,16 @@ def test_an_animation_plays_from_the_first_to_the_last_frame(bunch, pipe):
     html = animation._repr_html_()
     assert html.count("data:image/png;base64") == 4
     assert "Animation" in html
+    # The notebook shows the animation, and not the figure besides.
+    assert not plt.fignum_exists(number)
 
 
 def test_an_animation_on_given_axes(bunch, pipe):
     figure, axes = plt.subplots(2, 1)
     display = SkeletonDisplay.from_estimator(pipe, bunch.data, performances=[0, 1], ax=axes)
-    animation = display.animate(axes, seconds=0.5, fps=4)
+    animation = display.animate(seconds=0.5, fps=4)
     assert display.axes_ == list(axes)
+    assert all(len(axis.collections) == 3 for axis in axes), "the still figures are still there"
     assert plt.fignum_exists(figure.number)
     assert animation.to_jshtml().count("data:image/png;base64") == 2
 
