@@ -1,102 +1,19 @@
 """Skeleton: which columns are which joints, and which joints are the body's."""
 
-import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = ["LANDMARKS", "Skeleton"]
+from .landmarks import (
+    ACCLAIM,
+    ACCLAIM_LANDMARKS,
+    KINECT,
+    KINECT_LANDMARKS,
+    LANDMARKS,
+    PAPER,
+    guess_landmarks,
+)
 
-# The fifteen joints of the body model and the parent of each.
-_PAPER_PARENTS = {
-    "pelvis": None,
-    "neck": "pelvis",
-    "head": "neck",
-    **{
-        f"{side}_{joint}": parent if parent in ("neck", "pelvis") else f"{side}_{parent}"
-        for side in ("left", "right")
-        for joint, parent in (
-            ("shoulder", "neck"),
-            ("elbow", "shoulder"),
-            ("wrist", "elbow"),
-            ("hip", "pelvis"),
-            ("knee", "hip"),
-            ("ankle", "knee"),
-        )
-    },
-}
-LANDMARKS = list(_PAPER_PARENTS)
-
-_ACCLAIM = {
-    "root": None,
-    **{"lhipjoint": "root", "rhipjoint": "root", "lowerback": "root"},
-    **{"lfemur": "lhipjoint", "ltibia": "lfemur", "lfoot": "ltibia", "ltoes": "lfoot"},
-    **{"rfemur": "rhipjoint", "rtibia": "rfemur", "rfoot": "rtibia", "rtoes": "rfoot"},
-    **{"upperback": "lowerback", "thorax": "upperback", "lowerneck": "thorax"},
-    **{"lclavicle": "thorax", "rclavicle": "thorax"},
-    **{"upperneck": "lowerneck", "head": "upperneck"},
-    **{"lhumerus": "lclavicle", "lradius": "lhumerus", "lwrist": "lradius"},
-    **{"lhand": "lwrist", "lthumb": "lwrist", "lfingers": "lhand"},
-    **{"rhumerus": "rclavicle", "rradius": "rhumerus", "rwrist": "rradius"},
-    **{"rhand": "rwrist", "rthumb": "rwrist", "rfingers": "rhand"},
-}
-# An Acclaim joint is the far end of the bone of that name.
-_ACCLAIM_LANDMARKS = {
-    "pelvis": "root",
-    "neck": "thorax",
-    "head": "head",
-    **{
-        f"{side}_{landmark}": side[0] + bone
-        for side in ("left", "right")
-        for landmark, bone in (
-            ("shoulder", "clavicle"),
-            ("elbow", "humerus"),
-            ("wrist", "radius"),
-            ("hip", "hipjoint"),
-            ("knee", "femur"),
-            ("ankle", "tibia"),
-        )
-    },
-}
-
-_KINECT = {
-    "HipCenter": None,
-    "Spine": "HipCenter",
-    "ShoulderCenter": "Spine",
-    "Head": "ShoulderCenter",
-    **{"ShoulderLeft": "ShoulderCenter", "ElbowLeft": "ShoulderLeft"},
-    **{"WristLeft": "ElbowLeft", "HandLeft": "WristLeft"},
-    **{"ShoulderRight": "ShoulderCenter", "ElbowRight": "ShoulderRight"},
-    **{"WristRight": "ElbowRight", "HandRight": "WristRight"},
-    **{"HipLeft": "HipCenter", "KneeLeft": "HipLeft"},
-    **{"AnkleLeft": "KneeLeft", "FootLeft": "AnkleLeft"},
-    **{"HipRight": "HipCenter", "KneeRight": "HipRight"},
-    **{"AnkleRight": "KneeRight", "FootRight": "AnkleRight"},
-}
-_KINECT_LANDMARKS = {
-    "pelvis": "HipCenter",
-    "neck": "ShoulderCenter",
-    "head": "Head",
-    **{
-        f"{side}_{landmark}": landmark.capitalize() + side.capitalize()
-        for side in ("left", "right")
-        for landmark in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-    },
-}
-
-# Names of the joint at each landmark in files whose joints are the near ends of the
-# bones, the likeliest first.
-_SYNONYMS = {
-    "pelvis": ("pelvis", "hips", "hip", "hipcenter", "midhip", "root"),
-    "neck": ("neck", "neck1", "necktwist01", "shouldercenter", "spineshoulder", "thorax"),
-    "head": ("head",),
-    "shoulder": ("upperarm", "uparm", "arm", "shoulder"),
-    "elbow": ("elbow", "forearm", "lowerarm", "lowarm"),
-    "wrist": ("wrist", "hand"),
-    "hip": ("thigh", "upleg", "upperleg", "hip", "hipjoint"),
-    "knee": ("knee", "calf", "leg", "lowerleg", "lowleg", "shin"),
-    "ankle": ("ankle", "foot"),
-}
+__all__ = ["LANDMARKS", "Skeleton", "joints_of"]
 
 
 @dataclass(frozen=True)
@@ -123,6 +40,10 @@ class Skeleton:
         If lengths disagree, a name comes twice, a parent does not exist, or a landmark
         is missing or names no joint.
 
+    Notes
+    -----
+    The skeleton of a file is ``Skeleton.from_frame(datasets.read_motion(path))``.
+
     Examples
     --------
     >>> from sklearn_motionsync import Skeleton
@@ -148,7 +69,7 @@ class Skeleton:
             raise ValueError(f"parents must be other joints' indices, or -1; got {parents}.")
         if self.up not in ("y", "z"):
             raise ValueError(f"up must be 'y' or 'z', got {self.up!r}.")
-        landmarks = _guess_landmarks(joints) if self.landmarks is None else dict(self.landmarks)
+        landmarks = guess_landmarks(joints) if self.landmarks is None else dict(self.landmarks)
         missing = [name for name in LANDMARKS if landmarks.get(name) not in joints]
         if missing:
             raise ValueError(
@@ -159,28 +80,84 @@ class Skeleton:
         object.__setattr__(self, "parents", parents)
         object.__setattr__(self, "landmarks", {name: landmarks[name] for name in LANDMARKS})
 
+    def __repr__(self):
+        for name in ("acclaim", "kinect", "paper"):
+            if self == getattr(type(self), name)():
+                return f"Skeleton.{name}()"
+        return f"Skeleton(<{len(self.joints)} joints>, up={self.up!r})"
+
     @classmethod
     def paper(cls):
         """The paper's fifteen joints."""
-        return cls._of(_PAPER_PARENTS, {name: name for name in LANDMARKS})
+        return cls._of(PAPER, {name: name for name in LANDMARKS})
 
     @classmethod
     def acclaim(cls):
         """The 31 joints of HDM05 and of CMU's ASF/AMC files."""
-        return cls._of(_ACCLAIM, _ACCLAIM_LANDMARKS)
+        return cls._of(ACCLAIM, ACCLAIM_LANDMARKS)
 
     @classmethod
     def kinect(cls):
         """The 20 joints of the first Kinect."""
-        return cls._of(_KINECT, _KINECT_LANDMARKS)
+        return cls._of(KINECT, KINECT_LANDMARKS)
 
     @classmethod
     def from_names(cls, joints, parents, up="y"):
         """A ready skeleton if the names are one's, otherwise landmarks guessed from names."""
+        return cls(joints, parents, cls._likely_landmarks(joints), up)
+
+    @classmethod
+    def from_frame(cls, df, *, landmarks=None, up=None):
+        """The skeleton of a DataFrame of positions, such as `datasets.read_motion` gives.
+
+        Parameters
+        ----------
+        df : DataFrame (n_frames, 3 * n_joints)
+            Columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint by joint. Where its
+            ``attrs`` name ``joints`` and ``parents``, the parent of a joint is its nearest
+            ancestor that has columns; otherwise nothing is joined.
+        landmarks : mapping of str to str, default=None
+            The joints of some or all landmarks; the others are told from the names.
+        up : {"y", "z"}, default=None
+            The vertical axis; by default ``df.attrs["up"]``, or "y".
+
+        Returns
+        -------
+        Skeleton
+
+        Raises
+        ------
+        ValueError
+            If the columns are not such triples, or a landmark has no joint.
+
+        Examples
+        --------
+        >>> import pandas as pd
+        >>> from sklearn_motionsync import Skeleton
+        >>> df = pd.DataFrame(0.0, index=range(2), columns=Skeleton.paper().column_names)
+        >>> Skeleton.from_frame(df).landmarks["left_knee"]
+        'left_knee'
+        """
+        joints = joints_of(df)
+        given = dict(landmarks or {})
+        if unknown := sorted(set(given) - set(LANDMARKS)):
+            raise ValueError(f"landmarks must be among {LANDMARKS}, got {unknown}.")
+        up = up or df.attrs.get("up") or "y"
+        names = df.attrs.get("joints", ())
+        # Columns that were renamed are none of the joints that the file had.
+        likely = cls._likely_landmarks(joints, names if set(joints) <= set(names) else ())
+        return cls(joints, _kept_parents(df, joints), likely | given, up)
+
+    @classmethod
+    def _likely_landmarks(cls, joints, names=()):
+        """The landmarks of a ready skeleton if the names are one's, otherwise guessed ones.
+
+        `names` may tell more joints than are there; their landmarks are left out.
+        """
         for known in (cls.acclaim(), cls.kinect(), cls.paper()):
-            if set(known.joints) <= set(joints):
-                return cls(joints, parents, known.landmarks, up)
-        return cls(joints, parents, None, up)
+            if set(known.landmarks.values()) <= {*joints, *names}:
+                return {name: j for name, j in known.landmarks.items() if j in joints}
+        return guess_landmarks([str(joint) for joint in joints])
 
     @classmethod
     def _of(cls, parents, landmarks):
@@ -198,21 +175,30 @@ class Skeleton:
         return [f"{joint}_{axis}" for joint in self.joints for axis in "xyz"]
 
 
-def _guess_landmarks(joints):
-    """The joint of each landmark that can be told from the names."""
-    # A prefix that a program gave to every joint but perhaps the root is no part of a name.
-    prefix = re.match(r"(.*[^A-Za-z0-9])?", os.path.commonprefix(joints[1:])).group()  # noqa: RUF071
-    plain = {re.sub(r"[^a-z0-9]", "", j.removeprefix(prefix).lower()): j for j in reversed(joints)}
-    found = {}
-    for landmark in LANDMARKS:
-        side, _, part = landmark.rpartition("_")
-        forms = ("{side}{part}", "{part}{side}", "{side[0]}{part}", "{part}{side[0]}")
-        names = [
-            form.format(side=side, part=synonym)
-            for synonym in _SYNONYMS[part]
-            for form in (forms if side else ("{part}",))
-        ]
-        joint = next((plain[name] for name in names if name in plain), None)
-        if joint is not None:
-            found[landmark] = joint
-    return found
+def joints_of(df):
+    """Names of the joints of a DataFrame whose columns are ``<joint>_x``, ``_y``, ``_z``, ..."""
+    columns = [str(column) for column in df.columns]
+    joints = [column[:-2] for column in columns[::3]]
+    if not joints or columns != [f"{joint}_{axis}" for joint in joints for axis in "xyz"]:
+        raise ValueError(
+            "The columns must be <joint>_x, <joint>_y, <joint>_z for one joint after the other, "
+            f"got {columns[:4]}{' ...' if len(columns) > 4 else ''}; select them with "
+            "df[skeleton.column_names] or drop the others."
+        )
+    return joints
+
+
+def _kept_parents(df, joints):
+    """Index of the nearest ancestor that is among the joints, or -1, for each joint."""
+    names, parents = df.attrs.get("joints", ()), df.attrs.get("parents", ())
+    above = {name: names[p] for name, p in zip(names, parents, strict=True) if p >= 0}
+    index = {joint: j for j, joint in enumerate(joints)}
+    result = []
+    for joint in joints:
+        ancestor = above.get(joint)
+        for _ in names:  # no more steps than joints, should parents run in a circle
+            if ancestor is None or ancestor in index:
+                break
+            ancestor = above.get(ancestor)
+        result.append(index.get(ancestor, -1))
+    return result

@@ -3,9 +3,10 @@
 import numpy as np
 
 from .action_model import ActionModel
+from .bodies import bones_by_side, on_screen, placed, upright
 from .clock import Synchronizer
 from .drawing import COLORS, panels, pyplot
-from .posture import DirectionCosines, heading
+from .posture import DirectionCosines
 from .sampling import sample
 from .sequences import to_sequences
 from .skeleton import Skeleton
@@ -27,7 +28,8 @@ class SkeletonDisplay:
     Make one with `from_positions`, `from_postures` (strips), `from_model` (Fig. 4),
     `from_estimator` or `from_predictions` (performances before and after synchronisation, to
     `animate`). Left limbs are blue, right ones orange. People are turned to face the same way
-    at first, and stand where they stood.
+    at first. Their lowest joint ever is on the floor; the pictures of a strip, and those of people
+    who walk away, go with the pelvis.
 
     Parameters
     ----------
@@ -92,15 +94,15 @@ class SkeletonDisplay:
         -------
         SkeletonDisplay
         """
-        performances = [_upright(x, skeleton, i) for i, x in enumerate(_as_performances(X))]
+        performances = [upright(x, skeleton, i) for i, x in enumerate(_as_performances(X))]
         n_frames = min(len(x) for x in performances)
         if np.ndim(frames) == 0:
             frames = np.linspace(0, n_frames - 1, int(frames)).round()
         frames = [int(frame) for frame in frames]
         if not frames or min(frames) < 0 or max(frames) >= n_frames:
             raise ValueError(f"frames must be from 0 to {n_frames - 1}, got {frames}.")
-        placed = [_placed(x, skeleton) for x in performances]
-        scenes = [[x[[frame]] for x in placed] for frame in frames]
+        standing = [placed(x, skeleton, follow=True) for x in performances]
+        scenes = [[x[[frame]] for x in standing] for frame in frames]
         titles = [f"frame {frame}" for frame in frames]
         return cls(scenes, skeleton, titles).plot(ax, **view)
 
@@ -223,7 +225,7 @@ class SkeletonDisplay:
                 f"times must have shape (n_sequences, P), one row for each of the {len(X)} "
                 f"performances; got {times.shape}."
             )
-        raw = [_placed(_upright(x, skeleton, i), skeleton) for i, x in enumerate(X)]
+        raw = [placed(upright(x, skeleton, i), skeleton) for i, x in enumerate(X)]
         flat = [x.reshape(len(x), -1) for x in raw]
         warped = sample(flat, times, times.shape[1])
         warped = warped.reshape(*warped.shape[:2], -1, 3)
@@ -254,7 +256,7 @@ class SkeletonDisplay:
         -------
         self
         """
-        drawn = [[_on_screen(x, azimuth) for x in scene] for scene in self.scenes]
+        drawn = [[on_screen(x, azimuth) for x in scene] for scene in self.scenes]
         if self.labels is not None:
             gap = _SPACING * max(np.ptp(x[..., 1]) for x in drawn[0])
             drawn = [[x + [i * gap, 0] for i, x in enumerate(scene)] for scene in drawn]
@@ -314,7 +316,7 @@ class SkeletonDisplay:
                 return html
 
         self.plot(getattr(self, "axes_", None) if ax is None else ax, azimuth=azimuth)
-        figure = self.figure_.get_figure(root=True)
+        figure = self.figure_.canvas.figure
         count = max(2, round(seconds * fps))
         return Playable(
             figure,
@@ -360,7 +362,7 @@ class SkeletonDisplay:
         if durations is None:
             durations = [[len(x) - 1 for x in scene] for scene in self._drawn]
         longest = max(max(of_scene) for of_scene in durations)
-        head, bones = self._landmark("head"), _bones_by_side(self.skeleton)
+        head, bones = self._landmark("head"), bones_by_side(self.skeleton)
         artists = []
         for i, (scene, taking) in enumerate(zip(self._drawn, durations, strict=True)):
             shares = [min(1.0, at * longest / d) if d > 0 else 0.0 for d in taking]
@@ -391,51 +393,3 @@ def _before_synchronizer(estimator):
             "by itself use from_predictions with the joint positions."
         )
     return before, find_step(before, DirectionCosines, "DirectionCosines")[1]
-
-
-def _upright(x, skeleton, i):
-    """(n_frames, n_joints, 3) of (n_frames, 3 n_joints), with the second axis vertical."""
-    x = np.asarray(x, dtype=np.float64)
-    if x.ndim != 2 or x.shape[1] != 3 * len(skeleton.joints):
-        raise ValueError(
-            f"Performance {i} has shape {x.shape}, but the positions of the skeleton's "
-            f"{len(skeleton.joints)} joints are (n_frames, {3 * len(skeleton.joints)})."
-        )
-    x = x.reshape(len(x), -1, 3)
-    return np.stack([x[..., 0], x[..., 2], -x[..., 1]], axis=-1) if skeleton.up == "z" else x
-
-
-def _placed(x, skeleton):
-    """A performance turned to face forward at first, above the origin, its lowest joint at 0."""
-    at = [
-        skeleton.joints.index(skeleton.landmarks[name])
-        for name in ("left_hip", "right_hip", "pelvis")
-    ]
-    hip = x[:1, at[0]] - x[:1, at[1]]
-    turn = heading(hip / max(np.linalg.norm(hip), np.finfo(float).tiny))[0]
-    origin = x[0, at[2]] * [1, 0, 1]
-    origin[1] = np.nanmin(x[..., 1])
-    return (x - origin) @ turn.T
-
-
-def _on_screen(x, azimuth):
-    """(n_frames, n_joints, 2) places across and up, as seen from far away at eye level."""
-    a = np.deg2rad(azimuth)
-    across = x @ np.array([np.cos(a), 0, -np.sin(a)])
-    return np.stack([across, x[..., 1]], axis=-1)
-
-
-def _bones_by_side(skeleton):
-    """Bones by the side of the body they hang on: below a hip or shoulder, or in the middle."""
-    side_of = {}
-    for side in ("left", "right"):
-        for landmark in ("hip", "shoulder"):
-            side_of[skeleton.joints.index(skeleton.landmarks[f"{side}_{landmark}"])] = side
-    bones = {"left": [], "middle": [], "right": []}
-    for parent, joint in skeleton.bones:
-        above, seen = joint, set()
-        while above >= 0 and above not in side_of and above not in seen:
-            seen.add(above)
-            above = skeleton.parents[above]
-        bones[side_of.get(above, "middle")].append((parent, joint))
-    return bones

@@ -182,6 +182,25 @@ def test_the_same_from_known_warps(bunch, pipe):
         SkeletonDisplay.from_predictions(bunch.data, times[:2], bunch.skeleton)
 
 
+def test_the_picture_follows_people_who_walk_away(bunch):
+    staying = bunch.data[0]
+    drift = np.outer(np.linspace(0, 6, len(staying)), np.tile([0.6, 0, 0.8], 15))
+    strips, moving = [], []
+    for X in (staying, staying + drift):
+        display = SkeletonDisplay.from_positions(X, bunch.skeleton, frames=[0, 30])
+        strips.append([bones_drawn(display, panel) for panel in (0, 1)])
+        times = np.linspace(0, 39, 40)[np.newaxis]
+        display = SkeletonDisplay.from_predictions([X], times, bunch.skeleton, at=0.7)
+        moving.append(bones_drawn(display, 0))
+    np.testing.assert_allclose(strips[0], strips[1], atol=1e-9)
+    middle = np.abs(moving[1][:, :, 0]).max()
+    assert middle < 1.5, "six metres away without following"
+    # Who stays is not followed: the feet stand still while the pelvis moves.
+    feet = [j for j, name in enumerate(bunch.skeleton.joints) if name.endswith("ankle")]
+    raw = SkeletonDisplay.from_predictions([staying], times, bunch.skeleton).scenes[0][0]
+    assert np.ptp(raw[:, feet], axis=0).max() < 0.05 < np.ptp(raw[:, 0, [0, 2]], axis=0).max()
+
+
 def test_an_animation_plays_from_the_first_to_the_last_frame(bunch, pipe):
     display = SkeletonDisplay.from_estimator(pipe, bunch.data, performances=[0, 1])
     animation = display.animate(seconds=1, fps=4)

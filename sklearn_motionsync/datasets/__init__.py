@@ -1,6 +1,16 @@
-"""Performances to begin with: synthetic ones with known truth, and archives of real ones."""
+"""Performances to begin with: synthetic ones with known truth, archives and files of real ones."""
 
 from ._archive import load_performances
 from ._bending import make_bending
+from ._cmu import fetch_cmu
+from ._gaps import fill_gaps, find_gaps
+from ._motion import read_motion
 
-__all__ = ["load_performances", "make_bending"]
+__all__ = [
+    "fetch_cmu",
+    "fill_gaps",
+    "find_gaps",
+    "load_performances",
+    "make_bending",
+    "read_motion",
+]

@@ -1,0 +1,64 @@
+"""Bodies to be drawn: put upright, turned the same way, seen from a side."""
+
+import numpy as np
+
+from .posture import heading
+
+__all__ = ["bones_by_side", "on_screen", "placed", "upright"]
+
+# How far people may walk, in their heights, before the picture follows them.
+_FAR = 0.75
+
+
+def upright(x, skeleton, i):
+    """(n_frames, n_joints, 3) of (n_frames, 3 n_joints), with the second axis vertical."""
+    x = np.asarray(x, dtype=np.float64)
+    if x.ndim != 2 or x.shape[1] != 3 * len(skeleton.joints):
+        raise ValueError(
+            f"Performance {i} has shape {x.shape}, but the positions of the skeleton's "
+            f"{len(skeleton.joints)} joints are (n_frames, {3 * len(skeleton.joints)})."
+        )
+    x = x.reshape(len(x), -1, 3)
+    return np.stack([x[..., 0], x[..., 2], -x[..., 1]], axis=-1) if skeleton.up == "z" else x
+
+
+def placed(x, skeleton, *, follow=False):
+    """A performance turned to face forward at first, above the origin, its lowest joint at 0.
+
+    With ``follow``, or if it leads far away, the pelvis stays above the origin all the time.
+    """
+    at = [
+        skeleton.joints.index(skeleton.landmarks[name])
+        for name in ("left_hip", "right_hip", "pelvis")
+    ]
+    hip = x[:1, at[0]] - x[:1, at[1]]
+    turn = heading(hip / max(np.linalg.norm(hip), np.finfo(float).tiny))[0]
+    way = x[:, at[2]] * [1, 0, 1]
+    height = np.ptp(x[0, :, 1])
+    follow = follow or np.ptp(way, axis=0).max() > _FAR * height
+    origin = way if follow else np.repeat(way[:1], len(x), axis=0)
+    origin[:, 1] = x[..., 1].min()
+    return (x - origin[:, np.newaxis]) @ turn.T
+
+
+def on_screen(x, azimuth):
+    """(n_frames, n_joints, 2) places across and up, as seen from far away at eye level."""
+    a = np.deg2rad(azimuth)
+    across = x @ np.array([np.cos(a), 0, -np.sin(a)])
+    return np.stack([across, x[..., 1]], axis=-1)
+
+
+def bones_by_side(skeleton):
+    """Bones by the side of the body they hang on: below a hip or shoulder, or in the middle."""
+    side_of = {}
+    for side in ("left", "right"):
+        for landmark in ("hip", "shoulder"):
+            side_of[skeleton.joints.index(skeleton.landmarks[f"{side}_{landmark}"])] = side
+    bones = {"left": [], "middle": [], "right": []}
+    for parent, joint in skeleton.bones:
+        above, seen = joint, set()
+        while above >= 0 and above not in side_of and above not in seen:
+            seen.add(above)
+            above = skeleton.parents[above]
+        bones[side_of.get(above, "middle")].append((parent, joint))
+    return bones

@@ -1,0 +1,142 @@
+"""Files of motion capture: BVH, Acclaim's ASF/AMC, and C3D."""
+
+import math
+from numbers import Real
+from pathlib import Path
+
+import pandas as pd
+
+from ._acclaim import read_acclaim
+from ._asf import find_asf
+from ._bvh import read_bvh
+from ._c3d import read_c3d
+from ._gaps import check_max_gap, fill_gaps, warn_of_gaps
+
+
+def read_motion(path, *, asf=None, frame_rate=None, max_gap=0):
+    """Read a recording of joints or markers from a BVH, AMC or C3D file.
+
+    Parameters
+    ----------
+    path : str or path-like
+        A file whose name ends with ``.bvh``, ``.amc`` or ``.c3d``, in any case.
+    asf : str or path-like, default=None
+        The skeleton of an AMC file. By default the ``.asf`` file beside it with the longest name
+        that the AMC file's begins with (``02.asf`` for ``02_01.amc``), or the only one there.
+    frame_rate : float, default=None
+        Frames a second. By default what the file says; AMC files mostly do not.
+    max_gap : int, default=0
+        Gaps of markers up to that many frames are interpolated, see `fill_gaps`.
+
+    Returns
+    -------
+    DataFrame (n_frames, 3 * n_joints)
+        Float64 columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint by joint, and an index
+        named "frame", from 0. Names that come twice end with ``_2``, ``_3`` and so on. A joint
+        of a BVH file is where the joint turns, and ``<parent>_end`` where an End Site is; a joint
+        of an AMC file is the far end of the bone of that name. A marker that was not seen is NaN.
+        Its ``attrs`` hold
+
+        format : {"bvh", "amc", "c3d"}
+        frame_rate : float or None
+            Frames a second, None where nobody says.
+        units : str or None
+            "m" for AMC, what the file says for C3D ("mm"), None for BVH, which has none.
+        up : {"y", "z"} or None
+            The vertical axis, None where a C3D file does not say.
+        kind : {"joints", "markers"}
+        joints : list of str
+        parents : list of int
+            Index of each joint's parent, -1 for a root and for markers.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If it is not of these formats, damaged or not complete; the message says what was found
+        where. A result of more than 64 MB and 32 times the size of its file is refused.
+
+    Warns
+    -----
+    UserWarning
+        If positions are missing; the message says how many, of which markers, and what helps.
+
+    See Also
+    --------
+    find_gaps : The gaps of a recording.
+    sklearn_motionsync.Skeleton.from_frame : The skeleton of what is returned.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync.datasets import read_motion
+    >>> path = getfixture("tmp_path") / "arm.bvh"
+    >>> _ = path.write_text('''HIERARCHY
+    ... ROOT arm
+    ... {
+    ...   OFFSET 0 0 0
+    ...   CHANNELS 1 Zrotation
+    ...   End Site { OFFSET 2 0 0 }
+    ... }
+    ... MOTION
+    ... Frames: 2
+    ... Frame Time: 0.01
+    ... 0
+    ... 90
+    ... ''')
+    >>> df = read_motion(path)
+    >>> df[["arm_end_x", "arm_end_y"]].round(6).to_numpy().tolist()
+    [[2.0, 0.0], [0.0, 2.0]]
+    >>> df.attrs["frame_rate"], df.attrs["joints"], df.attrs["parents"]
+    (100.0, ['arm', 'arm_end'], [-1, 0])
+    """
+    check_max_gap(max_gap)
+    _check_frame_rate(frame_rate)
+    path = _existing(path, "motion file")
+    kind = path.suffix.lower()
+    if kind == ".asf":
+        raise ValueError(f"{path} is a skeleton without motion; give the .amc file, and asf=.")
+    if kind not in (".bvh", ".amc", ".c3d"):
+        raise ValueError(f"{path} must end with .bvh, .amc or .c3d, got {kind or 'nothing'!r}.")
+    if asf is not None and kind != ".amc":
+        raise ValueError(f"asf= goes with .amc files only, got asf={str(asf)!r} with {path}.")
+    if kind == ".amc":
+        asf = find_asf(path) if asf is None else _existing(asf, "skeleton (asf=)")
+        motion = read_acclaim(path, asf)
+    else:
+        motion = {".bvh": read_bvh, ".c3d": read_c3d}[kind](path)
+    df = _to_frame(motion, kind.removeprefix("."), frame_rate)
+    if max_gap:
+        df = fill_gaps(df, max_gap)
+    warn_of_gaps(df, path.name)
+    return df
+
+
+def _check_frame_rate(frame_rate):
+    if frame_rate is None:
+        return
+    number = isinstance(frame_rate, Real) and not isinstance(frame_rate, bool)
+    if not number or not math.isfinite(frame_rate) or frame_rate <= 0:
+        raise ValueError(f"frame_rate must be frames a second, above 0, got {frame_rate!r}.")
+
+
+def _existing(path, what):
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"There is no {what} at {path}.")
+    return path
+
+
+def _to_frame(motion, name, frame_rate):
+    positions = motion.pop("positions")
+    joints = motion["joints"]
+    df = pd.DataFrame(
+        positions.reshape(len(positions), -1),
+        columns=[f"{joint}_{axis}" for joint in joints for axis in "xyz"],
+        index=pd.RangeIndex(len(positions), name="frame"),
+    )
+    rate = motion["frame_rate"] if frame_rate is None else float(frame_rate)
+    facts = {"format": name, "frame_rate": rate}
+    facts |= {fact: motion[fact] for fact in ("units", "up", "kind", "joints", "parents")}
+    df.attrs = facts
+    return df

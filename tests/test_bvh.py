@@ -1,0 +1,156 @@
+"""Reading BVH: against plain matrices, by hand, and where the file is wrong."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn_motionsync import Skeleton
+from sklearn_motionsync.datasets import load_performances, read_motion
+
+from motion_files import body, bvh_oracle, joint, put
+
+
+@pytest.mark.parametrize("order", ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"])
+def test_bvh_against_the_oracle(tmp_path, order):
+    df = read_motion(put(tmp_path, body(order)))
+    expected = bvh_oracle(body(order))
+    assert df.attrs["joints"] == ["hips", "spine", "neck", "neck_end", "leg", "foot"]
+    assert df.attrs["parents"] == [-1, 0, 1, 2, 0, 4]
+    for name in df.attrs["joints"]:
+        np.testing.assert_allclose(joint(df, name), expected[name], atol=1e-10)
+
+
+def test_bvh_by_hand(tmp_path):
+    """A position channel takes the place of OFFSET; the first rotation is the outermost."""
+    text = (
+        "HIERARCHY ROOT a { OFFSET 9 9 9 CHANNELS 2 Zposition Xposition JOINT b { OFFSET 1 0 0 "
+        "CHANNELS 3 Zrotation Yposition Xrotation End Site { OFFSET 0 2 0 } } }\n"
+        "MOTION\nFrames: 1\nFrame Time: 1\n4 5 90 7 90\n"
+    )
+    df = read_motion(put(tmp_path, text))
+    np.testing.assert_allclose(joint(df, "a"), [[5, 9, 4]])
+    np.testing.assert_allclose(joint(df, "b"), [[6, 16, 4]])
+    # About its own X first y turns to z, which stays when all turns about Z.
+    np.testing.assert_allclose(joint(df, "b_end"), [[6, 16, 6]], atol=1e-12)
+
+
+def test_what_a_frame_says_of_itself(tmp_path):
+    df = read_motion(put(tmp_path, body()))
+    assert df.shape == (3, 18)
+    assert set(df.dtypes) == {np.dtype(float)}
+    assert df.index.equals(pd.RangeIndex(3))
+    assert df.index.name == "frame"
+    facts = {k: v for k, v in df.attrs.items() if k not in ("joints", "parents")}
+    kind = {"format": "bvh", "units": None, "up": "y", "kind": "joints"}
+    assert facts == kind | {"frame_rate": 50.0}
+    assert json.loads(json.dumps(df.attrs)) == df.attrs
+    assert read_motion(tmp_path / "a.bvh", frame_rate=25).attrs["frame_rate"] == 25.0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace("\n", "\r"),
+        lambda text: text.replace("\n", "\n\n"),
+        lambda text: text.replace("\n  ", " ").replace("OFFSET", "offset"),
+        lambda text: text.replace("rotation", "ROTATION").replace("\n  {", "{"),
+        lambda text: text.replace("Frames: 3", "frames:3"),
+    ],
+)
+def test_bvh_as_programs_write_it(tmp_path, change):
+    expected = read_motion(put(tmp_path, body()))
+    pd.testing.assert_frame_equal(read_motion(put(tmp_path, change(body()), "b.BVH")), expected)
+
+
+def test_names_are_made_unique(tmp_path):
+    text = body().replace("JOINT spine", "JOINT left arm").replace("JOINT leg", "JOINT left arm")
+    text = text.replace("JOINT foot", "JOINT left arm_2").replace("JOINT neck", "JOINT f\xfc\xdf")
+    df = read_motion(put(tmp_path, text))
+    names = ["hips", "left arm", "f\xfc\xdf", "f\xfc\xdf_end", "left arm_3", "left arm_2"]
+    assert df.attrs["joints"] == names
+    assert df.columns.is_unique
+
+
+@pytest.mark.parametrize("deep", [True, False])
+def test_very_many_joints(tmp_path, deep):
+    n = 6000
+    head = "HIERARCHY\nROOT a { OFFSET 0 0 0 CHANNELS 1 Xposition\n"
+    one = "JOINT a { OFFSET 0 1 0 "
+    inner = one * n + "} " * n if deep else (one + "} ") * n
+    text = head + inner + "}\nMOTION\nFrames: 2\nFrame Time: 1\n0\n1\n"
+    df = read_motion(put(tmp_path, text))
+    assert df.iloc[1, -3:].tolist() == [1, n if deep else 1, 0]
+
+
+def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame Time: 1\n1 2 3\n"):
+    return f"HIERARCHY\nROOT a\n{{\nOFFSET 0 0 0\nCHANNELS {channels}\n}}\nMOTION\n{motion}"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"line 0: the file ends where ROOT, .* should follow; it is not complete"),
+        ("\x00\xff", "line 1: expected ROOT, .* got "),
+        (small()[:30], "line 4: the file ends where a number of OFFSET"),
+        (small().replace("OFFSET 0 0 0\n", ""), "line 5: joint 'a' ends without an OFFSET"),
+        (small().replace("0 0 0", "0 x 0"), "line 4: OFFSET needs finite numbers, got 'x'"),
+        (small().replace("0 0 0", "0 1_0 0"), "OFFSET needs finite numbers, got '1_0'"),
+        (small().replace("ROOT a", "ROOT"), "line 3: expected the joint's name"),
+        (small().replace("ROOT a\n{", "ROOT a"), "line 3: expected a joint's name and {, got 'OFF"),
+        (small().replace("ROOT", "JOINT"), "'JOINT' stands where it cannot"),
+        (small().replace("}\n", ""), "MOTION begins, but 1 joints are open"),
+        ("MOTION\n", "at least one ROOT"),
+        (small("7 Xrotation"), "CHANNELS needs a number from 0 to 6, got '7'"),
+        (small("2 Xrotation Xrotation"), "as many different names"),
+        (small("1 Wrotation"), "got 'WROTATION'"),
+        (small("0"), "no joint has CHANNELS"),
+        (small().replace("}", "End Site { OFFSET 0 0 0 CHANNELS 1 Xrotation } }"), "End Site has"),
+        (small(motion=""), "line 7: expected 'Frames: <number>', got ''"),
+        (small(motion="Frames: -1\n"), "Frames: needs a whole number above 0, got '-1'"),
+        (small(motion="Frames: 1\nFrame Time: 0\n1 2 3"), "Frame Time: needs seconds above 0"),
+        (small(motion="Frames: 1\nFrame Time: inf\n1 2 3"), "Frame Time: needs finite numbers"),
+        (small(motion="Frames: 9999999999\nFrame Time: 1\n1 2 3\n"), "but only 6 bytes follow"),
+        (small(motion="Frames: 2\nFrame Time: 1\n1.00 2.00 3.00\n"), "2, but 1 frames follow"),
+        (small(motion="Frames: 1\nFrame Time: 1\n1 2 3\n4 5 6\n"), "1, but 2 frames follow"),
+        (small(motion="Frames: 1\nFrame Time: 1\n1 2 \n"), r"line 10: a frame .* needs 3 numbers"),
+        (small(motion="Frames: 1\nFrame Time: 1\n1 nan 3\n"), "finite numbers, got 'nan'"),
+        (small(motion="Frames: 1\nFrame Time: 1\n1 1e999 3\n"), "finite numbers, got '1e999'"),
+    ],
+)
+def test_bad_bvh(tmp_path, text, message):
+    with pytest.raises(ValueError, match=rf"a\.bvh, {message}|a\.bvh, line \d+: .*{message}"):
+        read_motion(put(tmp_path, text))
+
+
+def test_positions_out_of_this_world(tmp_path):
+    text = body().replace("OFFSET 0 3 1", "OFFSET 0 1e308 1e308")
+    text = text.replace("OFFSET 1 5 -2", "OFFSET 1e308 1e308 1e308")
+    with pytest.raises(ValueError, match="infinitely far away in frame 1; offsets, lengths"):
+        read_motion(put(tmp_path, text))
+
+
+def test_a_small_file_of_a_huge_result(tmp_path):
+    joints = "JOINT a { OFFSET 0 0 0 }\n" * 2000
+    text = f"HIERARCHY\nROOT a {{ OFFSET 0 0 0 CHANNELS 1 Xposition\n{joints}}}\nMOTION\n"
+    text += "Frames: 4000\nFrame Time: 1\n" + "0\n" * 4000
+    with pytest.raises(ValueError, match=r"4000 frames of 2001 joints would take 183 MB, from a"):
+        read_motion(put(tmp_path, text))
+
+
+def test_real_bvh(real_data):
+    path = real_data / "original_files" / "bvh" / "007_01.bvh"
+    df = read_motion(path)
+    assert df.shape == (157, 3 * 142)
+    assert df.attrs["frame_rate"] == pytest.approx(60, rel=1e-4)
+    lines = path.read_text().split("\n")
+    start = next(i for i, line in enumerate(lines) if line.startswith("Frames"))
+    few = [*lines[:start], "Frames: 3", lines[start + 1], *lines[start + 2 : start + 5]]
+    for name, track in bvh_oracle("\n".join(few)).items():
+        np.testing.assert_allclose(joint(df, name)[:3], track, atol=1e-9)
+    archive = load_performances(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
+    columns = [f"{j}_{axis}" for j in archive.joints for axis in "xyz"]
+    np.testing.assert_allclose(df[columns], archive.data[0], atol=1e-4)
+    assert Skeleton.from_frame(df[columns]) == archive.skeleton
+    assert Skeleton.from_frame(df).landmarks["left_knee"] == "CC_Base_L_Calf"
