@@ -32,6 +32,7 @@ display = SkeletonDisplay.from_estimator(
     pipe, bunch.data, performances=[pipe[-1].pattern_index_, 0, 1, 2]
 )
 animation = display.animate(seconds=4, fps=12)
+plt.close()  # the player below shows it
 animation
 
 # %%

@@ -1,0 +1,44 @@
+"""The methods of a class: those of the package, and those it has from scikit-learn."""
+
+import inspect
+
+PACKAGE = "sklearn_motionsync"
+
+
+def members(cls):
+    """What the page of a class lists, as plain data for its template."""
+    own, properties, inherited = [], [], []
+    names = [name for name in dir(cls) if not name.startswith("_") or name == "__call__"]
+    for name in names:
+        home, value = _definition(cls, name)
+        if isinstance(value, property):
+            properties.append(name)
+        elif not callable(getattr(cls, name)):
+            continue
+        elif home == PACKAGE:
+            own.append(name)
+        elif home == "sklearn":
+            inherited.append(_entry(cls, name))
+    return {"own": own, "properties": properties, "inherited": inherited}
+
+
+def _definition(cls, name):
+    """Package that defines a member, and the member as its class holds it."""
+    for base in cls.__mro__:
+        if name in vars(base):
+            value = vars(base)[name]
+            made_by = type(value).__module__.split(".")[0]
+            home = "sklearn" if made_by == "sklearn" else base.__module__.split(".")[0]
+            return home, value
+    return None, None
+
+
+def _entry(cls, name):
+    method = getattr(cls, name)
+    parameters = list(inspect.signature(method).parameters.values())
+    if parameters and parameters[0].name == "self":
+        parameters = parameters[1:]
+    shown = [p.replace(annotation=inspect.Parameter.empty) for p in parameters]
+    signature = str(inspect.Signature(shown))
+    summary = inspect.getdoc(method).strip().split("\n\n")[0].replace("\n", " ")
+    return {"name": name, "signature": signature, "summary": summary}

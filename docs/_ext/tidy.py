@@ -1,0 +1,66 @@
+"""Small repairs to what Sphinx and its extensions make of docstrings, doctests and tables."""
+
+import re
+
+# The names of a nested list of a docstring, such as what a Bunch holds.
+_TERM = re.compile(r"( {4,})\w+(, \w+)* : \S")
+
+_NUMBERS = re.compile(r"[-+]?\d[\d.,e+%/() -]*( to [\d.]+\))?")
+
+# Matplotlib's player of animations fetches its icons; the theme has them here.
+_ICONS = re.compile(r"<link[^>]*font-awesome[^>]*>")
+
+
+def complete_terms(app, what, name, obj, options, lines):
+    """A term of a nested list that has no description gets an empty one, as the syntax wants."""
+    completed = []
+    for line, following in zip(lines, [*lines[1:], ""], strict=True):
+        completed.append(line)
+        term = _TERM.match(line)
+        if term and not following.startswith(term.group(1) + " "):
+            completed.append(term.group(1) + "    ..")
+    lines[:] = completed
+
+
+def strip_blocks(app, doctree):
+    """A doctest in Markdown ends with an empty line, so that its fence is no expected output."""
+    from docutils import nodes
+
+    for block in doctree.findall(nodes.literal_block):
+        text = block.astext()
+        if block.rawsource == text and text != text.rstrip("\n"):
+            block.rawsource = text.rstrip("\n")
+            block[:] = [nodes.Text(block.rawsource)]
+
+
+def mark_numbers(app, doctree):
+    """Cells of numbers, such as "3.34 / 0.95 / 16%", are kept on one line by the style sheet."""
+    from docutils import nodes
+
+    for entry in doctree.findall(nodes.entry):
+        if _NUMBERS.fullmatch(entry.astext().strip()):
+            entry["classes"].append("number")
+
+
+def keep_local(app, doctree):
+    """Pages fetch nothing from other sites."""
+    from docutils import nodes
+
+    for raw in doctree.findall(nodes.raw):
+        if raw["format"] == "html" and _ICONS.search(raw.astext()):
+            raw[:] = [nodes.Text(_ICONS.sub("", raw.astext()))]
+
+
+def setup(app):
+    from numpydoc.xref import DEFAULT_LINKS
+    from sphinx.ext import autosummary
+
+    # Types are linked to pages of this site only.
+    DEFAULT_LINKS.clear()
+    autosummary.WELL_KNOWN_ABBREVIATIONS += ("Eq.", "Eqs.", "Fig.", "Figs.")
+    # Before numpydoc reads them.
+    app.connect("autodoc-process-docstring", complete_terms, priority=400)
+    app.connect("doctree-read", strip_blocks)
+    app.connect("doctree-read", mark_numbers)
+    app.connect("doctree-read", keep_local)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
