@@ -27,18 +27,29 @@ def placed(x, skeleton, *, follow=False):
 
     With ``follow``, or if it leads far away, the pelvis stays above the origin all the time.
     """
-    at = [
+    left, right, pelvis = (
         skeleton.joints.index(skeleton.landmarks[name])
         for name in ("left_hip", "right_hip", "pelvis")
-    ]
-    hip = x[:1, at[0]] - x[:1, at[1]]
+    )
+    hip = _known(x[:, left] - x[:, right], "hips")[:1]
     turn = heading(hip / max(np.linalg.norm(hip), np.finfo(float).tiny))[0]
-    way = x[:, at[2]] * [1, 0, 1]
-    height = np.ptp(x[0, :, 1])
-    follow = follow or np.ptp(way, axis=0).max() > _FAR * height
+    way = _known(x[:, pelvis], "pelvis")
+    height = np.nanmax(np.nanmax(x[..., 1], axis=1) - np.nanmin(x[..., 1], axis=1))
+    follow = follow or np.ptp(way[:, [0, 2]], axis=0).max() > _FAR * height
     origin = way if follow else np.repeat(way[:1], len(x), axis=0)
-    origin[:, 1] = x[..., 1].min()
+    origin[:, 1] = np.nanmin(x[..., 1])
     return (x - origin[:, np.newaxis]) @ turn.T
+
+
+def _known(track, what):
+    """A track (n_frames, 3) with its gaps bridged."""
+    seen = np.flatnonzero(np.isfinite(track).all(axis=1))
+    if len(seen) == 0:
+        raise ValueError(
+            f"The {what} are never seen together, so there is no telling where people are and face."
+        )
+    frames = np.arange(len(track))
+    return np.column_stack([np.interp(frames, seen, column[seen]) for column in track.T])
 
 
 def on_screen(x, azimuth):

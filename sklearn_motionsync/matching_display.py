@@ -1,10 +1,9 @@
 """What a synchronizer did: features before and after, warps, the trellis (Figs. 1 to 3)."""
 
 import numpy as np
-from sklearn.utils.validation import check_is_fitted
 
 from .drawing import COLORS, choose_features, curves, group_colors, names_of, panels
-from .sampling import sample
+from .sampling import as_match
 from .steps import find_step, reach_synchronizer
 from .synchronizer import DenseSynchronizer
 
@@ -94,7 +93,6 @@ class SynchronizationDisplay:
         SynchronizationDisplay
         """
         synchronizer, arrays = reach_synchronizer(estimator, X)
-        check_is_fitted(synchronizer)
         before, _ = find_step(estimator, type(synchronizer), "synchronizer")
         names = names_of(before, synchronizer, arrays[0].shape[1])
         chosen = choose_features(features, names)
@@ -141,20 +139,16 @@ class SynchronizationDisplay:
         -------
         SynchronizationDisplay
         """
-        arrays, times = [np.asarray(x, dtype=np.float64) for x in X], np.asarray(times)
-        if times.ndim != 2 or len(times) != len(arrays) or times.shape[1] < 2:
-            raise ValueError(
-                f"times must have shape (n_sequences, P), one row for each of the {len(arrays)} "
-                f"performances; got {times.shape}."
-            )
+        arrays = [np.asarray(x, dtype=np.float64) for x in X]
+        match = as_match(times, len(arrays))
         if feature_names is None:
             feature_names = [f"x{i}" for i in range(arrays[0].shape[1])]
         chosen = choose_features(features, feature_names)
         shown = [x[:, chosen] for x in arrays]
         display = cls(
             shown,
-            sample(shown, times, times.shape[1]),
-            times,
+            match.warp(shown),
+            match.times,
             feature_names=[feature_names[i] for i in chosen],
             pattern=None if pattern is None else np.asarray(pattern)[:, chosen],
             groups=groups,
@@ -298,7 +292,6 @@ class TrellisDisplay:
         TrellisDisplay
         """
         _, synchronizer = find_step(estimator, DenseSynchronizer, "DenseSynchronizer")
-        check_is_fitted(synchronizer)
         _, arrays = reach_synchronizer(estimator, X)
         if not 0 <= performance < len(arrays):
             raise ValueError(

@@ -6,7 +6,7 @@ import numpy as np
 
 from .matching import even_slices
 
-__all__ = ["Match", "sample"]
+__all__ = ["Match", "as_match", "sample"]
 
 # Sequences sampled together: bounds the memory of what stands in between.
 _SAMPLED_AT_ONCE = 64
@@ -82,6 +82,24 @@ class Match(NamedTuple):
                     "warp are arrays (n_frames, n_features) of one width with at least 2 frames."
                 )
         return sample(arrays, self.times, n_frames)
+
+
+def as_match(times, n_sequences):
+    """Warps that somebody made, checked, as a match without distances."""
+    times = np.asarray(times, dtype=np.float64)
+    if times.ndim != 2 or len(times) != n_sequences or times.shape[1] < 2:
+        raise ValueError(
+            f"times must have shape (n_sequences, P), one row for each of the {n_sequences} "
+            f"performances; got {times.shape}."
+        )
+    last = times.shape[1] - 1
+    # Not a number fails the comparison, too.
+    if not ((times >= 0) & (times <= last)).all():
+        raise ValueError(
+            f"times must be from 0 to P - 1 = {last}, in frames of the pattern, got "
+            f"{times.min():g} to {times.max():g}."
+        )
+    return Match(times - np.arange(last + 1), times, np.full(n_sequences, np.nan))
 
 
 def sample(arrays, times, n_frames):

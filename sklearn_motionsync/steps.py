@@ -1,6 +1,7 @@
 """Where the synchronizer of a pipeline is, and what reaches it."""
 
 from sklearn.pipeline import Pipeline
+from sklearn.utils.validation import check_is_fitted
 
 from .clock import Synchronizer
 from .sequences import check_performances
@@ -34,5 +35,6 @@ def find_step(estimator, kind, name):
 def reach_synchronizer(estimator, X):
     """The synchronizer of an estimator, and the performances as they reach it."""
     before, step = find_step(estimator, Synchronizer, "synchronizer")
+    check_is_fitted(step)
     features = X if before is None else before.transform(X)
     return step, check_performances(step, features, reset=False, level="sequence").arrays

@@ -7,7 +7,7 @@ from .bodies import bones_by_side, on_screen, placed, upright
 from .clock import Synchronizer
 from .drawing import COLORS, panels, pyplot
 from .posture import DirectionCosines
-from .sampling import sample
+from .sampling import as_match
 from .sequences import to_sequences
 from .skeleton import Skeleton
 from .steps import find_step, reach_synchronizer
@@ -219,15 +219,11 @@ class SkeletonDisplay:
         -------
         SkeletonDisplay
         """
-        X, times = _as_performances(X), np.asarray(times, dtype=np.float64)
-        if times.ndim != 2 or len(times) != len(X):
-            raise ValueError(
-                f"times must have shape (n_sequences, P), one row for each of the {len(X)} "
-                f"performances; got {times.shape}."
-            )
+        X = _as_performances(X)
+        match = as_match(times, len(X))
         raw = [placed(upright(x, skeleton, i), skeleton) for i, x in enumerate(X)]
         flat = [x.reshape(len(x), -1) for x in raw]
-        warped = sample(flat, times, times.shape[1])
+        warped = match.warp(flat)
         warped = warped.reshape(*warped.shape[:2], -1, 3)
         lengths = [len(x) - 1 for x in raw]
         return cls(
@@ -258,12 +254,12 @@ class SkeletonDisplay:
         """
         drawn = [[on_screen(x, azimuth) for x in scene] for scene in self.scenes]
         if self.labels is not None:
-            gap = _SPACING * max(np.ptp(x[..., 1]) for x in drawn[0])
+            gap = _SPACING * max(np.nanmax(x[..., 1]) - np.nanmin(x[..., 1]) for x in drawn[0])
             drawn = [[x + [i * gap, 0] for i, x in enumerate(scene)] for scene in drawn]
         n_cols = 1 if self.labels is not None else min(len(drawn), _PANELS_A_ROW)
         n_rows = -(-len(drawn) // n_cols)
         everything = np.concatenate([x.reshape(-1, 2) for scene in drawn for x in scene])
-        low, high = everything.min(axis=0), everything.max(axis=0)
+        low, high = np.nanmin(everything, axis=0), np.nanmax(everything, axis=0)
         width, height = high - low
         # All panels have one scale, which makes figures of about 10 inches.
         scale = min(9.5 / (1.1 * n_cols * width), 3 / height)

@@ -7,6 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
@@ -143,6 +144,9 @@ def test_from_predictions_draws_what_from_estimator_does(bunch, pipe):
     assert "mean" in without.axes_[1].get_title()
     with pytest.raises(ValueError, match=r"each of the 7 performances; got \(2, 30\)"):
         SynchronizationDisplay.from_predictions(points, np.zeros((2, 30)))
+    for wrong in (-1.0, 30.0, np.nan):
+        with pytest.raises(ValueError, match="times must be from 0 to P - 1 = 29"):
+            SynchronizationDisplay.from_predictions(points, np.full((7, 30), wrong))
 
 
 def test_axes_given(bunch, pipe):
@@ -294,7 +298,22 @@ def test_a_model_by_itself(bunch, pipe):
         ActionModelDisplay.from_estimator(pipe, features=["knee"])
 
 
+def test_a_model_of_univariate_sequences():
+    rows = np.random.default_rng(0).normal(size=(6, 20))
+    model = ActionModel().fit(rows)
+    display = ActionModelDisplay.from_estimator(model, rows)
+    assert display.feature_names == ["x0"]
+    np.testing.assert_allclose(display.mean_[0].get_ydata(), rows.mean(axis=0))
+
+
 # -- all of them ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("display", [SynchronizationDisplay, TrellisDisplay, ActionModelDisplay])
+def test_not_fitted(bunch, display):
+    steps = DirectionCosines(bunch.skeleton), DenseSynchronizer(), ActionModel()
+    with pytest.raises(NotFittedError):
+        display.from_estimator(make_pipeline(*steps), bunch.data)
 
 
 def test_matplotlib_is_not_imported_before_drawing():

@@ -201,6 +201,25 @@ def test_the_picture_follows_people_who_walk_away(bunch):
     assert np.ptp(raw[:, feet], axis=0).max() < 0.05 < np.ptp(raw[:, 0, [0, 2]], axis=0).max()
 
 
+def test_joints_that_were_not_seen(bunch):
+    X = bunch.data[0].copy()
+    joints = list(bunch.skeleton.joints)
+    for joint, frames in (("left_wrist", slice(None)), ("pelvis", slice(0, 4)), ("neck", [20])):
+        j = joints.index(joint)
+        X[frames, 3 * j : 3 * j + 3] = np.nan
+    display = SkeletonDisplay.from_positions(X, bunch.skeleton, frames=[10, 20])
+    whole = SkeletonDisplay.from_positions(bunch.data[0], bunch.skeleton, frames=[10, 20])
+    for panel, hidden in ((0, 1), (1, 5)):
+        drawn, expected = bones_drawn(display, panel), bones_drawn(whole, panel)
+        seen = np.isfinite(drawn).all(axis=(1, 2))
+        # A bone lacks if one of its ends does; the others are where they are without gaps.
+        assert (~seen).sum() == hidden
+        np.testing.assert_allclose(drawn[seen], expected[seen], atol=0.02)
+    X[:, :3] = np.nan
+    with pytest.raises(ValueError, match="pelvis are never seen"):
+        SkeletonDisplay.from_positions(X, bunch.skeleton)
+
+
 def test_an_animation_plays_from_the_first_to_the_last_frame(bunch, pipe):
     display = SkeletonDisplay.from_estimator(pipe, bunch.data, performances=[0, 1])
     animation = display.animate(seconds=1, fps=4)
@@ -237,3 +256,21 @@ def test_pipelines_that_cannot_be_drawn(bunch, pipe):
         SkeletonDisplay.from_estimator(short, bunch.data)
     with pytest.raises(ValueError, match="no ActionModel in Pipeline"):
         SkeletonDisplay.from_model(pipe[:3])
+
+
+def test_real_people_fall_into_step(bends):
+    """Six of the real bends: their pelvises come down together."""
+    pipe = make_pipeline(DirectionCosines(bends.skeleton), ASpace(0.95), DenseSynchronizer(100))
+    display = SkeletonDisplay.from_estimator(pipe.fit(bends.data), bends.data)
+    pelvis = bends.skeleton.joints.index("root")
+    lowest = [
+        np.array(
+            [
+                x[:, pelvis, 1].argmin() / (len(x) - 1) * d
+                for x, d in zip(scene, taking, strict=True)
+            ]
+        )
+        for scene, taking in zip(display.scenes, display.durations, strict=True)
+    ]
+    raw, synchronised = (np.ptp(moments) for moments in lowest)
+    assert synchronised < 0.3 * raw
