@@ -1,8 +1,10 @@
 """Check a built site: every link, fragment and picture, and that nothing is fetched to show it.
 
-    python docs/check_site.py docs/_build/html
+    python docs/check_site.py docs/_build/html [--base URL]
 
-``--external`` lists the links to other sites; they are not followed.
+Links that begin with the address of the site itself, ``--base``, such as those in the diagrams of
+estimators, are looked up like the others. ``--external`` lists links to other sites; they are
+not followed.
 """
 
 import argparse
@@ -63,8 +65,8 @@ class Page(HTMLParser):
 class Site:
     """The pages of a folder, and what is wrong with them."""
 
-    def __init__(self, root):
-        self.root = root.resolve()
+    def __init__(self, root, base=None):
+        self.root, self.base = root.resolve(), base and base.rstrip("/")
         # Themes keep templates of their own in _static: they are no pages.
         pages = [p for p in self.root.rglob("*.html") if "_static" not in p.parts]
         self.pages = {path.resolve(): Page(path) for path in sorted(pages)}
@@ -82,6 +84,8 @@ class Site:
 
     def _check(self, path, target, *, fetched):
         where = path.relative_to(self.root)
+        if self.base and target.startswith(self.base + "/"):
+            target = target.removeprefix(self.base)
         parts = urlsplit(target)
         if parts.scheme in ("data", "javascript", "mailto"):
             return
@@ -113,9 +117,10 @@ class Site:
 def main(arguments=None):
     parser = argparse.ArgumentParser(description="Check the links and pictures of a built site.")
     parser.add_argument("folder", type=Path)
+    parser.add_argument("--base", help="address of the site itself")
     parser.add_argument("--external", action="store_true", help="list links to other sites")
     options = parser.parse_args(arguments)
-    site = Site(options.folder)
+    site = Site(options.folder, options.base)
     if not site.pages:
         print(f"There are no HTML pages in {options.folder}.")
         return 1

@@ -351,7 +351,9 @@ class TrellisDisplay:
         self.ax_.set_ylabel(f"offset d of {self.names[1]}, frames")
         outside = Patch(facecolor="0.85", edgecolor="0.6", label="no path can pass")
         handles = [self.path_, self.warp_, outside]
-        self.ax_.legend(handles=handles, loc="best", fontsize="small")
+        # On top of an image, whatever the style says of legends and grids.
+        self.ax_.legend(handles=handles, loc="best", fontsize="small", frameon=True)
+        self.ax_.grid(False)
         self.colorbar_ = None
         if colorbar:
             self.colorbar_ = self.figure_.colorbar(self.image_, ax=self.ax_)
@@ -361,7 +363,7 @@ class TrellisDisplay:
 
 def _legend_of_groups(axis, color_of):
     handles = [axis.plot([], [], color=color, label=name)[0] for name, color in color_of.items()]
-    axis.legend(handles=handles, loc="best", fontsize="small")
+    axis.legend(handles=handles, loc="best", fontsize="small", frameon=True)
 
 
 def _small_titles(axes):

@@ -158,7 +158,7 @@ class ActionModelDisplay:
             axis.set_ylabel(name)
             if i + n_cols >= count:
                 axis.set_xlabel("frame of the pattern")
-        self.axes_[0].legend(loc="best", fontsize="small")
+        self.axes_[0].legend(loc="best", fontsize="small", frameon=True)
         return self
 
 

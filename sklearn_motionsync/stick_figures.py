@@ -341,6 +341,7 @@ class SkeletonDisplay:
         axis.set_aspect("equal")
         axis.set_title(title, fontsize="medium")
         axis.set_yticks([])
+        axis.grid(False)
         axis.set_xticks([])
         axis.spines[:].set_visible(False)
         axis.axhline(0, color="0.6", linewidth=1, zorder=0)
