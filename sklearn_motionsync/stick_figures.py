@@ -252,10 +252,14 @@ class SkeletonDisplay:
         -------
         self
         """
+        if not 0 <= at <= 1:
+            raise ValueError(f"at must be a share of the time from 0 to 1, got {at!r}.")
         drawn = [[on_screen(x, azimuth) for x in scene] for scene in self.scenes]
+        places = None
         if self.labels is not None:
             gap = _SPACING * max(np.nanmax(x[..., 1]) - np.nanmin(x[..., 1]) for x in drawn[0])
-            drawn = [[x + [i * gap, 0] for i, x in enumerate(scene)] for scene in drawn]
+            places = gap * np.arange(len(self.labels))
+            drawn = [[x + [gap * i, 0] for i, x in enumerate(scene)] for scene in drawn]
         n_cols = 1 if self.labels is not None else min(len(drawn), _PANELS_A_ROW)
         n_rows = -(-len(drawn) // n_cols)
         everything = np.concatenate([x.reshape(-1, 2) for scene in drawn for x in scene])
@@ -272,7 +276,9 @@ class SkeletonDisplay:
                 axis.clear()
         self._drawn, self.bones_, self.heads_ = drawn, [], []
         for axis, title, scene in zip(self.axes_, self.titles, drawn, strict=True):
-            self._prepare(axis, title, scene, low, high)
+            self._prepare(axis, title, len(scene), low, high)
+            if places is not None:
+                axis.set_xticks(places, self.labels)
         self._show(at)
         return self
 
@@ -296,6 +302,9 @@ class SkeletonDisplay:
             a file.
         """
         from matplotlib.animation import FuncAnimation
+
+        if not (seconds > 0 and fps > 0):
+            raise ValueError(f"seconds and fps must be above 0, got {seconds!r} and {fps!r}.")
 
         class Playable(FuncAnimation):
             """Plays in a notebook without further ado."""
@@ -322,10 +331,10 @@ class SkeletonDisplay:
             blit=False,
         )
 
-    def _prepare(self, axis, title, scene, low, high):
+    def _prepare(self, axis, title, n_bodies, low, high):
         from matplotlib.collections import LineCollection
 
-        alpha = 1.0 if self.labels is not None or len(scene) == 1 else 0.45
+        alpha = 1.0 if self.labels is not None or n_bodies == 1 else 0.45
         width = 2.2 if alpha == 1 else 1.1
         sides = {}
         for side in ("middle", "left", "right"):
@@ -345,10 +354,7 @@ class SkeletonDisplay:
         axis.set_xticks([])
         axis.spines[:].set_visible(False)
         axis.axhline(0, color="0.6", linewidth=1, zorder=0)
-        if self.labels is not None:
-            feet = [x[0, self._landmark("pelvis"), 0] for x in scene]
-            axis.set_xticks(feet, self.labels)
-            axis.tick_params(length=0)
+        axis.tick_params(length=0)
 
     def _landmark(self, name):
         return self.skeleton.joints.index(self.skeleton.landmarks[name])

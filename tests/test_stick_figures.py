@@ -247,6 +247,15 @@ def test_an_animation_on_given_axes(bunch, pipe):
     assert animation.to_jshtml().count("data:image/png;base64") == 2
 
 
+def test_times_that_do_not_exist(bunch, pipe):
+    display = SkeletonDisplay.from_estimator(pipe, bunch.data)
+    for at in (-0.1, 1.1, np.nan):
+        with pytest.raises(ValueError, match="at must be a share of the time from 0 to 1"):
+            display.plot(at=at)
+    with pytest.raises(ValueError, match="seconds and fps must be above 0, got 0 and 15"):
+        display.animate(seconds=0)
+
+
 def test_pipelines_that_cannot_be_drawn(bunch, pipe):
     points = pipe[:2].transform(bunch.data)
     with pytest.raises(ValueError, match="begins with DirectionCosines"):
