@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from sklearn_motionsync import DirectionCosines, Skeleton
 from sklearn_motionsync.datasets import read_motion
 
 import fuzz_readers
@@ -47,3 +48,24 @@ def test_damaged_files(tmp_path):
         for number in range(400)
     ]
     assert set(outcomes) == {"read", "ValueError"}
+
+
+@pytest.mark.parametrize(
+    "name", ["bvh/007_01.bvh", "asf_amc/02_01.amc", "asf_amc/HDM_bd_depositFloorR_001_120.amc"]
+)
+def test_from_a_file_to_postures(real_data, name):
+    """What is read goes into the pipeline as it is."""
+    df = read_motion(real_data / "original_files" / name)
+    df = df.iloc[1:] if name.startswith("bvh") else df  # its first frame was put there later
+    cosines = DirectionCosines(Skeleton.from_frame(df))
+    (postures,) = cosines.fit_transform([df])
+    limbs = postures[:, 1:].reshape(len(df), 12, 3)
+    np.testing.assert_allclose(np.linalg.norm(limbs, axis=2), 1)
+    if "deposit" not in name:
+        # A walk: the pelvis at about the height of the stretched legs, legs and torso upright.
+        assert 0.9 < postures[:, 0].min() <= postures[:, 0].max() < 1.3
+        names = list(cosines.get_feature_names_out())
+        assert (postures[:, names.index("torso_y")] > 0.9).all()
+        assert (postures[:, names.index("left_thigh_y")] < -0.7).all()
+    else:
+        assert postures[:, 0].min() < 0.8 * postures[0, 0]
