@@ -232,11 +232,13 @@ class TrellisDisplay:
 
     Parameters
     ----------
-    costs : ndarray, shape (P, n_offsets)
+    frames : ndarray, shape (n_frames,)
+        p, all frames of the pattern or, of long takes, evenly spaced ones.
+    offsets : ndarray, shape (n_offsets,)
+        d, in frames of the pattern; evenly spaced ones of long takes.
+    costs : ndarray, shape (n_frames, n_offsets)
         E(p, d): how much the posture (or velocity) of the pattern at p differs from that of the
         performance at p + d; NaN where no path that obeys Eqs. 9 and 13 can pass.
-    offsets : ndarray, shape (n_offsets,)
-        d, in frames of the pattern.
     path : ndarray, shape (P,)
         The offsets of the best path, straight from the pattern to the performance.
     warp : ndarray, shape (P,)
@@ -263,9 +265,10 @@ class TrellisDisplay:
     (50, 25)
     """
 
-    def __init__(self, costs, offsets, path, warp, *, names=("pattern", "performance")):
-        self.costs = costs
+    def __init__(self, frames, offsets, costs, path, warp, *, names=("pattern", "performance")):
+        self.frames = frames
         self.offsets = offsets
+        self.costs = costs
         self.path = path
         self.warp = warp
         self.names = names
@@ -297,11 +300,11 @@ class TrellisDisplay:
             raise ValueError(
                 f"performance={performance} is out of range: there are {len(arrays)} performances."
             )
-        costs, offsets, path = synchronizer._disparity_space(arrays[performance])
+        space = synchronizer._disparity_space(arrays[performance])
         warp = synchronizer._match([arrays[performance]]).offsets[0]
         index = synchronizer._find_pattern(arrays)
         names = ("pattern" if index is None else f"pattern {index}", f"performance {performance}")
-        return cls(costs, offsets, path, warp, names=names).plot(ax, colorbar=colorbar)
+        return cls(*space, warp, names=names).plot(ax, colorbar=colorbar)
 
     def plot(self, ax=None, *, colorbar=True):
         """Draw.
@@ -320,14 +323,13 @@ class TrellisDisplay:
         from matplotlib.patheffects import Normal, Stroke
 
         self.figure_, (self.ax_,) = panels(ax, [(0, 0)], 1, 1, (7, 4))
-        frames = np.arange(len(self.costs))
+        frames = np.arange(len(self.path))
         # Dark where the two are alike; the square root shows differences among the small ones.
-        half = (self.offsets[1] - self.offsets[0]) / 2 if len(self.offsets) > 1 else 0.5
         self.image_ = self.ax_.imshow(
             np.ma.masked_invalid(self.costs.T),
             origin="lower",
             aspect="auto",
-            extent=(-0.5, len(frames) - 0.5, self.offsets[0] - half, self.offsets[-1] + half),
+            extent=(*_edges(self.frames), *_edges(self.offsets)),
             interpolation="nearest",
             cmap="cividis",
             norm=PowerNorm(0.5, vmin=0),
@@ -359,6 +361,12 @@ class TrellisDisplay:
             self.colorbar_ = self.figure_.colorbar(self.image_, ax=self.ax_)
             self.colorbar_.set_label("disparity E(p, d); dark: alike")
         return self
+
+
+def _edges(centres):
+    """Where cells around evenly spaced centres begin and end."""
+    half = (centres[1] - centres[0]) / 2 if len(centres) > 1 else 0.5
+    return centres[0] - half, centres[-1] + half
 
 
 def _legend_of_groups(axis, color_of):

@@ -1,5 +1,6 @@
 """From performances on the common clock to their warps: match, vote, smooth, refine."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,9 @@ from .matching import Trellis
 from .refinement import misfit, refine_warps
 
 __all__ = ["Warper"]
+
+# A picture of a disparity space has no use for more cells.
+_DRAWN_CELLS = 4_000_000
 
 
 class Warper(NamedTuple):
@@ -71,17 +75,22 @@ class Warper(NamedTuple):
     def disparity_space(self, positions):
         """E(p, d) of the pattern and one performance at the pattern's rate (Eq. 12), and the path.
 
-        Returns costs (P, n_offsets), NaN where no path may pass, the offsets and the path, in
-        frames.
+        Returns the frames p and the offsets d of the costs, all of them or evenly spaced ones of
+        many; the costs (n_frames, n_offsets), NaN where no path may pass; and the path (P,).
         """
         (base, *_), (moving,) = self.bases, self.features(positions)
-        n_frames, width, sub = len(base), self.trellis.width, self.subframes
-        costs = np.full((n_frames, 2 * width + 1), np.nan)
-        for p, (low, high) in enumerate(zip(*self.trellis.windows(n_frames), strict=True)):
-            window = moving[p * sub + low : p * sub + high + 1]
-            costs[p, width + low : width + high + 1] = np.square(base[p] - window).sum(axis=1)
+        width, sub = self.trellis.width, self.subframes
+        lows, highs = map(np.array, self.trellis.windows(len(base)))
+        every = math.ceil(math.sqrt(len(base) * (2 * width + 1) / _DRAWN_CELLS))
+        frames = np.arange(0, len(base), every)
+        disparities = every * np.arange(-(width // every), width // every + 1)
+        costs = np.full((len(frames), len(disparities)), np.nan)
+        for row, p in zip(costs, frames, strict=True):
+            inside = (lows[p] <= disparities) & (disparities <= highs[p])
+            window = moving[p * sub + disparities[inside]]
+            row[inside] = np.square(base[p] - window).sum(axis=1)
         path = self._paths(self.bases[:1], moving[np.newaxis])[1][0, 0]
-        return costs, np.arange(-width, width + 1) / sub, path - np.arange(n_frames)
+        return frames, disparities / sub, costs, path - np.arange(len(base))
 
     def distances(self, features, bases, moving, tiles):
         """Synchronisation distances ``D_{n,m}`` of the tiles of the pairs of two index arrays."""

@@ -236,6 +236,19 @@ def test_the_cells_of_the_image_lie_around_their_offsets(bunch, pipe):
     np.testing.assert_array_equal(display.warp_.get_ydata(), pipe[2].match(points).offsets[1])
 
 
+def test_the_disparity_space_of_long_takes_is_thinned(bunch, pipe, monkeypatch):
+    points = pipe[:2].transform(bunch.data)
+    whole = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
+    monkeypatch.setattr("sklearn_motionsync.warping._DRAWN_CELLS", whole.costs.size // 7)
+    thin = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
+    np.testing.assert_array_equal(thin.frames, np.arange(0, 30, 3))
+    np.testing.assert_array_equal(thin.offsets, [-6, -3, 0, 3, 6])
+    columns = np.searchsorted(whole.offsets, thin.offsets)
+    np.testing.assert_array_equal(thin.costs, whole.costs[::3, columns])
+    np.testing.assert_array_equal(thin.path_.get_xydata(), whole.path_.get_xydata())
+    assert thin.image_.get_extent() == [-1.5, 28.5, -7.5, 7.5]
+
+
 def test_a_trellis_on_given_axes(bunch, pipe):
     _, ax = plt.subplots()
     display = TrellisDisplay.from_estimator(pipe, bunch.data, ax=ax, colorbar=False)
