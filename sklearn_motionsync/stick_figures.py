@@ -347,7 +347,7 @@ class SkeletonDisplay:
         margin = 0.05 * (high - low)
         axis.set_xlim(low[0] - margin[0], high[0] + margin[0])
         axis.set_ylim(low[1] - margin[1], high[1] + margin[1])
-        axis.set_aspect("equal")
+        axis.set_aspect("equal", anchor="S")
         axis.set_title(title, fontsize="medium")
         axis.set_yticks([])
         axis.grid(False)
