@@ -69,6 +69,14 @@ def test_c3d_longer_than_its_header_can_say(tmp_path):
     assert len(read_motion(path)) == n
 
 
+def test_scales_of_floats_do_not_matter(tmp_path):
+    """Writers leave any negative number there, not always the same twice."""
+    positions = tracks()
+    other = {"SCALE": (4, [], struct.pack("<f", -0.1))}
+    df = read_motion(put(tmp_path, c3d(positions, changes=other), "a.c3d"))
+    np.testing.assert_allclose(df, positions.reshape(len(df), -1), rtol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [

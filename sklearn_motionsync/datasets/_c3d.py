@@ -67,6 +67,9 @@ def _find_scale(file, parameters):
     """What an integer is multiplied with; negative where numbers are floats."""
     header = file.float(12)
     scale = parameters.number("POINT", "SCALE", header)
+    if scale < 0 and header < 0:
+        # Floats are not scaled, so writers did not care what stands there.
+        return scale
     if not math.isfinite(scale) or not scale or not math.isclose(scale, header, rel_tol=1e-3):
         raise file.error(
             f"the header says scale {header:g}, POINT:SCALE says {scale:g}; both must be the same "
