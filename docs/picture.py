@@ -1,7 +1,7 @@
 """The picture of the README and the start page: ``python docs/picture.py``.
 
-Above, five people at one instant; below, one feature of all performances over time. From left to
-right: as recorded, on one clock, and what was learnt.
+Above, five performances at one instant; below, one feature of all performances over time. From
+left to right: as recorded, on one clock, and what was learnt.
 """
 
 from pathlib import Path

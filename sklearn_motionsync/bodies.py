@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .posture import heading
+from .posture import heading, y_up
 
 __all__ = ["bones_by_side", "on_screen", "placed", "upright"]
 
@@ -18,8 +18,7 @@ def upright(x, skeleton, i):
             f"Performance {i} has shape {x.shape}, but the positions of the skeleton's "
             f"{len(skeleton.joints)} joints are (n_frames, {3 * len(skeleton.joints)})."
         )
-    x = x.reshape(len(x), -1, 3)
-    return np.stack([x[..., 0], x[..., 2], -x[..., 1]], axis=-1) if skeleton.up == "z" else x
+    return y_up(x.reshape(len(x), -1, 3), skeleton)
 
 
 def placed(x, skeleton, *, follow=False):
@@ -27,17 +26,14 @@ def placed(x, skeleton, *, follow=False):
 
     With ``follow``, or if it leads far away, the pelvis stays above the origin all the time.
     """
-    left, right, pelvis = (
-        skeleton.joints.index(skeleton.landmarks[name])
-        for name in ("left_hip", "right_hip", "pelvis")
-    )
+    left, right, pelvis = map(skeleton.index_of, ("left_hip", "right_hip", "pelvis"))
     hip = _known(x[:, left] - x[:, right], "hips")[:1]
     turn = heading(hip / max(np.linalg.norm(hip), np.finfo(float).tiny))[0]
     way = _known(x[:, pelvis], "pelvis")
-    height = np.nanmax(np.nanmax(x[..., 1], axis=1) - np.nanmin(x[..., 1], axis=1))
-    follow = follow or np.ptp(way[:, [0, 2]], axis=0).max() > _FAR * height
+    floor, top = np.nanmin(x[..., 1]), np.nanmax(x[..., 1])
+    follow = follow or np.ptp(way[:, [0, 2]], axis=0).max() > _FAR * (top - floor)
     origin = way if follow else np.repeat(way[:1], len(x), axis=0)
-    origin[:, 1] = np.nanmin(x[..., 1])
+    origin[:, 1] = floor
     return (x - origin[:, np.newaxis]) @ turn.T
 
 
@@ -46,7 +42,7 @@ def _known(track, what):
     seen = np.flatnonzero(np.isfinite(track).all(axis=1))
     if len(seen) == 0:
         raise ValueError(
-            f"The {what} are never seen together, so there is no telling where people are and face."
+            f"No frame shows the {what}, so there is no telling where people stand and face."
         )
     frames = np.arange(len(track))
     return np.column_stack([np.interp(frames, seen, column[seen]) for column in track.T])
@@ -64,7 +60,7 @@ def bones_by_side(skeleton):
     side_of = {}
     for side in ("left", "right"):
         for landmark in ("hip", "shoulder"):
-            side_of[skeleton.joints.index(skeleton.landmarks[f"{side}_{landmark}"])] = side
+            side_of[skeleton.index_of(f"{side}_{landmark}")] = side
     bones = {"left": [], "middle": [], "right": []}
     for parent, joint in skeleton.bones:
         above, seen = joint, set()

@@ -111,7 +111,8 @@ class Synchronizer(DocumentedMixin, TransformerMixin, BaseEstimator):
         return self
 
     def _warp(self, performances, **extra):
-        out = self._match(performances.arrays, **extra).warp(performances.arrays)
+        times = self._match(performances.arrays, **extra).times
+        out = sample(performances.arrays, times, self.n_frames_)
         if performances.kind == "rows":
             return out[:, :, 0]
         return restore(self, performances, out, frames=range(self.n_frames_))

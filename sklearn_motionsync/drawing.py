@@ -2,7 +2,16 @@
 
 import numpy as np
 
-__all__ = ["COLORS", "choose_features", "curves", "group_colors", "names_of", "panels", "pyplot"]
+__all__ = [
+    "COLORS",
+    "as_features",
+    "choose_features",
+    "curves",
+    "group_colors",
+    "names_of",
+    "panels",
+    "pyplot",
+]
 
 # Okabe and Ito's colours, told apart by colour-blind people. One role each, in every figure.
 COLORS = {
@@ -103,9 +112,8 @@ def choose_features(features, names):
     names = list(names)
     if features is None:
         return list(range(min(_FEW_FEATURES, len(names))))
-    features = [features] if np.ndim(features) == 0 else list(features)
     chosen = []
-    for feature in features:
+    for feature in as_features(features):
         index = names.index(feature) if feature in names else feature
         if not isinstance(index, (int, np.integer)) or not 0 <= index < len(names):
             raise ValueError(
@@ -117,11 +125,21 @@ def choose_features(features, names):
     return chosen
 
 
+def as_features(features):
+    """Features by index or name as a list, of one or several; empty for None."""
+    if features is None:
+        return []
+    return [features] if np.ndim(features) == 0 else list(features)
+
+
 def names_of(before, step, width):
     """Names of the ``width`` features that reach a step of a pipeline, after those before it."""
     names = getattr(step, "feature_names_in_", None)
-    if names is None and hasattr(before, "get_feature_names_out"):
-        names = before.get_feature_names_out()
+    if names is None and before is not None:
+        try:
+            names = before.get_feature_names_out()
+        except AttributeError:  # of a pipeline in which some step does not name its features
+            names = None
     if names is None or len(names) != width:
         names = [f"x{i}" for i in range(width)]
     return [str(name) for name in names]

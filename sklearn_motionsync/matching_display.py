@@ -4,7 +4,8 @@ import numpy as np
 
 from .drawing import COLORS, choose_features, curves, group_colors, names_of, panels
 from .sampling import as_match
-from .steps import find_step, reach_synchronizer
+from .sequences import read_collection
+from .steps import reach_synchronizer
 from .synchronizer import DenseSynchronizer
 
 __all__ = ["SynchronizationDisplay", "TrellisDisplay"]
@@ -92,8 +93,7 @@ class SynchronizationDisplay:
         -------
         SynchronizationDisplay
         """
-        synchronizer, arrays = reach_synchronizer(estimator, X)
-        before, _ = find_step(estimator, type(synchronizer), "synchronizer")
+        before, synchronizer, arrays = reach_synchronizer(estimator, X)
         names = names_of(before, synchronizer, arrays[0].shape[1])
         chosen = choose_features(features, names)
         match, shown = synchronizer._match(arrays), [x[:, chosen] for x in arrays]
@@ -125,24 +125,24 @@ class SynchronizationDisplay:
 
         Parameters
         ----------
-        X : list of arrays (n_frames_i, n_features), or 3-D array
+        X : list of arrays (n_frames_i, n_features), 3-D array, or (performance, frame) frame
         times : array-like, shape (n_sequences, P)
             tau(p) from 0 to P - 1, such as ``synchronizer.match(X).times``.
         pattern : array-like, shape (P, n_features), default=None
             Drawn in front; by default the mean of the synchronised performances.
         features : int, str or list of them, default=None
         feature_names : sequence of str, default=None
-            By default x0, x1, ...
+            By default the names of the columns, or x0, x1, ...
         groups, warps, ax : as for `from_estimator`
 
         Returns
         -------
         SynchronizationDisplay
         """
-        arrays = [np.asarray(x, dtype=np.float64) for x in X]
+        _, arrays, names = read_collection(X)
         match = as_match(times, len(arrays))
         if feature_names is None:
-            feature_names = [f"x{i}" for i in range(arrays[0].shape[1])]
+            feature_names = names or [f"x{i}" for i in range(arrays[0].shape[1])]
         chosen = choose_features(features, feature_names)
         shown = [x[:, chosen] for x in arrays]
         display = cls(
@@ -294,8 +294,9 @@ class TrellisDisplay:
         -------
         TrellisDisplay
         """
-        _, synchronizer = find_step(estimator, DenseSynchronizer, "DenseSynchronizer")
-        _, arrays = reach_synchronizer(estimator, X)
+        _, synchronizer, arrays = reach_synchronizer(
+            estimator, X, DenseSynchronizer, "DenseSynchronizer"
+        )
         if not 0 <= performance < len(arrays):
             raise ValueError(
                 f"performance={performance} is out of range: there are {len(arrays)} performances."

@@ -5,7 +5,8 @@ from sklearn.utils.validation import check_is_fitted
 
 from .action_model import ActionModel
 from .aspace import ASpace
-from .drawing import COLORS, choose_features, curves, names_of, panels
+from .clock import Synchronizer
+from .drawing import COLORS, as_features, choose_features, curves, names_of, panels
 from .steps import find_step
 
 __all__ = ["ActionModelDisplay"]
@@ -164,8 +165,15 @@ class ActionModelDisplay:
 
 def _posture_space(before, names, features):
     """The ASpace before the model and the names of its postures, if the features ask for them."""
-    asked = [features] if isinstance(features, str) else features or []
+    asked = as_features(features)
     if before is None or all(not isinstance(f, str) or f in names for f in asked):
         return None
     before_aspace, aspace = find_step(before, ASpace, "ASpace")
+    steps = [step for _, step in before.steps]
+    between = [s for s in steps[steps.index(aspace) + 1 :] if not isinstance(s, Synchronizer)]
+    if between:
+        raise ValueError(
+            f"Between ASpace and ActionModel stands {between[0]}: the model cannot be taken back "
+            f"to postures. Draw features of the model: {', '.join(names)}."
+        )
     return aspace, names_of(before_aspace, aspace, aspace.n_features_in_)

@@ -209,12 +209,8 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
 
     def _landmarks(self, positions):
         """(n_frames, 15, 3) positions of the landmarks, y up."""
-        joints = self.skeleton.joints
-        columns = [joints.index(self.skeleton.landmarks[name]) for name in LANDMARKS]
-        points = positions.reshape(len(positions), -1, 3)[:, columns]
-        if self.skeleton.up == "z":
-            points = np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1)
-        return points
+        columns = [self.skeleton.index_of(name) for name in LANDMARKS]
+        return y_up(positions.reshape(len(positions), -1, 3)[:, columns], self.skeleton)
 
     def _postures(self, i, positions):
         points = self._landmarks(positions)
@@ -258,6 +254,13 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
                 start, end, _, _ = LIMBS[f"{side}_{part}"]
                 at[end] = at[start] + limb[f"{side}_{part}"]
         return np.concatenate([at[name] for name in LANDMARKS], axis=1)
+
+
+def y_up(points, skeleton):
+    """Points (..., 3) of a skeleton in axes of which the second is vertical."""
+    if skeleton.up == "y":
+        return points
+    return np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1)
 
 
 def _limbs(points):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .matching import even_slices
+from .sequences import read_collection
 
 __all__ = ["Match", "as_match", "sample"]
 
@@ -53,8 +54,8 @@ class Match(NamedTuple):
 
         Parameters
         ----------
-        X : list of arrays (n_frames_i, n_features), or 3-D array
-            One sequence a performance, in the same order.
+        X : list of arrays (n_frames_i, n_features), 3-D array, or (performance, frame) frame
+            One sequence a performance, in the same order. NaN stay where they are.
 
         Returns
         -------
@@ -63,24 +64,16 @@ class Match(NamedTuple):
         Raises
         ------
         ValueError
-            If there is not one sequence a performance, or they are not 2-D arrays of one width
-            with at least 2 frames.
+            If there is not one sequence a performance, or they break the contract for
+            performances.
         """
-        arrays = [np.asarray(x) for x in X]
-        dtype = np.float32 if all(x.dtype == np.float32 for x in arrays) else np.float64
-        arrays = [x.astype(dtype, copy=False) for x in arrays]
+        _, arrays, _ = read_collection(X)
         n_sequences, n_frames = self.times.shape
         if len(arrays) != n_sequences:
             raise ValueError(
                 f"There are {n_sequences} matched performances, but {len(arrays)} sequences to "
                 "warp: give one for each, in the same order."
             )
-        for i, x in enumerate(arrays):
-            if x.ndim != 2 or len(x) < 2 or x.shape[1:] != arrays[0].shape[1:]:
-                raise ValueError(
-                    f"Sequence {i} has shape {x.shape}, sequence 0 {arrays[0].shape}: sequences to "
-                    "warp are arrays (n_frames, n_features) of one width with at least 2 frames."
-                )
         return sample(arrays, self.times, n_frames)
 
 

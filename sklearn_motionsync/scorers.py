@@ -70,7 +70,7 @@ class SpreadScorer(_SpreadMeasure):
         -------
         float
         """
-        synchronizer, arrays = reach_synchronizer(estimator, X)
+        _, synchronizer, arrays = reach_synchronizer(estimator, X)
         before = synchronizer._normalise(arrays, np.arange(synchronizer.n_frames_))
         after = synchronizer._match(arrays).warp(arrays)
         return self._score(before, after)
@@ -124,7 +124,7 @@ class FeatureHoldoutScorer(_SpreadMeasure):
         -------
         float
         """
-        synchronizer, arrays = reach_synchronizer(estimator, X)
+        _, synchronizer, arrays = reach_synchronizer(estimator, X)
         n_features = arrays[0].shape[1]
         if not 2 <= self.n_folds <= n_features:
             raise ValueError(

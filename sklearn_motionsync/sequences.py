@@ -114,10 +114,7 @@ def to_frame(sequences, *, performances=None, columns=None):
     >>> df.loc[1, "knee"].tolist()
     [1.0, 1.0, 1.0]
     """
-    sequences = _as_collection(sequences)
-    if sequences is None:
-        raise ValueError(f"{_ACCEPTED}; got a single 2-D input. Wrap one performance as [X].")
-    arrays, names = _check_members(sequences, finite=False)
+    sequences, arrays, names = read_collection(sequences)
     labels = range(len(arrays)) if performances is None else list(performances)
     if len(labels) != len(arrays) or len(set(labels)) != len(labels):
         raise ValueError(
@@ -126,6 +123,17 @@ def to_frame(sequences, *, performances=None, columns=None):
         )
     columns = names if columns is None else columns
     return _stack(arrays, labels, _frame_labels(sequences), columns)
+
+
+def read_collection(X):
+    """Members, arrays and column names of a collection of any kind, which may have gaps.
+
+    For what comes along with performances; their estimators use ``check_performances``.
+    """
+    sequences = as_collection(X)
+    if sequences is None:
+        raise ValueError(f"{_ACCEPTED}; got a single 2-D input. Wrap one performance as [X].")
+    return sequences, *_check_members(sequences, finite=False)
 
 
 class Performances(NamedTuple):
@@ -158,7 +166,7 @@ def check_performances(estimator, X, *, reset, level):
     Performances
         ``kind`` is "rows" (2-D), "array" (3-D), "list" or "frame" (MultiIndex).
     """
-    sequences = _as_collection(X)
+    sequences = as_collection(X)
     if sequences is None:
         return _check_rows(estimator, X, reset=reset, level=level)
     name = type(estimator).__name__
@@ -220,7 +228,7 @@ def restore(estimator, performances, arrays, *, frames=None, columns=None):
 # -- how the kinds are told apart ---------------------------------------------------
 
 
-def _as_collection(X):
+def as_collection(X):
     """The performances of a collection as a list; None for what scikit-learn calls 2-D."""
     if isinstance(X, pd.DataFrame):
         return to_sequences(X) if X.index.nlevels == 2 else None

@@ -164,6 +164,10 @@ class Skeleton:
         joints = list(parents)
         return cls(joints, [joints.index(p) if p else -1 for p in parents.values()], landmarks)
 
+    def index_of(self, landmark):
+        """Index of the joint that stands for a landmark."""
+        return self.joints.index(self.landmarks[landmark])
+
     @property
     def bones(self):
         """Pairs (parent, joint) of joint indices."""

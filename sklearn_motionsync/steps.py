@@ -32,9 +32,9 @@ def find_step(estimator, kind, name):
     raise ValueError(f"There is no {name} in {type(estimator).__name__}; its steps are {names}.")
 
 
-def reach_synchronizer(estimator, X):
-    """The synchronizer of an estimator, and the performances as they reach it."""
-    before, step = find_step(estimator, Synchronizer, "synchronizer")
+def reach_synchronizer(estimator, X, kind=Synchronizer, name="synchronizer"):
+    """The steps before the synchronizer of an estimator, it, and the performances that reach it."""
+    before, step = find_step(estimator, kind, name)
     check_is_fitted(step)
     features = X if before is None else before.transform(X)
-    return step, check_performances(step, features, reset=False, level="sequence").arrays
+    return before, step, check_performances(step, features, reset=False, level="sequence").arrays

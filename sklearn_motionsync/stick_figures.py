@@ -8,7 +8,7 @@ from .clock import Synchronizer
 from .drawing import COLORS, panels, pyplot
 from .posture import DirectionCosines
 from .sampling import as_match
-from .sequences import to_sequences
+from .sequences import as_collection
 from .skeleton import Skeleton
 from .steps import find_step, reach_synchronizer
 
@@ -183,7 +183,7 @@ class SkeletonDisplay:
         SkeletonDisplay
             At the beginning; see `animate`.
         """
-        synchronizer, arrays = reach_synchronizer(estimator, X)
+        _, synchronizer, arrays = reach_synchronizer(estimator, X)
         _, cosines = _before_synchronizer(estimator)
         match = synchronizer._match(arrays)
         pattern = synchronizer._find_pattern(arrays)
@@ -275,6 +275,7 @@ class SkeletonDisplay:
             if axis in before:
                 axis.clear()
         self._drawn, self.bones_, self.heads_ = drawn, [], []
+        self._bones_by_side = bones_by_side(self.skeleton)
         for axis, title, scene in zip(self.axes_, self.titles, drawn, strict=True):
             self._prepare(axis, title, len(scene), low, high)
             if places is not None:
@@ -310,8 +311,15 @@ class SkeletonDisplay:
             """Plays in a notebook without further ado."""
 
             def to_jshtml(self, *args, **kwargs):
-                with pyplot().rc_context({"savefig.dpi": _MOVING_DPI}):
-                    return super().to_jshtml(*args, **kwargs)
+                # The places of the panels stay: to find them costs more than to draw.
+                layout = figure.get_layout_engine()
+                figure.draw_without_rendering()
+                figure.set_layout_engine("none")
+                try:
+                    with pyplot().rc_context({"savefig.dpi": _MOVING_DPI}):
+                        return super().to_jshtml(*args, **kwargs)
+                finally:
+                    figure.set_layout_engine(layout)
 
             def _repr_html_(self):
                 html = self.to_jshtml()
@@ -356,16 +364,13 @@ class SkeletonDisplay:
         axis.axhline(0, color="0.6", linewidth=1, zorder=0)
         axis.tick_params(length=0)
 
-    def _landmark(self, name):
-        return self.skeleton.joints.index(self.skeleton.landmarks[name])
-
     def _show(self, at):
         """Put all stick figures where they are after a share of the time; the artists."""
         durations = self.durations
         if durations is None:
             durations = [[len(x) - 1 for x in scene] for scene in self._drawn]
         longest = max(max(of_scene) for of_scene in durations)
-        head, bones = self._landmark("head"), bones_by_side(self.skeleton)
+        head, bones = self.skeleton.index_of("head"), self._bones_by_side
         artists = []
         for i, (scene, taking) in enumerate(zip(self._drawn, durations, strict=True)):
             shares = [min(1.0, at * longest / d) if d > 0 else 0.0 for d in taking]
@@ -381,10 +386,9 @@ class SkeletonDisplay:
 
 
 def _as_performances(X):
-    """Performances one by one, of a list, a 3-D array, a frame of many or a single one."""
-    if getattr(getattr(X, "index", None), "nlevels", 1) == 2:
-        return to_sequences(X)
-    return [X] if getattr(X, "ndim", None) == 2 else list(X)
+    """Performances one by one, of a collection or a single one."""
+    collection = as_collection(X)
+    return [X] if collection is None else collection
 
 
 def _before_synchronizer(estimator):

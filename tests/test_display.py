@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
 from sklearn_motionsync import (
     ActionModel,
     ActionModelDisplay,
@@ -149,6 +150,22 @@ def test_from_predictions_draws_what_from_estimator_does(bunch, pipe):
             SynchronizationDisplay.from_predictions(points, np.full((7, 30), wrong))
 
 
+def test_from_predictions_takes_tables_and_their_names(bunch):
+    frames = [pd.DataFrame(x[:, :2], columns=["knee", "hip"]) for x in bunch.data]
+    times = LinearSynchronizer(20).fit(frames).match(frames).times
+    for X in (frames, to_frame(frames)):
+        display = SynchronizationDisplay.from_predictions(X, times, features="hip")
+        assert display.feature_names == ["hip"]
+        np.testing.assert_array_equal(segments(display.before_[0])[2][:, 1], frames[2]["hip"])
+
+
+def test_steps_that_do_not_name_their_features(bunch):
+    some = FunctionTransformer(lambda X: [x[:, :3] for x in X])
+    pipe = make_pipeline(some, DenseSynchronizer(20), ActionModel()).fit(bunch.data)
+    assert SynchronizationDisplay.from_estimator(pipe, bunch.data).feature_names[0] == "x0"
+    assert ActionModelDisplay.from_estimator(pipe).feature_names == ["x0", "x1", "x2"]
+
+
 def test_axes_given(bunch, pipe):
     figure, axes = plt.subplots(2, 2)
     display = SynchronizationDisplay.from_estimator(pipe, bunch.data, features=0, ax=axes[0, 1])
@@ -236,6 +253,17 @@ def test_the_cells_of_the_image_lie_around_their_offsets(bunch, pipe):
     np.testing.assert_array_equal(display.warp_.get_ydata(), pipe[2].match(points).offsets[1])
 
 
+def test_the_trellis_of_a_later_synchronizer(bunch):
+    """What is drawn is what reaches the dense one, after the linear one."""
+    X = [x[:, :3] for x in bunch.data]
+    linear, dense = LinearSynchronizer(25), DenseSynchronizer(20)
+    pipe = make_pipeline(linear, dense).fit(X)
+    display = TrellisDisplay.from_estimator(pipe, X, performance=4)
+    expected = TrellisDisplay.from_estimator(dense, linear.transform(X), performance=4)
+    np.testing.assert_array_equal(display.costs, expected.costs)
+    np.testing.assert_array_equal(display.warp_.get_ydata(), expected.warp_.get_ydata())
+
+
 def test_the_disparity_space_of_long_takes_is_thinned(bunch, pipe, monkeypatch):
     points = pipe[:2].transform(bunch.data)
     whole = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
@@ -297,6 +325,23 @@ def test_a_model_in_posture_features(bunch, pipe):
     std = pipe[1].inverse_transform(points)[:, chosen].std(axis=0)
     np.testing.assert_allclose(display.upper[frame] - display.mean[frame], 3 * std, rtol=0.01)
     np.testing.assert_allclose(display.mean[frame] - display.lower[frame], 3 * std, rtol=0.01)
+
+
+@pytest.mark.parametrize("features", [1, np.int64(1), [1], np.array([1]), range(1, 2), "aspace1"])
+def test_ways_to_name_a_feature(bunch, pipe, features):
+    for display in (
+        ActionModelDisplay.from_estimator(pipe, features=features),
+        SynchronizationDisplay.from_estimator(pipe, bunch.data, features=features),
+    ):
+        assert display.feature_names == ["aspace1"]
+
+
+def test_postures_out_of_reach(bunch):
+    double = FunctionTransformer(lambda X: [2 * x for x in X])
+    steps = DirectionCosines(bunch.skeleton), ASpace(3), double, DenseSynchronizer(20)
+    pipe = make_pipeline(*steps, ActionModel()).fit(bunch.data)
+    with pytest.raises(ValueError, match="Between ASpace and ActionModel stands FunctionTrans"):
+        ActionModelDisplay.from_estimator(pipe, features="pelvis_height")
 
 
 def test_a_model_by_itself(bunch, pipe):

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import ASpace, DenseSynchronizer
+from sklearn_motionsync import ASpace, DenseSynchronizer, to_frame
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,25 @@ def test_what_cannot_be_warped(matched):
     points, _, match = matched
     with pytest.raises(ValueError, match="6 matched performances, but 5 sequences"):
         match.warp(points[:5])
-    with pytest.raises(ValueError, match=r"Sequence 1 has shape \(9, 2\), sequence 0 \(.*, 3\)"):
+    with pytest.raises(ValueError, match="Performance 1 has 2 features a frame, performance 0 has"):
         match.warp([points[0], np.zeros((9, 2)), *points[2:]])
-    with pytest.raises(ValueError, match=r"Sequence 0 has shape \(9,\)"):
-        match.warp([np.zeros(9)] * 6)
+    with pytest.raises(ValueError, match=r"wrap|Wrap one performance as \[X\]"):
+        match.warp(np.zeros((6, 9)))
+
+
+def test_every_kind_of_collection(matched):
+    """The contract for performances holds for what comes along with them; gaps stay."""
+    points, _, match = matched
+    expected = match.warp(points)
+    names = ["a", "b", "c"]
+    frames = [pd.DataFrame(x, columns=names) for x in points]
+    objects = np.empty(6, dtype=object)
+    objects[:] = points
+    for X in (frames, to_frame(frames), objects):
+        np.testing.assert_array_equal(match.warp(X), expected)
+    with_gap = [x.copy() for x in points]
+    with_gap[2][5, 1] = np.nan
+    warped = match.warp(with_gap)
+    known = np.isfinite(warped)
+    assert not known[2, :, 1].all()
+    np.testing.assert_array_equal(warped[known], expected[known])

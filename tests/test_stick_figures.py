@@ -215,8 +215,10 @@ def test_joints_that_were_not_seen(bunch):
         # A bone lacks if one of its ends does; the others are where they are without gaps.
         assert (~seen).sum() == hidden
         np.testing.assert_allclose(drawn[seen], expected[seen], atol=0.02)
+    X[25] = np.nan  # nothing at all
+    assert len(SkeletonDisplay.from_positions(X, bunch.skeleton).axes_) == 6
     X[:, :3] = np.nan
-    with pytest.raises(ValueError, match="pelvis are never seen"):
+    with pytest.raises(ValueError, match="No frame shows the pelvis"):
         SkeletonDisplay.from_positions(X, bunch.skeleton)
 
 

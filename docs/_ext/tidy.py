@@ -1,25 +1,11 @@
-"""Small repairs to what Sphinx and its extensions make of docstrings, doctests and tables."""
+"""Small repairs to what Sphinx and its extensions make of doctests, tables and players."""
 
 import re
-
-# The names of a nested list of a docstring, such as what a Bunch holds.
-_TERM = re.compile(r"( {4,})\w+(, \w+)* : \S")
 
 _NUMBERS = re.compile(r"[-+]?\d[\d.,e+%/() -]*( to [\d.]+\))?")
 
 # Matplotlib's player of animations fetches its icons; the theme has them here.
 _ICONS = re.compile(r"<link[^>]*font-awesome[^>]*>")
-
-
-def complete_terms(app, what, name, obj, options, lines):
-    """A term of a nested list that has no description gets an empty one, as the syntax wants."""
-    completed = []
-    for line, following in zip(lines, [*lines[1:], ""], strict=True):
-        completed.append(line)
-        term = _TERM.match(line)
-        if term and not following.startswith(term.group(1) + " "):
-            completed.append(term.group(1) + "    ..")
-    lines[:] = completed
 
 
 def strip_blocks(app, doctree):
@@ -58,8 +44,6 @@ def setup(app):
     # Types are linked to pages of this site only.
     DEFAULT_LINKS.clear()
     autosummary.WELL_KNOWN_ABBREVIATIONS += ("Eq.", "Eqs.", "Fig.", "Figs.")
-    # Before numpydoc reads them.
-    app.connect("autodoc-process-docstring", complete_terms, priority=400)
     app.connect("doctree-read", strip_blocks)
     app.connect("doctree-read", mark_numbers)
     app.connect("doctree-read", keep_local)

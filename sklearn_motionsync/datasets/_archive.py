@@ -29,6 +29,7 @@ def load_performances(path):
         target, actor, take : ndarray of str (N,)
             The action, who performed it, and which of their performances it is.
         joints : list of str
+            Names of the joints.
         skeleton : Skeleton or None
             None if the names of the joints do not tell which of them are the body's.
         frame_rate : ndarray (N,)

@@ -90,12 +90,17 @@ def make_bending(
         keyframes : ndarray (n_performances, 5)
             Frame (with fraction) of five moments in each performance.
         keyframe_names : list of str
+            What these moments are.
         keyframe_times : ndarray (5,)
             When these moments come, on the scale of ``times``.
         skeleton : Skeleton
+            The paper's fifteen joints.
         joints : list of str
+            Their names.
         target, actor, take : ndarray of str (n_performances,)
+            The action, who performed it, and which of their performances it is.
         frame_rate : float
+            Frames a second, as given.
 
     Raises
     ------

@@ -66,8 +66,11 @@ def fetch_cmu(
         data : list of DataFrame (n_frames_i, 3 * n_joints)
             Joint positions in metres, as `read_motion` gives them.
         subject : str
+            Number of the subject, in two digits.
         take : ndarray of str (n_trials,)
+            Numbers of the trials, in two digits.
         joints : list of str
+            Names of the joints.
         skeleton : Skeleton or None
             None if the names of the joints do not tell which of them are the body's.
         frame_rate : ndarray (n_trials,)

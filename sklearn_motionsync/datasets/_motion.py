@@ -38,6 +38,7 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0):
         Its ``attrs`` hold
 
         format : {"bvh", "amc", "c3d"}
+            What was read.
         frame_rate : float or None
             Frames a second, None where nobody says.
         units : str or None
@@ -45,7 +46,9 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0):
         up : {"y", "z"} or None
             The vertical axis, None where a C3D file does not say.
         kind : {"joints", "markers"}
+            What the positions are of.
         joints : list of str
+            Their names.
         parents : list of int
             Index of each joint's parent, -1 for a root and for markers.
 
