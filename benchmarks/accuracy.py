@@ -29,7 +29,8 @@ from sklearn_motionsync import (
     __version__,
 )
 from sklearn_motionsync.datasets import load_performances, make_bending
-from sklearn_motionsync.features import SMOOTHING, cost_features, smooth
+from sklearn_motionsync.matching.costs import cost_features
+from sklearn_motionsync.matching.filters import SMOOTHING, smooth
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error, timing_error
 
 P = 100

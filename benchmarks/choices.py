@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 from accuracy import ALL_PAIRS, EVENTS, Clips, P
-from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer, matching
+from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
+from sklearn_motionsync.matching import costs
+from sklearn_motionsync.matching.warps import sample
 from sklearn_motionsync.metrics import sobolev_least_squares
-from sklearn_motionsync.sampling import sample
 
 CHOICES = {
     "smoothness": [0.001, 0.003, 0.01, 0.03, 0.1],
@@ -25,7 +26,7 @@ CHOICES = {
     "consensus": [0, 4, 8, 16],
     "warp_smoothing": [0, 0.02, 0.03, 0.05],
 }
-# Not a parameter: w of the velocity cost, matching.step_table.
+# Not a parameter: w of the velocity cost, costs.step_table.
 RATE_WEIGHTS = [0.0, 0.1, 0.2, 0.3, 1.0]
 
 
@@ -83,11 +84,11 @@ def main():
     for name, values in CHOICES.items():
         for value in values:
             row(f"`{name}={value}`", clips, **{name: value})
-    default = matching._RATE_WEIGHT
+    default = costs.RATE_WEIGHT
     for weight in RATE_WEIGHTS:
-        matching._RATE_WEIGHT = weight
+        costs.RATE_WEIGHT = weight
         row(f"w = {weight}", clips)
-    matching._RATE_WEIGHT = default
+    costs.RATE_WEIGHT = default
     for rounds in (1, 3):
         label = f"no vote, re-matched to the running mean, rounds: {rounds}"
         row(label, clips, rematched_to_mean, rounds=rounds)

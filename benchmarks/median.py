@@ -12,7 +12,8 @@ import sys
 import numpy as np
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import load_performances, make_bending
-from sklearn_motionsync.median import search_median
+from sklearn_motionsync.matching.median import search_median
+from sklearn_motionsync.matching.warper import Features, Matcher
 
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
 SETS, SEARCHES = 20, 3
@@ -57,9 +58,14 @@ class Variations:
 
 def matrix(X, settings):
     """All synchronisation distances, by the estimator's own comparison."""
-    sync = DenseSynchronizer(**settings, search="exhaustive").fit(X[:2])
-    features = sync._prepare(list(X), X)
-    return sync._warper.trellis.distances(features, features).astype(np.float64)
+    given = DenseSynchronizer(**settings).get_params()
+    names = ("smoothness", "max_offset", "max_rate")
+    matcher, features = Matcher.learn(
+        Features(given["cost"], 1, given["velocity_smoothing"], X.mean(axis=(0, 1))),
+        X,
+        **{name: given[name] for name in names},
+    )
+    return matcher.trellis.distances(features, features).astype(np.float64)
 
 
 def main():

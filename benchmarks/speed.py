@@ -30,7 +30,9 @@ import sklearn_motionsync
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.matching import Trellis, step_table
+from sklearn_motionsync.matching.costs import step_table
+from sklearn_motionsync.matching.rows import Bases
+from sklearn_motionsync.matching.trellis import Trellis
 
 HERE = Path(__file__).resolve().parent
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
@@ -118,8 +120,8 @@ class Recurrence:
 
 def products(trellis, X):
     """The matrix products of all pairs, and nothing else."""
-    for _, _, bundle in trellis._bundles(X, X):
-        for _ in bundle._costs_of_samples(0, X.shape[1], *trellis.windows(X.shape[1])):
+    for _, _, bundle in trellis.bundles(Bases(trellis, X), X):
+        for _ in bundle.costs_of_samples(0, X.shape[1], *trellis.windows(X.shape[1])):
             pass
 
 

@@ -8,7 +8,6 @@ sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 
 import sklearn_motionsync
 from members import members
-from sklearn_motionsync.sampling import Match
 
 project = "sklearn_motionsync"
 author = "The sklearn_motionsync developers"
@@ -50,7 +49,7 @@ numpydoc_show_class_members = False
 numpydoc_xref_param_type = True
 numpydoc_xref_ignore = "all"
 numpydoc_xref_aliases = {
-    "Match": "sklearn_motionsync.sampling.Match",
+    "Match": "sklearn_motionsync.Match",
     "Skeleton": "sklearn_motionsync.Skeleton",
 }
 python_maximum_signature_line_length = 88
@@ -64,7 +63,6 @@ def _classes():
         for name in module.__all__:
             if inspect.isclass(getattr(module, name)):
                 yield f"{module.__name__}.{name}", getattr(module, name)
-    yield "sklearn_motionsync.sampling.Match", Match
 
 
 # The templates of _templates/autosummary take the methods of a class from here.

@@ -14,17 +14,20 @@
 from . import datasets, display, metrics
 from .action_model import ActionModel
 from .aspace import ASpace
+from .body.direction_cosines import DirectionCosines
+from .body.skeleton import Skeleton
 from .display import (
     ActionModelDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
     TrellisDisplay,
 )
-from .keyframes import KeyframeSynchronizer
-from .posture import DirectionCosines
 from .sequences import to_frame, to_sequences
-from .skeleton import Skeleton
-from .synchronizer import DenseSynchronizer, LinearSynchronizer
+from .synchronizers.base import Synchronizer
+from .synchronizers.dense import DenseSynchronizer
+from .synchronizers.keyframes import KeyframeSynchronizer
+from .synchronizers.linear import LinearSynchronizer
+from .synchronizers.match import Match
 
 __version__ = "0.1.0.dev0"
 
@@ -36,9 +39,11 @@ __all__ = [
     "DirectionCosines",
     "KeyframeSynchronizer",
     "LinearSynchronizer",
+    "Match",
     "Skeleton",
     "SkeletonDisplay",
     "SynchronizationDisplay",
+    "Synchronizer",
     "TrellisDisplay",
     "datasets",
     "display",

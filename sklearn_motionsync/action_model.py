@@ -9,8 +9,9 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
+from .fitting import at_once
 from .notebook import DocumentedMixin
-from .sequences import check_performances
+from .performances import SequenceLevelMixin
 
 __all__ = ["ActionModel"]
 
@@ -19,7 +20,7 @@ __all__ = ["ActionModel"]
 _VARIANCE_FLOOR = 1e-9
 
 
-class ActionModel(DocumentedMixin, BaseEstimator):
+class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     """What an action looks like at every instant, and how much people vary there.
 
     1. The mean performance and the variance of every posture, over synchronised
@@ -76,6 +77,7 @@ class ActionModel(DocumentedMixin, BaseEstimator):
     def __init__(self, n_std=3.0):
         self.n_std = n_std
 
+    @at_once
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X, y=None):
         """Learn the mean performance and the variances.
@@ -95,7 +97,7 @@ class ActionModel(DocumentedMixin, BaseEstimator):
         ValueError
             If the performances have different lengths, or there is only one.
         """
-        X = self._stacked(check_performances(self, X, reset=True, level="sequence").arrays)
+        X = np.stack(self.check_performances(X, reset=True))
         if len(X) < 2:
             raise ValueError(
                 "A model of how performances vary needs at least 2 performances, got n_samples = 1."
@@ -109,6 +111,42 @@ class ActionModel(DocumentedMixin, BaseEstimator):
         self.offset_ = float(self._log_density(self.n_std**2 * self.mean_.size))
         return self
 
+    def check_performances(self, X, *, reset=False):
+        """Check that performances are synchronised, and to the clock of the model.
+
+        Parameters
+        ----------
+        X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
+            Synchronised performances. The rows of a 2-D array are univariate ones.
+        reset : bool, default=False
+            True in ``fit``: learn what to expect.
+
+        Returns
+        -------
+        list of ndarray (P, n_features)
+            All of one dtype, float32 or float64; not to be written to.
+
+        Raises
+        ------
+        ValueError
+            If the input breaks the contract, performances have different lengths, or others than
+            the model.
+        """
+        performances = super().check_performances(X, reset=reset)
+        n_frames = len(performances[0])
+        for i, x in enumerate(performances):
+            if len(x) != n_frames:
+                raise ValueError(
+                    f"Performance {i} has {len(x)} frames, performance 0 has {n_frames}: a model "
+                    "needs synchronised performances. Put a DenseSynchronizer before it."
+                )
+        if not reset and n_frames != self.n_frames_:
+            raise ValueError(
+                f"The performances have {n_frames} frames, the model {self.n_frames_}: "
+                "synchronise them with the synchronizer that the model was fitted after."
+            )
+        return performances
+
     def score_samples(self, X):
         """Log-density of performances under the model.
 
@@ -121,7 +159,7 @@ class ActionModel(DocumentedMixin, BaseEstimator):
         -------
         ndarray, shape (n_sequences,)
         """
-        X = self._check(X)
+        X = np.stack(self.check_performances(X))
         return self._log_density(np.square((X - self.mean_) / self._std()).sum(axis=(1, 2)))
 
     def score(self, X, y=None):
@@ -236,27 +274,6 @@ class ActionModel(DocumentedMixin, BaseEstimator):
         tags = super().__sklearn_tags__()
         tags.input_tags.three_d_array = True
         return tags
-
-    def _check(self, X):
-        check_is_fitted(self)
-        X = self._stacked(check_performances(self, X, reset=False, level="sequence").arrays)
-        if X.shape[1] != self.n_frames_:
-            raise ValueError(
-                f"The performances have {X.shape[1]} frames, the model {self.n_frames_}: "
-                "synchronise them with the synchronizer that the model was fitted after."
-            )
-        return X
-
-    @staticmethod
-    def _stacked(arrays):
-        lengths = np.array([len(a) for a in arrays])
-        if (lengths != lengths[0]).any():
-            i = int(np.argmax(lengths != lengths[0]))
-            raise ValueError(
-                f"Performance {i} has {lengths[i]} frames, performance 0 has {lengths[0]}: a model "
-                "needs synchronised performances. Put a DenseSynchronizer before it."
-            )
-        return np.stack(arrays)
 
     def _check_frame(self, frame):
         if not isinstance(frame, Integral) or not 0 <= frame < self.n_frames_:

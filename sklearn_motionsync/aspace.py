@@ -13,8 +13,9 @@ from sklearn.decomposition import PCA
 from sklearn.utils._param_validation import Interval, RealNotInt
 from sklearn.utils.validation import check_is_fitted
 
+from .fitting import at_once
 from .notebook import DocumentedMixin
-from .sequences import check_performances, check_transformed, restore
+from .performances import check_performances, check_transformed, restore
 
 __all__ = ["ASpace"]
 
@@ -79,6 +80,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     def __init__(self, n_components=0.95):
         self.n_components = n_components
 
+    @at_once
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X, y=None):
         """Find the components.
@@ -99,7 +101,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
             If there are fewer than two postures, or fewer than ``n_components`` postures or
             features.
         """
-        arrays = check_performances(self, X, reset=True, level="posture").arrays
+        arrays = check_performances(self, X, reset=True, level="posture")
         postures = np.concatenate(arrays) if len(arrays) > 1 else arrays[0]
         if len(postures) < 2:
             raise ValueError(
@@ -127,6 +129,8 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         self.n_components_ = b
         return self
 
+    fit_transform = at_once(TransformerMixin.fit_transform)
+
     def transform(self, X):
         """Project postures into the aSpace (Eq. 5).
 
@@ -141,9 +145,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         check_is_fitted(self)
         performances = check_performances(self, X, reset=False, level="posture")
         components = self.components_.T
-        arrays = [
-            ((a - self.mean_) @ components).astype(a.dtype, copy=False) for a in performances.arrays
-        ]
+        arrays = [((a - self.mean_) @ components).astype(a.dtype, copy=False) for a in performances]
         return restore(self, performances, arrays)
 
     def inverse_transform(self, X):
@@ -160,8 +162,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         check_is_fitted(self)
         performances = check_transformed(self, X, self.n_components_)
         arrays = [
-            (a @ self.components_ + self.mean_).astype(a.dtype, copy=False)
-            for a in performances.arrays
+            (a @ self.components_ + self.mean_).astype(a.dtype, copy=False) for a in performances
         ]
         names = getattr(self, "feature_names_in_", range(self.n_features_in_))
         return restore(self, performances, arrays, columns=names)

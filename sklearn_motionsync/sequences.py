@@ -6,21 +6,27 @@ MultiIndex DataFrame are the same thing. A 2-D array is read by rows: postures f
 the posture-level estimators, univariate sequences for the sequence-level ones.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
-from sklearn.base import BaseEstimator
-from sklearn.utils._set_output import _get_output_config
-from sklearn.utils.validation import validate_data
 
-__all__ = ["to_frame", "to_sequences"]
+__all__ = [
+    "ACCEPTED",
+    "NOT_ONE",
+    "as_collection",
+    "check_finite",
+    "check_members",
+    "frame_labels",
+    "stack_frame",
+    "to_frame",
+    "to_sequences",
+]
 
-_ACCEPTED = (
+ACCEPTED = (
     "A set of performances is a list of 2-D arrays (n_frames, n_features), a 3-D array "
     "(n_sequences, n_frames, n_features) or a DataFrame indexed by (performance, frame)"
 )
+NOT_ONE = f"{ACCEPTED}; got a single 2-D input. Wrap one performance as [X]."
 _INDEX_NAMES = ("performance", "frame")
 
 
@@ -114,7 +120,10 @@ def to_frame(sequences, *, performances=None, columns=None):
     >>> df.loc[1, "knee"].tolist()
     [1.0, 1.0, 1.0]
     """
-    sequences, arrays, names = read_collection(sequences)
+    sequences = as_collection(sequences)
+    if sequences is None:
+        raise ValueError(NOT_ONE)
+    arrays, names = check_members(sequences, finite=False)
     labels = range(len(arrays)) if performances is None else list(performances)
     if len(labels) != len(arrays) or len(set(labels)) != len(labels):
         raise ValueError(
@@ -122,107 +131,7 @@ def to_frame(sequences, *, performances=None, columns=None):
             f"got {len(labels)} of which {len(set(labels))} differ."
         )
     columns = names if columns is None else columns
-    return _stack(arrays, labels, _frame_labels(sequences), columns)
-
-
-def read_collection(X):
-    """Members, arrays and column names of a collection of any kind, which may have gaps.
-
-    For what comes along with performances; their estimators use ``check_performances``.
-    """
-    sequences = as_collection(X)
-    if sequences is None:
-        raise ValueError(f"{_ACCEPTED}; got a single 2-D input. Wrap one performance as [X].")
-    return sequences, *_check_members(sequences, finite=False)
-
-
-class Performances(NamedTuple):
-    """A checked set of performances and what it takes to give the same kind back.
-
-    ``arrays`` hold views of the input where its dtype allows: never write to them.
-    """
-
-    arrays: list
-    kind: str
-    labels: list
-    frames: list
-
-
-def check_performances(estimator, X, *, reset, level):
-    """Check the input of an estimator against the contract.
-
-    Parameters
-    ----------
-    estimator : estimator
-        Gets ``n_features_in_`` (features of a frame) and ``feature_names_in_``.
-    X : the input, of any kind the contract names
-    reset : bool
-        True in ``fit``.
-    level : {"posture", "sequence"}
-        How a 2-D input is read.
-
-    Returns
-    -------
-    Performances
-        ``kind`` is "rows" (2-D), "array" (3-D), "list" or "frame" (MultiIndex).
-    """
-    sequences = as_collection(X)
-    if sequences is None:
-        return _check_rows(estimator, X, reset=reset, level=level)
-    name = type(estimator).__name__
-    if not reset and getattr(estimator, "_fitted_on_rows", False):
-        raise ValueError(
-            f"{name} was fitted on a 2-D array of univariate sequences (n_sequences, "
-            f"{estimator.n_features_in_}) and got a collection of performances. Give it 2-D "
-            "input, or fit it on a collection."
-        )
-    arrays, names = _check_members(sequences)
-    if not reset and arrays[0].shape[1] != estimator.n_features_in_:
-        raise ValueError(
-            f"Performance 0 has {arrays[0].shape[1]} features a frame, but {name} is "
-            f"expecting {estimator.n_features_in_} features as input."
-        )
-    first = arrays[0] if names is None else pd.DataFrame(arrays[0], columns=names)
-    validate_data(estimator, first, reset=reset, skip_check_array=True)
-    if reset and level == "sequence":
-        estimator._fitted_on_rows = False
-    if isinstance(X, pd.DataFrame):
-        kind, labels = "frame", list(X.index.unique(level=0))
-    else:
-        kind, labels = "list", list(range(len(arrays)))
-        if getattr(X, "ndim", 1) == 3:
-            kind = "array"
-    return Performances(arrays, kind, labels, _frame_labels(sequences))
-
-
-def check_transformed(estimator, X, n_features):
-    """Check the input of ``inverse_transform``: postures of ``n_features`` values."""
-    space = type(type(estimator).__name__, (BaseEstimator,), {})()
-    space.n_features_in_ = n_features
-    return check_performances(space, X, reset=False, level="posture")
-
-
-def restore(estimator, performances, arrays, *, frames=None, columns=None):
-    """Give transformed arrays back as the kind of the input, or as a MultiIndex frame.
-
-    ``frames`` replaces the frame labels of the input where its time was changed,
-    ``columns`` the names of the estimator's outputs.
-    """
-    if performances.kind == "rows":
-        return arrays[0]
-    container = _get_output_config("transform", estimator)["dense"]
-    if container == "pandas":
-        labels = performances.frames if frames is None else [frames] * len(arrays)
-        columns = estimator.get_feature_names_out() if columns is None else columns
-        return _stack(arrays, performances.labels, labels, columns)
-    if container != "default":
-        raise ValueError(
-            f"{type(estimator).__name__} has no {container!r} output for a collection of "
-            "performances; use set_output(transform='pandas') or 'default'."
-        )
-    if performances.kind == "array" or isinstance(arrays, np.ndarray):
-        return np.stack(arrays) if isinstance(arrays, list) else arrays
-    return arrays
+    return stack_frame(arrays, labels, frame_labels(sequences), columns)
 
 
 # -- how the kinds are told apart ---------------------------------------------------
@@ -235,12 +144,12 @@ def as_collection(X):
     if issparse(X):
         return None
     if isinstance(X, (dict, set, frozenset, str, bytes)) or hasattr(X, "__next__"):
-        raise ValueError(f"{_ACCEPTED}, got {type(X).__name__}. Use list(...) of the arrays.")
+        raise ValueError(f"{ACCEPTED}, got {type(X).__name__}. Use list(...) of the arrays.")
     if isinstance(X, np.ndarray):
         if X.ndim == 3:
             return list(X)
         if X.ndim > 3:
-            raise ValueError(f"{_ACCEPTED}, got an array of shape {X.shape}.")
+            raise ValueError(f"{ACCEPTED}, got an array of shape {X.shape}.")
         is_collection = X.dtype == object and X.ndim == 1 and _holds_matrices(X)
         return list(X) if is_collection else None
     if isinstance(X, (list, tuple)):
@@ -256,7 +165,7 @@ def _holds_matrices(items):
     lengths = {len(item) for item, depth in zip(items, depths, strict=True) if depth == 1}
     if len(lengths) > 1:
         raise ValueError(
-            f"{_ACCEPTED}. Performance 0 has {len(items[0])} values in one dimension and others "
+            f"{ACCEPTED}. Performance 0 has {len(items[0])} values in one dimension and others "
             "have other lengths: give univariate performances as columns, x[:, np.newaxis]."
         )
     return False
@@ -273,40 +182,10 @@ def _depth(item):
 # -- checks -------------------------------------------------------------------------
 
 
-def _check_rows(estimator, X, *, reset, level):
-    """A 2-D input: rows are postures, or univariate sequences."""
-    name = type(estimator).__name__
-    on_rows = getattr(estimator, "_fitted_on_rows", True)
-    if level == "sequence" and not reset and not on_rows:
-        raise ValueError(
-            f"{name} was fitted on a collection of performances and got 2-D or other input: "
-            f"wrap one sequence as [X]. {_ACCEPTED}."
-        )
-    X = validate_data(
-        estimator,
-        X,
-        reset=reset,
-        dtype=[np.float64, np.float32],
-        order="C",
-        ensure_all_finite=False,
-    )
-    _check_finite(X, "Row")
-    if level == "posture":
-        return Performances([X], "rows", [0], [range(len(X))])
-    if X.shape[1] < 2:
-        raise ValueError(
-            "Each row of a 2-D input is one univariate sequence and needs at least 2 frames, got "
-            f"n_features = {X.shape[1]}. For performances of several features use a list."
-        )
-    if reset:
-        estimator._fitted_on_rows = True
-    return Performances([row[:, np.newaxis] for row in X], "rows", list(range(len(X))), [])
-
-
-def _check_members(sequences, *, finite=True):
+def check_members(sequences, *, finite=True):
     """Arrays of one dtype, and the column names they share (None without names)."""
     if len(sequences) == 0:
-        raise ValueError(f"Found 0 performances (n_samples=0), at least 1 is needed. {_ACCEPTED}.")
+        raise ValueError(f"Found 0 performances (n_samples=0), at least 1 is needed. {ACCEPTED}.")
     arrays = [_as_matrix(i, x) for i, x in enumerate(sequences)]
     names = _column_names(sequences[0])
     width = arrays[0].shape[1]
@@ -322,7 +201,7 @@ def _check_members(sequences, *, finite=True):
                 "All performances need the same columns in the same order."
             )
         if finite:
-            _check_finite(array, f"Performance {i}, frame")
+            check_finite(array, f"Performance {i}, frame")
     dtype = np.float32 if all(a.dtype == np.float32 for a in arrays) else np.float64
     # Row by row in memory, so that no result depends on the layout of the input.
     return [np.ascontiguousarray(a, dtype=dtype) for a in arrays], names
@@ -360,7 +239,7 @@ def _as_matrix(i, x):
     return array
 
 
-def _check_finite(array, where):
+def check_finite(array, where):
     if np.isfinite(array).all():
         return
     frame, feature = np.argwhere(~np.isfinite(array))[0]
@@ -371,7 +250,7 @@ def _check_finite(array, where):
     )
 
 
-def _frame_labels(sequences):
+def frame_labels(sequences):
     return [x.index if isinstance(x, pd.DataFrame) else range(len(x)) for x in sequences]
 
 
@@ -382,7 +261,7 @@ def _column_names(x):
     return list(columns)
 
 
-def _stack(arrays, labels, frames, columns):
+def stack_frame(arrays, labels, frames, columns):
     """Arrays below each other under a (performance, frame) MultiIndex."""
     lengths = [len(a) for a in arrays]
     index = pd.MultiIndex.from_arrays(

@@ -20,7 +20,7 @@ except ImportError:  # scikit-learn before 1.9
         """No callbacks."""
 
 
-__all__ = ["CallbackSupportMixin", "Progress", "run"]
+__all__ = ["LongWorkMixin", "Progress", "run"]
 
 # Seconds between two lines of a verbose estimator.
 _INTERVAL = 1.0
@@ -72,6 +72,15 @@ def _thread_pools():
     return ThreadpoolController()
 
 
+class LongWorkMixin(CallbackSupportMixin):
+    """What estimators share that take their time; they have a parameter ``verbose``."""
+
+    def _progress(self, *, fits):
+        """The `Progress` of a job; callbacks only belong to ``fit``."""
+        begin = getattr(self, "_init_callback_context", None) if fits else None
+        return Progress(self, self.verbose, begin)
+
+
 class Progress:
     """How far a long job of an estimator is: printed if verbose, and told to its callbacks.
 
@@ -81,21 +90,20 @@ class Progress:
     Parameters
     ----------
     estimator : estimator
-        Its callbacks are told if ``fits``.
+        Whose job it is.
     verbose : int
         Above 0 prints at most one line a second.
-    fits : bool, default=True
-        Callbacks only belong to ``fit``.
+    begin : callable, default=None
+        Begins scikit-learn's callbacks; None if they are not told.
     """
 
-    def __init__(self, estimator, verbose, fits=True):
-        self._estimator, self._verbose = estimator, verbose
-        self._tells = fits and hasattr(estimator, "_init_callback_context")
+    def __init__(self, estimator, verbose, begin=None):
+        self._estimator, self._verbose, self._begin = estimator, verbose, begin
         self._tasks = []
 
     def __enter__(self):
-        if self._tells:
-            root = self._estimator._init_callback_context(max_subtasks=None)
+        if self._begin is not None:
+            root = self._begin(max_subtasks=None)
             self._tasks.append(root.call_on_fit_task_begin(estimator=self._estimator))
         return self
 
@@ -111,7 +119,7 @@ class Progress:
     def stage(self, name, n_portions):
         """Begin a stage of so many portions."""
         stage = None
-        if self._tells:
+        if self._tasks:
             self._end_tasks(1)
             stage = self._tasks[0].subcontext(task_name=name, max_subtasks=n_portions)
             self._tasks.append(stage.call_on_fit_task_begin(estimator=self._estimator))

@@ -22,10 +22,17 @@ from sklearn_motionsync import (
     to_sequences,
 )
 
+from shift_synchronizer import ShiftSynchronizer
+
 N_JOINTS = 15
 WIDTH = 3 * N_JOINTS
 
-SYNCHRONIZERS = [LinearSynchronizer(), KeyframeSynchronizer(), DenseSynchronizer()]
+SYNCHRONIZERS = [
+    LinearSynchronizer(),
+    KeyframeSynchronizer(),
+    DenseSynchronizer(),
+    ShiftSynchronizer(),
+]
 ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, ActionModel()]
 ESTIMATORS = [DirectionCosines(Skeleton.paper()), *ROW_ESTIMATORS]
 TRANSFORMERS = [e for e in ESTIMATORS if hasattr(e, "transform")]

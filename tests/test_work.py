@@ -18,8 +18,8 @@ import threadpoolctl
 from sklearn.exceptions import NotFittedError
 from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.matching import Trellis
-from sklearn_motionsync.warping import Warper
+from sklearn_motionsync.matching.trellis import Trellis
+from sklearn_motionsync.matching.warper import Warper
 from sklearn_motionsync.work import Progress, run
 
 SETTINGS = {
@@ -151,7 +151,7 @@ def test_verbose_tells_how_far_it_is(walks, capsys):
 def test_verbose_prints_at_most_a_line_a_second(capsys, monkeypatch):
     clock = iter(np.arange(0, 100, 0.3))
     monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
-    with Progress(DenseSynchronizer(), verbose=1, fits=False) as progress:
+    with Progress(DenseSynchronizer(), verbose=1) as progress:
         step = progress.stage("stage", 10)
         for _ in range(10):
             step()

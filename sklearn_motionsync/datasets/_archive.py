@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from sklearn.utils import Bunch
 
-from ..skeleton import Skeleton
+from ..body.skeleton import Skeleton
 
 _NEEDED = ("positions", "offsets", "label", "actor", "take", "fps", "joints", "parents")
 

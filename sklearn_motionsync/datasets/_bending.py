@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from sklearn.utils import Bunch, check_random_state
 
-from ..skeleton import Skeleton
+from ..body.skeleton import Skeleton
 
 # When the five moments come, in shares of the action.
 _KEYFRAMES = {

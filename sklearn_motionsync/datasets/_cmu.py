@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from sklearn.utils import Bunch
 
-from ..skeleton import Skeleton
+from ..body.skeleton import Skeleton
 from ._motion import read_motion
 
 _FRAME_RATE = 120.0

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pandas as pd
 
-from ..skeleton import joints_of
+from ..body.skeleton import joints_of
 
 
 def find_gaps(df):

@@ -1,0 +1,13 @@
+"""Displays of what synchronizers and models did: compute once, draw as often as you like.
+
+As in scikit-learn, ``from_estimator`` and ``from_predictions`` compute and draw, ``plot`` draws
+again, and the artists stay on the display as attributes that end in an underscore.
+matplotlib, in the extra ``plot``, is imported only when something is drawn.
+"""
+
+from .model import ActionModelDisplay
+from .stick_figures import SkeletonDisplay
+from .synchronization import SynchronizationDisplay
+from .trellis import TrellisDisplay
+
+__all__ = ["ActionModelDisplay", "SkeletonDisplay", "SynchronizationDisplay", "TrellisDisplay"]

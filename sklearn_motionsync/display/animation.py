@@ -1,0 +1,52 @@
+"""Animations that a notebook plays without further ado."""
+
+from .drawing import pyplot
+
+__all__ = ["playable"]
+
+# Resolution of moving pictures: every one of them is kept in the notebook.
+_DPI = 64
+
+
+def playable(figure, show, count, fps, *, closes):
+    """An animation of a figure, which a notebook plays as the last value of a cell.
+
+    Parameters
+    ----------
+    figure : Figure
+    show : callable
+        ``show(k)`` draws picture k, of ``count``, and returns its artists.
+    count : int
+    fps : float
+        Pictures a second.
+    closes : bool
+        Whether the figure is closed once it plays; else the notebook shows it once more, standing
+        still.
+
+    Returns
+    -------
+    FuncAnimation
+    """
+    from matplotlib.animation import FuncAnimation
+
+    class Playable(FuncAnimation):
+        """Its places stay, its pictures are small."""
+
+        def to_jshtml(self, *args, **kwargs):
+            # To find the places of the panels costs more than to draw.
+            layout = figure.get_layout_engine()
+            figure.draw_without_rendering()
+            figure.set_layout_engine("none")
+            try:
+                with pyplot().rc_context({"savefig.dpi": _DPI}):
+                    return super().to_jshtml(*args, **kwargs)
+            finally:
+                figure.set_layout_engine(layout)
+
+        def _repr_html_(self):
+            html = self.to_jshtml()
+            if closes:
+                pyplot().close(figure)
+            return html
+
+    return Playable(figure, show, frames=count, interval=1000 / fps, blit=False)

@@ -1,0 +1,148 @@
+"""TrellisDisplay: the disparity space of one pair, and the path through it (Fig. 2)."""
+
+import numpy as np
+
+from ..pipelines import index_of_pattern, reach_synchronizer
+from ..synchronizers.dense import DenseSynchronizer
+from .drawing import COLORS, panels
+
+__all__ = ["TrellisDisplay"]
+
+
+class TrellisDisplay:
+    """The disparity space of one pair of performances, and the path through it (Fig. 2).
+
+    Use `from_estimator`.
+
+    Parameters
+    ----------
+    frames : ndarray, shape (n_frames,)
+        p, all frames of the pattern or, of long takes, evenly spaced ones.
+    offsets : ndarray, shape (n_offsets,)
+        d, in frames of the pattern; evenly spaced ones of long takes.
+    costs : ndarray, shape (n_frames, n_offsets)
+        E(p, d): how much the posture (or velocity) of the pattern at p differs from that of the
+        performance at p + d; NaN where no path that obeys Eqs. 9 and 13 can pass.
+    path : ndarray, shape (P,)
+        The offsets of the best path, straight from the pattern to the performance.
+    warp : ndarray, shape (P,)
+        The offsets Delta(p) in the end, after vote, smoothing and refinement.
+    names : (str, str), default=("pattern", "performance")
+        What the pattern and the performance are called.
+
+    Attributes
+    ----------
+    figure_ : Figure
+    ax_ : Axes
+    image_ : AxesImage
+    path_, warp_ : Line2D
+    colorbar_ : Colorbar or None
+
+    Examples
+    --------
+    >>> from sklearn_motionsync import DenseSynchronizer, DirectionCosines, TrellisDisplay
+    >>> from sklearn_motionsync.datasets import make_bending
+    >>> bunch = make_bending(6, random_state=0)
+    >>> X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+    >>> display = TrellisDisplay.from_estimator(DenseSynchronizer(50).fit(X), X, performance=2)
+    >>> display.costs.shape
+    (50, 25)
+    """
+
+    def __init__(self, frames, offsets, costs, path, warp, *, names=("pattern", "performance")):
+        self.frames = frames
+        self.offsets = offsets
+        self.costs = costs
+        self.path = path
+        self.warp = warp
+        self.names = names
+
+    def __repr__(self):
+        return f"TrellisDisplay({self.names[1]} matched to {self.names[0]})"
+
+    @classmethod
+    def from_estimator(cls, estimator, X, *, performance=0, ax=None, colorbar=True):
+        """Draw the disparity space of the pattern and one performance.
+
+        Parameters
+        ----------
+        estimator : DenseSynchronizer, or Pipeline with one
+            Fitted.
+        X : performances, as the estimator takes them
+        performance : int, default=0
+            Which of them is matched to the pattern.
+        ax : Axes, default=None
+        colorbar : bool, default=True
+
+        Returns
+        -------
+        TrellisDisplay
+        """
+        _, synchronizer, performances = reach_synchronizer(estimator, X, DenseSynchronizer)
+        space = synchronizer.disparity_space(performances, performance)
+        warp = synchronizer.match(performances.take([performance])).offsets[0]
+        index = index_of_pattern(synchronizer, performances)
+        names = ("pattern" if index is None else f"pattern {index}", f"performance {performance}")
+        return cls(**space, warp=warp, names=names).plot(ax, colorbar=colorbar)
+
+    def plot(self, ax=None, *, colorbar=True):
+        """Draw.
+
+        Parameters
+        ----------
+        ax : Axes, default=None
+        colorbar : bool, default=True
+
+        Returns
+        -------
+        self
+        """
+        from matplotlib.colors import PowerNorm
+        from matplotlib.patches import Patch
+        from matplotlib.patheffects import Normal, Stroke
+
+        self.figure_, (self.ax_,) = panels(ax, [(0, 0)], 1, 1, (7, 4))
+        frames = np.arange(len(self.path))
+        # Dark where the two are alike; the square root shows differences among the small ones.
+        self.image_ = self.ax_.imshow(
+            np.ma.masked_invalid(self.costs.T),
+            origin="lower",
+            aspect="auto",
+            extent=(*_edges(self.frames), *_edges(self.offsets)),
+            interpolation="nearest",
+            cmap="cividis",
+            norm=PowerNorm(0.5, vmin=0),
+        )
+        self.ax_.set_facecolor("0.85")
+        outline = [Stroke(linewidth=4, foreground="white"), Normal()]
+        (self.path_,) = self.ax_.plot(
+            frames, self.path, color="#D55E00", linewidth=2, path_effects=outline, label="best path"
+        )
+        (self.warp_,) = self.ax_.plot(
+            frames,
+            self.warp,
+            "--",
+            color=COLORS["pattern"],
+            linewidth=1.6,
+            path_effects=[Stroke(linewidth=3, foreground="white"), Normal()],
+            label="warp in the end",
+        )
+        self.ax_.set_title(f"{self.names[1]} matched to {self.names[0]}", fontsize="medium")
+        self.ax_.set_xlabel(f"frame p of {self.names[0]}")
+        self.ax_.set_ylabel(f"offset d of {self.names[1]}, frames")
+        outside = Patch(facecolor="0.85", edgecolor="0.6", label="no path can pass")
+        handles = [self.path_, self.warp_, outside]
+        # On top of an image, whatever the style says of legends and grids.
+        self.ax_.legend(handles=handles, loc="best", fontsize="small", frameon=True)
+        self.ax_.grid(False)
+        self.colorbar_ = None
+        if colorbar:
+            self.colorbar_ = self.figure_.colorbar(self.image_, ax=self.ax_)
+            self.colorbar_.set_label("disparity E(p, d); dark: alike")
+        return self
+
+
+def _edges(centres):
+    """Where cells around evenly spaced centres begin and end."""
+    half = (centres[1] - centres[0]) / 2 if len(centres) > 1 else 0.5
+    return centres[0] - half, centres[-1] + half

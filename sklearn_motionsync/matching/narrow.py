@@ -1,0 +1,99 @@
+"""The same rows for so few pairs that NumPy's calls cost more than its arithmetic (Eqs. 16, 17).
+
+All steps to all cells of all rows are laid out at once, each step a group of its own, so that a
+row takes two calls. The band is computed whole: what lies outside the sequences is never on a
+winning path.
+"""
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+
+__all__ = ["NARROW_CELLS", "narrow_paths", "suits"]
+
+# Cells, for each group of steps, of a bundle that is narrow, and at most so many ways into them.
+NARROW_CELLS = 30_000
+_NARROW_WAYS = 1_000_000
+# Pairs so few that Python's steps cost less than NumPy's.
+_FEW_PAIRS = 2
+
+
+def suits(bundle):
+    """Whether all steps of all rows of a bundle may be laid out."""
+    trellis = bundle.trellis
+    n_steps = len(trellis.table.steps)
+    consecutive = n_steps == trellis.table.steps.max() + 1
+    cells = bundle.n_frames * (2 * trellis.width + 1) * bundle.pairs
+    few = cells <= NARROW_CELLS * len(trellis.groups) and cells * n_steps <= _NARROW_WAYS
+    return consecutive and few
+
+
+def narrow_paths(bundle):
+    """Disparities of the best paths of a bundle: (n_bases, n_moving, P)."""
+    trellis, pairs = bundle.trellis, bundle.pairs
+    ways, states = _ways(bundle), bundle.states(bundle.n_frames)
+    edge, item = trellis.pad * pairs, states.itemsize
+    # S(p - 1, d - k) of every cell, step by step.
+    before = as_strided(
+        states[:, edge + trellis.table.subframes * pairs :],
+        shape=ways.shape,
+        strides=(states.strides[0], -pairs * item, item),
+        writeable=False,
+    )
+    rows = states[:, edge : states.shape[1] - edge]
+    middle = slice(trellis.width * pairs, (trellis.width + 1) * pairs)
+    rows[0, middle] = ways[0, trellis.table.subframes, middle]
+    for p in range(1, bundle.n_frames):
+        way = np.add(ways[p], before[p - 1], out=ways[p])
+        np.minimum.reduce(way, axis=0, out=rows[p])
+    return _walk(bundle, ways)
+
+
+def _ways(bundle):
+    """Local costs, with the penalty, of every step to every cell: (P, n_steps, cells)."""
+    trellis, right = bundle.trellis, bundle.right
+    table, width = trellis.table, trellis.width
+    n_moving, n_factors = right.shape[1:]
+    padded = np.zeros((len(right) + 2 * width, n_moving, n_factors), right.dtype)
+    padded[width : width + len(right)] = right
+    windows = as_strided(
+        padded,
+        shape=(bundle.n_frames, 1, (2 * width + 1) * n_moving, n_factors),
+        strides=(table.subframes * padded.strides[0], 0, *padded.strides[1:]),
+        writeable=False,
+    )
+    ways = np.matmul(windows, bundle.bases.by_step)
+    ways = ways.reshape(bundle.n_frames, len(table.steps), -1)
+    # The first sample is reached by no step, so it pays no penalty.
+    ways[0] -= trellis.of_step[0, trellis.entry_of_step, np.newaxis]
+    return ways
+
+
+def _walk(bundle, ways):
+    """Disparities: at each sample the first of the best steps."""
+    trellis, pairs = bundle.trellis, bundle.pairs
+    order, (n_frames, _, n_cells) = trellis.table.steps, ways.shape
+    shift = trellis.slopes * pairs
+    here = trellis.width * pairs + np.arange(pairs)
+    at = np.empty((n_frames, pairs), dtype=np.intp)
+    at[-1] = here
+    if pairs <= _FEW_PAIRS:
+        charged = ways[:, order]
+        by_pair = charged.reshape(n_frames, len(order), -1, pairs)
+        by_pair += bundle.handicaps[:, np.newaxis]
+        won = shift.take(charged.argmin(axis=1))
+        for pair, cell in enumerate(here.tolist()):
+            for p in range(n_frames - 1, 0, -1):
+                cell -= won.item(p, cell)
+                at[p - 1, pair] = cell
+    else:
+        handicaps, flat = bundle.handicaps, ways.reshape(n_frames, -1)
+        # The cell of every entry of the step table; that of the first tells where the path is.
+        cells = here + (order * n_cells)[:, np.newaxis]
+        first = cells[0]
+        for p in range(n_frames - 1, 0, -1):
+            value = flat[p].take(cells)
+            value += handicaps
+            cells -= shift.take(value.argmin(axis=0))
+            at[p - 1] = first
+        at[:-1] -= order[0] * n_cells
+    return bundle.disparities(at // pairs - trellis.width)

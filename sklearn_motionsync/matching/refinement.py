@@ -1,0 +1,190 @@
+"""Refinement: from a good warp to the best one for sequences of a single source.
+
+Repeated trials of one source (a machine, a neuron, one trained athlete) show the same
+postures but for noise and gain, so postures can place a moment to a fraction of a frame.
+Different people do not: their postures differ by style, and following them misleads. The
+misfit tells which is the case.
+"""
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.linalg import solveh_banded
+
+from .filters import SMOOTHING, smooth
+from .warps import follow
+
+__all__ = ["choose_smoothing", "curvature", "misfit", "refine_warps"]
+
+# How much a rate is expected to change over the whole clip, in units of the mean rate.
+_RATE_CHANGE = 2.0
+# Steps end when no frame moves by more than a hundredth of one.
+_ITERATIONS = 20
+_LONGEST_STEP = 1.5
+_SHORTEST_STEP = 0.01
+# Gains are drawn towards 1 with this share of a feature's mean energy.
+_RIDGE = 0.01
+# Narrowest Gaussian that is one on a grid of frames.
+_LEAST_SIGMA = 0.35
+# The noise is measured on at most so many sequences.
+_SAMPLE = 256
+_SMOOTHINGS = (0.0, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04)
+
+
+def choose_smoothing(on_clock):
+    """Width of the smoothing that suits the noise, by generalised cross-validation.
+
+    Parameters
+    ----------
+    on_clock : ndarray, shape (n_sequences, P, n_features)
+
+    Returns
+    -------
+    float
+        Standard deviation of a Gaussian, in frames; 0 for none.
+    """
+    n_frames = on_clock.shape[1]
+    on_clock = on_clock[:: -(-len(on_clock) // _SAMPLE)]
+    best, chosen = np.inf, 0.0
+    for sigma in (share * (n_frames - 1) for share in _SMOOTHINGS):
+        # No smoothing at all leaves no residual to judge by: a little stands in for it.
+        used = max(sigma, _LEAST_SIGMA)
+        residual = np.square(on_clock - smooth(on_clock, used)).sum(dtype=np.float64)
+        score = residual / (1 - _gaussian(used).max()) ** 2
+        if score < best:
+            best, chosen = score, sigma
+    return chosen
+
+
+def misfit(base, moving, times):
+    """Share of the base's variance that matched postures leave, noise aside.
+
+    Parameters
+    ----------
+    base : ndarray, shape (P, n_features)
+    moving : ndarray, shape (n_sequences, P, n_features)
+    times : ndarray, shape (n_sequences, P)
+
+    Returns
+    -------
+    ndarray, shape (n_sequences,)
+        The slow part of the energy of the residuals, after fitting a gain and an offset to
+        every feature, less what white noise puts there, over the energy of the base.
+    """
+    matched = follow(moving.swapaxes(1, 2), times[:, np.newaxis]).swapaxes(1, 2)
+    residuals = base - _fit_gain(base, matched)[0]
+    sigma = max(SMOOTHING * (len(base) - 1), _LEAST_SIGMA)
+    slow = smooth(residuals, sigma)
+    # White noise leaves this share of its energy in the slow part, which is not misfit.
+    kernel = _gaussian(sigma)
+    left = np.square(kernel).sum()
+    share = left / (1 - 2 * kernel.max() + left)
+    fast_energy = np.square(residuals - slow).sum(axis=(1, 2))
+    slow_energy = np.square(slow).sum(axis=(1, 2)) - share * fast_energy
+    energy = np.square(base - base.mean(axis=0)).sum()
+    return np.maximum(slow_energy, 0) / energy if energy > 0 else np.zeros(len(moving))
+
+
+def refine_warps(base, moving, times, reach):
+    """Gauss-Newton steps along the tangent that bring matched postures together.
+
+    Each step solves for the whole warp at once::
+
+        sum_p |x_n(p) - g x_m(tau) - o - g x_m'(tau) (tau_new - tau)|^2 / s^2
+            + sum_p (tau_new''(p) / q)^2
+
+    with a gain g and an offset o for every feature, the noise s measured from the
+    residual, and q the change of rate to be expected. The ends stay pinned, the warp stays
+    non-decreasing and in the band; the largest rate of the trellis does not bind it.
+
+    Parameters
+    ----------
+    base : ndarray, shape (P, n_features)
+    moving : ndarray, shape (n_sequences, P, n_features)
+    times : ndarray, shape (n_sequences, P)
+        Warps to begin with.
+    reach : float
+        Largest offset, in frames.
+
+    Returns
+    -------
+    ndarray, shape (n_sequences, P)
+    """
+    n_frames, n_features = base.shape
+    if n_frames < 5:
+        return times
+    frames = np.arange(n_frames)
+    low, high = np.maximum(frames - reach, 0), np.minimum(frames + reach, n_frames - 1)
+    rounding = np.square(16 * np.finfo(base.dtype).eps) * np.square(base).mean()
+    splines = CubicSpline(frames, moving, axis=1).c.astype(moving.dtype)
+    refined = times.astype(np.float64)
+    active = np.arange(len(moving))
+    for _ in range(_ITERATIONS):
+        values, tangents = _evaluate(splines, active, refined[active])
+        fitted, gain = _fit_gain(base, values)
+        slope, residual = gain * tangents, base - fitted
+        noise = np.square(residual).sum(axis=(1, 2)) / (n_frames * n_features)
+        pull = np.square(slope).sum(axis=2)[:, 1:-1]
+        going = (noise > rounding) & pull.any(axis=1)
+        active, noise, pull = active[going], noise[going], pull[going]
+        if len(active) == 0:
+            break
+        push = (slope[going] * residual[going]).sum(axis=2)[:, 1:-1]
+        stiffness = np.maximum(noise * (n_frames / _RATE_CHANGE) ** 2, 1e-9 * pull.mean(axis=1))
+        steps = _solve(refined[active, 1:-1], pull, push, stiffness)
+        tau = refined[active]
+        tau[:, 1:-1] += np.clip(steps, -_LONGEST_STEP, _LONGEST_STEP)
+        refined[active] = np.maximum.accumulate(np.clip(tau, low, high), axis=1)
+        active = active[np.abs(steps).max(axis=1) >= _SHORTEST_STEP]
+    return refined
+
+
+def _evaluate(splines, active, times):
+    """Cubic splines on whole frames, and their derivatives, each at times of its own."""
+    left = np.clip(times.astype(np.intp), 0, splines.shape[1] - 1)
+    x = (times - left).astype(splines.dtype)[:, :, np.newaxis]
+    a, b, c, d = splines[:, left, active[:, np.newaxis]]
+    return ((a * x + b) * x + c) * x + d, (3 * a * x + 2 * b) * x + c
+
+
+def _solve(inner, pull, push, stiffness):
+    """Steps of all warps: their systems, one below the other, are a single banded one."""
+    n_frames = inner.shape[1] + 2
+    band, border = curvature(n_frames)
+    system = band[:, np.newaxis] * stiffness[:, np.newaxis]
+    system[-1] += pull
+    target = pull * inner + push - stiffness[:, np.newaxis] * border
+    solved = solveh_banded(system.reshape(3, -1), target.ravel())
+    return solved.reshape(inner.shape) - inner
+
+
+def _gaussian(sigma):
+    """Weights of a Gaussian filter."""
+    reach = int(np.ceil(4 * sigma))
+    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
+    return weights / weights.sum()
+
+
+def _fit_gain(base, matched):
+    """``g * matched + o``, and ``g``: least squares, gains drawn a little towards 1.
+
+    ``matched`` is (n_sequences, P, n_features), ``g`` (n_sequences, 1, n_features).
+    """
+    x, y = base - base.mean(axis=0), matched - matched.mean(axis=1, keepdims=True)
+    energy = np.square(y).sum(axis=1, keepdims=True)
+    ridge = _RIDGE * energy.mean(axis=2, keepdims=True)
+    # Nothing moves: any gain fits.
+    ridge[ridge == 0] = 1
+    gain = ((x * y).sum(axis=1, keepdims=True) + ridge) / (energy + ridge)
+    return gain * y + base.mean(axis=0), gain
+
+
+def curvature(n_frames):
+    """``sum (tau'')^2`` for free inner frames: upper band, and what the pinned ends add."""
+    band = np.zeros((3, n_frames - 2))
+    band[2] = 6
+    band[2, [0, -1]] = 5
+    band[1, 1:] = -4
+    band[0, 2:] = 1
+    border = np.zeros(n_frames - 2)
+    border[-2:] = 1, -2
+    return band, border * (n_frames - 1)

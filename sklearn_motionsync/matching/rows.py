@@ -1,0 +1,305 @@
+"""The rows of the trellis for a bundle of pairs (Eqs. 16 and 17): the inner loop of the matching.
+
+What the code relies on:
+
+- A row ``S(p, .)`` looks only at the row before it, so it is computed for all offsets and all
+  pairs of the bundle at once.
+- Rows are flat, the offset first and the pair last: the cells before a step are one slice.
+- Local costs are matrix products of a left factor (the bases) and a right one (the moving
+  sequences). Steps of equal weights form a group and share one; penalties that a whole group
+  pays are in the product.
+"""
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+__all__ = ["PRODUCT_ROWS", "Bases", "Bundle", "group_steps", "right_factor"]
+
+# Samples of a single base that share one product.
+PRODUCT_ROWS = 16
+# Ties: costs of paths that differ by less than this share of all energy are equal. Rounding to
+# double precision moves them by a thousandth of it; in single precision there is no room between
+# rounding and data, so that rounding decides.
+_TIE = {np.dtype(np.float64): 2.0**-40, np.dtype(np.float32): 0.0}
+
+
+class Bases:
+    """Base sequences, and the left factors of their local costs, computed when first asked for.
+
+    Parameters
+    ----------
+    trellis : Trellis
+    sequences : ndarray, shape (n_bases, P, n_features)
+    """
+
+    def __init__(self, trellis, sequences):
+        self.trellis, self.sequences = trellis, sequences
+
+    def __len__(self):
+        return len(self.sequences)
+
+    def __getstate__(self):
+        # What can be computed again is neither sent away nor saved.
+        return {"trellis": self.trellis, "sequences": self.sequences}
+
+    def part(self, rows):
+        """Some of them, by a slice."""
+        if rows == slice(0, len(self)):
+            return self
+        return Bases(self.trellis, self.sequences[rows])
+
+    @functools.cached_property
+    def energy(self):
+        """``sum_p |x_n(p)|^2``: (n_bases,)."""
+        return np.einsum("npk,npk->n", self.sequences, self.sequences)
+
+    @functools.cached_property
+    def by_group(self):
+        """The left factor of every group of steps."""
+        weights = [(group.moving, group.inner, group.penalty) for group in self.trellis.groups]
+        return _left_factor(self.sequences, *zip(*weights, strict=True))
+
+    @functools.cached_property
+    def by_step(self):
+        """The left factor of every step, steps in order."""
+        penalty, moving, inner = self.trellis.of_step[:, self.trellis.entry_of_step]
+        return _left_factor(self.sequences, moving, inner, penalty)
+
+
+class Bundle:
+    """The pairs of one tile, whose rows are computed together.
+
+    A row holds the disparities of all pairs, flat: (2 * (width + pad) + 1, n_moving,
+    n_bases), with ``pad`` cells at both sides for the steps that leave the band.
+    """
+
+    def __init__(self, trellis, bases, right):
+        self.trellis, self.bases, self.right = trellis, bases, right
+        self.n_bases, self.n_frames = bases.sequences.shape[:2]
+        self.dtype = bases.sequences.dtype
+        self.pairs = right.shape[1] * self.n_bases
+        self.centre = trellis.width + trellis.pad
+        self.row_cells = (2 * self.centre + 1) * self.pairs
+
+    @functools.cached_property
+    def handicaps(self):
+        """What the back-tracking charges the steps of every pair: (n_steps, n_pairs).
+
+        The entries of the step table, one after the other, pay a little more, so that the first of
+        equal ones wins. Two bundles that hold the same pair round differently, but both far less
+        than this.
+        """
+        energy = self.right[..., -2].sum(axis=0)[:, np.newaxis] + self.bases.energy
+        rank = np.arange(len(self.trellis.slopes), dtype=self.dtype)[:, np.newaxis]
+        return _TIE[self.dtype] * rank * energy.ravel()
+
+    def states(self, n_rows):
+        """Rows of cells that no path has reached."""
+        return np.full((n_rows, self.row_cells), np.inf, dtype=self.dtype)
+
+    def cost(self, states):
+        """Costs of the best paths, from the last row."""
+        at = self.centre * self.pairs
+        best = states[(self.n_frames - 1) % len(states), at : at + self.pairs]
+        return np.maximum(best, 0).reshape(-1, self.n_bases).T
+
+    # -- forward: the recurrence, Eq. 16 --------------------------------------
+
+    def advance(self, states, first=0, last=None):
+        """Compute the rows ``S(p, .)`` from ``first`` on, before ``last``, in a ring of rows.
+
+        Yields every p when its row is there. If ``first`` is not 0 its row must be there already.
+        Cells that no path reaches stay infinite: the windows first only grow, over
+        cells never written, then only shrink, reading inside the row before.
+        """
+        pairs, rows, keep = self.pairs, list(states), len(states)
+        plan = [_plan(group, pairs, states.dtype) for group in self.trellis.groups]
+        room, level = np.empty((2, (2 * self.trellis.width + 1) * pairs), dtype=states.dtype)
+        last = self.n_frames if last is None else last
+        costs = self.costs_of_samples if self.n_bases > 1 else self.costs_of_blocks
+        lows, highs = self.trellis.windows(self.n_frames)
+        rest = plan[1:]
+        for p, local in costs(first, last, lows, highs):
+            start = (self.centre + lows[p]) * pairs
+            stop = (self.centre + highs[p] + 1) * pairs
+            new, old = rows[p % keep][start:stop], rows[(p - 1) % keep]
+            if p == 0:
+                unit = self.trellis.unit_group
+                np.subtract(local[unit], self.trellis.groups[unit].penalty, out=new)
+            elif p > first:
+                best = _best_step(old, start, stop, plan[0], new, level)
+                np.add(best, local[0], out=new)
+                for i, levels in enumerate(rest, 1):
+                    trial = room[: stop - start]
+                    best = _best_step(old, start, stop, levels, trial, level)
+                    np.minimum(new, np.add(best, local[i], out=trial), out=new)
+            yield p
+
+    def costs_of_samples(self, first, last, lows, highs):
+        """Yield ``p`` and the costs of its window, one flat array a group: a product a sample."""
+        sub, n_groups = self.trellis.table.subframes, len(self.trellis.groups)
+        n_factors = self.right.shape[2]
+        widest = (2 * self.trellis.width + 1) * self.pairs
+        room = np.empty(n_groups * widest, dtype=self.dtype)
+        for p in range(first, last):
+            window = self.right[p * sub + lows[p] : p * sub + highs[p] + 1]
+            factor = window.reshape(-1, n_factors)
+            costs = room[: n_groups * len(factor) * self.n_bases].reshape(n_groups, -1)
+            products = costs.reshape(n_groups, -1, self.n_bases)
+            np.matmul(factor, self.bases.by_group[p], out=products)
+            yield p, costs
+
+    def costs_of_blocks(self, first, last, lows, highs):
+        """The same for a single base: a product a block of samples."""
+        sub, n_groups = self.trellis.table.subframes, len(self.trellis.groups)
+        n_factors = self.right.shape[2]
+        for start in range(first, last, PRODUCT_ROWS):
+            # Whole blocks even if their end is not asked for: equal products, equal bits.
+            stop = min(start + PRODUCT_ROWS, self.n_frames)
+            # The ends of the windows never move back.
+            lowest = start * sub + lows[start]
+            highest = (stop - 1) * sub + highs[stop - 1]
+            factor = self.right[lowest : highest + 1].reshape(-1, n_factors)
+            left = self.bases.by_group[start:stop].reshape(-1, n_factors)
+            costs = np.matmul(left, factor.T).reshape(stop - start, n_groups, -1)
+            for p, rows in zip(range(start, min(stop, last)), costs, strict=False):
+                at = p * sub - lowest
+                low, high = at + lows[p], at + highs[p] + 1
+                yield p, rows[:, low * self.pairs : high * self.pairs]
+
+    # -- backward: the path, Eq. 17 -------------------------------------------
+
+    def paths(self, max_bytes):
+        """Disparities of the best paths: (n_bases, n_moving, P).
+
+        If not all rows may be kept, every ``length``-th is, and the rows between two of them
+        are computed again, from the last to the first.
+        """
+        n_frames, length = self.n_frames, self.n_frames
+        if self.row_cells * n_frames * self.dtype.itemsize > max_bytes:
+            length = PRODUCT_ROWS * math.ceil(math.sqrt(n_frames) / PRODUCT_ROWS)
+        states = self.states(n_frames if length >= n_frames else 2)
+        kept = {}
+        for p in self.advance(states):
+            if length < n_frames and p % length == 0:
+                kept[p] = states[p % 2].copy()
+        at = np.empty((n_frames, self.pairs), dtype=np.intp)
+        at[-1] = self.centre * self.pairs + np.arange(self.pairs)
+        for first in range(0, n_frames, length)[::-1]:
+            last = min(first + length, n_frames)
+            if kept:
+                states = self.states(length)
+                states[first % length] = kept.pop(first)
+                for _ in self.advance(states, first, last):
+                    pass
+            self._retrace(states, at, first, last)
+        return self.disparities(at // self.pairs - self.centre)
+
+    def _retrace(self, states, at, first, last):
+        """Follow the paths back from row ``last`` to ``first``: the step that won each time."""
+        trellis, pairs = self.trellis, self.pairs
+        several = len(trellis.groups) > 1
+        shift = trellis.slopes * pairs
+        back = shift[:, np.newaxis]
+        penalties, weight, inner = trellis.of_step.astype(states.dtype)[:, :, np.newaxis]
+        charges = penalties + self.handicaps
+        moving, base = np.divmod(np.arange(pairs), self.n_bases)
+        start = min(last, self.n_frames - 1)
+        here = at[start]
+        for p in range(start, first, -1):
+            value = states[(p - 1) % len(states)].take(here - back)
+            value += charges
+            if several:
+                q = p * trellis.table.subframes + here // pairs - self.centre
+                y, x = self.right[q, moving], self.bases.sequences[base, p]
+                value += weight * y[:, -2]
+                value -= inner * np.einsum("ik,ik->i", x, y[:, :-2])
+            here = here - shift.take(value.argmin(axis=0))
+            at[p - 1] = here
+
+    def disparities(self, at):
+        """(n_bases, n_moving, P), pair by pair, from (P, pairs)."""
+        return at.T.reshape(-1, self.n_bases, self.n_frames).swapaxes(0, 1)
+
+
+class _Group(NamedTuple):
+    """Steps whose local cost is the same; what their penalties have in common belongs to it."""
+
+    moving: float
+    inner: float
+    penalty: float
+    levels: list
+
+
+def group_steps(table, mu):
+    """Groups of steps of equal weights, and the group of every step."""
+    weights = np.column_stack([table.moving, table.inner])
+    unique, group_of_step = np.unique(weights, axis=0, return_inverse=True)
+    group_of_step = group_of_step.ravel()
+    slopes = table.steps - table.subframes
+    groups = []
+    for i, (moving, inner) in enumerate(unique):
+        mine = group_of_step == i
+        penalties = mu * table.penalty[mine]
+        least = penalties.min()
+        levels = [
+            (float(value - least), slopes[mine][penalties == value].tolist())
+            for value in np.unique(penalties)[::-1]
+        ]
+        groups.append(_Group(moving, inner, float(least), levels))
+    return groups, group_of_step
+
+
+def _plan(group, pairs, dtype):
+    """The levels of a group for flat rows; arrays spare NumPy the conversion of numbers."""
+    return [
+        (np.array(penalty, dtype) if penalty else None, [k * pairs for k in slopes])
+        for penalty, slopes in group.levels
+    ]
+
+
+def _best_step(old, start, stop, levels, out, scratch):
+    """``min_s S(p-1, d - k_s) + mu phi_s`` over the steps of one group.
+
+    ``levels`` come by falling penalty; what all steps have in common is not in them. The
+    result is in ``out``, or in ``old`` itself where there is nothing to compute.
+    """
+    best = None
+    for penalty, (shift, *others) in levels:
+        view = old[start - shift : stop - shift]
+        target = out if best is None else scratch[: stop - start]
+        for other in others:
+            view = np.minimum(view, old[start - other : stop - other], out=target)
+        if penalty is not None:
+            view = np.add(view, penalty, out=target)
+        best = view if best is None else np.minimum(best, view, out=out)
+    return best
+
+
+def right_factor(moving):
+    """(Q, n_moving, n_features + 2): x_m(q), |x_m(q)|^2 and 1."""
+    n_moving, n_positions, n_features = moving.shape
+    right = np.empty((n_positions, n_moving, n_features + 2), dtype=moving.dtype)
+    right[..., :-2] = moving.transpose(1, 0, 2)
+    np.einsum("mqk,mqk->qm", moving, moving, out=right[..., -2])
+    right[..., -1] = 1
+    return right
+
+
+def _left_factor(bases, moving, inner, penalty):
+    """(P, n_groups, n_features + 2, n_bases): times the right factor, the local costs.
+
+    Given the weights of |x_m|^2 and of the inner product, and the penalty, of every group.
+    """
+    n_bases, n_frames, n_features = bases.shape
+    shape = n_frames, len(moving), n_features + 2, n_bases
+    left = np.empty(shape, dtype=bases.dtype)
+    frames, energy = bases.transpose(1, 2, 0), np.einsum("npk,npk->pn", bases, bases)
+    moving, inner, penalty = np.asarray([moving, inner, penalty], dtype=bases.dtype)
+    np.multiply(frames[:, np.newaxis], -inner[:, np.newaxis, np.newaxis], out=left[:, :, :-2])
+    left[:, :, -2] = moving[:, np.newaxis]
+    np.add(energy[:, np.newaxis], penalty[:, np.newaxis], out=left[:, :, -1])
+    return left

@@ -1,0 +1,175 @@
+"""Dense matching of two sequences by dynamic programming (Eqs. 12-17).
+
+NumPy only; nothing here knows scikit-learn. All sequences are already linearly
+normalised (Eq. 7): a *base* ``n`` has ``P`` samples, a *moving* sequence ``m``
+has ``Q = (P - 1) * subframes + 1`` of them on the same interval. Sample ``p`` of
+the base meets position ``q = p * subframes + d`` of the moving sequence; ``d``
+is the disparity. A path makes one step ``s = q(p) - q(p - 1)`` a sample, the
+local rate being ``rho = s / subframes``, and costs::
+
+    sum_p  |x_n(p)|^2 + b_s |x_m(q)|^2 - g_s <x_n(p), x_m(q)> + mu phi(rho)
+
+Invariants the code relies on:
+
+- Both ends are pinned (Eq. 9) and no step is negative. A path that leaves
+  ``0 <= q < Q`` can therefore never come back, so Eq. 14's infinite cost outside
+  needs no test: whatever finite number stands there is never on a winning path.
+- A step looks only at the row before it. A row has no dependency inside
+  itself and is computed for all bases, disparities and moving sequences at once.
+- The sequence index is stored last, so that every window of ``q`` is one
+  contiguous slice for all moving sequences together.
+"""
+
+import numpy as np
+
+from . import narrow
+from .rows import Bases, Bundle, group_steps, right_factor
+from .warps import even_slices
+
+__all__ = ["Trellis"]
+
+# Sizes of one tile of pairs: the matrix product of a row stays below the size from which OpenBLAS
+# packs its operands (1.0 against 0.7 ns a cell), and has enough columns. Constants, so that no
+# result can depend on the number of workers or on the memory of the machine.
+TILE_PRODUCT = 1_000_000
+TILE_BASES = 48
+# Fewer bases than this make thin products: a single one is better, if its row is long.
+_FEW_BASES, LONG_ROW = 8, 1024
+
+
+class Trellis:
+    """The disparity-space trellis (Fig. 2) of base sequences against moving ones.
+
+    Parameters
+    ----------
+    table : StepTable
+    mu : float
+        Weight of the rate penalty.
+    max_disparity : int
+        ``D``, the largest offset, in frames.
+    """
+
+    def __init__(self, table, mu, max_disparity):
+        self.table, self.mu = table, mu
+        self.reach = max_disparity
+        self.width = max_disparity * table.subframes
+        self.groups, group_of_step = group_steps(table, mu)
+        # Of every step: its penalty, and the weights of |x_m|^2 and of the inner product.
+        self.of_step = np.stack([mu * table.penalty, table.moving, table.inner])
+        self.entry_of_step = np.argsort(table.steps)
+        # By how much it changes the disparity; ``pad`` cells at both ends of a row hold infinity.
+        self.slopes = table.steps - table.subframes
+        self.pad = int(np.abs(self.slopes).max())
+        self.unit_group = group_of_step[self.slopes == 0][0]
+        self._windows = {}
+
+    def distances(self, bases, moving):
+        """Cost of the best path for every ordered pair.
+
+        Parameters
+        ----------
+        bases : ndarray, shape (n_bases, P, n_features)
+        moving : ndarray, shape (n_moving, Q, n_features)
+
+        Returns
+        -------
+        ndarray, shape (n_bases, n_moving)
+        """
+        out = np.empty((len(bases), len(moving)), dtype=bases.dtype)
+        for rows, columns, bundle in self.bundles(Bases(self, bases), moving):
+            states = bundle.states(2)
+            for _ in bundle.advance(states):
+                pass
+            out[rows, columns] = bundle.cost(states)
+        return out
+
+    def paths(self, bases, moving, max_bytes=1 << 29):
+        """Best path for every ordered pair.
+
+        Parameters
+        ----------
+        bases : Bases, or ndarray, shape (n_bases, P, n_features)
+        moving : ndarray, shape (n_moving, Q, n_features)
+        max_bytes : int, default=2 ** 29
+            Above this the rows of the trellis are not all kept but computed twice.
+
+        Returns
+        -------
+        ndarray of int32, shape (n_bases, n_moving, P)
+            ``d(p)`` in sub-positions; ``d(0) = d(P-1) = 0``. It depends on the pair alone: what
+            other pairs are given changes rounding, and in double precision rounding decides
+            nothing.
+        """
+        if not isinstance(bases, Bases):
+            bases = Bases(self, bases)
+        shape = len(bases), len(moving), bases.sequences.shape[1]
+        disparities = np.empty(shape, dtype=np.int32)
+        for rows, columns, bundle in self.bundles(bases, moving):
+            few = narrow.suits(bundle)
+            found = narrow.narrow_paths(bundle) if few else bundle.paths(max_bytes)
+            disparities[rows, columns] = found
+        return disparities
+
+    def costs(self, base, moving, disparities):
+        """Cost of given paths from one base (Eq. 12), added up frame by frame, pair by pair.
+
+        Parameters
+        ----------
+        base : ndarray, shape (P, n_features)
+        moving : ndarray, shape (n_moving, Q, n_features)
+        disparities : ndarray of int, shape (n_moving, P)
+
+        Returns
+        -------
+        ndarray, shape (n_moving,)
+        """
+        n_moving, n_positions, n_features = moving.shape
+        q = disparities + self.table.subframes * np.arange(len(base))
+        entry = self.entry_of_step.take(q[:, 1:] - q[:, :-1])
+        penalty, _, inner = self.of_step
+        of_all = (q + n_positions * np.arange(n_moving)[:, np.newaxis]).ravel()
+        differences = moving.reshape(-1, n_features).take(of_all, axis=0).reshape(*q.shape, -1)
+        if len(self.groups) > 1:
+            differences[:, 1:] *= (inner / 2).take(entry)[:, :, np.newaxis]
+        differences -= base
+        np.square(differences, out=differences)
+        local = differences.reshape(n_moving, -1).sum(axis=1)
+        return local + penalty.take(entry).sum(axis=1).astype(local.dtype)
+
+    def tiles(self, n_bases, n_moving, n_features):
+        """Slices of bases and of moving sequences that cover all pairs.
+
+        What a pair costs depends in its last bit on the tile it is computed in: work is
+        to be divided between tiles only.
+        """
+        band = 2 * self.width + 1
+        cells = max(1, TILE_PRODUCT // (band * (n_features + 2)))
+        n_rows = min(cells, TILE_BASES)
+        if min(n_rows, n_bases) < _FEW_BASES and band * min(cells, n_moving) >= LONG_ROW:
+            n_rows = 1
+        for rows in even_slices(n_bases, n_rows):
+            for columns in even_slices(n_moving, max(1, cells // (rows.stop - rows.start))):
+                yield rows, columns
+
+    def cells(self, moving):
+        """Cells of the trellis of one pair."""
+        return (moving.shape[1] // self.table.subframes) * (2 * self.width + 1)
+
+    def bundles(self, bases, moving):
+        """Yield the slices of every tile of pairs, and the bundle of its rows."""
+        for rows, columns in self.tiles(len(bases), *moving.shape[::2]):
+            right = right_factor(moving[columns])
+            yield rows, columns, Bundle(self, bases.part(rows), right)
+
+    def windows(self, n_frames):
+        """Lowest and highest disparity, at every sample, of a pinned path in the band."""
+        known = self._windows.get(n_frames)
+        if known is not None:
+            return known
+        p = np.arange(n_frames)
+        down, up = self.table.subframes * p, int(self.slopes.max()) * p
+        low = -np.minimum(self.width, np.minimum(down, up[::-1]))
+        high = np.minimum(self.width, np.minimum(up, down[::-1]))
+        windows = low.tolist(), high.tolist()
+        self._windows = {n_frames: windows}
+        return windows

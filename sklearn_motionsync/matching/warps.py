@@ -1,0 +1,80 @@
+"""Warps: sequences sampled along them (Eqs. 7 and 18), and warps read at other times."""
+
+import itertools
+
+import numpy as np
+
+__all__ = ["even_slices", "follow", "normalise", "sample"]
+
+# Sequences sampled together: bounds the memory of what stands in between.
+_SAMPLED_AT_ONCE = 64
+
+
+def normalise(arrays, n_frames, subframes=1):
+    """Linear normalisation (Eq. 7): every sequence at the same times of its course.
+
+    Parameters
+    ----------
+    arrays : list of ndarray (n_frames_i, n_features)
+    n_frames : int
+        ``P``, frames of the clock.
+    subframes : int, default=1
+        Positions a frame.
+
+    Returns
+    -------
+    ndarray, shape (n_sequences, (P - 1) * subframes + 1, n_features)
+    """
+    if subframes == 1 and all(len(x) == n_frames for x in arrays):
+        return np.stack(arrays)
+    times = np.arange((n_frames - 1) * subframes + 1) / subframes
+    return sample(arrays, np.broadcast_to(times, (len(arrays), len(times))), n_frames)
+
+
+def sample(arrays, times, n_frames):
+    """Sequences at times on a clock of ``n_frames``, the first and last frame being theirs too.
+
+    Parameters
+    ----------
+    arrays : list of ndarray (n_frames_i, n_features)
+    times : ndarray, shape (n_sequences, n_times)
+        From 0 to ``n_frames - 1``.
+    n_frames : int
+
+    Returns
+    -------
+    ndarray, shape (n_sequences, n_times, n_features)
+    """
+    out = np.empty((len(arrays), times.shape[1], arrays[0].shape[1]), dtype=arrays[0].dtype)
+    for rows in even_slices(len(arrays), _SAMPLED_AT_ONCE):
+        _sample(arrays[rows], times[rows], n_frames, out[rows])
+    return out
+
+
+def _sample(arrays, times, n_frames, out):
+    last = np.array([len(x) for x in arrays])[:, np.newaxis] - 1
+    # In this order a whole number of frames stays whole.
+    at = times * last / (n_frames - 1)
+    left = np.minimum(at.astype(np.intp), last - 1)
+    weight = (at - left).astype(out.dtype)[:, :, np.newaxis]
+    frames = np.concatenate(arrays)
+    left += np.cumsum(last + 1)[:, np.newaxis] - (last + 1)
+    np.multiply(frames[left], 1 - weight, out=out)
+    left += 1
+    out += frames[left] * weight
+
+
+def even_slices(n, size):
+    """Slices that cover ``n`` items: as few as can be of at most ``size``, of even sizes."""
+    count = -(-n // size)
+    edges = [i * n // count for i in range(count + 1)] if count else []
+    return [slice(start, stop) for start, stop in itertools.pairwise(edges)]
+
+
+def follow(warps, times):
+    """Piecewise-linear warps ``(..., P)`` read at times ``(..., P')`` in frames."""
+    left = np.clip(times.astype(np.intp), 0, warps.shape[-1] - 2)
+    weight = times - left
+    low = np.take_along_axis(warps, left, axis=-1)
+    high = np.take_along_axis(warps, left + 1, axis=-1)
+    return low * (1 - weight) + high * weight

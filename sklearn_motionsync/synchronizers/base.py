@@ -1,0 +1,282 @@
+"""Synchronizer: the clock, the pattern and the warp to it, which all share (Eqs. 6, 7, 18)."""
+
+from numbers import Integral
+from typing import NamedTuple
+
+import numpy as np
+from sklearn.base import BaseEstimator, TransformerMixin, _fit_context
+from sklearn.utils._param_validation import Interval, StrOptions
+from sklearn.utils.validation import check_is_fitted
+
+from ..fitting import at_once
+from ..matching.median import Median, median_of
+from ..matching.warps import normalise
+from ..notebook import DocumentedMixin
+from ..performances import Performances, SequenceLevelMixin, restore
+
+__all__ = ["Clock", "Synchronizer"]
+
+
+class Clock(NamedTuple):
+    """A training set on the common clock.
+
+    Attributes
+    ----------
+    performances : Performances
+    on_clock : ndarray, shape (n_sequences, P, n_features)
+        Linearly normalised (Eq. 7).
+    given : ndarray, shape (n_frames, n_features), or None
+        The pattern, if it was given as an array.
+    """
+
+    performances: Performances
+    on_clock: np.ndarray
+    given: np.ndarray | None
+
+
+class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEstimator):
+    """Base of all synchronizers: a subclass only says how it matches.
+
+    From its ``match`` it gets ``fit``, which chooses the pattern after linear normalisation,
+    ``transform``, pandas output, and what scorers and displays need. Parameters of its own, it
+    takes in an ``__init__`` of its own; they are checked if it adds them to
+    ``_parameter_constraints``, as in scikit-learn.
+
+    Parameters
+    ----------
+    n_frames : int, default=None
+        Frames of the common clock; by default the median length of the performances, or
+        the length of a pattern given as an array.
+    pattern : "median", int or array (n_frames, n_features), default="median"
+        The performance with the smallest sum of squared distances to all others after linear
+        normalisation, one chosen by its index, or another one.
+
+    Attributes
+    ----------
+    pattern_ : ndarray, shape (P, n_features)
+        The pattern on the common clock.
+    pattern_index_ : int or None
+        Its index in the training set; None if it was given as an array.
+    n_frames_ : int
+        ``P``.
+    global_distances_ : ndarray, shape (n_sequences,)
+        Sum of the distances of each performance to all others; NaN if the pattern was given.
+    n_features_in_ : int
+        Features of a frame (columns, for 2-D input).
+    feature_names_in_ : ndarray of str
+        Names of the features; only if the input had names.
+
+    See Also
+    --------
+    Match : What ``match`` gives.
+    DenseSynchronizer : The one to use.
+
+    Examples
+    --------
+    A synchronizer that lets the largest value of the first feature coincide.
+
+    >>> import numpy as np
+    >>> from sklearn_motionsync import Match, Synchronizer
+    >>> class PeakSynchronizer(Synchronizer):
+    ...     def match(self, X):
+    ...         peaks = self.normalize(X)[:, 1:-1, 0].argmax(axis=1) + 1
+    ...         peak, last = self.pattern_[1:-1, 0].argmax() + 1, self.n_frames_ - 1
+    ...         frames = np.arange(self.n_frames_)
+    ...         return Match([np.interp(frames, [0, peak, last], [0, p, last]) for p in peaks])
+    >>> X = [np.eye(9)[[2]].T, np.eye(9)[[4]].T]
+    >>> PeakSynchronizer(pattern=0).fit_transform(X).argmax(axis=1).ravel().tolist()
+    [2, 2]
+    """
+
+    _parameter_constraints: dict = {
+        "n_frames": [Interval(Integral, 2, None, closed="left"), None],
+        "pattern": [
+            StrOptions({"median"}),
+            Interval(Integral, 0, None, closed="left"),
+            "array-like",
+        ],
+    }
+
+    def __init__(self, n_frames=None, pattern="median"):
+        self.n_frames = n_frames
+        self.pattern = pattern
+
+    @at_once
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X, y=None):
+        """Choose the pattern, the performance whose clock all others will follow.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+        y : ignored
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        ValueError
+            If the input breaks the contract, or the pattern does not exist or fit.
+        """
+        self._learn(self.check_performances(X, reset=True))
+        return self
+
+    fit_transform = at_once(TransformerMixin.fit_transform)
+
+    def transform(self, X):
+        """Warp performances onto the clock of the pattern (Eq. 18).
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P, n_features)
+            ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
+            ``set_output(transform="pandas")``.
+        """
+        return self._warp(X)
+
+    def match(self, X):
+        """Match performances to the pattern.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+
+        Returns
+        -------
+        Match
+            ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
+            the pattern, both on performances linearly normalised to its length (Eq. 7), and
+            ``distances``, shape (n_sequences,). tau is non-decreasing, ``tau(0) = 0``,
+            ``tau(P-1) = P-1``.
+        """
+        raise NotImplementedError(
+            f"{type(self).__name__} does not say how it matches: give it match(self, X), which "
+            "returns a Match."
+        )
+
+    def normalize(self, X):
+        """Normalise performances linearly to the clock of the pattern, without matching (Eq. 7).
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P, n_features)
+            One feature for the rows of a 2-D array.
+        """
+        return normalise(self.check_performances(X), self.n_frames_)
+
+    def get_feature_names_out(self, input_features=None):
+        """Names of the outputs: the features of a frame; for 2-D input, one name a frame.
+
+        Parameters
+        ----------
+        input_features : array-like of str, default=None
+            Names of the features, by default those seen in ``fit``, or x0, x1, ...
+
+        Returns
+        -------
+        ndarray of str
+        """
+        check_is_fitted(self)
+        names = getattr(self, "feature_names_in_", None)
+        if input_features is not None:
+            if len(input_features) != self.n_features_in_:
+                raise ValueError(
+                    "input_features should have length equal to number of features "
+                    f"({self.n_features_in_}), got {len(input_features)}."
+                )
+            if names is not None and not np.array_equal(names, input_features):
+                raise ValueError("input_features is not equal to feature_names_in_.")
+            names = input_features
+        if self._fitted_on_rows:
+            names = [f"{type(self).__name__.lower()}{p}" for p in range(self.n_frames_)]
+        elif names is None:
+            names = [f"x{i}" for i in range(self.n_features_in_)]
+        return np.asarray(names, dtype=object)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.three_d_array = True
+        tags.transformer_tags.preserves_dtype = ["float64", "float32"]
+        return tags
+
+    def _learn(self, performances):
+        """All that ``fit`` learns of checked performances."""
+        clock = self._set_clock(performances)
+        self._set_pattern(clock, self._plain_median(clock.on_clock))
+
+    def _warp(self, X, **params):
+        performances = self.check_performances(X)
+        out = self.match(performances, **params).warp(performances)
+        if performances.kind == "rows":
+            return out[:, :, 0]
+        return restore(self, performances, out, frames=range(out.shape[1]))
+
+    # -- steps of a fit ---------------------------------------------------------------------
+
+    def _set_clock(self, performances):
+        """How many frames the clock has, and the performances on it."""
+        given = self._given_pattern(performances)
+        if self.n_frames is not None:
+            self.n_frames_ = int(self.n_frames)
+        else:
+            self.n_frames_ = int(np.median([len(x) for x in performances]))
+            if given is not None:
+                self.n_frames_ = len(given)
+        return Clock(performances, normalise(performances, self.n_frames_), given)
+
+    def _given_pattern(self, performances):
+        """The pattern as an array, if that is what was given; indices are checked."""
+        pattern = self.pattern
+        if isinstance(pattern, str):
+            return None
+        if isinstance(pattern, Integral):
+            if pattern >= len(performances):
+                raise ValueError(
+                    f"pattern={pattern} is out of range: there are {len(performances)} "
+                    f"performances, the last has index {len(performances) - 1}."
+                )
+            return None
+        pattern = np.asarray(pattern, dtype=performances[0].dtype)
+        pattern = pattern[:, np.newaxis] if pattern.ndim == 1 else pattern
+        width = performances[0].shape[1]
+        if pattern.ndim != 2 or len(pattern) < 2 or pattern.shape[1] != width:
+            raise ValueError(
+                f"A pattern given as an array must have shape (n_frames, {width}) with at least 2 "
+                f"frames, like the performances; got {pattern.shape}."
+            )
+        if not np.isfinite(pattern).all():
+            raise ValueError("The pattern has NaN or infinite values; interpolate its gaps.")
+        return pattern
+
+    @property
+    def _wants_median(self):
+        return isinstance(self.pattern, str)
+
+    def _plain_median(self, sequences):
+        """The median performance (Eq. 19) without matching; nothing if it is not asked for."""
+        if not self._wants_median:
+            return Median.unknown(len(sequences))
+        return median_of(sequences)
+
+    def _set_pattern(self, clock, median):
+        """Take the median, or what was given, as the pattern; it is returned at its own pace."""
+        self.global_distances_ = median.distances
+        self.pattern_index_ = median.index if self._wants_median else None
+        if not self._wants_median and clock.given is None:
+            self.pattern_index_ = int(self.pattern)
+        source = clock.given
+        if source is None:
+            source = clock.performances[self.pattern_index_]
+        self.pattern_ = normalise([source], self.n_frames_)[0]
+        return source

@@ -1,0 +1,349 @@
+"""DenseSynchronizer: dense matching to the median performance (Eqs. 7-19)."""
+
+from functools import partial
+from numbers import Integral, Real
+
+import numpy as np
+from sklearn.utils import Bunch, check_random_state
+from sklearn.utils._param_validation import Interval, StrOptions
+
+from ..matching.consensus import choose_exemplars
+from ..matching.costs import COSTS
+from ..matching.median import Median, estimate_distances, rounding_of, search_median, sum_all
+from ..matching.refinement import choose_smoothing
+from ..matching.warper import Features, Matcher, RefinedWarper, Warper
+from ..matching.warps import normalise
+from ..work import LongWorkMixin, run
+from .base import Synchronizer
+from .match import Match
+from .portions import compare_in_portions, in_portions
+
+__all__ = ["DenseSynchronizer"]
+
+# Up to so many performances all pairs are compared: see docs/scaling.md.
+_EXHAUSTIVE = 100
+
+# Sets of repeated trials leave 0.0001 to 0.02 (0.07 with 4 features and 20 % noise), sets of people
+# 0.09 and more, single people 0.05 and more; there refining begins to help
+# (benchmarks/accuracy.py); measured on at most so many performances.
+_LARGEST_MISFIT = 0.07
+_MISFIT_SAMPLE = 32
+
+
+class DenseSynchronizer(LongWorkMixin, Synchronizer):
+    """Synchronise performances by dense matching to the median one.
+
+    1. Normalise all performances linearly to ``P`` frames (Eq. 7).
+    2. Match ordered pairs: dynamic programming finds the offsets Delta(p) that
+       minimise the synchronisation distance ``D_{n,m}`` (Eqs. 12-17)::
+
+           sum_p |x_n(p) - x_m(p + Delta(p))|^2 + mu sum_p phi(rate)
+
+       with both ends pinned and the local rate between 0 and ``max_rate``. By default
+       velocities stand in for the points x (see ``cost``): people differ in where the body
+       is more than in how it moves.
+    3. The pattern is the performance with the smallest global distance
+       ``C_n = sum_m D_{n,m}`` (Eq. 19), the "median" one; among more than 100 it is found
+       by a part of all matches (see ``search``).
+    4. Consensus: the time of the pattern reaches a performance straight, or by way of
+       one of ``consensus`` exemplars, typical performances of the training set; the median
+       of these routes outvotes a path that took a wrong valley. It is then smoothed.
+    5. Refinement: if postures agree but for noise and gain, as they do in repeated trials of
+       a single source, Gauss-Newton steps place every moment to a fraction of a frame.
+    6. ``transform`` samples performances at ``tau(p) = p + Delta(p)`` (Eq. 18).
+
+    Most data need nothing turned. Four parameters, among the first, are worth a thought:
+    ``n_frames``, the resolution of the clock; ``velocity_smoothing``, which goes with the noise of
+    the sensors; ``refine=True``, if all are trials of a single source; ``max_offset``, how far
+    apart they can be. ``pattern`` keeps a clock that is there already. The six from ``consensus``
+    to ``subframes`` are there for the record: they were measured and set, and make it the paper's
+    exact method, ``DenseSynchronizer(cost="posture", max_rate=2, subframes=1, consensus=0)``. The
+    last four are for many performances and long jobs.
+
+    Parameters
+    ----------
+    n_frames : int, default=None
+        ``P``, frames of the common clock; by default the median length of the performances,
+        or the length of a pattern given as an array. Time grows with its square, as
+        ``max_offset`` is a share of it.
+    pattern : "median", int or array (n_frames, n_features), default="median"
+        The median performance, one chosen by its index, or another one.
+    velocity_smoothing : float, default=0.03
+        Standard deviation of the Gaussian under which velocities are taken, as a share of the
+        clip, so that it does not depend on the frame rate; beyond its ends a clip is
+        continued by its point reflection. Noisy sensors want more: 0.1 for the Kinect.
+    refine : "auto" or bool, default="auto"
+        Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and
+        the postures of the training set, matched without, leave a misfit of less than 7 % of
+        their variance.
+    max_offset : float, default=0.25
+        Largest offset, as a share of ``n_frames``, in [0, 1].
+    consensus : int, default=8
+        How many exemplars vote on a warp; 0 for the direct path only, as in the paper, which
+        is then neither smoothed nor, unless ``refine=True``, refined.
+    warp_smoothing : float, default=0.02
+        Standard deviation of the Gaussian under which the offsets are smoothed after the
+        vote, as a share of the clip. More makes smoother synchronised movements and hits
+        key moments less closely.
+    cost : {"velocity", "elastic", "posture"}, default="velocity"
+        What is compared. ``"velocity"``: how the point moves; at the local rate rho,
+        ``v_n`` with ``(0.8 + 0.2 rho) v_m``. ``"elastic"``: its velocity
+        divided by the square root of its speed, with weights that make the distance (of
+        Fisher and Rao) independent of how either sequence is timed. ``"posture"``: where the
+        point is, as in the paper.
+    smoothness : float, default=0.003
+        Weight of the changes of pace, a pure number: ``mu`` is ``smoothness`` times the
+        mean squared norm of the compared features over the training set.
+    max_rate : float, default=4
+        Largest local rate of a path; 2 is the limit of Eq. 13. The vote and the refinement
+        may exceed it.
+    subframes : int, default=1
+        Positions a frame at which a path may stand. More than 1 serves direct paths
+        (``consensus=0``); the vote, its smoothing and the refinement are finer anyway.
+    search : {"auto", "exhaustive", "sampled"}, default="auto"
+        How the median is found. ``"exhaustive"``: by all ``N (N - 1)`` matches. ``"sampled"``: by
+        matches with random references, as few as it takes to be sure; see ``certified_``.
+        ``"auto"``: exhaustively up to 100 performances.
+    random_state : int, RandomState instance or None, default=0
+        Draws the references of a sampled search. The default makes equal input give equal results.
+    n_jobs : int, default=None
+        How many jobs share the matches, in ``fit``, ``transform`` and ``match``. None means 1
+        unless in a ``joblib.parallel_config`` context, -1 all cores. Results are the same to the
+        last bit.
+    verbose : int, default=0
+        Above 0, print how far a long job is, at most once a second.
+
+    Attributes
+    ----------
+    pattern_ : ndarray, shape (P, n_features)
+        The pattern on the common clock.
+    pattern_index_ : int or None
+        Its index in the training set; None if it was given as an array.
+    n_frames_ : int
+        ``P``.
+    global_distances_ : ndarray, shape (n_sequences,)
+        ``C_n`` of Eq. 19 where it is exact: for every performance after an exhaustive search, for
+        the best few after a sampled one; NaN for the others, and if nobody needed them.
+    certified_ : bool
+        Whether the pattern is the median of Eq. 19: known from all matches, or because a paired
+        test rejected every other performance, all tests together erring with a probability of
+        1 %. False if the pattern was given, or a sampled search ran out of the matches
+        it may spend: 9 % of all, or 150 a performance if that is more.
+    n_matches_ : int
+        Matches made to choose the pattern and the exemplars.
+    mu_ : float
+        The absolute weight of the changes of pace.
+    exemplars_ : ndarray of int
+        Indices of the performances that vote.
+    misfit_ : float
+        Median share of the pattern's variance that matched postures leave, smoothed so that
+        noise does not count; NaN unless ``refine="auto"`` had to find out.
+    refines_ : bool
+        Whether warps are refined.
+    n_features_in_ : int
+        Features of a frame (columns, for 2-D input).
+    feature_names_in_ : ndarray of str
+        Names of the features; only if the input had names.
+
+    See Also
+    --------
+    LinearSynchronizer : The baseline without matching.
+    KeyframeSynchronizer : Matching by key-frames.
+    ActionModel : What the synchronised performances have in common.
+
+    References
+    ----------
+    M. Mozerov, I. Rius, X. Roca, J. Gonzalez, "3D Human Motion Sequences Synchronization
+    Using Dense Matching Algorithm".
+
+    Examples
+    --------
+    A known warp is found again. The second performance is up to 8 frames ahead in its first
+    half, and behind in its second.
+
+    >>> import numpy as np
+    >>> from sklearn_motionsync import DenseSynchronizer
+    >>> t = np.linspace(0, 1, 101)
+    >>> phase = t + 0.08 * np.sin(2 * np.pi * t)
+    >>> def movement(phase):
+    ...     return np.column_stack([np.cos(4 * phase), np.sin(4 * phase)])
+    >>> X = [movement(t), movement(phase)]
+    >>> sync = DenseSynchronizer(pattern=0).fit(X)
+    >>> truth = 100 * (np.interp(t, phase, t) - t)
+    >>> float(np.abs(sync.match(X).offsets[1] - truth).mean().round(1))
+    0.0
+    >>> sync.transform(X).shape
+    (2, 101, 2)
+    """
+
+    _parameter_constraints: dict = {
+        **Synchronizer._parameter_constraints,
+        "velocity_smoothing": [Interval(Real, 0, 1, closed="both")],
+        "refine": [StrOptions({"auto"}), "boolean"],
+        "max_offset": [Interval(Real, 0, 1, closed="both")],
+        "consensus": [Interval(Integral, 0, None, closed="left")],
+        "warp_smoothing": [Interval(Real, 0, 1, closed="both")],
+        "cost": [StrOptions(set(COSTS))],
+        "smoothness": [Interval(Real, 0, None, closed="left")],
+        "max_rate": [Interval(Real, 1, None, closed="left")],
+        "subframes": [Interval(Integral, 1, None, closed="left")],
+        "search": [StrOptions({"auto", "exhaustive", "sampled"})],
+        "random_state": ["random_state"],
+        "n_jobs": [Integral, None],
+        "verbose": ["verbose"],
+    }
+
+    def __init__(
+        self,
+        n_frames=None,
+        pattern="median",
+        velocity_smoothing=0.03,
+        refine="auto",
+        max_offset=0.25,
+        consensus=8,
+        warp_smoothing=0.02,
+        cost="velocity",
+        smoothness=0.003,
+        max_rate=4,
+        subframes=1,
+        search="auto",
+        random_state=0,
+        n_jobs=None,
+        verbose=0,
+    ):
+        self.n_frames = n_frames
+        self.pattern = pattern
+        self.velocity_smoothing = velocity_smoothing
+        self.refine = refine
+        self.max_offset = max_offset
+        self.consensus = consensus
+        self.warp_smoothing = warp_smoothing
+        self.cost = cost
+        self.smoothness = smoothness
+        self.max_rate = max_rate
+        self.subframes = subframes
+        self.search = search
+        self.random_state = random_state
+        self.n_jobs = n_jobs
+        self.verbose = verbose
+
+    def match(self, X):
+        performances, warper = self.check_performances(X), self._warper
+        positions = warper.positions(performances)
+        with self._progress(fits=False) as progress:
+            portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "warping"}
+            results = in_portions(warper, "warps", positions, **portions)
+        distances, times = (np.concatenate(parts) for parts in zip(*results, strict=True))
+        return Match(times, distances)
+
+    def disparity_space(self, X, performance=0):
+        """The disparity space of the pattern and one performance, and the path through it (Fig. 2).
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+        performance : int, default=0
+            Which of them.
+
+        Returns
+        -------
+        Bunch
+            ``frames`` p and ``offsets`` d, all of them or, of long takes, evenly spaced ones;
+            ``costs`` E(p, d) of Eq. 12 at the pattern's rate, shape (n_frames, n_offsets), NaN
+            where no path that obeys Eqs. 9 and 13 can pass; ``path``, the offsets of the best
+            path, shape (P,), before vote, smoothing and refinement.
+
+        Raises
+        ------
+        ValueError
+            If there is no such performance.
+        """
+        performances = self.check_performances(X)
+        if not 0 <= performance < len(performances):
+            raise ValueError(
+                f"performance={performance} is out of range: there are {len(performances)} "
+                "performances."
+            )
+        warper = self._warper
+        positions = warper.positions([performances[performance]])
+        frames, offsets, costs, path = warper.disparity_space(positions)
+        return Bunch(frames=frames, offsets=offsets, costs=costs, path=path)
+
+    # -- steps of a fit ---------------------------------------------------------------------
+
+    def _learn(self, performances):
+        with self._progress(fits=True) as progress:
+            clock = self._set_clock(performances)
+            centre = clock.on_clock.mean(axis=(0, 1))
+            matcher, features = Matcher.learn(
+                Features(self.cost, self.subframes, self.velocity_smoothing, centre),
+                self._positions(clock),
+                smoothness=self.smoothness,
+                max_offset=self.max_offset,
+                max_rate=self.max_rate,
+            )
+            self.mu_ = matcher.trellis.mu
+            median = self._choose_median(matcher, features, progress)
+            source = self._set_pattern(clock, median)
+            warper = self._choose_exemplars(clock, matcher, source, median.estimates)
+            self._warper = self._decide_on_refinement(clock, warper, progress)
+
+    def _positions(self, clock, chosen=slice(None)):
+        """Performances of the training set at every sub-position of the clock."""
+        if self.subframes == 1:
+            return clock.on_clock[chosen]
+        performances = clock.performances
+        some = [performances[i] for i in np.arange(len(performances))[chosen]]
+        return normalise(some, self.n_frames_, self.subframes)
+
+    def _choose_median(self, matcher, features, progress):
+        """The median (Eq. 19), by all matches or some; without it, what exemplars are chosen by."""
+        n, rounding, wanted = len(features), rounding_of(features), self._wants_median
+        portions = {"n_jobs": self.n_jobs, "progress": progress}
+        compare = partial(compare_in_portions, matcher, features, **portions)
+        if not wanted and (self.consensus == 0 or n <= self.consensus):
+            # None of them, or all, are exemplars.
+            median = Median.unknown(n)
+        elif self.search == "exhaustive" or (self.search == "auto" and n <= _EXHAUSTIVE):
+            median = sum_all(compare, n, rounding)
+        elif wanted:
+            median = search_median(compare, n, rounding, check_random_state(self.random_state))
+        else:
+            median = estimate_distances(compare, n, check_random_state(self.random_state))
+        self.n_matches_ = median.n_matches
+        self.certified_ = median.certified and wanted
+        return median
+
+    def _choose_exemplars(self, clock, matcher, source, estimates):
+        """The exemplars, and the warper to the pattern by way of them."""
+        self.exemplars_ = np.empty(0, dtype=np.intp)
+        if self.consensus > 0:
+            self.exemplars_ = choose_exemplars(estimates, self.consensus, self.pattern_index_)
+        chosen = [source, *(clock.performances[k] for k in self.exemplars_)]
+        positions = normalise(chosen, self.n_frames_, self.subframes)
+        portion = matcher, self.pattern_, positions, self.consensus > 0, self.warp_smoothing
+        (warper,) = run(Warper.to_pattern, [portion])
+        return warper
+
+    def _decide_on_refinement(self, clock, warper, progress):
+        """Whether warps are refined by postures, and the warper that does so or does not."""
+        self.misfit_ = np.nan
+        if self.refine == "auto":
+            if self.consensus > 0:
+                self.misfit_ = self._measure_misfit(clock, warper, progress)
+            self.refines_ = self.misfit_ < _LARGEST_MISFIT
+        else:
+            self.refines_ = bool(self.refine)
+        if not self.refines_:
+            return warper
+        return RefinedWarper(**vars(warper), noise_width=choose_smoothing(clock.on_clock))
+
+    def _measure_misfit(self, clock, warper, progress):
+        """Median misfit of the performances, or of evenly spaced ones of many."""
+        others = np.flatnonzero(np.arange(len(clock.performances)) != self.pattern_index_)
+        if len(others) == 0:
+            return 0.0
+        some = others[:: -(-len(others) // _MISFIT_SAMPLE)]
+        portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "measuring the misfit"}
+        results = in_portions(warper, "misfits", self._positions(clock, some), **portions)
+        return float(np.median(np.concatenate(results)))

@@ -1,0 +1,214 @@
+"""KeyframeSynchronizer: the paper's manual baseline (Figs. 1c and 3c)."""
+
+from numbers import Integral
+
+import numpy as np
+from sklearn.base import _fit_context
+from sklearn.utils._param_validation import Interval
+
+from ..fitting import at_once
+from ..matching.keyframes import curvature_keyframes, match_keyframes
+from ..matching.warps import sample
+from .base import Synchronizer
+from .match import Match
+
+__all__ = ["KeyframeSynchronizer"]
+
+
+class KeyframeSynchronizer(Synchronizer):
+    """Synchronise performances by key-frames, piecewise linearly between them.
+
+    1. The pattern is the performance closest to all others, once the key-frames coincide if
+       they were given, after linear normalisation if not.
+    2. If no key-frames were given, find them: those of the pattern where the curvature of
+       its path is largest, the paper's own criterion; those of another performance among
+       its own peaks of curvature, by the closest postures in the same order.
+    3. ``transform`` stretches each performance evenly between its key-frames so that they
+       fall on those of the pattern.
+
+    Parameters
+    ----------
+    n_frames : int, default=None
+        Frames of the common clock; by default the median length of the performances, or
+        the length of a pattern given as an array.
+    pattern : "median", int or array (n_frames, n_features), default="median"
+        The performance whose key-frames the others follow. For an array, key-frames are
+        always found by curvature.
+    n_keyframes : int, default=5
+        How many to find when none are given, as far as there are frames for them; the
+        paper uses 5.
+
+    Attributes
+    ----------
+    pattern_ : ndarray, shape (P, n_features)
+        The pattern on the common clock.
+    pattern_index_ : int or None
+        Its index in the training set; None if it was given as an array.
+    keyframes_ : ndarray, shape (n_keyframes,)
+        The key-frames of the pattern, in frames of the common clock.
+    n_frames_ : int
+        ``P``.
+    global_distances_ : ndarray, shape (n_sequences,)
+        Sum of the squared distances of each performance to all others (step 1); NaN if the
+        pattern was given.
+    n_features_in_ : int
+        Features of a frame (columns, for 2-D input).
+    feature_names_in_ : ndarray of str
+        Names of the features; only if the input had names.
+
+    See Also
+    --------
+    DenseSynchronizer : Needs no key-frames.
+
+    Notes
+    -----
+    Found key-frames serve performances of one style. Between people who differ in style they
+    are often not the same moments, and linear normalisation is better than a wrong key-frame.
+
+    Key-frames are metadata: in a Pipeline enable scikit-learn's metadata routing and ask for them
+    with ``set_fit_request(keyframes=True)`` and ``set_transform_request(keyframes=True)``.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync import KeyframeSynchronizer
+    >>> from sklearn_motionsync.datasets import make_bending
+    >>> bunch = make_bending(4, random_state=0)
+    >>> sync = KeyframeSynchronizer(n_frames=50)
+    >>> sync.fit_transform(bunch.data, keyframes=bunch.keyframes).shape
+    (4, 50, 45)
+    """
+
+    _parameter_constraints: dict = {
+        **Synchronizer._parameter_constraints,
+        "n_keyframes": [Interval(Integral, 1, None, closed="left")],
+    }
+
+    def __init__(self, n_frames=None, pattern="median", n_keyframes=5):
+        self.n_frames = n_frames
+        self.pattern = pattern
+        self.n_keyframes = n_keyframes
+
+    @at_once
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X, y=None, keyframes=None):
+        """Choose the pattern and its key-frames.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+        y : ignored
+        keyframes : list of arrays (n_keyframes,), default=None
+            Key-frames of each performance, in its own frames (fractions allowed), increasing;
+            found by curvature if None.
+
+        Returns
+        -------
+        self
+        """
+        performances = self.check_performances(X, reset=True)
+        self._given = keyframes is not None
+        clock = self._set_clock(performances)
+        knots, comparable = None, clock.on_clock
+        if self._given:
+            knots = self._given_knots(performances, keyframes)
+            # On the mean key-frames all performances are comparable, as on one clock.
+            times = self._between(knots.mean(axis=0), knots)
+            comparable = sample(performances, times, self.n_frames_)
+        self._set_pattern(clock, self._plain_median(comparable))
+        if self._given and self.pattern_index_ is not None:
+            self.keyframes_ = knots[self.pattern_index_]
+        else:
+            count = knots.shape[1] if self._given else self.n_keyframes
+            self.keyframes_ = curvature_keyframes(self.pattern_, count)
+        return self
+
+    @at_once
+    def fit_transform(self, X, y=None, keyframes=None):
+        """Fit, and warp the same performances.
+
+        Parameters
+        ----------
+        X, y, keyframes : as for ``fit``
+
+        Returns
+        -------
+        As ``transform``
+        """
+        return self.fit(X, y, keyframes=keyframes).transform(X, keyframes=keyframes)
+
+    def transform(self, X, keyframes=None):
+        """Warp performances so that their key-frames fall on those of the pattern.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+        keyframes : list of arrays (n_keyframes,), default=None
+            Needed if ``fit`` was given key-frames.
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P, n_features)
+            ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
+            ``set_output(transform="pandas")``.
+        """
+        return self._warp(X, keyframes=keyframes)
+
+    def match(self, X, keyframes=None):
+        """Match performances to the pattern.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+        keyframes : list of arrays (n_keyframes,), default=None
+            Needed if ``fit`` was given key-frames.
+
+        Returns
+        -------
+        Match
+            As from ``DenseSynchronizer.match``; distances are squared ones to the pattern.
+        """
+        performances = self.check_performances(X)
+        if self._given and keyframes is None:
+            raise ValueError(
+                "The synchronizer was fitted with key-frames: give those of these performances "
+                "too, keyframes=[...]."
+            )
+        if keyframes is None:
+            found = [
+                match_keyframes(self.pattern_, self.keyframes_, x)
+                for x in self.normalize(performances)
+            ]
+            knots = np.stack(found)
+        else:
+            knots = self._given_knots(performances, keyframes, len(self.keyframes_))
+        times = self._between(self.keyframes_, knots)
+        synchronised = sample(performances, times, self.n_frames_)
+        distances = np.square(synchronised - self.pattern_).sum(axis=(1, 2))
+        return Match(times, distances)
+
+    def _between(self, knots, others):
+        """tau(p): piecewise linear through the ends and the key-frames."""
+        p, last = np.arange(self.n_frames_), self.n_frames_ - 1
+        return np.stack([np.interp(p, [0, *knots, last], [0, *other, last]) for other in others])
+
+    def _given_knots(self, arrays, keyframes, count=None):
+        """Given key-frames, checked, in frames of the common clock."""
+        if len(keyframes) != len(arrays):
+            raise ValueError(
+                f"keyframes must hold one array a performance, {len(arrays)}; got {len(keyframes)}."
+            )
+        checked = []
+        for i, (given, x) in enumerate(zip(keyframes, arrays, strict=True)):
+            frames = np.asarray(given, dtype=np.float64)
+            count = len(np.atleast_1d(frames)) if count is None else count
+            inside = frames.ndim == 1 and bool(
+                (np.diff(frames) > 0).all() and (frames > 0).all() and (frames < len(x) - 1).all()
+            )
+            if frames.shape != (count,) or not inside:
+                raise ValueError(
+                    f"Performance {i}: key-frames must be {count} increasing frames between 0 "
+                    f"and {len(x) - 1}, both excluded, got {given}."
+                )
+            checked.append(frames * (self.n_frames_ - 1) / (len(x) - 1))
+        return np.stack(checked)

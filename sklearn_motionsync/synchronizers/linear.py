@@ -1,0 +1,58 @@
+"""LinearSynchronizer: linear normalisation, the baseline (Eq. 7)."""
+
+import numpy as np
+
+from .base import Synchronizer
+from .match import Match
+
+__all__ = ["LinearSynchronizer"]
+
+
+class LinearSynchronizer(Synchronizer):
+    """Linear normalisation (Eq. 7): the same number of frames, no matching.
+
+    The baseline that every other synchronizer is held against: each performance is
+    stretched evenly to ``n_frames``; the pattern only serves as reference.
+
+    Parameters
+    ----------
+    n_frames : int, default=None
+        Frames of the common clock; by default the median length of the performances, or
+        the length of a pattern given as an array.
+    pattern : "median", int or array (n_frames, n_features), default="median"
+        The reference of ``match``: the performance with the smallest sum of distances
+        (Eq. 19, without matching), one chosen by its index, or another one.
+
+    Attributes
+    ----------
+    pattern_ : ndarray, shape (P, n_features)
+        The pattern on the common clock.
+    pattern_index_ : int or None
+        Its index in the training set; None if it was given as an array.
+    n_frames_ : int
+        ``P``.
+    global_distances_ : ndarray, shape (n_sequences,)
+        ``C_n`` of Eq. 19 for every performance; NaN if the pattern was given.
+    n_features_in_ : int
+        Features of a frame (columns, for 2-D input).
+    feature_names_in_ : ndarray of str
+        Names of the features; only if the input had names.
+
+    See Also
+    --------
+    DenseSynchronizer : Follows the changes of pace within a performance.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn_motionsync import LinearSynchronizer
+    >>> X = [np.arange(5.0)[:, None], np.arange(9.0)[:, None] / 2]
+    >>> LinearSynchronizer(n_frames=5).fit_transform(X)[1].ravel().tolist()
+    [0.0, 1.0, 2.0, 3.0, 4.0]
+    """
+
+    def match(self, X):
+        on_clock = self.normalize(X)
+        clock = np.arange(on_clock.shape[1], dtype=np.float64)
+        distances = np.square(on_clock - self.pattern_).sum(axis=(1, 2))
+        return Match(np.tile(clock, (len(on_clock), 1)), distances)

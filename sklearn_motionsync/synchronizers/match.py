@@ -1,0 +1,227 @@
+"""Match: how performances meet the pattern, which every synchronizer answers with."""
+
+from numbers import Integral
+
+import numpy as np
+
+from ..matching.warps import sample
+from ..performances import read_collection
+from ..pipelines import reach_synchronizer
+
+__all__ = ["Match", "as_match"]
+
+
+class Match:
+    """Warps of a set of performances to the pattern.
+
+    Synchronizers make them, by ``match``; `from_estimator` gets them out of a whole pipeline.
+
+    Parameters
+    ----------
+    times : array-like, shape (n_sequences, P)
+        ``tau(p)``, from 0 to ``P - 1``: what frame p of the pattern meets, in frames of
+        performances that are linearly normalised to its length.
+    distances : array-like, shape (n_sequences,), default=None
+        How far each performance is from the pattern; NaN if nobody measured.
+
+    Attributes
+    ----------
+    offsets : ndarray, shape (n_sequences, P)
+        ``Delta(p)``, in frames of the pattern.
+    times : ndarray, shape (n_sequences, P)
+        ``tau(p) = p + Delta(p)``; from synchronizers of this package non-decreasing,
+        ``tau(0) = 0``, ``tau(P-1) = P-1``.
+    distances : ndarray, shape (n_sequences,)
+        From a `DenseSynchronizer` the synchronisation distance ``D_{n,m}`` of Eq. 12, of the path
+        straight to the base; from others the squared distance to the pattern.
+
+    Raises
+    ------
+    ValueError
+        If times are no table of at least two frames, or not within the clock, or there is not one
+        distance a performance.
+
+    Notes
+    -----
+    ``offsets, times, distances = match`` unpacks it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn_motionsync import LinearSynchronizer
+    >>> X = [np.arange(5.0)[:, None], np.arange(9.0)[:, None] / 2]
+    >>> match = LinearSynchronizer(n_frames=5).fit(X).match(X)
+    >>> match
+    Match(2 performances on 5 frames)
+    >>> match.frames(X)[1].tolist()  # of the second performance, which has nine
+    [0.0, 2.0, 4.0, 6.0, 8.0]
+    >>> match.seconds(X, frame_rate=4)[1].tolist()
+    [0.0, 0.5, 1.0, 1.5, 2.0]
+    >>> forces = [np.arange(41.0)[:, None], np.arange(81.0)[:, None]]  # ten times the rate
+    >>> match.warp(forces)[1].ravel().tolist()
+    [0.0, 20.0, 40.0, 60.0, 80.0]
+    """
+
+    __slots__ = ("distances", "offsets", "times")
+
+    def __init__(self, times, distances=None):
+        times = np.asarray(times, dtype=np.float64)
+        if times.ndim != 2 or times.shape[1] < 2:
+            raise ValueError(
+                "times must have shape (n_sequences, P), one row a performance and at least 2 "
+                f"frames; got {times.shape}."
+            )
+        n_sequences, n_frames = times.shape
+        # Not a number fails the comparison, too.
+        if not (times.min(initial=0) >= 0 and times.max(initial=0) <= n_frames - 1):
+            raise ValueError(
+                f"times must be from 0 to P - 1 = {n_frames - 1}, in frames of the pattern, got "
+                f"{times.min():g} to {times.max():g}."
+            )
+        if distances is None:
+            distances = np.full(n_sequences, np.nan)
+        distances = np.asarray(distances)
+        if distances.shape != (n_sequences,):
+            raise ValueError(
+                f"distances must be one for each of the {n_sequences} performances, got shape "
+                f"{distances.shape}."
+            )
+        self.times, self.distances = times, distances
+        self.offsets = times - np.arange(n_frames)
+
+    @classmethod
+    def from_estimator(cls, estimator, X, **params):
+        """Match raw performances by a fitted synchronizer, or by a pipeline with one.
+
+        Parameters
+        ----------
+        estimator : synchronizer, or Pipeline with one
+            Fitted.
+        X : performances, as the estimator takes them
+        **params : dict
+            What the ``match`` of the synchronizer takes besides, such as ``keyframes``.
+
+        Returns
+        -------
+        Match
+
+        Examples
+        --------
+        >>> from sklearn.pipeline import make_pipeline
+        >>> from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, Match
+        >>> from sklearn_motionsync.datasets import make_bending
+        >>> bunch = make_bending(6, random_state=0)
+        >>> pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(), DenseSynchronizer(50))
+        >>> Match.from_estimator(pipe.fit(bunch.data), bunch.data)
+        Match(6 performances on 50 frames)
+        """
+        _, synchronizer, performances = reach_synchronizer(estimator, X)
+        return synchronizer.match(performances, **params)
+
+    def warp(self, X):
+        """Whatever was recorded along with the performances, on the clock of the pattern (Eq. 18).
+
+        Joint positions when the match was made in the aSpace, forces, muscle signals, at any rate:
+        the first and last frame of each are those of the performance.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or (performance, frame) frame
+            One sequence a performance, in the same order. NaN stay where they are.
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P, n_features)
+
+        Raises
+        ------
+        ValueError
+            If there is not one sequence a performance, or they break the contract for
+            performances.
+        """
+        arrays, _ = read_collection(X)
+        self._check_count(arrays, "sequences to warp")
+        return sample(arrays, self.times, self.times.shape[1])
+
+    def frames(self, X):
+        """The frame of each performance that meets each frame of the pattern.
+
+        Parameters
+        ----------
+        X : performances or array-like of int, shape (n_sequences,)
+            The performances, whatever was recorded along with them, or how many frames each has.
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P)
+            From 0 to ``n_frames_i - 1``, with fractions.
+
+        Raises
+        ------
+        ValueError
+            If there is not one a performance, or one has fewer than two frames.
+        """
+        lengths = np.asarray(_lengths(X))
+        self._check_count(lengths, "lengths")
+        if lengths.min(initial=2) < 2:
+            i = int(np.argmin(lengths))
+            raise ValueError(f"Performance {i} has {lengths[i]} frames; at least 2 are needed.")
+        return self.times * (lengths[:, np.newaxis] - 1) / (self.times.shape[1] - 1)
+
+    def seconds(self, X, frame_rate):
+        """When in each performance, from its beginning, each frame of the pattern is met.
+
+        Parameters
+        ----------
+        X : as for ``frames``
+        frame_rate : float, or array-like of shape (n_sequences,)
+            Frames a second of what X is; one for each performance if they differ.
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P)
+
+        Raises
+        ------
+        ValueError
+            As from ``frames``; or if a rate is not above 0, or there is not one a performance.
+        """
+        rate = np.asarray(frame_rate, dtype=np.float64)
+        if rate.ndim > 1 or not (rate > 0).all() or not np.isfinite(rate).all():
+            raise ValueError(
+                f"frame_rate must be one number above 0, or one a performance, got {frame_rate!r}."
+            )
+        if rate.ndim == 1:
+            self._check_count(rate, "frame rates")
+        return self.frames(X) / rate[..., np.newaxis]
+
+    def __iter__(self):
+        return iter((self.offsets, self.times, self.distances))
+
+    def __repr__(self):
+        n_sequences, n_frames = self.times.shape
+        return f"Match({n_sequences} performances on {n_frames} frames)"
+
+    def _check_count(self, given, what):
+        if len(given) != len(self.times):
+            raise ValueError(
+                f"There are {len(self.times)} matched performances, but {len(given)} {what}: give "
+                "one for each, in the same order."
+            )
+
+
+def as_match(times, n_sequences):
+    """Warps that somebody made of so many performances, as a match without distances."""
+    if np.ndim(times) > 0 and len(times) != n_sequences:
+        raise ValueError(
+            f"times must have shape (n_sequences, P), one row for each of the {n_sequences} "
+            f"performances; got {np.shape(times)}."
+        )
+    return Match(times)
+
+
+def _lengths(X):
+    """How many frames the sequences have, of sequences or of such numbers."""
+    if not hasattr(X, "columns") and all(isinstance(n, Integral) for n in X):
+        return X
+    return [len(x) for x in read_collection(X)[0]]

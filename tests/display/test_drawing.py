@@ -1,0 +1,61 @@
+"""Colours that everybody can tell apart."""
+
+import itertools
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from sklearn_motionsync.display.drawing import COLORS, group_colors
+
+# How colours look to people who lack one kind of cones: Machado, Oliveira and Fernandes, "A
+# physiologically-based model for simulation of color vision deficiency", 2009, severity 1.
+SEEN_BY = {
+    "everybody else": np.eye(3),
+    "protanopes": [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    "deuteranopes": [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ],
+    "tritanopes": [
+        [1.255528, -0.076749, -0.178779],
+        [-0.078411, 0.930809, 0.147602],
+        [0.004733, 0.691367, 0.303900],
+    ],
+}
+TOGETHER = [
+    ("performance", "pattern"),
+    ("performance", "mean"),
+    ("mean", "envelope"),
+    ("left", "right"),
+    ("left", "middle"),
+    ("right", "middle"),
+]
+
+
+def lab(color, seen_by):
+    """CIE L*a*b* of a colour, as somebody sees it."""
+    rgb = np.array(to_rgb(color))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    linear = np.clip(np.asarray(SEEN_BY[seen_by]) @ linear, 0, 1)
+    to_xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    x, y, z = np.cbrt(np.array(to_xyz) @ linear / [0.9505, 1, 1.089] + 1e-9)
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+@pytest.mark.parametrize("seen_by", SEEN_BY)
+def test_colors_that_stand_together_are_told_apart(seen_by):
+    for one, other in TOGETHER:
+        apart = np.linalg.norm(lab(COLORS[one], seen_by) - lab(COLORS[other], seen_by))
+        assert apart > 20, (one, other)
+
+
+@pytest.mark.parametrize("seen_by", SEEN_BY)
+def test_the_colors_of_a_few_groups_are_told_apart(seen_by):
+    _, color_of = group_colors(list("abcd"), 4)
+    for one, other in itertools.combinations(color_of.values(), 2):
+        assert np.linalg.norm(lab(one, seen_by) - lab(other, seen_by)) > 15

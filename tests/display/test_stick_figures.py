@@ -1,0 +1,299 @@
+"""Stick figures: which bones are drawn where, and that people fall into step."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from IPython.core.formatters import HTMLFormatter
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    Skeleton,
+    SkeletonDisplay,
+    to_frame,
+)
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import stick_figures
+from sklearn_motionsync.display.animation import playable
+
+
+@pytest.fixture(scope="module")
+def bunch():
+    return make_bending(6, n_frames=40, style=0, noise=0, random_state=1)
+
+
+@pytest.fixture(scope="module")
+def pipe(bunch):
+    steps = DirectionCosines(bunch.skeleton), ASpace(6), DenseSynchronizer(40), ActionModel()
+    return make_pipeline(*steps).fit(bunch.data)
+
+
+def bones_drawn(display, panel, side=None):
+    sides = [side] if side else list(display.bones_[panel])
+    paths = [p for s in sides for p in display.bones_[panel][s].get_paths()]
+    return np.array([path.vertices for path in paths])
+
+
+def standing(faces=(0, 0, 1)):
+    """A body that stands with its arms out, facing some way, and where its joints are."""
+    at = {
+        "pelvis": (0, 1, 0), "neck": (0, 1.5, 0), "head": (0, 1.8, 0.1),
+        "hip": (0.1, 1, 0), "knee": (0.1, 0.5, 0.05), "ankle": (0.1, 0, 0),
+        "shoulder": (0.2, 1.5, 0), "elbow": (0.5, 1.5, 0), "wrist": (0.8, 1.5, 0),
+    }  # fmt: skip
+    forward = np.array(faces, dtype=float)
+    left = np.cross([0, 1, 0], forward)
+    axes = np.stack([left, [0, 1, 0], forward])
+    points = []
+    for name in Skeleton.paper().joints:
+        side, _, part = name.rpartition("_")
+        x, y, z = at[part]
+        points.append((-x if side == "right" else x, y, z))
+    return np.array(points) @ axes
+
+
+def test_a_body_seen_from_the_front_and_from_its_right():
+    body, skeleton = standing(), Skeleton.paper()
+    X = np.tile(body.ravel(), (3, 1))
+    joints = dict(zip(skeleton.joints, body, strict=True))
+    for azimuth, column in ((0, 0), (-90, 2)):
+        display = SkeletonDisplay.from_positions(X, skeleton, frames=[1], azimuth=azimuth)
+        expected = np.array(
+            [
+                [joints[skeleton.joints[j]][[column, 1]] for j in bone]
+                for bone in skeleton.bones
+                if skeleton.joints[bone[1]].startswith("left")
+            ]
+        )
+        drawn = bones_drawn(display, 0, "left")
+        assert sorted(map(np.ndarray.tolist, drawn.round(9))) == sorted(
+            map(np.ndarray.tolist, expected.round(9))
+        )
+        head = np.ravel(display.heads_[0].get_data())
+        np.testing.assert_allclose(head, joints["head"][[column, 1]], atol=1e-9)
+        assert len(bones_drawn(display, 0)) == len(skeleton.bones)
+        assert len(bones_drawn(display, 0, "middle")) == 2
+        low, high = display.axes_[0].get_ylim()
+        assert low < 0 < 1.8 < high
+
+
+def test_left_and_right_have_colors_of_their_own():
+    display = SkeletonDisplay.from_positions(
+        np.tile(standing().ravel(), (2, 1)), Skeleton.paper(), frames=1
+    )
+    colors = {side: tuple(lines.get_colors()[0]) for side, lines in display.bones_[0].items()}
+    assert len(set(colors.values())) == 3
+
+
+def test_place_heading_and_vertical_axis_do_not_matter():
+    pictures = []
+    skeleton = Skeleton.paper()
+    for faces, shift in (((0, 0, 1), 0), ((0.6, 0, -0.8), 5)):
+        X = np.tile((standing(faces) + [shift, 0.3, -shift]).ravel(), (2, 1))
+        display = SkeletonDisplay.from_positions(X, skeleton, frames=1)
+        pictures.append(bones_drawn(display, 0))
+    upright = standing().reshape(-1, 3)
+    z_up = np.stack([upright[:, 0], -upright[:, 2], upright[:, 1]], axis=1)
+    turned = Skeleton(skeleton.joints, skeleton.parents, skeleton.landmarks, up="z")
+    display = SkeletonDisplay.from_positions(np.tile(z_up.ravel(), (2, 1)), turned, frames=1)
+    pictures.append(bones_drawn(display, 0))
+    for picture in pictures[1:]:
+        np.testing.assert_allclose(picture, pictures[0], atol=1e-9)
+
+
+def test_sides_of_a_skeleton_with_more_joints():
+    display = SkeletonDisplay(
+        [[np.random.default_rng(0).normal(size=(2, 31, 3))]], Skeleton.acclaim(), ["any"]
+    ).plot()
+    counts = {side: len(bones_drawn(display, 0, side)) for side in display.bones_[0]}
+    # Hip to toes are 5 bones a side, clavicle to fingers and thumb 7; 6 are in the middle.
+    assert counts == {"left": 12, "middle": 6, "right": 12}
+
+
+def test_a_strip_shows_the_frames_it_names(bunch):
+    display = SkeletonDisplay.from_positions(bunch.data[0], bunch.skeleton, frames=4)
+    last = len(bunch.data[0]) - 1
+    frames = [round(last * k / 3) for k in range(4)]
+    assert [axis.get_title() for axis in display.axes_] == [f"frame {f}" for f in frames]
+    whole = SkeletonDisplay.from_positions(bunch.data[0], bunch.skeleton, frames=range(last + 1))
+    for panel, frame in enumerate(frames):
+        np.testing.assert_array_equal(bones_drawn(display, panel), bones_drawn(whole, frame))
+    with pytest.raises(ValueError, match=f"frames must be from 0 to {last}, got"):
+        SkeletonDisplay.from_positions(bunch.data[0], bunch.skeleton, frames=[0, last + 1])
+    with pytest.raises(ValueError, match=r"15 joints are \(n_frames, 45\)"):
+        SkeletonDisplay.from_positions(bunch.data[0][:, :6], bunch.skeleton)
+
+
+def test_synchronised_performances_over_each_other(bunch):
+    X = LinearSynchronizer(12).fit_transform(bunch.data)
+    for given in (X, to_frame(X)):
+        display = SkeletonDisplay.from_positions(given, bunch.skeleton, frames=[6])
+        assert len(bones_drawn(display, 0)) == 6 * 14
+
+
+def test_postures_are_drawn_as_bodies(bunch, pipe):
+    postures = pipe[0].transform(bunch.data)
+    display = SkeletonDisplay.from_postures(postures[2], pipe[0], frames=[0, 9])
+    strip = SkeletonDisplay.from_positions(bunch.data[2], bunch.skeleton, frames=[0, 9])
+    drawn, expected = (np.diff(bones_drawn(d, 1), axis=1) for d in (display, strip))
+    # The same bones, turned as the body was at first; the hips are level in both.
+    np.testing.assert_allclose(drawn, expected, atol=0.02)
+
+
+def test_mean_and_accepted_postures_of_a_model(pipe):
+    display = SkeletonDisplay.from_model(pipe, frames=(0.1, 20), n_samples=5, azimuth=0)
+    titles = [axis.get_title() for axis in display.axes_]
+    assert [title.split("\n")[0] for title in titles] == ["frame 4"] * 2 + ["frame 20"] * 2
+    assert [len(bones_drawn(display, panel)) for panel in range(4)] == [14, 5 * 14, 14, 5 * 14]
+    mean = pipe[:2].inverse_transform(pipe[-1].mean_).reshape(40, 15, 3)
+    mean[..., 1] -= mean[..., 1].min()
+    for panel, frame in ((0, 4), (2, 20)):
+        x, y = display.heads_[panel].get_data()
+        np.testing.assert_allclose([x[0], y[0]], mean[frame, 2, :2])
+
+
+def test_people_fall_into_step(bunch, pipe):
+    display = SkeletonDisplay.from_estimator(pipe, bunch.data)
+    assert display.labels[0] == f"{pipe[2].pattern_index_} (pattern)"
+    # Bodies differ in size, so heads by the height they started from.
+    heights, standing = {"raw": [], "synchronised": []}, display.heads_[0].get_ydata()
+    for at in np.linspace(0.1, 0.7, 7):
+        display.plot(at=at)
+        for panel, name in enumerate(heights):
+            heights[name].append(display.heads_[panel].get_ydata() / standing)
+        assert len(bones_drawn(display, 0)) == 6 * 14
+    apart = {name: np.ptp(np.array(h), axis=1).mean() for name, h in heights.items()}
+    assert apart["synchronised"] < 0.02 < 0.2 < apart["raw"]
+
+
+def test_the_same_from_known_warps(bunch, pipe):
+    points = pipe[:2].transform(bunch.data)
+    times = pipe[2].match(points).times
+    one = SkeletonDisplay.from_estimator(pipe, bunch.data, performances=[4, 1])
+    other = SkeletonDisplay.from_predictions(
+        [bunch.data[4], bunch.data[1]], times[[4, 1]], bunch.skeleton, names=["x", "y"]
+    )
+    for at in (0, 0.5, 1):
+        one.plot(at=at)
+        other.plot(at=at)
+        np.testing.assert_array_equal(bones_drawn(one, 1), bones_drawn(other, 1))
+    assert [label.get_text() for label in other.axes_[0].get_xticklabels()] == ["x", "y"]
+    with pytest.raises(ValueError, match=r"each of the 6 performances; got \(2, 40\)"):
+        SkeletonDisplay.from_predictions(bunch.data, times[:2], bunch.skeleton)
+
+
+def test_the_picture_follows_people_who_walk_away(bunch):
+    staying = bunch.data[0]
+    drift = np.outer(np.linspace(0, 6, len(staying)), np.tile([0.6, 0, 0.8], 15))
+    strips, moving = [], []
+    for X in (staying, staying + drift):
+        display = SkeletonDisplay.from_positions(X, bunch.skeleton, frames=[0, 30])
+        strips.append([bones_drawn(display, panel) for panel in (0, 1)])
+        times = np.linspace(0, 39, 40)[np.newaxis]
+        display = SkeletonDisplay.from_predictions([X], times, bunch.skeleton, at=0.7)
+        moving.append(bones_drawn(display, 0))
+    np.testing.assert_allclose(strips[0], strips[1], atol=1e-9)
+    middle = np.abs(moving[1][:, :, 0]).max()
+    assert middle < 1.5, "six metres away without following"
+    # Who stays is not followed: the feet stand still while the pelvis moves.
+    feet = [j for j, name in enumerate(bunch.skeleton.joints) if name.endswith("ankle")]
+    raw = SkeletonDisplay.from_predictions([staying], times, bunch.skeleton).scenes[0][0]
+    assert np.ptp(raw[:, feet], axis=0).max() < 0.05 < np.ptp(raw[:, 0, [0, 2]], axis=0).max()
+
+
+def test_joints_that_were_not_seen(bunch):
+    X = bunch.data[0].copy()
+    joints = list(bunch.skeleton.joints)
+    for joint, frames in (("left_wrist", slice(None)), ("pelvis", slice(0, 4)), ("neck", [20])):
+        j = joints.index(joint)
+        X[frames, 3 * j : 3 * j + 3] = np.nan
+    display = SkeletonDisplay.from_positions(X, bunch.skeleton, frames=[10, 20])
+    whole = SkeletonDisplay.from_positions(bunch.data[0], bunch.skeleton, frames=[10, 20])
+    for panel, hidden in ((0, 1), (1, 5)):
+        drawn, expected = bones_drawn(display, panel), bones_drawn(whole, panel)
+        seen = np.isfinite(drawn).all(axis=(1, 2))
+        # A bone lacks if one of its ends does; the others are where they are without gaps.
+        assert (~seen).sum() == hidden
+        np.testing.assert_allclose(drawn[seen], expected[seen], atol=0.02)
+    X[25] = np.nan  # nothing at all
+    assert len(SkeletonDisplay.from_positions(X, bunch.skeleton).axes_) == 6
+    X[:, :3] = np.nan
+    with pytest.raises(ValueError, match="No frame shows the pelvis"):
+        SkeletonDisplay.from_positions(X, bunch.skeleton)
+
+
+def test_an_animation_plays_from_the_first_to_the_last_frame(bunch, pipe, monkeypatch):
+    display = SkeletonDisplay.from_estimator(pipe, bunch.data, performances=[0, 1])
+    shows = []
+
+    def watched(figure, show, count, *args, **kwargs):
+        shows.append((show, count))
+        return playable(figure, show, count, *args, **kwargs)
+
+    monkeypatch.setattr(stick_figures, "playable", watched)
+    animation = display.animate(seconds=1, fps=4)
+    number, heads = display.figure_.number, []
+    ((show, count),) = shows
+    assert count == 4
+    for k in range(4):
+        show(k)
+        heads.append(np.array(display.heads_[0].get_data()).T)
+    for k, at in enumerate(np.linspace(0, 1, 4)):
+        display.plot(at=at)
+        np.testing.assert_array_equal(np.array(display.heads_[0].get_data()).T, heads[k])
+    html = HTMLFormatter()(animation)
+    assert html.count("data:image/png;base64") == 4
+    assert "Animation" in html
+    # The notebook shows the animation, and not the figure besides.
+    assert not plt.fignum_exists(number)
+
+
+def test_an_animation_on_given_axes(bunch, pipe):
+    figure, axes = plt.subplots(2, 1)
+    display = SkeletonDisplay.from_estimator(pipe, bunch.data, performances=[0, 1], ax=axes)
+    animation = display.animate(seconds=0.5, fps=4)
+    assert display.axes_ == list(axes)
+    assert all(len(axis.collections) == 3 for axis in axes), "the still figures are still there"
+    assert plt.fignum_exists(figure.number)
+    assert animation.to_jshtml().count("data:image/png;base64") == 2
+
+
+def test_times_that_do_not_exist(bunch, pipe):
+    display = SkeletonDisplay.from_estimator(pipe, bunch.data)
+    for at in (-0.1, 1.1, np.nan):
+        with pytest.raises(ValueError, match="at must be a share of the time from 0 to 1"):
+            display.plot(at=at)
+    with pytest.raises(ValueError, match="seconds and fps must be above 0, got 0 and 15"):
+        display.animate(seconds=0)
+
+
+def test_pipelines_that_cannot_be_drawn(bunch, pipe):
+    points = pipe[:2].transform(bunch.data)
+    with pytest.raises(ValueError, match="begins with DirectionCosines"):
+        SkeletonDisplay.from_estimator(pipe[2], points)
+    short = make_pipeline(ASpace(2), DenseSynchronizer(20)).fit(bunch.data)
+    with pytest.raises(ValueError, match="no DirectionCosines in Pipeline"):
+        SkeletonDisplay.from_estimator(short, bunch.data)
+    with pytest.raises(ValueError, match="no ActionModel in Pipeline"):
+        SkeletonDisplay.from_model(pipe[:3])
+
+
+def test_real_people_fall_into_step(bends):
+    """Six of the real bends: their pelvises come down together."""
+    pipe = make_pipeline(DirectionCosines(bends.skeleton), ASpace(0.95), DenseSynchronizer(100))
+    display = SkeletonDisplay.from_estimator(pipe.fit(bends.data), bends.data)
+    pelvis = bends.skeleton.joints.index("root")
+    lowest = [
+        np.array(
+            [
+                x[:, pelvis, 1].argmin() / (len(x) - 1) * d
+                for x, d in zip(scene, taking, strict=True)
+            ]
+        )
+        for scene, taking in zip(display.scenes, display.durations, strict=True)
+    ]
+    raw, synchronised = (np.ptp(moments) for moments in lowest)
+    assert synchronised < 0.3 * raw

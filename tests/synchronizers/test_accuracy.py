@@ -1,0 +1,282 @@
+"""How accurate: the elastic distance, the paper's method, known warps and real people."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
+from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.matching.costs import cost_features, step_table
+from sklearn_motionsync.matching.filters import smooth
+from sklearn_motionsync.matching.refinement import choose_smoothing, curvature
+from sklearn_motionsync.matching.trellis import Trellis
+
+from oracle import brute_force, plain_loops
+
+PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
+P = 100
+
+
+# -- the costs against oracles of their own ---------------------------------------------
+
+
+def paper_oracle_costs():
+    return {s: (1.0, 2.0, abs(s - 1.0)) for s in (0, 1, 2)}
+
+
+def test_the_papers_settings_are_the_papers_equations():
+    """Through the public class: cost and path of every pair, against all admissible paths."""
+    rng = np.random.default_rng(0)
+    X = rng.standard_normal((4, 7, 2))
+    sync = DenseSynchronizer(pattern=1, smoothness=0.2, max_offset=0.5, **PAPER).fit(X)
+    mu = 0.2 * np.square(X - X.mean(axis=(0, 1))).sum(axis=2).mean()
+    np.testing.assert_allclose(sync.mu_, mu)
+    offsets, times, distances = sync.match(X)
+    for m, x in enumerate(X):
+        best, paths = brute_force(X[1], x, paper_oracle_costs(), mu, 1, 3)
+        np.testing.assert_allclose(distances[m], best, rtol=1e-10, atol=1e-12)
+        assert tuple(times[m].astype(int)) in paths
+        np.testing.assert_array_equal(offsets[m], times[m] - np.arange(7))
+
+
+def elastic_oracle_costs(max_rate, subframes):
+    """|q_n - sqrt(rho) q_m|^2 = |q_n|^2 + rho |q_m|^2 - 2 sqrt(rho) <q_n, q_m>."""
+    rates = {s: s / subframes for s in range(max_rate * subframes + 1)}
+    return {s: (rho, 2 * rho**0.5, (rho - 1) ** 2) for s, rho in rates.items()}
+
+
+def slow_elastic(x, subframes, sigma):
+    """q = v / sqrt(|v|), v the derivative under a Gaussian, by explicit sums."""
+    n = len(x)
+    reach = min(int(np.ceil(4 * sigma)) + 1, n - 1)
+
+    def at(i):
+        if i < 0:
+            return 2 * x[0] - x[-i]
+        return x[i] if i < n else 2 * x[-1] - x[2 * (n - 1) - i]
+
+    radius = int(4 * sigma + 0.5)
+    k = np.arange(-radius, radius + 1)
+    kernel = np.exp(-0.5 * (k / sigma) ** 2)
+    kernel /= kernel.sum()
+    q = np.empty_like(x)
+    for i in range(n):
+        terms = [
+            w * j / sigma**2 * at(min(max(i + j, -reach), n - 1 + reach))
+            for w, j in zip(kernel, k, strict=True)
+        ]
+        v = sum(terms) * subframes
+        q[i] = v / np.sqrt(np.linalg.norm(v))
+    return q
+
+
+def test_elastic_equals_an_oracle_of_its_own():
+    rng = np.random.default_rng(1)
+    X = np.cumsum(rng.standard_normal((3, 45, 2)), axis=1)
+    sub = 2
+    fine = np.stack([[np.interp(np.arange(89) / 2, np.arange(45), c) for c in x.T] for x in X])
+    q = np.stack([slow_elastic(x, sub, 0.03 * 88) for x in fine.transpose(0, 2, 1)])
+    settings = {
+        "max_rate": 3,
+        "subframes": sub,
+        "consensus": 0,
+    }
+    sync = DenseSynchronizer(
+        cost="elastic", pattern=0, smoothness=0.1, max_offset=0.2, **settings
+    ).fit(X)
+    mu = 0.1 * np.square(q).sum(axis=2).mean()
+    np.testing.assert_allclose(sync.mu_, mu)
+    costs = elastic_oracle_costs(3, sub)
+    expected = [plain_loops(q[0, ::sub], y, costs, mu, sub, 9) for y in q]
+    np.testing.assert_allclose(sync.match(X).distances, expected, rtol=1e-9, atol=1e-9)
+
+
+def curve(phase):
+    """A smooth closed path in space."""
+    return np.column_stack(
+        [np.sin(2 * np.pi * phase), np.cos(2 * np.pi * phase), np.sin(4 * np.pi * phase)]
+    )
+
+
+def other_curve(phase):
+    return 1.2 * curve(phase) + 0.3 * np.column_stack(
+        [np.cos(4 * np.pi * phase), np.sin(2 * np.pi * phase), np.cos(2 * np.pi * phase)]
+    )
+
+
+def elastic_distance(x, y, subframes=8):
+    """Squared Fisher-Rao distance, by the trellis alone (no penalty, hardly any smoothing)."""
+    fine = [
+        np.column_stack(
+            [
+                np.interp(np.arange(0, len(z) - 1 + 1e-9, 1 / subframes), np.arange(len(z)), c)
+                for c in z.T
+            ]
+        )
+        for z in (x, y)
+    ]
+    q = cost_features(np.stack(fine), "elastic", subframes, smoothing=0.004)
+    table = step_table("elastic", max_rate=5, subframes=subframes)
+    trellis = Trellis(table, 0.0, len(x) // 3)
+    return trellis.distances(q[:1, ::subframes], q[1:])[0, 0]
+
+
+def test_elastic_distance_of_a_warped_curve_is_nothing():
+    t = np.linspace(0, 1, 151)
+    warped = t + 0.06 * np.sin(2 * np.pi * t)
+    whole = elastic_distance(curve(t), other_curve(t))
+    assert elastic_distance(curve(t), curve(warped)) < 0.02 * whole
+
+
+def test_elastic_distance_does_not_depend_on_the_timing():
+    t = np.linspace(0, 1, 151)
+    warped = t + 0.06 * np.sin(2 * np.pi * t)
+    even = elastic_distance(curve(t), other_curve(t))
+    np.testing.assert_allclose(elastic_distance(curve(warped), other_curve(t)), even, rtol=0.05)
+    np.testing.assert_allclose(elastic_distance(curve(t), other_curve(warped)), even, rtol=0.05)
+
+
+def test_elastic_distance_is_fdasrsfs():
+    """fdasrsf 2.7.3 (curve_to_q without scaling, optimum_reparam_curve) gives 0.7281, 0.7175 and
+    0.7169 on 151, 301 and 601 points; its slopes are a coarser set, so it stays above the minimum.
+    """
+    t = np.linspace(0, 1, 301)
+    found = elastic_distance(curve(t), other_curve(t))
+    assert 0.97 * 0.7169 < found < 0.7169
+
+
+def test_velocity_does_not_depend_on_the_frame_rate():
+    t = [np.linspace(0, 1, n) for n in (100, 400)]
+    slow, fast = (LinearSynchronizer(100).fit_transform([curve(s)])[0] for s in t)
+    a, b = (cost_features(x[np.newaxis], "velocity") for x in (slow, fast))
+    np.testing.assert_allclose(a, b, atol=0.01 * np.abs(b).max())
+
+
+def test_a_movement_cut_off_keeps_its_velocity():
+    """Beyond the ends a straight movement goes on straight."""
+    line = np.linspace(0, 50, 51)[np.newaxis, :, np.newaxis] * [1.0, -2.0]
+    np.testing.assert_allclose(cost_features(line, "velocity")[0], [[1, -2]] * 51, rtol=1e-3)
+    np.testing.assert_allclose(smooth(line, 2.0), line, atol=1e-10)
+
+
+@pytest.mark.parametrize("n_frames", [5, 6, 30])
+def test_curvature_is_the_sum_of_squared_second_differences(n_frames):
+    """With pinned ends: tau' A tau + 2 b' tau + a constant, A as an upper band."""
+    band, border = curvature(n_frames)
+    inner = np.zeros((n_frames - 2, n_frames - 2))
+    for k in range(min(3, n_frames - 2)):
+        diagonal = np.diag(band[2 - k, k:], k)
+        inner += diagonal + (diagonal.T if k else 0)
+    rng = np.random.default_rng(0)
+    values = []
+    for free in rng.standard_normal((2, n_frames - 2)):
+        tau = np.concatenate([[0], free, [n_frames - 1]])
+        whole = np.square(np.diff(tau, 2)).sum()
+        values.append(whole - free @ inner @ free - 2 * border @ free)
+    np.testing.assert_allclose(values[0], values[1])
+
+
+# -- known warps ------------------------------------------------------------------------
+
+
+def known_warps(seed, noise, n=6, n_features=16):
+    """Copies of a random movement with smooth random warps (rates 0.5 to 2), noise and gains.
+
+    Returns the copies and, for each, the time that shows what copy 0 shows at p.
+    """
+    rng = np.random.default_rng(seed)
+    waves = np.arange(1, 7)[:, np.newaxis]
+    size = rng.standard_normal((n_features, 6)) / np.arange(1, 7) ** 0.7
+    shift = rng.uniform(0, 2 * np.pi, (n_features, 6))
+
+    def movement(phase):
+        return np.stack(
+            [
+                a @ np.sin(np.pi * waves * phase + b[:, np.newaxis])
+                for a, b in zip(size, shift, strict=True)
+            ],
+            axis=1,
+        )
+
+    fine = np.linspace(0, 1, 2001)
+    X, truth = [], []
+    for m in range(n):
+        wave = sum(
+            rng.standard_normal() / k * np.sin(np.pi * k * fine + rng.uniform(0, 6))
+            for k in (1, 2, 3)
+        )
+        rate = 2.0 ** (0 if m == 0 else 0.5 * np.tanh(1.5 * wave))
+        tau = np.concatenate([[0], np.cumsum(np.broadcast_to(rate, fine.shape)[1:])])
+        tau /= tau[-1]
+        x = movement(np.interp(np.linspace(0, 1, P), tau, fine))
+        gain = 1 + (0.05 * rng.standard_normal(n_features) if m else 0)
+        X.append(gain * x + noise * movement(fine).std() * rng.standard_normal(x.shape))
+        truth.append((P - 1) * np.interp(np.linspace(0, 1, P), fine, tau))
+    return X, np.array(truth)
+
+
+@pytest.mark.parametrize(("noise", "error"), [(0.005, 0.03), (0.05, 0.12), (0.2, 0.35)])
+@pytest.mark.parametrize("refine", ["auto", True])
+def test_known_warps_of_a_single_source_are_found_to_a_fraction_of_a_frame(noise, error, refine):
+    errors = []
+    for seed in range(3):
+        X, truth = known_warps(seed, noise)
+        sync = DenseSynchronizer(P, pattern=0, refine=refine).fit(X)
+        assert sync.refines_
+        errors.append(np.abs(sync.match(X).times - truth)[1:].mean())
+    assert np.mean(errors) < error
+
+
+def test_smoothing_follows_the_noise():
+    chosen = [choose_smoothing(np.stack(known_warps(0, noise)[0])) for noise in (0.005, 0.05, 0.2)]
+    assert chosen[0] < chosen[1] < chosen[2]
+
+
+def test_synthetic_people_of_little_style_are_refined(bending_aspace):
+    assert DenseSynchronizer(P).fit(bending_aspace).refines_
+
+
+# -- real people ------------------------------------------------------------------------
+
+# The best of tslearn, dtaidistance, gdtw, fdasrsf and aeon, each at its best setting, mean
+# and median over all ordered pairs: docs/accuracy.md.
+EVENTS = {
+    # action, joint, extreme: (peers' mean, median), (share of the mean that is asked for)
+    ("depositFloorR", "root", np.argmin): ((6.33, 1.46), 0.7),
+    ("depositFloorR", "rhand", np.argmin): ((5.91, 2.56), 0.7),
+    ("elbowToKnee1RepsLelbowStart", "rtibia", np.argmax): ((2.86, 2.10), 0.9),
+}
+
+
+@pytest.mark.parametrize("event", EVENTS, ids=lambda e: f"{e[0]}-{e[1]}")
+def test_key_moments_of_real_people(event, real_data):
+    action, joint, extreme = event
+    (peer_mean, peer_median), share = EVENTS[event]
+    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == action]
+    height = [x[:, 3 * bunch.joints.index(joint) + 1].astype(float) for x in X]
+    moments = np.array(
+        [extreme(gaussian_filter1d(h, 0.015 * len(h))) * (P - 1) / (len(h) - 1) for h in height]
+    )
+    points = ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(X))
+    errors = []
+    for n in range(len(X)):
+        sync = DenseSynchronizer(P, pattern=n).fit(points)
+        assert not sync.refines_
+        landed = [np.interp(moments[n], np.arange(P), tau) for tau in sync.match(points).times]
+        errors.append(np.delete(np.abs(landed - moments), n))
+    assert np.mean(errors) <= share * peer_mean
+    assert np.median(errors) < peer_median
+
+
+def test_a_performance_is_matched_alike_in_and_out_of_the_training_set(bends):
+    postures = DirectionCosines(bends.skeleton).fit_transform(bends.data)
+    X = ASpace(12).fit_transform(postures)
+    sync = DenseSynchronizer(P).fit(X)
+    copies = sync.match([x.copy() for x in X])
+    np.testing.assert_array_equal(copies.times, sync.match(X).times)
+    k = sync.exemplars_[0]
+    without = DenseSynchronizer(P, pattern=sync.pattern_).fit(
+        [x for i, x in enumerate(X) if i != k]
+    )
+    moved = np.abs(without.match([X[k]]).times - sync.match([X[k]]).times)
+    assert np.median(moved) < 1.5

@@ -1,0 +1,99 @@
+"""A warp depends on its performance and the fitted synchronizer, also where costs tie."""
+
+import numpy as np
+import pytest
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
+from sklearn_motionsync.matching.costs import step_table
+from sklearn_motionsync.matching.trellis import Trellis
+
+PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
+SETTINGS = {
+    "defaults": {},
+    "paper": PAPER,
+    "paper, free changes of pace": {**PAPER, "smoothness": 0},
+    "elastic": {"cost": "elastic"},
+    "posture, voted on": {"cost": "posture"},
+    "half frames": {"subframes": 2, "max_rate": 3},
+    "refined": {"refine": True},
+}
+
+
+def held(X):
+    """All of one length, the last frame held: every way to lose the time that is left ties."""
+    n_frames = max(map(len, X)) + 20
+    return [np.concatenate([x, np.repeat(x[-1:], n_frames - len(x), axis=0)]) for x in X]
+
+
+def piecewise(X):
+    """Constant over eight frames at a time."""
+    return [x[np.arange(len(x)) // 8 * 8] for x in X]
+
+
+TIES = {
+    "held": held,
+    "rounded": lambda X: [x.round(1) for x in X],
+    "held and rounded": lambda X: held([x.round(1) for x in X]),
+    "piecewise constant": piecewise,
+    "whole numbers": lambda X: [x.round() for x in X],
+    "as they are": list,
+}
+
+
+@pytest.fixture(scope="module")
+def real_aspace(bends):
+    """Real bends as points of their aSpace."""
+    return ASpace().fit_transform(DirectionCosines(bends.skeleton).fit_transform(bends.data))
+
+
+@pytest.fixture(scope="module", params=["bending_aspace", "real_aspace"])
+def performances(request):
+    return request.getfixturevalue(request.param)[:20]
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("settings", SETTINGS)
+@pytest.mark.parametrize("ties", TIES)
+def test_equal_bits_alone_and_in_groups(performances, ties, settings, dtype):
+    """One by one, three, thirteen, and all: bundles of different shapes and layouts."""
+    X = [x.astype(dtype) for x in TIES[ties](performances)]
+    n_frames = 60 if len(X[0]) > 150 or settings == "half frames" else None
+    sync = DenseSynchronizer(n_frames, **SETTINGS[settings]).fit(X)
+    together = sync.match(X)
+    assert together.distances.dtype == dtype
+    for size in (1, 3, 13):
+        groups = [sync.match(X[i : i + size]) for i in range(0, len(X), size)]
+        for whole, *parts in zip(together, *groups, strict=True):
+            assert np.concatenate(parts).tobytes() == whole.tobytes()
+
+
+@pytest.mark.parametrize("cost", ["posture", "velocity", "elastic"])
+@pytest.mark.parametrize("n_others", [0, 3, 60])
+def test_ties_go_to_the_first_entry_of_the_step_table(cost, n_others):
+    """Stand still, move three frames late, stand still: where to lose the time is up to the rule.
+
+    Walking backwards the path keeps its pace for as long as that costs nothing.
+    """
+    rng = np.random.default_rng(0)
+    P, start, stop, late = 60, 12, 30, 3
+    x, y = np.zeros((2, 1, P, 2))
+    x[0, start:stop] = rng.integers(1, 9, (stop - start, 2))
+    y[0, start + late : stop + late] = x[0, start:stop]
+    others = rng.standard_normal((n_others, P, 2))
+    trellis = Trellis(step_table(cost, max_rate=2), 0.01, 10)
+    offsets = trellis.paths(x, np.concatenate([y, others]))[0, 0]
+    expected = np.zeros(P)
+    # At rate 0 the elastic cost does not count what the moving sequence does: a frame earlier.
+    until = stop if cost == "elastic" else stop + 1
+    expected[: until + 3] = [0, 1, 2, *[late] * (until - 3), 2, 1, 0]
+    np.testing.assert_array_equal(offsets, expected)
+
+
+def test_small_differences_are_no_ties():
+    """A ten-billionth of the energy decides."""
+    rng = np.random.default_rng(1)
+    postures = rng.standard_normal((1, 25, 4)).repeat(2, axis=1)
+    moving = postures.copy()
+    moving[:, 1::2] += 1e-4  # the second of two like postures is the one of the base
+    trellis = Trellis(step_table("posture", max_rate=2), 0.0, 5)
+    q = trellis.paths(postures + 1e-4, moving)[0, 0] + np.arange(50)
+    assert (q[1:] % 2 == 1).all()

@@ -1,0 +1,111 @@
+"""What a subclass of Synchronizer gets, if it only says how it matches."""
+
+import inspect
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.exceptions import NotFittedError
+from sklearn.model_selection import GridSearchCV, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.utils.estimator_checks import check_estimator
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    Match,
+    SkeletonDisplay,
+    SynchronizationDisplay,
+    Synchronizer,
+    TrellisDisplay,
+)
+from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
+
+from shift_synchronizer import ShiftSynchronizer
+
+
+@pytest.fixture(scope="module")
+def shifted():
+    """One bump, early or late."""
+    t = np.linspace(0, 1, 81)[:, np.newaxis]
+    centres = (0.5, 0.4, 0.55, 0.6, 0.475)
+    return [np.exp(-(((t - c) / 0.1) ** 2)) * [1.0, -2.0, 0.5] for c in centres]
+
+
+def test_it_is_short_and_found_what_it_looks_for(shifted):
+    assert len(inspect.getsource(ShiftSynchronizer).splitlines()) <= 15
+    sync = ShiftSynchronizer(pattern=0).fit(shifted)
+    offsets = sync.match(shifted).offsets[:, 40]
+    np.testing.assert_array_equal(offsets.round(), [0, -8, 4, 8, -2])
+    out = sync.transform(shifted)
+    np.testing.assert_allclose(out[:, 20:60], np.repeat(out[:1, 20:60], 5, axis=0), atol=0.15)
+
+
+def test_check_estimator():
+    check_estimator(ShiftSynchronizer())
+
+
+def test_scorers_and_searches(shifted):
+    scores = cross_val_score(ShiftSynchronizer(60), shifted, cv=2, scoring=SpreadScorer())
+    linear = cross_val_score(LinearSynchronizer(60), shifted, cv=2, scoring=SpreadScorer())
+    assert (scores > linear).all()
+    search = GridSearchCV(
+        ShiftSynchronizer(), {"n_frames": [40, 60]}, cv=2, scoring=FeatureHoldoutScorer()
+    )
+    assert np.isfinite(search.fit(shifted).best_score_)
+
+
+def test_pipeline_and_displays(bending):
+    cosines = DirectionCosines(bending.skeleton)
+    data = bending.data[:8]
+    pipe = make_pipeline(cosines, ASpace(), ShiftSynchronizer(50), ActionModel()).fit(data)
+    assert pipe.predict(data).shape == (8,)
+    display = SynchronizationDisplay.from_estimator(pipe, data, features=["aspace0"])
+    assert display.pattern_index == pipe[2].pattern_index_
+    np.testing.assert_array_equal(display.times, Match.from_estimator(pipe, data).times)
+    assert len(SkeletonDisplay.from_estimator(pipe, data).axes_) == 2
+    assert np.isfinite(cross_val_score(pipe[:3], data, cv=2, scoring=SpreadScorer())).all()
+    with pytest.raises(ValueError, match="There is no DenseSynchronizer in Pipeline"):
+        TrellisDisplay.from_estimator(pipe, data)
+
+
+def test_pandas_output(shifted):
+    frames = [pd.DataFrame(x, columns=["a", "b", "c"]) for x in shifted]
+    out = ShiftSynchronizer(30).set_output(transform="pandas").fit_transform(frames)
+    assert out.shape == (150, 3)
+    assert out.index.names == ["performance", "frame"]
+
+
+def test_a_subclass_must_say_how_it_matches(shifted):
+    class Silent(Synchronizer):
+        pass
+
+    sync = Silent().fit(shifted)
+    assert sync.n_frames_ == 81
+    with pytest.raises(NotImplementedError, match=r"Silent does not say .* match\(self, X\)"):
+        sync.transform(shifted)
+
+
+@pytest.mark.parametrize("estimator", [LinearSynchronizer, ShiftSynchronizer, DenseSynchronizer])
+def test_normalize_is_linear_normalisation(estimator, shifted):
+    with pytest.raises(NotFittedError):
+        estimator().normalize(shifted)
+    sync = estimator(30).fit(shifted)
+    expected = LinearSynchronizer(30).fit_transform(shifted)
+    np.testing.assert_array_equal(sync.normalize(shifted), expected)
+    rows = np.stack([x[:, 0] for x in shifted])
+    assert estimator(30).fit(rows).normalize(rows).shape == (5, 30, 1)
+
+
+def test_checked_performances_are_not_checked_again(shifted):
+    sync = DenseSynchronizer(30).fit(shifted)
+    checked = sync.check_performances(shifted)
+    assert sync.check_performances(checked) is checked
+    assert [len(x) for x in checked] == [81] * 5
+    np.testing.assert_array_equal(sync.match(checked).times, sync.match(shifted).times)
+    # Those of another estimator are.
+    narrow = LinearSynchronizer().fit([x[:, :2] for x in shifted])
+    with pytest.raises(ValueError, match="Performance 0 has 3 features a frame"):
+        narrow.transform(checked)

@@ -1,0 +1,168 @@
+"""KeyframeSynchronizer: given key-frames, found ones, and metadata routing."""
+
+import numpy as np
+import pytest
+from sklearn import config_context
+from sklearn.model_selection import cross_validate
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    KeyframeSynchronizer,
+    LinearSynchronizer,
+)
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.matching.keyframes import curvature_keyframes
+from sklearn_motionsync.metrics import group_timing_error, keyframe_error
+
+
+def test_given_keyframes_meet(bending, bending_aspace):
+    sync = KeyframeSynchronizer(100).fit(bending_aspace, keyframes=bending.keyframes)
+    offsets, times, _ = sync.match(bending_aspace, keyframes=bending.keyframes)
+    lengths = [len(x) for x in bending_aspace]
+    pattern = bending.keyframes[sync.pattern_index_] * 99 / (lengths[sync.pattern_index_] - 1)
+    np.testing.assert_allclose(sync.keyframes_, pattern)
+    # Frames are whole, key-frames are not: what is left is the bend between two frames.
+    assert keyframe_error(times, bending.keyframes, pattern, lengths) < 0.15
+    assert not offsets[sync.pattern_index_].any()
+    assert (np.diff(times) >= 0).all()
+
+
+def test_whole_keyframes_meet_exactly():
+    X = [np.arange(11.0)[:, None] ** 2, np.arange(21.0)[:, None]]
+    sync = KeyframeSynchronizer(11, pattern=0).fit(X, keyframes=[[4, 6], [10, 16]])
+    times = sync.match(X, keyframes=[[4, 6], [10, 16]]).times[1]
+    np.testing.assert_allclose(times, np.interp(np.arange(11), [0, 4, 6, 10], [0, 5, 8, 10]))
+    out = sync.transform(X, keyframes=[[4, 6], [10, 16]])
+    np.testing.assert_allclose(out[1][[0, 4, 6, 10], 0], [0, 10, 16, 20])
+
+
+def test_median_is_closest_to_all_once_keyframes_coincide(bending, bending_aspace):
+    X, K = bending_aspace[:6], bending.keyframes[:6]
+    sync = KeyframeSynchronizer(60).fit(X, keyframes=K)
+    knots = np.array([k * 59 / (len(x) - 1) for k, x in zip(K, X, strict=True)])
+    centre, p = knots.mean(axis=0), np.arange(60)
+    matched = []
+    for x, k in zip(X, knots, strict=True):
+        tau = np.interp(p, [0, *centre, 59], [0, *k, 59])
+        own = np.linspace(0, 59, len(x))
+        matched.append(np.column_stack([np.interp(tau, own, column) for column in x.T]))
+    D = [[np.square(a - b).sum() for b in matched] for a in matched]
+    np.testing.assert_allclose(sync.global_distances_, np.sum(D, axis=1))
+    assert sync.pattern_index_ == np.argmin(np.sum(D, axis=1))
+
+
+def test_fit_transform_passes_keyframes_on(bending, bending_aspace):
+    K = list(bending.keyframes)
+    once = KeyframeSynchronizer(50).fit_transform(bending_aspace, keyframes=K)
+    sync = KeyframeSynchronizer(50).fit(bending_aspace, keyframes=K)
+    np.testing.assert_array_equal(once, sync.transform(bending_aspace, keyframes=K))
+
+
+def test_true_keyframes_bound_what_matching_can_reach(bending, bending_aspace):
+    """Between key-frames they are no truth: dense matching may be closer there, and is."""
+    key = KeyframeSynchronizer(100).fit(bending_aspace, keyframes=bending.keyframes)
+    times = {
+        "keyframes": key.match(bending_aspace, keyframes=bending.keyframes).times,
+        "dense": DenseSynchronizer(100).fit(bending_aspace).match(bending_aspace).times,
+        "found": KeyframeSynchronizer(100).fit(bending_aspace).match(bending_aspace).times,
+        "linear": LinearSynchronizer(100).fit(bending_aspace).match(bending_aspace).times,
+    }
+    errors = {name: group_timing_error(t, bending.times) for name, t in times.items()}
+    assert errors["keyframes"] < 0.5
+    assert errors["dense"] < 0.3
+    assert errors["found"] < errors["linear"]
+
+
+def test_curvature_finds_the_corners():
+    """A path along three sides of a box turns twice."""
+    t = np.linspace(0, 3, 91)[:, None]
+    path = np.hstack([np.clip(t, 0, 1), np.clip(t - 1, 0, 1), np.clip(t - 2, 0, 1)])
+    np.testing.assert_allclose(curvature_keyframes(path, 2), [30, 60], atol=1)
+
+
+@pytest.mark.parametrize("n_frames", [3, 5, 9])
+def test_as_many_keyframes_as_there_are_frames_for(n_frames):
+    X = [np.random.default_rng(i).standard_normal((n_frames, 2)) for i in range(3)]
+    sync = KeyframeSynchronizer(n_keyframes=20).fit(X)
+    assert len(sync.keyframes_) == n_frames - 2
+    np.testing.assert_allclose(sync.transform(X), X)
+
+
+def test_pattern_given_as_an_array(bending_aspace):
+    pattern = bending_aspace[3]
+    sync = KeyframeSynchronizer(pattern=pattern).fit(bending_aspace)
+    assert sync.pattern_index_ is None
+    np.testing.assert_allclose(sync.transform([pattern])[0], pattern)
+
+
+# -- metadata routing -------------------------------------------------------------------
+
+
+def make_pipe(bunch):
+    sync = KeyframeSynchronizer(60)
+    sync.set_fit_request(keyframes=True).set_transform_request(keyframes=True)
+    return make_pipeline(DirectionCosines(bunch.skeleton), ASpace(4), sync, ActionModel())
+
+
+def test_keyframes_reach_the_synchronizer_inside_a_pipeline(bending):
+    with config_context(enable_metadata_routing=True):
+        pipe = make_pipe(bending).fit(bending.data, keyframes=bending.keyframes)
+        points = pipe[:-2].transform(bending.data)
+        direct = KeyframeSynchronizer(60).fit_transform(points, keyframes=bending.keyframes)
+        np.testing.assert_array_equal(pipe[-1].mean_, ActionModel().fit(direct).mean_)
+        out = pipe[:-1].transform(bending.data, keyframes=bending.keyframes)
+        np.testing.assert_array_equal(out, direct)
+
+
+def test_keyframes_are_split_with_the_performances(bending):
+    with config_context(enable_metadata_routing=True):
+        result = cross_validate(
+            make_pipe(bending)[:-1],
+            bending.data,
+            cv=3,
+            scoring=lambda estimator, X, y=None: len(estimator[-1].keyframes_),
+            params={"keyframes": list(bending.keyframes)},
+            error_score="raise",
+        )
+    assert result["test_score"].tolist() == [5, 5, 5]
+
+
+# -- bad key-frames -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("keyframes", "message"),
+    [
+        ([[2, 5]], "one array a performance, 2; got 1"),
+        (
+            [[2, 5], [5, 2]],
+            r"Performance 1: key-frames must be 2 increasing frames between 0 and 9",
+        ),
+        ([[2, 5], [2, 5, 7]], "Performance 1: key-frames must be 2"),
+        ([[2, 5], [2, 9]], "Performance 1: .* both excluded"),
+        ([[0, 5], [2, 5]], "Performance 0: "),
+        ([[2, 5], [2, np.nan]], "Performance 1: "),
+        ([[2, 5], 3], "Performance 1: "),
+    ],
+)
+def test_impossible_keyframes(keyframes, message):
+    X = [np.arange(10.0)[:, None]] * 2
+    with pytest.raises(ValueError, match=message):
+        KeyframeSynchronizer().fit(X, keyframes=keyframes)
+
+
+def test_keyframes_must_be_given_again(bending):
+    sync = KeyframeSynchronizer().fit(bending.data, keyframes=bending.keyframes)
+    with pytest.raises(ValueError, match="give those of these performances too"):
+        sync.transform(bending.data)
+    with pytest.raises(ValueError, match="must be 5 increasing"):
+        sync.transform(bending.data, keyframes=bending.keyframes[:, :4])
+
+
+def test_new_performances_with_keyframes():
+    bunch = make_bending(6, random_state=0)
+    sync = KeyframeSynchronizer(40).fit(bunch.data[:4], keyframes=bunch.keyframes[:4])
+    assert sync.transform(bunch.data[4:], keyframes=bunch.keyframes[4:]).shape == (2, 40, 45)

@@ -1,0 +1,171 @@
+"""Match: warps of performances, and what they say of frames, seconds and other recordings."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.exceptions import NotFittedError
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    KeyframeSynchronizer,
+    Match,
+    to_frame,
+)
+
+
+@pytest.fixture(scope="module")
+def matched(bending):
+    points = ASpace(3).fit_transform(bending.data[:6])
+    synchronizer = DenseSynchronizer(40).fit(points)
+    return points, synchronizer, synchronizer.match(points)
+
+
+def test_performances_are_warped_as_by_transform(matched):
+    points, synchronizer, match = matched
+    np.testing.assert_array_equal(match.warp(points), synchronizer.transform(points))
+
+
+def test_other_recordings_at_another_rate(matched):
+    points, _, match = matched
+    rng = np.random.default_rng(0)
+    forces = [rng.normal(size=(10 * len(x) - 3, 2)) for x in points]
+    warped = match.warp([pd.DataFrame(x) for x in forces])
+    for x, times, out in zip(forces, match.times, warped, strict=True):
+        at = times / 39 * (len(x) - 1)
+        expected = np.array([np.interp(at, np.arange(len(x)), column) for column in x.T]).T
+        np.testing.assert_allclose(out, expected, atol=1e-12)
+
+
+def test_dtype(matched):
+    points, _, match = matched
+    assert match.warp([x.astype(np.float32) for x in points]).dtype == np.float32
+    mixed = [points[0].astype(np.float32), *points[1:]]
+    assert match.warp(mixed).dtype == np.float64
+    assert match.warp([np.arange(4)[:, np.newaxis]] * 6).dtype == np.float64
+
+
+def test_what_cannot_be_warped(matched):
+    points, _, match = matched
+    with pytest.raises(ValueError, match="6 matched performances, but 5 sequences"):
+        match.warp(points[:5])
+    with pytest.raises(ValueError, match="Performance 1 has 2 features a frame, performance 0 has"):
+        match.warp([points[0], np.zeros((9, 2)), *points[2:]])
+    with pytest.raises(ValueError, match=r"wrap|Wrap one performance as \[X\]"):
+        match.warp(np.zeros((6, 9)))
+
+
+def test_what_a_match_holds(matched):
+    match = matched[2]
+    assert match.times.shape == match.offsets.shape == (6, 40)
+    np.testing.assert_array_equal(match.offsets, match.times - np.arange(40))
+    offsets, times, distances = match
+    assert offsets is match.offsets
+    assert times is match.times
+    assert distances is match.distances
+    assert not isinstance(match, tuple)
+    assert not {"count", "index"} & set(dir(match))
+    copied = pickle.loads(pickle.dumps(match))
+    for one, other in zip(copied, match, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert repr(match) == "Match(6 performances on 40 frames)"
+
+
+def test_frames_and_seconds(matched):
+    points, _, match = matched
+    frames = match.frames(points)
+    for x, times, own in zip(points, match.times, frames, strict=True):
+        np.testing.assert_allclose(own, np.interp(times, [0, 39], [0, len(x) - 1]), atol=1e-12)
+    # What warp gives is what is there.
+    clocks = [np.arange(len(x), dtype=float)[:, np.newaxis] for x in points]
+    np.testing.assert_allclose(match.warp(clocks)[:, :, 0], frames, atol=1e-12)
+    lengths = [len(x) for x in points]
+    for X in (lengths, np.array(lengths), pd.Series(lengths, index=list("abcdef"))):
+        np.testing.assert_array_equal(match.frames(X), frames)
+    frame = to_frame([pd.DataFrame(x) for x in points])
+    np.testing.assert_array_equal(match.frames(frame), frames)
+    np.testing.assert_array_equal(match.seconds(points, 120), frames / 120)
+    rates = np.array([120, 120, 30, 60, 50, 100])
+    np.testing.assert_array_equal(match.seconds(points, rates), frames / rates[:, np.newaxis])
+
+
+@pytest.mark.parametrize(
+    ("lengths", "rate", "message"),
+    [
+        ([40] * 5, 1, "6 matched performances, but 5 lengths"),
+        ([40, 40, 1, 40, 40, 40], 1, "Performance 2 has 1 frames"),
+        ([40] * 6, 0, "frame_rate must be one number above 0"),
+        ([40] * 6, -5.0, "frame_rate must be one number above 0"),
+        ([40] * 6, np.nan, "frame_rate must be one number above 0"),
+        ([40] * 6, [1, 2], "6 matched performances, but 2 frame rates"),
+    ],
+)
+def test_impossible_lengths_and_rates(matched, lengths, rate, message):
+    with pytest.raises(ValueError, match=message):
+        matched[2].seconds(lengths, rate)
+
+
+@pytest.mark.parametrize(
+    ("times", "distances", "message"),
+    [
+        (np.zeros(5), None, r"got \(5,\)"),
+        (np.zeros((5, 1)), None, "at least 2"),
+        ([[0.0, 1.5]], None, "from 0 to P - 1 = 1, .* got 0 to 1.5"),
+        ([[0.0, np.nan]], None, "from 0 to P - 1"),
+        ([[0.0, 1.0]], [1.0, 2.0], r"each of the 1 performances, got shape \(2,\)"),
+    ],
+)
+def test_what_is_no_match(times, distances, message):
+    with pytest.raises(ValueError, match=message):
+        Match(times, distances)
+
+
+def test_a_match_of_ones_own():
+    match = Match([[0, 2, 2, 3]])
+    assert match.times.dtype == np.float64
+    assert match.offsets.tolist() == [[0, 1, 0, 0]]
+    assert np.isnan(match.distances).all()
+
+
+def test_from_a_pipeline(bending):
+    steps = DirectionCosines(bending.skeleton), ASpace(3), DenseSynchronizer(30), ActionModel()
+    pipe = make_pipeline(*steps).fit(bending.data[:6])
+    match = Match.from_estimator(pipe, bending.data[6:9])
+    expected = pipe[2].match(pipe[:2].transform(bending.data[6:9]))
+    for one, other in zip(match, expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+    alone = Match.from_estimator(pipe[2], pipe[:2].transform(bending.data[6:9]))
+    np.testing.assert_array_equal(alone.times, expected.times)
+    with pytest.raises(ValueError, match="There is no synchronizer in Pipeline"):
+        Match.from_estimator(pipe[:2], bending.data)
+    with pytest.raises(NotFittedError):
+        Match.from_estimator(DenseSynchronizer(), bending.data)
+
+
+def test_parameters_of_the_match_reach_it(bending):
+    X, keyframes = bending.data[:6], bending.keyframes[:6]
+    sync = KeyframeSynchronizer(30).fit(X, keyframes=keyframes)
+    match = Match.from_estimator(sync, X, keyframes=keyframes)
+    np.testing.assert_array_equal(match.times, sync.match(X, keyframes=keyframes).times)
+
+
+def test_every_kind_of_collection(matched):
+    """The contract for performances holds for what comes along with them; gaps stay."""
+    points, _, match = matched
+    expected = match.warp(points)
+    names = ["a", "b", "c"]
+    frames = [pd.DataFrame(x, columns=names) for x in points]
+    objects = np.empty(6, dtype=object)
+    objects[:] = points
+    for X in (frames, to_frame(frames), objects):
+        np.testing.assert_array_equal(match.warp(X), expected)
+    with_gap = [x.copy() for x in points]
+    with_gap[2][5, 1] = np.nan
+    warped = match.warp(with_gap)
+    known = np.isfinite(warped)
+    assert not known[2, :, 1].all()
+    np.testing.assert_array_equal(warped[known], expected[known])

@@ -1,0 +1,165 @@
+"""The house: which rooms there are, who may look into which, and what is public."""
+
+import ast
+import graphlib
+import re
+import statistics
+from pathlib import Path
+
+import pytest
+import sklearn_motionsync
+from sklearn_motionsync import datasets, display, metrics
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "sklearn_motionsync"
+
+# From the ground up: a room sees those before it, and those of its own wing.
+FLOORS = [
+    "notebook",
+    "fitting",
+    "work",
+    "sequences",
+    "performances",
+    "pipelines",
+    "aspace",
+    "action_model",
+    "body",
+    "matching",
+    "synchronizers",
+    "datasets",
+    "metrics",
+    "display",
+]
+
+# Private names of scikit-learn that third parties rely on.
+ALLOWED = {
+    "_fit_context",
+    "_get_output_config",
+    "_param_validation",
+    "_parameter_constraints",
+    "_set_output",
+}
+
+
+def read(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def name_of(path):
+    """sklearn_motionsync/matching/rows.py: matching.rows."""
+    parts = path.relative_to(PACKAGE).with_suffix("").parts
+    return ".".join(part for part in parts if part != "__init__")
+
+
+MODULES = {name_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def imports(name):
+    """What a module takes from other modules of the package, and from scikit-learn."""
+    inside, outside = set(), set()
+    base = name.split(".") if MODULES[name].name == "__init__.py" else name.split(".")[:-1]
+    for node in ast.walk(read(MODULES[name])):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            start = base[: len(base) + 1 - node.level]
+            module = ".".join([*start, *filter(None, [node.module])])
+            for alias in node.names:
+                whole = f"{module}.{alias.name}".lstrip(".")
+                inside.add(whole if whole in MODULES else module)
+        elif isinstance(node, ast.ImportFrom) and node.module.split(".")[0] == "sklearn":
+            outside |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.Import):
+            outside |= {a.name for a in node.names if a.name.split(".")[0] == "sklearn"}
+    return inside - {""}, outside
+
+
+def test_imports_run_downwards_only():
+    for name in MODULES:
+        if not name:
+            continue
+        own = FLOORS.index(name.split(".")[0])
+        for other in imports(name)[0]:
+            assert FLOORS.index(other.split(".")[0]) <= own, f"{name} imports {other}"
+
+
+def test_imports_run_in_no_circle():
+    list(graphlib.TopologicalSorter({name: imports(name)[0] for name in MODULES}).static_order())
+
+
+def test_the_matching_knows_nothing_of_scikit_learn():
+    taken = {name: imports(name) for name in MODULES if name.split(".")[0] == "matching"}
+    assert set().union(*(outside for _, outside in taken.values())) == {"get_config"}
+    for inside, _ in taken.values():
+        assert {module.split(".")[0] for module in inside} <= {"matching"}
+
+
+def test_every_module_says_what_it_holds():
+    for name, path in MODULES.items():
+        first = (ast.get_docstring(read(path)) or "").split("\n")[0]
+        assert re.fullmatch(r"[A-Za-z].{20,}[.:]", first), f"{name}: {first!r}"
+
+
+def test_rooms_are_small():
+    lengths = [len(path.read_text(encoding="utf-8").splitlines()) for path in MODULES.values()]
+    assert statistics.median(lengths) < 200
+    assert max(lengths) <= 400
+
+
+def _is_own(node):
+    """self, cls or super(): what is private to them is ours."""
+    if isinstance(node, ast.Name):
+        return node.id in ("self", "cls")
+    return isinstance(node, ast.Call) and getattr(node.func, "id", "") == "super"
+
+
+def _is_private(name):
+    return name.startswith("_") and not name.startswith("__")
+
+
+def private_accesses(path):
+    """Names with an underscore that a file takes from other modules and objects."""
+    for node in ast.walk(read(path)):
+        taken = []
+        if isinstance(node, ast.Attribute) and not _is_own(node.value):
+            taken = [node.attr]
+        elif isinstance(node, ast.ImportFrom):
+            taken = [*(node.module or "").split("."), *(alias.name for alias in node.names)]
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "setattr":
+            strings = [a.value for a in node.args if isinstance(a, ast.Constant)]
+            taken = [part for s in strings if isinstance(s, str) for part in s.split(".")]
+        for name in taken:
+            if _is_private(name) and name not in ALLOWED:
+                yield f"{path.relative_to(ROOT)}:{node.lineno}: {name}"
+
+
+def test_nobody_looks_into_private_matters_of_others():
+    found = []
+    for folder in ("sklearn_motionsync", "tests", "benchmarks", "docs", "examples"):
+        for path in (ROOT / folder).rglob("*.py"):
+            if "_build" in path.parts:
+                continue
+            found += list(private_accesses(path))
+    # The readers of one format are rooms that only the wing's own door leads to.
+    inside = re.compile(r"sklearn_motionsync/datasets/\w+\.py:\d+: _[a-z0-9_]+$")
+    rooms = {path.stem for path in (PACKAGE / "datasets").glob("_*.py")}
+    rest = [f for f in found if not (inside.match(f) and f.split(": ")[1] in rooms)]
+    assert rest == []
+
+
+def test_the_reference_is_what_is_public():
+    text = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
+    listed = set()
+    for block in re.findall(r"```\{eval-rst\}\n(.*?)```", text, re.DOTALL):
+        listed |= set(re.findall(r"^   ([A-Za-z_.]+)$", block, re.MULTILINE))
+    modules = {"datasets", "display", "metrics"}
+    # The displays are named by the package itself, too.
+    public = set(sklearn_motionsync.__all__) - modules
+    assert set(display.__all__) <= public
+    for prefix, module in (("datasets", datasets), ("metrics", metrics)):
+        public |= {f"{prefix}.{name}" for name in module.__all__}
+    assert listed == public
+
+
+@pytest.mark.parametrize("module", [sklearn_motionsync, datasets, display, metrics])
+def test_what_is_public_is_there(module):
+    assert len(set(module.__all__)) == len(module.__all__)
+    assert all(hasattr(module, name) for name in module.__all__)
