@@ -125,16 +125,17 @@ class Trellis:
         """
         n_moving, n_positions, n_features = moving.shape
         q = disparities + self.table.subframes * np.arange(len(base))
-        entry = self.entry_of_step.take(q[:, 1:] - q[:, :-1])
-        penalty, _, inner = self.of_step
-        of_all = (q + n_positions * np.arange(n_moving)[:, np.newaxis]).ravel()
-        differences = moving.reshape(-1, n_features).take(of_all, axis=0).reshape(*q.shape, -1)
+        steps = np.full_like(q, self.table.subframes)
+        np.subtract(q[:, 1:], q[:, :-1], out=steps[:, 1:])
+        penalty, _, inner = self.of_step.take(self.entry_of_step, axis=1)
+        q += n_positions * np.arange(n_moving)[:, np.newaxis]
+        differences = moving.reshape(-1, n_features).take(q, axis=0)
         if len(self.groups) > 1:
-            differences[:, 1:] *= (inner / 2).take(entry)[:, :, np.newaxis]
+            differences *= (inner / 2).take(steps)[:, :, np.newaxis]
         differences -= base
-        np.square(differences, out=differences)
-        local = differences.reshape(n_moving, -1).sum(axis=1)
-        return local + penalty.take(entry).sum(axis=1).astype(local.dtype)
+        differences = differences.reshape(n_moving, -1)
+        local = np.vecdot(differences, differences)
+        return local + penalty.take(steps[:, 1:]).sum(axis=1).astype(local.dtype)
 
     def tiles(self, n_bases, n_moving, n_features):
         """Slices of bases and of moving sequences that cover all pairs.

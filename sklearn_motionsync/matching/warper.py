@@ -125,10 +125,11 @@ class Warper:
     @classmethod
     def to_pattern(cls, matcher, pattern, chosen, votes, warp_smoothing):
         """The warper to a pattern: its postures, and it and its exemplars at all positions."""
-        features = matcher.features(chosen).astype(np.float64)
+        features = matcher.features(chosen)
+        sequences = features[:, :: matcher.features.subframes]
+        to_exemplars = matcher.times(matcher.paths(sequences[:1], features[1:])[0])
         # A copy: the whole of the features is not to be kept alive.
-        bases = Bases(matcher.trellis, features[:, :: matcher.features.subframes].copy())
-        to_exemplars = matcher.times(matcher.paths(bases.part(slice(1)), features[1:])[0])
+        bases = Bases(matcher.trellis, sequences.astype(np.float64))
         return cls(matcher, pattern, bases, to_exemplars, votes, warp_smoothing)
 
     def positions(self, arrays):
