@@ -49,7 +49,7 @@ class Performances(list):
     def suits(self, n_features, on_rows):
         """Whether an estimator that was fitted on such input would take them."""
         is_rows = self.kind == "rows"
-        return is_rows == on_rows and self[0].shape[not is_rows] == n_features
+        return is_rows is on_rows and self[0].shape[not is_rows] == n_features
 
     def take(self, indices):
         """Some of them: rows, or a list."""
@@ -86,10 +86,11 @@ class SequenceLevelMixin:
         """
         on_rows = None
         if not reset:
+            known = vars(self).get("n_features_in_"), vars(self).get("_fitted_on_rows")
+            if isinstance(X, Performances) and X.suits(*known):
+                return X
             check_is_fitted(self)
             on_rows = self._fitted_on_rows
-            if isinstance(X, Performances) and X.suits(self.n_features_in_, on_rows):
-                return X
         performances = check_performances(self, X, reset=reset, level="sequence", on_rows=on_rows)
         if reset:
             self._fitted_on_rows = performances.kind == "rows"

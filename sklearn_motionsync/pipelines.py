@@ -24,7 +24,11 @@ def find_step(estimator, kind):
 
 def find_synchronizer(estimator):
     """The same for whatever matches performances."""
-    return _first(estimator, lambda step: hasattr(step, "match"), "synchronizer")
+
+    def matches(step):
+        return hasattr(step, "match") and hasattr(step, "check_performances")
+
+    return _first(estimator, matches, "synchronizer")
 
 
 def reach_synchronizer(estimator, X, kind=None):

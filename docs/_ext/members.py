@@ -27,9 +27,10 @@ def _definition(cls, name):
     for base in cls.__mro__:
         if name in vars(base):
             value = vars(base)[name]
-            made_by = type(value).__module__.split(".")[0]
-            home = "sklearn" if made_by == "sklearn" else base.__module__.split(".")[0]
-            return home, value
+            # Descriptors of scikit-learn's, and functions of its that we only wrap.
+            makers = {type(value).__module__, getattr(value, "__module__", None) or ""}
+            of_sklearn = any(maker.split(".")[0] == "sklearn" for maker in makers)
+            return "sklearn" if of_sklearn else base.__module__.split(".")[0], value
     return None, None
 
 

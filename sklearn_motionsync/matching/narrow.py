@@ -5,6 +5,8 @@ row takes two calls. The band is computed whole: what lies outside the sequences
 winning path.
 """
 
+import math
+
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
@@ -14,7 +16,7 @@ __all__ = ["NARROW_CELLS", "narrow_paths", "suits"]
 NARROW_CELLS = 30_000
 _NARROW_WAYS = 1_000_000
 # Pairs so few that Python's steps cost less than NumPy's.
-_FEW_PAIRS = 2
+_FEW_PAIRS = 4
 
 
 def suits(bundle):
@@ -77,14 +79,8 @@ def _walk(bundle, ways):
     at = np.empty((n_frames, pairs), dtype=np.intp)
     at[-1] = here
     if pairs <= _FEW_PAIRS:
-        charged = ways[:, order]
-        by_pair = charged.reshape(n_frames, len(order), -1, pairs)
-        by_pair += bundle.handicaps[:, np.newaxis]
-        won = shift.take(charged.argmin(axis=1))
         for pair, cell in enumerate(here.tolist()):
-            for p in range(n_frames - 1, 0, -1):
-                cell -= won.item(p, cell)
-                at[p - 1, pair] = cell
+            at[:-1, pair] = _walk_alone(ways, cell, order, shift, bundle.handicaps[:, pair])
     else:
         handicaps, flat = bundle.handicaps, ways.reshape(n_frames, -1)
         # The cell of every entry of the step table; that of the first tells where the path is.
@@ -97,3 +93,18 @@ def _walk(bundle, ways):
             at[p - 1] = first
         at[:-1] -= order[0] * n_cells
     return bundle.disparities(at // pairs - trellis.width)
+
+
+def _walk_alone(ways, cell, *steps):
+    """The cells of one path at all samples before the last."""
+    entries = list(zip(*(values.tolist() for values in steps), strict=True))
+    cost_of, cells = ways.item, []
+    for p in range(len(ways) - 1, 0, -1):
+        best, way = math.inf, 0
+        for step, moved, handicap in entries:
+            cost = cost_of(p, step, cell) + handicap
+            if cost < best:
+                best, way = cost, moved
+        cell -= way
+        cells.append(cell)
+    return cells[::-1]

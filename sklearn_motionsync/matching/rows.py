@@ -27,7 +27,7 @@ _TIE = {np.dtype(np.float64): 2.0**-40, np.dtype(np.float32): 0.0}
 
 
 class Bases:
-    """Base sequences, and the left factors of their local costs, computed when first asked for.
+    """Base sequences, and what is known of them before anything is matched to them.
 
     Parameters
     ----------
@@ -56,15 +56,14 @@ class Bases:
         """``sum_p |x_n(p)|^2``: (n_bases,)."""
         return np.einsum("npk,npk->n", self.sequences, self.sequences)
 
-    @functools.cached_property
     def by_group(self):
-        """The left factor of every group of steps."""
+        """The left factor of every group of steps. Long takes make it large: it is not kept."""
         weights = [(group.moving, group.inner, group.penalty) for group in self.trellis.groups]
         return _left_factor(self.sequences, *zip(*weights, strict=True))
 
     @functools.cached_property
     def by_step(self):
-        """The left factor of every step, steps in order."""
+        """The left factor of every step, steps in order, for narrow bundles; kept for the next."""
         penalty, moving, inner = self.trellis.of_step[:, self.trellis.entry_of_step]
         return _left_factor(self.sequences, moving, inner, penalty)
 
@@ -83,6 +82,11 @@ class Bundle:
         self.pairs = right.shape[1] * self.n_bases
         self.centre = trellis.width + trellis.pad
         self.row_cells = (2 * self.centre + 1) * self.pairs
+
+    @functools.cached_property
+    def left(self):
+        """The left factor of the bases."""
+        return self.bases.by_group()
 
     @functools.cached_property
     def handicaps(self):
@@ -149,7 +153,7 @@ class Bundle:
             factor = window.reshape(-1, n_factors)
             costs = room[: n_groups * len(factor) * self.n_bases].reshape(n_groups, -1)
             products = costs.reshape(n_groups, -1, self.n_bases)
-            np.matmul(factor, self.bases.by_group[p], out=products)
+            np.matmul(factor, self.left[p], out=products)
             yield p, costs
 
     def costs_of_blocks(self, first, last, lows, highs):
@@ -163,7 +167,7 @@ class Bundle:
             lowest = start * sub + lows[start]
             highest = (stop - 1) * sub + highs[stop - 1]
             factor = self.right[lowest : highest + 1].reshape(-1, n_factors)
-            left = self.bases.by_group[start:stop].reshape(-1, n_factors)
+            left = self.left[start:stop].reshape(-1, n_factors)
             costs = np.matmul(left, factor.T).reshape(stop - start, n_groups, -1)
             for p, rows in zip(range(start, min(stop, last)), costs, strict=False):
                 at = p * sub - lowest
@@ -206,17 +210,20 @@ class Bundle:
         back = shift[:, np.newaxis]
         penalties, weight, inner = trellis.of_step.astype(states.dtype)[:, :, np.newaxis]
         charges = penalties + self.handicaps
-        moving, base = np.divmod(np.arange(pairs), self.n_bases)
+        n_moving, n_factors = self.right.shape[1:]
+        positions = self.right.reshape(-1, n_factors)
         start = min(last, self.n_frames - 1)
         here = at[start]
         for p in range(start, first, -1):
             value = states[(p - 1) % len(states)].take(here - back)
             value += charges
             if several:
-                q = p * trellis.table.subframes + here // pairs - self.centre
-                y, x = self.right[q, moving], self.bases.sequences[base, p]
+                q = p * trellis.table.subframes - self.centre
+                y = positions.take(here // self.n_bases + q * n_moving, axis=0)
                 value += weight * y[:, -2]
-                value -= inner * np.einsum("ik,ik->i", x, y[:, :-2])
+                y = y.reshape(n_moving, self.n_bases, n_factors)[..., :-2]
+                products = np.einsum("mnk,nk->mn", y, self.bases.sequences[:, p])
+                value -= inner * products.ravel()
             here = here - shift.take(value.argmin(axis=0))
             at[p - 1] = here
 

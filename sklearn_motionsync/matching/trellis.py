@@ -57,6 +57,8 @@ class Trellis:
         # Of every step: its penalty, and the weights of |x_m|^2 and of the inner product.
         self.of_step = np.stack([mu * table.penalty, table.moving, table.inner])
         self.entry_of_step = np.argsort(table.steps)
+        self.penalty_by_step = mu * table.penalty[self.entry_of_step]
+        self.scale_by_step = table.inner[self.entry_of_step] / 2
         # By how much it changes the disparity; ``pad`` cells at both ends of a row hold infinity.
         self.slopes = table.steps - table.subframes
         self.pad = int(np.abs(self.slopes).max())
@@ -127,15 +129,14 @@ class Trellis:
         q = disparities + self.table.subframes * np.arange(len(base))
         steps = np.full_like(q, self.table.subframes)
         np.subtract(q[:, 1:], q[:, :-1], out=steps[:, 1:])
-        penalty, _, inner = self.of_step.take(self.entry_of_step, axis=1)
         q += n_positions * np.arange(n_moving)[:, np.newaxis]
         differences = moving.reshape(-1, n_features).take(q, axis=0)
         if len(self.groups) > 1:
-            differences *= (inner / 2).take(steps)[:, :, np.newaxis]
+            differences *= self.scale_by_step.take(steps)[:, :, np.newaxis]
         differences -= base
         differences = differences.reshape(n_moving, -1)
         local = np.vecdot(differences, differences)
-        return local + penalty.take(steps[:, 1:]).sum(axis=1).astype(local.dtype)
+        return local + self.penalty_by_step.take(steps[:, 1:]).sum(axis=1).astype(local.dtype)
 
     def tiles(self, n_bases, n_moving, n_features):
         """Slices of bases and of moving sequences that cover all pairs.

@@ -37,10 +37,9 @@ class Clock(NamedTuple):
 class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEstimator):
     """Base of all synchronizers: a subclass only says how it matches.
 
-    From its ``match`` it gets ``fit``, which chooses the pattern after linear normalisation,
-    ``transform``, pandas output, and what scorers and displays need. Parameters of its own, it
-    takes in an ``__init__`` of its own; they are checked if it adds them to
-    ``_parameter_constraints``, as in scikit-learn.
+    Whoever adds ``match`` gets ``fit``, which chooses the pattern after linear normalisation,
+    ``transform``, pandas output, and what scorers and displays need. Parameters of one's own are
+    taken by an ``__init__`` of one's own, as in scikit-learn; it has ``n_frames`` and ``pattern``.
 
     Parameters
     ----------
@@ -60,7 +59,8 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
     n_frames_ : int
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
-        Sum of the distances of each performance to all others; NaN if the pattern was given.
+        Sum of the squared distances of each performance to all others; NaN if the pattern was
+        given.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
