@@ -9,7 +9,7 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
-from .fitting import at_once
+from .fitting import at_once, of_one_state
 from .notebook import DocumentedMixin
 from .performances import SequenceLevelMixin
 
@@ -97,7 +97,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         ValueError
             If the performances have different lengths, or there is only one.
         """
-        X = np.stack(self.check_performances(X, reset=True))
+        X = np.stack(_alike(self._check_training_set(X)))
         if len(X) < 2:
             raise ValueError(
                 "A model of how performances vary needs at least 2 performances, got n_samples = 1."
@@ -111,19 +111,17 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         self.offset_ = float(self._log_density(self.n_std**2 * self.mean_.size))
         return self
 
-    def check_performances(self, X, *, reset=False):
+    def check_performances(self, X):
         """Check that performances are synchronised, and to the clock of the model.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
             Synchronised performances. The rows of a 2-D array are univariate ones.
-        reset : bool, default=False
-            True in ``fit``: learn what to expect.
 
         Returns
         -------
-        list of ndarray (P, n_features)
+        sequence of ndarray (P, n_features)
             All of one dtype, float32 or float64; not to be written to.
 
         Raises
@@ -132,21 +130,16 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
             If the input breaks the contract, performances have different lengths, or others than
             the model.
         """
-        performances = super().check_performances(X, reset=reset)
-        n_frames = len(performances[0])
-        for i, x in enumerate(performances):
-            if len(x) != n_frames:
-                raise ValueError(
-                    f"Performance {i} has {len(x)} frames, performance 0 has {n_frames}: a model "
-                    "needs synchronised performances. Put a DenseSynchronizer before it."
-                )
-        if not reset and n_frames != self.n_frames_:
+        performances = _alike(super().check_performances(X))
+        if len(performances[0]) != self.n_frames_:
             raise ValueError(
-                f"The performances have {n_frames} frames, the model {self.n_frames_}: "
-                "synchronise them with the synchronizer that the model was fitted after."
+                f"The performances have {len(performances[0])} frames, the model "
+                f"{self.n_frames_}: synchronise them with the synchronizer that the model was "
+                "fitted after."
             )
         return performances
 
+    @of_one_state
     def score_samples(self, X):
         """Log-density of performances under the model.
 
@@ -162,6 +155,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         X = np.stack(self.check_performances(X))
         return self._log_density(np.square((X - self.mean_) / self._std()).sum(axis=(1, 2)))
 
+    @of_one_state
     def score(self, X, y=None):
         """Mean log-density of performances.
 
@@ -176,6 +170,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         """
         return float(self.score_samples(X).mean())
 
+    @of_one_state
     def predict(self, X):
         """Whether performances are inside the model.
 
@@ -190,6 +185,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         """
         return np.where(self.score_samples(X) >= self.offset_, 1, -1)
 
+    @of_one_state
     def accepts(self, postures, frame):
         """Whether postures lie inside the envelope at a frame.
 
@@ -217,6 +213,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         lower, upper = self.envelope()
         return ((postures >= lower[frame]) & (postures <= upper[frame])).all(axis=1)
 
+    @of_one_state
     def envelope(self):
         """The mean performance, minus and plus ``n_std`` standard deviations.
 
@@ -228,6 +225,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         reach = self.n_std * np.sqrt(self.variance_)
         return self.mean_ - reach, self.mean_ + reach
 
+    @of_one_state
     def sample(self, n=1, frame=None, random_state=None):
         """Draw accepted postures at a frame (Fig. 4), or whole performances.
 
@@ -289,3 +287,15 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         """Log-density of performances with these sums of squared standard deviations."""
         log_std = np.log(self._std()).sum(dtype=np.float64)
         return -0.5 * squares - log_std - 0.5 * self.mean_.size * np.log(2 * np.pi)
+
+
+def _alike(performances):
+    """Performances, all of the same length."""
+    n_frames = len(performances[0])
+    for i, x in enumerate(performances):
+        if len(x) != n_frames:
+            raise ValueError(
+                f"Performance {i} has {len(x)} frames, performance 0 has {n_frames}: a model "
+                "needs synchronised performances. Put a DenseSynchronizer before it."
+            )
+    return performances

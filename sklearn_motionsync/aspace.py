@@ -13,7 +13,7 @@ from sklearn.decomposition import PCA
 from sklearn.utils._param_validation import Interval, RealNotInt
 from sklearn.utils.validation import check_is_fitted
 
-from .fitting import at_once
+from .fitting import at_once, of_one_state
 from .notebook import DocumentedMixin
 from .performances import check_performances, check_transformed, restore
 
@@ -131,6 +131,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
 
     fit_transform = at_once(TransformerMixin.fit_transform)
 
+    @of_one_state
     def transform(self, X):
         """Project postures into the aSpace (Eq. 5).
 
@@ -148,6 +149,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         arrays = [((a - self.mean_) @ components).astype(a.dtype, copy=False) for a in performances]
         return restore(self, performances, arrays)
 
+    @of_one_state
     def inverse_transform(self, X):
         """Postures of points of the aSpace; exact where nothing was left out.
 

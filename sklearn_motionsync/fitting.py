@@ -1,9 +1,8 @@
 """A fit is all or nothing: it works on a copy of the estimator, whose state is taken over whole."""
 
-import copy
 import functools
 
-__all__ = ["at_once"]
+__all__ = ["at_once", "of_one_state"]
 
 
 def at_once(method):
@@ -24,27 +23,45 @@ def at_once(method):
 
     @functools.wraps(method)
     def on_a_copy(self, *args, **kwargs):
-        twin = copy.copy(self)
-        _forget(twin, _fitted(twin))
+        before = vars(self)
+        blank = _unfitted(before)
+        twin = _with_state(self, dict(blank))
         try:
             result = method(twin, *args, **kwargs)
         except BaseException:
-            _forget(self, _fitted(self))
+            # What another thread has fitted meanwhile is not ours to forget.
+            if vars(self) is before:
+                self.__dict__ = blank
             raise
-        stale = _fitted(self) - _fitted(twin)
-        # One step: who reads in between sees the old state or the new one.
-        vars(self).update({k: v for k, v in vars(twin).items() if k[0] == "_" or k[-1] == "_"})
-        _forget(self, stale)
+        after = _unfitted(vars(self))
+        learnt = {k: v for k, v in vars(twin).items() if k not in blank or v is not blank[k]}
+        self.__dict__ = {**after, **learnt, "_learnt": tuple(learnt)}
         return self if result is twin else result
 
     return on_a_copy
 
 
-def _fitted(estimator):
-    """Names of the attributes that a fit sets, by scikit-learn's convention."""
-    return {name for name in list(vars(estimator)) if name[-1] == "_"}
+def of_one_state(method):
+    """Decorate an answer so that it is of one fit, also if another thread fits meanwhile.
+
+    It is given the estimator as it was when it was asked, and must not write to it.
+    """
+
+    @functools.wraps(method)
+    def of_a_snapshot(self, *args, **kwargs):
+        # A fit replaces the state, it never writes to it.
+        return method(_with_state(self, vars(self)), *args, **kwargs)
+
+    return of_a_snapshot
 
 
-def _forget(estimator, names):
-    for name in names:
-        vars(estimator).pop(name, None)
+def _with_state(estimator, state):
+    twin = object.__new__(type(estimator))
+    twin.__dict__ = state
+    return twin
+
+
+def _unfitted(state):
+    """A copy of an estimator's state without what the last fit learnt."""
+    learnt = {"_learnt", *state.get("_learnt", ())}
+    return {name: value for name, value in state.items() if name not in learnt}

@@ -26,10 +26,10 @@ __all__ = [
 ]
 
 
-class Performances(list):
+class Performances(tuple):
     """Checked performances: their arrays, and what it takes to give the same kind back.
 
-    Whoever checks input takes them as they are. The arrays are views of the input where its dtype
+    Whoever checked them takes them as they are. The arrays are views of the input where its dtype
     allows: never write to them.
 
     Attributes
@@ -40,43 +40,50 @@ class Performances(list):
         Of the performances.
     frames : list
         Labels of the frames of each performance; empty for univariate rows.
+    names : ndarray of str or None
+        ``feature_names_in_`` of the estimator that checked them.
     """
 
-    def __init__(self, arrays, kind, labels, frames):
-        super().__init__(arrays)
-        self.kind, self.labels, self.frames = kind, labels, frames
+    def __new__(cls, arrays, kind, labels, frames, names=None):
+        self = super().__new__(cls, arrays)
+        self.kind, self.labels, self.frames, self.names = kind, labels, frames, names
+        return self
 
-    def suits(self, n_features, on_rows):
-        """Whether an estimator that was fitted on such input would take them."""
-        is_rows = self.kind == "rows"
-        return is_rows is on_rows and self[0].shape[not is_rows] == n_features
+    def __getitem__(self, index):
+        if isinstance(index, slice):
+            return self.take(range(len(self))[index])
+        return super().__getitem__(index)
 
     def take(self, indices):
         """Some of them: rows, or a list."""
         kind = "rows" if self.kind == "rows" else "list"
         frames = [self.frames[i] for i in indices] if self.frames else []
         labels = [self.labels[i] for i in indices]
-        return Performances([self[i] for i in indices], kind, labels, frames)
+        return Performances([self[i] for i in indices], kind, labels, frames, self.names)
+
+    def suits(self, n_features=None, on_rows=None, names=None):
+        """Whether an estimator that was fitted on such input would take them."""
+        is_rows = self.kind == "rows"
+        fits = is_rows is on_rows and self.names is names and len(self) > 0
+        return fits and self[0].shape[not is_rows] == n_features
 
 
 class SequenceLevelMixin:
     """What estimators share whose samples are whole performances: how they take input."""
 
-    def check_performances(self, X, *, reset=False):
-        """Check performances against the input contract.
+    def check_performances(self, X):
+        """Check performances against the input contract, and against those of ``fit``.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             The rows of a 2-D array are univariate performances.
-        reset : bool, default=False
-            True in ``fit``: learn what to expect, ``n_features_in_`` and ``feature_names_in_``.
 
         Returns
         -------
-        list of ndarray (n_frames_i, n_features)
-            All of one dtype, float32 or float64; not to be written to. Given again, it is
-            returned at once.
+        sequence of ndarray (n_frames_i, n_features)
+            All of one dtype, float32 or float64; not to be written to. Methods of this estimator
+            take it without checking again.
 
         Raises
         ------
@@ -84,16 +91,18 @@ class SequenceLevelMixin:
             If the input breaks the contract, or differs from that of ``fit`` in kind, width or
             names.
         """
-        on_rows = None
-        if not reset:
-            known = vars(self).get("n_features_in_"), vars(self).get("_fitted_on_rows")
-            if isinstance(X, Performances) and X.suits(*known):
-                return X
-            check_is_fitted(self)
-            on_rows = self._fitted_on_rows
-        performances = check_performances(self, X, reset=reset, level="sequence", on_rows=on_rows)
-        if reset:
-            self._fitted_on_rows = performances.kind == "rows"
+        known = map(vars(self).get, ("n_features_in_", "_fitted_on_rows", "feature_names_in_"))
+        if isinstance(X, Performances) and X.suits(*known):
+            return X
+        check_is_fitted(self)
+        return check_performances(
+            self, X, reset=False, level="sequence", on_rows=self._fitted_on_rows
+        )
+
+    def _check_training_set(self, X):
+        """The same in ``fit``, where it is learnt what to expect."""
+        performances = check_performances(self, X, reset=True, level="sequence")
+        self._fitted_on_rows = performances.kind == "rows"
         return performances
 
 
@@ -140,7 +149,8 @@ def check_performances(estimator, X, *, reset, level, on_rows=None):
         kind, labels = "list", list(range(len(arrays)))
         if getattr(X, "ndim", 1) == 3:
             kind = "array"
-    return Performances(arrays, kind, labels, frame_labels(sequences))
+    names = getattr(estimator, "feature_names_in_", None)
+    return Performances(arrays, kind, labels, frame_labels(sequences), names)
 
 
 def check_transformed(estimator, X, n_features):
@@ -209,4 +219,5 @@ def _check_rows(estimator, X, *, reset, level, on_rows):
             "Each row of a 2-D input is one univariate sequence and needs at least 2 frames, got "
             f"n_features = {X.shape[1]}. For performances of several features use a list."
         )
-    return Performances([row[:, np.newaxis] for row in X], "rows", list(range(len(X))), [])
+    rows, names = [row[:, np.newaxis] for row in X], getattr(estimator, "feature_names_in_", None)
+    return Performances(rows, "rows", list(range(len(X))), [], names)

@@ -54,6 +54,8 @@ def index_of_pattern(synchronizer, performances):
 
 
 def _first(estimator, fits, name):
+    # What a search found.
+    estimator = getattr(estimator, "best_estimator_", estimator)
     steps = estimator.steps if isinstance(estimator, Pipeline) else [("", estimator)]
     for i, (_, step) in enumerate(steps):
         if fits(step):

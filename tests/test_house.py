@@ -65,10 +65,14 @@ def imports(name):
             for alias in node.names:
                 whole = f"{module}.{alias.name}".lstrip(".")
                 inside.add(whole if whole in MODULES else module)
-        elif isinstance(node, ast.ImportFrom) and node.module.split(".")[0] == "sklearn":
-            outside |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.module.split(".")[0] != PACKAGE.name, f"{name}: imports are relative"
+            if node.module.split(".")[0] == "sklearn":
+                outside |= {alias.name for alias in node.names}
         elif isinstance(node, ast.Import):
-            outside |= {a.name for a in node.names if a.name.split(".")[0] == "sklearn"}
+            tops = {alias.name.split(".")[0] for alias in node.names}
+            assert PACKAGE.name not in tops, f"{name}: imports are relative"
+            outside |= tops & {"sklearn"}
     return inside - {""}, outside
 
 

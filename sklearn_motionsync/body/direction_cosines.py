@@ -7,12 +7,12 @@ from sklearn.base import BaseEstimator, TransformerMixin, _fit_context
 from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..fitting import at_once
+from ..fitting import at_once, of_one_state
 from ..notebook import DocumentedMixin
 from ..performances import check_performances, check_transformed, restore
 from .skeleton import LANDMARKS, Skeleton
 
-__all__ = ["DirectionCosines", "Skeleton"]
+__all__ = ["DirectionCosines"]
 
 
 class _Limb(NamedTuple):
@@ -129,6 +129,7 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
 
     fit_transform = at_once(TransformerMixin.fit_transform)
 
+    @of_one_state
     def transform(self, X):
         """Postures of joint positions.
 
@@ -152,6 +153,7 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
             self, performances, [self._postures(i, a) for i, a in enumerate(performances)]
         )
 
+    @of_one_state
     def inverse_transform(self, X, limb_lengths=None):
         """Joint positions of postures: the paper's fifteen joints, for drawing.
 

@@ -59,6 +59,7 @@ class Trellis:
         self.entry_of_step = np.argsort(table.steps)
         self.penalty_by_step = mu * table.penalty[self.entry_of_step]
         self.scale_by_step = table.inner[self.entry_of_step] / 2
+        self.scales = bool((self.scale_by_step != 1).any())
         # By how much it changes the disparity; ``pad`` cells at both ends of a row hold infinity.
         self.slopes = table.steps - table.subframes
         self.pad = int(np.abs(self.slopes).max())
@@ -131,7 +132,7 @@ class Trellis:
         np.subtract(q[:, 1:], q[:, :-1], out=steps[:, 1:])
         q += n_positions * np.arange(n_moving)[:, np.newaxis]
         differences = moving.reshape(-1, n_features).take(q, axis=0)
-        if len(self.groups) > 1:
+        if self.scales:
             differences *= self.scale_by_step.take(steps)[:, :, np.newaxis]
         differences -= base
         differences = differences.reshape(n_moving, -1)

@@ -126,29 +126,28 @@ class Warper:
     def to_pattern(cls, matcher, pattern, chosen, votes, warp_smoothing):
         """The warper to a pattern: its postures, and it and its exemplars at all positions."""
         features = matcher.features(chosen)
-        sequences = features[:, :: matcher.features.subframes]
-        to_exemplars = matcher.times(matcher.paths(sequences[:1], features[1:])[0])
         # A copy: the whole of the features is not to be kept alive.
-        bases = Bases(matcher.trellis, sequences.astype(np.float64))
+        bases = Bases(matcher.trellis, features[:, :: matcher.features.subframes].copy())
+        to_exemplars = matcher.times(matcher.paths(bases.part(slice(1)), features[1:])[0])
         return cls(matcher, pattern, bases, to_exemplars, votes, warp_smoothing)
 
     def positions(self, arrays):
-        """Performances at every sub-position of the clock (Eq. 7)."""
+        """Performances at every sub-position of the clock (Eq. 7), in double precision.
+
+        There rounding decides nothing, so that the warp of a performance does not depend on those
+        it comes with.
+        """
+        arrays = [x.astype(np.float64, copy=False) for x in arrays]
         return normalise(arrays, len(self.pattern), self.matcher.features.subframes)
 
     def warps(self, positions, rows):
-        """Distances of the direct paths to the pattern, and times ``tau``, of some performances.
-
-        They are matched in double precision, where rounding decides nothing: the warp of a
-        performance does not depend on those it comes with.
-        """
-        distances, times = self._voted(positions[rows], np.float64)
-        return distances.astype(positions.dtype, copy=False), times
+        """Distances of the direct paths to the pattern, and times ``tau``, of some performances."""
+        return self._voted(positions[rows])
 
     def misfits(self, positions, rows):
         """Misfits of matched postures, before any refinement."""
         positions = positions[rows]
-        times = self._voted(positions, positions.dtype)[1]
+        times = self._voted(positions)[1]
         return misfit(self.pattern, positions[:, :: self.matcher.features.subframes], times)
 
     def disparity_space(self, positions):
@@ -157,7 +156,7 @@ class Warper:
         Returns the frames p and the offsets d of the costs, all of them or evenly spaced ones of
         many; the costs (n_frames, n_offsets), NaN where no path may pass; and the path (P,).
         """
-        trellis, moving = self.matcher.trellis, self.matcher.features(positions).astype(np.float64)
+        trellis, moving = self.matcher.trellis, self.matcher.features(positions)
         base, width, sub = self.bases.sequences[0], trellis.width, trellis.table.subframes
         lows, highs = map(np.array, trellis.windows(len(base)))
         every = math.ceil(math.sqrt(len(base) * (2 * width + 1) / DRAWN_CELLS))
@@ -171,12 +170,12 @@ class Warper:
         path = self.matcher.paths(self.bases.part(slice(1)), moving)[0, 0] / sub
         return frames, disparities / sub, costs, path
 
-    def _voted(self, positions, dtype):
+    def _voted(self, positions):
         """Distances of the direct paths, and smoothed times after the vote of the exemplars."""
-        moving = self.matcher.features(positions).astype(dtype, copy=False)
-        bases, trellis = self.bases, self.matcher.trellis
-        if dtype != bases.sequences.dtype:
-            bases = Bases(trellis, bases.sequences.astype(dtype))
+        moving, trellis = self.matcher.features(positions), self.matcher.trellis
+        bases = self.bases
+        if moving.dtype != bases.sequences.dtype:
+            bases = Bases(trellis, bases.sequences.astype(moving.dtype))
         base, disparities = bases.sequences[0], self.matcher.paths(bases, moving)
         distances = trellis.costs(base, moving, disparities[0])
         routes = self.matcher.times(disparities)

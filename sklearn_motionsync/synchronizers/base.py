@@ -8,17 +8,17 @@ from sklearn.base import BaseEstimator, TransformerMixin, _fit_context
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..fitting import at_once
+from ..fitting import at_once, of_one_state
 from ..matching.median import Median, median_of
 from ..matching.warps import normalise
 from ..notebook import DocumentedMixin
 from ..performances import Performances, SequenceLevelMixin, restore
 
-__all__ = ["Clock", "Synchronizer"]
+__all__ = ["Synchronizer", "TrainingSet"]
 
 
-class Clock(NamedTuple):
-    """A training set on the common clock.
+class TrainingSet(NamedTuple):
+    """A training set, as it is and on the common clock.
 
     Attributes
     ----------
@@ -38,8 +38,10 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
     """Base of all synchronizers: a subclass only says how it matches.
 
     Whoever adds ``match`` gets ``fit``, which chooses the pattern after linear normalisation,
-    ``transform``, pandas output, and what scorers and displays need. Parameters of one's own are
-    taken by an ``__init__`` of one's own, as in scikit-learn; it has ``n_frames`` and ``pattern``.
+    ``transform``, pandas output, and what scorers and displays need. These call ``match`` with
+    performances that are checked already, a sequence of arrays; the user gives any collection.
+    ``normalize`` and ``check_performances`` take both. Parameters of one's own are taken by an
+    ``__init__`` of one's own, as in scikit-learn; it has ``n_frames`` and ``pattern``, too.
 
     Parameters
     ----------
@@ -121,7 +123,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         ValueError
             If the input breaks the contract, or the pattern does not exist or fit.
         """
-        self._learn(self.check_performances(X, reset=True))
+        self._learn(self._check_training_set(X))
         return self
 
     fit_transform = at_once(TransformerMixin.fit_transform)
@@ -161,6 +163,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
             "returns a Match."
         )
 
+    @of_one_state
     def normalize(self, X):
         """Normalise performances linearly to the clock of the pattern, without matching (Eq. 7).
 
@@ -212,12 +215,21 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
 
     def _learn(self, performances):
         """All that ``fit`` learns of checked performances."""
-        clock = self._set_clock(performances)
-        self._set_pattern(clock, self._plain_median(clock.on_clock))
+        training = self._set_clock(performances)
+        self._set_pattern(training, self._plain_median(training.on_clock))
 
+    @of_one_state
     def _warp(self, X, **params):
         performances = self.check_performances(X)
-        out = self.match(performances, **params).warp(performances)
+        match = self.match(performances, **params)
+        shape = np.shape(getattr(match, "times", None))
+        if shape != (len(performances), self.n_frames_):
+            raise ValueError(
+                f"{type(self).__name__}.match must return a Match with times of shape "
+                f"(n_sequences, P), here {(len(performances), self.n_frames_)}; got "
+                f"{type(match).__name__} with {shape}."
+            )
+        out = match.warp(performances)
         if performances.kind == "rows":
             return out[:, :, 0]
         return restore(self, performances, out, frames=range(out.shape[1]))
@@ -233,7 +245,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
             self.n_frames_ = int(np.median([len(x) for x in performances]))
             if given is not None:
                 self.n_frames_ = len(given)
-        return Clock(performances, normalise(performances, self.n_frames_), given)
+        return TrainingSet(performances, normalise(performances, self.n_frames_), given)
 
     def _given_pattern(self, performances):
         """The pattern as an array, if that is what was given; indices are checked."""
@@ -269,14 +281,14 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
             return Median.unknown(len(sequences))
         return median_of(sequences)
 
-    def _set_pattern(self, clock, median):
+    def _set_pattern(self, training, median):
         """Take the median, or what was given, as the pattern; it is returned at its own pace."""
         self.global_distances_ = median.distances
         self.pattern_index_ = median.index if self._wants_median else None
-        if not self._wants_median and clock.given is None:
+        if not self._wants_median and training.given is None:
             self.pattern_index_ = int(self.pattern)
-        source = clock.given
+        source = training.given
         if source is None:
-            source = clock.performances[self.pattern_index_]
+            source = training.performances[self.pattern_index_]
         self.pattern_ = normalise([source], self.n_frames_)[0]
         return source

@@ -7,6 +7,7 @@ import numpy as np
 from sklearn.utils import Bunch, check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
 
+from ..fitting import of_one_state
 from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
 from ..matching.median import Median, estimate_distances, rounding_of, search_median, sum_all
@@ -197,6 +198,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         self,
         n_frames=None,
         pattern="median",
+        *,
         velocity_smoothing=0.03,
         refine="auto",
         max_offset=0.25,
@@ -227,6 +229,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         self.n_jobs = n_jobs
         self.verbose = verbose
 
+    @of_one_state
     def match(self, X):
         performances, warper = self.check_performances(X), self._warper
         positions = warper.positions(performances)
@@ -234,8 +237,9 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "warping"}
             results = in_portions(warper, "warps", positions, **portions)
         distances, times = (np.concatenate(parts) for parts in zip(*results, strict=True))
-        return Match(times, distances)
+        return Match(times, distances.astype(performances[0].dtype, copy=False))
 
+    @of_one_state
     def disparity_space(self, X, performance=0):
         """The disparity space of the pattern and one performance, and the path through it (Fig. 2).
 
@@ -259,10 +263,10 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             If there is no such performance.
         """
         performances = self.check_performances(X)
-        if not 0 <= performance < len(performances):
+        if not isinstance(performance, Integral) or not 0 <= performance < len(performances):
             raise ValueError(
                 f"performance={performance} is out of range: there are {len(performances)} "
-                "performances."
+                f"performances, 0 to {len(performances) - 1}."
             )
         warper = self._warper
         positions = warper.positions([performances[performance]])
@@ -273,26 +277,26 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
     def _learn(self, performances):
         with self._progress(fits=True) as progress:
-            clock = self._set_clock(performances)
-            centre = clock.on_clock.mean(axis=(0, 1))
+            training = self._set_clock(performances)
+            centre = training.on_clock.mean(axis=(0, 1))
             matcher, features = Matcher.learn(
                 Features(self.cost, self.subframes, self.velocity_smoothing, centre),
-                self._positions(clock),
+                self._positions(training),
                 smoothness=self.smoothness,
                 max_offset=self.max_offset,
                 max_rate=self.max_rate,
             )
             self.mu_ = matcher.trellis.mu
             median = self._choose_median(matcher, features, progress)
-            source = self._set_pattern(clock, median)
-            warper = self._choose_exemplars(clock, matcher, source, median.estimates)
-            self._warper = self._decide_on_refinement(clock, warper, progress)
+            source = self._set_pattern(training, median)
+            warper = self._choose_exemplars(training, matcher, source, median.estimates)
+            self._warper = self._decide_on_refinement(training, warper, progress)
 
-    def _positions(self, clock, chosen=slice(None)):
+    def _positions(self, training, chosen=slice(None)):
         """Performances of the training set at every sub-position of the clock."""
         if self.subframes == 1:
-            return clock.on_clock[chosen]
-        performances = clock.performances
+            return training.on_clock[chosen]
+        performances = training.performances
         some = [performances[i] for i in np.arange(len(performances))[chosen]]
         return normalise(some, self.n_frames_, self.subframes)
 
@@ -314,36 +318,38 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         self.certified_ = median.certified and wanted
         return median
 
-    def _choose_exemplars(self, clock, matcher, source, estimates):
+    def _choose_exemplars(self, training, matcher, source, estimates):
         """The exemplars, and the warper to the pattern by way of them."""
         self.exemplars_ = np.empty(0, dtype=np.intp)
         if self.consensus > 0:
             self.exemplars_ = choose_exemplars(estimates, self.consensus, self.pattern_index_)
-        chosen = [source, *(clock.performances[k] for k in self.exemplars_)]
+        chosen = [source, *(training.performances[k] for k in self.exemplars_)]
+        # In double precision, as all that is warped.
+        chosen = [x.astype(np.float64, copy=False) for x in chosen]
         positions = normalise(chosen, self.n_frames_, self.subframes)
         portion = matcher, self.pattern_, positions, self.consensus > 0, self.warp_smoothing
         (warper,) = run(Warper.to_pattern, [portion])
         return warper
 
-    def _decide_on_refinement(self, clock, warper, progress):
+    def _decide_on_refinement(self, training, warper, progress):
         """Whether warps are refined by postures, and the warper that does so or does not."""
         self.misfit_ = np.nan
         if self.refine == "auto":
             if self.consensus > 0:
-                self.misfit_ = self._measure_misfit(clock, warper, progress)
+                self.misfit_ = self._measure_misfit(training, warper, progress)
             self.refines_ = self.misfit_ < _LARGEST_MISFIT
         else:
             self.refines_ = bool(self.refine)
         if not self.refines_:
             return warper
-        return RefinedWarper(**vars(warper), noise_width=choose_smoothing(clock.on_clock))
+        return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.on_clock))
 
-    def _measure_misfit(self, clock, warper, progress):
+    def _measure_misfit(self, training, warper, progress):
         """Median misfit of the performances, or of evenly spaced ones of many."""
-        others = np.flatnonzero(np.arange(len(clock.performances)) != self.pattern_index_)
+        others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
         if len(others) == 0:
             return 0.0
         some = others[:: -(-len(others) // _MISFIT_SAMPLE)]
         portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "measuring the misfit"}
-        results = in_portions(warper, "misfits", self._positions(clock, some), **portions)
+        results = in_portions(warper, "misfits", self._positions(training, some), **portions)
         return float(np.median(np.concatenate(results)))

@@ -6,7 +6,7 @@ import numpy as np
 from sklearn.base import _fit_context
 from sklearn.utils._param_validation import Interval
 
-from ..fitting import at_once
+from ..fitting import at_once, of_one_state
 from ..matching.keyframes import curvature_keyframes, match_keyframes
 from ..matching.warps import sample
 from .base import Synchronizer
@@ -106,21 +106,7 @@ class KeyframeSynchronizer(Synchronizer):
         -------
         self
         """
-        performances = self.check_performances(X, reset=True)
-        self._given = keyframes is not None
-        clock = self._set_clock(performances)
-        knots, comparable = None, clock.on_clock
-        if self._given:
-            knots = self._given_knots(performances, keyframes)
-            # On the mean key-frames all performances are comparable, as on one clock.
-            times = self._between(knots.mean(axis=0), knots)
-            comparable = sample(performances, times, self.n_frames_)
-        self._set_pattern(clock, self._plain_median(comparable))
-        if self._given and self.pattern_index_ is not None:
-            self.keyframes_ = knots[self.pattern_index_]
-        else:
-            count = knots.shape[1] if self._given else self.n_keyframes
-            self.keyframes_ = curvature_keyframes(self.pattern_, count)
+        self._learn(self._check_training_set(X), keyframes)
         return self
 
     @at_once
@@ -154,6 +140,7 @@ class KeyframeSynchronizer(Synchronizer):
         """
         return self._warp(X, keyframes=keyframes)
 
+    @of_one_state
     def match(self, X, keyframes=None):
         """Match performances to the pattern.
 
@@ -186,6 +173,22 @@ class KeyframeSynchronizer(Synchronizer):
         synchronised = sample(performances, times, self.n_frames_)
         distances = np.square(synchronised - self.pattern_).sum(axis=(1, 2))
         return Match(times, distances)
+
+    def _learn(self, performances, keyframes):
+        self._given = keyframes is not None
+        training = self._set_clock(performances)
+        knots, comparable = None, training.on_clock
+        if self._given:
+            knots = self._given_knots(performances, keyframes)
+            # On the mean key-frames all performances are comparable, as on one clock.
+            times = self._between(knots.mean(axis=0), knots)
+            comparable = sample(performances, times, self.n_frames_)
+        self._set_pattern(training, self._plain_median(comparable))
+        if self._given and self.pattern_index_ is not None:
+            self.keyframes_ = knots[self.pattern_index_]
+        else:
+            count = knots.shape[1] if self._given else self.n_keyframes
+            self.keyframes_ = curvature_keyframes(self.pattern_, count)
 
     def _between(self, knots, others):
         """tau(p): piecewise linear through the ends and the key-frames."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..fitting import of_one_state
 from .base import Synchronizer
 from .match import Match
 
@@ -51,6 +52,7 @@ class LinearSynchronizer(Synchronizer):
     [0.0, 1.0, 2.0, 3.0, 4.0]
     """
 
+    @of_one_state
     def match(self, X):
         on_clock = self.normalize(X)
         clock = np.arange(on_clock.shape[1], dtype=np.float64)

@@ -1,7 +1,5 @@
 """Match: how performances meet the pattern, which every synchronizer answers with."""
 
-from numbers import Integral
-
 import numpy as np
 
 from ..matching.warps import sample
@@ -26,8 +24,6 @@ class Match:
 
     Attributes
     ----------
-    offsets : ndarray, shape (n_sequences, P)
-        ``Delta(p)``, in frames of the pattern.
     times : ndarray, shape (n_sequences, P)
         ``tau(p) = p + Delta(p)``; from synchronizers of this package non-decreasing,
         ``tau(0) = 0``, ``tau(P-1) = P-1``.
@@ -62,10 +58,10 @@ class Match:
     [0.0, 20.0, 40.0, 60.0, 80.0]
     """
 
-    __slots__ = ("distances", "offsets", "times")
+    __slots__ = ("distances", "times")
 
     def __init__(self, times, distances=None):
-        times = np.asarray(times, dtype=np.float64)
+        times = np.array(times, dtype=np.float64)
         if times.ndim != 2 or times.shape[1] < 2:
             raise ValueError(
                 "times must have shape (n_sequences, P), one row a performance and at least 2 "
@@ -74,20 +70,27 @@ class Match:
         n_sequences, n_frames = times.shape
         # Not a number fails the comparison, too.
         if not (times.min(initial=0) >= 0 and times.max(initial=0) <= n_frames - 1):
+            i = int(np.argmin(((times >= 0) & (times <= n_frames - 1)).all(axis=1)))
             raise ValueError(
-                f"times must be from 0 to P - 1 = {n_frames - 1}, in frames of the pattern, got "
-                f"{times.min():g} to {times.max():g}."
+                f"Performance {i}: times must be from 0 to P - 1 = {n_frames - 1}, in frames of "
+                f"the pattern, got {times[i].min():g} to {times[i].max():g}."
             )
         if distances is None:
             distances = np.full(n_sequences, np.nan)
-        distances = np.asarray(distances)
+        distances = np.array(distances)
+        if distances.dtype.kind != "f":
+            distances = distances.astype(np.float64)
         if distances.shape != (n_sequences,):
             raise ValueError(
                 f"distances must be one for each of the {n_sequences} performances, got shape "
                 f"{distances.shape}."
             )
         self.times, self.distances = times, distances
-        self.offsets = times - np.arange(n_frames)
+
+    @property
+    def offsets(self):
+        """``Delta(p) = tau(p) - p``, in frames of the pattern: (n_sequences, P)."""
+        return self.times - np.arange(self.times.shape[1])
 
     @classmethod
     def from_estimator(cls, estimator, X, **params):
@@ -148,8 +151,9 @@ class Match:
 
         Parameters
         ----------
-        X : performances or array-like of int, shape (n_sequences,)
+        X : performances, or array-like of numbers, shape (n_sequences,)
             The performances, whatever was recorded along with them, or how many frames each has.
+            Of univariate performances in rows, give how many: ``[X.shape[1]] * len(X)``.
 
         Returns
         -------
@@ -161,11 +165,15 @@ class Match:
         ValueError
             If there is not one a performance, or one has fewer than two frames.
         """
-        lengths = np.asarray(_lengths(X))
+        lengths = _lengths(X)
         self._check_count(lengths, "lengths")
-        if lengths.min(initial=2) < 2:
-            i = int(np.argmin(lengths))
-            raise ValueError(f"Performance {i} has {lengths[i]} frames; at least 2 are needed.")
+        sound = (lengths >= 2) & (lengths == np.floor(lengths))
+        if not sound.all():
+            i = int(np.argmin(sound))
+            raise ValueError(
+                f"Performance {i} has {lengths[i]:g} frames; give the performances, or how many "
+                "frames each has, whole numbers of at least 2."
+            )
         return self.times * (lengths[:, np.newaxis] - 1) / (self.times.shape[1] - 1)
 
     def seconds(self, X, frame_rate):
@@ -187,9 +195,12 @@ class Match:
             As from ``frames``; or if a rate is not above 0, or there is not one a performance.
         """
         rate = np.asarray(frame_rate, dtype=np.float64)
-        if rate.ndim > 1 or not (rate > 0).all() or not np.isfinite(rate).all():
+        sound = (rate > 0) & np.isfinite(rate)
+        if rate.ndim > 1 or not sound.all():
+            which = f" for performance {int(np.argmin(sound))}" if rate.ndim == 1 else ""
             raise ValueError(
-                f"frame_rate must be one number above 0, or one a performance, got {frame_rate!r}."
+                f"frame_rate must be one number above 0, or one a performance, got {frame_rate!r}"
+                f"{which}."
             )
         if rate.ndim == 1:
             self._check_count(rate, "frame rates")
@@ -222,6 +233,6 @@ def as_match(times, n_sequences):
 
 def _lengths(X):
     """How many frames the sequences have, of sequences or of such numbers."""
-    if not hasattr(X, "columns") and all(isinstance(n, Integral) for n in X):
-        return X
-    return [len(x) for x in read_collection(X)[0]]
+    if hasattr(X, "__len__") and not hasattr(X, "columns") and all(np.ndim(n) == 0 for n in X):
+        return np.asarray(X, dtype=np.float64)
+    return np.array([len(x) for x in read_collection(X)[0]], dtype=np.float64)

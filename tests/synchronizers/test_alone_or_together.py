@@ -66,6 +66,15 @@ def test_equal_bits_alone_and_in_groups(performances, ties, settings, dtype):
             assert np.concatenate(parts).tobytes() == whole.tobytes()
 
 
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_single_precision_among_double(performances, settings):
+    X = [x.astype(np.float32) for x in performances]
+    sync = DenseSynchronizer(60, **SETTINGS[settings]).fit(X)
+    alone = sync.match(X).times
+    among = sync.match([*X, performances[0]]).times[:-1]
+    np.testing.assert_array_equal(among, alone)
+
+
 @pytest.mark.parametrize("cost", ["posture", "velocity", "elastic"])
 @pytest.mark.parametrize("n_others", [0, 3, 60])
 def test_ties_go_to_the_first_entry_of_the_step_table(cost, n_others):

@@ -71,6 +71,23 @@ def test_pipeline_and_displays(bending):
         TrellisDisplay.from_estimator(pipe, data)
 
 
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (lambda X: np.zeros((5, 30)), r"got ndarray with \(\)"),
+        (lambda X: Match(np.zeros((5, 7))), r"here \(5, 30\); got Match with \(5, 7\)"),
+        (lambda X: Match(np.zeros((2, 30))), r"here \(5, 30\); got Match with \(2, 30\)"),
+    ],
+)
+def test_what_a_subclass_may_not_answer(answer, message, shifted):
+    class Wrong(Synchronizer):
+        def match(self, X):
+            return answer(X)
+
+    with pytest.raises(ValueError, match=f"Wrong.match must return a Match .*{message}"):
+        Wrong(30).fit_transform(shifted)
+
+
 def test_pandas_output(shifted):
     frames = [pd.DataFrame(x, columns=["a", "b", "c"]) for x in shifted]
     out = ShiftSynchronizer(30).set_output(transform="pandas").fit_transform(frames)
@@ -104,6 +121,12 @@ def test_checked_performances_are_not_checked_again(shifted):
     checked = sync.check_performances(shifted)
     assert sync.check_performances(checked) is checked
     assert [len(x) for x in checked] == [81] * 5
+    some = sync.match(checked[1:3])
+    np.testing.assert_array_equal(some.times, sync.match(shifted[1:3]).times)
+    rows = np.stack([x[:, 0] for x in shifted])
+    univariate = DenseSynchronizer(30).fit(rows)
+    some = univariate.match(univariate.check_performances(rows)[1:3])
+    np.testing.assert_array_equal(some.times, univariate.match(rows[1:3]).times)
     np.testing.assert_array_equal(sync.match(checked).times, sync.match(shifted).times)
     # Those of another estimator are.
     narrow = LinearSynchronizer().fit([x[:, :2] for x in shifted])

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.exceptions import NotFittedError
+from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
@@ -64,7 +65,7 @@ def test_what_a_match_holds(matched):
     assert match.times.shape == match.offsets.shape == (6, 40)
     np.testing.assert_array_equal(match.offsets, match.times - np.arange(40))
     offsets, times, distances = match
-    assert offsets is match.offsets
+    np.testing.assert_array_equal(offsets, match.offsets)
     assert times is match.times
     assert distances is match.distances
     assert not isinstance(match, tuple)
@@ -84,7 +85,13 @@ def test_frames_and_seconds(matched):
     clocks = [np.arange(len(x), dtype=float)[:, np.newaxis] for x in points]
     np.testing.assert_allclose(match.warp(clocks)[:, :, 0], frames, atol=1e-12)
     lengths = [len(x) for x in points]
-    for X in (lengths, np.array(lengths), pd.Series(lengths, index=list("abcdef"))):
+    for X in (
+        lengths,
+        np.array(lengths, dtype=float),
+        tuple(lengths),
+        np.array(lengths),
+        pd.Series(lengths, index=list("abcdef")),
+    ):
         np.testing.assert_array_equal(match.frames(X), frames)
     frame = to_frame([pd.DataFrame(x) for x in points])
     np.testing.assert_array_equal(match.frames(frame), frames)
@@ -97,10 +104,15 @@ def test_frames_and_seconds(matched):
     ("lengths", "rate", "message"),
     [
         ([40] * 5, 1, "6 matched performances, but 5 lengths"),
-        ([40, 40, 1, 40, 40, 40], 1, "Performance 2 has 1 frames"),
+        ([40, 40, 1, 40, 40, 40], 1, "Performance 2 has 1 frames; give the performances"),
+        ([40, 40, 40, 40, 40.5, 40], 1, "Performance 4 has 40.5 frames"),
+        (np.zeros((6, 9)), 1, "Wrap one performance"),
+        (map(len, ["ab"] * 6), 1, "got map"),
+        (5, 1, "single 2-D input"),
         ([40] * 6, 0, "frame_rate must be one number above 0"),
         ([40] * 6, -5.0, "frame_rate must be one number above 0"),
         ([40] * 6, np.nan, "frame_rate must be one number above 0"),
+        ([40] * 6, [1, 2, 3, np.inf, 5, 6], "for performance 3"),
         ([40] * 6, [1, 2], "6 matched performances, but 2 frame rates"),
     ],
 )
@@ -114,7 +126,8 @@ def test_impossible_lengths_and_rates(matched, lengths, rate, message):
     [
         (np.zeros(5), None, r"got \(5,\)"),
         (np.zeros((5, 1)), None, "at least 2"),
-        ([[0.0, 1.5]], None, "from 0 to P - 1 = 1, .* got 0 to 1.5"),
+        ([[0.0, 1.0], [0.0, 1.5]], None, "Performance 1: .* 0 to P - 1 = 1, .* got 0 to 1.5"),
+        ([[0.0, 1.0]], ["near"], "could not convert"),
         ([[0.0, np.nan]], None, "from 0 to P - 1"),
         ([[0.0, 1.0]], [1.0, 2.0], r"each of the 1 performances, got shape \(2,\)"),
     ],
@@ -129,6 +142,10 @@ def test_a_match_of_ones_own():
     assert match.times.dtype == np.float64
     assert match.offsets.tolist() == [[0, 1, 0, 0]]
     assert np.isnan(match.distances).all()
+    times = np.array([[0.0, 1.0, 2.0]])
+    match = Match(times)
+    times[0, 1] = 9
+    assert not match.offsets.any(), "it does not change with what it was made of"
 
 
 def test_from_a_pipeline(bending):
@@ -140,6 +157,10 @@ def test_from_a_pipeline(bending):
         np.testing.assert_array_equal(one, other)
     alone = Match.from_estimator(pipe[2], pipe[:2].transform(bending.data[6:9]))
     np.testing.assert_array_equal(alone.times, expected.times)
+    search = GridSearchCV(pipe, {"aspace__n_components": [3]}, cv=2).fit(bending.data[:6])
+    np.testing.assert_array_equal(
+        Match.from_estimator(search, bending.data[6:9]).times, expected.times
+    )
     with pytest.raises(ValueError, match="There is no synchronizer in Pipeline"):
         Match.from_estimator(pipe[:2], bending.data)
     with pytest.raises(NotFittedError):

@@ -59,6 +59,8 @@ def state(estimator):
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
 def test_fits_at_once(estimator, sets):
     """No call fails, and in the end the estimator is that of one call, whole."""
+    # Names are learnt of frames only.
+    sets = [*sets, [pd.DataFrame(x).add_prefix("f") for x in sets[0]]]
     expected = [state(clone(estimator).fit(X)) for X in sets]
     shared, start = clone(estimator), threading.Barrier(len(sets))
 
@@ -72,9 +74,7 @@ def test_fits_at_once(estimator, sets):
     assert state(shared) in expected
 
 
-@pytest.mark.parametrize(
-    "estimator", [e for e in ESTIMATORS if hasattr(e, "transform")], ids=by_name
-)
+@pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
 def test_each_fit_transform_is_right(estimator, sets):
     expected = [clone(estimator).fit_transform(X) for X in sets]
     shared, start = clone(estimator), threading.Barrier(len(sets))
@@ -91,17 +91,22 @@ def test_each_fit_transform_is_right(estimator, sets):
                 np.testing.assert_array_equal(x, y)
 
 
-def test_transforms_while_it_is_fitted_again(sets):
-    """Each transform is that of the old state or of the new one."""
-    first, second = sets[:2]
-    sync = DenseSynchronizer(30).fit(first)
-    right = [sync.transform(first), clone(sync).fit(second).transform(first)]
+@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
+def test_answers_while_it_is_fitted_again(estimator, sets):
+    """Each answer is that of the old state or of the new one."""
+    ask = "transform" if hasattr(estimator, "transform") else "score_samples"
+    first, second = sets[0], [x[:30] for x in sets[1]] if ask == "score_samples" else sets[1]
+    shared = clone(estimator).fit(first)
+    right = [getattr(clone(estimator).fit(X), ask)(first) for X in (first, second)]
+
+    def same(answer, expected):
+        return all(np.array_equal(x, y) for x, y in zip(answer, expected, strict=True))
+
     with ThreadPoolExecutor(2) as pool:
-        fits = pool.submit(lambda: [sync.fit(X) for X in (second, first) * 10])
-        outputs = list(pool.map(lambda _: sync.transform(first), range(50)))
+        fits = pool.submit(lambda: [shared.fit(X) for X in (second, first) * 10])
+        answers = list(pool.map(lambda _: getattr(shared, ask)(first), range(50)))
         fits.result()
-    for output in outputs:
-        assert any(np.array_equal(output, expected) for expected in right)
+    assert all(any(same(answer, expected) for expected in right) for answer in answers)
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
@@ -114,6 +119,39 @@ def test_a_fit_that_fails_leaves_nothing_fitted(estimator, sets):
         check_is_fitted(fitted)
     assert fitted.get_params() == parameters
     assert state(fitted.fit(sets[2])) == state(clone(estimator).fit(sets[2]))
+
+
+def test_a_fit_that_fails_does_not_undo_that_of_another_thread(sets):
+    class Meeting(LinearSynchronizer):
+        def _learn(self, performances):
+            if len(performances) == len(sets[1]):
+                shared.fit(sets[0])
+                raise ValueError("too late")
+            super()._learn(performances)
+
+    shared = Meeting()
+    with pytest.raises(ValueError, match="too late"):
+        shared.fit(sets[1])
+    assert shared.n_frames_ == 30
+
+
+def test_what_a_fit_learns_may_have_any_name(sets):
+    class Named(LinearSynchronizer):
+        def __init__(self, n_frames=None, pattern="median", lambda_=1.0):
+            super().__init__(n_frames, pattern)
+            self.lambda_ = lambda_
+
+        def _learn(self, performances):
+            super()._learn(performances)
+            self.weights = np.ones(self.n_frames_)
+
+    named = Named(lambda_=2.0).fit(sets[0])
+    assert named.weights.shape == (30,)
+    assert named.fit(sets[2]).weights.shape == (25,)
+    assert named.get_params()["lambda_"] == 2.0
+    with pytest.raises(ValueError, match="0 performances"):
+        named.fit([])
+    assert vars(named) == {"n_frames": None, "pattern": "median", "lambda_": 2.0}
 
 
 def test_what_an_earlier_fit_alone_learnt_is_gone(sets):
