@@ -291,7 +291,7 @@ def right_factor(moving):
     n_moving, n_positions, n_features = moving.shape
     right = np.empty((n_positions, n_moving, n_features + 2), dtype=moving.dtype)
     right[..., :-2] = moving.transpose(1, 0, 2)
-    np.einsum("mqk,mqk->qm", moving, moving, out=right[..., -2])
+    right[..., -2] = np.einsum("mqk,mqk->mq", moving, moving).T
     right[..., -1] = 1
     return right
 

@@ -35,6 +35,8 @@ TILE_PRODUCT = 1_000_000
 TILE_BASES = 48
 # Fewer bases than this make thin products: a single one is better, if its row is long.
 _FEW_BASES, LONG_ROW = 8, 1024
+# Paths whose costs are added up together: what stands in between stays in the cache.
+_SUMMED_AT_ONCE = 32
 
 
 class Trellis:
@@ -126,6 +128,12 @@ class Trellis:
         -------
         ndarray, shape (n_moving,)
         """
+        out = np.empty(len(moving), dtype=moving.dtype)
+        for rows in even_slices(len(moving), _SUMMED_AT_ONCE):
+            out[rows] = self._costs(base, moving[rows], disparities[rows])
+        return out
+
+    def _costs(self, base, moving, disparities):
         n_moving, n_positions, n_features = moving.shape
         q = disparities + self.table.subframes * np.arange(len(base))
         steps = np.full_like(q, self.table.subframes)

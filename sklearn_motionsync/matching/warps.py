@@ -59,9 +59,11 @@ def _sample(arrays, times, n_frames, out):
     weight = (at - left).astype(out.dtype)[:, :, np.newaxis]
     frames = np.concatenate(arrays)
     left += np.cumsum(last + 1)[:, np.newaxis] - (last + 1)
-    np.multiply(frames[left], 1 - weight, out=out)
+    np.multiply(frames.take(left, axis=0), 1 - weight, out=out)
     left += 1
-    out += frames[left] * weight
+    following = frames.take(left, axis=0)
+    following *= weight
+    out += following
 
 
 def even_slices(n, size):
