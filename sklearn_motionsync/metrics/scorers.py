@@ -6,7 +6,7 @@ from sklearn.utils import check_random_state
 
 from ..matching.warps import normalise
 from ..pipelines import reach_synchronizer
-from .measures import least_squares, pairwise_correlation, sobolev_least_squares
+from .spread import least_squares, pairwise_correlation, sobolev_least_squares
 
 __all__ = ["FeatureHoldoutScorer", "SpreadScorer"]
 
