@@ -9,6 +9,7 @@ from sklearn.utils._param_validation import Interval
 from ..fitting import at_once, of_one_state
 from ..matching.keyframes import curvature_keyframes, match_keyframes
 from ..matching.warps import sample
+from ..pipelines import MissingMetadata
 from .base import Synchronizer
 from .match import Match
 
@@ -157,9 +158,9 @@ class KeyframeSynchronizer(Synchronizer):
         """
         performances = self.check_performances(X)
         if self._given and keyframes is None:
-            raise ValueError(
-                "The synchronizer was fitted with key-frames: give those of these performances "
-                "too, keyframes=[...]."
+            raise MissingMetadata(
+                "The synchronizer was fitted with key-frames: give those of these performances too",
+                "keyframes",
             )
         if keyframes is None:
             found = [
