@@ -67,7 +67,9 @@ class KeyframeSynchronizer(Synchronizer):
     are often not the same moments, and linear normalisation is better than a wrong key-frame.
 
     Key-frames are metadata: in a Pipeline enable scikit-learn's metadata routing and ask for them
-    with ``set_fit_request(keyframes=True)`` and ``set_transform_request(keyframes=True)``.
+    with ``set_fit_request(keyframes=True)`` and ``set_transform_request(keyframes=True)``. Scorers
+    are asked to take them with ``set_score_request(keyframes=True)``; scorers that are called by
+    hand, displays and ``Match.from_estimator`` take ``keyframes=...``.
 
     Examples
     --------
