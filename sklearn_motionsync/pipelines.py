@@ -100,7 +100,7 @@ def find_synchronizer(estimator):
     return _first(estimator, matches, "synchronizer")
 
 
-def reach_synchronizer(estimator, X, params, caller, *, kind=None, hint=""):
+def reach_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",), hint=""):
     """The synchronizer of an estimator, and what reaches it of raw performances.
 
     Parameters
@@ -114,6 +114,8 @@ def reach_synchronizer(estimator, X, params, caller, *, kind=None, hint=""):
         Whom the user has called with (estimator, X), for messages.
     kind : class, default=None
         Of the synchronizer; by default any.
+    uses : tuple of str, default=("match",)
+        Methods of the synchronizer that the caller gives params to.
     hint : str, default=""
         Other ways to give params.
 
@@ -129,28 +131,29 @@ def reach_synchronizer(estimator, X, params, caller, *, kind=None, hint=""):
     found = find_synchronizer(estimator) if kind is None else find_step(estimator, kind)
     before, synchronizer = found
     check_is_fitted(synchronizer)
-    features = transform_through(before, X, params, caller, hint=hint, last=synchronizer.match)
+    also = [getattr(synchronizer, name) for name in uses]
+    features = transform_through(before, X, params, caller, hint=hint, also=also)
     performances = synchronizer.check_performances(features)
     taken = taken_by(synchronizer.match, params)
     return Reached(before, synchronizer, performances, taken, _how(caller, hint))
 
 
-def transform_through(before, X, params, caller, *, hint="", last=None):
+def transform_through(before, X, params, caller, *, hint="", also=()):
     """Performances after the steps of a pipeline, each given what its ``transform`` takes.
 
     Parameters
     ----------
     before : Pipeline or None
     X, params, caller, hint : as for `reach_synchronizer`
-    last : callable, default=None
-        Takes params, too, after the last step.
+    also : list of callable, default=()
+        Who else takes params, after the last step.
 
     Returns
     -------
     performances, as the last step gives them
     """
     methods = [] if before is None else [step.transform for step in flat_steps(before)]
-    takers = methods if last is None else [*methods, last]
+    takers = [*methods, *also]
     unknown = set(params).difference(*(taken_by(method, params) for method in takers))
     for name in params:
         if name in unknown and params[name] is not None:

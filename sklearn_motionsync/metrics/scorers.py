@@ -101,7 +101,7 @@ class _SynchronizerScorer(BaseEstimator):
         measure, sign = self._measure()
         return sign * measure(before, after)
 
-    def _reach(self, estimator, X, params):
+    def _reach(self, estimator, X, params, uses=("match",)):
         """The synchronizer and the performances, of which there must be two to differ."""
         self._measure()
         name = type(self).__name__
@@ -110,7 +110,7 @@ class _SynchronizerScorer(BaseEstimator):
             f"enable_metadata_routing=True), scoring={name}().set_score_request({{name}}=True), "
             "and params={{'{name}': [...]}} or search.fit(X, {name}=[...])"
         )
-        reached = reach_synchronizer(estimator, X, params, f"{name}()", hint=hint)
+        reached = reach_synchronizer(estimator, X, params, f"{name}()", uses=uses, hint=hint)
         if len(reached.performances) < 2:
             raise ValueError(
                 f"{name} tells how much performances differ from each other, and got one alone. "
@@ -132,7 +132,7 @@ class SpreadScorer(_SynchronizerScorer):
     -----
     In-sample spread rewards over-warping: prefer `FeatureHoldoutScorer` to choose parameters.
 
-    What is scored are at least two performances: `LeaveOneOut` leaves nothing to compare.
+    What is scored are at least two performances: ``LeaveOneOut`` leaves nothing to compare.
 
     Examples
     --------
@@ -243,7 +243,7 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
         TypeError
             If nobody takes one of the params.
         """
-        reached = self._reach(estimator, X, params)
+        reached = self._reach(estimator, X, params, ("match", "fit"))
         synchronizer, performances = reached.synchronizer, reached.performances
         n_features = performances[0].shape[1]
         if n_features < 2:

@@ -153,6 +153,25 @@ def test_metadata_of_any_name(scorer, bunch, points, routing):
     assert np.isfinite(scores).all()
 
 
+class WeighingSynchronizer(LinearSynchronizer):
+    """One whose fit alone takes metadata, and says what it got."""
+
+    seen = []
+
+    def fit(self, X, y=None, *, weights=None):
+        self.seen.append(weights)
+        return super().fit(X)
+
+
+def test_clones_are_fitted_with_what_only_a_fit_takes(points):
+    sync, weights = WeighingSynchronizer(40).fit(points), np.ones(len(points))
+    sync.seen.clear()
+    FeatureHoldoutScorer(n_folds=2)(sync, points, weights=weights)
+    assert [w is weights for w in sync.seen] == [True, True]
+    with pytest.raises(TypeError, match="got 'weights'"):
+        SpreadScorer()(sync, points, weights=weights)
+
+
 # -- routed -----------------------------------------------------------------------------
 
 
