@@ -10,6 +10,7 @@ from ..fitting import at_once, of_one_state
 from ..matching.keyframes import curvature_keyframes, match_keyframes
 from ..matching.units import squared_distances
 from ..matching.warps import sample
+from ..pipelines import MissingMetadata
 from .base import Synchronizer
 from .match import Match
 
@@ -67,7 +68,9 @@ class KeyframeSynchronizer(Synchronizer):
     are often not the same moments, and linear normalisation is better than a wrong key-frame.
 
     Key-frames are metadata: in a Pipeline enable scikit-learn's metadata routing and ask for them
-    with ``set_fit_request(keyframes=True)`` and ``set_transform_request(keyframes=True)``.
+    with ``set_fit_request(keyframes=True)`` and ``set_transform_request(keyframes=True)``. Scorers
+    are asked to take them with ``set_score_request(keyframes=True)``; scorers that are called by
+    hand, displays and ``Match.from_estimator`` take ``keyframes=...``.
 
     Examples
     --------
@@ -158,9 +161,9 @@ class KeyframeSynchronizer(Synchronizer):
         """
         performances = self.check_performances(X)
         if self._given and keyframes is None:
-            raise ValueError(
-                "The synchronizer was fitted with key-frames: give those of these performances "
-                "too, keyframes=[...]."
+            raise MissingMetadata(
+                "The synchronizer was fitted with key-frames: give those of these performances too",
+                "keyframes",
             )
         if keyframes is None:
             found = [
