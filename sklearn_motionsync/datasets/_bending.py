@@ -79,7 +79,7 @@ def make_bending(
     noise : float, default=0.002
         Standard deviation of the noise of each coordinate, in metres, up to 1000.
     frame_rate : float, default=50.0
-        Frames a second; only returned.
+        Frames a second, from 0.001; only returned.
     random_state : int, RandomState instance or None, default=None
 
     Returns
@@ -125,14 +125,14 @@ def make_bending(
         ("style", style, Real, 0, 100),
         ("warp", warp, Real, 0, 10),
         ("noise", noise, Real, 0, 1000),
-        ("frame_rate", frame_rate, Real, 1e-6, 1e9),
+        ("frame_rate", frame_rate, Real, 0.001, 10**9),
     ):
         number = isinstance(value, kind) and not isinstance(value, bool)
         if not number or not least <= value <= most:
             what = "a whole number" if kind is Integral else "a number"
             raise ValueError(
-                f"The '{name}' parameter of make_bending must be {what} from {least:g} to "
-                f"{most:g}, got {value!r}."
+                f"The '{name}' parameter of make_bending must be {what} from {least} to "
+                f"{most}, got {value!r}."
             )
     n_bytes = n_performances * n_frames * 45 * 8
     if n_bytes > _LARGEST:

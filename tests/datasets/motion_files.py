@@ -258,3 +258,35 @@ def tracks(n_frames=40, gap=None):
     if gap:
         positions[slice(*gap), 1] = np.nan
     return positions
+
+
+def everything(machine=84):
+    """What a C3D file of that machine may hold beside markers, for `c3d`."""
+    order = ">" if machine == 86 else "<"
+
+    def floats(*values):
+        each = dec if machine == 85 else struct.Struct(order + "f").pack
+        return b"".join(map(each, values))
+
+    events = {
+        "USED": (2, [], struct.pack(order + "H", 3)),
+        "LABELS": texts("Foot Off", "Foot Strike", "Turn"),
+        "CONTEXTS": texts("Left", "Right", "General"),
+        "TIMES": (4, [2, 3], floats(0, 2.5, 0, 2.25, 1, 0.5)),
+    }
+    analog = {
+        "USED": (2, [], struct.pack(order + "H", 2)),
+        "LABELS": texts("Fx", "EMG"),
+        "UNITS": texts("N", "V"),
+        "SCALE": (4, [2], floats(0.5, 2)),
+        "OFFSET": (2, [2], struct.pack(order + "2h", 10, -20)),
+        "GEN_SCALE": (4, [], floats(0.25)),
+    }
+    return {
+        "positions": tracks(gap=(3, 9)),
+        "machine": machine,
+        "analog": np.random.default_rng(0).integers(-900, 900, (40, 2, 2)),
+        "changes": {"ANGLES": texts("M2"), "ANGLE_UNITS": texts("deg")},
+        "others": {"EVENT": events, "ANALOG": analog},
+        "header": {"first": 101, "last": 140, "events": [("RHS", 0.5), ("RTO", 0.1)]},
+    }

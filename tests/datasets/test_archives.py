@@ -1,6 +1,5 @@
 """Archives of performances, good and bad."""
 
-import io
 import struct
 import tracemalloc
 import zipfile
@@ -10,19 +9,8 @@ import pytest
 from sklearn_motionsync import Skeleton
 from sklearn_motionsync.datasets import load_performances
 
-
-def fields():
-    kinect = Skeleton.kinect()
-    return {
-        "positions": np.random.default_rng(0).standard_normal((12, 20, 3)).astype(np.float32),
-        "offsets": [0, 5, 12],
-        "label": ["bow", "wave"],
-        "actor": ["A", "B"],
-        "take": ["1", "1"],
-        "fps": [30.0, np.nan],
-        "joints": kinect.joints,
-        "parents": kinect.parents,
-    }
+import fuzz_readers
+from damaged_archives import archive, fields, npy
 
 
 def bad(value):
@@ -165,25 +153,6 @@ def test_real_archives(real_data):
 # -- garbled archives -------------------------------------------------------------------
 
 
-def npy(values, header=None):
-    """An array as NumPy writes it, or with a header of ours."""
-    file = io.BytesIO()
-    np.save(file, values)
-    if header is None:
-        return file.getvalue()
-    header = header.encode("latin-1") + b"\n"
-    content = np.ascontiguousarray(values).tobytes()
-    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + content
-
-
-def archive(path, compression=zipfile.ZIP_STORED, **members):
-    contents = {name: npy(np.asarray(values)) for name, values in fields().items()} | members
-    with zipfile.ZipFile(path, "w", compression) as file:
-        for name, content in contents.items():
-            file.writestr(f"{name}.npy", content)
-    return path
-
-
 def headers():
     shape = "{{'descr': '<f4', 'fortran_order': False, 'shape': {}}}"
     yield from (shape.format(s) for s in ("(12, 20, 4)", "(-12, 20, -3)", "(10**9,)", "12", "None"))
@@ -267,3 +236,13 @@ def test_archives_that_unpack_to_very_much(tmp_path):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 10**7
+
+
+def test_damaged_archives(tmp_path):
+    """A short run of tests/datasets/fuzz_readers.py."""
+    originals = fuzz_readers.load_originals("archives")
+    outcomes = [
+        fuzz_readers.run_case(fuzz_readers.damaged(originals, 0, number), tmp_path)
+        for number in range(300)
+    ]
+    assert set(outcomes) == {"read", "ValueError"}
