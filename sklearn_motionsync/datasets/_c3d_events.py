@@ -50,9 +50,9 @@ def _read_parameters(parameters):
     times = np.array(parameters.all_numbers(group, "TIMES"))
     times = times[: len(times) // 2 * 2].reshape(-1, 2) @ [60.0, 1.0]
     n = parameters.number(group, "USED", len(times))
-    if not n or not math.isfinite(n):
+    n = int(n) if n in range(65536) else len(times)
+    if not n:
         return None
-    n = int(n)
     columns = [parameters.all_texts(group, name) for name in ("LABELS", "CONTEXTS")]
     labels, contexts = ((texts + [""] * n)[:n] for texts in columns)
     times = [*times.tolist(), *[math.nan] * n][:n]

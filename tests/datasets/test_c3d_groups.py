@@ -227,6 +227,13 @@ def test_events_without_a_time_or_a_clock(tmp_path):
     assert df.attrs["events"][0]["frame"] == 110  # the file's own clock
 
 
+@pytest.mark.parametrize("used", [-3, 0.5, 1e30, np.nan, np.inf])
+def test_numbers_of_events_that_are_none(tmp_path, used):
+    others = {"EVENT": event_parameters(USED=floats(used))}
+    df = read_motion(put(tmp_path, c3d(tracks(), others=others), "a.c3d"))
+    assert [event["frame"] for event in df.attrs["events"]] == [110, 125, 3025]
+
+
 def test_events_are_keyframes(tmp_path):
     recordings = []
     for strike, off in ((0.2, 0.5), (0.3, 0.6)):
