@@ -34,8 +34,13 @@ def find_point_groups(parameters, labels):
 
 def _group_names(parameters):
     there = parameters.names("POINT")
-    units = {name.removesuffix("_UNITS") for name in there if name.endswith("_UNITS")}
-    others = {f"{unit}S" for unit in units} - {"LABELS", "DESCRIPTIONS", "MARKERS"}
+    markers = parameters.text("POINT", "UNITS")
+    # Points in the unit of markers, such as centres of joints, are as good as markers.
+    others = {
+        f"{name.removesuffix('_UNITS')}S"
+        for name in there
+        if name.endswith("_UNITS") and parameters.text("POINT", name) != markers
+    } - {"LABELS", "DESCRIPTIONS", "MARKERS"}
     return [name for name in dict.fromkeys([*_COMPUTED, *sorted(others)]) if name in there]
 
 

@@ -29,6 +29,9 @@ MODELLED = {
     "ANGLE_UNITS": texts("deg"),
     "MOMENT_UNITS": texts("Nmm"),
     "SWAY_UNITS": texts("cm"),
+    # Centres of joints, in the unit of markers, are as good as these.
+    "CENTRES": texts("RKNE"),
+    "CENTRE_UNITS": texts("mm"),
 }
 
 
