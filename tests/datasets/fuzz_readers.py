@@ -288,9 +288,10 @@ def work(originals, seed, first, step, deadline, current, queue):
         number = first
         while time.time() < deadline:
             current.value = number
+            files = damaged(originals, seed, number)
             signal.alarm(LIMIT_SECONDS)  # the process dies of it, wherever it hangs
             start = time.time()
-            outcome = run_case(damaged(originals, seed, number), Path(folder))
+            outcome = run_case(files, Path(folder))
             signal.alarm(0)
             queue.put((number, outcome, time.time() - start))
             number += step
