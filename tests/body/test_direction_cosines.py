@@ -206,22 +206,6 @@ def test_landmarks_of_common_names():
     assert skeleton.landmarks["left_wrist"] == "LeftHand"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((["a", "a"], [-1, 0]), "different joint names"),
-        ((["a", "b"], [-1]), "one parent each"),
-        ((["a", "b"], [-1, 5]), "parents must be"),
-        ((["a", "b"], [-1, 0]), "No joint stands for the landmarks"),
-        ((Skeleton.paper().joints, Skeleton.paper().parents, None, "x"), "up must be"),
-        ((Skeleton.paper().joints, Skeleton.paper().parents, {"pelvis": "tail"}), "'neck'"),
-    ],
-)
-def test_impossible_skeletons(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        Skeleton(*arguments)
-
-
 def test_bones_and_columns():
     skeleton = Skeleton.kinect()
     assert len(skeleton.bones) == 19
