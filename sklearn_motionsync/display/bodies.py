@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..body.direction_cosines import heading, y_up
+from ..body.axes import heading
+from ..body.limbs import y_up
 
 __all__ = ["bones_by_side", "on_screen", "placed", "upright"]
 
