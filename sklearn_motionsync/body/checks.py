@@ -5,7 +5,7 @@ from numbers import Integral, Real
 
 from .landmarks import LANDMARKS
 
-__all__ = ["as_joints", "as_landmarks", "as_parents", "circle_of"]
+__all__ = ["as_joints", "as_landmarks", "as_parents", "circle_of", "is_whole"]
 
 
 def as_joints(joints):
@@ -28,7 +28,7 @@ def as_parents(parents):
             f"{type(parents).__name__}."
         )
     for j, parent in enumerate(listed):
-        if not _is_whole(parent):
+        if not is_whole(parent):
             raise ValueError(
                 "parents must be whole numbers, the index of each joint's parent or -1; got "
                 f"{parent!r} for joint {j}."
@@ -43,7 +43,8 @@ def _listed(values):
     return None if getattr(values, "ndim", 1) == 0 else tuple(values)
 
 
-def _is_whole(value):
+def is_whole(value):
+    """Whether it is a whole number of any type, but no truth value."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return False
     return isinstance(value, Integral) or float(value).is_integer()
