@@ -51,7 +51,8 @@ def stop(reason):
 
 parser.error = stop
 # The arguments of a notebook are its own.
-options = parser.parse_args(sys.argv[1:] if "__file__" in globals() else [])
+is_script = "__file__" in globals() or Path(sys.argv[0]).name == "plot_bending.py"
+options = parser.parse_args(sys.argv[1:] if is_script else [])
 output = Path(options.output)
 if options.action and not options.data:
     stop("--action chooses among the performances of an archive: give --data, too.")

@@ -11,7 +11,16 @@ from ..gate import as_numbers
 from ..notebook import DocumentedMixin
 from ..performances import check_performances, check_transformed, restore
 from .axes import along_parents, heading, turned
-from .limbs import LIMB_NAMES, LIMBS, check_upright, landmarks_of, leg_length, limbs_of, unit
+from .limbs import (
+    LIMB_NAMES,
+    LIMBS,
+    check_upright,
+    exponent_of,
+    landmarks_of,
+    leg_length,
+    limbs_of,
+    unit,
+)
 from .skeleton import LANDMARKS, Skeleton, check_columns
 
 __all__ = ["DirectionCosines"]
@@ -102,9 +111,9 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
             As from ``transform``.
         """
         performances = self._check(X, reset=True)
-        bodies = [self._body(performances, i) for i in range(len(performances))]
-        unit_of_all = max(k for _, _, k in bodies)
-        lengths = [np.ldexp(lengths, k - unit_of_all) for _, lengths, k in bodies]
+        bodies = [self._body(performances, i)[2:] for i in range(len(performances))]
+        unit_of_all = max(k for _, k in bodies)
+        lengths = [x if k == unit_of_all else np.ldexp(x, k - unit_of_all) for x, k in bodies]
         with np.errstate(over="ignore"):
             found = np.ldexp(np.median(np.concatenate(lengths), axis=0), unit_of_all)
         if not (found > 0).all() or not np.isfinite(found).all():
@@ -213,11 +222,13 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
         return performances
 
     def _body(self, performances, i):
-        """Limb vectors of a performance and their lengths, in units of ``2**k``, its points; k."""
+        """Landmarks of a performance, limbs and their lengths in units of ``2**k``; k."""
         points, k = landmarks_of(performances[i], self.skeleton)
-        lengths = np.linalg.norm(limbs_of(points), axis=2)
-        # The unit is the largest coordinate: what is less is rounding.
-        without = lengths <= 2 * np.finfo(lengths.dtype).eps
+        limbs = limbs_of(points)
+        lengths = np.linalg.norm(limbs, axis=2)
+        # What is less is rounding of the coordinates.
+        largest = max(points.max(), -points.min())
+        without = lengths <= np.finfo(lengths.dtype).eps * largest
         if without.any():
             frame, limb = np.argwhere(without)[0]
             name = LIMB_NAMES[limb]
@@ -226,16 +237,16 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
                 f"joints {[self.skeleton.landmarks[j] for j in LIMBS[name][:2]]} coincide. Repair "
                 "the frame, or choose other landmarks."
             )
-        check_upright(points, self.skeleton, _called(performances, i))
-        return points, lengths, k
+        check_upright(points, lengths, self.skeleton, _called(performances, i))
+        return points, limbs, lengths, k
 
     def _postures(self, performances, i):
-        points, lengths, _ = self._body(performances, i)
+        points, limbs, lengths, _ = self._body(performances, i)
         height = points[:, LANDMARKS.index("pelvis"), 1]
         ankles = [LANDMARKS.index(f"{side}_ankle") for side in ("left", "right")]
         floor = points[:, ankles, 1].min()
         u = (height - floor) / leg_length(np.median(lengths, axis=0))
-        cosines = limbs_of(points) / lengths[:, :, np.newaxis]
+        cosines = limbs / lengths[:, :, np.newaxis]
         if self.reference != "world":
             cosines = turned(cosines, heading(cosines[:, 0]))
         if self.reference == "parent":
@@ -245,7 +256,8 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
     def _positions(self, performances, i, lengths):
         postures = performances[i]
         cosines = postures[:, 1:].reshape(len(postures), -1, 3)
-        without = ~cosines.any(axis=2)
+        # All of them being there is told sooner than one of each limb.
+        without = np.zeros(()) if cosines.all() else ~cosines.any(axis=2)
         if without.any():
             frame, limb = np.argwhere(without)[0]
             raise ValueError(
@@ -256,11 +268,12 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
         cosines = unit(cosines)
         if self.reference == "parent":
             cosines = along_parents(cosines, inverse=True)
-        _, k = np.frexp(lengths.max())
+        k = exponent_of(lengths.max(), postures.dtype)
         with np.errstate(over="ignore", invalid="ignore"):
             body = _built(postures[:, 0], cosines, np.ldexp(lengths, -k).astype(postures.dtype))
-            positions = np.ldexp(body, int(k))
-        if not np.isfinite(positions).all():
+            positions = np.ldexp(body, k) if k else body
+            sound = np.isfinite(positions.sum()) or np.isfinite(positions).all()
+        if not sound:
             raise ValueError(
                 f"{_called(performances, i)}: the positions are beyond {positions.dtype} numbers. "
                 "Give limb_lengths in a larger unit, or smaller heights of the pelvis."

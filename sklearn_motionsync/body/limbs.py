@@ -12,6 +12,7 @@ __all__ = [
     "LIMB_NAMES",
     "UP",
     "check_upright",
+    "exponent_of",
     "landmarks_of",
     "leg_length",
     "limbs_of",
@@ -65,8 +66,16 @@ def landmarks_of(positions, skeleton):
     """
     columns = [skeleton.index_of(name) for name in LANDMARKS]
     points = positions.reshape(len(positions), -1, 3)[:, columns]
-    _, k = np.frexp(np.abs(points).max())
-    return y_up(np.ldexp(points, -k), skeleton), int(k)
+    k = exponent_of(max(points.max(), -points.min()), points.dtype)
+    return y_up(np.ldexp(points, -k) if k else points, skeleton), k
+
+
+def exponent_of(largest, dtype):
+    """The k of a unit ``2**k`` in which numbers up to the largest have squares; 0 if they have."""
+    info = np.finfo(dtype)
+    if largest == 0 or abs(k := int(np.frexp(largest)[1])) < info.maxexp // 8:
+        return 0
+    return k
 
 
 def y_up(points, skeleton):
@@ -92,26 +101,34 @@ def leg_length(lengths):
 
 def unit(vectors):
     """Directions of vectors (..., 3) of any length; what has none stays 0."""
-    largest = np.abs(vectors).max(axis=-1, keepdims=True)
-    vectors = vectors / np.where(largest > 0, largest, 1)
     norm = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    small = np.finfo(vectors.dtype).tiny ** 0.25
+    if not (norm.min() > small and norm.max() < 1 / small):
+        largest = np.abs(vectors).max(axis=-1, keepdims=True)
+        vectors = vectors / np.where(largest > 0, largest, 1)
+        norm = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(norm > 0, norm, 1)
 
 
-def check_upright(points, skeleton, what):
+def check_upright(points, lengths, skeleton, what):
     """Refuse a body that stands on its head from the first to the last frame.
 
     Parameters
     ----------
     points : ndarray, shape (n_frames, 15, 3)
         Landmarks, the second axis vertical.
+    lengths : ndarray, shape (n_frames, 12)
+        Of the limbs.
     skeleton : Skeleton
     what : str
         What to call it in messages, with a capital letter.
     """
-    legs = leg_length(np.median(np.linalg.norm(limbs_of(points), axis=2), axis=0))
-    feet = points[:, [LANDMARKS.index(f"{side}_ankle") for side in ("left", "right")]].mean(axis=1)
+    left, right = (points[:, LANDMARKS.index(f"{side}_ankle")] for side in ("left", "right"))
+    feet = left / 2 + right / 2
     pelvis, head = (points[:, LANDMARKS.index(name)] for name in ("pelvis", "head"))
+    if np.count_nonzero(pelvis[:, 1] < feet[:, 1]) < _NEARLY_ALWAYS * (len(points) - 1):
+        return
+    legs = leg_length(np.median(lengths, axis=0))
     below = np.quantile(pelvis[:, 1] - feet[:, 1], _NEARLY_ALWAYS) < -_CLEARLY * legs
     if not below or (head - pelvis)[:, 1].mean() > -_CLEARLY * legs:
         return
