@@ -273,10 +273,10 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
             body = _built(postures[:, 0], cosines, np.ldexp(lengths, -k).astype(postures.dtype))
             positions = np.ldexp(body, k) if k else body
             sound = np.isfinite(positions.sum()) or np.isfinite(positions).all()
-        if not sound:
+        if not sound or lengths.min() < np.finfo(positions.dtype).tiny:
             raise ValueError(
                 f"{_called(performances, i)}: the positions are beyond {positions.dtype} numbers. "
-                "Give limb_lengths in a larger unit, or smaller heights of the pelvis."
+                "Give limb_lengths in another unit, or smaller heights of the pelvis."
             )
         return positions
 

@@ -177,7 +177,7 @@ class Skeleton:
         joints = joints_of(df)
         given = {} if landmarks is None else as_landmarks(landmarks)
         attrs = getattr(df, "attrs", {})
-        up = up or attrs.get("up") or "y"
+        up = attrs.get("up") or "y" if up is None else up
         names = as_joints(attrs.get("joints", ()))
         # Columns that were renamed are none of the joints that the file had.
         likely = cls._likely_landmarks(joints, names if set(joints) <= set(names) else ())

@@ -22,6 +22,8 @@ __all__ = [
 _FAR = 0.75
 # Pictures are at least so high and wide, as a share of the other.
 _FLAT = 0.05
+# What squares and products of coordinates bear.
+_LARGEST = 1e150
 
 
 def upright(x, skeleton, i):
@@ -43,10 +45,12 @@ def upright(x, skeleton, i):
         raise ValueError(
             f"{what} has shape {x.shape}, but the positions of {whose} are (n_frames, {width})."
         )
-    if np.isinf(x).any():
-        frame, column = np.argwhere(np.isinf(x))[0]
+    wrong = np.abs(x) > _LARGEST
+    if wrong.any():
+        frame, column = np.argwhere(wrong)[0]
+        size = "infinite" if np.isinf(x[frame, column]) else "too large to draw"
         raise ValueError(
-            f"{what}, frame {frame}, column {column} is infinite; make it NaN to leave a gap."
+            f"{what}, frame {frame}, column {column} is {size}; make it NaN to leave a gap."
         )
     points = x.reshape(len(x), -1, 3)
     return points if skeleton is None else y_up(points, skeleton)

@@ -17,6 +17,7 @@ __all__ = [
     "as_labels",
     "as_moments",
     "as_names",
+    "as_pictures",
     "as_scenes",
     "as_skeleton",
     "check_view",
@@ -24,8 +25,8 @@ __all__ = [
     "mean_of_seen",
 ]
 
-# No strip has more panels.
-_MOST = 1000
+# Panels of a strip; pictures of an animation, a quarter of an hour.
+_MOST, _MOST_PICTURES = 1000, 25_000
 
 
 def as_names(names, count, what, each):
@@ -68,6 +69,18 @@ def as_frames(frames, n_frames):
             f"0 to {n_frames - 1}; got {frames!r}."
         )
     return np.linspace(0, n_frames - 1, int(frames)).round().astype(int).tolist()
+
+
+def as_pictures(seconds, fps):
+    """How many pictures an animation has, at least two."""
+    if not (is_number(seconds) and is_number(fps) and seconds > 0 and fps > 0):
+        raise ValueError(f"seconds and fps must be above 0, got {seconds!r} and {fps!r}.")
+    if seconds * fps > _MOST_PICTURES:
+        raise ValueError(
+            f"seconds={seconds!r} at fps={fps!r} are {seconds * fps:.3g} pictures, more than "
+            f"{_MOST_PICTURES}; choose fewer."
+        )
+    return max(2, round(seconds * fps))
 
 
 def as_moments(frames, n_frames):

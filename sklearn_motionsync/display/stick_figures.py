@@ -27,10 +27,10 @@ from .given import (
     as_labels,
     as_moments,
     as_names,
+    as_pictures,
     as_scenes,
     as_skeleton,
     check_view,
-    is_number,
 )
 
 __all__ = ["SkeletonDisplay"]
@@ -239,10 +239,10 @@ class SkeletonDisplay:
         SkeletonDisplay
         """
         X, skeleton = _as_performances(X), as_skeleton(skeleton)
+        raw = [placed(upright(x, skeleton, i), skeleton) for i, x in enumerate(X)]
         match = as_match(times, len(X))
         labels = list(range(len(X))) if names is None else names
         labels = as_names(labels, len(X), "names", "performances")
-        raw = [placed(upright(x, skeleton, i), skeleton) for i, x in enumerate(X)]
         flat = [x.reshape(len(x), -1) for x in raw]
         warped = match.warp(flat)
         warped = warped.reshape(*warped.shape[:2], -1, 3)
@@ -322,10 +322,8 @@ class SkeletonDisplay:
             Shown by a notebook as its last value; ``to_jshtml()`` gives the HTML, ``save(path)``
             a file.
         """
-        if not (is_number(seconds) and is_number(fps) and seconds > 0 and fps > 0):
-            raise ValueError(f"seconds and fps must be above 0, got {seconds!r} and {fps!r}.")
+        count = as_pictures(seconds, fps)
         self.plot(getattr(self, "axes_", None) if ax is None else ax, azimuth=azimuth)
-        count = max(2, round(seconds * fps))
         return playable(
             self.figure_.canvas.figure,
             lambda k: self._show(k / (count - 1)),

@@ -196,6 +196,10 @@ def test_lengths_that_no_number_holds(recording):
     postures = cosines.fit_transform([recording])
     with pytest.raises(ValueError, match="Performance 0: the positions are beyond float64"):
         cosines.inverse_transform(postures, np.full(12, 1e308))
+    small = [x.astype(np.float32) for x in postures]
+    for length in (1e-60, 1e60):
+        with pytest.raises(ValueError, match="Performance 0: the positions are beyond float32"):
+            cosines.inverse_transform(small, np.full(12, length))
 
 
 def test_hips_above_each_other_have_no_heading():

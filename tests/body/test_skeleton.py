@@ -148,6 +148,9 @@ def test_what_has_no_joints_in_its_columns():
         Skeleton.from_frame(pd.concat([df, df[["neck_x", "neck_y", "neck_z"]]], axis=1))
     with pytest.raises(ValueError, match="landmarks must be a mapping"):
         Skeleton.from_frame(df, landmarks="pelvis")
+    for up in ("x", "", np.array(["y", "z"])):
+        with pytest.raises(ValueError, match="up must be 'y' or 'z'"):
+            Skeleton.from_frame(df, up=up)
 
 
 @pytest.mark.parametrize(

@@ -210,6 +210,7 @@ def strip(x=POSITIONS[0], skeleton=PAPER, **given):
         ({"x": [POSITIONS[0], masked(POSITIONS[1])]}, "Performance 1 has masked values"),
         ({"x": [POSITIONS[0], POSITIONS[1].astype(str)]}, "Performance 1 is not a numeric"),
         ({"x": with_one(POSITIONS[0], np.inf)}, "Performance 0, frame 3, column 1 is infinite"),
+        ({"x": with_one(POSITIONS[0], 1e200)}, "frame 3, column 1 is too large to draw"),
         ({"x": POSITIONS[0] * np.nan}, "No frame shows the hips"),
         ({"x": pd.DataFrame(POSITIONS[0], columns=NAMES[::-1])}, "column 0 is 'right_ankle_z'"),
         ({"skeleton": "paper"}, "skeleton must be a Skeleton, .* or None .*; got str"),
@@ -244,6 +245,7 @@ def test_frames_of_any_whole_numbers():
         ({"times": TIMES[:2]}, r"each of the 4 performances; got \(2, 10\)"),
         ({"skeleton": 15}, "skeleton must be a Skeleton"),
         ({"X": POSITIONS[:3]}, "each of the 3 performances"),
+        ({"X": None}, r"Performance 0 has shape \(\)"),
         ({"X": [x[:, :9] for x in POSITIONS]}, "15 joints are"),
     ],
 )
@@ -330,6 +332,7 @@ def test_stick_figures_made_by_hand(change, message):
 @pytest.mark.parametrize("given", [{"fps": "15"}, {"seconds": np.nan}, {"fps": -1}, {"fps": True}])
 def test_animations_that_cannot_play(given):
     refuses(lambda: strip().animate(**given), "seconds and fps must be above 0")
+    refuses(lambda: strip().animate(seconds=1e9), r"are 1.5e\+10 pictures, more than 25000")
 
 
 # -- without a skeleton ---------------------------------------------------------------------
