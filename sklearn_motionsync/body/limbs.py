@@ -24,6 +24,9 @@ __all__ = [
 # real performances that bend, hop, crouch and sit down, the one that comes closest has its pelvis
 # 0.26 legs above the ankles and its head, on average, 0.15 above the pelvis.
 _NEARLY_ALWAYS, _CLEARLY = 0.9, 0.1
+# Whose left and right limbs differ by more is no body, so it has no upside; of those people the
+# limbs differ by 1.38 at most.
+_ALIKE = 1.5
 
 
 class Limb(NamedTuple):
@@ -110,6 +113,15 @@ def unit(vectors):
     return vectors / np.where(norm > 0, norm, 1)
 
 
+def _is_even(lengths):
+    """Whether limbs of the left and the right are about as long as each other."""
+    left, right = (
+        np.array([lengths[i] for i, name in enumerate(LIMB_NAMES) if name.startswith(side)])
+        for side in ("left", "right")
+    )
+    return bool(np.all((left < _ALIKE * right) & (right < _ALIKE * left)))
+
+
 def check_upright(points, lengths, skeleton, what):
     """Refuse a body that stands on its head from the first to the last frame.
 
@@ -128,9 +140,10 @@ def check_upright(points, lengths, skeleton, what):
     pelvis, head = (points[:, LANDMARKS.index(name)] for name in ("pelvis", "head"))
     if np.count_nonzero(pelvis[:, 1] < feet[:, 1]) < _NEARLY_ALWAYS * (len(points) - 1):
         return
-    legs = leg_length(np.median(lengths, axis=0))
+    typical = np.median(lengths, axis=0)
+    legs = leg_length(typical)
     below = np.quantile(pelvis[:, 1] - feet[:, 1], _NEARLY_ALWAYS) < -_CLEARLY * legs
-    if not below or (head - pelvis)[:, 1].mean() > -_CLEARLY * legs:
+    if not below or (head - pelvis)[:, 1].mean() > -_CLEARLY * legs or not _is_even(typical):
         return
     axes = (("x", 1), ("y", 1), ("z", 1)) if skeleton.up == "y" else (("x", 1), ("z", 1), ("y", -1))
     rise = (head - feet).mean(axis=0)

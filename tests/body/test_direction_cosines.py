@@ -347,6 +347,12 @@ def test_real_people_are_upright_and_turned_over_they_are_not(real_data, name):
             cosines.transform([turned_over(x)])
 
 
+def test_what_is_no_body_has_no_upside():
+    rng = np.random.default_rng(0)
+    walks = list(np.cumsum(rng.standard_normal((200, 30, 45)), axis=1))
+    DirectionCosines(Skeleton.paper()).fit(walks + [-x for x in walks])
+
+
 def test_who_lies_down_or_stands_on_the_hands_for_a_while_is_taken(recording):
     lying = recording.reshape(-1, 15, 3)[..., [0, 2, 1]].reshape(recording.shape)
     handstand = recording.copy()
