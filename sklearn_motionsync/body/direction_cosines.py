@@ -184,7 +184,7 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
         """
         check_is_fitted(self)
         lengths = self.limb_lengths_ if limb_lengths is None else _checked_lengths(limb_lengths)
-        performances = check_transformed(self, X, 1 + 3 * len(LIMBS))
+        performances = check_transformed(self, X, self.get_feature_names_out())
         arrays = [self._positions(performances, i, lengths) for i in range(len(performances))]
         return restore(self, performances, arrays, columns=Skeleton.paper().column_names)
 

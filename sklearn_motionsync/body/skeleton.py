@@ -175,6 +175,11 @@ class Skeleton:
         'left_knee'
         """
         joints = joints_of(df)
+        if twice := sorted({joint for joint in joints if joints.count(joint) > 1}):
+            raise ValueError(
+                f"The columns of the joints {twice} come more than once; use "
+                "df.loc[:, ~df.columns.duplicated()]."
+            )
         given = {} if landmarks is None else as_landmarks(landmarks)
         attrs = getattr(df, "attrs", {})
         up = attrs.get("up") or "y" if up is None else up
@@ -232,11 +237,6 @@ def joints_of(df):
             "The columns must be <joint>_x, <joint>_y, <joint>_z for one joint after the other, "
             f"got {columns[:4]}{' ...' if len(columns) > 4 else ''}; select them with "
             "df[skeleton.column_names] or drop the others."
-        )
-    if twice := sorted({joint for joint in joints if joints.count(joint) > 1}):
-        raise ValueError(
-            f"The columns of the joints {twice} come more than once; use "
-            "df.loc[:, ~df.columns.duplicated()]."
         )
     return joints
 

@@ -212,7 +212,7 @@ class SkeletonDisplay:
             others = [i for i in range(len(match.times)) if i != pattern]
             performances = ([] if pattern is None else [pattern]) + others
             performances = performances[:_FEW_PERFORMANCES]
-        performances = as_indices(performances, len(reached), "performances")
+        performances = as_indices(performances, len(match.times), "performances")
         return cls.from_predictions(
             [_as_performances(X)[i] for i in performances],
             match.times[performances],

@@ -257,7 +257,7 @@ def test_more_smoothness_is_smoother(warps):
         (np.zeros((10, 2)), r"must have shape \(n_frames, 3\).*got \(10, 2\)"),
         (np.zeros((1, 3)), "at least 2"),
         (np.full((10, 3), np.nan), "NaN"),
-        ([["a", "b", "c"]] * 3, "could not convert"),
+        ([["a", "b", "c"]] * 3, "The pattern is not a numeric array: got str, 'a'"),
         ("mean", "'pattern' parameter"),
         (-1, "'pattern' parameter"),
         (1.5, "'pattern' parameter"),
