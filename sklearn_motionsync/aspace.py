@@ -119,7 +119,8 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         exponent = int(np.frexp(np.abs(postures).max())[1])
         with np.errstate(invalid="ignore"):  # no variance at all: 0 / 0 in shares not used
             pca = PCA().set_output(transform="default").fit(np.ldexp(postures, -exponent))
-        variance = np.ldexp(pca.explained_variance_, 2 * exponent)
+        with np.errstate(over="ignore"):
+            variance = np.ldexp(pca.explained_variance_, 2 * exponent)
         check_squares(postures, variance[0], "variances")
         b = self._count(variance)
         self.components_ = np.ascontiguousarray(pca.components_[:b])

@@ -161,10 +161,10 @@ def check_performances(estimator, X, *, reset, level, on_rows=None):
             f"Performance 0 has {arrays[0].shape[1]} features a frame, but {name} is "
             f"expecting {estimator.n_features_in_} features as input."
         )
+    _check_names(estimator, sequences[0], reset)
     told = names is not None and isinstance(names[0], str)
     first = pd.DataFrame(arrays[0], columns=names) if told else arrays[0]
     validate_data(estimator, first, reset=reset, skip_check_array=True)
-    _check_names(estimator, sequences[0], reset)
     kind = "frame" if is_frame else "array" if getattr(X, "ndim", 1) == 3 else "list"
     names = getattr(estimator, "feature_names_in_", None)
     given = X.index.names if is_frame else [None, frame_name(sequences)]
@@ -240,9 +240,9 @@ def _check_rows(estimator, X, *, reset, level, on_rows):
             f"{type(estimator).__name__} was fitted on a collection of performances and got 2-D or "
             f"other input: wrap one sequence as [X]. {ACCEPTED}."
         )
-    refuse(X, "The input")
     if reset and level == "sequence" and isinstance(X, pd.DataFrame):
         _refuse_long_table(type(estimator).__name__, X)
+    refuse(X, "The input")
     index = X.index if isinstance(X, pd.DataFrame) else None
     source, X = (
         X,

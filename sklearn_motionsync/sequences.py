@@ -132,7 +132,9 @@ def _indexed(df, by, time):
 def _check_sampling(df):
     """Refuse times with gaps: frames count as evenly spaced."""
     for label, part in df.groupby(level=0, sort=False, dropna=False):
-        times = as_numbers(part.index.get_level_values(1), f"The time of performance {label!r}")
+        times = as_numbers(
+            part.index.get_level_values(1).to_numpy(), f"The time of performance {label!r}"
+        )
         steps = np.diff(times)
         if not np.isfinite(times).all() or (steps <= 0).any():
             i = int(np.argmax(~(steps > 0))) + 1

@@ -18,6 +18,8 @@ from ..performances import Performances, SequenceLevelMixin, names_of_input, res
 
 __all__ = ["Synchronizer", "TrainingSet"]
 
+# So many times the training set, what differs in it is lost beside a performance.
+_FAR = 1e30
 # What one copy of a training set on the clock may take; a fit holds several.
 MOST_BYTES = 8 * 2**30
 
@@ -187,7 +189,10 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         ndarray, shape (n_sequences, P, n_features)
             One feature for the rows of a 2-D array.
         """
-        return normalise(self.check_performances(X), self.n_frames_)
+        on_clock = normalise(self.check_performances(X), self.n_frames_)
+        with np.errstate(over="ignore"):
+            self._check_unit(np.ldexp(on_clock, -self._unit.exponent))
+        return on_clock
 
     def get_feature_names_out(self, input_features=None):
         """Names of the outputs: the features of a frame; for 2-D input, one name a frame.
@@ -258,8 +263,18 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
                 self.n_frames_ = len(given)
         self._check_size(performances)
         on_clock = normalise(performances, self.n_frames_)
-        unit = Unit.of(on_clock)
+        self._unit = unit = Unit.of(on_clock)
         return TrainingSet(performances, on_clock, unit, unit(on_clock), given)
+
+    def _check_unit(self, scaled):
+        """Refuse performances, in the unit of the training set, that it cannot be compared with."""
+        sizes = np.maximum(scaled.max(axis=(1, 2)), -scaled.min(axis=(1, 2)))
+        if not (sizes < _FAR).all():
+            i = int(np.argmin(sizes < _FAR))
+            raise ValueError(
+                f"Performance {i} is more than {_FAR:.0e} times as large as the training set: give "
+                "it in the same unit."
+            )
 
     def _check_size(self, performances):
         """Say what a clock asks for before memory runs out."""

@@ -233,6 +233,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     def match(self, X):
         performances, warper = self.check_performances(X), self._warper
         positions = warper.positions(performances)
+        self._check_unit(positions)
         with self._progress(fits=False) as progress:
             portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "warping"}
             results = in_portions(warper, "warps", positions, **portions)

@@ -1,0 +1,263 @@
+"""Bad inputs, each a line: what is given, to whom, and the words that its message must hold.
+
+To add one, add a line to the table where it belongs.
+"""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.sparse import csr_array
+from sklearn.base import clone
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    KeyframeSynchronizer,
+    LinearSynchronizer,
+    Match,
+    to_frame,
+    to_sequences,
+)
+
+from shift_synchronizer import ShiftSynchronizer
+
+SYNCHRONIZERS = [
+    LinearSynchronizer(),
+    KeyframeSynchronizer(),
+    DenseSynchronizer(),
+    ShiftSynchronizer(),
+]
+SEQUENCES = [*SYNCHRONIZERS, ActionModel()]
+ALL = [ASpace(), *SEQUENCES]
+
+NAMES = ["hip", "knee", "ankle"]
+RNG = np.random.default_rng(0)
+X = [np.cumsum(RNG.standard_normal((20, 3)), axis=0) for _ in range(5)]
+FRAMES = [pd.DataFrame(x, columns=NAMES) for x in X]
+TURNED = [df[NAMES[::-1]] for df in FRAMES]
+NUMBERED = [pd.DataFrame(x, columns=[10, 20, 30]) for x in X]
+MIXED = [pd.DataFrame(x, columns=["hip", 1, 2]) for x in X]
+LABELLED = to_frame(FRAMES, performances=["ann", "bob", "cem", "dov", "eva"])
+LONG = LABELLED.reset_index().rename(columns={"performance": "trial", "frame": "time"})
+DATES = pd.date_range("2020", periods=20)
+
+
+def one(change, i=2):
+    """The performances, one of them changed."""
+    return [change(x.copy()) if k == i else x for k, x in enumerate(X)]
+
+
+def put(value, x=None):
+    def change(x):
+        x = x.astype(np.result_type(x, type(value)) if not isinstance(value, str) else object)
+        x[4, 1] = value
+        return x
+
+    return change if x is None else change(x)
+
+
+def masked(x):
+    return np.ma.masked_where(np.arange(x.size).reshape(x.shape) == 7, x)
+
+
+def by_name(value):
+    return type(value).__name__ if hasattr(value, "get_params") else None
+
+
+def refuses(call, words, error=(ValueError, TypeError)):
+    with pytest.raises(error) as caught:
+        call()
+    message = str(caught.value)
+    missing = [word for word in words if word not in message]
+    assert not missing, f"{missing} not in: {message}"
+    assert len(message) < 1000
+
+
+# -- performances -------------------------------------------------------------------------
+
+PERFORMANCES = [
+    # input, estimators, words
+    (one(masked), ALL, ["Performance 2", "masked", "interpolate"]),
+    (one(lambda x: list(masked(x))), ALL, ["Performance 2", "masked"]),
+    (one(lambda x: masked(x).astype(object)), ALL, ["Performance 2", "masked"]),
+    (one(put(1j)), ALL, ["Performance 2", "complex"]),
+    (one(put("text")), ALL, ["Performance 2", "'text'"]),
+    (one(put("1.5")), ALL, ["Performance 2", "'1.5'", "numbers"]),
+    (one(lambda x: x.astype(str)), ALL, ["Performance 2", "not a numeric array"]),
+    (one(lambda x: x.astype("m8[s]")), ALL, ["Performance 2", "durations", "seconds"]),
+    (one(lambda x: x.astype("M8[s]")), ALL, ["Performance 2", "dates", "seconds"]),
+    (one(lambda x: FRAMES[2].assign(hip=DATES)), ALL, ["Performance 2", "'hip'", "dates"]),
+    (one(lambda x: FRAMES[2].assign(hip="a")), ALL, ["Performance 2", "'hip'", "'a'"]),
+    (one(lambda x: csr_array(x)), ALL, ["Performance 2", "sparse", "toarray"]),
+    (one(lambda x: x.astype(np.longdouble) * np.longdouble("1e400")), ALL, ["2", "too large"]),
+    (one(lambda x: [[10**400, 1, 2]] * 20), ALL, ["Performance 2", "too large"]),
+    (one(put(np.nan)), ALL, ["Performance 2, frame 4, feature 1 is NaN", "nterpolate"]),
+    (one(put(-np.inf)), ALL, ["Performance 2, frame 4, feature 1 is infinity"]),
+    (one(lambda x: x[:1]), ALL, ["Performance 2", "(1, 3)", "at least 2 frames"]),
+    (one(lambda x: x[:, :0]), ALL, ["Performance 2", "(20, 0)", "1 feature"]),
+    (one(lambda x: [[1, 2, 3], [4, 5]]), ALL, ["Performance 2", "not a numeric array"]),
+    (LABELLED.mask(LABELLED["knee"] == X[1][4, 1]), ALL, ["'bob'", "frame 4", "'hip'", "NaN"]),
+    ([*FRAMES[:2], TURNED[2]], ALL, ["Performance 2", "columns", "same order"]),
+    ([*NUMBERED[:2], NUMBERED[2][[20, 10, 30]]], ALL, ["Performance 2", "[20, 10, 30]"]),
+    (MIXED, ALL, ["'hip'", "astype(str)"]),
+    (["a.csv", "b.csv"], ALL, ["'a.csv'", "read the files"]),
+    ("a.csv", ALL, ["got str"]),
+    (np.ma.masked_less(X[0], 0), ALL, ["masked"]),
+    ([np.ma.masked_less(row, 0) for row in X[0]], ALL, ["masked"]),
+    (X[0].astype("m8[s]"), ALL, ["durations"]),
+    (X[0].astype(str).tolist(), ALL, ["not a numeric array"]),
+    (LONG.drop(columns="trial"), SEQUENCES, ["to_sequences(df, by=[...], time=...)", "'time'"]),
+    (FRAMES[0], SEQUENCES, ["'hip'", "to_sequences", "to_numpy()"]),
+    (LONG, ALL, ["'trial'", "'ann'"]),
+]
+
+
+@pytest.mark.parametrize(
+    ("given", "estimator", "words"),
+    [(given, e, words) for given, estimators, words in PERFORMANCES for e in estimators],
+    ids=by_name,
+)
+def test_fit_refuses(given, estimator, words):
+    if given is LONG and estimator in SEQUENCES:
+        words = ["to_sequences(df, by=[...], time=...)"]
+    fresh = clone(estimator)
+    refuses(lambda: fresh.fit(given), words)
+    assert not [name for name in vars(fresh) if name.endswith("_")], "half fitted"
+
+
+FITTED_ON = [
+    # fitted on, input, estimators, words
+    (FRAMES, TURNED, ALL, ["feature names should match"]),
+    (NUMBERED, [df[[30, 20, 10]] for df in NUMBERED], ALL, ["[30, 20, 10]", "same order"]),
+    (NUMBERED, FRAMES, ALL, ["'hip'", "[10, 20, 30]"]),
+    (X, [x[:, :2] for x in X], ALL, ["2 features", "expecting 3"]),
+    (X, one(masked), ALL, ["Performance 2", "masked"]),
+    (X, one(lambda x: x + 0j), ALL, ["Performance 2", "complex"]),
+    (X, [1e35 * x for x in X], SYNCHRONIZERS, ["Performance 0", "1e+30 times", "same unit"]),
+    (X, X[0], SEQUENCES, ["wrap one sequence as [X]"]),
+    (np.stack(X)[:, :, 0], X, SEQUENCES, ["2-D"]),
+]
+
+
+@pytest.mark.parametrize(
+    ("training", "given", "estimator", "words"),
+    [(fit, given, e, words) for fit, given, estimators, words in FITTED_ON for e in estimators],
+    ids=by_name,
+)
+def test_a_fitted_estimator_refuses(training, given, estimator, words):
+    fitted = clone(estimator).fit(training)
+    ask = fitted.transform if hasattr(fitted, "transform") else fitted.predict
+    refuses(lambda: ask(given), words)
+
+
+# -- parameters -----------------------------------------------------------------------------
+
+PARAMETERS = [
+    # estimators, parameters, words
+    (SYNCHRONIZERS, {"pattern": X[0][:, :2]}, ["shape (n_frames, 3)", "(20, 2)"]),
+    (SYNCHRONIZERS, {"pattern": X[0][:1]}, ["at least 2 frames", "(1, 3)"]),
+    (SYNCHRONIZERS, {"pattern": masked(X[0])}, ["pattern", "masked"]),
+    (SYNCHRONIZERS, {"pattern": X[0] + 1j}, ["pattern", "complex"]),
+    (SYNCHRONIZERS, {"pattern": put(np.nan, X[0])}, ["pattern, frame 4", "NaN"]),
+    (SYNCHRONIZERS, {"pattern": X[0].astype("m8[s]")}, ["pattern", "durations"]),
+    (SYNCHRONIZERS, {"pattern": [["a"] * 3] * 5}, ["pattern", "'a'"]),
+    (SYNCHRONIZERS, {"pattern": 5}, ["pattern=5", "5 performances"]),
+    (SYNCHRONIZERS, {"n_frames": 10**9}, ["n_frames is 1000000000", "GB"]),
+    ([DenseSynchronizer()], {"subframes": 10**9}, ["subframes 1000000000", "GB"]),
+]
+
+
+@pytest.mark.parametrize(
+    ("estimator", "params", "words"),
+    [(e, params, words) for estimators, params, words in PARAMETERS for e in estimators],
+    ids=by_name,
+)
+def test_parameters_that_cannot_be(estimator, params, words):
+    refuses(lambda: clone(estimator).set_params(**params).fit(X), words)
+
+
+@pytest.mark.parametrize("estimator", SYNCHRONIZERS, ids=by_name)
+def test_a_pattern_by_names(estimator):
+    """In another order it is refused, in the same order it is the pattern."""
+    turned = clone(estimator).set_params(pattern=TURNED[0])
+    refuses(lambda: turned.fit(FRAMES), ["pattern", "['ankle', 'knee', 'hip']", "same order"])
+    named = clone(estimator).set_params(pattern=FRAMES[0]).fit(FRAMES)
+    np.testing.assert_array_equal(named.pattern_, X[0])
+
+
+# -- everything else ------------------------------------------------------------------------
+
+MODEL, FRAMED = ActionModel().fit(X), ActionModel().fit(FRAMES)
+SPACE = ASpace(2).fit(FRAMES)
+KEYS, KEYED = KeyframeSynchronizer(), KeyframeSynchronizer().fit(X, keyframes=[[5, 9]] * 5)
+MATCH = LinearSynchronizer().fit(X).match(X)
+CALLS = [
+    # call, words
+    (lambda: MODEL.accepts(masked(X[0]), 0), ["postures", "masked"]),
+    (lambda: MODEL.accepts(X[0] + 0j, 0), ["postures", "complex"]),
+    (lambda: MODEL.accepts(X[0].astype("m8[s]"), 0), ["postures", "durations"]),
+    (lambda: MODEL.accepts(put(np.nan, X[0]), 0), ["postures, row 4, feature 1 is NaN"]),
+    (lambda: FRAMED.accepts(put(np.nan, X[0]), 0), ["feature 1 ('knee') is NaN"]),
+    (lambda: FRAMED.accepts(TURNED[0], 0), ["postures", "same order"]),
+    (lambda: MODEL.accepts(X[0][0], 0), ["shape (n_postures, 3)", "[posture]"]),
+    (lambda: MODEL.accepts(X[0], 20), ["frame", "0 to 19"]),
+    (lambda: ActionModel().fit([1e200 * x for x in X]), ["variances", "unit"]),
+    (lambda: ActionModel().fit([1e-200 * x for x in X]), ["variances", "unit"]),
+    (lambda: ActionModel().fit([(1e25 * x).astype("f4") for x in X]), ["float32", "float64"]),
+    (lambda: ASpace().fit([1e200 * x for x in X]), ["variances", "unit"]),
+    (lambda: ASpace().fit([1e-200 * x for x in X]), ["variances", "unit"]),
+    (lambda: SPACE.inverse_transform(pd.DataFrame(X[0][:, :2], columns=list("ba"))), ["names"]),
+    (lambda: KEYS.fit(X, keyframes="abcde"), ["keyframes", "list of arrays", "got str"]),
+    (lambda: KEYS.fit(X, keyframes=[["a", "b"]] * 5), ["Performance 0", "keyframes", "'a'"]),
+    (lambda: KEYS.fit(X, keyframes=[[5, 9]] * 4), ["one array a performance, 5; got 4"]),
+    (lambda: KEYS.fit(X, keyframes=[[9, 5]] * 5), ["Performance 0", "increasing"]),
+    (lambda: KEYS.fit(X, keyframes=[[5, 9]] * 4 + [[5]]), ["Performance 4", "2 increasing"]),
+    (lambda: KEYS.fit(X, keyframes=[[5, np.nan]] * 5), ["Performance 0", "increasing"]),
+    (lambda: KEYS.fit(X, keyframes=[[5, 19]] * 5), ["Performance 0", "between 0 and 19"]),
+    (lambda: KEYS.fit(X, keyframes=[[]] * 5), ["Performance 0", "some increasing"]),
+    (lambda: KEYS.fit(X, keyframes=[DATES[:2]] * 5), ["Performance 0", "keyframes"]),
+    (lambda: KEYS.fit(X, keyframes=[[5 + 0j, 9]] * 5), ["Performance 0", "complex"]),
+    (lambda: KEYED.transform(X), ["fitted with key-frames", "keyframes=[...]"]),
+    (lambda: Match([[0, 3, 1, 3]]), ["Performance 0", "must not decrease", "1 at frame 2"]),
+    (lambda: Match(np.ma.masked_equal([[0, 1, 2]], 1)), ["times", "masked"]),
+    (lambda: Match([["a", "b"]]), ["times", "'a'"]),
+    (lambda: Match([[0, 1j]]), ["times", "complex"]),
+    (lambda: Match([[0, np.nan, 2]]), ["Performance 0", "times"]),
+    (lambda: Match([[0, 1]], np.ma.masked_equal([1], 1)), ["distances", "masked"]),
+    (lambda: MATCH.warp(one(masked)), ["Performance 2", "masked"]),
+    (lambda: MATCH.warp(X[:4]), ["5 matched performances, but 4"]),
+    (lambda: MATCH.seconds(X, "fast"), ["frame_rate", "'fast'"]),
+    (lambda: MATCH.frames(["a"] * 5), ["lengths", "'a'"]),
+    (lambda: to_sequences(LONG), ["by=", "time="]),
+    (lambda: to_sequences(LONG, time="time"), ["goes with by="]),
+    (lambda: to_sequences(LONG, by="subject"), ["['subject']", "'trial'"]),
+    (lambda: to_sequences(LONG, by="trial", time="trial"), ["different"]),
+    (lambda: to_sequences(LONG, by="trial", time="knee"), ["'ann'", "do not increase"]),
+    (lambda: to_sequences(LONG.drop(index=3), by="trial", time="time"), ["'ann'", "gap", "2 to 4"]),
+    (lambda: to_sequences(LONG.assign(time=DATES[0]), by="trial", time="time"), ["durations"]),
+    (lambda: to_sequences(X), ["DataFrame", "got list"]),
+    (lambda: to_frame(X[0]), ["single 2-D input", "[X]"]),
+]
+
+
+@pytest.mark.parametrize(("call", "words"), CALLS, ids=range(len(CALLS)))
+def test_calls_that_cannot_be_answered(call, words):
+    refuses(call, words)
+
+
+def test_a_clock_among_the_features_is_told():
+    clocks = [np.column_stack([0.02 * np.arange(len(x)), x]) for x in X]
+    with pytest.warns(UserWarning, match="Feature 0 increases evenly in every performance"):
+        LinearSynchronizer().fit(clocks)
+    named = [pd.DataFrame(x, columns=["time", *NAMES]).round(3) for x in clocks]
+    with pytest.warns(UserWarning, match="Feature 'time' .* clock"):
+        LinearSynchronizer().fit(named)
+
+
+@pytest.mark.parametrize(
+    "other", [np.zeros(20), -np.arange(20.0), np.arange(20.0) ** 1.2, np.r_[0:10, 9:19]]
+)
+def test_what_does_not_tick_in_every_performance_is_no_clock(other):
+    ramps = [np.column_stack([0.02 * np.arange(len(x)), x]) for x in X]
+    LinearSynchronizer().fit([*ramps, np.column_stack([other, X[0]])])
+    LinearSynchronizer().fit([ramp[:, :1] for ramp in ramps])
