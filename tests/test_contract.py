@@ -249,6 +249,19 @@ def test_dtype(estimator, given, performances):
             np.testing.assert_allclose(a, b, rtol=2e-3, atol=2e-3 * np.abs(b).max())
 
 
+@pytest.mark.parametrize("estimator", SYNCHRONIZERS, ids=by_name)
+@pytest.mark.parametrize("pattern", ["median", 0, 3])
+def test_the_pattern_matches_itself(estimator, pattern, performances, request):
+    """Frame by frame: synthetic ones, those that never move, and people."""
+    still = [np.full((12, 2), k) for k in range(5)]
+    people = request.getfixturevalue("bends").data if pattern == "median" else performances
+    # A cross-correlation finds no shift of what never moves.
+    for X in (performances, people, *([] if isinstance(estimator, ShiftSynchronizer) else [still])):
+        sync = clone(estimator).set_params(pattern=pattern).fit(X)
+        own = sync.match([X[sync.pattern_index_]]).times[0]
+        np.testing.assert_array_equal(own, np.arange(sync.n_frames_))
+
+
 # -- pandas in and out ----------------------------------------------------------------
 
 
@@ -268,6 +281,27 @@ def test_pandas_output_of_collections(estimator, kind, how, performances):
     assert list(out.columns) == list(clone(estimator).fit(X).get_feature_names_out())
     for frame, expected in zip(to_sequences(out), plain, strict=True):
         np.testing.assert_array_equal(frame, expected)
+
+
+def test_pandas_output_keeps_what_levels_are_called(performances):
+    X = to_frame(performances, columns=NAMES).rename_axis(["trial", "sample"])
+    frames = [df.rename_axis("sample") for df in to_sequences(X)]
+    for estimator in (ASpace(2), LinearSynchronizer(20)):
+        pandas = clone(estimator).set_output(transform="pandas")
+        assert pandas.fit_transform(X).index.names == ["trial", "sample"]
+        assert pandas.fit_transform(frames).index.names == ["performance", "sample"]
+
+
+def test_the_way_back_takes_its_own_output(performances):
+    """Warnings are errors here."""
+    for estimator in (ASpace(2), DirectionCosines(Skeleton.paper())):
+        fitted = clone(estimator).fit(performances)
+        expected = np.concatenate(fitted.inverse_transform(fitted.transform(performances)))
+        fitted.set_output(transform="pandas")
+        points = fitted.transform(performances)
+        np.testing.assert_array_equal(fitted.inverse_transform(points), expected)
+        with pytest.raises(ValueError, match="should match"):
+            fitted.inverse_transform(points[points.columns[::-1]])
 
 
 def test_pandas_output_keeps_the_labels(performances):

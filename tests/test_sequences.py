@@ -76,3 +76,45 @@ def test_to_frame_wants_a_collection():
         to_frame(np.zeros((3, 2)))
     with pytest.raises(ValueError, match="0 performances"):
         to_frame([])
+
+
+# -- tables that are not indexed ------------------------------------------------------------
+
+
+@pytest.fixture
+def table():
+    """Two subjects, two trials each, rows of the trials mixed but in order of time."""
+    rng = np.random.default_rng(0)
+    lengths = {("ann", 2): 4, ("ann", 1): 5, ("bob", 1): 3, ("bob", 2): 4}
+    parts = [
+        pd.DataFrame(
+            {"subject": who, "trial": k, "time": 0.1 * np.arange(n), "knee": rng.random(n)}
+        )
+        for (who, k), n in lengths.items()
+    ]
+    return pd.concat(parts).sort_values("time", kind="stable", ignore_index=True)
+
+
+@pytest.mark.parametrize("levels", [[], ["subject"], ["trial", "time"]])
+def test_performances_by_columns_or_levels(table, levels):
+    df = table.set_index(levels) if levels else table
+    found = to_sequences(df, by=["subject", "trial"], time="time")
+    keys = list(table[["subject", "trial"]].drop_duplicates().itertuples(index=False, name=None))
+    assert len(found) == len(keys) == 4
+    for x, (who, k) in zip(found, keys, strict=True):
+        rows = table[(table["subject"] == who) & (table["trial"] == k)]
+        assert list(x.columns) == ["knee"]
+        assert x.index.name == "time"
+        np.testing.assert_array_equal(x["knee"], rows["knee"])
+        np.testing.assert_array_equal(x.index, rows["time"])
+
+
+def test_without_a_time_rows_are_in_order(table):
+    found = to_sequences(table.drop(columns=["time", "trial"]), by="subject")
+    assert [x.index.tolist() for x in found] == [list(range(9)), list(range(7))]
+
+
+def test_jitter_is_no_gap(table):
+    rng = np.random.default_rng(0)
+    table["time"] += rng.uniform(-0.02, 0.02, len(table))
+    assert len(to_sequences(table, by=["subject", "trial"], time="time")) == 4

@@ -235,7 +235,41 @@ def test_synthetic_people_of_little_style_are_refined(bending_aspace):
     assert DenseSynchronizer(P).fit(bending_aspace).refines_
 
 
+def test_two_trials_of_a_single_source_are_enough():
+    """One pair, no noise: the example of the docstring."""
+    t = np.linspace(0, 1, 101)
+    phase = t + 0.08 * np.sin(2 * np.pi * t)
+    X = [np.column_stack([np.cos(4 * s), np.sin(4 * s)]) for s in (t, phase)]
+    assert DenseSynchronizer(pattern=0).fit(X).refines_
+
+
+def test_what_says_the_same_cannot_judge():
+    """A single curve, also if it is there several times with some noise."""
+    X, _ = known_warps(0, 0.0, n_features=1)
+    rng = np.random.default_rng(0)
+    copies = [x * [1, -2, 0.5] + 0.01 * x.std() * rng.standard_normal((P, 3)) for x in X]
+    for performances in (X, copies, X[:1], [X[0]] * 3):
+        sync = DenseSynchronizer(P).fit(performances)
+        assert np.isnan(sync.refinement_.ratio)
+        assert not sync.refines_
+
+
 # -- real people ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("action", ["depositFloorR", "sneak2StepsLStart", "grabHighR"])
+def test_people_are_not_refined(action, real_data):
+    """All actors and each by himself, all features and the first few: refining misleads there."""
+    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    chosen = np.flatnonzero(bunch.target == action)
+    postures = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
+    for actor in (None, "bd", "bk", "dg", "tr"):
+        mine = [x for x, i in zip(postures, chosen, strict=True) if actor in (None, bunch.actor[i])]
+        points = ASpace().fit_transform(mine)
+        for n_features in (None, 3, 2, 1):
+            sync = DenseSynchronizer(P).fit([x[:, :n_features] for x in points])
+            assert not sync.refines_, (actor, n_features, sync.refinement_)
+
 
 # The best of tslearn, dtaidistance, gdtw, fdasrsf and aeon, each at its best setting, mean
 # and median over all ordered pairs: docs/accuracy.md.

@@ -190,3 +190,20 @@ def test_every_kind_of_collection(matched):
     known = np.isfinite(warped)
     assert not known[2, :, 1].all()
     np.testing.assert_array_equal(warped[known], expected[known])
+
+
+@pytest.mark.parametrize("gap", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("frame", [0, 5, 8, 9])
+def test_gaps_stay_where_they_are(gap, frame):
+    """Where a frame is met exactly its neighbours have no say; between frames they have."""
+    x = np.arange(10.0)[:, np.newaxis].repeat(2, axis=1)
+    x[frame, 1] = gap
+    np.testing.assert_array_equal(Match([np.arange(10)]).warp([x])[0], x)
+    half = Match([np.minimum(np.arange(10) + 0.5, 9)]).warp([x])[0]
+    near = [k for k in range(10) if gap in (x[k, 1], x[min(k + 1, 9), 1]) or frame in (k, k + 1)]
+    np.testing.assert_array_equal(np.flatnonzero(~np.isfinite(half[:, 1])), near)
+    np.testing.assert_array_equal(half[near, 1], [gap] * len(near))
+    # A frame that no time is near leaves no trace.
+    if 0 < frame < 9:
+        skips = np.where(np.arange(10) < frame, frame - 1.0, frame + 1.0)
+        assert np.isfinite(Match([skips]).warp([x])).all()

@@ -1,0 +1,148 @@
+"""Properties of all synchronizers, on performances that hypothesis draws.
+
+What a warp must not depend on, and by how much it does, in frames: the bounds are what rounding
+leaves, in double precision.
+"""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sklearn.base import clone
+from sklearn_motionsync import DenseSynchronizer, KeyframeSynchronizer, LinearSynchronizer
+
+PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0}
+SYNCHRONIZERS = [
+    LinearSynchronizer(),
+    KeyframeSynchronizer(n_keyframes=3),
+    DenseSynchronizer(),
+    DenseSynchronizer(refine=True),
+    DenseSynchronizer(**PAPER),
+    DenseSynchronizer(cost="elastic", refine=False),
+]
+every_synchronizer = pytest.mark.parametrize("estimator", SYNCHRONIZERS, ids=str)
+# The same examples everywhere.
+few = settings(max_examples=12, deadline=None, derandomize=True, database=None)
+ROUNDING = 1e-6
+
+
+@st.composite
+def performances(draw):
+    """A few smooth movements of one kind, each at its own pace, with noise or without."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    n, n_features = draw(st.integers(3, 6)), draw(st.integers(2, 4))
+    noise = draw(st.sampled_from([0.0, 0.01, 0.1]))
+    size, shift = rng.standard_normal((2, n_features, 3))
+    X = []
+    for _ in range(n):
+        t = np.linspace(0, 1, draw(st.integers(15, 40)))
+        phase = t + rng.uniform(-0.1, 0.1) * np.sin(2 * np.pi * t)
+        waves = np.sin(np.pi * np.arange(1, 4) * phase[:, np.newaxis, np.newaxis] + shift)
+        x = (size * waves).sum(axis=2)
+        X.append(x + noise * rng.standard_normal(x.shape))
+    return X
+
+
+def times(estimator, X, **params):
+    return clone(estimator).set_params(n_frames=30, **params).fit(X).match(X).times
+
+
+def assert_close(a, b, bound=ROUNDING):
+    assert np.abs(a - b).max() <= bound
+
+
+@every_synchronizer
+@few
+@given(performances(), st.floats(-1e3, 1e3))
+def test_where_the_origin_is(estimator, X, shift):
+    offset = shift * np.arange(1, 1 + X[0].shape[1])
+    assert_close(
+        times(estimator, [x + offset for x in X], pattern=0), times(estimator, X, pattern=0)
+    )
+
+
+@every_synchronizer
+@few
+@given(performances(), st.floats(-250, 250), st.integers(-900, 900))
+def test_the_unit(estimator, X, exponent, binary):
+    """To the last bit if the units differ by a power of two."""
+    expected = times(estimator, X)
+    assert_close(times(estimator, [np.ldexp(x, binary) for x in X]), expected, 0)
+    assert_close(times(estimator, [10.0**exponent * x for x in X]), expected)
+
+
+@every_synchronizer
+@few
+@given(performances(), st.floats(-15, 15))
+def test_the_unit_of_single_precision(estimator, X, exponent):
+    X = [x.astype(np.float32) for x in X]
+    factor = np.float32(10.0**exponent)
+    scaled = [(x.astype(np.float64) * factor).astype(np.float32) for x in X]
+    # A warp may change where float32 cannot tell two paths apart.
+    moved = np.abs(times(estimator, scaled, pattern=0) - times(estimator, X, pattern=0))
+    assert np.median(moved) <= 1e-3
+
+
+@every_synchronizer
+@few
+@given(performances(), st.randoms(use_true_random=False))
+def test_the_order_of_performances(estimator, X, random):
+    order = random.sample(range(len(X)), len(X))
+    expected = times(estimator, X)[order]
+    assert_close(times(estimator, [X[i] for i in order]), expected)
+
+
+@every_synchronizer
+@few
+@given(performances(), st.randoms(use_true_random=False))
+def test_the_order_of_features(estimator, X, random):
+    order = random.sample(range(X[0].shape[1]), X[0].shape[1])
+    assert_close(times(estimator, [x[:, order] for x in X]), times(estimator, X))
+
+
+@every_synchronizer
+@few
+@given(performances(), st.floats(-1e6, 1e6), st.integers(1, 30))
+def test_features_that_do_not_move(estimator, X, value, count):
+    still = [np.hstack([x, np.full((len(x), count), value)]) for x in X]
+    assert_close(times(estimator, still), times(estimator, X))
+
+
+@every_synchronizer
+@few
+@given(performances(), st.integers(0, 1), st.integers(1, 3))
+def test_features_that_are_there_twice(estimator, X, which, copies):
+    if isinstance(estimator, KeyframeSynchronizer | LinearSynchronizer):
+        copies, which = 1, slice(None)
+    twice = [np.hstack([x, *[x[:, which].reshape(len(x), -1)] * copies]) for x in X]
+    assert_close(times(estimator, twice), times(estimator, X))
+
+
+@every_synchronizer
+@few
+@given(performances(), st.integers(2, 4))
+def test_the_frame_rate(estimator, X, factor):
+    def resampled(x):
+        fine = np.linspace(0, len(x) - 1, factor * (len(x) - 1) + 1)
+        return np.column_stack([np.interp(fine, np.arange(len(x)), column) for column in x.T])
+
+    assert_close(times(estimator, [resampled(x) for x in X]), times(estimator, X))
+
+
+@every_synchronizer
+@few
+@given(performances(), st.integers(0, 2))
+def test_the_pattern_is_itself(estimator, X, pattern):
+    frames = np.arange(30)
+    assert_close(times(estimator, X, pattern=pattern)[pattern], frames, 0)
+    given_as_array = clone(estimator).set_params(n_frames=30, pattern=X[pattern]).fit(X)
+    assert_close(given_as_array.match([X[pattern]]).times[0], frames, 0)
+
+
+@every_synchronizer
+@few
+@given(performances())
+def test_alone_or_together(estimator, X):
+    sync = clone(estimator).set_params(n_frames=30).fit(X)
+    alone = np.concatenate([sync.match([x]).times for x in X])
+    assert_close(sync.match(X).times, alone, 0)
