@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import to_frame, to_sequences
+from sklearn_motionsync import DenseSynchronizer, to_frame, to_sequences
 
 
 @pytest.fixture
@@ -76,3 +76,13 @@ def test_to_frame_wants_a_collection():
         to_frame(np.zeros((3, 2)))
     with pytest.raises(ValueError, match="0 performances"):
         to_frame([])
+
+
+@pytest.mark.parametrize("shape", [(1, 2), (0, 2), (5, 0)])
+def test_a_performance_has_frames_and_features(shape):
+    """None of either is no performance, wherever it stands."""
+    for take in (to_frame, DenseSynchronizer().fit):
+        with pytest.raises(ValueError, match=r"Performance 1 .* at least 2 frames and 1 feature"):
+            take([np.zeros((5, 2)), np.zeros(shape)])
+        with pytest.raises(ValueError, match=r"Performance 0 .* at least 2 frames and 1 feature"):
+            take([np.zeros(shape)] * 3)

@@ -83,6 +83,15 @@ def test_curvature_finds_the_corners():
     np.testing.assert_allclose(curvature_keyframes(path, 2), [30, 60], atol=1)
 
 
+def test_rest_has_no_keyframes():
+    """Who stands still trembles, and that bends sharply; what counts is where the movement turns."""
+    t, rng = np.linspace(0, 3, 151)[:, None], np.random.default_rng(0)
+    path = np.hstack([np.clip(t, 0, 1), np.clip(t - 1, 0, 1)])
+    path[100:] += 0.003 * rng.standard_normal((51, 2))
+    sync = KeyframeSynchronizer(n_keyframes=1).fit([path])
+    np.testing.assert_allclose(sync.keyframes_, [50], atol=1)
+
+
 @pytest.mark.parametrize("n_frames", [3, 5, 9])
 def test_as_many_keyframes_as_there_are_frames_for(n_frames):
     X = [np.random.default_rng(i).standard_normal((n_frames, 2)) for i in range(3)]
