@@ -96,16 +96,17 @@ def test_who_is_worse_beyond_doubt_is_out(worse):
     """Paired t tests of 1 % in all: of 64 performances, in 2 rounds, the first by 32 references.
 
     References are drawn without replacement: a mean over half of all has half the variance.
+    What rounding may do to a mean counts as doubt, too.
     """
-    n, leader, rival, few = 64, 40, 50, 32
+    n, leader, rival, few, rounding = 64, 40, 50, 32, 6.4
     differences = np.tile([1.0, -1.0], n // 2)
     error = differences[:few].std(ddof=1) * np.sqrt((1 - few / n) / few)
-    doubt = student.ppf(1 - 0.01 / (n * 2), few - 1) * error
+    doubt = student.ppf(1 - 0.01 / (n * 2), few - 1) * error + rounding / n
     distances = np.full((n, n), 100.0)
     distances[leader] = 10
     distances[rival] = 10 + differences + doubt * (1.001 if worse else 0.999)
     np.fill_diagonal(distances, 0)
-    median = search_median(Matrix(distances), n, 0.0, InOrder)
+    median = search_median(Matrix(distances), n, rounding, InOrder)
     assert median.index == leader
     assert median.certified
     assert median.n_matches == n * few + (1 if worse else 2) * few
@@ -118,6 +119,11 @@ def test_estimates_without_a_median():
     assert median.index is None
     assert compare.asked == median.n_matches == 32 * 300
     np.testing.assert_allclose(median.estimates, distances.sum(axis=1), rtol=0.5)
+    # Nobody is a reference of itself.
+    others = [[j for j in range(32) if j != i] for i in range(300)]
+    expected = [299 * distances[i, js].mean() for i, js in enumerate(others)]
+    median = estimate_distances(compare, 300, InOrder)
+    np.testing.assert_allclose(median.estimates, expected)
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])

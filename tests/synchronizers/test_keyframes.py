@@ -17,6 +17,8 @@ from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.keyframes import curvature_keyframes
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error
 
+from oracle import slow_filter
+
 
 def test_given_keyframes_meet(bending, bending_aspace):
     sync = KeyframeSynchronizer(100).fit(bending_aspace, keyframes=bending.keyframes)
@@ -83,8 +85,40 @@ def test_curvature_finds_the_corners():
     np.testing.assert_allclose(curvature_keyframes(path, 2), [30, 60], atol=1)
 
 
+@pytest.mark.parametrize("n_frames", [20, 40, 101])
+def test_the_first_keyframe_is_where_the_path_bends_most(n_frames):
+    """sqrt(|v|^2 |a|^2 - (v.a)^2) / |v|^3, a tenth of the mean |v|^2 added where it stands."""
+    rng, t, cases = np.random.default_rng(n_frames), np.linspace(0, 1, n_frames), 0
+    for _ in range(40):
+        waves = np.sin(np.outer(t, rng.uniform(2, 20, 3)) + rng.uniform(0, 6, 3))
+        path = waves @ rng.standard_normal((3, 3))
+        v, a = (slow_filter(path, 0.03 * (n_frames - 1), order) for order in (1, 2))
+        vv = (v**2).sum(axis=1)
+        bend = np.linalg.norm(np.cross(v, a), axis=1) / (vv + 0.1 * vv.mean()) ** 1.5
+        # Close to an end no key-frame is chosen.
+        if n_frames / 6 < bend.argmax() < n_frames - 1 - n_frames / 6:
+            cases += 1
+            sync = KeyframeSynchronizer(n_keyframes=1).fit([path])
+            assert sync.keyframes_.tolist() == [bend.argmax()]
+    assert cases > 10
+
+
+def test_keyframes_that_look_alike_are_found_in_their_order():
+    """Twice around a triangle: each corner is passed again, early or late, and is another one."""
+    corners = np.array([[0.0, 0], [1, 0], [0.5, 0.8], [0, 0], [1, 0], [0.5, 0.8], [0, 0]])
+    turns = [20, 40, 60, 80, 100], [24, 36, 66, 76, 98], [14, 40, 52, 88, 106]
+    X = [
+        np.column_stack([np.interp(np.arange(121), [0, *k, 120], way) for way in corners.T])
+        for k in turns
+    ]
+    sync = KeyframeSynchronizer(pattern=0, n_keyframes=5).fit(X)
+    np.testing.assert_allclose(sync.keyframes_, turns[0], atol=1)
+    times = sync.match(X).times[:, sync.keyframes_.astype(int)]
+    np.testing.assert_allclose(times, turns, atol=4)
+
+
 def test_rest_has_no_keyframes():
-    """Who stands still trembles, and that bends sharply; what counts is where the movement turns."""
+    """Who stands still trembles, which bends sharply; what counts is where the movement turns."""
     t, rng = np.linspace(0, 3, 151)[:, None], np.random.default_rng(0)
     path = np.hstack([np.clip(t, 0, 1), np.clip(t - 1, 0, 1)])
     path[100:] += 0.003 * rng.standard_normal((51, 2))
