@@ -36,6 +36,8 @@ LIMIT_BYTES = 8 * 2**30
 DENSE = ["synchronizers/test_dense.py", "synchronizers/test_accuracy.py"]
 ALONE = ["synchronizers/test_alone_or_together.py"]
 KEYFRAMES = ["synchronizers/test_keyframes.py"]
+SPACE = ["against_brute_force", "of_long_takes_is_thinned"]
+SPACE = [f"display/test_displays.py::test_the_disparity_space_{name}" for name in SPACE]
 METRICS = ["metrics/test_measures.py"]
 INPUT = ["test_sequences.py", "test_contract.py", "synchronizers/test_match.py"]
 TRELLIS = ["matching/test_trellis.py", *DENSE, *ALONE]
@@ -52,7 +54,7 @@ TESTS = {
     "matching/refinement": [*DENSE, *ALONE],
     "matching/rows": TRELLIS,
     "matching/trellis": TRELLIS,
-    "matching/warper": [*DENSE, *ALONE],
+    "matching/warper": [*DENSE, *SPACE, *ALONE],
     "matching/warps": ["matching/test_warps.py", *DENSE, *METRICS, *KEYFRAMES, *ALONE],
     "metrics/measures": METRICS,
     "metrics/scorers": METRICS,

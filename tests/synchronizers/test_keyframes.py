@@ -117,6 +117,18 @@ def test_keyframes_that_look_alike_are_found_in_their_order():
     np.testing.assert_allclose(times, turns, atol=4)
 
 
+def test_a_style_does_not_move_keyframes():
+    """Twice around an ellipse, elsewhere: its ends are where it bends, not where it is closest."""
+    t = np.linspace(0, 1, 121)
+    phase = np.pi / 2 + 4 * np.pi * np.stack([t, t + 0.03 * np.sin(2 * np.pi * t)])
+    pattern, other = np.stack([2 * np.cos(phase), np.sin(phase)], axis=2)
+    sync = KeyframeSynchronizer(pattern=0, n_keyframes=4).fit([pattern, other + [0, 0.5]])
+    np.testing.assert_allclose(sync.keyframes_, [15, 45, 75, 105], atol=1)
+    landed = sync.match([pattern, other + [0, 0.5]]).times[:, sync.keyframes_.astype(int)]
+    shown = [np.interp(f, np.arange(121), p) for f, p in zip(landed, phase, strict=True)]
+    np.testing.assert_allclose(shown, [np.pi * np.arange(1, 5)] * 2, atol=0.15)
+
+
 def test_rest_has_no_keyframes():
     """Who stands still trembles, which bends sharply; what counts is where the movement turns."""
     t, rng = np.linspace(0, 3, 151)[:, None], np.random.default_rng(0)
