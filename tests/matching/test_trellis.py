@@ -186,7 +186,7 @@ def test_tiles_are_as_large_as_they_may_be(sizes, reach):
 
 @pytest.mark.parametrize(
     ("sizes", "reach", "n_bases"),
-    [((7, 20), 26, 1), ((7, 19), 26, 7), ((8, 300), 26, 8), ((1, 5), 3, 1), ((3, 500), 512, 1)],
+    [((7, 1024), 0, 1), ((7, 1023), 0, 7), ((8, 3000), 0, 8), ((7, 20), 26, 1), ((7, 19), 26, 7)],
 )
 def test_few_bases_with_long_rows_are_taken_one_by_one(sizes, reach, n_bases):
     """Less than 8 bases, 1024 cells and more."""
