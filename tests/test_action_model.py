@@ -113,6 +113,11 @@ def test_a_feature_in_which_nobody_differs(performances):
     model = ActionModel().fit(X)
     assert np.isfinite(model.score_samples(X)).all()
     assert (model.variance_[:, 1] == 0).all()
+    # A billionth of the variance of the feature that varies most, over time and performances.
+    floor = 1e-9 * max(X[:, :, k].var() for k in range(3))
+    std = np.sqrt(np.maximum(X.var(axis=0), floor))
+    expected = norm(X.mean(axis=0), std).logpdf(X).sum(axis=(1, 2))
+    np.testing.assert_allclose(model.score_samples(X), expected)
     other = X[:1] + [0, 0.5, 0]
     assert model.predict(other).tolist() == [-1]
     assert model.accepts(model.sample(5, frame=2, random_state=0), 2).all()
