@@ -68,6 +68,8 @@ EQUIVALENT = {
     ("matching/filters", "_WIDE = 10"): "either filter gives the same but for rounding",
     ("matching/filters", "get_config()['working_memory'] * 2 ** 20"): SIZE,
     ("matching/filters", "get_config()['working_memory'] * 2 ** 20 / 6"): SIZE,
+    ("matching/filters", "beyond > 0 -> beyond > -1"): "pads by nothing",
+    ("matching/filters", "next_fast_len(sequences.shape[1] + 2 * margin, real=True)"): SIZE,
     ("matching/narrow", "NARROW_CELLS = 30000"): SIZE,
     ("matching/narrow", "_NARROW_WAYS = 1000000"): SIZE,
     ("matching/narrow", "_FEW_PAIRS = 4"): SIZE,

@@ -103,6 +103,20 @@ def test_the_first_keyframe_is_where_the_path_bends_most(n_frames):
     assert cases > 10
 
 
+@pytest.mark.parametrize("n_keyframes", [2, 5, 9])
+def test_a_movement_run_backwards_has_the_same_keyframes(n_keyframes):
+    """One end is as good as the other, to keep away from as well."""
+    rng = np.random.default_rng(0)
+    for n_frames in range(30, 70):
+        path = np.cumsum(rng.standard_normal((n_frames, 3)), axis=0)
+        there, back = (
+            KeyframeSynchronizer(n_keyframes=n_keyframes).fit([x]).keyframes_
+            for x in (path, path[::-1])
+        )
+        assert len(there) == n_keyframes
+        np.testing.assert_array_equal(back, n_frames - 1 - there[::-1])
+
+
 def test_keyframes_that_look_alike_are_found_in_their_order():
     """Twice around a triangle: each corner is passed again, early or late, and is another one."""
     corners = np.array([[0.0, 0], [1, 0], [0.5, 0.8], [0, 0], [1, 0], [0.5, 0.8], [0, 0]])
@@ -136,6 +150,14 @@ def test_rest_has_no_keyframes():
     path[100:] += 0.003 * rng.standard_normal((51, 2))
     sync = KeyframeSynchronizer(n_keyframes=1).fit([path])
     np.testing.assert_allclose(sync.keyframes_, [50], atol=1)
+
+
+def test_what_never_moves_bends_nowhere():
+    """No curvature of 0 / 0."""
+    X = [np.full((n, 2), float(n)) for n in (20, 30)]
+    sync = KeyframeSynchronizer(n_keyframes=3).fit(X)
+    assert len(sync.keyframes_) == 3
+    assert np.isfinite(sync.match(X).times).all()
 
 
 @pytest.mark.parametrize("n_frames", [3, 5, 9])
