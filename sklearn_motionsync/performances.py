@@ -6,11 +6,11 @@ from sklearn.base import BaseEstimator
 from sklearn.utils._set_output import _get_output_config
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from .gate import check_finite
 from .sequences import (
     ACCEPTED,
     NOT_ONE,
     as_collection,
-    check_finite,
     check_members,
     frame_labels,
     stack_frame,

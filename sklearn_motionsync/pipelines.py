@@ -1,9 +1,77 @@
-"""Where the synchronizer of a pipeline is, and what reaches it."""
+"""Where the synchronizer of a pipeline is, and what reaches it: performances, and key-frames."""
+
+import inspect
+from contextlib import contextmanager
+from typing import NamedTuple
 
 from sklearn.pipeline import Pipeline
 from sklearn.utils.validation import check_is_fitted
 
-__all__ = ["find_step", "find_synchronizer", "index_of_pattern", "reach_synchronizer"]
+__all__ = [
+    "MissingMetadata",
+    "Reached",
+    "find_step",
+    "find_synchronizer",
+    "flat_steps",
+    "index_of_pattern",
+    "reach_synchronizer",
+    "taken_by",
+    "transform_through",
+]
+
+
+class MissingMetadata(ValueError):
+    """A synchronizer was not given what it needs besides performances.
+
+    Parameters
+    ----------
+    reason : str
+        What is missing, and why it is needed; it goes on with how to give it.
+    name : str
+        Of the parameter.
+    how : str, default="{name}=[...]"
+        How to give it to the function that was called.
+    """
+
+    def __init__(self, reason, name, how="{name}=[...]"):
+        super().__init__(reason, name, how)
+
+    def __str__(self):
+        reason, name, how = self.args
+        return f"{reason}, {how.format(name=name)}."
+
+
+class Reached(NamedTuple):
+    """A fitted synchronizer, and what reaches it through the steps before.
+
+    Attributes
+    ----------
+    before : Pipeline or None
+        The steps before.
+    synchronizer : estimator
+    performances : sequence of ndarray (n_frames_i, n_features)
+        Checked: the methods of the synchronizer take them without checking again.
+    params : dict
+        What else its ``match`` was given, such as ``keyframes``.
+    how : str
+        How to give that to the function that was called.
+    """
+
+    before: Pipeline | None
+    synchronizer: object
+    performances: tuple
+    params: dict
+    how: str
+
+    @property
+    def takes_params(self):
+        """Whether its ``match`` takes more than performances."""
+        return len(inspect.signature(self.synchronizer.match).parameters) > 1
+
+    def match(self):
+        """The performances matched to the pattern."""
+        with _asking(self.how):
+            return self.synchronizer.match(self.performances, **self.params)
 
 
 def find_step(estimator, kind):
@@ -12,6 +80,7 @@ def find_step(estimator, kind):
     Parameters
     ----------
     estimator : estimator or Pipeline
+        Pipelines within pipelines are searched, and the best estimators of searches.
     kind : class
 
     Returns
@@ -31,17 +100,95 @@ def find_synchronizer(estimator):
     return _first(estimator, matches, "synchronizer")
 
 
-def reach_synchronizer(estimator, X, kind=None):
-    """The steps before the synchronizer of an estimator, it, and the performances that reach it.
+def reach_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",), hint=""):
+    """The synchronizer of an estimator, and what reaches it of raw performances.
 
-    The performances are checked: its methods take them without checking again. ``kind`` is a class
-    of synchronizers, by default any.
+    Parameters
+    ----------
+    estimator : synchronizer, or Pipeline with one
+    X : performances, as the estimator takes them
+    params : dict
+        What is given besides, by name: to ``match``, and to ``transform`` of the steps before,
+        whichever takes it. None is nothing given.
+    caller : str
+        Whom the user has called with (estimator, X), for messages.
+    kind : class, default=None
+        Of the synchronizer; by default any.
+    uses : tuple of str, default=("match",)
+        Methods of the synchronizer that the caller gives params to.
+    hint : str, default=""
+        Other ways to give params.
+
+    Returns
+    -------
+    Reached
+
+    Raises
+    ------
+    TypeError
+        If nobody takes what was given.
     """
     found = find_synchronizer(estimator) if kind is None else find_step(estimator, kind)
     before, synchronizer = found
     check_is_fitted(synchronizer)
-    features = X if before is None else before.transform(X)
-    return before, synchronizer, synchronizer.check_performances(features)
+    also = [getattr(synchronizer, name) for name in uses]
+    features = transform_through(before, X, params, caller, hint=hint, also=also)
+    performances = synchronizer.check_performances(features)
+    taken = taken_by(synchronizer.match, params)
+    return Reached(before, synchronizer, performances, taken, _how(caller, hint))
+
+
+def transform_through(before, X, params, caller, *, hint="", also=()):
+    """Performances after the steps of a pipeline, each given what its ``transform`` takes.
+
+    Parameters
+    ----------
+    before : Pipeline or None
+    X, params, caller, hint : as for `reach_synchronizer`
+    also : list of callable, default=()
+        Who else takes params, after the last step.
+
+    Returns
+    -------
+    performances, as the last step gives them
+    """
+    methods = [] if before is None else [step.transform for step in flat_steps(before)]
+    takers = [*methods, *also]
+    unknown = set(params).difference(*(taken_by(method, params) for method in takers))
+    for name in params:
+        if name in unknown and params[name] is not None:
+            names = [_name_of(method) for method in takers]
+            raise TypeError(
+                f"{caller} got {name!r}, which is no argument of its own, and is not taken by "
+                f"{' or '.join(names) or 'a step before'}."
+            )
+    with _asking(_how(caller, hint)):
+        for method in methods:
+            X = method(X, **taken_by(method, params))
+    return X
+
+
+def taken_by(method, params):
+    """Those params that a method takes by name, or all if it takes any; None is not given."""
+    given = {name: value for name, value in params.items() if value is not None}
+    accepted = list(inspect.signature(method).parameters.values())
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
+        return given
+    # The first one is X.
+    names = {parameter.name for parameter in accepted[1:]}
+    return {name: value for name, value in given.items() if name in names}
+
+
+def flat_steps(estimator):
+    """The steps of a pipeline and of those within it, in order; an estimator is its own only one.
+
+    Steps that pass everything through are left out.
+    """
+    estimator = getattr(estimator, "best_estimator_", estimator)
+    if not isinstance(estimator, Pipeline):
+        return [estimator]
+    steps = [step for _, step in estimator.steps if step is not None and step != "passthrough"]
+    return [inner for step in steps for inner in flat_steps(step)]
 
 
 def index_of_pattern(synchronizer, performances):
@@ -53,12 +200,48 @@ def index_of_pattern(synchronizer, performances):
     return index if (same == synchronizer.pattern_).all() else None
 
 
+# -- helpers ------------------------------------------------------------------------------
+
+
 def _first(estimator, fits, name):
-    # What a search found.
+    found = _search(estimator, fits)
+    if found is None:
+        # What a search found.
+        estimator = getattr(estimator, "best_estimator_", estimator)
+        names = [type(step).__name__ for step in flat_steps(estimator)]
+        raise ValueError(
+            f"There is no {name} in {type(estimator).__name__}; its steps are {names}."
+        )
+    return found
+
+
+def _search(estimator, fits):
+    """The steps before the first one that fits, and that one; None if there is none."""
     estimator = getattr(estimator, "best_estimator_", estimator)
-    steps = estimator.steps if isinstance(estimator, Pipeline) else [("", estimator)]
-    for i, (_, step) in enumerate(steps):
-        if fits(step):
-            return (estimator[:i] if i else None), step
-    names = [type(step).__name__ for _, step in steps]
-    raise ValueError(f"There is no {name} in {type(estimator).__name__}; its steps are {names}.")
+    if not isinstance(estimator, Pipeline):
+        return (None, estimator) if fits(estimator) else None
+    for i, (name, step) in enumerate(estimator.steps):
+        found = _search(step, fits)
+        if found is not None:
+            inner, fitting = found
+            before = estimator.steps[:i] + ([] if inner is None else [(name, inner)])
+            return (Pipeline(before) if before else None), fitting
+    return None
+
+
+def _name_of(method):
+    return f"{type(method.__self__).__name__}.{method.__name__}"
+
+
+def _how(caller, hint):
+    return f"{caller}(estimator, X, {{name}}=[...]){hint}"
+
+
+@contextmanager
+def _asking(how):
+    """Whoever misses something says how to give it to the function that was called."""
+    try:
+        yield
+    except MissingMetadata as error:
+        reason, name, _ = error.args
+        raise MissingMetadata(reason, name, how) from error

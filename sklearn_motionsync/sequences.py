@@ -10,11 +10,12 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
+from .gate import as_numbers, check_finite, names_of
+
 __all__ = [
     "ACCEPTED",
     "NOT_ONE",
     "as_collection",
-    "check_finite",
     "check_members",
     "frame_labels",
     "stack_frame",
@@ -182,83 +183,52 @@ def _depth(item):
 # -- checks -------------------------------------------------------------------------
 
 
-def check_members(sequences, *, finite=True):
+def check_members(sequences, *, finite=True, labels=None):
     """Arrays of one dtype, and the column names they share (None without names)."""
     if len(sequences) == 0:
         raise ValueError(f"Found 0 performances (n_samples=0), at least 1 is needed. {ACCEPTED}.")
-    arrays = [_as_matrix(i, x) for i, x in enumerate(sequences)]
-    names = _column_names(sequences[0])
-    width = arrays[0].shape[1]
-    for i, (x, array) in enumerate(zip(sequences, arrays, strict=True)):
+    called = [f"Performance {i}" for i in range(len(sequences))]
+    if labels is not None:
+        called = [f"{name} ({label!r})" for name, label in zip(called, labels, strict=True)]
+    arrays = [_as_matrix(what, x) for what, x in zip(called, sequences, strict=True)]
+    names, width = names_of(sequences[0]), arrays[0].shape[1]
+    for what, x, array in zip(called, sequences, arrays, strict=True):
         if array.shape[1] != width:
             raise ValueError(
-                f"Performance {i} has {array.shape[1]} features a frame, performance 0 has "
+                f"{what} has {array.shape[1]} features a frame, performance 0 has "
                 f"{width}. All performances need the same features in the same order."
             )
-        if _column_names(x) != names:
+        if names_of(x) != names:
             raise ValueError(
-                f"Performance {i} has the columns {_column_names(x)}, performance 0 has {names}. "
+                f"{what} has the columns {names_of(x)}, performance 0 has {names}. "
                 "All performances need the same columns in the same order."
             )
         if finite:
-            check_finite(array, f"Performance {i}, frame")
+            frames = x.index if isinstance(x, pd.DataFrame) else None
+            check_finite(array, f"{what}, frame", names, frames)
     dtype = np.float32 if all(a.dtype == np.float32 for a in arrays) else np.float64
     # Row by row in memory, so that no result depends on the layout of the input.
     return [np.ascontiguousarray(a, dtype=dtype) for a in arrays], names
 
 
-def _as_matrix(i, x):
+def _as_matrix(what, x):
     """One performance as a float array (n_frames, n_features) of at least 2 frames."""
-    if issparse(x):
-        raise TypeError(f"Performance {i} is a sparse matrix; use x.toarray().")
-    if isinstance(x, np.ma.MaskedArray) and np.ma.is_masked(x):
-        raise ValueError(
-            f"Performance {i} has masked values: interpolate the gaps, or drop the performance."
-        )
-    try:
-        array = np.asarray(x)
-        if array.dtype.kind not in "fc":
-            array = array.astype(np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(
-            f"Performance {i} is not a numeric array (n_frames, n_features): got "
-            f"{type(x).__name__}, {error}."
-        ) from error
-    if array.dtype.kind == "c":
-        raise ValueError(f"Performance {i}: complex data are not supported.")
+    array = as_numbers(x, what)
     if array.ndim != 2:
         raise ValueError(
-            f"Performance {i} has shape {array.shape}, expected (n_frames, n_features). Give a "
+            f"{what} has shape {array.shape}, expected (n_frames, n_features). Give a "
             "univariate performance as a column, x[:, np.newaxis]."
         )
     if array.shape[0] < 2 or array.shape[1] < 1:
         raise ValueError(
-            f"Performance {i} has shape {array.shape}; a performance needs at least 2 frames and "
+            f"{what} has shape {array.shape}; a performance needs at least 2 frames and "
             "1 feature. Drop it from the list."
         )
     return array
 
 
-def check_finite(array, where):
-    if np.isfinite(array).all():
-        return
-    frame, feature = np.argwhere(~np.isfinite(array))[0]
-    what = "NaN" if np.isnan(array[frame, feature]) else "infinity"
-    raise ValueError(
-        f"{where} {frame}, feature {feature} is {what}; the input must be finite. Interpolate the "
-        "gap, or drop the performance. (Input X contains NaN or infinity.)"
-    )
-
-
 def frame_labels(sequences):
     return [x.index if isinstance(x, pd.DataFrame) else range(len(x)) for x in sequences]
-
-
-def _column_names(x):
-    columns = getattr(x, "columns", None)
-    if columns is None or not all(isinstance(c, str) for c in columns):
-        return None
-    return list(columns)
 
 
 def stack_frame(arrays, labels, frames, columns):

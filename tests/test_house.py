@@ -18,6 +18,7 @@ FLOORS = [
     "notebook",
     "fitting",
     "work",
+    "gate",
     "sequences",
     "performances",
     "pipelines",

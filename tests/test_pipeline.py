@@ -7,15 +7,25 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
+from sklearn import config_context
+from sklearn.exceptions import NotFittedError
 from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
-from sklearn.pipeline import make_pipeline
+from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn_motionsync import (
     ActionModel,
+    ActionModelDisplay,
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
+    KeyframeSynchronizer,
     LinearSynchronizer,
+    Match,
+    SkeletonDisplay,
+    SynchronizationDisplay,
+    TrellisDisplay,
 )
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "plot_bending.py"
 PARAMETERS = {
@@ -88,6 +98,165 @@ def test_a_model_tells_another_action(bends, real_data):
     others = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t.startswith("hop")]
     pipe = make_pipe(bends.skeleton).fit(bends.data)
     assert pipe.score_samples(others).max() < pipe.score_samples(bends.data).min()
+
+
+# -- pipelines within pipelines ---------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def few():
+    return make_bending(5, n_frames=40, random_state=2)
+
+
+@pytest.fixture
+def no_figures():
+    yield
+    mpl.pyplot.close("all")
+
+
+def nestings(skeleton, synchronizer):
+    """The same pipeline, with all steps of one level and with pipelines and searches as steps."""
+    cosines, aspace = DirectionCosines(skeleton), ASpace(4)
+    steps = cosines, aspace, synchronizer, ActionModel()
+    search = GridSearchCV(synchronizer, {"n_frames": [40]}, cv=2, scoring=SpreadScorer())
+    return {
+        "flat": make_pipeline(*steps),
+        "postures inside": make_pipeline(make_pipeline(cosines, aspace), *steps[2:]),
+        "across": make_pipeline(cosines, make_pipeline(aspace, synchronizer), steps[3]),
+        "first and alone": make_pipeline(cosines, aspace, make_pipeline(synchronizer), steps[3]),
+        "deep": make_pipeline(make_pipeline(cosines, make_pipeline(aspace, *steps[2:]))),
+        "nothing between": make_pipeline(
+            cosines,
+            "passthrough",
+            Pipeline([("a", aspace), ("b", None), ("c", synchronizer)]),
+            steps[3],
+        ),
+        "search": make_pipeline(cosines, aspace, search, steps[3]),
+    }
+
+
+NESTINGS = list(nestings(None, DenseSynchronizer()))
+
+
+@pytest.mark.parametrize("name", NESTINGS)
+def test_a_synchronizer_is_found_at_any_depth(name, few, no_figures):
+    pipes = nestings(few.skeleton, DenseSynchronizer(40))
+    flat, pipe = (pipes[key].fit(few.data) for key in ("flat", name))
+    for scorer in (SpreadScorer(), FeatureHoldoutScorer()):
+        assert scorer(pipe, few.data) == scorer(flat, few.data)
+    one, other = (Match.from_estimator(p, few.data).times for p in (flat, pipe))
+    np.testing.assert_array_equal(one, other)
+    figures = SynchronizationDisplay.from_estimator(pipe, few.data)
+    assert figures.feature_names == ["aspace0", "aspace1", "aspace2", "aspace3"]
+    assert TrellisDisplay.from_estimator(pipe, few.data).costs.shape[0] == 40
+    one, other = (
+        ActionModelDisplay.from_estimator(p, few.data, features="pelvis_height")
+        for p in (flat, pipe)
+    )
+    np.testing.assert_array_equal(one.performances, other.performances)
+    assert len(SkeletonDisplay.from_estimator(pipe, few.data).axes_) == 2
+    assert len(SkeletonDisplay.from_model(pipe, n_samples=2).axes_) == 4
+
+
+def test_what_is_not_in_nested_pipelines(few):
+    pipe = make_pipeline(make_pipeline(DirectionCosines(few.skeleton), ASpace(4)), ActionModel())
+    message = r"no synchronizer in Pipeline; its steps are \['DirectionCosines', 'ASpace', 'Action"
+    with pytest.raises(ValueError, match=message):
+        SpreadScorer()(pipe, few.data)
+    with pytest.raises(NotFittedError):
+        SpreadScorer()(nestings(few.skeleton, DenseSynchronizer(40))["deep"], few.data)
+
+
+# -- key-frames along with performances -------------------------------------------------
+
+
+def make_marked(bunch, *, nested):
+    """A pipeline with key-frames, fitted."""
+    sync = KeyframeSynchronizer(40)
+    with config_context(enable_metadata_routing=True):
+        sync.set_fit_request(keyframes=True).set_transform_request(keyframes=True)
+        steps = DirectionCosines(bunch.skeleton), ASpace(4), sync, ActionModel()
+        pipe = (
+            make_pipeline(make_pipeline(*steps[:3]), steps[3]) if nested else make_pipeline(*steps)
+        )
+        return pipe.fit(bunch.data, keyframes=bunch.keyframes)
+
+
+# Whoever takes a pipeline and performances, with whatever goes along with these.
+OF_PIPELINES = {
+    "Match": Match.from_estimator,
+    "SynchronizationDisplay": SynchronizationDisplay.from_estimator,
+    "SkeletonDisplay": SkeletonDisplay.from_estimator,
+    "ActionModelDisplay": ActionModelDisplay.from_estimator,
+    "SpreadScorer()": SpreadScorer(),
+    "FeatureHoldoutScorer()": FeatureHoldoutScorer(),
+}
+
+
+@pytest.mark.parametrize("nested", [False, True])
+@pytest.mark.parametrize("routing", [False, True])
+def test_key_frames_are_shown_and_scored(nested, routing, few, no_figures):
+    pipe, K = make_marked(few, nested=nested), list(few.keyframes)
+    points = make_pipeline(DirectionCosines(few.skeleton), ASpace(4)).fit_transform(few.data)
+    sync = KeyframeSynchronizer(40).fit(points, keyframes=K)
+    expected = sync.match(points, keyframes=K)
+    with config_context(enable_metadata_routing=routing):
+        match = Match.from_estimator(pipe, few.data, keyframes=K)
+        display = SynchronizationDisplay.from_estimator(pipe, few.data, keyframes=K, features=0)
+        model = ActionModelDisplay.from_estimator(pipe, few.data, keyframes=K, features=0)
+        people = SkeletonDisplay.from_estimator(pipe, few.data, keyframes=K, azimuth=0, at=0.5)
+    np.testing.assert_array_equal(match.times, expected.times)
+    np.testing.assert_array_equal(display.times, expected.times)
+    after = sync.transform(points, keyframes=K)[:, :, :1]
+    np.testing.assert_array_equal(display.after, after)
+    np.testing.assert_array_equal(model.performances, after)
+    assert len(people.axes_) == 2
+
+
+@pytest.mark.parametrize("nested", [False, True])
+@pytest.mark.parametrize("name", OF_PIPELINES)
+def test_everybody_says_how_to_give_key_frames(name, nested, few):
+    call = OF_PIPELINES[name]
+    caller = name if name.endswith("()") else f"{name}.from_estimator"
+    with pytest.raises(ValueError, match="fitted with key-frames") as error:
+        call(make_marked(few, nested=nested), few.data)
+    assert f"{caller}(estimator, X, keyframes=[...])" in str(error.value)
+
+
+@pytest.mark.parametrize("name", [*OF_PIPELINES, "TrellisDisplay"])
+def test_what_nobody_takes(name, few):
+    call = {**OF_PIPELINES, "TrellisDisplay": TrellisDisplay.from_estimator}[name]
+    pipe = make_pipe(few.skeleton).fit(few.data)
+    with pytest.raises(TypeError, match=f"{name}.* got 'keyframes', .*DenseSynchronizer"):
+        call(pipe, few.data, keyframes=few.keyframes)
+    with pytest.raises(TypeError, match="got 'feature'"):
+        call(pipe, few.data, feature="aspace0")
+
+
+def test_nothing_given_is_nothing_to_take(few):
+    pipe = make_pipe(few.skeleton).fit(few.data)
+    score = SpreadScorer()(pipe, few.data, keyframes=None)
+    assert score == SpreadScorer()(pipe, few.data)
+
+
+def test_a_model_alone_has_no_performances_to_go_with_key_frames(few):
+    with pytest.raises(TypeError, match="keyframes along with performances X only"):
+        ActionModelDisplay.from_estimator(make_marked(few, nested=False), keyframes=few.keyframes)
+
+
+def test_key_frames_for_a_step_before_the_synchronizer(few, no_figures):
+    """Dense matching of what coincides in its key-frames already."""
+    K = few.keyframes
+    points = make_pipeline(DirectionCosines(few.skeleton), ASpace(4)).fit_transform(few.data)
+    steps = KeyframeSynchronizer(40), DenseSynchronizer(30)
+    pipe = make_pipeline(*steps).fit(points, keyframesynchronizer__keyframes=K)
+    marked = steps[0].transform(points, keyframes=K)
+    display = TrellisDisplay.from_estimator(pipe, points, performance=2, keyframes=K)
+    expected = TrellisDisplay.from_estimator(steps[1], marked, performance=2)
+    np.testing.assert_array_equal(display.costs, expected.costs)
+    message = r"TrellisDisplay.from_estimator\(estimator, X, keyframes="
+    with pytest.raises(ValueError, match=message):
+        TrellisDisplay.from_estimator(pipe, points)
 
 
 # -- the main job -----------------------------------------------------------------------

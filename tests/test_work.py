@@ -18,8 +18,8 @@ import threadpoolctl
 from sklearn.exceptions import NotFittedError
 from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import DenseSynchronizer
+from sklearn_motionsync.matching.holdout import RefinementTrial
 from sklearn_motionsync.matching.trellis import Trellis
-from sklearn_motionsync.matching.warper import Warper
 from sklearn_motionsync.work import Progress, run
 
 SETTINGS = {
@@ -144,7 +144,7 @@ def test_verbose_tells_how_far_it_is(walks, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert all(line.startswith("[DenseSynchronizer] ") for line in lines)
     assert "comparing 300 with 32 performances: 100 %" in lines[0]
-    assert "measuring the misfit: 100 %" in lines[-2]
+    assert "trying to refine: 100 %" in lines[-2]
     assert "warping: 100 %" in lines[-1]
 
 
@@ -202,7 +202,7 @@ def test_an_interrupted_fit_leaves_no_half_fitted_estimator(walks, monkeypatch):
         calls.append(1)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Warper, "misfits", interrupted)
+    monkeypatch.setattr(RefinementTrial, "misfits", interrupted)
     with pytest.raises(KeyboardInterrupt):
         sync.fit(walks)
     assert calls

@@ -5,7 +5,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..action_model import ActionModel
 from ..aspace import ASpace
-from ..pipelines import find_step
+from ..pipelines import find_step, flat_steps, transform_through
 from .drawing import COLORS, as_features, choose_features, curves, names_of, panels
 
 __all__ = ["ActionModelDisplay"]
@@ -61,7 +61,7 @@ class ActionModelDisplay:
         return f"ActionModelDisplay({self.feature_names})"
 
     @classmethod
-    def from_estimator(cls, estimator, X=None, *, features=None, ax=None):
+    def from_estimator(cls, estimator, X=None, *, features=None, ax=None, **params):
         """Draw a fitted model, or a pipeline that ends in one.
 
         Parameters
@@ -77,6 +77,8 @@ class ActionModelDisplay:
             first four of the model.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
+        **params : dict
+            What synchronizing X takes besides, such as ``keyframes``.
 
         Returns
         -------
@@ -85,8 +87,13 @@ class ActionModelDisplay:
         before, model = find_step(estimator, ActionModel)
         check_is_fitted(model)
         synchronised = None
+        if X is None and params:
+            raise TypeError(
+                f"{cls.__name__}.from_estimator takes {', '.join(params)} along with performances "
+                "X only."
+            )
         if X is not None:
-            given = X if before is None else before.transform(X)
+            given = transform_through(before, X, params, f"{cls.__name__}.from_estimator")
             synchronised = np.stack(model.check_performances(given))
         mean, std = model.mean_, np.sqrt(model.variance_)
         names = names_of(before, model, mean.shape[1])
@@ -168,7 +175,7 @@ def _posture_space(before, names, features):
     if before is None or all(not isinstance(f, str) or f in names for f in asked):
         return None
     before_aspace, aspace = find_step(before, ASpace)
-    steps = [step for _, step in before.steps]
+    steps = flat_steps(before)
     between = [s for s in steps[steps.index(aspace) + 1 :] if not hasattr(s, "match")]
     if between:
         raise ValueError(

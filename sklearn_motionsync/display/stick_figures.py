@@ -162,7 +162,9 @@ class SkeletonDisplay:
         return cls(scenes, Skeleton.paper(), titles).plot(ax, **view)
 
     @classmethod
-    def from_estimator(cls, estimator, X, *, performances=None, ax=None, **view):
+    def from_estimator(
+        cls, estimator, X, *, performances=None, ax=None, at=0.0, azimuth=-60, **params
+    ):
         """Performances as they were recorded, above the same ones synchronised.
 
         Parameters
@@ -174,7 +176,9 @@ class SkeletonDisplay:
         performances : list of int, default=None
             Which of them to draw; by default the pattern, if it is one of them, and others up to
             six in all.
-        ax, **view : as for `plot`
+        ax, at, azimuth : as for `plot`
+        **params : dict
+            What the ``match`` of the synchronizer takes besides, such as ``keyframes``.
 
         Returns
         -------
@@ -182,11 +186,11 @@ class SkeletonDisplay:
             At the beginning; see `animate`.
         """
         _, cosines = _before_synchronizer(estimator)
-        _, synchronizer, reached = reach_synchronizer(estimator, X)
-        match = synchronizer.match(reached)
-        pattern = index_of_pattern(synchronizer, reached)
+        reached = reach_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
+        match = reached.match()
+        pattern = index_of_pattern(reached.synchronizer, reached.performances)
         if performances is None:
-            others = [i for i in range(len(reached)) if i != pattern]
+            others = [i for i in range(len(match.times)) if i != pattern]
             performances = ([] if pattern is None else [pattern]) + others
             performances = performances[:_FEW_PERFORMANCES]
         return cls.from_predictions(
@@ -195,7 +199,8 @@ class SkeletonDisplay:
             cosines.skeleton,
             names=[f"{i} (pattern)" if i == pattern else str(i) for i in performances],
             ax=ax,
-            **view,
+            at=at,
+            azimuth=azimuth,
         )
 
     @classmethod

@@ -70,7 +70,9 @@ class SynchronizationDisplay:
         return f"SynchronizationDisplay({len(self.before)} performances, {self.feature_names})"
 
     @classmethod
-    def from_estimator(cls, estimator, X, *, features=None, groups=None, warps=True, ax=None):
+    def from_estimator(
+        cls, estimator, X, *, features=None, groups=None, warps=True, ax=None, **params
+    ):
         """Draw what a fitted synchronizer, or a pipeline with one, does to performances.
 
         Parameters
@@ -87,15 +89,18 @@ class SynchronizationDisplay:
             Whether to draw tau(p) against the diagonal.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
+        **params : dict
+            What the ``match`` of the synchronizer takes besides, such as ``keyframes``.
 
         Returns
         -------
         SynchronizationDisplay
         """
-        before, synchronizer, performances = reach_synchronizer(estimator, X)
+        reached = reach_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
+        before, synchronizer, performances = reached[:3]
         names = names_of(before, synchronizer, performances[0].shape[1])
         chosen = choose_features(features, names)
-        match, shown = synchronizer.match(performances), [x[:, chosen] for x in performances]
+        match, shown = reached.match(), [x[:, chosen] for x in performances]
         display = cls(
             shown,
             match.warp(shown),

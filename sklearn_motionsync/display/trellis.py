@@ -61,7 +61,7 @@ class TrellisDisplay:
         return f"TrellisDisplay({self.names[1]} matched to {self.names[0]})"
 
     @classmethod
-    def from_estimator(cls, estimator, X, *, performance=0, ax=None, colorbar=True):
+    def from_estimator(cls, estimator, X, *, performance=0, ax=None, colorbar=True, **params):
         """Draw the disparity space of the pattern and one performance.
 
         Parameters
@@ -73,12 +73,16 @@ class TrellisDisplay:
             Which of them is matched to the pattern.
         ax : Axes, default=None
         colorbar : bool, default=True
+        **params : dict
+            What steps before take besides, such as ``keyframes``.
 
         Returns
         -------
         TrellisDisplay
         """
-        _, synchronizer, performances = reach_synchronizer(estimator, X, DenseSynchronizer)
+        caller = f"{cls.__name__}.from_estimator"
+        reached = reach_synchronizer(estimator, X, params, caller, kind=DenseSynchronizer)
+        _, synchronizer, performances = reached[:3]
         space = synchronizer.disparity_space(performances, performance)
         warp = synchronizer.match(performances.take([performance])).offsets[0]
         index = index_of_pattern(synchronizer, performances)

@@ -22,10 +22,13 @@ class Cost(NamedTuple):
         ``features(on_clock, subframes, smoothing)``: what is compared at every position.
     weights : callable
         ``weights(rates)``: ``b``, ``g`` and ``phi`` of `StepTable` at local rates.
+    degree : int
+        With which power of the unit of the data squares of the features grow.
     """
 
     features: Callable
     weights: Callable
+    degree: int
 
 
 class StepTable(NamedTuple):
@@ -146,7 +149,7 @@ def _elastic_weights(rates):
 
 
 COSTS = {
-    "velocity": Cost(_velocities, _velocity_weights),
-    "elastic": Cost(_square_roots, _elastic_weights),
-    "posture": Cost(_postures, _posture_weights),
+    "velocity": Cost(_velocities, _velocity_weights, 2),
+    "elastic": Cost(_square_roots, _elastic_weights, 1),
+    "posture": Cost(_postures, _posture_weights, 2),
 }

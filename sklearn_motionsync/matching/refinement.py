@@ -2,8 +2,11 @@
 
 Repeated trials of one source (a machine, a neuron, one trained athlete) show the same
 postures but for noise and gain, so postures can place a moment to a fraction of a frame.
-Different people do not: their postures differ by style, and following them misleads. The
-misfit tells which is the case.
+Different people do not: their postures differ by style, and following them misleads.
+``holdout`` tells which is the case.
+
+A feature that never moves says nothing, and one that is there twice nothing new: what is
+averaged over features is weighted by what they do, so that neither counts.
 """
 
 import numpy as np
@@ -13,7 +16,7 @@ from scipy.linalg import solveh_banded
 from .filters import SMOOTHING, smooth
 from .warps import follow
 
-__all__ = ["choose_smoothing", "curvature", "misfit", "refine_warps"]
+__all__ = ["choose_smoothing", "curvature", "match_postures", "refine_warps", "slow_energy"]
 
 # How much a rate is expected to change over the whole clip, in units of the mean rate.
 _RATE_CHANGE = 2.0
@@ -21,7 +24,7 @@ _RATE_CHANGE = 2.0
 _ITERATIONS = 20
 _LONGEST_STEP = 1.5
 _SHORTEST_STEP = 0.01
-# Gains are drawn towards 1 with this share of a feature's mean energy.
+# Gains are drawn towards 1 with this share of the energy of a typical feature.
 _RIDGE = 0.01
 # Narrowest Gaussian that is one on a grid of frames.
 _LEAST_SIGMA = 0.35
@@ -55,33 +58,20 @@ def choose_smoothing(on_clock):
     return chosen
 
 
-def misfit(base, moving, times):
-    """Share of the base's variance that matched postures leave, noise aside.
+def match_postures(moving, times):
+    """Postures at the times of warps: (n_sequences, P, n_features)."""
+    return follow(moving.swapaxes(1, 2), times[:, np.newaxis]).swapaxes(1, 2)
 
-    Parameters
-    ----------
-    base : ndarray, shape (P, n_features)
-    moving : ndarray, shape (n_sequences, P, n_features)
-    times : ndarray, shape (n_sequences, P)
 
-    Returns
-    -------
-    ndarray, shape (n_sequences,)
-        The slow part of the energy of the residuals, after fitting a gain and an offset to
-        every feature, less what white noise puts there, over the energy of the base.
+def slow_energy(base, matched):
+    """What matched postures leave of the base's, as far as it is slow: (n_sequences,).
+
+    The energy of the residuals, after fitting a gain and an offset to every feature and smoothing:
+    noise is mostly gone.
     """
-    matched = follow(moving.swapaxes(1, 2), times[:, np.newaxis]).swapaxes(1, 2)
     residuals = base - _fit_gain(base, matched)[0]
     sigma = max(SMOOTHING * (len(base) - 1), _LEAST_SIGMA)
-    slow = smooth(residuals, sigma)
-    # White noise leaves this share of its energy in the slow part, which is not misfit.
-    kernel = _gaussian(sigma)
-    left = np.square(kernel).sum()
-    share = left / (1 - 2 * kernel.max() + left)
-    fast_energy = np.square(residuals - slow).sum(axis=(1, 2))
-    slow_energy = np.square(slow).sum(axis=(1, 2)) - share * fast_energy
-    energy = np.square(base - base.mean(axis=0)).sum()
-    return np.maximum(slow_energy, 0) / energy if energy > 0 else np.zeros(len(moving))
+    return np.square(smooth(residuals, sigma)).sum(axis=(1, 2))
 
 
 def refine_warps(base, moving, times, reach):
@@ -92,8 +82,8 @@ def refine_warps(base, moving, times, reach):
         sum_p |x_n(p) - g x_m(tau) - o - g x_m'(tau) (tau_new - tau)|^2 / s^2
             + sum_p (tau_new''(p) / q)^2
 
-    with a gain g and an offset o for every feature, the noise s measured from the
-    residual, and q the change of rate to be expected. The ends stay pinned, the warp stays
+    with a gain g and an offset o for every feature, the noise s of a feature measured from the
+    residuals, and q the change of rate to be expected. The ends stay pinned, the warp stays
     non-decreasing and in the band; the largest rate of the trellis does not bind it.
 
     Parameters
@@ -109,12 +99,13 @@ def refine_warps(base, moving, times, reach):
     -------
     ndarray, shape (n_sequences, P)
     """
-    n_frames, n_features = base.shape
+    n_frames = len(base)
     if n_frames < 5:
         return times
     frames = np.arange(n_frames)
     low, high = np.maximum(frames - reach, 0), np.minimum(frames + reach, n_frames - 1)
-    rounding = np.square(16 * np.finfo(base.dtype).eps) * np.square(base).mean()
+    energy = np.square(base - base.mean(axis=0)).sum()
+    rounding = np.square(16 * np.finfo(base.dtype).eps) * energy / n_frames
     splines = CubicSpline(frames, moving, axis=1).c.astype(moving.dtype)
     refined = times.astype(np.float64)
     active = np.arange(len(moving))
@@ -122,7 +113,7 @@ def refine_warps(base, moving, times, reach):
         values, tangents = _evaluate(splines, active, refined[active])
         fitted, gain = _fit_gain(base, values)
         slope, residual = gain * tangents, base - fitted
-        noise = np.square(residual).sum(axis=(1, 2)) / (n_frames * n_features)
+        noise = _typical_energy(residual) / n_frames
         pull = np.square(slope).sum(axis=2)[:, 1:-1]
         going = (noise > rounding) & pull.any(axis=1)
         active, noise, pull = active[going], noise[going], pull[going]
@@ -157,6 +148,17 @@ def _solve(inner, pull, push, stiffness):
     return solved.reshape(inner.shape) - inner
 
 
+def _typical_energy(curves):
+    """The energy of a typical feature of centred curves (n_sequences, P, n_features).
+
+    All their energy, shared among as many features as vary on their own: ``tr(C)^2 / tr(C^2)`` of
+    their covariance C.
+    """
+    energy = np.square(curves).sum(axis=(1, 2))
+    together = np.square(np.matmul(curves.swapaxes(1, 2), curves)).sum(axis=(1, 2))
+    return together / np.where(energy > 0, energy, 1)
+
+
 def _gaussian(sigma):
     """Weights of a Gaussian filter."""
     reach = int(np.ceil(4 * sigma))
@@ -171,7 +173,7 @@ def _fit_gain(base, matched):
     """
     x, y = base - base.mean(axis=0), matched - matched.mean(axis=1, keepdims=True)
     energy = np.square(y).sum(axis=1, keepdims=True)
-    ridge = _RIDGE * energy.mean(axis=2, keepdims=True)
+    ridge = _RIDGE * _typical_energy(y)[:, np.newaxis, np.newaxis]
     # Nothing moves: any gain fits.
     ridge[ridge == 0] = 1
     gain = ((x * y).sum(axis=1, keepdims=True) + ridge) / (energy + ridge)

@@ -13,11 +13,12 @@ import numpy as np
 from sklearn import get_config
 
 from .consensus import vote
-from .costs import cost_features, step_table
+from .costs import COSTS, cost_features, step_table
 from .filters import smooth
-from .refinement import misfit, refine_warps
+from .refinement import refine_warps
 from .rows import Bases
 from .trellis import Trellis
+from .units import Unit
 from .warps import normalise
 
 __all__ = ["Features", "Matcher", "RefinedWarper", "Warper"]
@@ -36,20 +37,25 @@ class Features(NamedTuple):
     subframes : int
         Positions a frame.
     velocity_smoothing : float
-    centre : ndarray, shape (n_features,)
-        Mean posture of the training set: centred features keep inner products small.
+    unit : Unit
     """
 
     cost: str
     subframes: int
     velocity_smoothing: float
-    centre: np.ndarray
+    unit: Unit
 
     def __call__(self, positions):
-        """Features at every position: (n_sequences, Q, n_features)."""
-        return cost_features(
-            positions - self.centre, self.cost, self.subframes, self.velocity_smoothing
-        )
+        """Features, at every position, of postures in the unit: (n_sequences, Q, n_features)."""
+        return cost_features(positions, self.cost, self.subframes, self.velocity_smoothing)
+
+    def positions(self, arrays, n_frames):
+        """Performances at every position of the clock (Eq. 7), in the unit."""
+        return self.unit(normalise(arrays, n_frames, self.subframes))
+
+    def back(self, squares):
+        """Squares of features in the unit of the data."""
+        return self.unit.back(squares, COSTS[self.cost].degree)
 
 
 class Matcher(NamedTuple):
@@ -60,7 +66,7 @@ class Matcher(NamedTuple):
 
     @classmethod
     def learn(cls, features, positions, *, smoothness, max_offset, max_rate):
-        """The matcher of a training set at all positions, and what it compares of it.
+        """The matcher of a training set, at all positions in the unit, and what it compares of it.
 
         The weight of changes of pace, ``mu``, is ``smoothness`` times the mean squared norm of the
         features, so that it does not depend on their unit.
@@ -71,7 +77,8 @@ class Matcher(NamedTuple):
         mu = float(smoothness * energy / np.prod(compared.shape[:2]))
         # Whole frames; 0.29 * 100 must not lose one to rounding.
         reach = int(np.floor(max_offset * n_frames * (1 + 1e-12)))
-        table = step_table(features.cost, max_rate, subframes)
+        # No step is longer than the clip.
+        table = step_table(features.cost, min(max_rate, n_frames - 1), subframes)
         return cls(features, Trellis(table, mu, min(reach, n_frames - 1))), compared
 
     def distances(self, features, bases, moving, tiles):
@@ -104,7 +111,7 @@ class Warper:
     ----------
     matcher : Matcher
     pattern : ndarray, shape (P, n_features)
-        Its postures.
+        Its postures, in the unit.
     bases : Bases
         Features of the pattern and of the exemplars, in double precision.
     to_exemplars : ndarray, shape (n_exemplars, P)
@@ -132,23 +139,17 @@ class Warper:
         return cls(matcher, pattern, bases, to_exemplars, votes, warp_smoothing)
 
     def positions(self, arrays):
-        """Performances at every sub-position of the clock (Eq. 7), in double precision.
+        """Performances in the unit at every sub-position of the clock (Eq. 7), in double precision.
 
         There rounding decides nothing, so that the warp of a performance does not depend on those
         it comes with.
         """
         arrays = [x.astype(np.float64, copy=False) for x in arrays]
-        return normalise(arrays, len(self.pattern), self.matcher.features.subframes)
+        return self.matcher.features.positions(arrays, len(self.pattern))
 
     def warps(self, positions, rows):
         """Distances of the direct paths to the pattern, and times ``tau``, of some performances."""
-        return self._voted(positions[rows])
-
-    def misfits(self, positions, rows):
-        """Misfits of matched postures, before any refinement."""
-        positions = positions[rows]
-        times = self._voted(positions)[1]
-        return misfit(self.pattern, positions[:, :: self.matcher.features.subframes], times)
+        return self.voted(positions[rows])
 
     def disparity_space(self, positions):
         """E(p, d) of the pattern and one performance at the pattern's rate (Eq. 12), and the path.
@@ -170,7 +171,7 @@ class Warper:
         path = self.matcher.paths(self.bases.part(slice(1)), moving)[0, 0] / sub
         return frames, disparities / sub, costs, path
 
-    def _voted(self, positions):
+    def voted(self, positions):
         """Distances of the direct paths, and smoothed times after the vote of the exemplars."""
         moving, trellis = self.matcher.features(positions), self.matcher.trellis
         bases = self.bases
@@ -216,9 +217,13 @@ class RefinedWarper(Warper):
     def warps(self, positions, rows):
         """As those of `Warper`, refined by postures."""
         distances, times = super().warps(positions, rows)
-        postures = positions[rows, :: self.matcher.features.subframes]
-        curves = np.concatenate([self.pattern[np.newaxis], postures])
-        if self.noise_width > 0:
-            curves = smooth(curves, self.noise_width)
-        reach = self.matcher.trellis.reach
-        return distances, refine_warps(curves[0], curves[1:], times, reach)
+        base, moving = self.postures(positions[rows])
+        return distances, refine_warps(base, moving, times, self.matcher.trellis.reach)
+
+    def postures(self, positions):
+        """Postures of the pattern and of performances, smoothed as the noise asks for."""
+        postures = positions[:, :: self.matcher.features.subframes]
+        if self.noise_width <= 0:
+            return self.pattern, postures
+        curves = smooth(np.concatenate([self.pattern[np.newaxis], postures]), self.noise_width)
+        return curves[0], curves[1:]

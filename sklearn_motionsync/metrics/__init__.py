@@ -4,14 +4,12 @@ from .measures import (
     group_timing_error,
     inverse_consistency,
     keyframe_error,
-    least_squares,
-    pairwise_correlation,
     pause_share,
     roughness,
-    sobolev_least_squares,
     timing_error,
 )
 from .scorers import FeatureHoldoutScorer, SpreadScorer
+from .spread import least_squares, pairwise_correlation, sobolev_least_squares
 
 __all__ = [
     "FeatureHoldoutScorer",

@@ -10,6 +10,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..fitting import at_once, of_one_state
 from ..matching.median import Median, median_of
+from ..matching.units import Unit
 from ..matching.warps import normalise
 from ..notebook import DocumentedMixin
 from ..performances import Performances, SequenceLevelMixin, restore
@@ -25,12 +26,18 @@ class TrainingSet(NamedTuple):
     performances : Performances
     on_clock : ndarray, shape (n_sequences, P, n_features)
         Linearly normalised (Eq. 7).
+    unit : Unit
+        In which they are about 1.
+    scaled : ndarray, shape (n_sequences, P, n_features)
+        Those on the clock, in this unit.
     given : ndarray, shape (n_frames, n_features), or None
         The pattern, if it was given as an array.
     """
 
     performances: Performances
     on_clock: np.ndarray
+    unit: Unit
+    scaled: np.ndarray
     given: np.ndarray | None
 
 
@@ -216,7 +223,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
     def _learn(self, performances):
         """All that ``fit`` learns of checked performances."""
         training = self._set_clock(performances)
-        self._set_pattern(training, self._plain_median(training.on_clock))
+        self._set_pattern(training, self._plain_median(training.scaled))
 
     @of_one_state
     def _warp(self, X, **params):
@@ -245,7 +252,9 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
             self.n_frames_ = int(np.median([len(x) for x in performances]))
             if given is not None:
                 self.n_frames_ = len(given)
-        return TrainingSet(performances, normalise(performances, self.n_frames_), given)
+        on_clock = normalise(performances, self.n_frames_)
+        unit = Unit.of(on_clock)
+        return TrainingSet(performances, on_clock, unit, unit(on_clock), given)
 
     def _given_pattern(self, performances):
         """The pattern as an array, if that is what was given; indices are checked."""
@@ -276,14 +285,17 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         return isinstance(self.pattern, str)
 
     def _plain_median(self, sequences):
-        """The median performance (Eq. 19) without matching; nothing if it is not asked for."""
+        """The median (Eq. 19) of scaled sequences without matching; nothing if it is not wanted."""
         if not self._wants_median:
             return Median.unknown(len(sequences))
         return median_of(sequences)
 
-    def _set_pattern(self, training, median):
-        """Take the median, or what was given, as the pattern; it is returned at its own pace."""
-        self.global_distances_ = median.distances
+    def _set_pattern(self, training, median, degree=2):
+        """Take the median, or what was given, as the pattern; it is returned at its own pace.
+
+        Distances are in the unit of the training set to this degree.
+        """
+        self.global_distances_ = training.unit.back(median.distances, degree)
         self.pattern_index_ = median.index if self._wants_median else None
         if not self._wants_median and training.given is None:
             self.pattern_index_ = int(self.pattern)

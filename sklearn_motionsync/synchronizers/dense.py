@@ -10,6 +10,7 @@ from sklearn.utils._param_validation import Interval, StrOptions
 from ..fitting import of_one_state
 from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
+from ..matching.holdout import RefinementTrial, Verdict, deal_features
 from ..matching.median import Median, estimate_distances, rounding_of, search_median, sum_all
 from ..matching.refinement import choose_smoothing
 from ..matching.warper import Features, Matcher, RefinedWarper, Warper
@@ -24,11 +25,8 @@ __all__ = ["DenseSynchronizer"]
 # Up to so many performances all pairs are compared: see docs/scaling.md.
 _EXHAUSTIVE = 100
 
-# Sets of repeated trials leave 0.0001 to 0.02 (0.07 with 4 features and 20 % noise), sets of people
-# 0.09 and more, single people 0.05 and more; there refining begins to help
-# (benchmarks/accuracy.py); measured on at most so many performances.
-_LARGEST_MISFIT = 0.07
-_MISFIT_SAMPLE = 32
+# Whether refining helps is tried on at most so many performances.
+_TRIED = 12
 
 
 class DenseSynchronizer(LongWorkMixin, Synchronizer):
@@ -49,8 +47,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     4. Consensus: the time of the pattern reaches a performance straight, or by way of
        one of ``consensus`` exemplars, typical performances of the training set; the median
        of these routes outvotes a path that took a wrong valley. It is then smoothed.
-    5. Refinement: if postures agree but for noise and gain, as they do in repeated trials of
-       a single source, Gauss-Newton steps place every moment to a fraction of a frame.
+    5. Refinement: if it helps, as it does for repeated trials of a single source, whose postures
+       agree but for noise and gain, Gauss-Newton steps place every moment to a fraction of a frame.
     6. ``transform`` samples performances at ``tau(p) = p + Delta(p)`` (Eq. 18).
 
     Most data need nothing turned. Four parameters, among the first, are worth a thought:
@@ -74,9 +72,9 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         clip, so that it does not depend on the frame rate; beyond its ends a clip is
         continued by its point reflection. Noisy sensors want more: 0.1 for the Kinect.
     refine : "auto" or bool, default="auto"
-        Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and
-        the postures of the training set, matched without, leave a misfit of less than 7 % of
-        their variance.
+        Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and it
+        helps: on features of the training set that had no part in it (see ``refinement_``).
+        A single feature, or several that say the same, cannot tell.
     max_offset : float, default=0.25
         Largest offset, as a share of ``n_frames``, in [0, 1].
     consensus : int, default=8
@@ -136,9 +134,11 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         The absolute weight of the changes of pace.
     exemplars_ : ndarray of int
         Indices of the performances that vote.
-    misfit_ : float
-        Median share of the pattern's variance that matched postures leave, smoothed so that
-        noise does not count; NaN unless ``refine="auto"`` had to find out.
+    refinement_ : Bunch
+        What was found out by ``refine="auto"``, on features that had no part in the warps:
+        ``ratio``, their misfit after refining by the other features to that after matching by the
+        others alone; ``p_value``, of a t test that refining does not help; ``ratio_to_all``, to
+        the misfit after matching by all features. NaN where nothing can tell.
     refines_ : bool
         Whether warps are refined.
     n_features_in_ : int
@@ -237,7 +237,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "warping"}
             results = in_portions(warper, "warps", positions, **portions)
         distances, times = (np.concatenate(parts) for parts in zip(*results, strict=True))
-        return Match(times, distances.astype(performances[0].dtype, copy=False))
+        return Match(times, warper.matcher.features.back(distances))
 
     @of_one_state
     def disparity_space(self, X, performance=0):
@@ -271,6 +271,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         warper = self._warper
         positions = warper.positions([performances[performance]])
         frames, offsets, costs, path = warper.disparity_space(positions)
+        costs = warper.matcher.features.back(costs)
         return Bunch(frames=frames, offsets=offsets, costs=costs, path=path)
 
     # -- steps of a fit ---------------------------------------------------------------------
@@ -278,27 +279,24 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     def _learn(self, performances):
         with self._progress(fits=True) as progress:
             training = self._set_clock(performances)
-            centre = training.on_clock.mean(axis=(0, 1))
             matcher, features = Matcher.learn(
-                Features(self.cost, self.subframes, self.velocity_smoothing, centre),
+                Features(self.cost, self.subframes, self.velocity_smoothing, training.unit),
                 self._positions(training),
-                smoothness=self.smoothness,
-                max_offset=self.max_offset,
-                max_rate=self.max_rate,
+                **self._settings(),
             )
-            self.mu_ = matcher.trellis.mu
+            self.mu_ = float(matcher.features.back(matcher.trellis.mu))
             median = self._choose_median(matcher, features, progress)
-            source = self._set_pattern(training, median)
+            source = self._set_pattern(training, median, COSTS[self.cost].degree)
             warper = self._choose_exemplars(training, matcher, source, median.estimates)
-            self._warper = self._decide_on_refinement(training, warper, progress)
+            self._warper = self._decide_on_refinement(training, warper, source, progress)
 
     def _positions(self, training, chosen=slice(None)):
-        """Performances of the training set at every sub-position of the clock."""
+        """Performances of the training set at every sub-position of the clock, in the unit."""
         if self.subframes == 1:
-            return training.on_clock[chosen]
+            return training.scaled[chosen]
         performances = training.performances
         some = [performances[i] for i in np.arange(len(performances))[chosen]]
-        return normalise(some, self.n_frames_, self.subframes)
+        return training.unit(normalise(some, self.n_frames_, self.subframes))
 
     def _choose_median(self, matcher, features, progress):
         """The median (Eq. 19), by all matches or some; without it, what exemplars are chosen by."""
@@ -326,30 +324,41 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         chosen = [source, *(training.performances[k] for k in self.exemplars_)]
         # In double precision, as all that is warped.
         chosen = [x.astype(np.float64, copy=False) for x in chosen]
-        positions = normalise(chosen, self.n_frames_, self.subframes)
-        portion = matcher, self.pattern_, positions, self.consensus > 0, self.warp_smoothing
+        positions = matcher.features.positions(chosen, self.n_frames_)
+        pattern = positions[0, :: self.subframes]
+        portion = matcher, pattern, positions, self.consensus > 0, self.warp_smoothing
         (warper,) = run(Warper.to_pattern, [portion])
         return warper
 
-    def _decide_on_refinement(self, training, warper, progress):
+    def _decide_on_refinement(self, training, warper, source, progress):
         """Whether warps are refined by postures, and the warper that does so or does not."""
-        self.misfit_ = np.nan
-        if self.refine == "auto":
-            if self.consensus > 0:
-                self.misfit_ = self._measure_misfit(training, warper, progress)
-            self.refines_ = self.misfit_ < _LARGEST_MISFIT
-        else:
-            self.refines_ = bool(self.refine)
+        verdict = Verdict()
+        if self.refine == "auto" and self.consensus > 0:
+            verdict = self._try_refinement(training, warper, source, progress)
+        names = "ratio", "p_value", "ratio_to_all"
+        self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
+        self.refines_ = bool(verdict.helps if self.refine == "auto" else self.refine)
         if not self.refines_:
             return warper
-        return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.on_clock))
+        return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.scaled))
 
-    def _measure_misfit(self, training, warper, progress):
-        """Median misfit of the performances, or of evenly spaced ones of many."""
+    def _try_refinement(self, training, warper, source, progress):
+        """Find out on the performances, or evenly spaced ones of many, whether refining helps."""
         others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
-        if len(others) == 0:
-            return 0.0
-        some = others[:: -(-len(others) // _MISFIT_SAMPLE)]
-        portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "measuring the misfit"}
-        results = in_portions(warper, "misfits", self._positions(training, some), **portions)
-        return float(np.median(np.concatenate(results)))
+        some = others[:: -(-len(others) // _TRIED) or 1]
+        hands = deal_features(training.scaled[some]) if len(some) else []
+        if not hands:
+            return Verdict()
+        positions = self._positions(training, some).astype(np.float64, copy=False)
+        source = warper.positions([source])
+        width = choose_smoothing(training.scaled[some])
+        portion = warper, source, positions, hands, width
+        (trial,) = run(partial(RefinementTrial.of, **self._settings()), [portion])
+        portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "trying to refine"}
+        results = in_portions(trial, "misfits", positions, **portions)
+        return Verdict.of(np.concatenate(results, axis=1))
+
+    def _settings(self):
+        """What a `Matcher` learns with."""
+        names = "smoothness", "max_offset", "max_rate"
+        return {name: getattr(self, name) for name in names}

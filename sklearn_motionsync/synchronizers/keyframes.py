@@ -8,7 +8,9 @@ from sklearn.utils._param_validation import Interval
 
 from ..fitting import at_once, of_one_state
 from ..matching.keyframes import curvature_keyframes, match_keyframes
+from ..matching.units import squared_distances
 from ..matching.warps import sample
+from ..pipelines import MissingMetadata
 from .base import Synchronizer
 from .match import Match
 
@@ -66,7 +68,9 @@ class KeyframeSynchronizer(Synchronizer):
     are often not the same moments, and linear normalisation is better than a wrong key-frame.
 
     Key-frames are metadata: in a Pipeline enable scikit-learn's metadata routing and ask for them
-    with ``set_fit_request(keyframes=True)`` and ``set_transform_request(keyframes=True)``.
+    with ``set_fit_request(keyframes=True)`` and ``set_transform_request(keyframes=True)``. Scorers
+    are asked to take them with ``set_score_request(keyframes=True)``; scorers that are called by
+    hand, displays and ``Match.from_estimator`` take ``keyframes=...``.
 
     Examples
     --------
@@ -157,9 +161,9 @@ class KeyframeSynchronizer(Synchronizer):
         """
         performances = self.check_performances(X)
         if self._given and keyframes is None:
-            raise ValueError(
-                "The synchronizer was fitted with key-frames: give those of these performances "
-                "too, keyframes=[...]."
+            raise MissingMetadata(
+                "The synchronizer was fitted with key-frames: give those of these performances too",
+                "keyframes",
             )
         if keyframes is None:
             found = [
@@ -171,18 +175,17 @@ class KeyframeSynchronizer(Synchronizer):
             knots = self._given_knots(performances, keyframes, len(self.keyframes_))
         times = self._between(self.keyframes_, knots)
         synchronised = sample(performances, times, self.n_frames_)
-        distances = np.square(synchronised - self.pattern_).sum(axis=(1, 2))
-        return Match(times, distances)
+        return Match(times, squared_distances(synchronised, self.pattern_))
 
     def _learn(self, performances, keyframes):
         self._given = keyframes is not None
         training = self._set_clock(performances)
-        knots, comparable = None, training.on_clock
+        knots, comparable = None, training.scaled
         if self._given:
             knots = self._given_knots(performances, keyframes)
             # On the mean key-frames all performances are comparable, as on one clock.
             times = self._between(knots.mean(axis=0), knots)
-            comparable = sample(performances, times, self.n_frames_)
+            comparable = training.unit(sample(performances, times, self.n_frames_))
         self._set_pattern(training, self._plain_median(comparable))
         if self._given and self.pattern_index_ is not None:
             self.keyframes_ = knots[self.pattern_index_]

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..fitting import of_one_state
+from ..matching.units import squared_distances
 from .base import Synchronizer
 from .match import Match
 
@@ -56,5 +57,5 @@ class LinearSynchronizer(Synchronizer):
     def match(self, X):
         on_clock = self.normalize(X)
         clock = np.arange(on_clock.shape[1], dtype=np.float64)
-        distances = np.square(on_clock - self.pattern_).sum(axis=(1, 2))
+        distances = squared_distances(on_clock, self.pattern_)
         return Match(np.tile(clock, (len(on_clock), 1)), distances)

@@ -102,11 +102,19 @@ class Match:
             Fitted.
         X : performances, as the estimator takes them
         **params : dict
-            What the ``match`` of the synchronizer takes besides, such as ``keyframes``.
+            What the ``match`` of the synchronizer takes besides, such as ``keyframes``; steps
+            before it whose ``transform`` takes the same are given it, too.
 
         Returns
         -------
         Match
+
+        Raises
+        ------
+        ValueError
+            If the estimator has no synchronizer, or that needs key-frames and gets none.
+        TypeError
+            If nobody takes one of the params.
 
         Examples
         --------
@@ -118,8 +126,7 @@ class Match:
         >>> Match.from_estimator(pipe.fit(bunch.data), bunch.data)
         Match(6 performances on 50 frames)
         """
-        _, synchronizer, performances = reach_synchronizer(estimator, X)
-        return synchronizer.match(performances, **params)
+        return reach_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator").match()
 
     def warp(self, X):
         """Whatever was recorded along with the performances, on the clock of the pattern (Eq. 18).

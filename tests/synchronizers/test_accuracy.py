@@ -178,7 +178,7 @@ def test_curvature_is_the_sum_of_squared_second_differences(n_frames):
 # -- known warps ------------------------------------------------------------------------
 
 
-def known_warps(seed, noise, n=6, n_features=16):
+def known_warps(seed, noise, n=8, n_features=16):
     """Copies of a random movement with smooth random warps (rates 0.5 to 2), noise and gains.
 
     Returns the copies and, for each, the time that shows what copy 0 shows at p.

@@ -59,7 +59,7 @@ def test_equal_bits_alone_and_in_groups(performances, ties, settings, dtype):
     n_frames = 60 if len(X[0]) > 150 or settings == "half frames" else None
     sync = DenseSynchronizer(n_frames, **SETTINGS[settings]).fit(X)
     together = sync.match(X)
-    assert together.distances.dtype == dtype
+    assert together.distances.dtype == np.float64
     for size in (1, 3, 13):
         groups = [sync.match(X[i : i + size]) for i in range(0, len(X), size)]
         for whole, *parts in zip(together, *groups, strict=True):

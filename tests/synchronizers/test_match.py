@@ -185,7 +185,7 @@ def test_every_kind_of_collection(matched):
     for X in (frames, to_frame(frames), objects):
         np.testing.assert_array_equal(match.warp(X), expected)
     with_gap = [x.copy() for x in points]
-    with_gap[2][5, 1] = np.nan
+    with_gap[2][5:8, 1] = np.nan
     warped = match.warp(with_gap)
     known = np.isfinite(warped)
     assert not known[2, :, 1].all()

@@ -53,7 +53,11 @@ def sets():
 def state(estimator):
     """All that a fit learnt, and that a user can see."""
     names = [name for name in vars(estimator) if name.endswith("_")]
-    return {name: np.asarray(getattr(estimator, name)).tobytes() for name in sorted(names)}
+    return {name: as_bytes(getattr(estimator, name)) for name in sorted(names)}
+
+
+def as_bytes(value):
+    return repr(value) if isinstance(value, dict) else np.asarray(value).tobytes()
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)

@@ -1,0 +1,156 @@
+"""Does refining help? It does if features that had no part in it agree better afterwards.
+
+Trials of one source have one time for all of their features: a warp refined by some of them brings
+the others together. People have a style in every feature: a warp refined by some follows
+their style, and takes the others apart.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+from scipy.special import stdtr
+
+from .refinement import match_postures, refine_warps, slow_energy
+from .warper import Matcher, RefinedWarper, Warper
+
+__all__ = ["RefinementTrial", "Verdict", "deal_features"]
+
+# Features that correlate by more than this say the same; one of them must not judge another.
+_SAME = 0.9
+# Share of the energy below which a feature does not move.
+_STILL = 1e-20
+# Probability, at most, that refining is taken for a help where it is none.
+_DOUBT = 0.01
+# Warps matched by all features have seen the noise of those that judge: what that may be worth.
+_SIGHT = 1.1
+
+
+def deal_features(on_clock):
+    """Deal features into two hands of about equal energy; those that say the same stay together.
+
+    Parameters
+    ----------
+    on_clock : ndarray, shape (n_sequences, P, n_features)
+
+    Returns
+    -------
+    list of ndarray of int
+        Two hands, of all features that move; none if all of these say the same.
+    """
+    frames = on_clock.reshape(-1, on_clock.shape[2]).astype(np.float64)
+    frames = frames - frames.mean(axis=0)
+    energy = np.square(frames).sum(axis=0)
+    moving = np.flatnonzero(energy > _STILL * energy.max(initial=0))
+    if len(moving) < 2:
+        return []
+    frames = frames[:, moving] / np.sqrt(energy[moving])
+    count, group_of = connected_components(np.abs(frames.T @ frames) > _SAME, directed=False)
+    if count < 2:
+        return []
+    groups = [moving[group_of == k] for k in range(count)]
+    weights = np.array([energy[group].sum() for group in groups])
+    hands, loads = [[], []], np.zeros(2)
+    for k in np.argsort(-weights, kind="stable"):
+        hand = loads.argmin()
+        hands[hand].extend(groups[k])
+        loads[hand] += weights[k]
+    return [np.sort(hand) for hand in hands]
+
+
+class Verdict(NamedTuple):
+    """What refining did to features that had no part in it.
+
+    Attributes
+    ----------
+    ratio : float
+        Misfit after refining by the shown features to that after matching by them, in geometric
+        mean; NaN if there was nothing to compare.
+    p_value : float
+        Of a t test of the logarithms of these ratios, that refining does not help.
+    ratio_to_all : float
+        The same to the misfit after matching by all features, those that judge among them.
+    """
+
+    ratio: float = np.nan
+    p_value: float = np.nan
+    ratio_to_all: float = np.nan
+
+    @property
+    def helps(self):
+        """Whether refining helps beyond doubt, and is not worse than the sight of all features."""
+        return self.p_value < _DOUBT and self.ratio_to_all < _SIGHT
+
+    @classmethod
+    def of(cls, misfits):
+        """The verdict on misfits (3, ...): matched by all features, by those shown, refined."""
+        by_all, by_shown, refined = np.reshape(misfits, (3, -1))
+        known = (by_all > 0) & (by_shown > 0) & (refined > 0)
+        if not known.any():
+            return cls()
+        gain = np.log(refined[known] / by_shown[known])
+        worse = np.log(refined[known] / by_all[known]).mean()
+        return cls(float(np.exp(gain.mean())), _p_value(gain), float(np.exp(worse)))
+
+
+def _p_value(gain):
+    """Of a one-sided t test that the mean is not below 0; 1 for a single value."""
+    if len(gain) < 2:
+        return 1.0
+    error = gain.std(ddof=1) / np.sqrt(len(gain))
+    return float(stdtr(len(gain) - 1, gain.mean() / max(error, np.finfo(float).tiny)))
+
+
+@dataclass(frozen=True, eq=False)
+class RefinementTrial(RefinedWarper):
+    """A warper that finds out whether refining helps.
+
+    Attributes
+    ----------
+    hands : list of ndarray of int
+        Features in two hands, each of which judges warps that are made by the other.
+    blind : list of Warper
+        For each hand, the warper by the features of the other one; without exemplars.
+    """
+
+    hands: list
+    blind: list
+
+    @classmethod
+    def of(cls, warper, source, positions, hands, noise_width, **settings):
+        """The trial of a warper.
+
+        Parameters
+        ----------
+        warper : Warper
+        source : ndarray, shape (1, Q, n_features)
+            The pattern at all positions.
+        positions : ndarray, shape (n_sequences, Q, n_features)
+            Some performances, from which the blind warpers learn.
+        hands : list of ndarray of int
+        noise_width : float
+        **settings : dict
+            Those of `Matcher.learn`.
+        """
+        blind = []
+        for shown in hands[::-1]:
+            matcher, _ = Matcher.learn(warper.matcher.features, positions[:, :, shown], **settings)
+            chosen, pattern = source[:, :, shown], warper.pattern[:, shown]
+            blind.append(Warper.to_pattern(matcher, pattern, chosen, True, warper.warp_smoothing))
+        return cls(**vars(warper), noise_width=noise_width, hands=hands, blind=blind)
+
+    def misfits(self, positions, rows):
+        """Misfits of every hand (3, n_sequences, 2), for `Verdict.of`."""
+        positions = positions[rows]
+        base, moving = self.postures(positions)
+        reach = self.matcher.trellis.reach
+        by_all = self.voted(positions)[1]
+        out = np.empty((3, len(positions), 2))
+        for i, (held, shown) in enumerate((self.hands, self.hands[::-1])):
+            by_shown = self.blind[i].voted(positions[:, :, shown])[1]
+            refined = refine_warps(base[:, shown], moving[:, :, shown], by_shown, reach)
+            for j, times in enumerate((by_all, by_shown, refined)):
+                matched = match_postures(moving[:, :, held], times)
+                out[j, :, i] = slow_energy(base[:, held], matched)
+        return out

@@ -1,0 +1,114 @@
+"""Units: whatever the unit of the data, matching computes with numbers about 1.
+
+Powers of two are taken out, which costs no bit: nothing that is computed depends on the unit, and
+no square is too large or too small for the precision.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+__all__ = ["Unit", "exponent_of", "squared_distances"]
+
+# A feature whose values differ by less than this share of their size does not move, and features
+# that differ by less than this share of their energy are copies: the rest is rounding.
+_STILL = 2.0**-44
+_COPY = 2.0**-30
+
+
+class Unit(NamedTuple):
+    """What is taken off and out of postures before they are compared.
+
+    Attributes
+    ----------
+    centre : ndarray, shape (n_features,)
+        Mean posture of the training set, in the unit: centred features keep inner products small.
+    exponent : int
+        The unit is ``2 ** exponent``; even, so that its square root is a power of two, too.
+    rounding : ndarray, shape (n_features,)
+        Of features that are constant, how far rounding may take them from the centre; else 0.
+    copies : list of ndarray of int
+        Features that are copies of each other: the first one becomes their mean, the others 0.
+    """
+
+    centre: np.ndarray
+    exponent: int
+    rounding: np.ndarray
+    copies: list
+
+    @classmethod
+    def of(cls, on_clock):
+        """The unit of a training set on the clock: (n_sequences, P, n_features)."""
+        size = exponent_of(on_clock)
+        sized = np.ldexp(on_clock, -size)
+        centre = sized.mean(axis=(0, 1))
+        spread = np.abs(sized - centre).max(axis=(0, 1))
+        rounding = max(_STILL, 64 * float(np.finfo(on_clock.dtype).eps))
+        rounding = rounding * np.abs(sized).max(axis=(0, 1))
+        moves = spread > rounding
+        exponent = size + exponent_of(spread[moves])
+        exponent += exponent % 2
+        copies = _copies((sized - centre).reshape(-1, len(centre)))
+        centre, rounding = (np.ldexp(x, size - exponent) for x in (centre, rounding))
+        return cls(centre, exponent, np.where(moves, 0, rounding), copies)
+
+    def __call__(self, postures):
+        """Postures (..., n_features), centred, in this unit; what does not move is exactly 0."""
+        out = np.ldexp(postures, -self.exponent)
+        out -= self.centre
+        still = np.flatnonzero(self.rounding)
+        if len(still):
+            part = out[..., still]
+            out[..., still] = np.where(np.abs(part) > self.rounding[still], part, 0)
+        for first, *others in self.copies:
+            kept = out[..., first]
+            # Nothing is added to what is equal to the last bit.
+            kept += (out[..., others] - kept[..., np.newaxis]).sum(axis=-1) / (1 + len(others))
+            out[..., others] = 0
+        return out
+
+    def back(self, values, degree=2):
+        """What grows as the unit to some degree, such as squares, in the unit of the data.
+
+        In double precision; infinite where that does not reach.
+        """
+        with np.errstate(over="ignore", under="ignore"):
+            return np.ldexp(np.asarray(values, dtype=np.float64), degree * self.exponent)
+
+
+def _copies(frames):
+    """The columns of centred frames that are there more than once, copies together."""
+    energy = np.square(frames).sum(axis=0, dtype=np.float64)
+    order = np.argsort(energy, kind="stable")
+    alike = np.diff(energy[order]) <= _COPY * energy[order[1:]]
+    found = []
+    # Only columns of equal energy can be copies: they are neighbours in this order.
+    for run in np.split(order, np.flatnonzero(~alike) + 1):
+        if len(run) == 1 or energy[run[0]] == 0:
+            continue
+        run = np.sort(run)
+        columns = frames[:, run].astype(np.float64)
+        distances = energy[run][:, np.newaxis] + energy[run] - 2 * columns.T @ columns
+        count, group_of = connected_components(distances <= _COPY * energy[run[0]], directed=False)
+        groups = [run[group_of == k] for k in range(count)]
+        found.extend(group for group in groups if len(group) > 1)
+    return found
+
+
+def exponent_of(values):
+    """The e of the largest of some numbers, ``2 ** (e - 1) <= |x| < 2 ** e``; 0 for none."""
+    largest = max(abs(float(values.max(initial=0))), abs(float(values.min(initial=0))))
+    return int(np.frexp(largest)[1])
+
+
+def squared_distances(sequences, other):
+    """``|x_i - y|^2`` of sequences (n_sequences, P, n_features) to another one, in any unit.
+
+    Infinite where double precision does not reach.
+    """
+    exponent = max(exponent_of(sequences), exponent_of(other))
+    differences = np.ldexp(sequences, -exponent) - np.ldexp(other, -exponent)
+    squares = np.square(differences).sum(axis=(1, 2), dtype=np.float64)
+    with np.errstate(over="ignore", under="ignore"):
+        return np.ldexp(squares, 2 * exponent)
