@@ -12,6 +12,7 @@ depositFloorR``.
 """
 
 import argparse
+import sys
 import time
 from pathlib import Path
 
@@ -32,11 +33,31 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import load_performances, make_bending
 from sklearn_motionsync.metrics import keyframe_error, sobolev_least_squares
 
-parser = argparse.ArgumentParser(description="Synchronise and model performances of an action.")
+parser = argparse.ArgumentParser(
+    description="Synchronise and model performances of an action.", allow_abbrev=False
+)
 parser.add_argument("--data", help="archive of performances (.npz); by default synthetic ones")
 parser.add_argument("--action", help="which action of the archive")
 parser.add_argument("--output", default=".", help="folder of the figures")
-options, _ = parser.parse_known_args()  # a notebook has arguments of its own
+
+
+def stop(reason):
+    """End with one line that says why, and status 2."""
+    print(f"{parser.prog}: {reason}", file=sys.stderr)
+    end = SystemExit(reason)  # which a notebook shows
+    end.code = 2
+    raise end
+
+
+parser.error = stop
+# The arguments of a notebook are its own.
+is_script = "__file__" in globals() or Path(sys.argv[0]).name == "plot_bending.py"
+options = parser.parse_args(sys.argv[1:] if is_script else [])
+output = Path(options.output)
+if options.action and not options.data:
+    stop("--action chooses among the performances of an archive: give --data, too.")
+if output.exists() and not output.is_dir():
+    stop(f"--output must be a folder, {output} is a file.")
 
 # %%
 # The performances
@@ -49,15 +70,19 @@ def read_performances(path=None, action=None):
     """Performances of one action, as a Bunch."""
     if path is None:
         return make_bending(random_state=0)
-    bunch = load_performances(path)
+    try:
+        bunch = load_performances(path)
+    except (OSError, ValueError) as error:
+        stop(f"--data {path}: {error}")
     actions = sorted(set(bunch.target))
     if action is None and len(actions) > 1:
-        raise SystemExit(f"Choose one with --action: {', '.join(actions)}.")
+        stop(f"Choose one with --action: {', '.join(actions)}.")
     chosen = np.flatnonzero(bunch.target == (action or actions[0]))
     if len(chosen) < 2:
-        raise SystemExit(f"There are {len(chosen)} performances of {action!r}; choose {actions}.")
+        names = ", ".join(actions)
+        stop(f"There are {len(chosen)} performances of {action or actions[0]!r} among {names}.")
     if bunch.skeleton is None:
-        raise SystemExit("The names of the joints do not tell which ones are the body's.")
+        stop("The names of the joints do not tell which ones are the body's.")
     bunch.data = [bunch.data[i] for i in chosen]
     for name in ("target", "actor", "take"):
         bunch[name] = bunch[name][chosen]
@@ -188,7 +213,6 @@ postures = SkeletonDisplay.from_model(pipe, frames=(0.1, 0.4, 0.6)).figure_
 
 # %%
 
-output = Path(options.output)
 output.mkdir(parents=True, exist_ok=True)
 for name, figure in (("dimensions", dimensions), ("postures", postures)):
     path = output / f"bending_{name}.png"

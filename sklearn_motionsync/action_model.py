@@ -10,8 +10,9 @@ from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
 from .fitting import at_once, of_one_state
+from .gate import as_numbers, check_finite, check_names, check_squares
 from .notebook import DocumentedMixin
-from .performances import SequenceLevelMixin
+from .performances import SequenceLevelMixin, names_of_input
 
 __all__ = ["ActionModel"]
 
@@ -95,7 +96,8 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If the performances have different lengths, or there is only one.
+            If the performances have different lengths, or there is only one, or their unit is such
+            that variances are beyond the precision.
         """
         X = np.stack(_alike(self._check_training_set(X)))
         if len(X) < 2:
@@ -103,10 +105,12 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
                 "A model of how performances vary needs at least 2 performances, got n_samples = 1."
             )
         self.n_frames_ = X.shape[1]
-        self.mean_ = X.mean(axis=0)
-        self.deviations_ = X - self.mean_
-        self.variance_ = np.square(self.deviations_).mean(axis=0)
-        spread = float(X.var(axis=(0, 1)).max())
+        with np.errstate(over="ignore", invalid="ignore"):
+            self.mean_ = X.mean(axis=0)
+            self.deviations_ = X - self.mean_
+            self.variance_ = np.square(self.deviations_).mean(axis=0)
+            spread = float(X.var(axis=(0, 1)).max())
+        check_squares(X, spread, "variances")
         self._floor = _VARIANCE_FLOOR * (spread if spread > 0 else 1.0)
         self.offset_ = float(self._log_density(self.n_std**2 * self.mean_.size))
         return self
@@ -153,7 +157,10 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         ndarray, shape (n_sequences,)
         """
         X = np.stack(self.check_performances(X))
-        return self._log_density(np.square((X - self.mean_) / self._std()).sum(axis=(1, 2)))
+        # What is too far away for any number has the density 0.
+        with np.errstate(over="ignore"):
+            squares = np.square((X - self.mean_) / self._std()).sum(axis=(1, 2))
+        return self._log_density(squares)
 
     @of_one_state
     def score(self, X, y=None):
@@ -201,15 +208,15 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         """
         check_is_fitted(self)
         frame = self._check_frame(frame)
-        postures = np.asarray(postures, dtype=self.mean_.dtype)
+        check_names(postures, names_of_input(self), "postures")
+        postures = as_numbers(postures, "postures", dtype=self.mean_.dtype)
         width = self.mean_.shape[1]
         if postures.ndim != 2 or postures.shape[1] != width:
             raise ValueError(
                 f"postures must have shape (n_postures, {width}), got {postures.shape}. Give one "
                 "posture as [posture]."
             )
-        if not np.isfinite(postures).all():
-            raise ValueError("postures has NaN or infinite values; drop those rows.")
+        check_finite(postures, "postures, row", names_of_input(self))
         lower, upper = self.envelope()
         return ((postures >= lower[frame]) & (postures <= upper[frame])).all(axis=1)
 

@@ -14,6 +14,7 @@ from sklearn.utils._param_validation import Interval, RealNotInt
 from sklearn.utils.validation import check_is_fitted
 
 from .fitting import at_once, of_one_state
+from .gate import check_squares
 from .notebook import DocumentedMixin
 from .performances import check_performances, check_transformed, restore
 
@@ -99,7 +100,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         ------
         ValueError
             If there are fewer than two postures, or fewer than ``n_components`` postures or
-            features.
+            features, or their unit is such that variances are beyond the precision.
         """
         arrays = check_performances(self, X, reset=True, level="posture")
         postures = np.concatenate(arrays) if len(arrays) > 1 else arrays[0]
@@ -114,12 +115,15 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
                 f"{postures.shape[1]} features can span; use at most {most}, or a share of the "
                 "variance such as 0.95."
             )
+        # In units of a power of two no square is out of range, and no bit is lost.
+        exponent = int(np.frexp(np.abs(postures).max())[1])
         with np.errstate(invalid="ignore"):  # no variance at all: 0 / 0 in shares not used
-            pca = PCA().set_output(transform="default").fit(postures)
-        variance = pca.explained_variance_
+            pca = PCA().set_output(transform="default").fit(np.ldexp(postures, -exponent))
+        variance = np.ldexp(pca.explained_variance_, 2 * exponent)
+        check_squares(postures, variance[0], "variances")
         b = self._count(variance)
         self.components_ = np.ascontiguousarray(pca.components_[:b])
-        self.mean_ = pca.mean_
+        self.mean_ = np.ldexp(pca.mean_, exponent)
         self.explained_variance_ = variance[:b]
         whole = variance.sum()
         self.explained_variance_ratio_ = (
@@ -162,7 +166,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         The kind that was given, with ``n_features`` features
         """
         check_is_fitted(self)
-        performances = check_transformed(self, X, self.n_components_)
+        performances = check_transformed(self, X, self.get_feature_names_out())
         arrays = [
             (a @ self.components_ + self.mean_).astype(a.dtype, copy=False) for a in performances
         ]

@@ -1,14 +1,16 @@
 """The one gate: whatever comes in from outside becomes numbers here, or is refused."""
 
 import datetime
+import os
 
 import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
-__all__ = ["as_numbers", "check_finite", "check_names", "names_of"]
+__all__ = ["as_numbers", "check_finite", "check_names", "check_squares", "names_of", "refuse"]
 
 _TIMES = (np.datetime64, np.timedelta64, datetime.date, datetime.time, datetime.timedelta)
+_FILES = {"amc", "bvh", "c3d", "csv", "json", "npy", "npz", "parquet", "txt", "xlsx"}
 _SECONDS = "Give seconds as numbers, (t - t[0]) / np.timedelta64(1, 's')"
 
 
@@ -35,6 +37,26 @@ def as_numbers(values, what, *, dtype=None):
     ValueError
         If it is text, dates, complex, masked, ragged, or beyond double precision.
     """
+    refuse(values, what)
+    array = _as_array(values, what)
+    if array.dtype.kind == "O":
+        array = _from_objects(array, values, what)
+    elif array.dtype.kind == "c":
+        raise ValueError(
+            f"{what}: complex data are not supported (Complex data not supported). Give the real "
+            "and the imaginary part as two features."
+        )
+    elif array.dtype.kind not in "fbiu":
+        raise ValueError(_not_numeric(values, what, f"it has the dtype {array.dtype}"))
+    keeps = array.dtype == np.float32 and dtype is None
+    return array if keeps else _cast(array, dtype or np.float64, what)
+
+
+def refuse(values, what):
+    """Refuse what would become numbers without being any: masked values, text, dates; and sparse.
+
+    Parameters and errors are those of `as_numbers`.
+    """
     if issparse(values):
         raise TypeError(f"{what} is a sparse matrix; use x.toarray().")
     if _is_masked(values):
@@ -42,21 +64,48 @@ def as_numbers(values, what, *, dtype=None):
             f"{what} has masked values: interpolate the gaps, or drop what has them; "
             "x.filled(np.nan) makes them NaN."
         )
-    array = _as_array(values, what)
-    kind = array.dtype.kind
-    if kind == "O":
-        array = _from_objects(array, values, what)
-    elif kind in "Mm":
-        raise ValueError(f"{what} holds dates or durations ({array.dtype}). {_SECONDS}.")
-    elif kind == "c":
-        raise ValueError(
-            f"{what}: complex data are not supported (Complex data not supported). Give the real "
-            "and the imaginary part as two features."
-        )
-    elif kind not in "fbiu":
-        raise ValueError(_not_numeric(values, what, f"it holds {_example(array)}"))
-    keeps = array.dtype == np.float32 and dtype is None
-    return array if keeps else _cast(array, dtype or np.float64, what)
+    if isinstance(values, (pd.DataFrame, pd.Series)):
+        _refuse_columns(values, what)
+    else:
+        _refuse_items(values, what)
+
+
+def _refuse_columns(table, what):
+    for column in [table] if isinstance(table, pd.Series) else [c for _, c in table.items()]:
+        which = f"{what}, column {column.name!r}," if column.name is not None else what
+        if column.dtype.kind in "Mm" or isinstance(column.dtype, pd.PeriodDtype):
+            raise ValueError(f"{which} holds dates or durations. {_SECONDS}.")
+        if column.dtype.kind in "OSUT" or isinstance(column.dtype, pd.CategoricalDtype):
+            _refuse_items(column.to_numpy(dtype=object), which)
+
+
+def _refuse_items(values, what):
+    """The same for arrays, and for lists in lists."""
+    if isinstance(values, np.ndarray):
+        kind = values.dtype.kind
+        if kind in "Mm":
+            raise ValueError(f"{what} holds dates or durations ({values.dtype}). {_SECONDS}.")
+        if kind not in "OSU":
+            return
+        values = values.ravel().tolist() if kind != "O" else values.flat
+    elif not isinstance(values, (list, tuple)):
+        values = [values]
+    for value in values:
+        if isinstance(value, (str, bytes, os.PathLike)):
+            raise ValueError(_not_numeric(value, what, _advice(value)))
+        if isinstance(value, _TIMES):
+            kind = type(value).__name__
+            raise ValueError(f"{what} holds dates or durations ({kind}). {_SECONDS}.")
+        if isinstance(value, (list, tuple, np.ndarray)):
+            _refuse_items(value, what)
+
+
+def _advice(text):
+    ending = str(text).rpartition(".")[2].lower()
+    advice = "; give numbers"
+    if isinstance(text, os.PathLike) or ending in _FILES:
+        advice = "; read the files first, by read_motion(path), pandas.read_csv(path) or the like"
+    return f"{str(text)[:60]!r}{advice}"
 
 
 def _as_array(values, what):
@@ -70,26 +119,15 @@ def _as_array(values, what):
 
 def _from_pandas(values, what):
     """The array of a table; missing values of pandas' own types become NaN."""
-    columns = [values] if isinstance(values, pd.Series) else [c for _, c in values.items()]
-    for column in columns:
-        if column.dtype.kind in "Mm" or isinstance(column.dtype, pd.PeriodDtype):
-            which = f", column {column.name!r}," if column.name is not None else ""
-            raise ValueError(f"{what}{which} holds dates or durations. {_SECONDS}.")
-        if column.dtype.kind in "OSUT" or isinstance(column.dtype, pd.CategoricalDtype):
-            return values.to_numpy(dtype=object)
-    if any(column.dtype.kind == "c" for column in columns):
-        return values.to_numpy()
-    if not columns:
-        return np.empty(values.shape)
-    single = all(column.dtype == np.float32 for column in columns)
-    if all(isinstance(column.dtype, np.dtype) for column in columns):
+    dtypes = {values.dtype} if isinstance(values, pd.Series) else set(values.dtypes)
+    kinds = {dtype.kind for dtype in dtypes}
+    categories = any(isinstance(dtype, pd.CategoricalDtype) for dtype in dtypes)
+    if kinds & set("OSUT") or categories:
+        return values.to_numpy(dtype=object)
+    if "c" in kinds or (len(dtypes) == 1 and isinstance(next(iter(dtypes)), np.dtype)):
         # No copy where there is one block of memory.
-        return values.to_numpy() if single or len(set(_dtypes(columns))) == 1 else _double(values)
+        return values.to_numpy()
     return _double(values)
-
-
-def _dtypes(columns):
-    return [column.dtype for column in columns]
 
 
 def _double(values):
@@ -106,13 +144,7 @@ def _is_masked(values):
 
 
 def _from_objects(array, values, what):
-    """Numbers of an array of Python objects, none of which only looks like one."""
-    for value in array.flat:
-        if isinstance(value, (str, bytes)):
-            raise ValueError(_not_numeric(values, what, f"it holds the text {_example(array)}"))
-        if isinstance(value, _TIMES):
-            kind = type(value).__name__
-            raise ValueError(f"{what} holds dates or durations ({kind}). {_SECONDS}.")
+    """Numbers of an array of Python objects."""
     try:
         return np.where(pd.isna(array), np.nan, array).astype(np.float64)
     except OverflowError as error:
@@ -139,16 +171,6 @@ def _not_numeric(values, what, reason):
     return f"{what} is not a numeric array: got {type(values).__name__}, {reason}."
 
 
-def _example(array):
-    text = next((v for v in array.flat if isinstance(v, (str, bytes))), None)
-    if text is None:
-        return f"the dtype {array.dtype}"
-    advice = ""
-    if str(text).rpartition(".")[2].lower() in ("bvh", "amc", "c3d", "csv", "npz", "txt", "npy"):
-        advice = ": read the files first, such as by read_motion(path)"
-    return f"{str(text)[:40]!r}{advice}"
-
-
 def check_finite(array, where, names=None, frames=None):
     """Refuse NaN and infinity in (n_frames, n_features), naming the first one.
 
@@ -171,6 +193,32 @@ def check_finite(array, where, names=None, frames=None):
     raise ValueError(
         f"{where} {frame}{label}, feature {feature}{name} is {kind}; the input must be finite. "
         "Interpolate the gap, or drop the performance. (Input X contains NaN or infinity.)"
+    )
+
+
+def check_squares(values, squares, what):
+    """Refuse data whose squares are beyond the range of their precision.
+
+    Parameters
+    ----------
+    values : ndarray
+        The data.
+    squares : float
+        Their variance, or the largest of several.
+    what : str
+        What they are squared for.
+    """
+    spread = np.ptp(values.astype(np.longdouble).reshape(-1, values.shape[-1]), axis=0).max()
+    info = np.finfo(values.dtype)
+    largest = np.abs(values).max()
+    # Below this share of the values differences are rounding, and a variance of 0 is right.
+    tells = spread > 64 * info.eps * largest
+    if np.isfinite(squares) and (squares >= info.tiny or not tells):
+        return
+    precision = " or float64" if info.dtype == np.float32 else ""
+    raise ValueError(
+        f"The data differ by {float(spread):.2g}, so that their {what} are beyond {info.dtype}: "
+        f"use another unit{precision}."
     )
 
 

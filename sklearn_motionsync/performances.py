@@ -1,18 +1,23 @@
 """How estimators take performances, and give the same kind back: checked once, by one contract."""
 
+import re
+import warnings
+
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator
 from sklearn.utils._set_output import _get_output_config
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from .gate import check_finite
+from .gate import check_finite, check_names, names_of, refuse
 from .sequences import (
     ACCEPTED,
+    INDEX_NAMES,
     NOT_ONE,
     as_collection,
     check_members,
     frame_labels,
+    frame_name,
     stack_frame,
 )
 
@@ -21,9 +26,16 @@ __all__ = [
     "SequenceLevelMixin",
     "check_performances",
     "check_transformed",
+    "names_of_input",
     "read_collection",
     "restore",
 ]
+
+
+# Attribute of estimators: ``feature_names_in_``, but of any type.
+_NAMES = "_names_in"
+# Frames from which on a straight line is no accident.
+_CLOCK_FRAMES = 8
 
 
 class Performances(tuple):
@@ -42,11 +54,14 @@ class Performances(tuple):
         Labels of the frames of each performance; empty for univariate rows.
     names : ndarray of str or None
         ``feature_names_in_`` of the estimator that checked them.
+    levels : tuple of str
+        What performances and frames are called.
     """
 
-    def __new__(cls, arrays, kind, labels, frames, names=None):
+    def __new__(cls, arrays, kind, labels, frames, names=None, levels=INDEX_NAMES):
         self = super().__new__(cls, arrays)
         self.kind, self.labels, self.frames, self.names = kind, labels, frames, names
+        self.levels = levels
         return self
 
     def __getitem__(self, index):
@@ -59,7 +74,8 @@ class Performances(tuple):
         kind = "rows" if self.kind == "rows" else "list"
         frames = [self.frames[i] for i in indices] if self.frames else []
         labels = [self.labels[i] for i in indices]
-        return Performances([self[i] for i in indices], kind, labels, frames, self.names)
+        some = [self[i] for i in indices]
+        return Performances(some, kind, labels, frames, self.names, self.levels)
 
     def suits(self, n_features=None, on_rows=None, names=None):
         """Whether an estimator that was fitted on such input would take them."""
@@ -103,6 +119,8 @@ class SequenceLevelMixin:
         """The same in ``fit``, where it is learnt what to expect."""
         performances = check_performances(self, X, reset=True, level="sequence")
         self._fitted_on_rows = performances.kind == "rows"
+        if not self._fitted_on_rows:
+            _warn_of_clocks(performances, names_of_input(self))
         return performances
 
 
@@ -135,28 +153,47 @@ def check_performances(estimator, X, *, reset, level, on_rows=None):
             f"{estimator.n_features_in_}) and got a collection of performances. Give it 2-D "
             "input, or fit it on a collection."
         )
-    arrays, names = check_members(sequences)
+    is_frame = isinstance(X, pd.DataFrame)
+    labels = list(X.index.unique(level=0)) if is_frame else list(range(len(sequences)))
+    arrays, names = check_members(sequences, labels=labels if is_frame else None)
     if not reset and arrays[0].shape[1] != estimator.n_features_in_:
         raise ValueError(
             f"Performance 0 has {arrays[0].shape[1]} features a frame, but {name} is "
             f"expecting {estimator.n_features_in_} features as input."
         )
-    first = arrays[0] if names is None else pd.DataFrame(arrays[0], columns=names)
+    told = names is not None and isinstance(names[0], str)
+    first = pd.DataFrame(arrays[0], columns=names) if told else arrays[0]
     validate_data(estimator, first, reset=reset, skip_check_array=True)
-    if isinstance(X, pd.DataFrame):
-        kind, labels = "frame", list(X.index.unique(level=0))
-    else:
-        kind, labels = "list", list(range(len(arrays)))
-        if getattr(X, "ndim", 1) == 3:
-            kind = "array"
+    _check_names(estimator, sequences[0], reset)
+    kind = "frame" if is_frame else "array" if getattr(X, "ndim", 1) == 3 else "list"
     names = getattr(estimator, "feature_names_in_", None)
-    return Performances(arrays, kind, labels, frame_labels(sequences), names)
+    given = X.index.names if is_frame else [None, frame_name(sequences)]
+    levels = tuple(given or usual for given, usual in zip(given, INDEX_NAMES, strict=True))
+    return Performances(arrays, kind, labels, frame_labels(sequences), names, levels)
 
 
-def check_transformed(estimator, X, n_features):
-    """Check the input of ``inverse_transform``: postures of ``n_features`` values."""
+def names_of_input(estimator):
+    """The names of the features that an estimator was fitted on, of any type; None without any."""
+    return vars(estimator).get(_NAMES)
+
+
+def _check_names(estimator, x, reset):
+    """Names of any type are kept to, as scikit-learn keeps to those that are text."""
+    if reset:
+        vars(estimator)[_NAMES] = names_of(x)
+    else:
+        check_names(x, names_of_input(estimator), "The input")
+
+
+def check_transformed(estimator, X, names):
+    """Check the input of ``inverse_transform``: postures of features of these names."""
     space = type(type(estimator).__name__, (BaseEstimator,), {})()
-    space.n_features_in_ = n_features
+    space.n_features_in_ = len(names)
+    sequences = as_collection(X)
+    some = X if sequences is None else next(iter(sequences), None)
+    named = names_of(some)
+    if named is not None and isinstance(named[0], str):
+        space.feature_names_in_ = np.asarray(names, dtype=object)
     return check_performances(space, X, reset=False, level="posture")
 
 
@@ -172,7 +209,7 @@ def restore(estimator, performances, arrays, *, frames=None, columns=None):
     if container == "pandas":
         labels = performances.frames if frames is None else [frames] * len(arrays)
         columns = estimator.get_feature_names_out() if columns is None else columns
-        return stack_frame(arrays, performances.labels, labels, columns)
+        return stack_frame(arrays, performances.labels, labels, columns, performances.levels)
     if container != "default":
         raise ValueError(
             f"{type(estimator).__name__} has no {container!r} output for a collection of "
@@ -203,21 +240,83 @@ def _check_rows(estimator, X, *, reset, level, on_rows):
             f"{type(estimator).__name__} was fitted on a collection of performances and got 2-D or "
             f"other input: wrap one sequence as [X]. {ACCEPTED}."
         )
-    X = validate_data(
-        estimator,
+    refuse(X, "The input")
+    if reset and level == "sequence" and isinstance(X, pd.DataFrame):
+        _refuse_long_table(type(estimator).__name__, X)
+    index = X.index if isinstance(X, pd.DataFrame) else None
+    source, X = (
         X,
-        reset=reset,
-        dtype=[np.float64, np.float32],
-        order="C",
-        ensure_all_finite=False,
+        validate_data(
+            estimator,
+            X,
+            reset=reset,
+            dtype=[np.float64, np.float32],
+            order="C",
+            ensure_all_finite=False,
+        ),
     )
-    check_finite(X, "Row")
+    _check_names(estimator, source, reset)
+    names = getattr(estimator, "feature_names_in_", None)
+    check_finite(X, "Row", names, index)
     if level == "posture":
-        return Performances([X], "rows", [0], [range(len(X))])
+        levels = INDEX_NAMES[0], getattr(index, "name", None) or INDEX_NAMES[1]
+        return Performances([X], "rows", [0], [range(len(X))], levels=levels)
     if X.shape[1] < 2:
         raise ValueError(
             "Each row of a 2-D input is one univariate sequence and needs at least 2 frames, got "
             f"n_features = {X.shape[1]}. For performances of several features use a list."
         )
-    rows, names = [row[:, np.newaxis] for row in X], getattr(estimator, "feature_names_in_", None)
+    rows = [row[:, np.newaxis] for row in X]
     return Performances(rows, "rows", list(range(len(X))), [], names)
+
+
+def _refuse_long_table(name, df):
+    """Named columns are features, and rows frames, unless the names only number the frames."""
+    texts = [c for c in df.columns if isinstance(c, str)]
+    if not texts or _are_numbered(list(df.columns)):
+        return
+    shown = ", ".join(map(repr, texts[:4])) + (", ..." if len(texts) > 4 else "")
+    raise ValueError(
+        f"{name} got a table of {len(df)} rows with the columns {shown}, whose index does not tell "
+        "performances apart. If its rows are frames, say which columns name the performance and "
+        "the time: to_sequences(df, by=[...], time=...), or index it by (performance, frame). If "
+        "every row is one univariate performance, give df.to_numpy()."
+    )
+
+
+def _are_numbered(names):
+    """Whether names are one text with a number that goes up by one."""
+    parts = [re.fullmatch(r"(.*?)(\d+)", name) if isinstance(name, str) else None for name in names]
+    if not all(parts):
+        return False
+    numbers = [int(part[2]) for part in parts]
+    together = numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    return together and len({part[1] for part in parts}) == 1
+
+
+def _warn_of_clocks(performances, names):
+    """Say if a feature of several only tells the time."""
+    n_features = performances[0].shape[1]
+    if n_features == 1 or min(map(len, performances)) < _CLOCK_FRAMES:
+        return
+    ticks = np.all([_is_even(x) for x in performances], axis=0)
+    for k in np.flatnonzero(ticks):
+        name = k if names is None else repr(names[k])
+        warnings.warn(
+            f"Feature {name} increases evenly in every performance: it is a clock, not a movement, "
+            "and is matched like one. Leave it out, or give it as time= to to_sequences.",
+            UserWarning,
+            stacklevel=2,
+        )
+
+
+def _is_even(x):
+    """Which features rise on a straight line, but for rounding to half a step: (n_features,)."""
+    x = np.ldexp(x, -int(np.frexp(np.abs(x).max())[1]))
+    step = (x[-1] - x[0]) / (len(x) - 1)
+    line = x[0] + step * np.arange(len(x))[:, np.newaxis]
+    return (
+        (step > 0)
+        & (np.diff(x, axis=0) > 0).all(axis=0)
+        & (np.abs(x - line) <= step / 2).all(axis=0)
+    )

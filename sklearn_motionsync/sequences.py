@@ -14,10 +14,12 @@ from .gate import as_numbers, check_finite, names_of
 
 __all__ = [
     "ACCEPTED",
+    "INDEX_NAMES",
     "NOT_ONE",
     "as_collection",
     "check_members",
     "frame_labels",
+    "frame_name",
     "stack_frame",
     "to_frame",
     "to_sequences",
@@ -28,30 +30,39 @@ ACCEPTED = (
     "(n_sequences, n_frames, n_features) or a DataFrame indexed by (performance, frame)"
 )
 NOT_ONE = f"{ACCEPTED}; got a single 2-D input. Wrap one performance as [X]."
-_INDEX_NAMES = ("performance", "frame")
+# Steps of time this much longer than the usual one are gaps.
+_GAP = 1.9
+INDEX_NAMES = ("performance", "frame")
 
 
-def to_sequences(df):
-    """Turn a ``(performance, frame)`` MultiIndex frame into a list of performances.
+def to_sequences(df, by=None, time=None):
+    """Turn a table of frames into a list of performances.
 
-    Do this *before* cross-validation: scikit-learn would split the frame by row.
+    Do this *before* cross-validation: scikit-learn would split the table by row.
 
     Parameters
     ----------
     df : DataFrame
-        Its index has two levels: the performance, and the frame within it,
-        increasing within each performance. Its columns are the features.
+        One row a frame. Without ``by`` and ``time`` its index has two levels: the performance,
+        and the frame within it, increasing within each performance.
+    by : str or list of str, default=None
+        Columns or index levels that together tell performances apart; rows of one performance
+        need not be neighbours.
+    time : str, default=None
+        The column or index level that tells the time of frames, evenly sampled. By default rows
+        are frames in the order they come in.
 
     Returns
     -------
     list of DataFrame
-        One ``(n_frames_i, n_features)`` frame a performance, in order of first
-        appearance, indexed by the frame level alone.
+        One ``(n_frames_i, n_features)`` frame a performance, in order of first appearance, indexed
+        by the frame level, the time, or 0, 1, ... What ``by`` and ``time`` name are no features.
 
     Raises
     ------
     ValueError
-        If the index has not two levels, or the frames of a performance do not increase.
+        If there is no such column or level, the index has not two levels, or the frames or times of
+        a performance do not increase, or have gaps.
 
     See Also
     --------
@@ -61,17 +72,25 @@ def to_sequences(df):
     --------
     >>> import pandas as pd
     >>> from sklearn_motionsync import to_sequences
-    >>> index = pd.MultiIndex.from_product([["a", "b"], range(3)])
-    >>> df = pd.DataFrame({"knee": [0.0, 1.0, 0.0, 0.0, 2.0, 0.0]}, index=index)
-    >>> [x.shape for x in to_sequences(df)]
-    [(3, 1), (3, 1)]
+    >>> df = pd.DataFrame({"trial": ["a", "a", "b", "b"], "time": [0, 1, 0, 1], "knee": range(4)})
+    >>> [x.shape for x in to_sequences(df, by="trial", time="time")]
+    [(2, 1), (2, 1)]
+    >>> indexed = df.set_index(["trial", "time"])
+    >>> [x.shape for x in to_sequences(indexed)]
+    [(2, 1), (2, 1)]
     """
-    if not isinstance(df, pd.DataFrame) or df.index.nlevels != 2:
-        levels = df.index.nlevels if isinstance(df, pd.DataFrame) else None
-        got = f"an index of {levels} level(s)" if levels else type(df).__name__
+    if not isinstance(df, pd.DataFrame):
+        raise ValueError(f"to_sequences needs a DataFrame, got {type(df).__name__}.")
+    if by is not None:
+        df = _indexed(df, [by] if isinstance(by, str) else list(by), time)
+    elif time is not None:
+        raise ValueError(f"time={time!r} goes with by=: say which columns name the performance.")
+    if df.index.nlevels != 2:
         raise ValueError(
-            "to_sequences needs a DataFrame whose index has the two levels (performance, "
-            f"frame), got {got}. Build one with df.set_index(['performance', 'frame'])."
+            "to_sequences needs a DataFrame whose index has the two levels (performance, frame), "
+            f"got an index of {df.index.nlevels} level(s). Say which columns name the performance "
+            "and the time: to_sequences(df, by=['subject', 'trial'], time='time'), or build the "
+            "index with df.set_index(['performance', 'frame'])."
         )
     sequences = []
     for label, part in df.groupby(level=0, sort=False, dropna=False):
@@ -83,6 +102,51 @@ def to_sequences(df):
             )
         sequences.append(sequence)
     return sequences
+
+
+def _indexed(df, by, time):
+    """The table indexed by performance and time; the columns that say so are no features."""
+    keys = [*by, *([] if time is None else [time])]
+    flat = df.reset_index([level for level in df.index.names if level in keys])
+    missing = [key for key in keys if key not in flat.columns]
+    if missing or not by:
+        raise ValueError(
+            f"There is no column or index level {missing}; there are {list(df.columns)} and "
+            f"{[name for name in df.index.names if name is not None]}."
+        )
+    if len(set(keys)) < len(keys):
+        raise ValueError(f"by={by} and time={time!r} must be different columns.")
+    groups = flat.groupby(by, sort=False, dropna=False)
+    label = groups.ngroup() if len(by) > 1 else flat[by[0]]
+    if len(by) > 1:
+        names = list(flat[by].drop_duplicates().itertuples(index=False, name=None))
+        label = pd.Index(names, tupleize_cols=False).take(label)
+    frame = groups.cumcount() if time is None else flat[time]
+    index = pd.MultiIndex.from_arrays([label, frame], names=["/".join(by), time or INDEX_NAMES[1]])
+    features = flat.drop(columns=keys).set_axis(index)
+    if time is not None:
+        _check_sampling(features)
+    return features
+
+
+def _check_sampling(df):
+    """Refuse times with gaps: frames count as evenly spaced."""
+    for label, part in df.groupby(level=0, sort=False, dropna=False):
+        times = as_numbers(part.index.get_level_values(1), f"The time of performance {label!r}")
+        steps = np.diff(times)
+        if not np.isfinite(times).all() or (steps <= 0).any():
+            i = int(np.argmax(~(steps > 0))) + 1
+            raise ValueError(
+                f"The times of performance {label!r} do not increase: {times[i]:g} follows "
+                f"{times[i - 1]:g}. Sort the table by time, and drop what comes twice."
+            )
+        if len(steps) > 1 and steps.max() > _GAP * np.median(steps):
+            i = int(steps.argmax())
+            raise ValueError(
+                f"Performance {label!r} has a gap from {times[i]:g} to {times[i + 1]:g}, where "
+                f"frames are {np.median(steps):g} apart. Interpolate it, or leave the performance "
+                "out: frames count as evenly spaced."
+            )
 
 
 def to_frame(sequences, *, performances=None, columns=None):
@@ -101,7 +165,7 @@ def to_frame(sequences, *, performances=None, columns=None):
     -------
     DataFrame
         The concatenated performances; the index levels are ``performance`` and
-        ``frame``. The frames of DataFrames keep their labels.
+        ``frame``. The frames of DataFrames keep their labels, and what they are called.
 
     Raises
     ------
@@ -132,7 +196,8 @@ def to_frame(sequences, *, performances=None, columns=None):
             f"got {len(labels)} of which {len(set(labels))} differ."
         )
     columns = names if columns is None else columns
-    return stack_frame(arrays, labels, frame_labels(sequences), columns)
+    levels = INDEX_NAMES[0], frame_name(sequences) or INDEX_NAMES[1]
+    return stack_frame(arrays, labels, frame_labels(sequences), columns, levels)
 
 
 # -- how the kinds are told apart ---------------------------------------------------
@@ -231,14 +296,20 @@ def frame_labels(sequences):
     return [x.index if isinstance(x, pd.DataFrame) else range(len(x)) for x in sequences]
 
 
-def stack_frame(arrays, labels, frames, columns):
-    """Arrays below each other under a (performance, frame) MultiIndex."""
+def frame_name(sequences):
+    """What frames of DataFrames are called; None if they are not called anything."""
+    names = {x.index.name if isinstance(x, pd.DataFrame) else None for x in sequences}
+    return names.pop() if len(names) == 1 else None
+
+
+def stack_frame(arrays, labels, frames, columns, levels=INDEX_NAMES):
+    """Arrays below each other under a MultiIndex of performance and frame."""
     lengths = [len(a) for a in arrays]
     index = pd.MultiIndex.from_arrays(
         [
-            pd.Index(list(labels)).repeat(lengths),
+            pd.Index(list(labels), tupleize_cols=False).repeat(lengths),
             np.concatenate([np.asarray(f) for f in frames]),
         ],
-        names=_INDEX_NAMES,
+        names=levels,
     )
     return pd.DataFrame(np.concatenate(list(arrays)), index=index, columns=columns)

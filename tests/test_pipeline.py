@@ -275,6 +275,40 @@ def assert_figures(folder):
         assert mpl.pyplot.imread(folder / name).std() > 0.05
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--dta", "x"], "unrecognized arguments: --dta x"),
+        (["--act", "bend"], "unrecognized arguments: --act bend"),
+        (["archive.npz"], "unrecognized arguments: archive.npz"),
+        (["--action", "bend"], "give --data, too"),
+        (["--data", "missing.npz"], "no archive at missing.npz"),
+        (["--data", str(EXAMPLE)], "cannot be read"),
+        (["--data", str(EXAMPLE.parent)], "--data"),
+        (["--output", str(EXAMPLE)], "--output must be a folder"),
+    ],
+)
+def test_what_the_example_cannot_do_it_says_in_a_line(monkeypatch, capsys, arguments, message):
+    monkeypatch.setattr(sys, "argv", [str(EXAMPLE), *arguments])
+    with pytest.raises(SystemExit) as end:
+        runpy.run_path(str(EXAMPLE), run_name="__main__")
+    out, err = capsys.readouterr()
+    assert end.value.code == 2
+    assert out == ""
+    assert err.count("\n") == 1
+    assert err.startswith("plot_bending.py: ")
+    assert message in err
+
+
+def test_the_example_in_a_notebook_has_no_arguments(monkeypatch, capsys, tmp_path):
+    """Those of the kernel are not for it."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["ipykernel_launcher.py", "-f", "kernel.json"])
+    exec(compile(EXAMPLE.read_text(), "cell", "exec"), {"__name__": "__main__"})
+    assert "40 of bending" in capsys.readouterr().out
+    assert_figures(tmp_path)
+
+
 def test_example_on_the_embedded_data(monkeypatch, capsys, tmp_path):
     out = run_example(monkeypatch, capsys, "--output", tmp_path)
     for words in (

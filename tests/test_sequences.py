@@ -30,7 +30,7 @@ def test_interleaved_rows_are_sorted_out(frame):
 
 def test_round_trip(frame):
     back = to_frame(to_sequences(frame), performances=["b", "a"])
-    pd.testing.assert_frame_equal(back, frame.rename_axis(["performance", "frame"]))
+    pd.testing.assert_frame_equal(back, frame.rename_axis(["performance", "t"]))
 
 
 def test_round_trip_of_arrays():

@@ -1,51 +1,34 @@
 """DirectionCosines: from joint positions to postures, and back (Eq. 1)."""
 
-from typing import NamedTuple
-
 import numpy as np
+import pandas as pd
 from sklearn.base import BaseEstimator, TransformerMixin, _fit_context
 from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..fitting import at_once, of_one_state
+from ..gate import as_numbers
 from ..notebook import DocumentedMixin
 from ..performances import check_performances, check_transformed, restore
-from .skeleton import LANDMARKS, Skeleton
+from .axes import along_parents, heading, turned
+from .limbs import (
+    LIMB_NAMES,
+    LIMBS,
+    check_upright,
+    exponent_of,
+    landmarks_of,
+    leg_length,
+    limbs_of,
+    unit,
+)
+from .skeleton import LANDMARKS, Skeleton, check_columns
 
 __all__ = ["DirectionCosines"]
 
-
-class _Limb(NamedTuple):
-    """A limb of the body model: its two joints, its parent limb, and where it points at rest.
-
-    Rest directions are those of a person standing with the arms out, seen in a frame
-    whose x axis points to the person's left, y up and z forward.
-    """
-
-    start: str
-    end: str
-    parent: str | None
-    rest: tuple
-
-
-_LEFT, _RIGHT, _UP, _DOWN = (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)
-
-# Parents come before their children: frames are built in this order.
-LIMBS = {
-    "hip": _Limb("right_hip", "left_hip", None, _LEFT),
-    "torso": _Limb("pelvis", "neck", "hip", _UP),
-    "shoulder": _Limb("right_shoulder", "left_shoulder", "torso", _LEFT),
-    "neck": _Limb("neck", "head", "torso", _UP),
-    "left_thigh": _Limb("left_hip", "left_knee", "hip", _DOWN),
-    "right_thigh": _Limb("right_hip", "right_knee", "hip", _DOWN),
-    "left_leg": _Limb("left_knee", "left_ankle", "left_thigh", _DOWN),
-    "right_leg": _Limb("right_knee", "right_ankle", "right_thigh", _DOWN),
-    "left_arm": _Limb("left_shoulder", "left_elbow", "shoulder", _LEFT),
-    "right_arm": _Limb("right_shoulder", "right_elbow", "shoulder", _RIGHT),
-    "left_forearm": _Limb("left_elbow", "left_wrist", "left_arm", _LEFT),
-    "right_forearm": _Limb("right_elbow", "right_wrist", "right_arm", _RIGHT),
-}
-_LIMB_NAMES = list(LIMBS)
+# How far the hips of a body may be moved from where its pelvis is, in leg lengths, so that it
+# stands on the floor. Of 144 performances of optical motion capture, and of their approximations in
+# an aSpace, none needs more than 0.21.
+_MOVED = 0.25
 
 
 class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
@@ -121,10 +104,24 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         self
+
+        Raises
+        ------
+        ValueError
+            As from ``transform``.
         """
         performances = self._check(X, reset=True)
-        lengths = [np.linalg.norm(_limbs(self._landmarks(a)), axis=2) for a in performances]
-        self.limb_lengths_ = np.median(np.concatenate(lengths), axis=0)
+        bodies = [self._body(performances, i)[2:] for i in range(len(performances))]
+        unit_of_all = max(k for _, k in bodies)
+        lengths = [x if k == unit_of_all else np.ldexp(x, k - unit_of_all) for x, k in bodies]
+        with np.errstate(over="ignore"):
+            found = np.ldexp(np.median(np.concatenate(lengths), axis=0), unit_of_all)
+        if not (found > 0).all() or not np.isfinite(found).all():
+            raise ValueError(
+                f"The lengths of the limbs are beyond {found.dtype} numbers: give the positions in "
+                "another unit, such as metres."
+            )
+        self.limb_lengths_ = found
         return self
 
     fit_transform = at_once(TransformerMixin.fit_transform)
@@ -145,42 +142,50 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If the width is not that of the skeleton, or a limb has no length.
+            If the width is not that of the skeleton, a column of the skeleton stands in another
+            one's place, a limb has no length, or a body is upside down: in nine of ten frames its
+            pelvis is below the ankles, and its head is below the pelvis on average.
         """
         check_is_fitted(self)
         performances = self._check(X, reset=False)
-        return restore(
-            self, performances, [self._postures(i, a) for i, a in enumerate(performances)]
-        )
+        postures = [self._postures(performances, i) for i in range(len(performances))]
+        return restore(self, performances, postures)
 
     @of_one_state
     def inverse_transform(self, X, limb_lengths=None):
         """Joint positions of postures: the paper's fifteen joints, for drawing.
 
-        The body stands on the floor y = 0 (the height of the ankles), its pelvis above the
+        The lowest ankle of a performance stands on the floor y = 0, its pelvis above the
         origin; unless ``reference="world"`` it faces along z. Its hips lie evenly on both sides
         of the pelvis and its shoulders of the neck, so a body built that way comes back exactly.
+
+        Postures do not tell how far the hips are below the pelvis. All hips of a performance
+        are moved up or down by as much as puts its lowest ankle on the floor: then
+        ``transform`` gives the same height of the pelvis, and the same cosines. They
+        are moved by a quarter of a leg at most. A body that is farther from the floor, such as a
+        single posture in the air, stays there, and its height comes back as near as that allows.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, 37), 3-D array, or 2-D array
             Postures; the three cosines of a limb only give its direction.
         limb_lengths : array-like of shape (12,), default=None
-            Length of each limb; by default ``limb_lengths_``.
+            Length of each limb, above 0; by default ``limb_lengths_``.
 
         Returns
         -------
         The kind that was given, with 45 features: the positions of ``Skeleton.paper()``
+
+        Raises
+        ------
+        ValueError
+            If the three cosines of a limb are all 0, columns are not those of
+            ``get_feature_names_out``, or ``limb_lengths`` are not 12 numbers above 0.
         """
         check_is_fitted(self)
-        lengths = np.asarray(self.limb_lengths_ if limb_lengths is None else limb_lengths)
-        if lengths.shape != (len(LIMBS),):
-            raise ValueError(
-                f"limb_lengths needs one length for each of {_LIMB_NAMES}, got shape "
-                f"{lengths.shape}."
-            )
+        lengths = self.limb_lengths_ if limb_lengths is None else _checked_lengths(limb_lengths)
         performances = check_transformed(self, X, 1 + 3 * len(LIMBS))
-        arrays = [self._positions(a, lengths.astype(a.dtype)) for a in performances]
+        arrays = [self._positions(performances, i, lengths) for i in range(len(performances))]
         return restore(self, performances, arrays, columns=Skeleton.paper().column_names)
 
     def get_feature_names_out(self, input_features=None):
@@ -211,120 +216,112 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
                 f"Performance 0 has {width} features a frame, but the skeleton's "
                 f"{len(self.skeleton.joints)} joints need {expected}: x, y, z of each."
             )
+        # All tables of a list have the names of the first.
+        first = X[0] if isinstance(X, (list, tuple, np.ndarray)) else X
+        check_columns(first, self.skeleton, "Performance 0")
         return performances
 
-    def _landmarks(self, positions):
-        """(n_frames, 15, 3) positions of the landmarks, y up."""
-        columns = [self.skeleton.index_of(name) for name in LANDMARKS]
-        return y_up(positions.reshape(len(positions), -1, 3)[:, columns], self.skeleton)
-
-    def _postures(self, i, positions):
-        points = self._landmarks(positions)
-        limbs = _limbs(points)
+    def _body(self, performances, i):
+        """Landmarks of a performance, limbs and their lengths in units of ``2**k``; k."""
+        points, k = landmarks_of(performances[i], self.skeleton)
+        limbs = limbs_of(points)
         lengths = np.linalg.norm(limbs, axis=2)
-        if not lengths.all():
-            frame, limb = np.argwhere(lengths == 0)[0]
-            name = _LIMB_NAMES[limb]
+        # What is less is rounding of the coordinates.
+        largest = max(points.max(), -points.min())
+        without = lengths <= np.finfo(lengths.dtype).eps * largest
+        if without.any():
+            frame, limb = np.argwhere(without)[0]
+            name = LIMB_NAMES[limb]
             raise ValueError(
-                f"Performance {i}, frame {frame}: the limb {name!r} has no length, its joints "
-                f"{[self.skeleton.landmarks[j] for j in LIMBS[name][:2]]} coincide. Repair the "
-                "frame, or choose other landmarks."
+                f"{_called(performances, i)}, frame {frame}: the limb {name!r} has no length, its "
+                f"joints {[self.skeleton.landmarks[j] for j in LIMBS[name][:2]]} coincide. Repair "
+                "the frame, or choose other landmarks."
             )
+        check_upright(points, lengths, self.skeleton, _called(performances, i))
+        return points, limbs, lengths, k
+
+    def _postures(self, performances, i):
+        points, limbs, lengths, _ = self._body(performances, i)
         height = points[:, LANDMARKS.index("pelvis"), 1]
         ankles = [LANDMARKS.index(f"{side}_ankle") for side in ("left", "right")]
         floor = points[:, ankles, 1].min()
-        u = (height - floor) / _leg_length(np.median(lengths, axis=0))
+        u = (height - floor) / leg_length(np.median(lengths, axis=0))
         cosines = limbs / lengths[:, :, np.newaxis]
         if self.reference != "world":
-            cosines = _turn(cosines, heading(cosines[:, 0]))
+            cosines = turned(cosines, heading(cosines[:, 0]))
         if self.reference == "parent":
-            cosines = _along_parents(cosines)
+            cosines = along_parents(cosines)
         return np.column_stack([u, cosines.reshape(len(u), -1)])
 
-    def _positions(self, postures, lengths):
+    def _positions(self, performances, i, lengths):
+        postures = performances[i]
         cosines = postures[:, 1:].reshape(len(postures), -1, 3)
+        # All of them being there is told sooner than one of each limb.
+        without = np.zeros(()) if cosines.all() else ~cosines.any(axis=2)
+        if without.any():
+            frame, limb = np.argwhere(without)[0]
+            raise ValueError(
+                f"{_called(performances, i)}, frame {frame}: the limb {LIMB_NAMES[limb]!r} has no "
+                "direction, its three cosines are 0. Drop the frame, or give it a direction."
+            )
         # A mean or an approximation of cosines is shorter than 1, a limb is not.
-        norm = np.linalg.norm(cosines, axis=2, keepdims=True)
-        cosines = cosines / np.where(norm > 0, norm, 1)
+        cosines = unit(cosines)
         if self.reference == "parent":
-            cosines = _along_parents(cosines, inverse=True)
-        limb = dict(zip(LIMBS, np.moveaxis(cosines * lengths[:, np.newaxis], 1, 0), strict=True))
-        at = {"pelvis": np.zeros_like(limb["hip"])}
-        at["pelvis"][:, 1] = postures[:, 0] * _leg_length(lengths)
-        at["neck"] = at["pelvis"] + limb["torso"]
-        at["head"] = at["neck"] + limb["neck"]
-        for side, sign in (("left", 0.5), ("right", -0.5)):
-            at[f"{side}_hip"] = at["pelvis"] + sign * limb["hip"]
-            at[f"{side}_shoulder"] = at["neck"] + sign * limb["shoulder"]
-            for part in ("thigh", "leg", "arm", "forearm"):
-                start, end, _, _ = LIMBS[f"{side}_{part}"]
-                at[end] = at[start] + limb[f"{side}_{part}"]
-        return np.concatenate([at[name] for name in LANDMARKS], axis=1)
+            cosines = along_parents(cosines, inverse=True)
+        k = exponent_of(lengths.max(), postures.dtype)
+        with np.errstate(over="ignore", invalid="ignore"):
+            body = _built(postures[:, 0], cosines, np.ldexp(lengths, -k).astype(postures.dtype))
+            positions = np.ldexp(body, k) if k else body
+            sound = np.isfinite(positions.sum()) or np.isfinite(positions).all()
+        if not sound or lengths.min() < np.finfo(positions.dtype).tiny:
+            raise ValueError(
+                f"{_called(performances, i)}: the positions are beyond {positions.dtype} numbers. "
+                "Give limb_lengths in another unit, or smaller heights of the pelvis."
+            )
+        return positions
 
 
-def y_up(points, skeleton):
-    """Points (..., 3) of a skeleton in axes of which the second is vertical."""
-    if skeleton.up == "y":
-        return points
-    return np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1)
+def _called(performances, i):
+    """What to call a performance in messages."""
+    label = performances.labels[i]
+    return f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
 
 
-def _limbs(points):
-    """(n_frames, 12, 3) limb vectors of (n_frames, 15, 3) landmarks."""
-    start, end = ([LANDMARKS.index(limb[k]) for limb in LIMBS.values()] for k in (0, 1))
-    return points[:, end] - points[:, start]
+def _checked_lengths(limb_lengths):
+    """One length above 0 for each limb."""
+    names = list(limb_lengths.index) if isinstance(limb_lengths, pd.Series) else LIMB_NAMES
+    if names not in (LIMB_NAMES, list(range(len(LIMB_NAMES)))):
+        raise ValueError(f"limb_lengths is indexed by {names}; select {LIMB_NAMES}, in that order.")
+    lengths = as_numbers(limb_lengths, "limb_lengths", dtype=np.float64)
+    if lengths.shape != (len(LIMBS),):
+        raise ValueError(
+            f"limb_lengths needs one length for each of {LIMB_NAMES}, got shape {lengths.shape}."
+        )
+    wrong = ~((lengths > 0) & np.isfinite(lengths))
+    if wrong.any():
+        limb = int(wrong.argmax())
+        raise ValueError(
+            f"limb_lengths must be numbers above 0, got {lengths[limb]:g} for {LIMB_NAMES[limb]!r}."
+        )
+    return lengths
 
 
-def _leg_length(lengths):
-    """Length of the stretched leg, the mean of both sides."""
-    parts = [
-        lengths[_LIMB_NAMES.index(f"{s}_{p}")] for s in ("left", "right") for p in ("thigh", "leg")
-    ]
-    return sum(parts) / 2
-
-
-def heading(hip):
-    """Frames (n_frames, 3, 3), rows x to the left along the hips, y up, z forward."""
-    x = hip * np.array([1, 0, 1], dtype=hip.dtype)
-    length = np.linalg.norm(x, axis=1, keepdims=True)
-    # Hips one above the other show no heading: keep the recording's axes.
-    shown = length[:, 0] > np.sqrt(np.finfo(hip.dtype).eps)
-    x = np.where(shown[:, np.newaxis], x / np.where(length > 0, length, 1), _LEFT)
-    y = np.broadcast_to(np.asarray(_UP, dtype=x.dtype), x.shape)
-    return np.stack([x, y, np.cross(x, y)], axis=1).astype(hip.dtype)
-
-
-def _turn(vectors, frames):
-    """Coordinates of (n_frames, n, 3) vectors along the rows of (n_frames, 3, 3) frames."""
-    return vectors @ frames.transpose(0, 2, 1)
-
-
-def _swing(rest, direction):
-    """Rows: the axes after the smallest rotation that takes ``rest`` to each direction."""
-    rest = np.asarray(rest, dtype=direction.dtype)
-    axis = np.cross(rest, direction)
-    cosine = direction @ rest
-    # At the opposite of rest every axis serves; the limit keeps the rotation finite.
-    scale = 1 / np.maximum(1 + cosine, np.finfo(direction.dtype).eps)
-    cross = np.zeros((len(axis), 3, 3), dtype=direction.dtype)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        cross[:, i, j], cross[:, j, i] = -axis[:, k], axis[:, k]
-    rotation = np.eye(3, dtype=direction.dtype) + cross + scale[:, None, None] * (cross @ cross)
-    return rotation.transpose(0, 2, 1)
-
-
-def _along_parents(cosines, *, inverse=False):
-    """From cosines along the body's axes to those along the parent limbs' axes, or back."""
-    frames, out = {}, np.empty_like(cosines)
-    for i, (name, limb) in enumerate(LIMBS.items()):
-        given = cosines[:, i : i + 1]
-        if limb.parent is None:
-            local = whole = given
-            parent = np.broadcast_to(np.eye(3, dtype=cosines.dtype), (len(cosines), 3, 3))
-        else:
-            parent = frames[limb.parent]
-            local = given if inverse else _turn(given, parent)
-            whole = given @ parent if inverse else given
-        out[:, i : i + 1] = whole if inverse else local
-        frames[name] = _swing(limb.rest, local[:, 0]) @ parent
-    return out
+def _built(heights, cosines, lengths):
+    """(n_frames, 45) positions of bodies with given heights, directions and lengths of limbs."""
+    limb = dict(zip(LIMBS, np.moveaxis(cosines * lengths[:, np.newaxis], 1, 0), strict=True))
+    legs = leg_length(lengths)
+    at = {"pelvis": np.zeros_like(limb["hip"])}
+    at["pelvis"][:, 1] = heights * legs
+    at["neck"] = at["pelvis"] + limb["torso"]
+    at["head"] = at["neck"] + limb["neck"]
+    for side, sign in (("left", 0.5), ("right", -0.5)):
+        at[f"{side}_hip"] = at["pelvis"] + sign * limb["hip"]
+        at[f"{side}_shoulder"] = at["neck"] + sign * limb["shoulder"]
+        for part in ("thigh", "leg", "arm", "forearm"):
+            start, end, _, _ = LIMBS[f"{side}_{part}"]
+            at[end] = at[start] + limb[f"{side}_{part}"]
+    above = min(at[f"{side}_ankle"][:, 1].min() for side in ("left", "right"))
+    for side in ("left", "right"):
+        for joint in ("hip", "knee", "ankle"):
+            at[f"{side}_{joint}"][:, 1] -= np.clip(above, -_MOVED * legs, _MOVED * legs)
+    return np.concatenate([at[name] for name in LANDMARKS], axis=1)

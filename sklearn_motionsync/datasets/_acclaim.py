@@ -5,7 +5,7 @@ import array
 import numpy as np
 
 from ._asf import read_asf
-from ._kinematics import MotionText, check_growth, decode, joint_positions, rotations, show
+from ._kinematics import MotionText, check_positions, decode, joint_positions, rotations, show
 
 _METRES_PER_INCH = 0.0254
 
@@ -16,7 +16,7 @@ def read_acclaim(path, asf):
     text = MotionText(path)
     values, degrees, frame_rate = _read_amc(text, skeleton, asf)
     bones = skeleton.bones
-    check_growth(path, text.size, len(values), len(bones))
+    check_positions(path, text.size, len(values), len(bones))
     parents = [bone.parent for bone in bones]
     positions = joint_positions(path, parents, values, _transforms(skeleton, degrees))
     with np.errstate(over="ignore", invalid="ignore"):

@@ -1,14 +1,16 @@
 """Archives of joint positions (``*_positions.npz``)."""
 
-import zipfile
+import sys
 from pathlib import Path
 
 import numpy as np
 from sklearn.utils import Bunch
 
 from ..body.skeleton import Skeleton
+from ._archive_file import read_arrays
 
 _NEEDED = ("positions", "offsets", "label", "actor", "take", "fps", "joints", "parents")
+_TEXTS = ("label", "actor", "take", "joints")
 
 
 def load_performances(path):
@@ -20,6 +22,8 @@ def load_performances(path):
         A NumPy archive (``.npz``) with ``positions`` (sum of frames, joints, 3);
         ``offsets`` (N + 1,), performance i being ``positions[offsets[i]:offsets[i + 1]]``;
         ``label``, ``actor``, ``take`` and ``fps`` (N,); ``joints`` and ``parents`` (joints,).
+        Every performance has at least two frames, and every position is finite. Parents are
+        indices of joints, -1 for a root. Labels, actors and takes are text or whole numbers.
 
     Returns
     -------
@@ -40,7 +44,8 @@ def load_performances(path):
     FileNotFoundError
         If there is no such file.
     ValueError
-        If the file is no such archive; the message says what is wrong with it.
+        If the file is no such archive; the message says what is wrong with it. Arrays of more
+        than 64 MB and 32 times the size of their file are refused before they are unpacked.
 
     Examples
     --------
@@ -60,10 +65,13 @@ def load_performances(path):
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"There is no archive at {path}; give the path of a .npz file.")
-    fields = _read_fields(path)
-    _check_fields(path, fields)
-    positions, offsets = fields["positions"], fields["offsets"]
-    joints, parents = fields["joints"].tolist(), fields["parents"].tolist()
+    fields = read_arrays(path, _NEEDED)
+    positions, offsets = _check_positions(path, fields)
+    texts = {name: _check_texts(path, name, fields[name]) for name in _TEXTS}
+    joints = texts["joints"].tolist()
+    parents = _check_parents(path, fields["parents"], joints)
+    frame_rate = _check_frame_rates(path, fields["fps"])
+    _check_finite(path, positions, offsets, joints)
     try:
         skeleton = Skeleton.from_names(joints, parents)
     except ValueError:
@@ -71,45 +79,124 @@ def load_performances(path):
     frames = positions.reshape(len(positions), -1)
     return Bunch(
         data=np.split(frames, offsets[1:-1]),
-        target=fields["label"].astype(str),
-        actor=fields["actor"].astype(str),
-        take=fields["take"].astype(str),
+        target=texts["label"],
+        actor=texts["actor"],
+        take=texts["take"],
         joints=joints,
         skeleton=skeleton,
-        frame_rate=np.asarray(fields["fps"], dtype=np.float64),
+        frame_rate=frame_rate,
     )
 
 
-def _read_fields(path):
-    if not zipfile.is_zipfile(path):
-        raise ValueError(f"{path} cannot be read as a NumPy .npz archive: it is no zip file.")
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            return {name: archive[name] for name in _NEEDED if name in archive.files}
-    except (zipfile.BadZipFile, ValueError, EOFError, OSError) as error:
-        raise ValueError(f"{path} cannot be read as a NumPy .npz archive: {error}.") from error
-
-
-def _check_fields(path, fields):
-    missing = [name for name in _NEEDED if name not in fields]
-    if missing:
+def _check_positions(path, fields):
+    """Positions and offsets; all other fields have the shapes that go with them."""
+    if missing := [name for name in _NEEDED if name not in fields]:
         raise ValueError(f"{path} lacks {missing}; an archive of performances holds {_NEEDED}.")
     positions, offsets = fields["positions"], fields["offsets"]
-    if positions.ndim != 3 or positions.shape[2] != 3 or positions.dtype.kind != "f":
+    if (
+        positions.ndim != 3
+        or positions.shape[2] != 3
+        or not positions.shape[1]
+        or positions.dtype.kind != "f"
+    ):
         raise ValueError(
             f"{path}: positions must be floats of shape (frames, joints, 3), got "
             f"{positions.dtype} {positions.shape}."
         )
     if offsets.ndim != 1 or len(offsets) < 2 or offsets.dtype.kind not in "iu":
-        raise ValueError(f"{path}: offsets must be N + 1 whole numbers, got shape {offsets.shape}.")
-    if offsets[0] != 0 or offsets[-1] != len(positions) or (np.diff(offsets) < 1).any():
+        raise ValueError(
+            f"{path}: offsets must be N + 1 whole numbers, got {offsets.dtype} {offsets.shape}."
+        )
+    outside = (offsets < 0) | (offsets > len(positions))
+    # Differences of unsigned numbers are never negative.
+    lengths = np.diff(np.where(outside, 0, offsets).astype(np.int64))
+    if offsets[0] != 0 or offsets[-1] != len(positions) or outside.any() or (lengths < 1).any():
         raise ValueError(
             f"{path}: offsets must increase from 0 to the {len(positions)} frames of positions."
         )
-    n = len(offsets) - 1
+    if (lengths < 2).any():
+        raise ValueError(
+            f"{path}: performance {np.argmin(lengths)} has one frame; a performance needs at least "
+            "2. Leave it out of positions, offsets, label, actor, take and fps."
+        )
+    n = len(lengths)
     for name, size in (
         *((name, n) for name in ("label", "actor", "take", "fps")),
         *((name, positions.shape[1]) for name in ("joints", "parents")),
     ):
         if fields[name].shape != (size,):
             raise ValueError(f"{path}: {name} must have shape ({size},), got {fields[name].shape}.")
+    return positions, offsets.astype(np.int64)
+
+
+def _check_texts(path, name, values):
+    """Text, or the whole numbers that a label, an actor or a take may be."""
+    kinds = "US" if name == "joints" else "USiu"
+    if values.dtype.kind not in kinds:
+        raise ValueError(f"{path}: {name} must be text, got {values.dtype}.")
+    try:
+        if values.dtype.kind == "S":
+            values = np.char.decode(values, "utf-8")
+        values = values.astype(str)
+        # Neither NumPy nor Python asks whether the numbers are characters.
+        if values.view(np.uint32).max() > sys.maxunicode:
+            raise ValueError
+        "".join(values.tolist()).encode()
+    except ValueError as error:
+        raise ValueError(f"{path}: {name} must be text, got bytes that are none.") from error
+    if name == "joints" and len(set(values.tolist())) < len(values):
+        names, counts = np.unique(values, return_counts=True)
+        raise ValueError(
+            f"{path}: joints must have different names, got {str(names[counts > 1][0])[:40]!r} "
+            "more than once."
+        )
+    return values
+
+
+def _check_parents(path, parents, joints):
+    n = len(joints)
+    whole = parents.dtype.kind in "iuf" and (parents == np.trunc(parents)).all()
+    if not whole or (parents < -1).any() or (parents >= n).any():
+        raise ValueError(
+            f"{path}: parents must be indices of joints, whole numbers from 0 to {n - 1}, or -1 "
+            f"for a root, got {_shown(parents)}."
+        )
+    parents = parents.astype(np.int64)
+    # Every step leads to an ancestor; after as many as there are joints all are past the root.
+    ancestors = parents.copy()
+    for _ in range(n.bit_length()):
+        above = ancestors >= 0
+        ancestors[above] = ancestors[ancestors[above]]
+    if (ancestors >= 0).any():
+        joint = joints[np.flatnonzero(ancestors >= 0)[0]][:40]
+        raise ValueError(
+            f"{path}: parents must lead to a root (-1), but from joint {joint!r} they run in a "
+            f"circle, got {_shown(parents)}."
+        )
+    return parents.tolist()
+
+
+def _check_frame_rates(path, fps):
+    if fps.dtype.kind not in "iuf" or ((fps <= 0) | np.isinf(fps)).any():
+        raise ValueError(
+            f"{path}: fps must be frames a second, above 0, or NaN where they are not known, got "
+            f"{_shown(fps)}."
+        )
+    return fps.astype(np.float64)
+
+
+def _check_finite(path, positions, offsets, joints):
+    finite = np.isfinite(positions)
+    if not finite.all():
+        frame, joint, _ = np.argwhere(~finite)[0]
+        i = np.searchsorted(offsets, frame, side="right") - 1
+        raise ValueError(
+            f"{path}: performance {i}, frame {frame - offsets[i]}, joint {joints[joint][:40]!r} is "
+            "NaN or infinite. Interpolate the gap before the archive is written (fill_gaps), or "
+            "leave the performance out."
+        )
+
+
+def _shown(values):
+    shown = str(values.tolist()[:8])[:80].rstrip("]")
+    return shown + (", ...]" if len(values) > 8 else "]")

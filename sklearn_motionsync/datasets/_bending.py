@@ -8,6 +8,9 @@ from sklearn.utils import Bunch, check_random_state
 
 from ..body.skeleton import Skeleton
 
+# What is made at once at most, in bytes.
+_LARGEST = 16e9
+
 # When the five moments come, in shares of the action.
 _KEYFRAMES = {
     "starts to bend": 0.12,
@@ -63,20 +66,20 @@ def make_bending(
     Parameters
     ----------
     n_performances : int, default=40
-        How many.
+        How many, up to a million.
     n_frames : int, default=100
-        Mean number of frames; performances have 0.75 to 1.25 times as many.
+        Mean number of frames, from 10 to a million; performances have 0.75 to 1.25 times as many.
     n_actors : int, default=4
         Performances go round the actors.
     style : float, default=1.0
-        How much actors and performances differ in their movement; 0 for not at all.
+        How much actors and performances differ in their movement, up to 100; 0 for not at all.
     warp : float, default=1.0
-        How much the pace varies within a performance; 0 for an even pace. At 1 the rates of
-        two performances differ at most by a factor of 2.
+        How much the pace varies within a performance, up to 10; 0 for an even pace. At 1 the
+        rates of two performances differ at most by a factor of 2, at 10 by one of 1024.
     noise : float, default=0.002
-        Standard deviation of the noise of each coordinate, in metres.
+        Standard deviation of the noise of each coordinate, in metres, up to 1000.
     frame_rate : float, default=50.0
-        Frames a second; only returned.
+        Frames a second, from 0.001; only returned.
     random_state : int, RandomState instance or None, default=None
 
     Returns
@@ -105,7 +108,8 @@ def make_bending(
     Raises
     ------
     ValueError
-        If a parameter is out of its range; the message names it.
+        If a parameter is out of its range; the message names it. If the performances would take
+        more than 16 GB.
 
     Examples
     --------
@@ -114,21 +118,29 @@ def make_bending(
     >>> [x.shape[1] for x in bunch.data], bunch.keyframes.shape
     ([45, 45, 45], (3, 5))
     """
-    for name, value, kind, least in (
-        ("n_performances", n_performances, Integral, 1),
-        ("n_frames", n_frames, Integral, 10),
-        ("n_actors", n_actors, Integral, 1),
-        ("style", style, Real, 0),
-        ("warp", warp, Real, 0),
-        ("noise", noise, Real, 0),
-        ("frame_rate", frame_rate, Real, np.finfo(float).tiny),
+    for name, value, kind, least, most in (
+        ("n_performances", n_performances, Integral, 1, 10**6),
+        ("n_frames", n_frames, Integral, 10, 10**6),
+        ("n_actors", n_actors, Integral, 1, 10**6),
+        ("style", style, Real, 0, 100),
+        ("warp", warp, Real, 0, 10),
+        ("noise", noise, Real, 0, 1000),
+        ("frame_rate", frame_rate, Real, 0.001, 10**9),
     ):
-        if not isinstance(value, kind) or not least <= value < np.inf:
+        number = isinstance(value, kind) and not isinstance(value, bool)
+        if not number or not least <= value <= most:
             what = "a whole number" if kind is Integral else "a number"
             raise ValueError(
-                f"The '{name}' parameter of make_bending must be {what}, at least {least}; got "
-                f"{value!r}."
+                f"The '{name}' parameter of make_bending must be {what} from {least} to "
+                f"{most}, got {value!r}."
             )
+    n_bytes = n_performances * n_frames * 45 * 8
+    if n_bytes > _LARGEST:
+        raise ValueError(
+            f"{n_performances} performances of about {n_frames} frames would take "
+            f"{n_bytes / 1e9:.0f} GB; make_bending makes up to {_LARGEST / 1e9:.0f} GB. Give a "
+            "smaller n_performances or n_frames."
+        )
     random_state = check_random_state(random_state)
     actors = [_draw_actor(random_state, style) for _ in range(n_actors)]
     moments = np.array(list(_KEYFRAMES.values()))

@@ -7,7 +7,7 @@ import numpy as np
 
 from ._kinematics import (
     MotionText,
-    check_growth,
+    check_positions,
     decode,
     joint_positions,
     rotations,
@@ -41,7 +41,7 @@ def read_bvh(path):
     if not n_channels:
         raise text.error("no joint has CHANNELS, so nothing moves.")
     values, frame_rate = _read_motion(text, n_channels)
-    check_growth(path, text.size, len(values), len(joints))
+    check_positions(path, text.size, len(values), len(joints))
     parents = [joint.parent for joint in joints]
     return {
         "joints": unique([joint.name for joint in joints]),

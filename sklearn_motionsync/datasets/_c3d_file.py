@@ -39,6 +39,22 @@ class C3DFile:
                 "85 (DEC) and 86 (MIPS) are known"
             )
         self.order = ">" if self.machine == _BIG else "<"
+        self.float_order = self.order
+        other = "<" if self.order == ">" else ">"
+        # Some writers turned the floats only, or the integers only.
+        if not self._holds(self.data_start) and self._holds(self._find_data_start(other)):
+            self.order = other
+
+    @property
+    def data_start(self):
+        """Where the data begin, as the header says."""
+        return self._find_data_start(self.order)
+
+    def _find_data_start(self, order):
+        return (int(np.frombuffer(self.data, order + "u2", 1, 16)[0]) - 1) * BLOCK
+
+    def _holds(self, at):
+        return self.first_parameter < at < len(self.data)
 
     def error(self, message):
         return ValueError(f"{self.path}: {message}. Export the recording again.")
@@ -56,7 +72,7 @@ class C3DFile:
         """Numbers of 4 bytes, given as an array of their bytes."""
         if self.machine != _DEC:
             with np.errstate(invalid="ignore"):
-                return raw.view(self.order + "f4").astype(np.float64)
+                return raw.view(self.float_order + "f4").astype(np.float64)
         # A DEC number has its two 16-bit words swapped and is four times too large for IEEE;
         # those with an exponent of 0 are 0.
         words = raw.view("<u2").astype(np.uint32)
@@ -76,7 +92,9 @@ class Parameters:
         groups, members = {}, []
         data, at = file.data, file.first_parameter
         n_blocks = data[at + 2]
-        end = min(len(data), at + n_blocks * BLOCK) if n_blocks else len(data)
+        counted = min(len(data), at + n_blocks * BLOCK) if n_blocks else len(data)
+        # Writers count wrongly, and one byte is too little for many; the data bound them.
+        end = file.data_start if at < file.data_start < len(data) else counted
         at += 4
         # Every entry is longer than 4 bytes, so this comes to an end.
         while at + 4 < end and data[at] and data[at + 1]:
@@ -86,6 +104,8 @@ class Parameters:
             step = file.integer(link) if link + 2 <= end else 0
             content = data[link + 2 : min(end, link + step) if step else end]
             if link + 2 > end or link + step > end or step == 1:
+                if at >= counted:
+                    break  # what follows them may be anything
                 raise self._error(at, "leads out of the parameters")
             name = decode(data[at + 2 : link]).strip().upper()
             if group < 0:
@@ -113,14 +133,18 @@ class Parameters:
             raise self._error(at, f"says {n_bytes} bytes of type {size}, which are not there")
         return int(size), dimensions, values
 
-    def numbers(self, group, name):
-        """The numbers of a parameter, unsigned where they are integers; None without any."""
+    def names(self, group):
+        """Names of the parameters of a group, in the order of the file."""
+        return [name for found, name in self._found if found == group]
+
+    def numbers(self, group, name, kind="u"):
+        """The numbers of a parameter, integers unsigned or of kind "i"; None without any."""
         size, _, values = self._found.get((group, name), (-1, [], b""))
         if size < 0 or not values:
             return None
         if size == 4:
             return self._file.floats(np.frombuffer(values, np.uint8))
-        return np.frombuffer(values, f"{self._file.order}u{size}").astype(np.float64)
+        return np.frombuffer(values, f"{self._file.order}{kind}{size}").astype(np.float64)
 
     def number(self, group, name, default=None):
         numbers = self.numbers(group, name)
@@ -133,6 +157,24 @@ class Parameters:
             return []
         pieces = (values[i : i + width] for i in range(0, len(values), width))
         return [decode(piece).replace("\0", " ").strip() for piece in pieces]
+
+    def all_texts(self, group, name):
+        """Those of a parameter and of its continuations, NAME2, NAME3, ..."""
+        return self._continued(self.texts, group, name)
+
+    def all_numbers(self, group, name, kind="u"):
+        def numbers(group, name):
+            found = self.numbers(group, name, kind)
+            return [] if found is None else found.tolist()
+
+        return self._continued(numbers, group, name)
+
+    def _continued(self, read, group, name):
+        result, number = list(read(group, name)), 2
+        while more := read(group, f"{name}{number}"):
+            result += more
+            number += 1
+        return result
 
     def text(self, group, name):
         texts = self.texts(group, name)

@@ -1,7 +1,10 @@
 """The motion capture database of Carnegie Mellon University, clip by clip."""
 
 import hashlib
+import re
 import time
+from collections.abc import Mapping
+from numbers import Integral, Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,6 +15,7 @@ from ..body.skeleton import Skeleton
 from ._motion import read_motion
 
 _FRAME_RATE = 120.0
+_LONGEST_DELAY = 3600
 _DESCR = """\
 CMU Graphics Lab Motion Capture Database, mocap.cs.cmu.edu: optical motion capture of a
 person ("subject") in many takes ("trials"), as Acclaim ASF/AMC files, 120 frames a second.
@@ -56,9 +60,9 @@ def fetch_cmu(
         Checksums of files by name, such as ``{"02.asf": "..."}``. A file of another checksum is
         downloaded again, and refused if that does not help.
     n_retries : int, default=3
-        How often a download is tried again after the network failed.
+        How often a download is tried again after the network failed; 0 for not at all.
     delay : float, default=1.0
-        Seconds between these.
+        Seconds between these, up to an hour.
 
     Returns
     -------
@@ -89,7 +93,7 @@ def fetch_cmu(
     OSError
         If a file is neither there nor can be downloaded, or has another checksum.
     ValueError
-        If a number makes no sense, or a file cannot be read. What was just downloaded and
+        If a parameter makes no sense, or a file cannot be read. What was just downloaded and
         cannot be read is removed again.
 
     Examples
@@ -101,6 +105,7 @@ def fetch_cmu(
     """
     from sklearn.datasets import get_data_home
 
+    _check_download(download_if_missing, url, sha256, n_retries, delay)
     subject = _two_digits(subject, "subject")
     many = isinstance(trials, list | tuple | range | np.ndarray)
     takes = [_two_digits(trial, "trials") for trial in (trials if many else [trials])]
@@ -136,6 +141,27 @@ def fetch_cmu(
         filenames=[str(file) for file in files[1:]],
         DESCR=_DESCR,
     )
+
+
+def _check_download(download_if_missing, url, sha256, n_retries, delay):
+    if not isinstance(download_if_missing, bool | np.bool_):
+        raise ValueError(f"download_if_missing must be True or False, got {download_if_missing!r}.")
+    if not isinstance(url, str) or not re.fullmatch(r"[a-z]+://\S+", url):
+        raise ValueError(f"url must be an address, such as 'http://host/folder', got {url!r}.")
+    whole = isinstance(n_retries, Integral) and not isinstance(n_retries, bool)
+    if not whole or n_retries < 0:
+        raise ValueError(f"n_retries must be a whole number, 0 or more, got {n_retries!r}.")
+    number = isinstance(delay, Real) and not isinstance(delay, bool)
+    if not number or not 0 <= delay <= _LONGEST_DELAY:
+        raise ValueError(f"delay must be seconds, from 0 to {_LONGEST_DELAY}, got {delay!r}.")
+    if sha256 is not None and not isinstance(sha256, Mapping):
+        raise ValueError(
+            'sha256 must be checksums by the names of files, such as {"02.asf": "..."}, got '
+            f"{sha256!r}."
+        )
+    for name, known in (sha256 or {}).items():
+        if not isinstance(known, str) or not re.fullmatch("[0-9a-fA-F]{64}", known):
+            raise ValueError(f"sha256 of {name!r} must be 64 hexadecimal digits, got {known!r}.")
 
 
 def _two_digits(number, name):

@@ -27,7 +27,8 @@ def find_gaps(df):
     Raises
     ------
     ValueError
-        If the columns are not such triples.
+        If it is no DataFrame, the columns are not such triples, values are infinite or no
+        numbers, or it holds several performances.
 
     Examples
     --------
@@ -39,13 +40,8 @@ def find_gaps(df):
       joint  first  last  n_frames  inside
     0  knee      1     2         2    True
     """
-    joints = joints_of(df)
-    missing = _missing(df, len(joints))
-    padded = np.pad(missing, ((1, 1), (0, 0))).astype(np.int8)
-    # Column by column, so that the gaps of a joint come one behind the other.
-    change = np.diff(padded, axis=0).T
-    joint, first = np.nonzero(change == 1)
-    last = np.nonzero(change == -1)[1] - 1
+    joints, values = _read(df)
+    joint, first, last = _find(_missing(values))
     return pd.DataFrame(
         {
             "joint": np.array(joints, dtype=object)[joint],
@@ -66,7 +62,8 @@ def fill_gaps(df, max_gap):
         As for `find_gaps`. It is not changed.
     max_gap : int
         The longest gap to fill, in frames. Longer ones stay NaN, as do those that touch an end
-        of the recording: nothing is extrapolated.
+        of the recording: nothing is extrapolated. Joints of the same name are filled each by
+        itself.
 
     Returns
     -------
@@ -76,7 +73,7 @@ def fill_gaps(df, max_gap):
     Raises
     ------
     ValueError
-        If `max_gap` is no whole number from 0, or the columns are no triples.
+        If `max_gap` is no whole number from 0, or as for `find_gaps`.
 
     Notes
     -----
@@ -111,17 +108,16 @@ def fill_gaps(df, max_gap):
     np.int64(2)
     """
     check_max_gap(max_gap)
-    gaps = find_gaps(df)
-    gaps = gaps[gaps["inside"] & (gaps["n_frames"] <= max_gap)]
-    joints = joints_of(df)
-    values = df.to_numpy(dtype=np.float64, copy=True)
-    missing = _missing(df, len(joints))
-    number = {joint: j for j, joint in enumerate(joints)}
-    for joint, rows in gaps.groupby("joint", sort=False):
-        j = number[joint]
+    _, values = _read(df)
+    missing = _missing(values)
+    joint, first, last = _find(missing)
+    short = (first > 0) & (last < len(df) - 1) & (last - first < max_gap)
+    # By the joint's place: names may come twice.
+    for j in np.unique(joint[short]):
+        rows = short & (joint == j)
         here = np.zeros(len(df) + 1, dtype=int)
-        np.add.at(here, rows["first"].to_numpy(), 1)
-        np.add.at(here, rows["last"].to_numpy() + 1, -1)
+        np.add.at(here, first[rows], 1)
+        np.add.at(here, last[rows] + 1, -1)
         frames = np.flatnonzero(np.cumsum(here[:-1]))
         part = values[:, 3 * j : 3 * j + 3]
         filled = _interpolate(np.flatnonzero(~missing[:, j]), part, frames)
@@ -160,9 +156,62 @@ def warn_of_gaps(df, name):
     )
 
 
-def _missing(df, n_joints):
-    values = df.to_numpy(dtype=np.float64)
-    return np.isnan(values).reshape(len(df), n_joints, 3).any(axis=2)
+def _read(df):
+    """Names of the joints, and a copy of the positions (n_frames, 3 * n_joints)."""
+    if not isinstance(df, pd.DataFrame):
+        raise ValueError(
+            f"A recording must be a DataFrame, as read_motion gives, got {type(df).__name__}; name "
+            "the columns of an array with pd.DataFrame(x, columns=skeleton.column_names)."
+        )
+    joints = joints_of(df)
+    levels = df.index.droplevel(-1) if df.index.nlevels > 1 else df.index[:0]
+    if levels.nunique() > 1:
+        raise ValueError(
+            f"A recording must be of one performance, got a table of {levels.nunique()}; take them "
+            "one by one, as in df.groupby(level=0, group_keys=False).apply(fill_gaps, max_gap=10)."
+        )
+    for column, dtype in enumerate(df.dtypes):
+        if getattr(dtype, "kind", "O") not in "fiubO":
+            raise _no_numbers(df, column, dtype)
+    try:
+        values = df.to_numpy(dtype=np.float64, na_value=np.nan, copy=True)
+    except (TypeError, ValueError) as error:
+        column = next(i for i in range(df.shape[1]) if not _is_numeric(df.iloc[:, i]))
+        raise _no_numbers(df, column, df.dtypes.iloc[column]) from error
+    if np.isinf(values).any():
+        frame, column = np.argwhere(np.isinf(values))[0]
+        raise ValueError(
+            f"Frame {frame}, column {df.columns[column]!r} is infinite; positions must be finite, "
+            "or NaN where a marker was not seen. Replace it, as in "
+            "df.replace([np.inf, -np.inf], np.nan)."
+        )
+    return joints, values
+
+
+def _is_numeric(column):
+    try:
+        column.to_numpy(dtype=np.float64, na_value=np.nan)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+def _no_numbers(df, column, dtype):
+    return ValueError(
+        f"Column {df.columns[column]!r} must hold numbers, got {dtype}; convert it with "
+        "pd.to_numeric, or drop that joint."
+    )
+
+
+def _missing(values):
+    return np.isnan(values).reshape(len(values), -1, 3).any(axis=2)
+
+
+def _find(missing):
+    """Joint, first and last frame of each gap; those of a joint one behind the other."""
+    change = np.diff(np.pad(missing, ((1, 1), (0, 0))).astype(np.int8), axis=0).T
+    joint, first = np.nonzero(change == 1)
+    return joint, first, np.nonzero(change == -1)[1] - 1
 
 
 def _interpolate(known, part, frames):

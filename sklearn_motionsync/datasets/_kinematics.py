@@ -6,10 +6,7 @@ import math
 
 import numpy as np
 
-# A small text may stand for a huge result (many joints that never move, many short frames).
-# No recording does: its result is about as large as its file.
-_LARGE = 64 * 2**20
-_MAX_GROWTH = 32
+from ._guard import check_growth
 
 # Joints times frames whose rotations are held at once.
 _BLOCK = 2**17
@@ -116,15 +113,9 @@ def unique(names):
     return result
 
 
-def check_growth(path, size, n_frames, n_joints):
-    """Refuse a result out of all proportion to the file, before it is made."""
-    n_bytes = n_frames * n_joints * 24
-    if n_bytes > max(_LARGE, _MAX_GROWTH * size):
-        raise ValueError(
-            f"{path}: {n_frames} frames of {n_joints} joints would take {n_bytes / 2**20:.0f} MB, "
-            f"from a file of {size / 2**20:.2f} MB. No recording grows like that, so the file is "
-            "taken for damaged. Remove the joints or the frames that are not needed."
-        )
+def check_positions(path, size, n_frames, n_joints):
+    """Refuse positions out of all proportion to the file, before they are made."""
+    check_growth(path, size, n_frames * n_joints * 24, f"{n_frames} frames of {n_joints} joints")
 
 
 def rotations(values, groups, n_joints, degrees):

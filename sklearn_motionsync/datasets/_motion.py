@@ -13,7 +13,7 @@ from ._c3d import read_c3d
 from ._gaps import check_max_gap, fill_gaps, warn_of_gaps
 
 
-def read_motion(path, *, asf=None, frame_rate=None, max_gap=0):
+def read_motion(path, *, asf=None, frame_rate=None, max_gap=0, group=None):
     """Read a recording of joints or markers from a BVH, AMC or C3D file.
 
     Parameters
@@ -27,6 +27,11 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0):
         Frames a second. By default what the file says; AMC files mostly do not.
     max_gap : int, default=0
         Gaps of markers up to that many frames are interpolated, see `fill_gaps`.
+    group : str, default=None
+        What to read of a C3D file: by default its "markers"; "angles", "forces", "moments",
+        "powers", "scalars" or "reactions", where the file says that some of its points are
+        such; "analog" for the channels that were recorded along with them. ``attrs["groups"]``
+        tells which of them a file has.
 
     Returns
     -------
@@ -34,7 +39,9 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0):
         Float64 columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint by joint, and an index
         named "frame", from 0. Names that come twice end with ``_2``, ``_3`` and so on. A joint
         of a BVH file is where the joint turns, and ``<parent>_end`` where an End Site is; a joint
-        of an AMC file is the far end of the bone of that name. A marker that was not seen is NaN.
+        of an AMC file is the far end of the bone of that name. A marker that was not seen is NaN:
+        the file says so, or has it at exactly (0, 0, 0) and names no camera. The group "analog"
+        has a column for each channel, in its unit, and a row for each sample.
         Its ``attrs`` hold
 
         format : {"bvh", "amc", "c3d"}
@@ -42,15 +49,31 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0):
         frame_rate : float or None
             Frames a second, None where nobody says.
         units : str or None
-            "m" for AMC, what the file says for C3D ("mm"), None for BVH, which has none.
+            "m" for AMC, what the file says for C3D ("mm"), None for BVH, which has none. For the
+            group "analog" a list, one for each channel.
         up : {"y", "z"} or None
             The vertical axis, None where a C3D file does not say.
-        kind : {"joints", "markers"}
-            What the positions are of.
+        kind : str
+            What the positions are of: "joints", or for C3D the group.
         joints : list of str
-            Their names.
+            Their names; for the group "analog" ``channels`` instead.
         parents : list of int
             Index of each joint's parent, -1 for a root and for markers.
+
+        and for C3D files also
+
+        first_frame : int
+            The number that frame 0 has in its trial.
+        events : list of dict
+            What was marked in the recording, by time: ``label``, ``context`` (such as "Left", or
+            None), ``time`` in seconds of the trial, and ``frame``, the place in the frames
+            returned here, from 0 and with fractions. It may lie outside of them, and is None if
+            the file has no frame rate.
+        groups : dict of str to dict
+            How many there are in each group (``n``), their ``units`` and ``frame_rate``.
+        left_out : str
+            What else is in the file, in one line, such as "12 angles, 16 analog channels at
+            1000 Hz, the geometry of 2 force plates"; empty if there is nothing.
 
     Raises
     ------
@@ -103,12 +126,20 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0):
         raise ValueError(f"{path} must end with .bvh, .amc or .c3d, got {kind or 'nothing'!r}.")
     if asf is not None and kind != ".amc":
         raise ValueError(f"asf= goes with .amc files only, got asf={str(asf)!r} with {path}.")
+    if group is not None and kind != ".c3d":
+        raise ValueError(f"group= goes with .c3d files only, got group={group!r} with {path}.")
+    if group is not None and not isinstance(group, str):
+        raise ValueError(f"group must be the name of a group, such as 'markers', got {group!r}.")
+    if group == "analog" and max_gap:
+        raise ValueError(f"max_gap goes with points, got max_gap={max_gap} with group='analog'.")
     if kind == ".amc":
         asf = find_asf(path) if asf is None else _existing(asf, "skeleton (asf=)")
         motion = read_acclaim(path, asf)
     else:
-        motion = {".bvh": read_bvh, ".c3d": read_c3d}[kind](path)
+        motion = read_bvh(path) if kind == ".bvh" else read_c3d(path, group or "markers")
     df = _to_frame(motion, kind.removeprefix("."), frame_rate)
+    if group == "analog":
+        return df
     if max_gap:
         df = fill_gaps(df, max_gap)
     warn_of_gaps(df, path.name)
@@ -131,15 +162,15 @@ def _existing(path, what):
 
 
 def _to_frame(motion, name, frame_rate):
-    positions = motion.pop("positions")
-    joints = motion["joints"]
-    df = pd.DataFrame(
-        positions.reshape(len(positions), -1),
-        columns=[f"{joint}_{axis}" for joint in joints for axis in "xyz"],
-        index=pd.RangeIndex(len(positions), name="frame"),
-    )
-    rate = motion["frame_rate"] if frame_rate is None else float(frame_rate)
-    facts = {"format": name, "frame_rate": rate}
-    facts |= {fact: motion[fact] for fact in ("units", "up", "kind", "joints", "parents")}
-    df.attrs = facts
+    if "values" in motion:
+        values, columns = motion.pop("values"), list(motion["channels"])
+    else:
+        values = motion.pop("positions")
+        values = values.reshape(len(values), -1)
+        columns = [f"{joint}_{axis}" for joint in motion["joints"] for axis in "xyz"]
+    index = pd.RangeIndex(len(values), name="frame")
+    df = pd.DataFrame(values, columns=columns, index=index)
+    if frame_rate is not None:
+        motion["frame_rate"] = float(frame_rate)
+    df.attrs = {"format": name} | motion
     return df

@@ -1,6 +1,10 @@
 """One way to draw: the panels, colours and curves that all displays share."""
 
+from numbers import Integral
+
 import numpy as np
+
+from .given import as_names
 
 __all__ = [
     "COLORS",
@@ -11,6 +15,7 @@ __all__ = [
     "names_of",
     "panels",
     "pyplot",
+    "stage",
 ]
 
 # Okabe and Ito's colours, told apart by colour-blind people. One role each, in every figure.
@@ -33,9 +38,7 @@ def pyplot():
     try:
         import matplotlib.pyplot as plt
     except ImportError as error:
-        raise ImportError(
-            "Drawing needs matplotlib: pip install 'sklearn-motionsync[plot]'."
-        ) from error
+        raise ImportError("Drawing needs matplotlib: pip install matplotlib.") from error
     return plt
 
 
@@ -64,8 +67,10 @@ def panels(ax, spots, n_rows, n_cols, size):
         grid = figure.add_gridspec(n_rows, n_cols)
         return figure, [figure.add_subplot(grid[spot]) for spot in spots]
     given = list(np.ravel(np.asarray(ax, dtype=object)))
-    if not all(isinstance(a, plt.Axes) for a in given):
-        raise ValueError(f"ax must be Axes of matplotlib, got {type(given[0]).__name__}.")
+    strange = [type(a).__name__ for a in given if not isinstance(a, plt.Axes)]
+    if strange or not given:
+        got = strange[0] if strange else "none of them"
+        raise ValueError(f"ax must be Axes of matplotlib, got {got}.")
     figure = given[0].figure
     if len(given) == len(spots):
         return figure, given
@@ -77,6 +82,21 @@ def panels(ax, spots, n_rows, n_cols, size):
     given[0].set_axis_off()
     grid = given[0].get_subplotspec().subgridspec(n_rows, n_cols)
     return figure, [figure.add_subplot(grid[spot]) for spot in spots]
+
+
+def stage(axis, title, low, high):
+    """Axes as a stage for bodies that move between two corners (2,): a floor, and no scales."""
+    margin = 0.05 * (high - low)
+    axis.set_xlim(low[0] - margin[0], high[0] + margin[0])
+    axis.set_ylim(low[1] - margin[1], high[1] + margin[1])
+    axis.set_aspect("equal", anchor="S")
+    axis.set_title(title, fontsize="medium")
+    axis.set_yticks([])
+    axis.grid(False)
+    axis.set_xticks([])
+    axis.spines[:].set_visible(False)
+    axis.axhline(0, color="0.6", linewidth=1, zorder=0)
+    axis.tick_params(length=0)
 
 
 def curves(axis, xs, ys, **style):
@@ -93,12 +113,7 @@ def group_colors(groups, n_sequences):
     """The colour of every performance, and the colour of every group by its name."""
     if groups is None:
         return [COLORS["performance"]] * n_sequences, {}
-    groups = [str(group) for group in groups]
-    if len(groups) != n_sequences:
-        raise ValueError(
-            f"groups must name the group of each of the {n_sequences} performances, got "
-            f"{len(groups)}."
-        )
+    groups = as_names(groups, n_sequences, "groups", "performances")
     names = list(dict.fromkeys(groups))
     palette = _GROUPS
     if len(names) > len(_GROUPS):
@@ -112,24 +127,31 @@ def choose_features(features, names):
     names = list(names)
     if features is None:
         return list(range(min(_FEW_FEATURES, len(names))))
-    chosen = []
-    for feature in as_features(features):
-        index = names.index(feature) if feature in names else feature
-        if not isinstance(index, (int, np.integer)) or not 0 <= index < len(names):
-            raise ValueError(
-                f"There is no feature {feature!r}; there are {len(names)}: {', '.join(names)}."
-            )
-        chosen.append(int(index))
+    chosen = [_index_of(feature, names) for feature in as_features(features)]
     if not chosen:
         raise ValueError("features must name at least one feature to draw.")
     return chosen
+
+
+def _index_of(feature, names):
+    if isinstance(feature, str) and names.count(feature) > 1:
+        raise ValueError(f"The feature {feature!r} comes {names.count(feature)} times; say which.")
+    if isinstance(feature, str) and feature in names:
+        return names.index(feature)
+    is_index = isinstance(feature, Integral) and not isinstance(feature, bool)
+    if not (is_index and 0 <= feature < len(names)):
+        raise ValueError(
+            f"There is no feature {feature!r}; there are {len(names)}: {', '.join(names)}."
+        )
+    return int(feature)
 
 
 def as_features(features):
     """Features by index or name as a list, of one or several; empty for None."""
     if features is None:
         return []
-    return [features] if np.ndim(features) == 0 else list(features)
+    single = isinstance(features, str) or not hasattr(features, "__iter__")
+    return [features] if single or getattr(features, "ndim", 1) == 0 else list(features)
 
 
 def names_of(before, step, width):

@@ -7,6 +7,7 @@ from ..action_model import ActionModel
 from ..aspace import ASpace
 from ..pipelines import find_step, flat_steps, transform_through
 from .drawing import COLORS, as_features, choose_features, curves, names_of, panels
+from .given import as_drawn, as_names, is_number
 
 __all__ = ["ActionModelDisplay"]
 
@@ -50,12 +51,18 @@ class ActionModelDisplay:
     """
 
     def __init__(self, mean, lower, upper, *, feature_names, n_std, performances=None):
-        self.mean = mean
-        self.lower = lower
-        self.upper = upper
-        self.feature_names = feature_names
+        self.mean = as_drawn(mean, "The mean", ("P", "n_shown"))
+        self.lower = as_drawn(lower, "The lower bound", self.mean.shape)
+        self.upper = as_drawn(upper, "The upper bound", self.mean.shape)
+        n_shown = self.mean.shape[1]
+        self.feature_names = as_names(feature_names, n_shown, "feature_names", "features")
+        if not is_number(n_std, 0):
+            raise ValueError(f"n_std must be a number of at least 0, got {n_std!r}.")
         self.n_std = n_std
-        self.performances = performances
+        self.performances = None
+        if performances is not None:
+            shape = ("n_sequences", *self.mean.shape)
+            self.performances = as_drawn(performances, "What is drawn behind", shape)
 
     def __repr__(self):
         return f"ActionModelDisplay({self.feature_names})"

@@ -1,6 +1,7 @@
 """Stick figures: strips of postures, samples of a model (Fig. 4), and people moving in step."""
 
 import numpy as np
+from sklearn.utils.validation import check_is_fitted
 
 from ..action_model import ActionModel
 from ..body.direction_cosines import DirectionCosines
@@ -9,8 +10,28 @@ from ..pipelines import find_step, find_synchronizer, index_of_pattern, reach_sy
 from ..sequences import as_collection
 from ..synchronizers.match import as_match
 from .animation import playable
-from .bodies import bones_by_side, on_screen, placed, upright
-from .drawing import COLORS, panels
+from .bodies import (
+    bodies_of,
+    bodies_of_postures,
+    bones_by_side,
+    limits,
+    on_screen,
+    placed,
+    upright,
+)
+from .drawing import COLORS, panels, stage
+from .given import (
+    as_durations,
+    as_frames,
+    as_indices,
+    as_labels,
+    as_moments,
+    as_names,
+    as_pictures,
+    as_scenes,
+    as_skeleton,
+    check_view,
+)
 
 __all__ = ["SkeletonDisplay"]
 
@@ -33,8 +54,8 @@ class SkeletonDisplay:
     ----------
     scenes : list of list of ndarray (n_frames_i, n_joints, 3)
         For each panel its performances: joint positions in axes of which the second is vertical.
-    skeleton : Skeleton
-        Joints and bones.
+    skeleton : Skeleton or None
+        Joints and bones; None draws all joints as points, without bones.
     titles : list of str
         One a panel.
     durations : list of list of float, default=None
@@ -51,6 +72,7 @@ class SkeletonDisplay:
     bones_ : list of dict
         For each panel the LineCollections of the ``"left"``, ``"middle"`` and ``"right"`` bones.
     heads_ : list of Line2D
+        Without a skeleton, all joints.
 
     Examples
     --------
@@ -63,11 +85,11 @@ class SkeletonDisplay:
     """
 
     def __init__(self, scenes, skeleton, titles, *, durations=None, labels=None):
-        self.scenes = scenes
-        self.skeleton = skeleton
-        self.titles = titles
-        self.durations = durations
-        self.labels = labels
+        self.skeleton = as_skeleton(skeleton)
+        self.scenes = as_scenes(scenes, skeleton)
+        self.titles = as_names(titles, len(self.scenes), "titles", "panels")
+        self.durations = None if durations is None else as_durations(durations, self.scenes)
+        self.labels = None if labels is None else as_labels(labels, self.scenes)
 
     def __repr__(self):
         return f"SkeletonDisplay({len(self.scenes)} panels)"
@@ -80,7 +102,8 @@ class SkeletonDisplay:
         ----------
         X : array-like, shape (n_frames, 3 * n_joints), or (n_sequences, n_frames, 3 * n_joints)
             Joint positions.
-        skeleton : Skeleton
+        skeleton : Skeleton or None
+            None draws the joints as points without bones, turned as they are, y up.
         frames : int or list of int, default=6
             How many, evenly spaced from the first to the last, or which ones.
         ax : Axes or array-like of Axes, default=None
@@ -92,13 +115,10 @@ class SkeletonDisplay:
         -------
         SkeletonDisplay
         """
+        as_skeleton(skeleton)
         performances = [upright(x, skeleton, i) for i, x in enumerate(_as_performances(X))]
         n_frames = min(len(x) for x in performances)
-        if np.ndim(frames) == 0:
-            frames = np.linspace(0, n_frames - 1, int(frames)).round()
-        frames = [int(frame) for frame in frames]
-        if not frames or min(frames) < 0 or max(frames) >= n_frames:
-            raise ValueError(f"frames must be from 0 to {n_frames - 1}, got {frames}.")
+        frames = as_frames(frames, n_frames)
         standing = [placed(x, skeleton, follow=True) for x in performances]
         scenes = [[x[[frame]] for x in standing] for frame in frames]
         titles = [f"frame {frame}" for frame in frames]
@@ -120,7 +140,7 @@ class SkeletonDisplay:
         -------
         SkeletonDisplay
         """
-        positions = [cosines.inverse_transform(np.asarray(x)) for x in _as_performances(X)]
+        positions = bodies_of_postures(_as_performances(X), cosines)
         return cls.from_positions(positions, Skeleton.paper(), frames=frames, ax=ax, **view)
 
     @classmethod
@@ -147,17 +167,16 @@ class SkeletonDisplay:
         """
         _, model = find_step(estimator, ActionModel)
         space, _ = _before_synchronizer(estimator)
-        last = model.n_frames_ - 1
+        check_is_fitted(model)
+        bodies = bodies_of(space, model.mean_)
         # The floor is the lowest that the mean performance ever reaches.
-        floor = np.asarray(space.inverse_transform(model.mean_))[:, 1::3].min()
-        frames = [round(f * last) if isinstance(f, float) and f < 1 else int(f) for f in frames]
+        floor = [0, bodies(model.mean_)[..., 1].min(), 0]
         scenes, titles = [], []
-        for frame in frames:
+        for frame in as_moments(frames, model.n_frames_):
             samples = model.sample(n_samples, frame=frame, random_state=random_state)
             accepted = model.accepts(samples, frame)
             for points in (model.mean_[[frame]], samples[accepted]):
-                positions = np.asarray(space.inverse_transform(points))
-                scenes.append([x.reshape(1, -1, 3) - [0, floor, 0] for x in positions])
+                scenes.append([x[np.newaxis] - floor for x in bodies(points)])
             titles += [f"frame {frame}\nmean posture", f"frame {frame}\n{sum(accepted)} samples"]
         return cls(scenes, Skeleton.paper(), titles).plot(ax, **view)
 
@@ -193,6 +212,7 @@ class SkeletonDisplay:
             others = [i for i in range(len(match.times)) if i != pattern]
             performances = ([] if pattern is None else [pattern]) + others
             performances = performances[:_FEW_PERFORMANCES]
+        performances = as_indices(performances, len(reached), "performances")
         return cls.from_predictions(
             [_as_performances(X)[i] for i in performances],
             match.times[performances],
@@ -213,7 +233,8 @@ class SkeletonDisplay:
             Joint positions.
         times : array-like, shape (n_sequences, P)
             tau(p) from 0 to P - 1, such as ``synchronizer.match(points).times``.
-        skeleton : Skeleton
+        skeleton : Skeleton or None
+            None draws the joints as points without bones, turned as they are, y up.
         names : list of str, default=None
             What stands under the performances; by default their numbers.
         ax, **view : as for `plot`
@@ -222,9 +243,11 @@ class SkeletonDisplay:
         -------
         SkeletonDisplay
         """
-        X = _as_performances(X)
-        match = as_match(times, len(X))
+        X, skeleton = _as_performances(X), as_skeleton(skeleton)
         raw = [placed(upright(x, skeleton, i), skeleton) for i, x in enumerate(X)]
+        match = as_match(times, len(X))
+        labels = list(range(len(X))) if names is None else names
+        labels = as_names(labels, len(X), "names", "performances")
         flat = [x.reshape(len(x), -1) for x in raw]
         warped = match.warp(flat)
         warped = warped.reshape(*warped.shape[:2], -1, 3)
@@ -234,7 +257,7 @@ class SkeletonDisplay:
             skeleton,
             ["as recorded: each at its own pace", "synchronised: all on one clock"],
             durations=[lengths, [float(np.median(lengths))] * len(raw)],
-            labels=[str(i) for i in range(len(raw))] if names is None else list(names),
+            labels=labels,
         ).plot(ax, **view)
 
     def plot(self, ax=None, *, at=0.0, azimuth=-60):
@@ -255,8 +278,7 @@ class SkeletonDisplay:
         -------
         self
         """
-        if not 0 <= at <= 1:
-            raise ValueError(f"at must be a share of the time from 0 to 1, got {at!r}.")
+        check_view(at, azimuth)
         drawn = [[on_screen(x, azimuth) for x in scene] for scene in self.scenes]
         places = None
         if self.labels is not None:
@@ -266,7 +288,7 @@ class SkeletonDisplay:
         n_cols = 1 if self.labels is not None else min(len(drawn), _PANELS_A_ROW)
         n_rows = -(-len(drawn) // n_cols)
         everything = np.concatenate([x.reshape(-1, 2) for scene in drawn for x in scene])
-        low, high = np.nanmin(everything, axis=0), np.nanmax(everything, axis=0)
+        low, high = limits(everything)
         width, height = high - low
         # All panels have one scale, which makes figures of about 10 inches.
         scale = min(9.5 / (1.1 * n_cols * width), 3 / height)
@@ -305,10 +327,8 @@ class SkeletonDisplay:
             Shown by a notebook as its last value; ``to_jshtml()`` gives the HTML, ``save(path)``
             a file.
         """
-        if not (seconds > 0 and fps > 0):
-            raise ValueError(f"seconds and fps must be above 0, got {seconds!r} and {fps!r}.")
+        count = as_pictures(seconds, fps)
         self.plot(getattr(self, "axes_", None) if ax is None else ax, azimuth=azimuth)
-        count = max(2, round(seconds * fps))
         return playable(
             self.figure_.canvas.figure,
             lambda k: self._show(k / (count - 1)),
@@ -328,27 +348,19 @@ class SkeletonDisplay:
             lines.set_capstyle("round")
             sides[side] = axis.add_collection(lines, autolim=False)
         self.bones_.append(sides)
-        style = {"color": COLORS["middle"], "alpha": alpha, "markersize": 3 * width}
+        size = 3 * width if self.skeleton is not None else 1.5 * width
+        style = {"color": COLORS["middle"], "alpha": alpha, "markersize": size}
         self.heads_ += axis.plot([], [], "o", **style)
-        margin = 0.05 * (high - low)
-        axis.set_xlim(low[0] - margin[0], high[0] + margin[0])
-        axis.set_ylim(low[1] - margin[1], high[1] + margin[1])
-        axis.set_aspect("equal", anchor="S")
-        axis.set_title(title, fontsize="medium")
-        axis.set_yticks([])
-        axis.grid(False)
-        axis.set_xticks([])
-        axis.spines[:].set_visible(False)
-        axis.axhline(0, color="0.6", linewidth=1, zorder=0)
-        axis.tick_params(length=0)
+        stage(axis, title, low, high)
 
     def _show(self, at):
         """Put all stick figures where they are after a share of the time; the artists."""
         durations = self.durations
         if durations is None:
             durations = [[len(x) - 1 for x in scene] for scene in self._drawn]
-        longest = max(max(of_scene) for of_scene in durations)
-        head, bones = self.skeleton.index_of("head"), self._bones_by_side
+        longest = max(max(of_scene, default=0) for of_scene in durations)
+        heads = slice(None) if self.skeleton is None else [self.skeleton.index_of("head")]
+        bones = self._bones_by_side
         artists = []
         for i, (scene, taking) in enumerate(zip(self._drawn, durations, strict=True)):
             shares = [min(1.0, at * longest / d) if d > 0 else 0.0 for d in taking]
@@ -358,7 +370,8 @@ class SkeletonDisplay:
             for side, lines in self.bones_[i].items():
                 lines.set_segments([body[list(bone)] for body in bodies for bone in bones[side]])
                 artists.append(lines)
-            self.heads_[i].set_data(np.array([body[head] for body in bodies]).T)
+            dots = [body[heads] for body in bodies]
+            self.heads_[i].set_data(np.concatenate(dots).T if dots else ([], []))
             artists.append(self.heads_[i])
         return artists
 
@@ -366,6 +379,8 @@ class SkeletonDisplay:
 def _as_performances(X):
     """Performances one by one, of a collection or a single one."""
     collection = as_collection(X)
+    if collection is not None and len(collection) == 0:
+        raise ValueError("Found 0 performances (n_samples=0); there is nothing to draw.")
     return [X] if collection is None else collection
 
 

@@ -2,10 +2,12 @@
 
 import numpy as np
 
+from ..gate import check_names
 from ..performances import read_collection
 from ..pipelines import index_of_pattern, reach_synchronizer
 from ..synchronizers.match import as_match
 from .drawing import COLORS, choose_features, curves, group_colors, names_of, panels
+from .given import as_drawn, as_names, mean_of_seen
 
 __all__ = ["SynchronizationDisplay"]
 
@@ -18,7 +20,7 @@ class SynchronizationDisplay:
     Parameters
     ----------
     before : list of ndarray (n_frames_i, n_shown)
-        The shown features of the performances, at their own frames.
+        The shown features of the performances, at their own frames; NaN where there is a gap.
     after : ndarray, shape (n_sequences, P, n_shown)
         The same on the clock of the pattern.
     times : ndarray, shape (n_sequences, P)
@@ -58,11 +60,18 @@ class SynchronizationDisplay:
     def __init__(
         self, before, after, times, *, feature_names, pattern=None, pattern_index=None, groups=None
     ):
-        self.before = before
-        self.after = after
-        self.times = times
-        self.feature_names = feature_names
-        self.pattern = pattern
+        before, _ = read_collection(before)
+        self.times = as_match(times, len(before)).times
+        n_sequences, n_frames = self.times.shape
+        n_shown = np.shape(after)[-1] if np.ndim(after) else 0
+        self.feature_names = as_names(feature_names, n_shown, "feature_names", "features")
+        self.before = [
+            as_drawn(x, f"Performance {i}", ("n_frames", n_shown)) for i, x in enumerate(before)
+        ]
+        self.after = as_drawn(after, "What is synchronised", (n_sequences, n_frames, n_shown))
+        self.pattern = None
+        if pattern is not None:
+            self.pattern = as_drawn(pattern, "The pattern", (n_frames, n_shown))
         self.pattern_index = pattern_index
         self.groups = groups
 
@@ -133,7 +142,8 @@ class SynchronizationDisplay:
         times : array-like, shape (n_sequences, P)
             tau(p) from 0 to P - 1, such as ``synchronizer.match(X).times``.
         pattern : array-like, shape (P, n_features), default=None
-            Drawn in front; by default the mean of the synchronised performances.
+            Drawn in front, with the features of X; by default the mean of the synchronised
+            performances.
         features : int, str or list of them, default=None
         feature_names : sequence of str, default=None
             By default the names of the columns, or x0, x1, ...
@@ -142,11 +152,21 @@ class SynchronizationDisplay:
         Returns
         -------
         SynchronizationDisplay
+
+        Raises
+        ------
+        ValueError
+            If there is not one row of times a performance, a pattern of another shape, another
+            number of names, a feature that does not exist, or something infinite.
         """
         arrays, names = read_collection(X)
-        match = as_match(times, len(arrays))
+        match, width = as_match(times, len(arrays)), arrays[0].shape[1]
         if feature_names is None:
-            feature_names = names or [f"x{i}" for i in range(arrays[0].shape[1])]
+            feature_names = names or [f"x{i}" for i in range(width)]
+        feature_names = as_names(feature_names, width, "feature_names", "features")
+        if pattern is not None:
+            check_names(pattern, names, "The pattern")
+            pattern = as_drawn(pattern, "The pattern", (match.times.shape[1], width))
         chosen = choose_features(features, feature_names)
         shown = [x[:, chosen] for x in arrays]
         display = cls(
@@ -154,7 +174,7 @@ class SynchronizationDisplay:
             match.warp(shown),
             match.times,
             feature_names=[feature_names[i] for i in chosen],
-            pattern=None if pattern is None else np.asarray(pattern)[:, chosen],
+            pattern=None if pattern is None else pattern[:, chosen],
             groups=groups,
         )
         return display.plot(ax, warps=warps)
@@ -211,7 +231,7 @@ class SynchronizationDisplay:
         return f"black: the pattern{which}"
 
     def _draw_pattern(self, axis, clock, row):
-        curve = self.after[:, :, row].mean(axis=0)
+        curve = mean_of_seen(self.after[:, :, row], axis=0)
         if self.pattern is not None:
             curve = self.pattern[:, row]
         (line,) = axis.plot(clock, curve, color=COLORS["pattern"], linewidth=1.6)

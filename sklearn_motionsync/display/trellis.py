@@ -5,6 +5,7 @@ import numpy as np
 from ..pipelines import index_of_pattern, reach_synchronizer
 from ..synchronizers.dense import DenseSynchronizer
 from .drawing import COLORS, panels
+from .given import as_drawn, as_names
 
 __all__ = ["TrellisDisplay"]
 
@@ -50,12 +51,13 @@ class TrellisDisplay:
     """
 
     def __init__(self, frames, offsets, costs, path, warp, *, names=("pattern", "performance")):
-        self.frames = frames
-        self.offsets = offsets
-        self.costs = costs
-        self.path = path
-        self.warp = warp
-        self.names = names
+        self.frames = as_drawn(frames, "The frames", ("n_frames",))
+        self.offsets = as_drawn(offsets, "The offsets", ("n_offsets",))
+        shape = len(self.frames), len(self.offsets)
+        self.costs = as_drawn(costs, "The costs", shape)
+        self.path = as_drawn(path, "The path", ("P",))
+        self.warp = as_drawn(warp, "The warp", self.path.shape)
+        self.names = as_names(names, 2, "names", "performances, the pattern and the other")
 
     def __repr__(self):
         return f"TrellisDisplay({self.names[1]} matched to {self.names[0]})"

@@ -23,6 +23,8 @@ _SAME = 0.9
 _STILL = 1e-20
 # Probability, at most, that refining is taken for a help where it is none.
 _DOUBT = 0.01
+# Degrees of freedom, and standard deviation of the logarithms, that are taken for granted.
+_PRIOR = 2, 0.1
 # Warps matched by all features have seen the noise of those that judge: what that may be worth.
 _SIGHT = 1.1
 
@@ -68,7 +70,7 @@ class Verdict(NamedTuple):
         Misfit after refining by the shown features to that after matching by them, in geometric
         mean; NaN if there was nothing to compare.
     p_value : float
-        Of a t test of the logarithms of these ratios, that refining does not help.
+        Of a moderated t test of the logarithms of these ratios, that refining does not help.
     ratio_to_all : float
         The same to the misfit after matching by all features, those that judge among them.
     """
@@ -95,11 +97,14 @@ class Verdict(NamedTuple):
 
 
 def _p_value(gain):
-    """Of a one-sided t test that the mean is not below 0; 1 for a single value."""
-    if len(gain) < 2:
-        return 1.0
-    error = gain.std(ddof=1) / np.sqrt(len(gain))
-    return float(stdtr(len(gain) - 1, gain.mean() / max(error, np.finfo(float).tiny)))
+    """Of a one-sided t test that the mean is not below 0.
+
+    The variance is moderated: a few values may agree by accident, or a few good ones differ.
+    """
+    freedom, expected = _PRIOR
+    variance = freedom * expected**2 + np.square(gain - gain.mean()).sum()
+    freedom += len(gain) - 1
+    return float(stdtr(freedom, gain.mean() / np.sqrt(variance / freedom / len(gain))))
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,8 +3,12 @@
 import numpy as np
 
 from .filters import SMOOTHING, smooth
+from .units import Unit
 
 __all__ = ["curvature_keyframes", "match_keyframes"]
+
+# Weight of the distance in time, which only decides between postures that are equally close.
+_TIE = 1e-9
 
 
 def curvature_keyframes(on_clock, count):
@@ -38,8 +42,9 @@ def curvature_keyframes(on_clock, count):
 def match_keyframes(pattern, keyframes, on_clock):
     """The frames of a performance that show the key-frames of the pattern.
 
-    Among the frames where its own curvature peaks, those in the same order whose postures
-    are closest in sum, found by dynamic programming.
+    Among the frames where its own curvature peaks, and those that would be its key-frames, the ones
+    in the same order whose postures are closest in sum, found by dynamic programming. Of postures
+    that are equally close those at the time of the pattern's: so the pattern matches itself.
 
     Parameters
     ----------
@@ -55,10 +60,12 @@ def match_keyframes(pattern, keyframes, on_clock):
     curvature = _curvature(on_clock)
     inner = curvature[1:-1]
     peaks = 1 + np.flatnonzero((inner >= curvature[:-2]) & (inner > curvature[2:]))
-    if len(peaks) < len(keyframes):
-        peaks = np.arange(1, n_frames - 1)
-    wanted = pattern[keyframes.astype(np.intp)]
-    costs = np.square(wanted[:, np.newaxis] - on_clock[peaks]).sum(axis=2, dtype=np.float64)
+    own = curvature_keyframes(on_clock, len(keyframes)).astype(np.intp)
+    peaks = np.union1d(peaks, own)
+    unit = Unit.of(pattern[np.newaxis])
+    wanted, shown = unit(pattern[keyframes.astype(np.intp)]), unit(on_clock[peaks])
+    costs = np.square(wanted[:, np.newaxis] - shown).sum(axis=2, dtype=np.float64)
+    costs += _TIE * np.square((keyframes[:, np.newaxis] - peaks) / n_frames)
     best, choices = np.zeros(len(peaks)), []
     for cost in costs:
         # best[j]: the key-frames so far, all of them before peak j.
@@ -82,7 +89,9 @@ def _running_argmin(values):
 def _curvature(on_clock):
     """``sqrt(|v|^2 |a|^2 - (v.a)^2) / |v|^3`` of the path, damped where the movement rests."""
     sigma = SMOOTHING * (len(on_clock) - 1)
-    v, a = (smooth(on_clock[np.newaxis], sigma, order)[0].astype(np.float64) for order in (1, 2))
+    on_clock = on_clock[np.newaxis]
+    scaled = Unit.of(on_clock)(on_clock)
+    v, a = (smooth(scaled, sigma, order)[0].astype(np.float64) for order in (1, 2))
     vv, aa, va = np.square(v).sum(1), np.square(a).sum(1), (v * a).sum(1)
     rest = 0.1 * vv.mean()
     if rest == 0:

@@ -59,11 +59,17 @@ def _sample(arrays, times, n_frames, out):
     weight = (at - left).astype(out.dtype)[:, :, np.newaxis]
     frames = np.concatenate(arrays)
     left += np.cumsum(last + 1)[:, np.newaxis] - (last + 1)
-    np.multiply(frames.take(left, axis=0), 1 - weight, out=out)
-    left += 1
-    following = frames.take(left, axis=0)
-    following *= weight
-    out += following
+    with np.errstate(over="ignore", invalid="ignore"):
+        has_gaps = not np.isfinite(frames.sum())
+        np.multiply(frames.take(left, axis=0), 1 - weight, out=out)
+        left += 1
+        following = frames.take(left, axis=0)
+        following *= weight
+        out += following
+    if has_gaps:
+        # Where a frame is met its neighbours have no say: nothing times infinity is no number.
+        for at, met in ((left - 1, weight == 0), (left, weight == 1)):
+            np.copyto(out, frames.take(at, axis=0), where=met)
 
 
 def even_slices(n, size):

@@ -9,13 +9,17 @@ from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..fitting import at_once, of_one_state
+from ..gate import as_numbers, check_finite, check_names
 from ..matching.median import Median, median_of
 from ..matching.units import Unit
 from ..matching.warps import normalise
 from ..notebook import DocumentedMixin
-from ..performances import Performances, SequenceLevelMixin, restore
+from ..performances import Performances, SequenceLevelMixin, names_of_input, restore
 
 __all__ = ["Synchronizer", "TrainingSet"]
+
+# What one copy of a training set on the clock may take; a fit holds several.
+MOST_BYTES = 8 * 2**30
 
 
 class TrainingSet(NamedTuple):
@@ -252,9 +256,23 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
             self.n_frames_ = int(np.median([len(x) for x in performances]))
             if given is not None:
                 self.n_frames_ = len(given)
+        self._check_size(performances)
         on_clock = normalise(performances, self.n_frames_)
         unit = Unit.of(on_clock)
         return TrainingSet(performances, on_clock, unit, unit(on_clock), given)
+
+    def _check_size(self, performances):
+        """Say what a clock asks for before memory runs out."""
+        positions = (self.n_frames_ - 1) * getattr(self, "subframes", 1) + 1
+        n_features = performances[0].shape[1]
+        asked = 8 * len(performances) * positions * n_features
+        if asked > MOST_BYTES:
+            raise ValueError(
+                f"{len(performances)} performances of {n_features} feature(s) at {positions} "
+                f"positions of the clock ask for {asked / 2**30:.0f} GB, more than "
+                f"{MOST_BYTES / 2**30:.0f} GB: n_frames is {self.n_frames_}, subframes "
+                f"{getattr(self, 'subframes', 1)}. Use fewer frames, subframes or performances."
+            )
 
     def _given_pattern(self, performances):
         """The pattern as an array, if that is what was given; indices are checked."""
@@ -268,7 +286,8 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
                     f"performances, the last has index {len(performances) - 1}."
                 )
             return None
-        pattern = np.asarray(pattern, dtype=performances[0].dtype)
+        check_names(pattern, names_of_input(self), "The pattern")
+        pattern = as_numbers(pattern, "The pattern", dtype=performances[0].dtype)
         pattern = pattern[:, np.newaxis] if pattern.ndim == 1 else pattern
         width = performances[0].shape[1]
         if pattern.ndim != 2 or len(pattern) < 2 or pattern.shape[1] != width:
@@ -276,8 +295,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
                 f"A pattern given as an array must have shape (n_frames, {width}) with at least 2 "
                 f"frames, like the performances; got {pattern.shape}."
             )
-        if not np.isfinite(pattern).all():
-            raise ValueError("The pattern has NaN or infinite values; interpolate its gaps.")
+        check_finite(pattern, "The pattern, frame", names_of_input(self))
         return pattern
 
     @property

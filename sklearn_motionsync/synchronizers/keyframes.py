@@ -3,10 +3,12 @@
 from numbers import Integral
 
 import numpy as np
+import pandas as pd
 from sklearn.base import _fit_context
 from sklearn.utils._param_validation import Interval
 
 from ..fitting import at_once, of_one_state
+from ..gate import as_numbers
 from ..matching.keyframes import curvature_keyframes, match_keyframes
 from ..matching.units import squared_distances
 from ..matching.warps import sample
@@ -200,21 +202,29 @@ class KeyframeSynchronizer(Synchronizer):
 
     def _given_knots(self, arrays, keyframes, count=None):
         """Given key-frames, checked, in frames of the common clock."""
+        if isinstance(keyframes, (pd.DataFrame, pd.Series)):
+            # One row a performance; iterating would give columns.
+            keyframes = keyframes.to_numpy()
+        if isinstance(keyframes, (str, dict)) or not hasattr(keyframes, "__len__"):
+            raise ValueError(
+                "keyframes must be a list of arrays (n_keyframes,), one a performance; got "
+                f"{type(keyframes).__name__}."
+            )
         if len(keyframes) != len(arrays):
             raise ValueError(
                 f"keyframes must hold one array a performance, {len(arrays)}; got {len(keyframes)}."
             )
         checked = []
         for i, (given, x) in enumerate(zip(keyframes, arrays, strict=True)):
-            frames = np.asarray(given, dtype=np.float64)
+            frames = as_numbers(given, f"Performance {i}: keyframes", dtype=np.float64)
             count = len(np.atleast_1d(frames)) if count is None else count
             inside = frames.ndim == 1 and bool(
                 (np.diff(frames) > 0).all() and (frames > 0).all() and (frames < len(x) - 1).all()
             )
-            if frames.shape != (count,) or not inside:
+            if frames.shape != (count,) or count == 0 or not inside:
                 raise ValueError(
-                    f"Performance {i}: key-frames must be {count} increasing frames between 0 "
-                    f"and {len(x) - 1}, both excluded, got {given}."
+                    f"Performance {i}: key-frames must be {count or 'some'} increasing frames "
+                    f"between 0 and {len(x) - 1}, both excluded, got {given}."
                 )
             checked.append(frames * (self.n_frames_ - 1) / (len(x) - 1))
         return np.stack(checked)

@@ -2,11 +2,15 @@
 
 import numpy as np
 
+from ..gate import as_numbers
 from ..matching.warps import sample
 from ..performances import read_collection
 from ..pipelines import reach_synchronizer
 
 __all__ = ["Match", "as_match"]
+
+# Rounding may take times back by this share of the clock.
+_ROUNDING = 1e-9
 
 
 class Match:
@@ -25,7 +29,7 @@ class Match:
     Attributes
     ----------
     times : ndarray, shape (n_sequences, P)
-        ``tau(p) = p + Delta(p)``; from synchronizers of this package non-decreasing,
+        ``tau(p) = p + Delta(p)``, non-decreasing; from synchronizers of this package
         ``tau(0) = 0``, ``tau(P-1) = P-1``.
     distances : ndarray, shape (n_sequences,)
         From a `DenseSynchronizer` the synchronisation distance ``D_{n,m}`` of Eq. 12, of the path
@@ -34,8 +38,8 @@ class Match:
     Raises
     ------
     ValueError
-        If times are no table of at least two frames, or not within the clock, or there is not one
-        distance a performance.
+        If times are no table of at least two frames, or decrease, or are not within the clock, or
+        there is not one distance a performance.
 
     Notes
     -----
@@ -61,7 +65,7 @@ class Match:
     __slots__ = ("distances", "times")
 
     def __init__(self, times, distances=None):
-        times = np.array(times, dtype=np.float64)
+        times = np.array(as_numbers(times, "times", dtype=np.float64))
         if times.ndim != 2 or times.shape[1] < 2:
             raise ValueError(
                 "times must have shape (n_sequences, P), one row a performance and at least 2 "
@@ -75,11 +79,17 @@ class Match:
                 f"Performance {i}: times must be from 0 to P - 1 = {n_frames - 1}, in frames of "
                 f"the pattern, got {times[i].min():g} to {times[i].max():g}."
             )
+        back = np.diff(times) < -_ROUNDING * n_frames
+        if back.any():
+            i, p = np.argwhere(back)[0]
+            raise ValueError(
+                f"Performance {i}: times must not decrease, but {times[i, p + 1]:g} at frame "
+                f"{p + 1} follows {times[i, p]:g}: a movement that runs backwards is no warp."
+            )
+        np.maximum.accumulate(times, axis=1, out=times)
         if distances is None:
             distances = np.full(n_sequences, np.nan)
-        distances = np.array(distances)
-        if distances.dtype.kind != "f":
-            distances = distances.astype(np.float64)
+        distances = np.array(as_numbers(distances, "distances"))
         if distances.shape != (n_sequences,):
             raise ValueError(
                 f"distances must be one for each of the {n_sequences} performances, got shape "
@@ -137,7 +147,8 @@ class Match:
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or (performance, frame) frame
-            One sequence a performance, in the same order. NaN stay where they are.
+            One sequence a performance, in the same order. NaN and infinite values stay where they
+            are: between frames, what is next to one is one, too.
 
         Returns
         -------
@@ -201,7 +212,7 @@ class Match:
         ValueError
             As from ``frames``; or if a rate is not above 0, or there is not one a performance.
         """
-        rate = np.asarray(frame_rate, dtype=np.float64)
+        rate = as_numbers(frame_rate, "frame_rate")
         sound = (rate > 0) & np.isfinite(rate)
         if rate.ndim > 1 or not sound.all():
             which = f" for performance {int(np.argmin(sound))}" if rate.ndim == 1 else ""
@@ -241,5 +252,5 @@ def as_match(times, n_sequences):
 def _lengths(X):
     """How many frames the sequences have, of sequences or of such numbers."""
     if hasattr(X, "__len__") and not hasattr(X, "columns") and all(np.ndim(n) == 0 for n in X):
-        return np.asarray(X, dtype=np.float64)
+        return as_numbers(X, "The lengths", dtype=np.float64)
     return np.array([len(x) for x in read_collection(X)[0]], dtype=np.float64)

@@ -1,5 +1,10 @@
-"""Skeletons of what was read, and how they show themselves."""
+"""Skeletons: what is none, those of what was read, and how they show themselves."""
 
+import copy
+import pickle
+
+import joblib
+import numpy as np
 import pandas as pd
 import pytest
 from sklearn.base import clone
@@ -80,3 +85,134 @@ def test_a_short_repr():
     other = Skeleton(known.joints, known.parents, known.landmarks, "z")
     assert repr(other) == "Skeleton(<15 joints>, up='z')"
     assert clone(DirectionCosines(other)).skeleton == other
+
+
+# -- what is no skeleton --------------------------------------------------------------------
+
+PAPER = Skeleton.paper()
+UNKNOWN = {**PAPER.landmarks, "nose": "head"}
+
+
+def with_parents(**parents):
+    """The parents of the paper's joints, some of them otherwise."""
+    return [parents.get(j, p) for j, p in zip(PAPER.joints, PAPER.parents, strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((["a", "a"], [-1, 0]), "different joint names"),
+        ((["a", "b"], [-1]), "one parent each"),
+        ((["a", "b"], [-1, 5]), "parents must be"),
+        ((["a", "b"], [-1, 0]), "No joint stands for the landmarks"),
+        ((PAPER.joints, PAPER.parents, None, "x"), "up must be"),
+        ((PAPER.joints, PAPER.parents, None, ["y"]), "up must be"),
+        ((PAPER.joints, PAPER.parents, {"pelvis": "tail"}), "'neck'"),
+        ((PAPER.joints, PAPER.parents, ["pelvis"]), "landmarks must be a mapping"),
+        ((PAPER.joints, PAPER.parents, UNKNOWN), r"landmarks must be among .* got \['nose'\]"),
+        (("pelvis", PAPER.parents), "joints must be the names"),
+        ((None, PAPER.parents), "joints must be the names"),
+        ((set(PAPER.joints), PAPER.parents), "joints must be the names"),
+        ((range(15), PAPER.parents), "joints must be the names"),
+        (([*PAPER.joints[:-1], np.nan], PAPER.parents), "joints must be the names"),
+        ((PAPER.joints, 0), "parents must be a list"),
+        ((PAPER.joints, "0" * 15), "parents must be a list"),
+        ((PAPER.joints, np.array(0)), "parents must be a list"),
+        *(
+            ((PAPER.joints, with_parents(head=parent)), "whole numbers.* for joint 2")
+            for parent in (1.5, "1", True, np.nan, np.inf, None, np.ma.masked, 1j, [1])
+        ),
+        ((PAPER.joints, with_parents(pelvis=2)), r"circle: pelvis > head > neck > pelvis\. The"),
+        ((PAPER.joints, with_parents(neck=2)), "circle: neck > head > neck"),
+        ((PAPER.joints, with_parents(head=2)), "other joints' indices, or -1"),
+    ],
+)
+def test_impossible_skeletons(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        Skeleton(*arguments)
+
+
+def test_whole_numbers_of_any_type_are_parents():
+    for parents in (np.array(PAPER.parents), np.array(PAPER.parents, float), iter(PAPER.parents)):
+        skeleton = Skeleton(np.array(PAPER.joints), parents)
+        assert skeleton == PAPER
+        assert {type(p) for p in skeleton.parents} == {int}
+
+
+def test_what_has_no_joints_in_its_columns():
+    for given in (np.zeros((2, 45)), [[0.0] * 45], None, pd.Series([0.0])):
+        with pytest.raises(ValueError, match=r"columns of a DataFrame, got \w+\. Use pd.DataFrame"):
+            Skeleton.from_frame(given)
+    df = positions_of(PAPER)
+    with pytest.raises(ValueError, match=r"joints \['neck'\] come more than once"):
+        Skeleton.from_frame(pd.concat([df, df[["neck_x", "neck_y", "neck_z"]]], axis=1))
+    with pytest.raises(ValueError, match="landmarks must be a mapping"):
+        Skeleton.from_frame(df, landmarks="pelvis")
+    for up in ("x", "", np.array(["y", "z"])):
+        with pytest.raises(ValueError, match="up must be 'y' or 'z'"):
+            Skeleton.from_frame(df, up=up)
+
+
+@pytest.mark.parametrize(
+    ("attrs", "message"),
+    [
+        ({"joints": ["head"], "parents": []}, "1 joints and the parents"),
+        ({"joints": ["head"], "parents": [3]}, "one parent, an index or -1"),
+        ({"joints": ["head", "neck"], "parents": [1, 0.5]}, "whole numbers"),
+        ({"joints": ["head", "neck"], "parents": [1, 0]}, "circle: neck > head > neck"),
+        ({"joints": [1, 2], "parents": [-1, 0]}, "joints must be the names"),
+    ],
+)
+def test_attributes_that_are_no_skeleton(attrs, message):
+    with pytest.raises(ValueError, match=message):
+        Skeleton.from_frame(positions_of(PAPER, **attrs))
+
+
+def test_a_landmark_that_does_not_exist():
+    with pytest.raises(ValueError, match=r"landmark must be among .* got 'nose'"):
+        PAPER.index_of("nose")
+
+
+# -- a skeleton stays as it is, and serves as a key -----------------------------------------
+
+
+def test_equal_skeletons_have_equal_hashes():
+    again = Skeleton(PAPER.joints, PAPER.parents, dict(reversed(PAPER.landmarks.items())))
+    other = Skeleton(PAPER.joints, PAPER.parents, up="z")
+    assert {PAPER: "paper"}[again] == "paper"
+    assert len({PAPER, again, other, Skeleton.kinect()}) == 3
+
+
+@pytest.mark.parametrize("skeleton", [PAPER, Skeleton.acclaim(), Skeleton.kinect()])
+def test_copies_are_equal(skeleton):
+    copies = [copy.copy(skeleton), copy.deepcopy(skeleton), pickle.loads(pickle.dumps(skeleton))]
+    copies += [clone(DirectionCosines(skeleton)).skeleton]
+    for other in copies:
+        assert other == skeleton
+        assert hash(other) == hash(skeleton)
+        assert joblib.hash(other) == joblib.hash(skeleton)
+        with pytest.raises(TypeError, match="stay as they are"):
+            other.landmarks["head"] = "neck"
+
+
+def test_landmarks_are_read_only():
+    landmarks = Skeleton.paper().landmarks
+    changes = [
+        lambda: landmarks.update(head="neck"),
+        lambda: landmarks.pop("head"),
+        lambda: landmarks.__ior__({}),
+        landmarks.clear,
+    ]
+    for change in changes:
+        with pytest.raises(TypeError, match="make another skeleton"):
+            change()
+    assert landmarks == PAPER.landmarks
+    assert landmarks | {"head": "x"} == {**PAPER.landmarks, "head": "x"}
+    assert pickle.loads(pickle.dumps(landmarks)) == copy.deepcopy(landmarks) == landmarks
+
+
+def test_skeletons_of_older_files_are_read_only_too():
+    old = Skeleton.__new__(Skeleton)
+    old.__setstate__(vars(PAPER) | {"landmarks": dict(PAPER.landmarks)})
+    assert old == PAPER
+    assert hash(old) == hash(PAPER)

@@ -1,7 +1,9 @@
-"""Damage real files of motion capture in many ways, and see that reading stays safe.
+"""Damage files of motion capture and archives in many ways, and see that reading stays safe.
 
     python tests/datasets/fuzz_readers.py FOLDER --seconds 600 [--seed 0] [--workers 2]
+    python tests/datasets/fuzz_readers.py archives --seconds 600
 
+FOLDER holds original files, to which small ones made here are added; ``archives`` are made here.
 A damaged file must be read, to finite numbers (or NaN for a marker that was not seen), or
 be refused with a ValueError that names the file. Anything else is a failure: another error, a
 warning, more than 1 GB, more than 10 seconds. Failures are printed with the number of their
@@ -10,6 +12,7 @@ case, and their files are kept; ``--case N`` runs that case alone.
 
 import argparse
 import collections
+import json
 import multiprocessing
 import random
 import re
@@ -22,7 +25,10 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from sklearn_motionsync.datasets import find_gaps, read_motion
+from sklearn_motionsync.datasets import find_gaps, load_performances, read_motion
+
+from damaged_archives import ARCHIVE, make_archives
+from motion_files import c3d, everything
 
 LIMIT_SECONDS = 10
 LIMIT_BYTES = 2**30
@@ -40,7 +46,9 @@ WORDS = (
 
 def load_originals(folder):
     """A list of {name: bytes}: what one call reads. Texts also come cut to a few frames."""
-    originals = []
+    if str(folder) == "archives":
+        return [{"a.npz": content} for content in make_archives()]
+    originals = [{"a.c3d": c3d(**everything(machine))} for machine in (84, 85, 86)]
     files = sorted(path for path in Path(folder).rglob("*") if path.is_file())
     for path in files:
         content = path.read_bytes()
@@ -191,7 +199,8 @@ def damaged(originals, seed, number):
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         name = rng.choice(list(files))
         if files[name]:
-            files[name] = rng.choice(BINARY if name == "a.c3d" else TEXT)(rng, files[name])
+            damages = {"a.c3d": BINARY, "a.npz": BINARY[:6] + ARCHIVE}.get(name, TEXT)
+            files[name] = rng.choice(damages)(rng, files[name])
     return files
 
 
@@ -207,8 +216,7 @@ def run_case(files, folder):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.filterwarnings("ignore", message="a.c3d: .* positions are missing")
-            df = read_motion(path, asf=folder / "a.asf" if path.suffix == ".amc" else None)
-            read_motion(path, max_gap=5) if path.suffix == ".c3d" else None
+            results = read_all(path, folder)
     except ValueError as error:
         message = str(error)
         if type(error) is ValueError and message.startswith(str(folder)) and len(message) < 700:
@@ -216,26 +224,74 @@ def run_case(files, folder):
         return "a bad message\n" + traceback.format_exc()
     except BaseException:  # whatever it is, it is what this script looks for
         return "another error\n" + traceback.format_exc()
-    values = df.to_numpy()
-    known = np.isfinite(values) | (np.isnan(values) & (path.suffix == ".c3d"))
-    if not known.all() or values.dtype != np.float64 or not df.columns.is_unique or df.empty:
-        return f"a bad result {df.shape} {values.dtype}"
-    if find_gaps(df).empty != (not np.isnan(values).any()):
+    try:
+        return next(filter(None, map(problem_of, results)), "read")
+    except Exception:
+        return "a result that cannot be judged\n" + traceback.format_exc()
+
+
+def read_all(path, folder):
+    """DataFrames, or the arrays of an archive."""
+    if path.suffix == ".npz":
+        bunch = load_performances(path)
+        parents = bunch.skeleton.parents if bunch.skeleton else ()
+        assert len(bunch.data) == len(bunch.target) == len(bunch.frame_rate)
+        assert all(-1 <= p < len(bunch.joints) for p in parents)
+        return bunch.data
+    if path.suffix != ".c3d":
+        return [read_motion(path, asf=folder / "a.asf" if path.suffix == ".amc" else None)]
+    df = None
+    try:
+        df = read_motion(path)
+        groups = list(df.attrs["groups"])
+        results = [df, read_motion(path, max_gap=5)]
+    except ValueError as error:
+        groups = re.findall(r"'(\w+)' \(\d+\)", str(error)) if "there are no" in str(error) else []
+        if not groups:
+            raise
+        results = []
+    for group in groups:
+        # One group may be damaged where the others are not.
+        try:
+            results.append(read_motion(path, group=group))
+        except ValueError as error:
+            if not re.search("there are no|ANALOG:", str(error)):
+                raise
+    return results
+
+
+def problem_of(result):
+    """What is wrong with a result, or None."""
+    if isinstance(result, np.ndarray):
+        good = result.ndim == 2 and len(result) >= 2 and result.shape[1] % 3 == 0
+        return None if good and np.isfinite(result).all() else f"a bad result {result.shape}"
+    values, attrs = result.to_numpy(), result.attrs
+    known = np.isfinite(values) | (np.isnan(values) & (attrs["format"] == "c3d"))
+    if not known.all() or values.dtype != np.float64 or not result.columns.is_unique:
+        return f"a bad result {result.shape} {values.dtype}"
+    if result.empty:
+        return "an empty result"
+    json.dumps(attrs, allow_nan=False)
+    if attrs["kind"] != "analog" and find_gaps(result).empty != (not np.isnan(values).any()):
         return "gaps that do not fit"
-    return "read"
+    return None
 
 
 def work(originals, seed, first, step, deadline, current, queue):
     import resource  # not on Windows, where the tests import this file all the same
 
-    resource.setrlimit(resource.RLIMIT_AS, (LIMIT_BYTES, LIMIT_BYTES))
+    # What the imports took is not the files' fault.
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    limit = pages * resource.getpagesize() + LIMIT_BYTES
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     with tempfile.TemporaryDirectory() as folder:
         number = first
         while time.time() < deadline:
             current.value = number
+            files = damaged(originals, seed, number)
             signal.alarm(LIMIT_SECONDS)  # the process dies of it, wherever it hangs
             start = time.time()
-            outcome = run_case(damaged(originals, seed, number), Path(folder))
+            outcome = run_case(files, Path(folder))
             signal.alarm(0)
             queue.put((number, outcome, time.time() - start))
             number += step

@@ -163,52 +163,94 @@ def dec(value):
     return struct.pack("<HH", high, low) if value else bytes(4)
 
 
-def c3d(positions, machine=84, real=True, changes=None, header=None, tail=b""):
-    """A C3D file of positions (n_frames, n_points, 3); NaN is invalid."""
+def texts(*words):
+    """A parameter of texts."""
+    width = max(map(len, words))
+    return -1, [width, len(words)], "".join(word.ljust(width) for word in words).encode()
+
+
+def c3d(
+    positions,
+    machine=84,
+    real=True,
+    changes=None,
+    header=None,
+    tail=b"",
+    others=None,
+    analog=None,
+    words=None,
+    order=None,
+    n_blocks=None,
+):
+    """A C3D file of positions (n_frames, n_points, 3); NaN is invalid.
+
+    `others` are groups of parameters beside POINT, `analog` raw values (n_frames, samples,
+    channels), `words` the fourth numbers of the points, `order` that of integers.
+    """
     n_frames, n_points = positions.shape[:2]
-    order = ">" if machine == 86 else "<"
+    float_order = ">" if machine == 86 else "<"
+    order = order or float_order
 
     def number(value):
-        return dec(value) if machine == 85 else struct.pack(order + "f", value)
+        return dec(value) if machine == 85 else struct.pack(float_order + "f", value)
 
     def whole(*values):
         return struct.pack(f"{order}{len(values)}H", *values)
 
     scale = -1.0 if real else 0.5
-    names = [f"M{i}" for i in range(n_points)]
-    parameters = {
+    analog = np.zeros((n_frames, 1, 0)) if analog is None else analog
+    point = {
         "USED": (2, [], whole(n_points)),
         "FRAMES": (2, [], whole(min(n_frames, 65535))),
         "SCALE": (4, [], number(scale)),
         "RATE": (4, [], number(50.0)),
         "DATA_START": (2, [], whole(4)),
-        "LABELS": (-1, [4, n_points], "".join(n.ljust(4) for n in names).encode()),
+        "LABELS": texts(*(f"M{i}".ljust(4) for i in range(n_points))) if n_points else None,
         "UNITS": (-1, [4], b"mm  "),
         "Y_SCREEN": (-1, [2], b"+Z"),
     } | (changes or {})
-    section = bytes([1, 0x50, 2, machine])
-    section += bytes([5, 255]) + b"POINT" + whole(3) + b"\0"
-    for name, content in parameters.items():
-        if content is not None:
-            size, dimensions, values = content
-            block = struct.pack("bB", size, len(dimensions)) + bytes(dimensions) + values + b"\0"
-            section += bytes([len(name), 1]) + name.encode() + whole(len(block) + 2) + block
-    section += bytes(2)
-    fields = {"points": n_points, "analog": 0, "first": 1, "last": min(n_frames, 65535), "start": 4}
-    fields |= header or {}
+
+    def written(start):
+        if point["DATA_START"] is not None:
+            point["DATA_START"] = (2, [], whole(start))
+        section = b""
+        for number, (group, members) in enumerate(({"POINT": point} | (others or {})).items(), 1):
+            section += bytes([len(group), 256 - number]) + group.encode() + whole(3) + b"\0"
+            for name, content in members.items():
+                if content is not None:
+                    size, dimensions, values = content
+                    block = struct.pack("bB", size, len(dimensions)) + bytes(dimensions) + values
+                    section += bytes([len(name), number]) + name.encode()
+                    section += whole(len(block) + 3) + block + b"\0"
+        return section + bytes(2)
+
+    needed = max(2, -(-(4 + len(written(4))) // 512))
+    n_blocks = needed if n_blocks is None else n_blocks
+    section = bytes([1, 0x50, n_blocks, machine]) + written(2 + needed)
+    fields = {"points": n_points, "analog": analog[0].size if n_frames else 0, "first": 1}
+    fields |= {"last": min(n_frames, 65535), "start": 2 + needed} | (header or {})
     head = bytes([2, 0x50]) + whole(*(fields[k] for k in ("points", "analog", "first", "last")))
-    head += whole(10) + number(scale) + whole(fields["start"], 0) + number(50.0)
+    head += whole(10) + number(scale) + whole(fields["start"], analog.shape[1]) + number(50.0)
+    if "events" in fields:
+        events = fields["events"]
+        head = head.ljust(298, b"\0") + whole(12345, len(events), 0)
+        head += b"".join(number(time) for _, time in events)
+        head = head.ljust(396, b"\0") + b"".join(label.ljust(4).encode() for label, _ in events)
     data = b""
-    for point in positions.reshape(-1, 3):
-        seen = not np.isnan(point).any()
-        values = [*(point if seen else (0.0, 0.0, 0.0)), 0.0 if seen else -1.0]
-        if real:
-            data += b"".join(map(number, values))
-        else:
-            values[:3] = [value / scale for value in values[:3]]
-            data += struct.pack(order + "4h", *map(round, values))
+    for frame in range(n_frames):
+        for i, point in enumerate(positions[frame]):
+            seen = not np.isnan(point).any()
+            word = (0.0 if seen else -1.0) if words is None else words[frame, i]
+            values = [*(point if seen else (0.0, 0.0, 0.0)), word]
+            if real:
+                data += b"".join(map(number, values))
+            else:
+                values[:3] = [value / scale for value in values[:3]]
+                data += struct.pack(order + "4h", *map(round, values))
+        for value in analog[frame].ravel():
+            data += number(value) if real else whole(int(value) % 65536)
     data += bytes(-len(data) % 512)
-    return head.ljust(512, b"\0") + section.ljust(1024, b"\0") + data + tail
+    return head.ljust(512, b"\0") + section.ljust(512 * needed, b"\0") + data + tail
 
 
 def tracks(n_frames=40, gap=None):
@@ -216,3 +258,35 @@ def tracks(n_frames=40, gap=None):
     if gap:
         positions[slice(*gap), 1] = np.nan
     return positions
+
+
+def everything(machine=84):
+    """What a C3D file of that machine may hold beside markers, for `c3d`."""
+    order = ">" if machine == 86 else "<"
+
+    def floats(*values):
+        each = dec if machine == 85 else struct.Struct(order + "f").pack
+        return b"".join(map(each, values))
+
+    events = {
+        "USED": (2, [], struct.pack(order + "H", 3)),
+        "LABELS": texts("Foot Off", "Foot Strike", "Turn"),
+        "CONTEXTS": texts("Left", "Right", "General"),
+        "TIMES": (4, [2, 3], floats(0, 2.5, 0, 2.25, 1, 0.5)),
+    }
+    analog = {
+        "USED": (2, [], struct.pack(order + "H", 2)),
+        "LABELS": texts("Fx", "EMG"),
+        "UNITS": texts("N", "V"),
+        "SCALE": (4, [2], floats(0.5, 2)),
+        "OFFSET": (2, [2], struct.pack(order + "2h", 10, -20)),
+        "GEN_SCALE": (4, [], floats(0.25)),
+    }
+    return {
+        "positions": tracks(gap=(3, 9)),
+        "machine": machine,
+        "analog": np.random.default_rng(0).integers(-900, 900, (40, 2, 2)),
+        "changes": {"ANGLES": texts("M2"), "ANGLE_UNITS": texts("deg")},
+        "others": {"EVENT": events, "ANALOG": analog},
+        "header": {"first": 101, "last": 140, "events": [("RHS", 0.5), ("RTO", 0.1)]},
+    }

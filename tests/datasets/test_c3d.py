@@ -9,7 +9,7 @@ import pytest
 from sklearn_motionsync import Skeleton
 from sklearn_motionsync.datasets import fill_gaps, read_motion
 
-from motion_files import c3d, put, tracks
+from motion_files import c3d, put, texts, tracks
 
 
 @pytest.mark.parametrize("machine", [84, 85, 86])
@@ -26,6 +26,10 @@ def test_c3d_of_every_machine(tmp_path, machine, real):
         "kind": "markers",
         "joints": ["M0", "M1", "M2"],
         "parents": [-1, -1, -1],
+        "first_frame": 1,
+        "events": [],
+        "groups": {"markers": {"n": 3, "units": "mm", "frame_rate": 50.0}},
+        "left_out": "",
     }
 
 
@@ -75,6 +79,57 @@ def test_scales_of_floats_do_not_matter(tmp_path):
     other = {"SCALE": (4, [], struct.pack("<f", -0.1))}
     df = read_motion(put(tmp_path, c3d(positions, changes=other), "a.c3d"))
     np.testing.assert_allclose(df, positions.reshape(len(df), -1), rtol=1e-6)
+
+
+def many_texts(n):
+    return {"NOTES": {f"N{i}": texts("x" * 255, "y" * 255) for i in range(n)}}
+
+
+def test_parameters_longer_than_they_count(tmp_path):
+    """The beginning of the data bounds them, and what lies behind their end may be anything."""
+    for n_blocks in (1, 2, 255):
+        content = c3d(tracks(), others=many_texts(5), n_blocks=n_blocks)
+        path = put(tmp_path, content, "a.c3d")
+        np.testing.assert_array_equal(read_motion(path).to_numpy().reshape(40, 3, 3), tracks())
+    path = put(tmp_path, c3d(tracks(), others=many_texts(300), n_blocks=45), "a.c3d")
+    assert len(read_motion(path)) == 40
+    end = content.index(b"N4") - 2
+    junk = content[:end] + b"\0\0" + b"\xff" * 100 + content[end + 102 :]
+    assert len(read_motion(put(tmp_path, junk, "a.c3d"))) == 40
+
+
+@pytest.mark.parametrize(("machine", "order"), [(86, "<"), (84, ">")])
+@pytest.mark.parametrize("real", [True, False])
+def test_integers_in_the_order_of_another_machine(tmp_path, machine, order, real):
+    analog = np.random.default_rng(0).integers(-300, 300, (40, 2, 2))
+    content = c3d(tracks(gap=(3, 5)), machine, real, analog=analog, order=order)
+    path = put(tmp_path, content, "a.c3d")
+    with pytest.warns(UserWarning, match="1 gaps"):
+        df = read_motion(path)
+    np.testing.assert_array_equal(df.to_numpy().reshape(40, 3, 3), tracks(gap=(3, 5)))
+    np.testing.assert_array_equal(read_motion(path, group="analog"), analog.reshape(80, 2))
+
+
+@pytest.mark.parametrize("real", [True, False])
+def test_points_at_the_origin_that_nobody_saw(tmp_path, real):
+    """No camera and no residual is no sight of the origin; a camera is."""
+    positions, words = tracks(), np.full((40, 3), 257.0)
+    positions[5:9, 0] = positions[20:22, 1] = positions[30, 2] = 0
+    words[5:9, 0], words[12:15, 0], words[30, 2] = 0, 0, -1
+    expected = positions.copy()
+    expected[5:9, 0] = expected[30, 2] = np.nan
+    path = put(tmp_path, c3d(positions, real=real, words=words), "a.c3d")
+    with pytest.warns(UserWarning, match=r"of 2 of 3 markers \(M0, M2\): 2 gaps"):
+        df = read_motion(path)
+    np.testing.assert_array_equal(df.to_numpy().reshape(40, 3, 3), expected)
+
+
+def test_other_signs_of_points_that_nobody_saw(tmp_path):
+    positions, words = tracks(), np.zeros((40, 3))
+    positions[5:9, 0], words[5:9, 0] = 0, 65535  # -1 in 16 bits
+    positions[20:22, 1] = 9999999
+    with pytest.warns(UserWarning, match=r"of 2 of 3 markers \(M0, M1\): 2 gaps"):
+        read_motion(put(tmp_path, c3d(positions, words=words), "a.c3d"))
 
 
 @pytest.mark.parametrize(
@@ -131,3 +186,22 @@ def test_real_c3d(real_data):
     for df in frames.values():
         np.testing.assert_allclose(df, first, atol=1e-3)
         assert df.attrs == first.attrs
+    events = [(event["label"], event["time"], event["frame"]) for event in first.attrs["events"]]
+    assert events == [("RIC", 2.72, 136), ("RHS", 5.4, 270), ("RTO", 7.32, 366)]
+    assert first.attrs["left_out"] == "16 analog channels at 200 Hz, the geometry of 2 force plates"
+
+
+def test_real_analog(real_data):
+    """All encodings are alike, and as the package c3d reads and scales them."""
+    import c3d as peer
+
+    for path in sorted((real_data / "original_files" / "c3d").glob("*.c3d")):
+        df = read_motion(path, group="analog")
+        with path.open("rb") as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            values = [frame[2] for frame in peer.Reader(file).read_frames(copy=True)]
+        np.testing.assert_allclose(df, np.concatenate(values, axis=1).T, rtol=1e-6, atol=1e-4)
+        assert df.attrs["frame_rate"] == 200
+        assert df.attrs["channels"] == list(df.columns)
+        assert df.attrs["units"][:4] == ["nt", "nt", "nt", "ntmm"]
+        assert df.attrs["events"][0]["frame"] == 4 * 136

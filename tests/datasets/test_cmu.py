@@ -200,6 +200,34 @@ def test_no_trials(tmp_path):
         fetch_cmu(1, [], data_home=tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        *(
+            ({"n_retries": n}, "n_retries must be a whole number, 0 or")
+            for n in (-1, 1.5, None, True)
+        ),
+        *(({"delay": d}, "delay must be seconds, from 0") for d in (-1, np.nan, np.inf, "1", True)),
+        *(
+            ({"url": u}, "url must be an address, such as")
+            for u in (None, 3, "", "host", b"http://h")
+        ),
+        *(({"sha256": m}, "sha256 must be checksums by the na") for m in ("0" * 64, ["0" * 64], 5)),
+        *(
+            ({"sha256": {"02.asf": c}}, "sha256 of '02.asf' must be 64 hex")
+            for c in (None, "", "0")
+        ),
+        *(({"download_if_missing": d}, "must be True or False") for d in ("no", None)),
+    ],
+    ids=str,
+)
+def test_parameters_that_make_no_sense(site, tmp_path, params, message):
+    with pytest.raises(ValueError, match=message):
+        fetch(site, tmp_path, **params)
+    assert site.asked == []
+    assert kept(tmp_path) == []
+
+
 def test_real_walks(site, tmp_path, real_data):
     folder = real_data / "original_files" / "asf_amc"
     for path in folder.glob("02*"):

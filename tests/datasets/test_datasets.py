@@ -1,9 +1,8 @@
-"""Data sets: what is promised of the synthetic one, and archives good and bad."""
+"""Data sets: what is promised of the synthetic one."""
 
 import numpy as np
 import pytest
-from sklearn_motionsync import Skeleton
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import make_bending
 
 
 def joint(bunch, i, name):
@@ -80,7 +79,15 @@ def test_random_state_decides():
 
 @pytest.mark.parametrize(
     "params",
-    [{"n_performances": 0}, {"noise": -1}, {"n_frames": 3}, {"style": np.nan}, {"frame_rate": 0}],
+    [
+        *({"n_performances": value} for value in (0, True, 10**9, 2.0)),
+        *({"n_frames": value} for value in (3, 10**9, np.nan)),
+        *({"n_actors": value} for value in (0, 10**12)),
+        *({"style": value} for value in (np.nan, -1, 1e308, "much")),
+        *({"warp": value} for value in (3000, 11, -1, np.inf, None)),
+        *({"noise": value} for value in (1e308, -1, np.nan, np.inf)),
+        *({"frame_rate": value} for value in (0, -1, np.inf)),
+    ],
     ids=str,
 )
 def test_nonsense_parameters(params):
@@ -88,86 +95,17 @@ def test_nonsense_parameters(params):
         make_bending(**params)
 
 
-# -- load_performances ------------------------------------------------------------------
+def test_what_it_would_take_is_said_before():
+    with pytest.raises(
+        ValueError, match=r"1000000 performances of about 100000 frames would take 36000 GB"
+    ):
+        make_bending(10**6, n_frames=10**5)
 
 
-def fields():
-    kinect = Skeleton.kinect()
-    return {
-        "positions": np.random.default_rng(0).standard_normal((12, 20, 3)).astype(np.float32),
-        "offsets": [0, 5, 12],
-        "label": ["bow", "wave"],
-        "actor": ["A", "B"],
-        "take": ["1", "1"],
-        "fps": [30.0, np.nan],
-        "joints": kinect.joints,
-        "parents": kinect.parents,
-    }
-
-
-def test_an_archive(tmp_path):
-    content = fields()
-    np.savez(tmp_path / "a.npz", **content)
-    bunch = load_performances(str(tmp_path / "a.npz"))
-    assert [x.shape for x in bunch.data] == [(5, 60), (7, 60)]
-    assert bunch.data[0].dtype == np.float32
-    np.testing.assert_array_equal(bunch.data[1], content["positions"][5:].reshape(7, 60))
-    assert bunch.target.tolist() == ["bow", "wave"]
-    assert bunch.actor.tolist() == ["A", "B"]
-    assert bunch.skeleton == Skeleton.kinect()
-    assert bunch.frame_rate[0] == 30
-    assert np.isnan(bunch.frame_rate[1])
-
-
-def test_an_archive_of_something_else_than_a_body(tmp_path):
-    np.savez(tmp_path / "a.npz", **fields() | {"joints": [f"m{i}" for i in range(20)]})
-    assert load_performances(tmp_path / "a.npz").skeleton is None
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"offsets": None}, r"lacks \['offsets'\]"),
-        ({"positions": np.zeros((12, 60))}, r"shape \(frames, joints, 3\)"),
-        ({"positions": np.zeros((12, 20, 3), int)}, "must be floats"),
-        ({"offsets": [0, 5, 11]}, "offsets must increase from 0 to the 12 frames"),
-        ({"offsets": [0, 12, 5]}, "offsets must increase"),
-        ({"offsets": [0, 0, 12]}, "offsets must increase"),
-        ({"offsets": [0.0, 5.0, 12.0]}, "whole numbers"),
-        ({"label": ["bow"]}, r"label must have shape \(2,\), got \(1,\)"),
-        ({"joints": ["a"]}, r"joints must have shape \(20,\)"),
-        ({"label": np.array([{}, {}], dtype=object)}, "cannot be read"),
-    ],
-    ids=str,
-)
-def test_bad_archives(tmp_path, change, message):
-    content = {k: v for k, v in (fields() | change).items() if v is not None}
-    np.savez(tmp_path / "a.npz", **content)
-    with pytest.raises(ValueError, match=message):
-        load_performances(tmp_path / "a.npz")
-
-
-@pytest.mark.parametrize("content", [b"", b"text", b"PK\x03\x04 and then nothing"])
-def test_files_that_are_no_archives(tmp_path, content):
-    (tmp_path / "a.npz").write_bytes(content)
-    with pytest.raises(ValueError, match=r"cannot be read as a NumPy \.npz archive"):
-        load_performances(tmp_path / "a.npz")
-
-
-def test_a_single_array_is_no_archive(tmp_path):
-    np.save(tmp_path / "a.npy", np.zeros(3))
-    with pytest.raises(ValueError, match="cannot be read"):
-        load_performances(tmp_path / "a.npy")
-
-
-def test_no_file(tmp_path):
-    with pytest.raises(FileNotFoundError, match="no archive at"):
-        load_performances(tmp_path / "a.npz")
-
-
-def test_real_archives(real_data):
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
-    assert len(bunch.data) == len(bunch.target) == 132
-    assert bunch.skeleton == Skeleton.acclaim()
-    assert load_performances(real_data / "utkinect" / "utkinect_positions.npz").skeleton is not None
-    assert load_performances(real_data / "cmu07_walk" / "cmu07_walk_positions.npz").skeleton
+@pytest.mark.parametrize("params", [{"warp": 10}, {"noise": 1000}, {"style": 100}], ids=str)
+def test_the_largest_parameters(params):
+    bunch = make_bending(4, n_frames=400, random_state=0, **params)
+    for x, times, keyframes in zip(bunch.data, bunch.times, bunch.keyframes, strict=True):
+        assert np.isfinite(x).all()
+        assert (np.diff(times) > 0).all()
+        assert (np.diff(keyframes) > 0).all()

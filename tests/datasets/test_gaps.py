@@ -54,3 +54,56 @@ def test_columns_that_are_no_joints():
     for columns in (["a_x", "a_y"], ["a_x", "a_z", "a_y"], ["time", "a_x", "a_y"], []):
         with pytest.raises(ValueError, match="columns must be <joint>_x, <joint>_y, <joint>_z"):
             find_gaps(pd.DataFrame(0.0, index=range(2), columns=columns))
+
+
+def test_a_joint_that_comes_twice():
+    """Each is filled by itself."""
+    df = with_gaps()
+    twice = pd.concat([df, df * 2], axis=1)
+    expected = pd.concat([fill_gaps(df, 9), fill_gaps(df * 2, 9)], axis=1)
+    pd.testing.assert_frame_equal(fill_gaps(twice, 9), expected)
+    assert find_gaps(twice)["joint"].tolist() == ["a", "a", "c", "c"] * 2
+
+
+def test_missing_values_of_other_kinds():
+    df = with_gaps()
+    for other in (df.convert_dtypes(), df.astype(object).where(df.notna(), None)):
+        pd.testing.assert_frame_equal(find_gaps(other), find_gaps(df))
+        pd.testing.assert_frame_equal(fill_gaps(other, 9), fill_gaps(df, 9))
+
+
+def one_changed(value):
+    df = with_gaps().astype(object)
+    df.iloc[7, 4] = value
+    return df
+
+
+@pytest.mark.parametrize(
+    ("df", "message"),
+    [
+        (np.zeros((5, 3)), r"must be a DataFrame, as read_motion gives, got ndarray; .*columns=sk"),
+        ([[0.0, 1.0, 2.0]], "must be a DataFrame, as read_motion gives, got list"),
+        (None, "got NoneType"),
+        (with_gaps()["a_x"], "got Series"),
+        (one_changed(np.inf).astype(float), r"Frame 7, column 'b_y' is infinite; .*df\.replace"),
+        (one_changed(-np.inf), "Frame 7, column 'b_y' is infinite"),
+        (one_changed("far"), "Column 'b_y' must hold numbers, got object; convert it"),
+        (one_changed(1j), "Column 'b_y' must hold numbers"),
+        (with_gaps().astype(complex), "Column 'a_x' must hold numbers, got complex128"),
+        (with_gaps().astype("M8[ns]"), "Column 'a_x' must hold numbers, got datetime64"),
+        (pd.concat({"p": with_gaps(), "q": with_gaps()}), "of one performance, got a table of 2"),
+    ],
+)
+def test_what_is_no_recording(df, message):
+    with pytest.raises(ValueError, match=message):
+        find_gaps(df)
+    with pytest.raises(ValueError, match=message):
+        fill_gaps(df, 3)
+
+
+def test_a_table_performance_by_performance():
+    """As the message says."""
+    table = pd.concat({"p": with_gaps(), "q": with_gaps() * 2})
+    filled = table.groupby(level=0, group_keys=False).apply(fill_gaps, max_gap=9)
+    np.testing.assert_array_equal(filled.loc["q"], fill_gaps(with_gaps() * 2, 9))
+    pd.testing.assert_frame_equal(fill_gaps(table.loc[["p"]], 9), filled.loc[["p"]])

@@ -6,7 +6,7 @@ from sklearn_motionsync import DirectionCosines, Skeleton
 from sklearn_motionsync.datasets import read_motion
 
 import fuzz_readers
-from motion_files import AMC, ASF, body, c3d, put, tracks
+from motion_files import AMC, ASF, body, c3d, everything, put, tracks
 
 
 @pytest.mark.parametrize("name", ["a.bvh", "a.amc", "a.c3d"])
@@ -42,10 +42,11 @@ def test_damaged_files(tmp_path):
         {"a.bvh": body().encode()},
         {"a.amc": AMC.encode(), "a.asf": ASF.encode("latin-1")},
         *({"a.c3d": c3d(tracks(gap=(3, 9)), machine)} for machine in (84, 85, 86)),
+        *({"a.c3d": c3d(**everything(machine))} for machine in (84, 85, 86)),
     ]
     outcomes = [
         fuzz_readers.run_case(fuzz_readers.damaged(originals, 0, number), tmp_path)
-        for number in range(400)
+        for number in range(500)
     ]
     assert set(outcomes) == {"read", "ValueError"}
 

@@ -381,5 +381,5 @@ def test_matplotlib_is_not_imported_before_drawing():
 
 def test_without_matplotlib(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
-    with pytest.raises(ImportError, match=r"pip install 'sklearn-motionsync\[plot\]'"):
+    with pytest.raises(ImportError, match="Drawing needs matplotlib: pip install matplotlib"):
         pyplot()

@@ -127,7 +127,7 @@ def test_impossible_lengths_and_rates(matched, lengths, rate, message):
         (np.zeros(5), None, r"got \(5,\)"),
         (np.zeros((5, 1)), None, "at least 2"),
         ([[0.0, 1.0], [0.0, 1.5]], None, "Performance 1: .* 0 to P - 1 = 1, .* got 0 to 1.5"),
-        ([[0.0, 1.0]], ["near"], "could not convert"),
+        ([[0.0, 1.0]], ["near"], "distances is not a numeric array: got str, 'near'"),
         ([[0.0, np.nan]], None, "from 0 to P - 1"),
         ([[0.0, 1.0]], [1.0, 2.0], r"each of the 1 performances, got shape \(2,\)"),
     ],

@@ -1,0 +1,54 @@
+"""Axes of bodies and of limbs: along the hips, and along the parent limb."""
+
+import numpy as np
+
+from .limbs import LEFT, LIMBS, UP
+
+__all__ = ["along_parents", "heading", "turned"]
+
+
+def heading(hip):
+    """Frames (n_frames, 3, 3), rows x to the left along the hips, y up, z forward."""
+    x = hip * np.array([1, 0, 1], dtype=hip.dtype)
+    length = np.linalg.norm(x, axis=1, keepdims=True)
+    # Hips one above the other show no heading: keep the recording's axes.
+    shown = length[:, 0] > np.sqrt(np.finfo(hip.dtype).eps)
+    x = np.where(shown[:, np.newaxis], x / np.where(length > 0, length, 1), LEFT)
+    y = np.broadcast_to(np.asarray(UP, dtype=x.dtype), x.shape)
+    return np.stack([x, y, np.cross(x, y)], axis=1).astype(hip.dtype)
+
+
+def turned(vectors, frames):
+    """Coordinates of (n_frames, n, 3) vectors along the rows of (n_frames, 3, 3) frames."""
+    return vectors @ frames.transpose(0, 2, 1)
+
+
+def _swing(rest, direction):
+    """Rows: the axes after the smallest rotation that takes ``rest`` to each direction."""
+    rest = np.asarray(rest, dtype=direction.dtype)
+    axis = np.cross(rest, direction)
+    cosine = direction @ rest
+    # At the opposite of rest every axis serves; the limit keeps the rotation finite.
+    scale = 1 / np.maximum(1 + cosine, np.finfo(direction.dtype).eps)
+    cross = np.zeros((len(axis), 3, 3), dtype=direction.dtype)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        cross[:, i, j], cross[:, j, i] = -axis[:, k], axis[:, k]
+    rotation = np.eye(3, dtype=direction.dtype) + cross + scale[:, None, None] * (cross @ cross)
+    return rotation.transpose(0, 2, 1)
+
+
+def along_parents(cosines, *, inverse=False):
+    """From cosines along the body's axes to those along the parent limbs' axes, or back."""
+    frames, out = {}, np.empty_like(cosines)
+    for i, (name, limb) in enumerate(LIMBS.items()):
+        given = cosines[:, i : i + 1]
+        if limb.parent is None:
+            local = whole = given
+            parent = np.broadcast_to(np.eye(3, dtype=cosines.dtype), (len(cosines), 3, 3))
+        else:
+            parent = frames[limb.parent]
+            local = given if inverse else turned(given, parent)
+            whole = given @ parent if inverse else given
+        out[:, i : i + 1] = whole if inverse else local
+        frames[name] = _swing(limb.rest, local[:, 0]) @ parent
+    return out
