@@ -68,6 +68,10 @@ SIZE = "a size of work or memory: results do not depend on it"
 # (module, what stood there, or the change as the table prints it): why nobody could tell.
 EQUIVALENT = {
     (
+        "gate",
+        "array.dtype.itemsize > out.dtype.itemsize -> array.dtype.itemsize >= out.dtype.itemsize",
+    ): "numbers of one size are never too large",
+    (
         "matching/consensus",
         "(np.arange(count) + 0.5) / max(count, 1) -> (np.arange(count) + 0.5) / max(count, 0)",
     ): "divides an empty array",
@@ -76,6 +80,7 @@ EQUIVALENT = {
     ("matching/filters", "get_config()['working_memory'] * 2 ** 20 / 6"): SIZE,
     ("matching/filters", "beyond > 0 -> beyond > -1"): "pads by nothing",
     ("matching/filters", "next_fast_len(sequences.shape[1] + 2 * margin, real=True)"): SIZE,
+    ("matching/keyframes", "np.zeros(len(peaks)) -> np.ones(len(peaks))"): "every way pays it",
     ("matching/narrow", "NARROW_CELLS = 30000"): SIZE,
     ("matching/narrow", "_NARROW_WAYS = 1000000"): SIZE,
     ("matching/narrow", "_FEW_PAIRS = 4"): SIZE,
