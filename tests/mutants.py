@@ -115,6 +115,14 @@ EQUIVALENT = {
     ("matching/warper", "get_config()['working_memory'] * 2 ** 20"): SIZE,
     ("matching/warper", "get_config()['working_memory'] * 2 ** 20 // 2"): SIZE,
     ("matching/warps", "_SAMPLED_AT_ONCE = 64"): SIZE,
+    ("metrics/spread", "len(z) * (len(z) - 1)"): "cancels in the ratio",
+    (
+        "metrics/spread",
+        "return correlation[~np.eye(len(centred), dtype=bool)].sum() / pairs -> "
+        "return correlation[~np.eye(len(centred), dtype=bool)].sum()",
+    ): "cancels in the ratio",
+    ("sequences", "max(depths, default=0) -> max(depths, default=1)"): "2 is asked for",
+    ("sequences", "max(depths, default=0) -> max(depths, default=-1)"): "2 is asked for",
 }
 
 NAMES = [

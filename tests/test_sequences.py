@@ -86,3 +86,9 @@ def test_a_performance_has_frames_and_features(shape):
             take([np.zeros((5, 2)), np.zeros(shape)])
         with pytest.raises(ValueError, match=r"Performance 0 .* at least 2 frames and 1 feature"):
             take([np.zeros(shape)] * 3)
+
+
+@pytest.mark.parametrize("rows", [[[1.0, 2.0], [3.0]], [[1.0, 2.0], []]])
+def test_rows_of_several_lengths_are_no_performances(rows):
+    with pytest.raises(ValueError, match="Performance 0 has 2 values in one dimension and others"):
+        to_frame(rows)
