@@ -57,3 +57,22 @@ def plain_loops(x, y, costs, mu, subframes, max_disparity):
                 new[q] = min(ways)
         row = new
     return row[last]
+
+
+def slow_filter(x, sigma, order):
+    """A sampled Gaussian, or its derivative, by explicit sums over the point reflections."""
+    n = len(x)
+    reach = min(int(np.ceil(4 * sigma)) + 1, n - 1)
+    sigma = max(sigma, 1 / 3)
+    k = np.arange(-int(4 * sigma + 0.5), int(4 * sigma + 0.5) + 1)
+    kernel = np.exp(-0.5 * (k / sigma) ** 2)
+    kernel /= kernel.sum()
+    kernel *= (1, k / sigma**2, k**2 / sigma**4 - 1 / sigma**2)[order]
+
+    def at(i):
+        i = min(max(i, -reach), n - 1 + reach)
+        if i < 0:
+            return 2 * x[0] - x[-i]
+        return x[i] if i < n else 2 * x[-1] - x[2 * (n - 1) - i]
+
+    return np.array([sum(w * at(i + j) for w, j in zip(kernel, k, strict=True)) for i in range(n)])

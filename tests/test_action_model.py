@@ -113,9 +113,28 @@ def test_a_feature_in_which_nobody_differs(performances):
     model = ActionModel().fit(X)
     assert np.isfinite(model.score_samples(X)).all()
     assert (model.variance_[:, 1] == 0).all()
+    # A billionth of the variance of the feature that varies most, over time and performances.
+    floor = 1e-9 * max(X[:, :, k].var() for k in range(3))
+    std = np.sqrt(np.maximum(X.var(axis=0), floor))
+    expected = norm(X.mean(axis=0), std).logpdf(X).sum(axis=(1, 2))
+    np.testing.assert_allclose(model.score_samples(X), expected)
     other = X[:1] + [0, 0.5, 0]
     assert model.predict(other).tolist() == [-1]
     assert model.accepts(model.sample(5, frame=2, random_state=0), 2).all()
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e-3, 1e3, 1e6])
+def test_the_unit_of_the_features_changes_nothing(performances, scale):
+    """Densities are those of the other unit; also where nobody differs, by the movement itself."""
+    same = np.repeat(performances[:1], 4, axis=0)
+    for X in (performances, same):
+        model, other = ActionModel().fit(X), ActionModel().fit(scale * X)
+        new = X[:3] + [[[0.0]], [[0.1]], [[5.0]]]
+        change = X[0].size * np.log(scale)
+        expected = model.score_samples(new) - change
+        np.testing.assert_allclose(other.score_samples(scale * new), expected, rtol=1e-6)
+        np.testing.assert_array_equal(other.predict(scale * new), model.predict(new))
+    assert model.predict(new).tolist() == [1, -1, -1]
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0, 1e6])

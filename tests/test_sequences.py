@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import to_frame, to_sequences
+from sklearn_motionsync import DenseSynchronizer, to_frame, to_sequences
 
 
 @pytest.fixture
@@ -118,3 +118,19 @@ def test_jitter_is_no_gap(table):
     rng = np.random.default_rng(0)
     table["time"] += rng.uniform(-0.02, 0.02, len(table))
     assert len(to_sequences(table, by=["subject", "trial"], time="time")) == 4
+
+
+@pytest.mark.parametrize("shape", [(1, 2), (0, 2), (5, 0)])
+def test_a_performance_has_frames_and_features(shape):
+    """None of either is no performance, wherever it stands."""
+    for take in (to_frame, DenseSynchronizer().fit):
+        with pytest.raises(ValueError, match=r"Performance 1 .* at least 2 frames and 1 feature"):
+            take([np.zeros((5, 2)), np.zeros(shape)])
+        with pytest.raises(ValueError, match=r"Performance 0 .* at least 2 frames and 1 feature"):
+            take([np.zeros(shape)] * 3)
+
+
+@pytest.mark.parametrize("rows", [[[1.0, 2.0], [3.0]], [[1.0, 2.0], []]])
+def test_rows_of_several_lengths_are_no_performances(rows):
+    with pytest.raises(ValueError, match="Performance 0 has 2 values in one dimension and others"):
+        to_frame(rows)

@@ -39,14 +39,24 @@ def _smooth(on_clock, sigma, order):
     # Below a third of a sample the derivative of a Gaussian is no derivative any more.
     sigma = max(sigma, 1 / 3)
     if sigma > _WIDE:
+        beyond = _margin(sigma) - reach
+        if beyond > 0:
+            # The filter is longer than the reflections: their ends go on.
+            continued = np.pad(continued, [(0, 0), (beyond, beyond), (0, 0)], mode="edge")
+            reach += beyond
         return _convolve(continued, sigma, order)[:, reach:-reach]
     filtered = gaussian_filter1d(continued, sigma, axis=1, order=order, mode="nearest")
     return filtered[:, reach:-reach]
 
 
+def _margin(sigma):
+    """How far a filter reaches."""
+    return int(4 * sigma + 0.5)
+
+
 def _convolve(sequences, sigma, order):
     """The same filter by Fourier transforms, for wide ones; the margins are of no use."""
-    margin = int(4 * sigma + 0.5)
+    margin = _margin(sigma)
     impulse = np.zeros(2 * margin + 1)
     impulse[margin] = 1
     kernel = gaussian_filter1d(impulse, sigma, order=order, mode="constant")

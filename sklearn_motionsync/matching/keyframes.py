@@ -93,5 +93,8 @@ def _curvature(on_clock):
     scaled = Unit.of(on_clock)(on_clock)
     v, a = (smooth(scaled, sigma, order)[0].astype(np.float64) for order in (1, 2))
     vv, aa, va = np.square(v).sum(1), np.square(a).sum(1), (v * a).sum(1)
-    rest = 0.1 * vv.mean() + np.finfo(np.float64).tiny
+    rest = 0.1 * vv.mean()
+    if rest == 0:
+        # What never moves bends nowhere.
+        return np.zeros_like(vv)
     return np.sqrt(np.maximum(vv * aa - va**2, 0)) / (vv + rest) ** 1.5

@@ -169,6 +169,31 @@ def test_tiles_cover_every_pair_once_and_are_tiles_themselves(sizes, reach):
     assert (count == 1).all()
 
 
+@pytest.mark.parametrize("sizes", [(60, 900), (400, 500), (1000, 40)])
+@pytest.mark.parametrize("reach", [5, 25, 400])
+def test_tiles_are_as_large_as_they_may_be(sizes, reach):
+    """The product of a row, a cell for every pair and offset, fills its room, and no more."""
+    trellis = Trellis(step_table(), 0.5, reach)
+    shapes = [
+        (some.stop - some.start, columns.stop - columns.start)
+        for some, columns in trellis.tiles(*sizes, n_features=16)
+    ]
+    products = [n * m * (2 * reach + 1) * (16 + 2) for n, m in shapes]
+    assert max(n for n, _ in shapes) <= tiling.TILE_BASES
+    assert max(products) <= tiling.TILE_PRODUCT
+    assert min(products) > tiling.TILE_PRODUCT / 3
+
+
+@pytest.mark.parametrize(
+    ("sizes", "reach", "n_bases"),
+    [((7, 1024), 0, 1), ((7, 1023), 0, 7), ((8, 3000), 0, 8), ((7, 20), 26, 1), ((7, 19), 26, 7)],
+)
+def test_few_bases_with_long_rows_are_taken_one_by_one(sizes, reach, n_bases):
+    """Less than 8 bases, 1024 cells and more."""
+    tiles = Trellis(step_table(), 0.5, reach).tiles(*sizes, n_features=3)
+    assert {some.stop - some.start for some, _ in tiles} == {n_bases}
+
+
 def test_memory_grows_with_the_band_not_with_the_square():
     """4000 frames in a band of 81: a full matrix of float64 would take 128 MB."""
     bases, moving = draw(np.random.default_rng(5), 1, 4000, n_features=3)

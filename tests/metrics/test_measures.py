@@ -228,6 +228,22 @@ def test_only_hidden_features_see_through_over_warping():
     assert FeatureHoldoutScorer()(sync, X) < -0.95
 
 
+def test_holdout_judges_by_every_feature(bending_aspace):
+    """One feature a hand: what is dealt first does not matter, each is judged by the others."""
+    X = [x[:, :4] for x in bending_aspace[:8]]
+    sync = DenseSynchronizer(40).fit(X)
+    scores = []
+    for k in range(4):
+        seen, hidden = [np.delete(x, k, axis=1) for x in X], [x[:, [k]] for x in X]
+        after = DenseSynchronizer(40).fit(seen).match(seen).warp(hidden)
+        before = LinearSynchronizer(40).fit_transform(hidden)
+        scores.append(-least_squares(before, after))
+    assert np.ptp(scores) > 0.1
+    for seed in range(3):
+        found = FeatureHoldoutScorer(n_folds=4, random_state=seed)(sync, X)
+        np.testing.assert_allclose(found, np.mean(scores))
+
+
 def test_holdout_needs_features(bending_aspace):
     sync = DenseSynchronizer(40).fit([x[:, :1] for x in bending_aspace])
     with pytest.raises(ValueError, match="n_folds=3 must be between 2 and the 1 features"):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
 
-from oracle import plain_loops
+from oracle import plain_loops, slow_filter
 
 BOTH = [LinearSynchronizer, DenseSynchronizer]
 # The settings at which DenseSynchronizer is the paper's method.
@@ -233,6 +233,59 @@ def test_smoothness_is_a_pure_number(warps):
     assert a.pattern_index_ == b.pattern_index_
     X, Y = warps, [1000 * x + 5e4 for x in warps]
     np.testing.assert_allclose(a.match(X).offsets, b.match(Y).offsets, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("n_frames", "max_offset", "reach"),
+    [(100, 0.29, 29), (100, 0.285, 28), (41, 0.25, 10), (60, 0.01, 0), (60, 1, 45)],
+)
+def test_offsets_reach_as_far_as_they_may(n_frames, max_offset, reach):
+    """A step comes three quarters of the clip late: as much of that is made up for."""
+    x = np.zeros((2, n_frames, 1))
+    x[0, 5:], x[1, 5 + 3 * n_frames // 4 :] = 1, 1
+    settings = {**PAPER, "smoothness": 0, "max_rate": n_frames}
+    sync = DenseSynchronizer(pattern=0, max_offset=max_offset, **settings).fit(x)
+    assert np.abs(sync.match(x).offsets).max() == reach
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"warp_smoothing": 0},
+        {"warp_smoothing": 0.008},
+        {"warp_smoothing": 0.01},
+        {"warp_smoothing": 0.2, "consensus": 2},
+        {"max_offset": 0.04},
+        {"cost": "posture", "subframes": 2, "max_rate": 3},
+    ],
+    ids=str,
+)
+def test_warps_are_votes_of_paths_smoothed(settings, warps):
+    """Paths to the pattern and to its exemplars, by synchronizers that match to each of them.
+
+    Less than a third of a frame is no smoothing.
+    """
+    P, settings = 40, {"n_frames": 40, **settings}
+    X = [x + 0.1 * np.sin(3 * x[:, ::-1]) * i for i, x in enumerate(warps)]
+    sync = DenseSynchronizer(pattern=1, refine=False, **settings).fit(X)
+    frames, reach, sigma = np.arange(P), int(sync.max_offset * P), sync.warp_smoothing * (P - 1)
+    direct, *others = (
+        DenseSynchronizer(pattern=int(k), **{**settings, "consensus": 0}).fit(X).match(X)
+        for k in (1, *sync.exemplars_)
+    )
+    np.testing.assert_array_equal(sync.match(X).distances, direct.distances)
+    for m in range(len(X)):
+        routes = [direct.times[m]]
+        for k, other in zip(sync.exemplars_, others, strict=True):
+            routes.append(np.interp(direct.times[k], frames, other.times[m]))
+        offsets = np.median(routes, axis=0) - frames
+        if sigma > 1 / 3:
+            offsets = slow_filter(offsets, sigma, 0)
+            offsets[[0, -1]] = 0
+        times = np.clip(frames + np.clip(offsets, -reach, reach), 0, P - 1)
+        expected = np.maximum.accumulate(times) if m != 1 else frames
+        np.testing.assert_allclose(sync.match(X).times[m], expected, atol=1e-9)
 
 
 def test_more_smoothness_is_smoother(warps):

@@ -17,6 +17,8 @@ from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.keyframes import curvature_keyframes
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error
 
+from oracle import slow_filter
+
 
 def test_given_keyframes_meet(bending, bending_aspace):
     sync = KeyframeSynchronizer(100).fit(bending_aspace, keyframes=bending.keyframes)
@@ -81,6 +83,82 @@ def test_curvature_finds_the_corners():
     t = np.linspace(0, 3, 91)[:, None]
     path = np.hstack([np.clip(t, 0, 1), np.clip(t - 1, 0, 1), np.clip(t - 2, 0, 1)])
     np.testing.assert_allclose(curvature_keyframes(path, 2), [30, 60], atol=1)
+
+
+@pytest.mark.parametrize("n_frames", [20, 40, 101])
+def test_the_first_keyframe_is_where_the_path_bends_most(n_frames):
+    """sqrt(|v|^2 |a|^2 - (v.a)^2) / |v|^3, a tenth of the mean |v|^2 added where it stands."""
+    rng, t, cases = np.random.default_rng(n_frames), np.linspace(0, 1, n_frames), 0
+    for _ in range(40):
+        waves = np.sin(np.outer(t, rng.uniform(2, 20, 3)) + rng.uniform(0, 6, 3))
+        path = waves @ rng.standard_normal((3, 3))
+        path -= path.mean(axis=0)
+        v, a = (slow_filter(path, 0.03 * (n_frames - 1), order) for order in (1, 2))
+        vv = (v**2).sum(axis=1)
+        bend = np.linalg.norm(np.cross(v, a), axis=1) / (vv + 0.1 * vv.mean()) ** 1.5
+        # Close to an end no key-frame is chosen.
+        if n_frames / 6 < bend.argmax() < n_frames - 1 - n_frames / 6:
+            cases += 1
+            sync = KeyframeSynchronizer(n_keyframes=1).fit([path])
+            assert sync.keyframes_.tolist() == [bend.argmax()]
+    assert cases > 10
+
+
+@pytest.mark.parametrize("n_keyframes", [2, 5, 9])
+def test_a_movement_run_backwards_has_the_same_keyframes(n_keyframes):
+    """One end is as good as the other, to keep away from as well."""
+    rng = np.random.default_rng(0)
+    for n_frames in range(30, 70):
+        path = np.cumsum(rng.standard_normal((n_frames, 3)), axis=0)
+        there, back = (
+            KeyframeSynchronizer(n_keyframes=n_keyframes).fit([x]).keyframes_
+            for x in (path, path[::-1])
+        )
+        assert len(there) == n_keyframes
+        np.testing.assert_array_equal(back, n_frames - 1 - there[::-1])
+
+
+def test_keyframes_that_look_alike_are_found_in_their_order():
+    """Twice around a triangle: each corner is passed again, early or late, and is another one."""
+    corners = np.array([[0.0, 0], [1, 0], [0.5, 0.8], [0, 0], [1, 0], [0.5, 0.8], [0, 0]])
+    turns = [20, 40, 60, 80, 100], [24, 36, 66, 76, 98], [14, 40, 52, 88, 106]
+    X = [
+        np.column_stack([np.interp(np.arange(121), [0, *k, 120], way) for way in corners.T])
+        for k in turns
+    ]
+    sync = KeyframeSynchronizer(pattern=0, n_keyframes=5).fit(X)
+    np.testing.assert_allclose(sync.keyframes_, turns[0], atol=1)
+    times = sync.match(X).times[:, sync.keyframes_.astype(int)]
+    np.testing.assert_allclose(times, turns, atol=4)
+
+
+def test_a_style_does_not_move_keyframes():
+    """Twice around an ellipse, elsewhere: its ends are where it bends, not where it is closest."""
+    t = np.linspace(0, 1, 121)
+    phase = np.pi / 2 + 4 * np.pi * np.stack([t, t + 0.03 * np.sin(2 * np.pi * t)])
+    pattern, other = np.stack([2 * np.cos(phase), np.sin(phase)], axis=2)
+    sync = KeyframeSynchronizer(pattern=0, n_keyframes=4).fit([pattern, other + [0, 0.5]])
+    np.testing.assert_allclose(sync.keyframes_, [15, 45, 75, 105], atol=1)
+    landed = sync.match([pattern, other + [0, 0.5]]).times[:, sync.keyframes_.astype(int)]
+    shown = [np.interp(f, np.arange(121), p) for f, p in zip(landed, phase, strict=True)]
+    np.testing.assert_allclose(shown, [np.pi * np.arange(1, 5)] * 2, atol=0.15)
+
+
+def test_rest_has_no_keyframes():
+    """Who stands still trembles, which bends sharply; what counts is where the movement turns."""
+    t, rng = np.linspace(0, 3, 151)[:, None], np.random.default_rng(0)
+    path = np.hstack([np.clip(t, 0, 1), np.clip(t - 1, 0, 1)])
+    path[100:] += 0.003 * rng.standard_normal((51, 2))
+    sync = KeyframeSynchronizer(n_keyframes=1).fit([path])
+    np.testing.assert_allclose(sync.keyframes_, [50], atol=1)
+
+
+def test_what_never_moves_bends_nowhere():
+    """No curvature of 0 / 0."""
+    X = [np.full((n, 2), float(n)) for n in (20, 30)]
+    sync = KeyframeSynchronizer(n_keyframes=3).fit(X)
+    assert len(sync.keyframes_) == 3
+    assert np.isfinite(sync.match(X).times).all()
 
 
 @pytest.mark.parametrize("n_frames", [3, 5, 9])
