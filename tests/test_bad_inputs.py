@@ -162,8 +162,9 @@ PARAMETERS = [
     (SYNCHRONIZERS, {"pattern": X[0].astype("m8[s]")}, ["pattern", "durations"]),
     (SYNCHRONIZERS, {"pattern": [["a"] * 3] * 5}, ["pattern", "'a'"]),
     (SYNCHRONIZERS, {"pattern": 5}, ["pattern=5", "5 performances"]),
-    (SYNCHRONIZERS, {"n_frames": 10**9}, ["n_frames is 1000000000", "GB"]),
-    ([DenseSynchronizer()], {"subframes": 10**9}, ["subframes 1000000000", "GB"]),
+    (SYNCHRONIZERS, {"n_frames": 10**9}, ["n_frames = 1000000000", "GB"]),
+    ([DenseSynchronizer()], {"subframes": 10**6}, ["subframes = 1000000", "steps", "fewer"]),
+    ([DenseSynchronizer()], {"subframes": 10**9}, ["subframes = 1000000000", "GB"]),
 ]
 
 

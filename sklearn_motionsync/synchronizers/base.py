@@ -21,7 +21,7 @@ __all__ = ["Synchronizer", "TrainingSet"]
 # So many times the training set, what differs in it is lost beside a performance.
 _FAR = 1e30
 # What one copy of a training set on the clock may take; a fit holds several.
-MOST_BYTES = 8 * 2**30
+_MOST_BYTES = 4 * 2**30
 
 
 class TrainingSet(NamedTuple):
@@ -229,6 +229,12 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         tags.transformer_tags.preserves_dtype = ["float64", "float32"]
         return tags
 
+    def __getstate__(self):
+        # The names of a pattern have been checked when it was fitted; not everything stores tables.
+        state = super().__getstate__()
+        pattern = state.get("pattern")
+        return {**state, "pattern": pattern.to_numpy()} if hasattr(pattern, "columns") else state
+
     def _learn(self, performances):
         """All that ``fit`` learns of checked performances."""
         training = self._set_clock(performances)
@@ -278,15 +284,15 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
 
     def _check_size(self, performances):
         """Say what a clock asks for before memory runs out."""
-        positions = (self.n_frames_ - 1) * getattr(self, "subframes", 1) + 1
-        n_features = performances[0].shape[1]
-        asked = 8 * len(performances) * positions * n_features
-        if asked > MOST_BYTES:
+        subframes = getattr(self, "subframes", 1)
+        positions = (self.n_frames_ - 1) * subframes + 1
+        asked = 8 * len(performances) * positions * performances[0].shape[1]
+        if asked > _MOST_BYTES:
             raise ValueError(
-                f"{len(performances)} performances of {n_features} feature(s) at {positions} "
-                f"positions of the clock ask for {asked / 2**30:.0f} GB, more than "
-                f"{MOST_BYTES / 2**30:.0f} GB: n_frames is {self.n_frames_}, subframes "
-                f"{getattr(self, 'subframes', 1)}. Use fewer frames, subframes or performances."
+                f"{len(performances)} performances at {positions} positions of the clock, for "
+                f"n_frames = {self.n_frames_} and subframes = {subframes}, ask for "
+                f"{asked / 2**30:.0f} GB several times over; {_MOST_BYTES / 2**30:.0f} GB is the "
+                "limit. Use fewer frames, subframes or performances."
             )
 
     def _given_pattern(self, performances):

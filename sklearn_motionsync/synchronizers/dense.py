@@ -25,6 +25,8 @@ __all__ = ["DenseSynchronizer"]
 # Up to so many performances all pairs are compared: see docs/scaling.md.
 _EXHAUSTIVE = 100
 
+# Steps that a path may take at a frame, all offsets together.
+_MOST_WAYS = 1e9
 # Whether refining helps is tried on at most so many performances.
 _TRIED = 12
 
@@ -280,6 +282,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     def _learn(self, performances):
         with self._progress(fits=True) as progress:
             training = self._set_clock(performances)
+            self._check_steps()
             matcher, features = Matcher.learn(
                 Features(self.cost, self.subframes, self.velocity_smoothing, training.unit),
                 self._positions(training),
@@ -290,6 +293,18 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             source = self._set_pattern(training, median, COSTS[self.cost].degree)
             warper = self._choose_exemplars(training, matcher, source, median.estimates)
             self._warper = self._decide_on_refinement(training, warper, source, progress)
+
+    def _check_steps(self):
+        """Say what a trellis asks for before it takes for ever."""
+        steps = min(self.max_rate, self.n_frames_ - 1) * self.subframes + 1
+        ways = steps * (2 * self.max_offset * self.n_frames_ * self.subframes + 1)
+        if ways > _MOST_WAYS:
+            raise ValueError(
+                f"subframes = {self.subframes}, max_rate = {self.max_rate} and max_offset = "
+                f"{self.max_offset} on {self.n_frames_} frames ask for {ways:.0e} steps of a path "
+                f"at every frame of every pair; {_MOST_WAYS:.0e} is the limit. Use fewer subframes, "
+                "a smaller rate or offset."
+            )
 
     def _positions(self, training, chosen=slice(None)):
         """Performances of the training set at every sub-position of the clock, in the unit."""

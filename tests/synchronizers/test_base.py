@@ -1,6 +1,7 @@
 """What a subclass of Synchronizer gets, if it only says how it matches."""
 
 import inspect
+import pickle
 
 import numpy as np
 import pandas as pd
@@ -132,3 +133,13 @@ def test_checked_performances_are_not_checked_again(shifted):
     narrow = LinearSynchronizer().fit([x[:, :2] for x in shifted])
     with pytest.raises(ValueError, match="Performance 0 has 3 features a frame"):
         narrow.transform(checked)
+
+
+def test_a_pattern_with_names_is_stored_without():
+    """Its names were checked by fit; not every format stores tables."""
+    X = [pd.DataFrame(np.eye(9)[:, :2] * k, columns=["hip", "knee"]) for k in (1, 2, 3)]
+    sync = LinearSynchronizer(pattern=X[1]).fit(X)
+    loaded = pickle.loads(pickle.dumps(sync))
+    assert isinstance(sync.pattern, pd.DataFrame)
+    assert type(loaded.pattern) is np.ndarray
+    np.testing.assert_array_equal(loaded.transform(X), sync.transform(X))

@@ -351,3 +351,11 @@ def test_nonsense_parameters(params, warps):
 def test_a_rate_must_be_a_number(max_rate, warps):
     with pytest.raises(ValueError, match="max_rate"):
         DenseSynchronizer(max_rate=max_rate).fit(warps)
+
+
+def test_no_step_is_longer_than_the_clip(warps):
+    """A rate beyond costs neither time nor memory."""
+    P = 30
+    most = DenseSynchronizer(P, max_rate=P - 1).fit(warps)
+    beyond = DenseSynchronizer(P, max_rate=1e6).fit(warps)
+    np.testing.assert_array_equal(beyond.match(warps).times, most.match(warps).times)
