@@ -17,7 +17,7 @@ from ..matching.warps import normalise
 from ..work import LongWorkMixin, run
 from .base import Synchronizer
 from .match import Match
-from .portions import compare_in_portions, in_portions
+from .portions import compare_in_portions, in_portions, shared_training_set
 
 __all__ = ["DenseSynchronizer"]
 
@@ -278,19 +278,20 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     def _learn(self, performances):
         with self._progress(fits=True) as progress:
             training = self._set_clock(performances)
-            centre = training.on_clock.mean(axis=(0, 1))
+            centre, positions = training.on_clock.mean(axis=(0, 1)), self._positions(training)
             matcher, features = Matcher.learn(
                 Features(self.cost, self.subframes, self.velocity_smoothing, centre),
-                self._positions(training),
+                positions,
                 smoothness=self.smoothness,
                 max_offset=self.max_offset,
                 max_rate=self.max_rate,
             )
             self.mu_ = matcher.trellis.mu
-            median = self._choose_median(matcher, features, progress)
+            shared = shared_training_set(matcher, positions, features)
+            median = self._choose_median(shared, features, progress)
             source = self._set_pattern(training, median)
             warper = self._choose_exemplars(training, matcher, source, median.estimates)
-            self._warper = self._decide_on_refinement(training, warper, progress)
+            self._warper = self._decide_on_refinement(training, warper, progress, shared)
 
     def _positions(self, training, chosen=slice(None)):
         """Performances of the training set at every sub-position of the clock."""
@@ -300,11 +301,11 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         some = [performances[i] for i in np.arange(len(performances))[chosen]]
         return normalise(some, self.n_frames_, self.subframes)
 
-    def _choose_median(self, matcher, features, progress):
+    def _choose_median(self, shared, features, progress):
         """The median (Eq. 19), by all matches or some; without it, what exemplars are chosen by."""
         n, rounding, wanted = len(features), rounding_of(features), self._wants_median
         portions = {"n_jobs": self.n_jobs, "progress": progress}
-        compare = partial(compare_in_portions, matcher, features, **portions)
+        compare = partial(compare_in_portions, shared, **portions)
         if not wanted and (self.consensus == 0 or n <= self.consensus):
             # None of them, or all, are exemplars.
             median = Median.unknown(n)
@@ -331,12 +332,12 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         (warper,) = run(Warper.to_pattern, [portion])
         return warper
 
-    def _decide_on_refinement(self, training, warper, progress):
+    def _decide_on_refinement(self, training, warper, progress, shared):
         """Whether warps are refined by postures, and the warper that does so or does not."""
         self.misfit_ = np.nan
         if self.refine == "auto":
             if self.consensus > 0:
-                self.misfit_ = self._measure_misfit(training, warper, progress)
+                self.misfit_ = self._measure_misfit(training, warper, progress, shared)
             self.refines_ = self.misfit_ < _LARGEST_MISFIT
         else:
             self.refines_ = bool(self.refine)
@@ -344,12 +345,13 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             return warper
         return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.on_clock))
 
-    def _measure_misfit(self, training, warper, progress):
+    def _measure_misfit(self, training, warper, progress, shared):
         """Median misfit of the performances, or of evenly spaced ones of many."""
         others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
         if len(others) == 0:
             return 0.0
         some = others[:: -(-len(others) // _MISFIT_SAMPLE)]
         portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "measuring the misfit"}
-        results = in_portions(warper, "misfits", self._positions(training, some), **portions)
+        positions, found = self._positions(training, some), (shared, some)
+        results = in_portions(warper, "misfits", positions, found=found, **portions)
         return float(np.median(np.concatenate(results)))
