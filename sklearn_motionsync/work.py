@@ -5,12 +5,15 @@ workers there are, and the linear algebra of a portion runs on one thread: so re
 the last bit however the portions are shared out.
 """
 
-import functools
+import threading
 import time
 
-from joblib import effective_n_jobs
-from sklearn.utils.parallel import Parallel, delayed
-from threadpoolctl import ThreadpoolController
+from joblib import Parallel, delayed, effective_n_jobs
+from joblib.parallel import get_active_backend
+from sklearn import config_context, get_config
+
+from .blas import on_one_thread
+from .cluster import Held, Name, client_of
 
 try:
     from sklearn.callback import CallbackSupportMixin
@@ -20,21 +23,25 @@ except ImportError:  # scikit-learn before 1.9
         """No callbacks."""
 
 
-__all__ = ["LongWorkMixin", "Progress", "run"]
+__all__ = ["Common", "LongWorkMixin", "Progress", "on_cluster", "run"]
 
 # Seconds between two lines of a verbose estimator.
 _INTERVAL = 1.0
 
 
-def run(function, portions, *, n_jobs=None, prefer=None, step=None):
-    """Yield ``function(*portion)`` for every portion, in order.
+def run(function, portions, *, common=(), n_jobs=None, prefer=None, step=None):
+    """Yield ``function(*common, *portion)`` for every portion, in order.
+
+    Whoever stops in between waits for the portions that other threads have begun.
 
     Parameters
     ----------
     function : callable
         Something that can be pickled, if there are several jobs.
     portions : list of tuples
-        Arguments. Large arrays among them reach other processes as read-only memory maps.
+        Arguments of a portion's own. Large arrays reach other processes as read-only memory maps.
+    common : tuple of Common, default=()
+        First arguments, which all portions share.
     n_jobs : int, default=None
         As everywhere in scikit-learn: None means 1, unless ``joblib.parallel_config`` says
         otherwise.
@@ -44,32 +51,106 @@ def run(function, portions, *, n_jobs=None, prefer=None, step=None):
     step : callable, default=None
         Called after every portion.
     """
-    results = _results(function, portions, n_jobs, prefer)
-    for result in results:
-        if step is not None:
-            step()
-        yield result
+    begun = _Begun()
+    results = _results(function, portions, common, n_jobs, prefer, begun)
+    try:
+        for result in results:
+            if step is not None:
+                step()
+            yield result
+    finally:
+        try:
+            results.close()
+        finally:
+            begun.wait()
 
 
-def _results(function, portions, n_jobs, prefer):
+def _results(function, portions, common, n_jobs, prefer, begun):
+    here = [shared.here for shared in common]
     if len(portions) < 2 or effective_n_jobs(n_jobs) == 1:
-        return (_on_one_thread(function, portion) for portion in portions)
+        return (on_one_thread(function, *here, *portion) for portion in portions)
+    backend, _ = get_active_backend(prefer=prefer)
+    if getattr(backend, "supports_sharedmem", False):
+        call, shared = begun.call, here
+    else:
+        call, shared = on_one_thread, [shared.sent_to(backend) for shared in common]
+    # Not by scikit-learn's own Parallel, whose threads restore each other's warning filters. The
+    # configuration is this thread's: those that hand out portions have one of their own.
+    config = get_config()
+    tasks = (delayed(_configured)(config, call, function, *shared, *p) for p in portions)
     try:
         parallel = Parallel(n_jobs=n_jobs, prefer=prefer, return_as="generator")
     except ValueError:
         # Some backends can only hand over all results at once.
-        parallel = Parallel(n_jobs=n_jobs, prefer=prefer)
-    return parallel(delayed(_on_one_thread)(function, portion) for portion in portions)
+        return (result for result in Parallel(n_jobs=n_jobs, prefer=prefer)(tasks))
+    return parallel(tasks)
 
 
-def _on_one_thread(function, portion):
-    with _thread_pools().limit(limits=1, user_api="blas"):
-        return function(*portion)
+def _configured(config, call, *arguments):
+    arguments = [a.value() if isinstance(a, Name) else a for a in arguments]
+    with config_context(**config):
+        return call(*arguments)
 
 
-@functools.cache
-def _thread_pools():
-    return ThreadpoolController()
+class Common:
+    """What all portions have in common, in however many runs.
+
+    Parameters
+    ----------
+    here : object
+        As portions get it on this machine.
+    sent : object, default=None
+        What is sent to the workers of a cluster, once to each; ``here`` by default.
+    """
+
+    def __init__(self, here, sent=None):
+        self.here, self._sent = here, here if sent is None else sent
+        self._held = None
+
+    def sent_to(self, backend):
+        """What portions are given under a backend: on a cluster the name of what it holds."""
+        client = client_of(backend)
+        if client is None:
+            return self.here
+        if self._held is None or self._held.client is not client:
+            self._held = Held(client, self._sent)
+        return self._held.name()
+
+
+def on_cluster():
+    """Whether work is shared out among machines that have to be sent everything."""
+    return client_of(get_active_backend()[0]) is not None
+
+
+class _Begun:
+    """The portions that threads have begun: after an interruption they are still at work."""
+
+    def __init__(self):
+        self._threads, self._ended = set(), False
+        # Entered by its lock, which an interruption leaves either taken or not.
+        self._lock = threading.RLock()
+        self._changed = threading.Condition(self._lock)
+
+    def call(self, function, *arguments):
+        """A portion; nothing, if nobody waits for its result any more."""
+        me = threading.get_ident()
+        try:
+            with self._lock:
+                if self._ended:
+                    return None
+                self._threads.add(me)
+            return on_one_thread(function, *arguments)
+        finally:
+            with self._lock:
+                self._threads.discard(me)
+                self._changed.notify_all()
+
+    def wait(self):
+        """Let no more begin, and wait for all others than this thread."""
+        with self._lock:
+            self._ended = True
+            me = {threading.get_ident()}
+            self._changed.wait_for(lambda: self._threads <= me)
 
 
 class LongWorkMixin(CallbackSupportMixin):

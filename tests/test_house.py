@@ -17,6 +17,8 @@ PACKAGE = ROOT / "sklearn_motionsync"
 FLOORS = [
     "notebook",
     "fitting",
+    "blas",
+    "cluster",
     "work",
     "gate",
     "sequences",

@@ -6,9 +6,9 @@ import subprocess
 import sys
 import textwrap
 import time
+import warnings
 from pathlib import Path
 
-import distributed
 import joblib
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import DenseSynchronizer
 from sklearn_motionsync.matching.holdout import RefinementTrial
 from sklearn_motionsync.matching.trellis import Trellis
-from sklearn_motionsync.work import Progress, run
+from sklearn_motionsync.work import Common, Progress, run
 
 SETTINGS = {
     "paper": {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0},
@@ -93,25 +93,6 @@ def test_all_matching_runs_on_one_blas_thread(walks, monkeypatch):
     assert all(threads == {1} for _, threads in seen)
 
 
-def test_fit_runs_on_a_dask_cluster(walks, monkeypatch):
-    """Two worker processes share the matches, and give the bits of a single one."""
-    package = Path(sklearn_motionsync.__file__).parents[1]
-    monkeypatch.setenv("PYTHONPATH", f"{package}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
-    expected = bits(DenseSynchronizer().fit(walks), walks)
-    cluster = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
-    with distributed.LocalCluster(**cluster) as local, distributed.Client(local) as client:
-        workers = set(client.run(os.getpid).values())
-        with distributed.get_task_stream(client), joblib.parallel_config(backend="dask"):
-            sync = DenseSynchronizer().fit(walks)
-            ran_fit = {task["worker"] for task in client.get_task_stream()}
-            warped = bits(sync, walks)
-        loaded = client.run(lambda: "sklearn_motionsync.matching" in sys.modules)
-        assert os.getpid() not in workers
-        assert len(workers) == len(ran_fit) == 2
-        assert all(loaded.values())
-    assert warped == expected
-
-
 # -- the workshop itself ------------------------------------------------------------------
 
 
@@ -127,6 +108,28 @@ def test_run_keeps_the_order_and_counts(n_jobs, n_portions):
     results = run(square, portions, n_jobs=n_jobs, prefer="threads", step=lambda: steps.append(1))
     assert list(results) == [i * i for i in range(n_portions)]
     assert len(steps) == n_portions
+
+
+def test_threads_leave_the_filters_of_warnings_alone():
+    before = [*warnings.filters]
+    for _ in range(5):
+        list(run(time.sleep, [(1e-3 * (i % 3),) for i in range(20)], n_jobs=2, prefer="threads"))
+    assert warnings.filters == before
+
+
+def test_the_configuration_of_scikit_learn_reaches_every_portion():
+    with sklearn.config_context(working_memory=77):
+        seen = list(run(sklearn.get_config, [()] * 5, n_jobs=2, prefer="threads"))
+    assert {config["working_memory"] for config in seen} == {77}
+
+
+def test_what_portions_share_comes_first():
+    common = Common("a", "of a cluster only"), Common("b")
+    for n_jobs in (1, 2):
+        assert list(run("{}{}{}".format, [(1,), (2,)], common=common, n_jobs=n_jobs)) == [
+            "ab1",
+            "ab2",
+        ]
 
 
 def test_backends_that_give_no_results_one_by_one():

@@ -147,7 +147,7 @@ class RefinementTrial(RefinedWarper):
 
     def misfits(self, positions, rows):
         """Misfits of every hand (3, n_sequences, 2), for `Verdict.of`."""
-        positions = positions[rows]
+        positions = positions[rows].astype(np.float64, copy=False)
         base, moving = self.postures(positions)
         reach = self.matcher.trellis.reach
         by_all = self.voted(positions)[1]

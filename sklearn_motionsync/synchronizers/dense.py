@@ -18,7 +18,7 @@ from ..matching.warps import normalise
 from ..work import LongWorkMixin, run
 from .base import Synchronizer
 from .match import Match
-from .portions import compare_in_portions, in_portions
+from .portions import compare_in_portions, in_portions, shared_training_set
 
 __all__ = ["DenseSynchronizer"]
 
@@ -283,16 +283,19 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         with self._progress(fits=True) as progress:
             training = self._set_clock(performances)
             self._check_steps()
+            positions = self._positions(training)
             matcher, features = Matcher.learn(
                 Features(self.cost, self.subframes, self.velocity_smoothing, training.unit),
-                self._positions(training),
+                positions,
                 **self._settings(),
             )
             self.mu_ = float(matcher.features.back(matcher.trellis.mu))
-            median = self._choose_median(matcher, features, progress)
+            shared = shared_training_set(matcher, positions, features)
+            median = self._choose_median(shared, features, progress)
             source = self._set_pattern(training, median, COSTS[self.cost].degree)
             warper = self._choose_exemplars(training, matcher, source, median.estimates)
-            self._warper = self._decide_on_refinement(training, warper, source, progress)
+            warper = self._decide_on_refinement(training, warper, source, progress, shared)
+            self._warper = warper
 
     def _check_steps(self):
         """Say what a trellis asks for before it takes for ever."""
@@ -302,8 +305,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             raise ValueError(
                 f"subframes = {self.subframes}, max_rate = {self.max_rate} and max_offset = "
                 f"{self.max_offset} on {self.n_frames_} frames ask for {ways:.0e} steps of a path "
-                f"at every frame of every pair; {_MOST_WAYS:.0e} is the limit. Use fewer subframes, "
-                "a smaller rate or offset."
+                f"at every frame of every pair; {_MOST_WAYS:.0e} is the limit. Use fewer "
+                "subframes, a smaller rate or offset."
             )
 
     def _positions(self, training, chosen=slice(None)):
@@ -314,11 +317,11 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         some = [performances[i] for i in np.arange(len(performances))[chosen]]
         return training.unit(normalise(some, self.n_frames_, self.subframes))
 
-    def _choose_median(self, matcher, features, progress):
+    def _choose_median(self, shared, features, progress):
         """The median (Eq. 19), by all matches or some; without it, what exemplars are chosen by."""
         n, rounding, wanted = len(features), rounding_of(features), self._wants_median
         portions = {"n_jobs": self.n_jobs, "progress": progress}
-        compare = partial(compare_in_portions, matcher, features, **portions)
+        compare = partial(compare_in_portions, shared, **portions)
         if not wanted and (self.consensus == 0 or n <= self.consensus):
             # None of them, or all, are exemplars.
             median = Median.unknown(n)
@@ -346,11 +349,11 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         (warper,) = run(Warper.to_pattern, [portion])
         return warper
 
-    def _decide_on_refinement(self, training, warper, source, progress):
+    def _decide_on_refinement(self, training, warper, source, progress, shared):
         """Whether warps are refined by postures, and the warper that does so or does not."""
         verdict = Verdict()
         if self.refine == "auto" and self.consensus > 0:
-            verdict = self._try_refinement(training, warper, source, progress)
+            verdict = self._try_refinement(training, warper, source, progress, shared)
         names = "ratio", "p_value", "ratio_to_all"
         self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
         self.refines_ = bool(verdict.helps if self.refine == "auto" else self.refine)
@@ -358,7 +361,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             return warper
         return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.scaled))
 
-    def _try_refinement(self, training, warper, source, progress):
+    def _try_refinement(self, training, warper, source, progress, shared):
         """Find out on the performances, or evenly spaced ones of many, whether refining helps."""
         others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
         some = others[:: -(-len(others) // _TRIED) or 1]
@@ -371,7 +374,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         portion = warper, source, positions, hands, width
         (trial,) = run(partial(RefinementTrial.of, **self._settings()), [portion])
         portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "trying to refine"}
-        results = in_portions(trial, "misfits", positions, **portions)
+        results = in_portions(trial, "misfits", positions, found=(shared, some), **portions)
         return Verdict.of(np.concatenate(results, axis=1))
 
     def _settings(self):
