@@ -9,6 +9,9 @@ concern its module run on it in a process of their own, up to the first that fai
 which one that was, or that the mutant survived. A hang counts as killed. ``--only`` shows what one
 mutant of the table changes, and what the tests say. ``EQUIVALENT`` names mutants that change
 nothing a user could see, and why; they are not run.
+
+Eighty mutants take 15 minutes. The last ones, with seed 0: 10 of 75 equivalent; of the other 65,
+61 were killed and 4 survived, in ``holdout``, ``refinement`` and ``units``.
 """
 
 import argparse
