@@ -2,6 +2,7 @@
 
 import os
 import sys
+import time
 from pathlib import Path
 
 import distributed
@@ -110,10 +111,11 @@ def test_the_workers_work_and_keep_nothing(client):
     def has_data(dask_worker):
         return len(dask_worker.data) > 0
 
-    for _ in range(100):
-        if not any(client.run(has_data).values()):
-            break
-    else:
+    # They are told when the client has forgotten, which takes a moment.
+    deadline = time.monotonic() + 60
+    while any(client.run(has_data).values()) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    if any(client.run(has_data).values()):
         pytest.fail("the workers still hold something")
 
 

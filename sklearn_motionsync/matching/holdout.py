@@ -73,11 +73,14 @@ class Verdict(NamedTuple):
         Of a moderated t test of the logarithms of these ratios, that refining does not help.
     ratio_to_all : float
         The same to the misfit after matching by all features, those that judge among them.
+    misfit : float
+        Median share of the pattern's energy that is that misfit after matching by all features.
     """
 
     ratio: float = np.nan
     p_value: float = np.nan
     ratio_to_all: float = np.nan
+    misfit: float = np.nan
 
     @property
     def helps(self):
@@ -85,15 +88,19 @@ class Verdict(NamedTuple):
         return self.p_value < _DOUBT and self.ratio_to_all < _SIGHT
 
     @classmethod
-    def of(cls, misfits):
-        """The verdict on misfits (3, ...): matched by all features, by those shown, refined."""
-        by_all, by_shown, refined = np.reshape(misfits, (3, -1))
+    def of(cls, misfits, energy):
+        """The verdict on misfits (3, n_sequences, 2), as of a trial of a pattern of this energy.
+
+        Matched by all features, by those shown, and refined.
+        """
+        misfit = float(np.median(misfits[0].sum(axis=1)) / energy)
+        by_all, by_shown, refined = misfits.reshape(3, -1)
         known = (by_all > 0) & (by_shown > 0) & (refined > 0)
         if not known.any():
-            return cls()
+            return cls(misfit=misfit)
         gain = np.log(refined[known] / by_shown[known])
         worse = np.log(refined[known] / by_all[known]).mean()
-        return cls(float(np.exp(gain.mean())), _p_value(gain), float(np.exp(worse)))
+        return cls(float(np.exp(gain.mean())), _p_value(gain), float(np.exp(worse)), misfit)
 
 
 def _p_value(gain):

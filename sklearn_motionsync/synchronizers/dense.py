@@ -136,6 +136,9 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         The absolute weight of the changes of pace.
     exemplars_ : ndarray of int
         Indices of the performances that vote.
+    misfit_ : float
+        Median share of the pattern's variance that matched postures leave, smoothed so that
+        noise hardly counts; NaN unless ``refine="auto"`` had to find out.
     refinement_ : Bunch
         What was found out by ``refine="auto"``, on features that had no part in the warps:
         ``ratio``, their misfit after refining by the other features to that after matching by the
@@ -356,6 +359,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             verdict = self._try_refinement(training, warper, source, progress, shared)
         names = "ratio", "p_value", "ratio_to_all"
         self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
+        self.misfit_ = verdict.misfit
         self.refines_ = bool(verdict.helps if self.refine == "auto" else self.refine)
         if not self.refines_:
             return warper
@@ -375,7 +379,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         (trial,) = run(partial(RefinementTrial.of, **self._settings()), [portion])
         portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "trying to refine"}
         results = in_portions(trial, "misfits", positions, found=(shared, some), **portions)
-        return Verdict.of(np.concatenate(results, axis=1))
+        energy = np.square(trial.pattern - trial.pattern.mean(axis=0)).sum()
+        return Verdict.of(np.concatenate(results, axis=1), energy or 1.0)
 
     def _settings(self):
         """What a `Matcher` learns with."""
