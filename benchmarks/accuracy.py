@@ -215,23 +215,54 @@ def actor_table(folder):
     print_table("held-out actors", list(clips), rows, show_errors)
 
 
-def misfit_table(folder):
-    """What refine="auto" goes by."""
-    print("\n| data | misfit | refines |\n|---|---|---|")
-    cases = {f"known warps {cell}": known_warps(0, *cell)[0] for cell in CELLS}
+def refinement_table(folder):
+    """What refine="auto" finds out, and what refining really does to the error."""
+    head = "| data | misfit | ratio | p | ratio to all | refines | error without | error with |"
+    print(f"\n{head}\n|---|---|---|---|---|---|---|---|")
+    for name, X, pattern, error in refinement_cases(folder):
+        sync = DenseSynchronizer(P, pattern).fit(X)
+        found = [sync.misfit_, *(sync.refinement_[k] for k in ("ratio", "p_value", "ratio_to_all"))]
+        texts = [f"{value:.3f}" if np.isfinite(value) else "-" for value in found]
+        texts += ["yes" if sync.refines_ else "no"]
+        for refine in (False, True):
+            sync = DenseSynchronizer(P, sync.pattern_index_, refine=refine).fit(X)
+            texts += [f"{error(sync.match(X).times, sync.pattern_index_):.2f}"]
+        print(f"| {name} | " + " | ".join(texts) + " |", flush=True)
+
+
+def refinement_cases(folder):
+    """Name, performances, pattern, and the error of times to a pattern."""
+    for n_features in (16, 4, 2, 1):
+        for cell in CELLS[:3]:
+            X, truth = known_warps(0, *cell, n_features=n_features)
+            name = f"known warps, {n_features} features, noise {cell[2]:.1%}"
+            yield name, X, 0, lambda times, n, truth=truth: timing_error(times[1:], truth[1:])
     for style in (1.0, 4.0):
         bunch = make_bending(24, style=style, random_state=0)
         postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-        cases[f"make_bending, style {style:g}"] = ASpace().fit_transform(postures)
-    if folder is not None:
-        cases |= {name: Clips(folder, *event).X for name, event in EVENTS.items()}
-        elbow = Clips(folder, *EVENTS["elbow to knee, highest ankle"])
-        for actor in sorted(set(elbow.actors)):
-            own = [x for x, a in zip(elbow.X, elbow.actors, strict=True) if a == actor]
-            cases[f"elbow to knee, actor {actor} alone"] = own
-    for name, X in cases.items():
-        sync = DenseSynchronizer(P).fit(X)
-        print(f"| {name} | {sync.misfit_:.4f} | {'yes' if sync.refines_ else 'no'} |")
+        points = ASpace().fit_transform(postures)
+        name = f"make_bending, style {style:g}"
+        yield name, points, "median", lambda times, n, b=bunch: group_timing_error(times, b.times)
+    for name, event in EVENTS.items() if folder is not None else ():
+        clips = Clips(folder, *event)
+        everyone = np.arange(len(clips.X))
+        for n_features in (None, 3, 2, 1):
+            some = "" if n_features is None else f", {n_features} dimension(s)"
+            X = [x[:, :n_features] for x in clips.X]
+            yield name + some, X, "median", event_error(clips, everyone)
+        for actor in sorted(set(clips.actors)) if event[0] == "hdm05" else ():
+            own = np.flatnonzero(clips.actors == actor)
+            X = [clips.X[i] for i in own]
+            yield f"{name}, actor {actor} alone", X, "median", event_error(clips, own)
+
+
+def event_error(clips, chosen):
+    """The mean error of chosen clips, given their times to one of them."""
+
+    def error(times, n):
+        return np.delete(clips.errors(chosen[n], times, chosen), n).mean()
+
+    return error
 
 
 def bending_table():
@@ -327,7 +358,7 @@ def main():
     for name in ("numpy", "scipy", "scikit-learn"):
         versions[name] = importlib.metadata.version(name)
     print(", ".join(f"{name} {version}" for name, version in versions.items() if version))
-    misfit_table(folder)
+    refinement_table(folder)
     bending_table()
     known_table()
     if folder is not None:

@@ -47,7 +47,9 @@ KEYFRAMES = ["synchronizers/test_keyframes.py"]
 SPACE = ["against_brute_force", "of_long_takes_is_thinned"]
 SPACE = [f"display/test_displays.py::test_the_disparity_space_{name}" for name in SPACE]
 METRICS = ["metrics/test_*.py"]
-INPUT = ["test_sequences.py", "test_contract.py", "synchronizers/test_match.py"]
+INPUT = ["test_bad_inputs.py", "test_sequences.py", "test_contract.py"]
+INPUT += ["synchronizers/test_match.py"]
+ANY = ["test_properties.py"]
 TRELLIS = ["matching/test_trellis.py", *DENSE, *ALONE]
 TESTS = {
     "action_model": ["test_action_model.py", "test_contract.py"],
@@ -55,8 +57,11 @@ TESTS = {
     "sequences": INPUT,
     "matching/consensus": ["matching/test_warps.py", *DENSE, "matching/test_median.py"],
     "matching/costs": ["matching/test_costs.py", *DENSE, "matching/test_trellis.py"],
+    "matching/holdout": ["matching/test_holdout.py", *DENSE],
+    "matching/refinement": ["matching/test_holdout.py", *DENSE, *ANY],
+    "matching/units": ["matching/test_units.py", *ANY, *DENSE],
     "matching/filters": ["matching/test_costs.py", *DENSE, *KEYFRAMES],
-    "matching/keyframes": [*KEYFRAMES, "test_contract.py"],
+    "matching/keyframes": [*KEYFRAMES, *ANY, "test_contract.py"],
     "matching/median": ["matching/test_median.py", *DENSE],
     "matching/narrow": TRELLIS,
     "matching/rows": TRELLIS,
