@@ -22,11 +22,11 @@ _SAME = 0.9
 # Share of the energy below which a feature does not move.
 _STILL = 1e-20
 # Probability, at most, that refining is taken for a help where it is none.
-_DOUBT = 0.01
+_DOUBT = 0.003
 # Degrees of freedom, and standard deviation of the logarithms, that are taken for granted.
 _PRIOR = 2, 0.1
 # Warps matched by all features have seen the noise of those that judge: what that may be worth.
-_SIGHT = 1.1
+_SIGHT = 1.2
 
 
 def deal_features(on_clock):
@@ -94,13 +94,17 @@ class Verdict(NamedTuple):
         Matched by all features, by those shown, and refined.
         """
         misfit = float(np.median(misfits[0].sum(axis=1)) / energy)
-        by_all, by_shown, refined = misfits.reshape(3, -1)
-        known = (by_all > 0) & (by_shown > 0) & (refined > 0)
+        known = (misfits > 0).all(axis=0)
         if not known.any():
             return cls(misfit=misfit)
-        gain = np.log(refined[known] / by_shown[known])
-        worse = np.log(refined[known] / by_all[known]).mean()
-        return cls(float(np.exp(gain.mean())), _p_value(gain), float(np.exp(worse)), misfit)
+        by_all, by_shown, refined = misfits[:, known]
+        gain = np.log(refined / by_shown)
+        return cls(
+            ratio=float(np.exp(gain.mean())),
+            p_value=_p_value(gain),
+            ratio_to_all=float(np.exp(np.log(refined / by_all).mean())),
+            misfit=misfit,
+        )
 
 
 def _p_value(gain):
@@ -155,14 +159,17 @@ class RefinementTrial(RefinedWarper):
     def misfits(self, positions, rows):
         """Misfits of every hand (3, n_sequences, 2), for `Verdict.of`."""
         positions = positions[rows].astype(np.float64, copy=False)
+        postures = positions[:, :: self.matcher.features.subframes]
         base, moving = self.postures(positions)
         reach = self.matcher.trellis.reach
         by_all = self.voted(positions)[1]
         out = np.empty((3, len(positions), 2))
         for i, (held, shown) in enumerate((self.hands, self.hands[::-1])):
             by_shown = self.blind[i].voted(positions[:, :, shown])[1]
-            refined = refine_warps(base[:, shown], moving[:, :, shown], by_shown, reach)
+            curves = base[:, shown], moving[:, :, shown]
+            refined = refine_warps(*curves, by_shown, reach, self.noise_width)
             for j, times in enumerate((by_all, by_shown, refined)):
-                matched = match_postures(moving[:, :, held], times)
-                out[j, :, i] = slow_energy(base[:, held], matched)
+                matched = match_postures(postures[:, :, held], times)
+                # Judged by postures as they are: smoothing them blurs what noise tells of time.
+                out[j, :, i] = slow_energy(self.pattern[:, held], matched)
         return out

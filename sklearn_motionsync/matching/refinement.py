@@ -25,7 +25,7 @@ _ITERATIONS = 20
 _LONGEST_STEP = 1.5
 _SHORTEST_STEP = 0.01
 # Gains are drawn towards 1 with this share of the energy of a typical feature.
-_RIDGE = 0.01
+_RIDGE = 0.003
 # Narrowest Gaussian that is one on a grid of frames.
 _LEAST_SIGMA = 0.35
 # The noise is measured on at most so many sequences.
@@ -74,7 +74,7 @@ def slow_energy(base, matched):
     return np.square(smooth(residuals, sigma)).sum(axis=(1, 2))
 
 
-def refine_warps(base, moving, times, reach):
+def refine_warps(base, moving, times, reach, noise_width=0.0):
     """Gauss-Newton steps along the tangent that bring matched postures together.
 
     Each step solves for the whole warp at once::
@@ -94,6 +94,8 @@ def refine_warps(base, moving, times, reach):
         Warps to begin with.
     reach : float
         Largest offset, in frames.
+    noise_width : float, default=0.0
+        How wide the postures were smoothed, in frames.
 
     Returns
     -------
@@ -107,13 +109,15 @@ def refine_warps(base, moving, times, reach):
     energy = np.square(base - base.mean(axis=0)).sum()
     rounding = np.square(16 * np.finfo(base.dtype).eps) * energy / n_frames
     splines = CubicSpline(frames, moving, axis=1).c.astype(moving.dtype)
+    # White noise under a Gaussian: so many frames vary on their own.
+    independent = n_frames / max(1, 2 * np.sqrt(np.pi) * noise_width)
     refined = times.astype(np.float64)
     active = np.arange(len(moving))
     for _ in range(_ITERATIONS):
         values, tangents = _evaluate(splines, active, refined[active])
         fitted, gain = _fit_gain(base, values)
         slope, residual = gain * tangents, base - fitted
-        noise = _typical_energy(residual) / n_frames
+        noise = _typical_energy(residual, independent) / n_frames
         pull = np.square(slope).sum(axis=2)[:, 1:-1]
         going = (noise > rounding) & pull.any(axis=1)
         active, noise, pull = active[going], noise[going], pull[going]
@@ -148,15 +152,17 @@ def _solve(inner, pull, push, stiffness):
     return solved.reshape(inner.shape) - inner
 
 
-def _typical_energy(curves):
+def _typical_energy(curves, independent=np.inf):
     """The energy of a typical feature of centred curves (n_sequences, P, n_features).
 
     All their energy, shared among as many features as vary on their own: ``tr(C)^2 / tr(C^2)`` of
-    their covariance C.
+    their covariance C. A covariance from few independent frames seems to tie features together:
+    what that adds to ``tr(C^2)`` is taken off.
     """
     energy = np.square(curves).sum(axis=(1, 2))
     together = np.square(np.matmul(curves.swapaxes(1, 2), curves)).sum(axis=(1, 2))
-    return together / np.where(energy > 0, energy, 1)
+    typical = together / np.where(energy > 0, energy, 1)
+    return np.maximum(typical - energy / independent, typical / 4)
 
 
 def _gaussian(sigma):

@@ -218,7 +218,8 @@ class RefinedWarper(Warper):
         """As those of `Warper`, refined by postures."""
         distances, times = super().warps(positions, rows)
         base, moving = self.postures(positions[rows])
-        return distances, refine_warps(base, moving, times, self.matcher.trellis.reach)
+        reach = self.matcher.trellis.reach
+        return distances, refine_warps(base, moving, times, reach, self.noise_width)
 
     def postures(self, positions):
         """Postures of the pattern and of performances, smoothed as the noise asks for."""
