@@ -112,7 +112,9 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
             spread = float(X.var(axis=(0, 1)).max())
         check_squares(X, spread, "variances")
         self._floor = _VARIANCE_FLOOR * (spread if spread > 0 else 1.0)
-        self.offset_ = float(self._log_density(self.n_std**2 * self.mean_.size))
+        with np.errstate(over="ignore"):
+            squares = np.square(np.float64(self.n_std)) * self.mean_.size
+        self.offset_ = float(self._log_density(squares))
         return self
 
     def check_performances(self, X):

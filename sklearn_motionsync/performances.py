@@ -273,11 +273,12 @@ def _check_rows(estimator, X, *, reset, level, on_rows):
 def _refuse_long_table(name, df):
     """Named columns are features, and rows frames, unless the names only number the frames."""
     texts = [c for c in df.columns if isinstance(c, str)]
-    if not texts or _are_numbered(list(df.columns)):
+    if df.index.nlevels == 1 and (not texts or _are_numbered(list(df.columns))):
         return
-    shown = ", ".join(map(repr, texts[:4])) + (", ..." if len(texts) > 4 else "")
+    shown = ", ".join(map(repr, df.columns[:4])) + (", ..." if df.shape[1] > 4 else "")
+    levels = "index does" if df.index.nlevels == 1 else f"index of {df.index.nlevels} levels does"
     raise ValueError(
-        f"{name} got a table of {len(df)} rows with the columns {shown}, whose index does not tell "
+        f"{name} got a table of {len(df)} rows with the columns {shown}, whose {levels} not tell "
         "performances apart. If its rows are frames, say which columns name the performance and "
         "the time: to_sequences(df, by=[...], time=...), or index it by (performance, frame). If "
         "every row is one univariate performance, give df.to_numpy()."

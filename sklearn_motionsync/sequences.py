@@ -122,7 +122,9 @@ def _indexed(df, by, time):
         names = list(flat[by].drop_duplicates().itertuples(index=False, name=None))
         label = pd.Index(names, tupleize_cols=False).take(label)
     frame = groups.cumcount() if time is None else flat[time]
-    index = pd.MultiIndex.from_arrays([label, frame], names=["/".join(by), time or INDEX_NAMES[1]])
+    index = pd.MultiIndex.from_arrays(
+        [label, frame], names=["/".join(map(str, by)), INDEX_NAMES[1] if time is None else time]
+    )
     features = flat.drop(columns=keys).set_axis(index)
     if time is not None:
         _check_sampling(features)
@@ -197,7 +199,11 @@ def to_frame(sequences, *, performances=None, columns=None):
             f"performances must be {len(arrays)} different labels, one a performance, "
             f"got {len(labels)} of which {len(set(labels))} differ."
         )
-    columns = names if columns is None else columns
+    columns = names if columns is None else list(columns)
+    if columns is not None and len(columns) != arrays[0].shape[1]:
+        raise ValueError(
+            f"columns must name the {arrays[0].shape[1]} features, one each; got {len(columns)}."
+        )
     levels = INDEX_NAMES[0], frame_name(sequences) or INDEX_NAMES[1]
     return stack_frame(arrays, labels, frame_labels(sequences), columns, levels)
 

@@ -67,7 +67,13 @@ TESTS = {
     "matching/rows": TRELLIS,
     "matching/trellis": TRELLIS,
     "matching/warper": [*DENSE, *SPACE, *ALONE],
-    "matching/warps": ["matching/test_warps.py", *DENSE, *METRICS, *KEYFRAMES],
+    "matching/warps": [
+        "matching/test_warps.py",
+        "synchronizers/test_match.py",
+        *DENSE,
+        *METRICS,
+        *KEYFRAMES,
+    ],
     "matching": DENSE,
     "metrics": METRICS,
 }

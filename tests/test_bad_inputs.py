@@ -109,6 +109,7 @@ PERFORMANCES = [
     (LONG.drop(columns="trial"), SEQUENCES, ["to_sequences(df, by=[...], time=...)", "'time'"]),
     (FRAMES[0], SEQUENCES, ["'hip'", "to_sequences", "to_numpy()"]),
     (LONG, ALL, ["'trial'", "'ann'"]),
+    (LABELLED.assign(k=1).set_index("k", append=True), SEQUENCES, ["3 levels", "to_sequences"]),
 ]
 
 
@@ -161,6 +162,8 @@ PARAMETERS = [
     (SYNCHRONIZERS, {"pattern": put(np.nan, X[0])}, ["pattern, frame 4", "NaN"]),
     (SYNCHRONIZERS, {"pattern": X[0].astype("m8[s]")}, ["pattern", "durations"]),
     (SYNCHRONIZERS, {"pattern": [["a"] * 3] * 5}, ["pattern", "'a'"]),
+    (SYNCHRONIZERS, {"pattern": True}, ["pattern", "index", "True"]),
+    (SYNCHRONIZERS, {"pattern": 1e40 * X[0]}, ["The pattern", "1e+30 times", "same unit"]),
     (SYNCHRONIZERS, {"pattern": 5}, ["pattern=5", "5 performances"]),
     (SYNCHRONIZERS, {"n_frames": 10**9}, ["n_frames = 1000000000", "GB"]),
     ([DenseSynchronizer()], {"subframes": 10**6}, ["subframes = 1000000", "steps", "fewer"]),
@@ -191,6 +194,7 @@ def test_a_pattern_by_names(estimator):
 MODEL, FRAMED = ActionModel().fit(X), ActionModel().fit(FRAMES)
 SPACE = ASpace(2).fit(FRAMES)
 KEYS, KEYED = KeyframeSynchronizer(), KeyframeSynchronizer().fit(X, keyframes=[[5, 9]] * 5)
+DENSE = DenseSynchronizer().fit(X)
 MATCH = LinearSynchronizer().fit(X).match(X)
 CALLS = [
     # call, words
@@ -238,6 +242,8 @@ CALLS = [
     (lambda: to_sequences(LONG.assign(time=DATES[0]), by="trial", time="time"), ["durations"]),
     (lambda: to_sequences(X), ["DataFrame", "got list"]),
     (lambda: to_frame(X[0]), ["single 2-D input", "[X]"]),
+    (lambda: to_frame(X, columns=["a"]), ["3 features", "got 1"]),
+    (lambda: DENSE.disparity_space(X, performance=True), ["performance=True", "0 to 4"]),
 ]
 
 

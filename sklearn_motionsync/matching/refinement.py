@@ -16,7 +16,15 @@ from scipy.linalg import solveh_banded
 from .filters import SMOOTHING, smooth
 from .warps import follow
 
-__all__ = ["choose_smoothing", "curvature", "match_postures", "refine_warps", "slow_energy"]
+__all__ = [
+    "choose_smoothing",
+    "curvature",
+    "independent_frames",
+    "match_postures",
+    "refine_warps",
+    "slow_energy",
+    "typical_energy",
+]
 
 # How much a rate is expected to change over the whole clip, in units of the mean rate.
 _RATE_CHANGE = 2.0
@@ -109,15 +117,14 @@ def refine_warps(base, moving, times, reach, noise_width=0.0):
     energy = np.square(base - base.mean(axis=0)).sum()
     rounding = np.square(16 * np.finfo(base.dtype).eps) * energy / n_frames
     splines = CubicSpline(frames, moving, axis=1).c.astype(moving.dtype)
-    # White noise under a Gaussian: so many frames vary on their own.
-    independent = n_frames / max(1, 2 * np.sqrt(np.pi) * noise_width)
+    independent = independent_frames(n_frames, noise_width)
     refined = times.astype(np.float64)
     active = np.arange(len(moving))
     for _ in range(_ITERATIONS):
         values, tangents = _evaluate(splines, active, refined[active])
         fitted, gain = _fit_gain(base, values)
         slope, residual = gain * tangents, base - fitted
-        noise = _typical_energy(residual, independent) / n_frames
+        noise = typical_energy(residual, independent) / n_frames
         pull = np.square(slope).sum(axis=2)[:, 1:-1]
         going = (noise > rounding) & pull.any(axis=1)
         active, noise, pull = active[going], noise[going], pull[going]
@@ -152,7 +159,12 @@ def _solve(inner, pull, push, stiffness):
     return solved.reshape(inner.shape) - inner
 
 
-def _typical_energy(curves, independent=np.inf):
+def independent_frames(n_frames, width):
+    """So many frames tell as much of a covariance as white noise does that a Gaussian smoothed."""
+    return n_frames / max(1, np.sqrt(2 * np.pi) * width)
+
+
+def typical_energy(curves, independent=np.inf):
     """The energy of a typical feature of centred curves (n_sequences, P, n_features).
 
     All their energy, shared among as many features as vary on their own: ``tr(C)^2 / tr(C^2)`` of
@@ -162,7 +174,8 @@ def _typical_energy(curves, independent=np.inf):
     energy = np.square(curves).sum(axis=(1, 2))
     together = np.square(np.matmul(curves.swapaxes(1, 2), curves)).sum(axis=(1, 2))
     typical = together / np.where(energy > 0, energy, 1)
-    return np.maximum(typical - energy / independent, typical / 4)
+    unbiased = (typical - energy / independent) / (1 + 1 / independent)
+    return np.maximum(unbiased, typical / 4)
 
 
 def _gaussian(sigma):
@@ -179,7 +192,7 @@ def _fit_gain(base, matched):
     """
     x, y = base - base.mean(axis=0), matched - matched.mean(axis=1, keepdims=True)
     energy = np.square(y).sum(axis=1, keepdims=True)
-    ridge = _RIDGE * _typical_energy(y)[:, np.newaxis, np.newaxis]
+    ridge = _RIDGE * typical_energy(y)[:, np.newaxis, np.newaxis]
     # Nothing moves: any gain fits.
     ridge[ridge == 0] = 1
     gain = ((x * y).sum(axis=1, keepdims=True) + ridge) / (energy + ridge)

@@ -272,14 +272,14 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         self._unit = unit = Unit.of(on_clock)
         return TrainingSet(performances, on_clock, unit, unit(on_clock), given)
 
-    def _check_unit(self, scaled):
+    def _check_unit(self, scaled, what=None):
         """Refuse performances, in the unit of the training set, that it cannot be compared with."""
         sizes = np.maximum(scaled.max(axis=(1, 2)), -scaled.min(axis=(1, 2)))
         if not (sizes < _FAR).all():
             i = int(np.argmin(sizes < _FAR))
             raise ValueError(
-                f"Performance {i} is more than {_FAR:.0e} times as large as the training set: give "
-                "it in the same unit."
+                f"{what or f'Performance {i}'} is more than {_FAR:.0e} times as large as the "
+                "training set: give it in the same unit."
             )
 
     def _check_size(self, performances):
@@ -300,6 +300,8 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         pattern = self.pattern
         if isinstance(pattern, str):
             return None
+        if isinstance(pattern, bool):
+            raise ValueError(f"pattern must be 'median', an index or an array, got {pattern}.")
         if isinstance(pattern, Integral):
             if pattern >= len(performances):
                 raise ValueError(
@@ -342,4 +344,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         if source is None:
             source = training.performances[self.pattern_index_]
         self.pattern_ = normalise([source], self.n_frames_)[0]
+        with np.errstate(over="ignore"):
+            scaled = np.ldexp(self.pattern_, -self._unit.exponent)
+        self._check_unit(scaled[np.newaxis], "The pattern")
         return source

@@ -269,7 +269,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             If there is no such performance.
         """
         performances = self.check_performances(X)
-        if not isinstance(performance, Integral) or not 0 <= performance < len(performances):
+        whole = isinstance(performance, Integral) and not isinstance(performance, bool)
+        if not whole or not 0 <= performance < len(performances):
             raise ValueError(
                 f"performance={performance} is out of range: there are {len(performances)} "
                 f"performances, 0 to {len(performances) - 1}."

@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 from scipy.stats import ttest_1samp
+from sklearn_motionsync.matching.filters import smooth
 from sklearn_motionsync.matching.holdout import Verdict, deal_features
-from sklearn_motionsync.matching.refinement import refine_warps, slow_energy
+from sklearn_motionsync.matching.refinement import (
+    independent_frames,
+    refine_warps,
+    slow_energy,
+    typical_energy,
+)
 
 
 def features(*columns):
@@ -78,6 +84,24 @@ def test_what_is_perfect_needs_no_help():
 def test_the_misfit_is_the_median_share():
     by_all = np.array([[1.0, 1.0], [2.0, 0.0], [5.0, 5.0]])
     assert Verdict.of(np.stack([by_all, by_all, by_all]), 4.0).misfit == 0.5
+
+
+@pytest.mark.parametrize("width", [0.0, 1.0, 2.0, 4.0])
+def test_the_energy_of_a_typical_feature(width):
+    """Of independent ones that of each, also if noise was smoothed and few frames are left."""
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal((100, 200, 8))
+    # Away from the ends, where smoothing is another one.
+    curves = (smooth(noise, width) if width else noise)[:, 40:160]
+    independent = independent_frames(120, width)
+    each = np.square(curves).sum(axis=1).mean()
+    typical = typical_energy(curves, independent)
+    assert typical.mean() == pytest.approx(each, rel=0.07)
+    # Neither still features nor more of the same make a difference, if copies are 0.
+    more = np.concatenate([curves, np.zeros((100, 120, 5))], axis=2)
+    np.testing.assert_allclose(typical_energy(more, independent), typical)
+    together = curves[:, :, :1] * np.ones(8)
+    assert typical_energy(together).mean() == pytest.approx(8 * each, rel=0.1)
 
 
 # -- the steps ------------------------------------------------------------------------------

@@ -59,6 +59,12 @@ def test_copies_count_once(sequences):
     assert shift == pytest.approx(np.ldexp(1.0, -unit.exponent))
 
 
+def test_much_alike_and_of_equal_energy_is_no_copy(sequences):
+    u, v = np.linalg.qr((sequences - sequences.mean(axis=(0, 1))).reshape(-1, 5))[0][:, :2].T
+    pair = np.stack([2 * u + v, 2 * u - v], axis=1).reshape(4, 30, 2)
+    assert Unit.of(pair).copies == []
+
+
 def test_equal_energy_is_no_copy(sequences):
     """Nor the same backwards, nor the opposite, nor with a little noise."""
     x = sequences[:, :, :1]
