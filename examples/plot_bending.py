@@ -154,7 +154,7 @@ rows = [
     ("variance kept", f"{aspace.explained_variance_ratio_.sum():.1%}", "95%"),
     ("median performance", f"{median} ({bunch.actor[median]}, take {bunch.take[median]})", "-"),
     ("its global distance", lead, "-"),
-    ("refined by postures", "yes" if dense.refines_ else "no: styles differ", "-"),
+    ("refined by postures", "yes" if dense.refines_ else "no: no help", "-"),
     ("spread before", f"{spread(points):.3f}", "-"),
     ("spread, linear", f"{spread(stretched):.3f}", "-"),
     ("spread, dense", f"{spread(synchronised):.3f}", "-"),

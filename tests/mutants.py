@@ -10,8 +10,9 @@ which one that was, or that the mutant survived. A hang counts as killed. ``--on
 mutant of the table changes, and what the tests say. ``EQUIVALENT`` names mutants that change
 nothing a user could see, and why; they are not run.
 
-Eighty mutants take 15 minutes. The last ones, with seed 0: 10 of 75 equivalent; of the other 65,
-61 were killed and 4 survived, in ``holdout``, ``refinement`` and ``units``.
+Eighty mutants take 10 minutes. The last ones, with seed 0: 12 of 80 equivalent; of the other 68,
+66 were killed. Two survived, for which there are tests now: a model of two performances, and the
+name of a performance that several columns tell, in a message.
 """
 
 import argparse
@@ -110,6 +111,7 @@ EQUIVALENT = {
     ("matching/rows", "(stop - 1) * sub -> (stop - 0) * sub"): "a block longer than needed",
     ("matching/rows", "(stop - 1) * sub -> (stop + 1) * sub"): "a block longer than needed",
     ("matching/rows", "slice(0, len(self))"): "all of them, put together again",
+    ("sequences", "flat[by[0]] -> flat[by[-1]]"): "there is one",
     ("matching/trellis", "TILE_PRODUCT = 1000000"): SIZE,
     ("matching/trellis", "TILE_BASES = 48"): SIZE,
     ("matching/trellis", "_SUMMED_AT_ONCE = 32"): SIZE,

@@ -185,3 +185,11 @@ def test_impossible_sample_sizes(model, n):
 def test_nonsense_parameters(performances, n_std):
     with pytest.raises(ValueError, match="'n_std' parameter"):
         ActionModel(n_std).fit(performances)
+
+
+def test_two_performances_are_enough():
+    """One says nothing of how they vary; two do."""
+    model = ActionModel().fit([np.zeros((5, 2)), np.ones((5, 2))])
+    np.testing.assert_array_equal(model.variance_, np.full((5, 2), 0.25))
+    with pytest.raises(ValueError, match="at least 2 performances"):
+        ActionModel().fit([np.zeros((5, 2))])

@@ -39,6 +39,7 @@ NUMBERED = [pd.DataFrame(x, columns=[10, 20, 30]) for x in X]
 MIXED = [pd.DataFrame(x, columns=["hip", 1, 2]) for x in X]
 LABELLED = to_frame(FRAMES, performances=["ann", "bob", "cem", "dov", "eva"])
 LONG = LABELLED.reset_index().rename(columns={"performance": "trial", "frame": "time"})
+BACKWARDS = LONG.assign(day=9 - LONG["trial"].factorize()[0])
 DATES = pd.date_range("2020", periods=20)
 
 
@@ -239,6 +240,7 @@ CALLS = [
     (lambda: to_sequences(LONG, by="trial", time="trial"), ["different"]),
     (lambda: to_sequences(LONG, by="trial", time="knee"), ["'ann'", "do not increase"]),
     (lambda: to_sequences(LONG.drop(index=3), by="trial", time="time"), ["'ann'", "gap", "2 to 4"]),
+    (lambda: to_sequences(BACKWARDS.drop(index=3), by=["day", "trial"], time="time"), ["9, 'ann'"]),
     (lambda: to_sequences(LONG.assign(time=DATES[0]), by="trial", time="time"), ["durations"]),
     (lambda: to_sequences(X), ["DataFrame", "got list"]),
     (lambda: to_frame(X[0]), ["single 2-D input", "[X]"]),
