@@ -75,7 +75,7 @@ def _refuse_columns(table, what):
         which = f"{what}, column {column.name!r}," if column.name is not None else what
         if column.dtype.kind in "Mm" or isinstance(column.dtype, pd.PeriodDtype):
             raise ValueError(f"{which} holds dates or durations. {_SECONDS}.")
-        if column.dtype.kind in "OSUT" or isinstance(column.dtype, pd.CategoricalDtype):
+        if column.dtype.kind in "OSUT":
             _refuse_items(column.to_numpy(dtype=object), which)
 
 
@@ -121,8 +121,8 @@ def _from_pandas(values, what):
     """The array of a table; missing values of pandas' own types become NaN."""
     dtypes = {values.dtype} if isinstance(values, pd.Series) else set(values.dtypes)
     kinds = {dtype.kind for dtype in dtypes}
-    categories = any(isinstance(dtype, pd.CategoricalDtype) for dtype in dtypes)
-    if kinds & set("OSUT") or categories:
+    # Categories are objects, too.
+    if kinds & set("OSUT"):
         return values.to_numpy(dtype=object)
     if "c" in kinds or (len(dtypes) == 1 and isinstance(next(iter(dtypes)), np.dtype)):
         # No copy where there is one block of memory.
