@@ -136,3 +136,21 @@ def test_where_nothing_moves_warps_stay():
         refine_warps(rng.standard_normal((30, 2)), moving, start, 29.0), start
     )
     assert slow_energy(still, moving) == 0
+
+
+@pytest.mark.parametrize("reach", [3.0, 39.0])
+def test_steps_stay_in_the_band_and_on_the_clock(reach):
+    """Also if nothing agrees: postures that have nothing to do with each other."""
+    rng = np.random.default_rng(0)
+    frames = np.arange(40)
+    base = np.cumsum(rng.standard_normal((40, 2)), axis=0)
+    moving = np.cumsum(rng.standard_normal((60, 40, 2)), axis=1)
+    # Half of them are the same, but late.
+    moving[:30] = base[np.maximum(frames - 5, 0)]
+    moving[:30] += 0.3 * rng.standard_normal((30, 40, 2))
+    start = np.tile(frames.astype(float), (60, 1))
+    times = refine_warps(base, moving, start, reach)
+    assert (np.diff(times) >= 0).all()
+    assert (times[:, [0, -1]] == [0, 39]).all()
+    assert np.abs(times - frames).max() <= reach
+    assert np.abs(times - frames)[:30].max() > 2.5
