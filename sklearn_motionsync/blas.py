@@ -5,6 +5,7 @@ of each thread. Whoever comes first limits it and remembers what was there; whoe
 restores it, unless somebody else has changed it meanwhile.
 """
 
+import functools
 import os
 import sys
 import threading
@@ -112,6 +113,7 @@ def _known_limits():
     """The limits of all libraries, also of those that came with a module loaded since."""
     global _n_modules
     if _n_modules != len(sys.modules):
+        _heed_forks()
         n_modules = len(sys.modules)
         for library in ThreadpoolController().lib_controllers:
             if library.user_api == "blas":
@@ -125,5 +127,7 @@ def _after_fork():
         limit.after_fork()
 
 
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_after_fork)
+@functools.cache
+def _heed_forks():
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=_after_fork)

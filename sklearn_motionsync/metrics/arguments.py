@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from ..gate import as_numbers, check_finite
+from ..matching.units import exponent_of
 from ..sequences import to_sequences
 
 __all__ = [
@@ -250,5 +251,5 @@ def _in_own_unit(array):
     exact = np.finfo(np.float64).eps
     rounding = 4 * (np.finfo(array.dtype).eps + len(array) * exact)
     values = array.astype(np.float64)
-    exponent = int(np.frexp(np.abs(values).max())[1])
+    exponent = exponent_of(values)
     return Movements(np.ldexp(values, -exponent), exponent, rounding)

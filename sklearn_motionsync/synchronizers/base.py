@@ -190,8 +190,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
             One feature for the rows of a 2-D array.
         """
         on_clock = normalise(self.check_performances(X), self.n_frames_)
-        with np.errstate(over="ignore"):
-            self._check_unit(np.ldexp(on_clock, -self._unit.exponent))
+        self._check_unit(on_clock, self._unit.exponent)
         return on_clock
 
     def get_feature_names_out(self, input_features=None):
@@ -272,9 +271,11 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         self._unit = unit = Unit.of(on_clock)
         return TrainingSet(performances, on_clock, unit, unit(on_clock), given)
 
-    def _check_unit(self, scaled, what=None):
-        """Refuse performances, in the unit of the training set, that it cannot be compared with."""
-        sizes = np.maximum(scaled.max(axis=(1, 2)), -scaled.min(axis=(1, 2)))
+    def _check_unit(self, sequences, exponent=0, what=None):
+        """Refuse sequences, given in ``2 ** -exponent`` units, far beyond the training set."""
+        sizes = np.maximum(sequences.max(axis=(1, 2)), -sequences.min(axis=(1, 2)))
+        with np.errstate(over="ignore"):
+            sizes = np.ldexp(sizes.astype(np.float64), -exponent)
         if not (sizes < _FAR).all():
             i = int(np.argmin(sizes < _FAR))
             raise ValueError(
@@ -344,7 +345,5 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         if source is None:
             source = training.performances[self.pattern_index_]
         self.pattern_ = normalise([source], self.n_frames_)[0]
-        with np.errstate(over="ignore"):
-            scaled = np.ldexp(self.pattern_, -self._unit.exponent)
-        self._check_unit(scaled[np.newaxis], "The pattern")
+        self._check_unit(self.pattern_[np.newaxis], self._unit.exponent, "The pattern")
         return source

@@ -271,6 +271,19 @@ def test_people_are_not_refined(action, real_data):
             assert not sync.refines_, (actor, n_features, sync.refinement_)
 
 
+@pytest.mark.parametrize(
+    ("archive", "action"), [("utkinect", "pull"), ("utkinect", "waveHands"), ("cmu07_walk", None)]
+)
+def test_people_that_nothing_was_chosen_on_are_not_refined(archive, action, real_data):
+    """Pulls leave as little misfit as repeated trials do; one subject walks, each time anew."""
+    bunch = load_performances(real_data / archive / f"{archive}_positions.npz")
+    X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if action in (None, t)]
+    X = [x for x in X if len(x) >= 8]
+    points = ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(X))
+    for n_features in (None, 3, 2, 1):
+        assert not DenseSynchronizer(P).fit([x[:, :n_features] for x in points]).refines_
+
+
 # The best of tslearn, dtaidistance, gdtw, fdasrsf and aeon, each at its best setting, mean
 # and median over all ordered pairs: docs/accuracy.md.
 EVENTS = {
