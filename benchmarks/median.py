@@ -12,8 +12,8 @@ import sys
 import numpy as np
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.matching.matcher import Features, Matcher
 from sklearn_motionsync.matching.median import search_median
-from sklearn_motionsync.matching.warper import Features, Matcher
 
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
 SETS, SEARCHES = 20, 3

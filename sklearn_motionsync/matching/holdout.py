@@ -12,8 +12,9 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.special import stdtr
 
+from .matcher import Matcher
 from .refinement import match_postures, refine_warps, slow_energy
-from .warper import Matcher, RefinedWarper, Warper
+from .warper import RefinedWarper, Warper
 
 __all__ = ["RefinementTrial", "Verdict", "deal_features"]
 
@@ -151,7 +152,8 @@ class RefinementTrial(RefinedWarper):
         """
         blind = []
         for shown in hands[::-1]:
-            matcher, _ = Matcher.learn(warper.matcher.features, positions[:, :, shown], **settings)
+            features = warper.matcher.features.of_features(shown)
+            matcher, _ = Matcher.learn(features, positions[:, :, shown], **settings)
             chosen, pattern = source[:, :, shown], warper.pattern[:, shown]
             blind.append(Warper.to_pattern(matcher, pattern, chosen, True, warper.warp_smoothing))
         return cls(**vars(warper), noise_width=noise_width, hands=hands, blind=blind)

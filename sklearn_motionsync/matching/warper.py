@@ -7,100 +7,19 @@ anything was compared; `Matcher`, which compares any two; `Warper`, which knows 
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from sklearn import get_config
 
-from .consensus import vote
-from .costs import COSTS, cost_features, step_table
+from .consensus import smoothed, vote
 from .filters import smooth
+from .matcher import Matcher
 from .refinement import refine_warps
 from .rows import Bases
-from .trellis import Trellis
-from .units import Unit
-from .warps import normalise
 
-__all__ = ["Features", "Matcher", "RefinedWarper", "Warper"]
+__all__ = ["RefinedWarper", "Warper"]
 
 # A picture of a disparity space has no use for more cells.
 DRAWN_CELLS = 4_000_000
-
-
-class Features(NamedTuple):
-    """What is compared of performances.
-
-    Attributes
-    ----------
-    cost : str
-        A key of ``costs.COSTS``.
-    subframes : int
-        Positions a frame.
-    velocity_smoothing : float
-    unit : Unit
-    """
-
-    cost: str
-    subframes: int
-    velocity_smoothing: float
-    unit: Unit
-
-    def __call__(self, positions):
-        """Features, at every position, of postures in the unit: (n_sequences, Q, n_features)."""
-        return cost_features(positions, self.cost, self.subframes, self.velocity_smoothing)
-
-    def positions(self, arrays, n_frames):
-        """Performances at every position of the clock (Eq. 7), in the unit."""
-        return self.unit(normalise(arrays, n_frames, self.subframes))
-
-    def back(self, squares):
-        """Squares of features in the unit of the data."""
-        return self.unit.back(squares, COSTS[self.cost].degree)
-
-
-class Matcher(NamedTuple):
-    """Matches performances to each other: what is compared, and the trellis."""
-
-    features: Features
-    trellis: Trellis
-
-    @classmethod
-    def learn(cls, features, positions, *, smoothness, max_offset, max_rate):
-        """The matcher of a training set, at all positions in the unit, and what it compares of it.
-
-        The weight of changes of pace, ``mu``, is ``smoothness`` times the mean squared norm of the
-        features, so that it does not depend on their unit.
-        """
-        compared, subframes = features(positions), features.subframes
-        n_frames = (compared.shape[1] - 1) // subframes + 1
-        energy = np.einsum("npk,npk->", compared, compared, dtype=np.float64)
-        mu = float(smoothness * energy / np.prod(compared.shape[:2]))
-        # Whole frames; 0.29 * 100 must not lose one to rounding.
-        reach = int(np.floor(max_offset * n_frames * (1 + 1e-12)))
-        # No step is longer than the clip.
-        table = step_table(features.cost, min(max_rate, n_frames - 1), subframes)
-        return cls(features, Trellis(table, mu, min(reach, n_frames - 1))), compared
-
-    def distances(self, features, bases, moving, tiles):
-        """Synchronisation distances ``D_{n,m}`` of the tiles of the pairs of two index arrays."""
-        return [
-            (rows, columns, self._tile(features, bases[rows], moving[columns]))
-            for rows, columns in tiles
-        ]
-
-    def _tile(self, features, bases, moving):
-        bases = features[bases, :: self.trellis.table.subframes]
-        return self.trellis.distances(bases, features[moving])
-
-    def paths(self, bases, moving):
-        """Disparities of the best paths: (n_bases, n_moving, P)."""
-        max_bytes = get_config()["working_memory"] * 2**20 // 2
-        return self.trellis.paths(bases, moving, max_bytes)
-
-    def times(self, disparities):
-        """``tau``, in frames, of disparities."""
-        frames = np.arange(disparities.shape[-1])
-        return frames + disparities / self.trellis.table.subframes
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +35,8 @@ class Warper:
         Features of the pattern and of the exemplars, in double precision.
     to_exemplars : ndarray, shape (n_exemplars, P)
         Times of the pattern on the clocks of the exemplars.
+    to_lengths : ndarray, shape (n_exemplars,)
+        Distances of these paths.
     votes : bool
         Whether direct paths are voted on and smoothed.
     warp_smoothing : float
@@ -126,6 +47,7 @@ class Warper:
     pattern: np.ndarray
     bases: Bases
     to_exemplars: np.ndarray
+    to_lengths: np.ndarray
     votes: bool
     warp_smoothing: float
 
@@ -135,8 +57,10 @@ class Warper:
         features = matcher.features(chosen)
         # A copy: the whole of the features is not to be kept alive.
         bases = Bases(matcher.trellis, features[:, :: matcher.features.subframes].copy())
-        to_exemplars = matcher.times(matcher.paths(bases.part(slice(1)), features[1:])[0])
-        return cls(matcher, pattern, bases, to_exemplars, votes, warp_smoothing)
+        disparities = matcher.paths(bases.part(slice(1)), features[1:])[0]
+        lengths = matcher.trellis.costs(bases.sequences[0], features[1:], disparities)
+        times = matcher.times(disparities)
+        return cls(matcher, pattern, bases, times, lengths, votes, warp_smoothing)
 
     def positions(self, arrays):
         """Performances in the unit at every sub-position of the clock (Eq. 7), in double precision.
@@ -178,28 +102,19 @@ class Warper:
         if moving.dtype != bases.sequences.dtype:
             bases = Bases(trellis, bases.sequences.astype(moving.dtype))
         base, disparities = bases.sequences[0], self.matcher.paths(bases, moving)
-        distances = trellis.costs(base, moving, disparities[0])
         routes = self.matcher.times(disparities)
-        times = direct = routes[0]
         if not self.votes:
-            return distances, times
+            return trellis.costs(base, moving, disparities[0]), routes[0]
+        pairs = zip(bases.sequences, disparities, strict=True)
+        lengths = np.stack([trellis.costs(x, moving, d) for x, d in pairs])
+        distances, times = lengths[0], routes[0]
         if len(self.to_exemplars):
-            times = vote(direct, self.to_exemplars, routes[1:])
-        times = self._smoothed(times)
+            lengths[1:] += self.to_lengths[:, np.newaxis].astype(lengths.dtype)
+            times = vote(times, self.to_exemplars, routes[1:], lengths)
+        times = smoothed(times, trellis.reach, self.warp_smoothing)
         # A path without any distance is right: the pattern keeps its own pace.
         rounding = 64 * np.finfo(positions.dtype).eps * np.square(base).sum()
-        return distances, np.where((distances <= rounding)[:, np.newaxis], direct, times)
-
-    def _smoothed(self, times):
-        """Warps whose offsets are smoothed and in the band, pinned and non-decreasing."""
-        n_frames, reach = times.shape[1], self.matcher.trellis.reach
-        frames, sigma = np.arange(n_frames), self.warp_smoothing * (n_frames - 1)
-        offsets = times - frames
-        if sigma > 1 / 3:
-            offsets = smooth(offsets[:, :, np.newaxis], sigma)[:, :, 0]
-            offsets[:, [0, -1]] = 0
-        times = frames + np.clip(offsets, -reach, reach)
-        return np.maximum.accumulate(np.clip(times, 0, n_frames - 1), axis=1)
+        return distances, np.where((distances <= rounding)[:, np.newaxis], routes[0], times)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,22 +11,22 @@ from ..fitting import of_one_state
 from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
 from ..matching.holdout import RefinementTrial, Verdict, deal_features
+from ..matching.matcher import Features, Matcher
 from ..matching.median import Median, estimate_distances, rounding_of, search_median, sum_all
 from ..matching.refinement import choose_smoothing
-from ..matching.warper import Features, Matcher, RefinedWarper, Warper
+from ..matching.warper import RefinedWarper, Warper
 from ..matching.warps import normalise
 from ..work import LongWorkMixin, run
 from .base import Synchronizer
 from .match import Match
 from .portions import compare_in_portions, in_portions, shared_training_set
+from .settings import Settings, learn_metric
 
 __all__ = ["DenseSynchronizer"]
 
 # Up to so many performances all pairs are compared: see docs/scaling.md.
 _EXHAUSTIVE = 100
 
-# Steps that a path may take at a frame, all offsets together.
-_MOST_WAYS = 1e9
 # Whether refining helps is tried on at most so many performances.
 _TRIED = 12
 
@@ -35,30 +35,32 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     """Synchronise performances by dense matching to the median one.
 
     1. Normalise all performances linearly to ``P`` frames (Eq. 7).
-    2. Match ordered pairs: dynamic programming finds the offsets Delta(p) that
+    2. Learn the metric: which features, and which combinations of them, tell the moments of the
+       action in these performances, and which are noise or style (see ``metric``).
+    3. Match ordered pairs: dynamic programming finds the offsets Delta(p) that
        minimise the synchronisation distance ``D_{n,m}`` (Eqs. 12-17)::
 
            sum_p |x_n(p) - x_m(p + Delta(p))|^2 + mu sum_p phi(rate)
 
        with both ends pinned and the local rate between 0 and ``max_rate``. By default
-       velocities stand in for the points x (see ``cost``): people differ in where the body
-       is more than in how it moves.
-    3. The pattern is the performance with the smallest global distance
+       velocities and postures in the learnt metric stand in for the points x (see ``cost``).
+    4. The pattern is the performance with the smallest global distance
        ``C_n = sum_m D_{n,m}`` (Eq. 19), the "median" one; among more than 100 it is found
        by a part of all matches (see ``search``).
-    4. Consensus: the time of the pattern reaches a performance straight, or by way of
+    5. Consensus: the time of the pattern reaches a performance straight, or by way of
        one of ``consensus`` exemplars, typical performances of the training set; the median
-       of these routes outvotes a path that took a wrong valley. It is then smoothed.
-    5. Refinement: if it helps, as it does for repeated trials of a single source, whose postures
+       of these routes, weighted by how alike the performances along them are, outvotes a path
+       that took a wrong valley. It is then smoothed.
+    6. Refinement: if it helps, as it does for repeated trials of a single source, whose postures
        agree but for noise and gain, Gauss-Newton steps place every moment to a fraction of a frame.
-    6. ``transform`` samples performances at ``tau(p) = p + Delta(p)`` (Eq. 18).
+    7. ``transform`` samples performances at ``tau(p) = p + Delta(p)`` (Eq. 18).
 
-    Most data need nothing turned. Four parameters, among the first, are worth a thought:
-    ``n_frames``, the resolution of the clock; ``velocity_smoothing``, which goes with the noise of
-    the sensors; ``refine=True``, if all are trials of a single source; ``max_offset``, how far
-    apart they can be. ``pattern`` keeps a clock that is there already. The six from ``consensus``
-    to ``subframes`` are there for the record: they were measured and set, and make it the paper's
-    exact method, ``DenseSynchronizer(cost="posture", max_rate=2, subframes=1, consensus=0)``. The
+    Most data need nothing turned. Three parameters, among the first, are worth a thought:
+    ``n_frames``, the resolution of the clock; ``refine=True``, if all are trials of a single
+    source; ``max_offset``, how far apart they can be. ``pattern`` keeps a clock that is there
+    already. The seven from ``metric`` to ``subframes`` are there for the record: they were measured
+    and set, and make it the paper's exact method,
+    ``DenseSynchronizer(cost="posture", max_rate=2, subframes=1, consensus=0)``. The
     last four are for many performances and long jobs.
 
     Parameters
@@ -69,16 +71,22 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         ``max_offset`` is a share of it.
     pattern : "median", int or array (n_frames, n_features), default="median"
         The median performance, one chosen by its index, or another one.
-    velocity_smoothing : float, default=0.03
+    velocity_smoothing : float, default=0.02
         Standard deviation of the Gaussian under which velocities are taken, as a share of the
         clip, so that it does not depend on the frame rate; beyond its ends a clip is
-        continued by its point reflection. Noisy sensors want more: 0.1 for the Kinect.
+        continued by its point reflection. With the learnt metric it hardly matters.
     refine : "auto" or bool, default="auto"
         Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and it
         helps: on features of the training set that had no part in it (see ``refinement_``).
         A single feature, or several that say the same, cannot tell.
-    max_offset : float, default=0.25
-        Largest offset, as a share of ``n_frames``, in [0, 1].
+    max_offset : "auto" or float, default="auto"
+        Largest offset, as a share of ``n_frames``, in [0, 1]. ``"auto"``: 0.4 with a learnt
+        metric, 0.25 without, where a wider band leads paths astray.
+    metric : "learned" or None, default="learned"
+        What the velocity cost compares. ``"learned"``: velocities, compressed, and postures less
+        their own mean, weighted by how well they agree at the same moment; learnt in ``fit`` from
+        3 to 20 performances, and off without a vote (``consensus=0``). Distances are then pure
+        numbers. None: velocities, all directions alike. Other costs are compared as they are.
     consensus : int, default=8
         How many exemplars vote on a warp; 0 for the direct path only, as in the paper, which
         is then neither smoothed nor, unless ``refine=True``, refined.
@@ -132,6 +140,10 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         it may spend: 9 % of all, or 150 a performance if that is more.
     n_matches_ : int
         Matches made to choose the pattern and the exemplars.
+    metric_ : Bunch or None
+        What was learnt: ``share``, the part of every feature in what is compared, about 0 for
+        noise; ``energy``, its part in the plain velocities, which would be compared without a
+        metric; ``performances``, the indices of those it was learnt from. None if none was learnt.
     mu_ : float
         The absolute weight of the changes of pace.
     exemplars_ : ndarray of int
@@ -186,7 +198,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         **Synchronizer._parameter_constraints,
         "velocity_smoothing": [Interval(Real, 0, 1, closed="both")],
         "refine": [StrOptions({"auto"}), "boolean"],
-        "max_offset": [Interval(Real, 0, 1, closed="both")],
+        "max_offset": [StrOptions({"auto"}), Interval(Real, 0, 1, closed="both")],
+        "metric": [StrOptions({"learned"}), None],
         "consensus": [Interval(Integral, 0, None, closed="left")],
         "warp_smoothing": [Interval(Real, 0, 1, closed="both")],
         "cost": [StrOptions(set(COSTS))],
@@ -204,9 +217,10 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         n_frames=None,
         pattern="median",
         *,
-        velocity_smoothing=0.03,
+        velocity_smoothing=0.02,
         refine="auto",
-        max_offset=0.25,
+        max_offset="auto",
+        metric="learned",
         consensus=8,
         warp_smoothing=0.02,
         cost="velocity",
@@ -223,6 +237,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         self.velocity_smoothing = velocity_smoothing
         self.refine = refine
         self.max_offset = max_offset
+        self.metric = metric
         self.consensus = consensus
         self.warp_smoothing = warp_smoothing
         self.cost = cost
@@ -286,32 +301,20 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     def _learn(self, performances):
         with self._progress(fits=True) as progress:
             training = self._set_clock(performances)
-            self._check_steps()
-            positions = self._positions(training)
-            matcher, features = Matcher.learn(
-                Features(self.cost, self.subframes, self.velocity_smoothing, training.unit),
-                positions,
-                **self._settings(),
-            )
+            learns = self.metric == "learned" and self.cost == "velocity" and self.consensus > 0
+            Settings.of(self, learns).check(self.n_frames_, self.subframes)
+            positions, self.metric_ = self._positions(training), None
+            features = Features(self.cost, self.subframes, self.velocity_smoothing, training.unit)
+            if learns:
+                features, self.metric_ = learn_metric(features, positions, self)
+            matcher, features = Matcher.learn(features, positions, **self._settings())
             self.mu_ = float(matcher.features.back(matcher.trellis.mu))
             shared = shared_training_set(matcher, positions, features)
             median = self._choose_median(shared, features, progress)
-            source = self._set_pattern(training, median, COSTS[self.cost].degree)
+            source = self._set_pattern(training, median, matcher.features.degree)
             warper = self._choose_exemplars(training, matcher, source, median.estimates)
             warper = self._decide_on_refinement(training, warper, source, progress, shared)
             self._warper = warper
-
-    def _check_steps(self):
-        """Say what a trellis asks for before it takes for ever."""
-        steps = min(self.max_rate, self.n_frames_ - 1) * self.subframes + 1
-        ways = steps * (2 * self.max_offset * self.n_frames_ * self.subframes + 1)
-        if ways > _MOST_WAYS:
-            raise ValueError(
-                f"subframes = {self.subframes}, max_rate = {self.max_rate} and max_offset = "
-                f"{self.max_offset} on {self.n_frames_} frames ask for {ways:.0e} steps of a path "
-                f"at every frame of every pair; {_MOST_WAYS:.0e} is the limit. Use fewer "
-                "subframes, a smaller rate or offset."
-            )
 
     def _positions(self, training, chosen=slice(None)):
         """Performances of the training set at every sub-position of the clock, in the unit."""
@@ -385,5 +388,4 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
     def _settings(self):
         """What a `Matcher` learns with."""
-        names = "smoothness", "max_offset", "max_rate"
-        return {name: getattr(self, name) for name in names}
+        return Settings.of(self, self.metric_ is not None)._asdict()

@@ -1,0 +1,163 @@
+"""Learning the metric: a training set tells which of its features tell the moments.
+
+Performances agree at the same moment of the action as well as their features are reliable, and
+differ at any two moments as much as these vary. If R is the covariance of differences at matched
+moments, and 2 S that of differences at any two, then ``r' (R^-1 - (2 S)^-1) r`` is, but for a
+constant, minus twice the log-likelihood ratio of "the same moment" to "any two", given a difference
+r (KISSME; Koestinger et al., 2012). That matrix, without what is negative, is the metric.
+
+1. Without any matching, performances on the clock agree in what is large and slow. That tells
+   noise, which agrees in nothing, and gives a first metric of velocities.
+2. By this one all ordered pairs are matched and voted on.
+3. Their differences give the metric of velocities and that of postures.
+"""
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+
+from .costs import RATE_WEIGHT
+from .metric import Metric, compressed, without_mean
+from .warps import sample
+
+__all__ = ["learn_metric", "metric_matrix"]
+
+# Share of a feature's mean variance that is added to all of them, before anything is inverted.
+_RIDGE = 0.1
+# Eigenvalues of a metric are raised to this power: half-way to counting all directions alike,
+# which is what is known before anything is learnt. From the table in docs/accuracy.md.
+_TRUST = 0.6
+# Directions that make so much of what is compared are enough.
+_KEPT = 0.98
+# Largest lag, as a share of the clip, at which differences are taken to be alike.
+_LONGEST = 0.3
+
+
+def learn_metric(match, positions, velocity):
+    """Learn the metric of a training set, or of some of it.
+
+    Parameters
+    ----------
+    match : callable
+        ``match(features)``: voted times (n_sequences, n_sequences, P) of all ordered pairs.
+    positions, velocity : ndarray, shape (n_sequences, P, n_features)
+        Postures on the clock and their velocities, in the unit.
+
+    Returns
+    -------
+    Metric or None
+        None if nothing tells the moments.
+    """
+    n_sequences, n_frames, n_features = positions.shape
+    energy = float(np.square(velocity).sum(axis=2).mean())
+    if n_sequences < 2 or not energy > 0:
+        return None
+    fast = compressed(velocity, energy)
+    postures = without_mean(positions)
+    even = np.arange(n_frames, dtype=np.float64)
+    unmatched = np.broadcast_to(even, (n_sequences, n_sequences, n_frames))
+    first = _square_root(metric_matrix(fast, _covariance(fast, unmatched)[0]))
+    features = fast @ first if first.any() else fast
+    voted = match(features)
+    of_fast, alike = _covariance(fast, voted)
+    of_postures, longer = _covariance(postures, voted, weighted=False)
+    by_fast = _square_root(metric_matrix(fast, of_fast))
+    # Differences that stay alike for longer are fewer pieces of evidence.
+    by_postures = _square_root(metric_matrix(postures, of_postures)) * np.sqrt(alike / longer)
+    turn = _turn(np.concatenate([fast @ by_fast, postures @ by_postures], axis=2))
+    if turn is None:
+        return None
+    return Metric(energy, by_fast @ turn[:n_features], by_postures @ turn[n_features:])
+
+
+def metric_matrix(block, covariance):
+    """``(R + a I)^-1 - (2 S + a I)^-1``, tempered: symmetric, without negative eigenvalues.
+
+    Parameters
+    ----------
+    block : ndarray, shape (n_sequences, P, n_features)
+        Features, about 0.
+    covariance : ndarray, shape (n_features, n_features)
+        R, of their differences at matched moments.
+
+    Returns
+    -------
+    ndarray, shape (n_features, n_features)
+    """
+    spread = _moments(block)
+    a = _RIDGE * np.trace(spread) / len(spread)
+    if not a > 0:
+        return np.zeros_like(spread)
+    ridge = a * np.eye(len(spread))
+    ratio = np.linalg.inv(covariance + ridge) - np.linalg.inv(2 * spread + ridge)
+    values, vectors = np.linalg.eigh((ratio + ratio.T) / 2)
+    # What rounding leaves of a direction that tells nothing is nothing.
+    values = np.where(values > 1e-9 * np.abs(values).max(initial=0), values, 0)
+    shares = np.einsum("ki,kl,li->i", vectors, spread, vectors)
+    tempered = values**_TRUST
+    tempered *= (values @ shares) / ((tempered @ shares) or 1)
+    return (vectors * tempered) @ vectors.T
+
+
+def _moments(block):
+    """Mean outer product of features with themselves."""
+    frames = block.reshape(-1, block.shape[2])
+    return frames.T @ frames / len(frames)
+
+
+def _square_root(matrix):
+    """A map after which squared distances are those of a metric: ``A A' = M``."""
+    values, vectors = np.linalg.eigh(matrix)
+    return vectors * np.sqrt(np.maximum(values, 0))
+
+
+def _covariance(block, times, weighted=True):
+    """Covariance R of differences at matched times, and for how many frames they stay alike.
+
+    Parameters
+    ----------
+    block : ndarray, shape (n_sequences, P, n_features)
+    times : ndarray, shape (n_sequences, n_sequences, P)
+        ``tau`` of all ordered pairs.
+    weighted : bool
+        Whether the moving sequence counts with the weight of its rate, as velocities do.
+    """
+    n_sequences, n_frames, n_features = block.shape
+    length = next_fast_len(2 * n_frames, real=True)
+    covariance, alike = np.zeros((n_features, n_features)), 0
+    for n in range(n_sequences):
+        others = np.arange(n_sequences) != n
+        moving = sample(list(block[others]), times[n, others], n_frames)
+        if weighted:
+            rates = np.gradient(times[n, others], axis=1)
+            moving *= (1 + RATE_WEIGHT * (rates - 1))[:, :, np.newaxis]
+        differences = block[n] - moving
+        flat = differences.reshape(-1, n_features)
+        covariance += flat.T @ flat
+        spectrum = rfft(differences, length, axis=1)
+        alike = alike + (np.square(spectrum.real) + np.square(spectrum.imag)).sum(axis=(0, 2))
+    covariance /= n_sequences * (n_sequences - 1) * n_frames
+    return covariance, _length(irfft(alike, length)[: 1 + int(_LONGEST * n_frames)])
+
+
+def _length(autocovariance):
+    """Frames for which something stays alike, from its autocovariance at lags 0, 1, ..."""
+    if not autocovariance[0] > 0:
+        return 1.0
+    correlation = autocovariance / autocovariance[0]
+    ends = np.flatnonzero(correlation <= 0)
+    last = ends[0] if len(ends) else len(correlation)
+    return float(1 + 2 * correlation[1:last].sum())
+
+
+def _turn(compared):
+    """Principal axes of what is compared, (n_sequences, P, 2 n_features), as columns.
+
+    The fewest that hold nearly all of it, and as many as features at most, but two: matching by
+    them costs no more than without a metric. None if there is nothing to compare.
+    """
+    values, vectors = np.linalg.eigh(_moments(compared))
+    held = np.cumsum(np.maximum(values[::-1], 0))
+    if not held[-1] > 0:
+        return None
+    count = 1 + int(np.searchsorted(held, _KEPT * held[-1]))
+    return vectors[:, ::-1][:, : min(count, max(compared.shape[2] // 2, 2))]

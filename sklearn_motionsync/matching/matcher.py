@@ -1,0 +1,159 @@
+"""Matcher: what is compared of performances, and how any two of them are compared."""
+
+from typing import NamedTuple
+
+import numpy as np
+from sklearn import get_config
+
+from .consensus import choose_exemplars, smoothed, vote
+from .costs import COSTS, cost_features, step_table
+from .learning import learn_metric
+from .metric import Metric, energy_shares
+from .trellis import Trellis
+from .units import Unit
+from .warps import normalise
+
+__all__ = ["Features", "Matcher"]
+
+# Of a clip so many frames tell the metric.
+LEARNING_FRAMES = 100
+
+
+class Features(NamedTuple):
+    """What is compared of performances.
+
+    Attributes
+    ----------
+    cost : str
+        A key of ``costs.COSTS``.
+    subframes : int
+        Positions a frame.
+    velocity_smoothing : float
+    unit : Unit
+    metric : Metric or None
+        Learnt of velocities and postures.
+    """
+
+    cost: str
+    subframes: int
+    velocity_smoothing: float
+    unit: Unit
+    metric: Metric | None = None
+
+    def __call__(self, positions):
+        """Features, at every position, of postures in the unit: (n_sequences, Q, n_compared)."""
+        plain = self._plain(positions)
+        return plain if self.metric is None else self.metric(plain, positions)
+
+    def _plain(self, positions):
+        return cost_features(positions, self.cost, self.subframes, self.velocity_smoothing)
+
+    @property
+    def degree(self):
+        """With which power of the unit of the data squares of features grow."""
+        return COSTS[self.cost].degree if self.metric is None else 0
+
+    def of_features(self, chosen):
+        """The same of some features of a posture, given alone."""
+        metric = None if self.metric is None else self.metric.of_features(chosen)
+        return self._replace(metric=metric)
+
+    def learn(self, positions, *, consensus, warp_smoothing, **settings):
+        """These features with the metric of performances, at all positions in the unit.
+
+        At most ``LEARNING_FRAMES`` frames of each are looked at, which the smoothing of velocities,
+        a share of the clip, leaves without loss.
+        """
+        positions = positions.astype(np.float64, copy=False)
+        velocity = self._plain(positions)
+        n_frames = (positions.shape[1] - 1) // self.subframes + 1
+        some = np.linspace(0, positions.shape[1] - 1, min(n_frames, LEARNING_FRAMES))
+        some = np.round(some).astype(np.intp)
+        settings["max_rate"] = min(settings["max_rate"], len(some) - 1)
+
+        def match(compared):
+            matcher = Matcher.of(self._replace(subframes=1), compared, **settings)
+            return matcher.all_voted(compared, consensus, warp_smoothing)
+
+        metric = learn_metric(match, positions[:, some], velocity[:, some])
+        return self._replace(metric=metric)
+
+    def shares(self, positions):
+        """The share of every feature in what is compared, and in the energy of its velocities."""
+        positions = positions.astype(np.float64, copy=False)
+        velocity = self._plain(positions)
+        return self.metric.shares(velocity, positions), energy_shares(velocity)
+
+    def positions(self, arrays, n_frames):
+        """Performances at every position of the clock (Eq. 7), in the unit."""
+        return self.unit(normalise(arrays, n_frames, self.subframes))
+
+    def back(self, squares):
+        """Squares of features in the unit of the data."""
+        return self.unit.back(squares, self.degree)
+
+
+class Matcher(NamedTuple):
+    """Matches performances to each other: what is compared, and the trellis."""
+
+    features: Features
+    trellis: Trellis
+
+    @classmethod
+    def learn(cls, features, positions, *, smoothness, max_offset, max_rate):
+        """The matcher of a training set, at all positions in the unit, and what it compares of it.
+
+        The weight of changes of pace, ``mu``, is ``smoothness`` times the mean squared norm of the
+        features, so that it does not depend on their unit.
+        """
+        compared = features(positions)
+        return cls.of(
+            features, compared, smoothness=smoothness, max_offset=max_offset, max_rate=max_rate
+        ), compared
+
+    @classmethod
+    def of(cls, features, compared, *, smoothness, max_offset, max_rate):
+        """The matcher of a training set, of which this is compared."""
+        subframes = features.subframes
+        n_frames = (compared.shape[1] - 1) // subframes + 1
+        energy = np.einsum("npk,npk->", compared, compared, dtype=np.float64)
+        mu = float(smoothness * energy / np.prod(compared.shape[:2]))
+        # Whole frames; 0.29 * 100 must not lose one to rounding.
+        reach = int(np.floor(max_offset * n_frames * (1 + 1e-12)))
+        # No step is longer than the clip.
+        table = step_table(features.cost, min(max_rate, n_frames - 1), subframes)
+        return cls(features, Trellis(table, mu, min(reach, n_frames - 1)))
+
+    def distances(self, features, bases, moving, tiles):
+        """Synchronisation distances ``D_{n,m}`` of the tiles of the pairs of two index arrays."""
+        return [
+            (rows, columns, self._tile(features, bases[rows], moving[columns]))
+            for rows, columns in tiles
+        ]
+
+    def _tile(self, features, bases, moving):
+        bases = features[bases, :: self.trellis.table.subframes]
+        return self.trellis.distances(bases, features[moving])
+
+    def paths(self, bases, moving):
+        """Disparities of the best paths: (n_bases, n_moving, P)."""
+        max_bytes = get_config()["working_memory"] * 2**20 // 2
+        return self.trellis.paths(bases, moving, max_bytes)
+
+    def all_voted(self, sequences, consensus, warp_smoothing):
+        """Times of all ordered pairs of sequences, at the pace of the frames, after the vote."""
+        disparities = self.paths(sequences, sequences)
+        pairs = zip(sequences, disparities, strict=True)
+        distances = np.stack([self.trellis.costs(x, sequences, d) for x, d in pairs])
+        times, out = self.times(disparities), np.empty(disparities.shape)
+        for n in range(len(out)):
+            k = choose_exemplars(distances.sum(axis=1), consensus, n)
+            lengths = np.concatenate([distances[[n]], distances[n, k, np.newaxis] + distances[k]])
+            voted = vote(times[n], times[n, k], times[k], lengths)
+            out[n] = smoothed(voted, self.trellis.reach, warp_smoothing)
+        return out
+
+    def times(self, disparities):
+        """``tau``, in frames, of disparities."""
+        frames = np.arange(disparities.shape[-1])
+        return frames + disparities / self.trellis.table.subframes

@@ -1,0 +1,87 @@
+"""Metric: velocity and posture, weighted by how well they tell a moment of the action.
+
+Noisy directions of the features count as much as reliable ones until the training set says which
+are which: `learning` finds that out, and what it finds is applied here. The distance of two
+moments stays that of two points, so the trellis knows nothing of it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+__all__ = ["Metric", "compressed", "energy_shares", "without_mean"]
+
+
+class Metric(NamedTuple):
+    """How velocities and postures become the points that are compared.
+
+    Attributes
+    ----------
+    energy : float
+        Mean squared speed of the training set.
+    velocity : ndarray, shape (n_features, n_compared)
+        Applied to compressed velocities.
+    posture : ndarray, shape (n_features, n_compared)
+        Applied to postures less their own mean over time: where a person stands or how they hold
+        an arm throughout tells no moment.
+    """
+
+    energy: float
+    velocity: np.ndarray
+    posture: np.ndarray
+
+    def __call__(self, velocity, positions):
+        """What is compared of sequences: (n_sequences, Q, n_compared).
+
+        Parameters
+        ----------
+        velocity, positions : ndarray, shape (n_sequences, Q, n_features)
+            In the unit.
+        """
+        dtype = positions.dtype
+        # Products of one sequence each: what a sequence gives does not depend on its company.
+        out = compressed(velocity, self.energy) @ self.velocity.astype(dtype, copy=False)
+        out += without_mean(positions) @ self.posture.astype(dtype, copy=False)
+        return out
+
+    def shares(self, velocity, positions):
+        """The share of every feature in what is compared; that of noise is about 0."""
+        compared = self(velocity, positions)
+        parts = compressed(velocity, self.energy), without_mean(positions)
+        products = sum(
+            np.einsum("npk,npc,kc->k", part, compared, weights, optimize=True)
+            for part, weights in zip(parts, (self.velocity, self.posture), strict=True)
+        )
+        return products / products.sum()
+
+    def of_features(self, chosen):
+        """The metric of some features, as if the others never moved."""
+        return self._replace(velocity=self.velocity[chosen], posture=self.posture[chosen])
+
+
+def energy_shares(velocity):
+    """The share of every feature in the energy of velocities."""
+    energy = np.square(velocity).sum(axis=(0, 1))
+    return energy / energy.sum()
+
+
+def without_mean(positions):
+    """Sequences less their own mean over time."""
+    return positions - positions.mean(axis=1, keepdims=True)
+
+
+def compressed(velocity, energy):
+    """Velocities whose large speeds are compressed to their square root.
+
+    Slow moments, where a limb turns, count more beside fast ones, and the differences of pace
+    between people less.
+
+    Parameters
+    ----------
+    velocity : ndarray, shape (n_sequences, Q, n_features)
+    energy : float
+        The mean squared speed: a speed that is the root of it is halfway between linear and root.
+    """
+    scaled = velocity / np.sqrt(energy).astype(velocity.dtype)
+    scaled /= np.sqrt(1 + np.linalg.norm(scaled, axis=2, keepdims=True))
+    return scaled

@@ -1,0 +1,79 @@
+"""Settings: what a matcher is made with, and the metric that is learnt before it."""
+
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from sklearn.utils import Bunch
+
+from ..work import run
+
+__all__ = ["Settings", "learn_metric"]
+
+# max_offset="auto". A wide band leads paths astray until a metric is learnt; after that gestures
+# need it: the table in docs/accuracy.md.
+_NARROW, _WIDE = 0.25, 0.4
+# Steps that a path may take at a frame, all offsets together.
+_MOST_WAYS = 1e9
+# Of how many performances a metric is learnt, at least and at most. Two have no route but the
+# direct one: what they disagree in cannot be told from a wrong path.
+_FEWEST, _MOST = 3, 20
+
+
+class Settings(NamedTuple):
+    """What `Matcher.learn` takes besides the performances."""
+
+    smoothness: float
+    max_offset: float
+    max_rate: float
+
+    @classmethod
+    def of(cls, synchronizer, learnt):
+        """Those of a synchronizer, with a metric or without."""
+        max_offset = synchronizer.max_offset
+        if max_offset == "auto":
+            max_offset = _WIDE if learnt else _NARROW
+        return cls(synchronizer.smoothness, max_offset, synchronizer.max_rate)
+
+    def check(self, n_frames, subframes):
+        """Say what a trellis asks for before it takes for ever."""
+        steps = min(self.max_rate, n_frames - 1) * subframes + 1
+        ways = steps * (2 * self.max_offset * n_frames * subframes + 1)
+        if ways > _MOST_WAYS:
+            raise ValueError(
+                f"subframes = {subframes}, max_rate = {self.max_rate} and max_offset = "
+                f"{self.max_offset} on {n_frames} frames ask for {ways:.0e} steps of a path "
+                f"at every frame of every pair; {_MOST_WAYS:.0e} is the limit. Use fewer "
+                "subframes, a smaller rate or offset."
+            )
+
+
+def learn_metric(features, positions, synchronizer):
+    """Features with the metric of a training set, learnt of evenly spaced ones of many.
+
+    Parameters
+    ----------
+    features : Features
+    positions : ndarray, shape (n_sequences, Q, n_features)
+        The performances at all positions, in the unit.
+    synchronizer : DenseSynchronizer
+
+    Returns
+    -------
+    features : Features
+        As they were if there is nothing to learn.
+    learnt : Bunch or None
+        ``metric_`` of the synchronizer.
+    """
+    n = len(positions)
+    if n < _FEWEST:
+        return features, None
+    some = np.unique(np.round(np.linspace(0, n - 1, min(n, _MOST))).astype(np.intp))
+    settings = Settings.of(synchronizer, learnt=False)
+    settings = settings._replace(max_offset=min(settings.max_offset, _NARROW))._asdict()
+    vote = {name: getattr(synchronizer, name) for name in ("consensus", "warp_smoothing")}
+    (with_metric,) = run(partial(features.learn, **vote, **settings), [(positions[some],)])
+    if with_metric.metric is None:
+        return features, None
+    share, energy = with_metric.shares(positions[some])
+    return with_metric, Bunch(share=share, energy=energy, performances=some)
