@@ -47,7 +47,7 @@ class TrellisDisplay:
     >>> X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
     >>> display = TrellisDisplay.from_estimator(DenseSynchronizer(50).fit(X), X, performance=2)
     >>> display.costs.shape
-    (50, 25)
+    (50, 41)
     """
 
     def __init__(self, frames, offsets, costs, path, warp, *, names=("pattern", "performance")):

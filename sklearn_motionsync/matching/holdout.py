@@ -152,7 +152,8 @@ class RefinementTrial(RefinedWarper):
         """
         blind = []
         for shown in hands[::-1]:
-            features = warper.matcher.features.of_features(shown)
+            # Without a metric: the features that judge would have had a part in it.
+            features = warper.matcher.features.plain()
             matcher, _ = Matcher.learn(features, positions[:, :, shown], **settings)
             chosen, pattern = source[:, :, shown], warper.pattern[:, shown]
             blind.append(Warper.to_pattern(matcher, pattern, chosen, True, warper.warp_smoothing))

@@ -47,26 +47,25 @@ def learn_metric(match, positions, velocity):
     Metric or None
         None if nothing tells the moments.
     """
-    n_sequences, n_frames, n_features = positions.shape
+    moves = positions.any(axis=(0, 1))
     energy = float(np.square(velocity).sum(axis=2).mean())
-    if n_sequences < 2 or not energy > 0:
+    if len(positions) < 2 or not energy > 0:
         return None
-    fast = compressed(velocity, energy)
-    postures = without_mean(positions)
-    even = np.arange(n_frames, dtype=np.float64)
-    unmatched = np.broadcast_to(even, (n_sequences, n_sequences, n_frames))
-    first = _square_root(metric_matrix(fast, _covariance(fast, unmatched)[0]))
-    features = fast @ first if first.any() else fast
-    voted = match(features)
-    of_fast, alike = _covariance(fast, voted)
-    of_postures, longer = _covariance(postures, voted, weighted=False)
+    fast = compressed(velocity[:, :, moves], energy)
+    postures = without_mean(positions[:, :, moves])
+    first = _square_root(metric_matrix(fast, _unmatched(fast)))
+    voted = match(fast @ first if first.any() else fast)
+    of_fast, alike = _matched(fast, voted, weighted=True)
+    of_postures, longer = _matched(postures, voted, weighted=False)
     by_fast = _square_root(metric_matrix(fast, of_fast))
     # Differences that stay alike for longer are fewer pieces of evidence.
     by_postures = _square_root(metric_matrix(postures, of_postures)) * np.sqrt(alike / longer)
     turn = _turn(np.concatenate([fast @ by_fast, postures @ by_postures], axis=2))
     if turn is None:
         return None
-    return Metric(energy, by_fast @ turn[:n_features], by_postures @ turn[n_features:])
+    maps = np.zeros((2, len(moves), turn.shape[1]))
+    maps[:, moves] = by_fast @ turn[: len(by_fast)], by_postures @ turn[len(by_fast) :]
+    return Metric(energy, *maps)
 
 
 def metric_matrix(block, covariance):
@@ -88,10 +87,11 @@ def metric_matrix(block, covariance):
     if not a > 0:
         return np.zeros_like(spread)
     ridge = a * np.eye(len(spread))
-    ratio = np.linalg.inv(covariance + ridge) - np.linalg.inv(2 * spread + ridge)
+    same = np.linalg.inv(covariance + ridge)
+    ratio = same - np.linalg.inv(2 * spread + ridge)
     values, vectors = np.linalg.eigh((ratio + ratio.T) / 2)
     # What rounding leaves of a direction that tells nothing is nothing.
-    values = np.where(values > 1e-9 * np.abs(values).max(initial=0), values, 0)
+    values = np.where(values > 1e-9 * np.trace(same), values, 0)
     shares = np.einsum("ki,kl,li->i", vectors, spread, vectors)
     tempered = values**_TRUST
     tempered *= (values @ shares) / ((tempered @ shares) or 1)
@@ -110,7 +110,15 @@ def _square_root(matrix):
     return vectors * np.sqrt(np.maximum(values, 0))
 
 
-def _covariance(block, times, weighted=True):
+def _unmatched(block):
+    """Covariance of the differences of all pairs at equal times, without any matching."""
+    n_sequences = len(block)
+    total = block.sum(axis=0)
+    outer = total.T @ total / (n_sequences * block.shape[1])
+    return 2 * (n_sequences * _moments(block) - outer) / (n_sequences - 1)
+
+
+def _matched(block, times, weighted):
     """Covariance R of differences at matched times, and for how many frames they stay alike.
 
     Parameters
@@ -123,7 +131,7 @@ def _covariance(block, times, weighted=True):
     """
     n_sequences, n_frames, n_features = block.shape
     length = next_fast_len(2 * n_frames, real=True)
-    covariance, alike = np.zeros((n_features, n_features)), 0
+    covariance, power = np.zeros((n_features, n_features)), np.zeros(length // 2 + 1)
     for n in range(n_sequences):
         others = np.arange(n_sequences) != n
         moving = sample(list(block[others]), times[n, others], n_frames)
@@ -134,9 +142,9 @@ def _covariance(block, times, weighted=True):
         flat = differences.reshape(-1, n_features)
         covariance += flat.T @ flat
         spectrum = rfft(differences, length, axis=1)
-        alike = alike + (np.square(spectrum.real) + np.square(spectrum.imag)).sum(axis=(0, 2))
+        power += (np.square(spectrum.real) + np.square(spectrum.imag)).sum(axis=(0, 2))
     covariance /= n_sequences * (n_sequences - 1) * n_frames
-    return covariance, _length(irfft(alike, length)[: 1 + int(_LONGEST * n_frames)])
+    return covariance, _length(irfft(power, length)[: 1 + int(_LONGEST * n_frames)])
 
 
 def _length(autocovariance):

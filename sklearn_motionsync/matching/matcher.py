@@ -42,10 +42,10 @@ class Features(NamedTuple):
 
     def __call__(self, positions):
         """Features, at every position, of postures in the unit: (n_sequences, Q, n_compared)."""
-        plain = self._plain(positions)
-        return plain if self.metric is None else self.metric(plain, positions)
+        features = self._of_cost(positions)
+        return features if self.metric is None else self.metric(features, positions)
 
-    def _plain(self, positions):
+    def _of_cost(self, positions):
         return cost_features(positions, self.cost, self.subframes, self.velocity_smoothing)
 
     @property
@@ -53,10 +53,9 @@ class Features(NamedTuple):
         """With which power of the unit of the data squares of features grow."""
         return COSTS[self.cost].degree if self.metric is None else 0
 
-    def of_features(self, chosen):
-        """The same of some features of a posture, given alone."""
-        metric = None if self.metric is None else self.metric.of_features(chosen)
-        return self._replace(metric=metric)
+    def plain(self):
+        """The same without the metric."""
+        return self._replace(metric=None)
 
     def learn(self, positions, *, consensus, warp_smoothing, **settings):
         """These features with the metric of performances, at all positions in the unit.
@@ -65,7 +64,7 @@ class Features(NamedTuple):
         a share of the clip, leaves without loss.
         """
         positions = positions.astype(np.float64, copy=False)
-        velocity = self._plain(positions)
+        velocity = self._of_cost(positions)
         n_frames = (positions.shape[1] - 1) // self.subframes + 1
         some = np.linspace(0, positions.shape[1] - 1, min(n_frames, LEARNING_FRAMES))
         some = np.round(some).astype(np.intp)
@@ -81,7 +80,7 @@ class Features(NamedTuple):
     def shares(self, positions):
         """The share of every feature in what is compared, and in the energy of its velocities."""
         positions = positions.astype(np.float64, copy=False)
-        velocity = self._plain(positions)
+        velocity = self._of_cost(positions)
         return self.metric.shares(velocity, positions), energy_shares(velocity)
 
     def positions(self, arrays, n_frames):

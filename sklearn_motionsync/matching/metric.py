@@ -54,10 +54,6 @@ class Metric(NamedTuple):
         )
         return products / products.sum()
 
-    def of_features(self, chosen):
-        """The metric of some features, as if the others never moved."""
-        return self._replace(velocity=self.velocity[chosen], posture=self.posture[chosen])
-
 
 def energy_shares(velocity):
     """The share of every feature in the energy of velocities."""

@@ -388,4 +388,4 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
     def _settings(self):
         """What a `Matcher` learns with."""
-        return Settings.of(self, self.metric_ is not None)._asdict()
+        return vars(Settings.of(self, self.metric_ is not None))

@@ -1,7 +1,7 @@
 """Settings: what a matcher is made with, and the metric that is learnt before it."""
 
+from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from sklearn.utils import Bunch
@@ -20,7 +20,8 @@ _MOST_WAYS = 1e9
 _FEWEST, _MOST = 3, 20
 
 
-class Settings(NamedTuple):
+@dataclass(frozen=True)
+class Settings:
     """What `Matcher.learn` takes besides the performances."""
 
     smoothness: float
@@ -69,8 +70,8 @@ def learn_metric(features, positions, synchronizer):
     if n < _FEWEST:
         return features, None
     some = np.unique(np.round(np.linspace(0, n - 1, min(n, _MOST))).astype(np.intp))
-    settings = Settings.of(synchronizer, learnt=False)
-    settings = settings._replace(max_offset=min(settings.max_offset, _NARROW))._asdict()
+    settings = vars(Settings.of(synchronizer, learnt=False))
+    settings = {**settings, "max_offset": min(settings["max_offset"], _NARROW)}
     vote = {name: getattr(synchronizer, name) for name in ("consensus", "warp_smoothing")}
     (with_metric,) = run(partial(features.learn, **vote, **settings), [(positions[some],)])
     if with_metric.metric is None:

@@ -270,11 +270,11 @@ def test_the_disparity_space_of_long_takes_is_thinned(bunch, pipe, monkeypatch):
     monkeypatch.setattr("sklearn_motionsync.matching.warper.DRAWN_CELLS", whole.costs.size // 7)
     thin = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
     np.testing.assert_array_equal(thin.frames, np.arange(0, 30, 3))
-    np.testing.assert_array_equal(thin.offsets, [-6, -3, 0, 3, 6])
+    np.testing.assert_array_equal(thin.offsets, np.arange(-12, 13, 3))
     columns = np.searchsorted(whole.offsets, thin.offsets)
     np.testing.assert_array_equal(thin.costs, whole.costs[::3, columns])
     np.testing.assert_array_equal(thin.path_.get_xydata(), whole.path_.get_xydata())
-    assert thin.image_.get_extent() == [-1.5, 28.5, -7.5, 7.5]
+    assert thin.image_.get_extent() == [-1.5, 28.5, -13.5, 13.5]
 
 
 def test_a_trellis_on_given_axes(bunch, pipe):

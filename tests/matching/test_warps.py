@@ -60,16 +60,40 @@ def test_slices_are_few_and_even():
 # -- the vote -------------------------------------------------------------------------------
 
 
-def test_the_vote_is_the_median_of_all_routes():
+def test_the_vote_is_the_weighted_median_of_all_routes():
     rng, frames = np.random.default_rng(0), np.arange(15)
     direct, there = random_warps(rng, 4, 15), random_warps(rng, 6, 15)
     back = np.stack([random_warps(rng, 4, 15) for _ in range(6)])
     for n_exemplars in (1, 2, 6):
-        found = vote(direct, there[:n_exemplars], back[:n_exemplars])
+        lengths = rng.uniform(1, 5, (1 + n_exemplars, 4))
+        found = vote(direct, there[:n_exemplars], back[:n_exemplars], lengths)
+        alike = vote(direct, there[:n_exemplars], back[:n_exemplars], np.ones_like(lengths))
         for m in range(4):
             routes = [direct[m]]
             routes += [np.interp(there[k], frames, back[k, m]) for k in range(n_exemplars)]
-            np.testing.assert_allclose(found[m], np.median(routes, axis=0), atol=1e-12)
+            says = np.exp(-1.5 * lengths[:, m] / np.median(lengths[:, m]))
+            np.testing.assert_allclose(found[m], slow_median(routes, says), atol=1e-12)
+            np.testing.assert_allclose(alike[m], np.median(routes, axis=0), atol=1e-12)
+
+
+def test_without_any_distance_all_routes_have_the_same_say():
+    rng = np.random.default_rng(0)
+    direct, there, back = random_warps(rng, 1, 9), random_warps(rng, 2, 9), random_warps(rng, 2, 9)
+    alike = (vote(direct, there, back[:, np.newaxis], x * np.ones((3, 1))) for x in (0, 1))
+    np.testing.assert_array_equal(*alike)
+
+
+def slow_median(values, weights):
+    """At every frame the value at which the sum of weights passes a half."""
+    out = []
+    for column in np.transpose(values):
+        held, pairs = 0, sorted(zip(column, weights, strict=True))
+        for value, weight in pairs:
+            held += weight
+            if held > sum(weights) / 2:
+                out.append(value)
+                break
+    return out
 
 
 @pytest.fixture(scope="module")

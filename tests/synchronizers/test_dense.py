@@ -225,11 +225,13 @@ def test_new_performances_are_put_on_the_learnt_clock(bending, bending_aspace):
     assert np.abs(times - pattern).mean() < 2
 
 
-def test_smoothness_is_a_pure_number(warps):
+@pytest.mark.parametrize("metric", ["learned", None])
+def test_smoothness_is_a_pure_number(metric, warps):
     """Units and offsets of the features change nothing."""
-    a = DenseSynchronizer(40).fit(warps)
-    b = DenseSynchronizer(40).fit([1000 * x + 5e4 for x in warps])
-    np.testing.assert_allclose(b.mu_, 1e6 * a.mu_)
+    a = DenseSynchronizer(40, metric=metric).fit(warps)
+    b = DenseSynchronizer(40, metric=metric).fit([1000 * x + 5e4 for x in warps])
+    # What is compared in the learnt metric has no unit.
+    np.testing.assert_allclose(b.mu_, (1 if metric else 1e6) * a.mu_)
     assert a.pattern_index_ == b.pattern_index_
     X, Y = warps, [1000 * x + 5e4 for x in warps]
     np.testing.assert_allclose(a.match(X).offsets, b.match(Y).offsets, atol=1e-6)
@@ -264,9 +266,11 @@ def test_offsets_reach_as_far_as_they_may(n_frames, max_offset, reach):
 def test_warps_are_votes_of_paths_smoothed(settings, warps):
     """Paths to the pattern and to its exemplars, by synchronizers that match to each of them.
 
+    The say of a route falls with its length.
+
     Less than a third of a frame is no smoothing.
     """
-    P, settings = 40, {"n_frames": 40, **settings}
+    P, settings = 40, {"n_frames": 40, "metric": None, "max_offset": 0.25, **settings}
     X = [x + 0.1 * np.sin(3 * x[:, ::-1]) * i for i, x in enumerate(warps)]
     sync = DenseSynchronizer(pattern=1, refine=False, **settings).fit(X)
     frames, reach, sigma = np.arange(P), int(sync.max_offset * P), sync.warp_smoothing * (P - 1)
@@ -276,16 +280,25 @@ def test_warps_are_votes_of_paths_smoothed(settings, warps):
     )
     np.testing.assert_array_equal(sync.match(X).distances, direct.distances)
     for m in range(len(X)):
-        routes = [direct.times[m]]
+        routes, lengths = [direct.times[m]], [direct.distances[m]]
         for k, other in zip(sync.exemplars_, others, strict=True):
             routes.append(np.interp(direct.times[k], frames, other.times[m]))
-        offsets = np.median(routes, axis=0) - frames
+            lengths.append(direct.distances[k] + other.distances[m])
+        says = np.exp(-1.5 * np.array(lengths) / (np.median(lengths) or 1))
+        offsets = [slow_median(x, says) - p for p, x in enumerate(np.transpose(routes))]
         if sigma > 1 / 3:
             offsets = slow_filter(offsets, sigma, 0)
             offsets[[0, -1]] = 0
         times = np.clip(frames + np.clip(offsets, -reach, reach), 0, P - 1)
         expected = np.maximum.accumulate(times) if m != 1 else frames
         np.testing.assert_allclose(sync.match(X).times[m], expected, atol=1e-9)
+
+
+def slow_median(values, weights):
+    """The value at which the sum of weights passes a half."""
+    order = np.argsort(values)
+    passed = np.cumsum(weights[order]) > weights.sum() / 2
+    return values[order][passed.argmax()]
 
 
 def test_more_smoothness_is_smoother(warps):

@@ -1,0 +1,200 @@
+"""What the learnt metric does for a synchronizer: noise, people, and when there is none."""
+
+import pickle
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
+from sklearn_motionsync.datasets import load_performances
+
+P = 100
+
+
+@pytest.fixture(scope="module")
+def trials():
+    """Twelve performances of one movement of three features, each at a pace of its own."""
+    rng, t = np.random.default_rng(0), np.linspace(0, 1, 60)
+    X, phases = [], []
+    for _ in range(12):
+        phases.append(t + rng.uniform(-0.1, 0.1) * np.sin(np.pi * t))
+        style = 1 + 0.2 * rng.standard_normal(3)
+        x = [np.sin(7 * phases[-1]), np.cos(5 * phases[-1]), np.sin(3 * phases[-1])]
+        X.append(np.transpose(x) * style)
+    return X, np.array(phases)
+
+
+def with_noise(X, seed=0):
+    """As many columns again, of white noise of the same energy."""
+    rng = np.random.default_rng(seed)
+    energy = np.concatenate(X).std(axis=0)
+    return [np.hstack([x, energy * rng.standard_normal(x.shape)]) for x in X]
+
+
+def test_noise_is_told_and_ignored(trials):
+    X, noisy = trials[0], with_noise(trials[0])
+    sync = DenseSynchronizer(60).fit(noisy)
+    assert sync.metric_.share.sum() == pytest.approx(1)
+    assert sync.metric_.energy.sum() == pytest.approx(1)
+    assert sync.metric_.energy[3:].sum() > 0.2
+    assert sync.metric_.share[3:].sum() < 0.2 * sync.metric_.energy[3:].sum()
+
+    def moved(**settings):
+        settings = {"n_frames": 60, "pattern": 0, "refine": False, **settings}
+        clean, found = (DenseSynchronizer(**settings).fit(x).match(x).times for x in (X, noisy))
+        return np.abs(found - clean)[1:].mean()
+
+    assert moved() < 1
+    assert moved() < 0.5 * moved(metric=None)
+
+
+def test_noise_that_all_performances_share_is_no_noise(trials):
+    """What is the same in all of them, whatever it looks like, tells the moment."""
+    same = np.random.default_rng(0).standard_normal(300)
+    X = []
+    for x, phase in zip(*trials, strict=True):
+        curve = gaussian_filter1d(same, 8)
+        extra = np.interp(np.clip(phase, 0, 1) * 299, np.arange(300), curve / curve.std())
+        X.append(np.hstack([x, extra[:, np.newaxis]]))
+    assert DenseSynchronizer(60).fit(X).metric_.share[3] > 0.1
+
+
+@pytest.mark.parametrize(
+    ("settings", "n"),
+    [
+        ({"metric": None}, 12),
+        ({"consensus": 0}, 12),
+        ({"cost": "posture"}, 12),
+        ({"cost": "elastic"}, 12),
+        ({}, 2),
+        ({}, 1),
+    ],
+    ids=str,
+)
+def test_when_there_is_no_metric(settings, n, trials):
+    """Off without a vote, for other costs, and for fewer than three performances."""
+    X = trials[0][:n]
+    sync, plain = DenseSynchronizer(60, **settings), DenseSynchronizer(60, **settings)
+    sync.fit(X)
+    plain.set_params(metric=None, max_offset=0.25).fit(X)
+    assert sync.metric_ is None
+    np.testing.assert_array_equal(sync.match(X).times, plain.match(X).times)
+    np.testing.assert_array_equal(sync.match(X).distances, plain.match(X).distances)
+
+
+def test_the_paper_takes_no_notice_of_it(trials):
+    paper = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
+    one, other = (DenseSynchronizer(60, metric=m, **paper) for m in ("learned", None))
+    one, other = (s.fit(trials[0]).match(trials[0]) for s in (one, other))
+    np.testing.assert_array_equal(one.times, other.times)
+
+
+def test_three_performances_teach(trials):
+    assert DenseSynchronizer(60).fit(trials[0][:3]).metric_ is not None
+
+
+def test_nothing_that_moves_teaches_nothing():
+    sync = DenseSynchronizer(20).fit(np.ones((4, 20, 2)))
+    assert sync.metric_ is None
+    np.testing.assert_array_equal(sync.match(np.ones((2, 20, 2))).offsets, 0)
+
+
+def test_one_feature_is_enough(trials):
+    X = [x[:, :1] for x in trials[0]]
+    sync = DenseSynchronizer(60, pattern=0).fit(X)
+    np.testing.assert_array_equal(sync.metric_.share, [1])
+    truth = [60 * (np.interp(trials[1][0], p, np.linspace(0, 1, 60))) for p in trials[1]]
+    errors = np.abs(sync.match(X).times / 59 * 60 - truth)
+    assert errors[1:].mean() < 0.5 * np.abs(np.arange(60) / 59 * 60 - truth)[1:].mean()
+
+
+def test_many_are_taught_by_twenty_evenly_spaced_ones(trials):
+    X = [x for x in trials[0] for _ in range(5)]
+    rng = np.random.default_rng(0)
+    X = [x + 0.01 * rng.standard_normal(x.shape) for x in X]
+    taught = DenseSynchronizer(60).fit(X).metric_.performances
+    assert len(taught) == 20
+    assert (taught[0], taught[-1]) == (0, 59)
+    assert set(np.diff(taught)) == {3, 4} or set(np.diff(taught)) == {3}
+    np.testing.assert_array_equal(DenseSynchronizer(60).fit(X[:12]).metric_.performances, range(12))
+
+
+def test_single_precision_learns_the_same(trials):
+    X = trials[0]
+    single = DenseSynchronizer(60, pattern=0).fit([x.astype(np.float32) for x in X])
+    double = DenseSynchronizer(60, pattern=0).fit(X)
+    np.testing.assert_allclose(single.metric_.share, double.metric_.share, atol=1e-4)
+    assert np.median(np.abs(single.match(X).times - double.match(X).times)) < 1e-3
+
+
+def test_long_takes_learn_of_a_hundred_frames(trials):
+    """The metric hardly depends on how many frames the clock has."""
+    X = trials[0]
+    short, long = (DenseSynchronizer(p, max_offset=0.1).fit(X).metric_ for p in (100, 401))
+    np.testing.assert_allclose(short.share, long.share, atol=0.05)
+
+
+def test_a_learnt_metric_survives_pickling(trials):
+    X = trials[0]
+    sync = DenseSynchronizer(60).fit(X)
+    again = pickle.loads(pickle.dumps(sync))
+    np.testing.assert_array_equal(again.match(X).times, sync.match(X).times)
+
+
+@pytest.mark.parametrize("max_offset", [0.05, 0.3, 1.0])
+def test_the_largest_offset_is_kept(max_offset, trials):
+    X = trials[0]
+    offsets = DenseSynchronizer(60, max_offset=max_offset).fit(X).match(X).offsets
+    assert np.abs(offsets).max() <= max_offset * 60
+
+
+# -- real people ------------------------------------------------------------------------
+
+
+def rise(h):
+    """Where a curve first passes the middle of its range upwards, as a share of the clip."""
+    over = h > (h.min() + h.max()) / 2
+    i = int(np.flatnonzero(~over[:-1] & over[1:])[0])
+    middle = (h.min() + h.max()) / 2
+    return (i + (middle - h[i]) / (h[i + 1] - h[i])) / (len(h) - 1)
+
+
+def errors_of(X, moments, **settings):
+    """Of all ordered pairs from every second pattern, in frames of 100."""
+    out = []
+    for n in range(0, len(X), 2):
+        times = DenseSynchronizer(P, n, **settings).fit(X).match(X).times
+        landed = np.array([np.interp(moments[n], np.arange(P), tau) for tau in times])
+        out.append(np.delete(np.abs(landed - moments), n))
+    return np.concatenate(out)
+
+
+@pytest.fixture(scope="module")
+def standing_up(real_data):
+    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
+    clips = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == "standUp"]
+    height = [x[:, 3 * bunch.joints.index("Head") + 1].astype(float) for x in clips]
+    heads = [gaussian_filter1d(h, max(0.03 * len(h), 0.6), mode="nearest") for h in height]
+    moments = np.array([rise(h) * (P - 1) for h in heads])
+    return ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(clips)), moments
+
+
+def test_people_before_a_noisy_camera_are_met_twice_as_closely(standing_up):
+    """Heads of people who stand up, halfway."""
+    X, moments = standing_up
+    learnt, plain = errors_of(X, moments), errors_of(X, moments, metric=None)
+    assert learnt.mean() < 0.6 * plain.mean()
+    assert np.median(learnt) < 0.6 * np.median(plain)
+
+
+def test_a_metric_of_other_movements_is_no_metric_of_people(standing_up):
+    """What makes it closer is what was learnt of these performances: shuffled, they teach less."""
+    X, moments = standing_up
+    rng = np.random.default_rng(0)
+    cut = [np.roll(x, rng.integers(len(x)), axis=0) for x in X]
+    sync, other = DenseSynchronizer(P, 0).fit(X), DenseSynchronizer(P, X[0]).fit(cut)
+    errors = []
+    for s in (sync, other):
+        landed = [np.interp(moments[0], np.arange(P), tau) for tau in s.match(X[1:]).times]
+        errors.append(np.abs(landed - moments[1:]).mean())
+    assert errors[0] < 0.7 * errors[1]
