@@ -6,10 +6,11 @@ moments, and 2 S that of differences at any two, then ``r' (R^-1 - (2 S)^-1) r``
 constant, minus twice the log-likelihood ratio of "the same moment" to "any two", given a difference
 r (KISSME; Koestinger et al., 2012). That matrix, without what is negative, is the metric.
 
-1. Without any matching, performances on the clock agree in what is large and slow. That tells
-   noise, which agrees in nothing, and gives a first metric of velocities.
-2. By this one all ordered pairs are matched and voted on.
-3. Their differences give the metric of velocities and that of postures.
+1. Without any matching, performances on the clock agree in what is large and slow. Features that
+   do so beyond doubt give a first metric of velocities.
+2. By this one all ordered pairs are matched and voted on. At these times other features may turn
+   out to agree, too; they had no part in the matching. What is left out is noise.
+3. The differences give the metric of velocities and that of postures.
 """
 
 import numpy as np
@@ -21,13 +22,15 @@ from .warps import sample
 
 __all__ = ["learn_metric", "metric_matrix"]
 
+# Standard errors of the agreement between performances at which a feature is believed.
+_DOUBT = 2.0
 # Share of a feature's mean variance that is added to all of them, before anything is inverted.
-_RIDGE = 0.1
+_RIDGE = 0.03
 # Eigenvalues of a metric are raised to this power: half-way to counting all directions alike,
 # which is what is known before anything is learnt. From the table in docs/accuracy.md.
 _TRUST = 0.6
 # Directions that make so much of what is compared are enough.
-_KEPT = 0.98
+_KEPT = 0.99
 # Largest lag, as a share of the clip, at which differences are taken to be alike.
 _LONGEST = 0.3
 
@@ -47,14 +50,18 @@ def learn_metric(match, positions, velocity):
     Metric or None
         None if nothing tells the moments.
     """
-    moves = positions.any(axis=(0, 1))
-    energy = float(np.square(velocity).sum(axis=2).mean())
-    if len(positions) < 2 or not energy > 0:
+    moves = positions.any(axis=(0, 1)) & velocity.any(axis=(0, 1))
+    if len(positions) < 2 or not moves.any():
         return None
-    fast = compressed(velocity[:, :, moves], energy)
-    postures = without_mean(positions[:, :, moves])
+    postures = without_mean(positions)
+    told = moves & _believed(postures, velocity)
+    told = told if told.any() else moves
+    fast = compressed(velocity[:, :, told], _energy(velocity[:, :, told]))
     first = _square_root(metric_matrix(fast, _unmatched(fast)))
     voted = match(fast @ first if first.any() else fast)
+    told |= moves & ~told & _believed(postures, velocity, voted)
+    postures, energy = postures[:, :, told], _energy(velocity[:, :, told])
+    fast = compressed(velocity[:, :, told], energy)
     of_fast, alike = _matched(fast, voted, weighted=True)
     of_postures, longer = _matched(postures, voted, weighted=False)
     by_fast = _square_root(metric_matrix(fast, of_fast))
@@ -63,9 +70,51 @@ def learn_metric(match, positions, velocity):
     turn = _turn(np.concatenate([fast @ by_fast, postures @ by_postures], axis=2))
     if turn is None:
         return None
-    maps = np.zeros((2, len(moves), turn.shape[1]))
-    maps[:, moves] = by_fast @ turn[: len(by_fast)], by_postures @ turn[len(by_fast) :]
-    return Metric(energy, *maps)
+    n_told = len(by_fast)
+    maps = by_fast @ turn[:n_told], by_postures @ turn[n_told:]
+    return Metric(np.flatnonzero(told), energy, *maps)
+
+
+def _energy(velocity):
+    """Mean squared speed."""
+    return float(np.square(velocity).sum(axis=2).mean())
+
+
+def _believed(postures, velocity, times=None):
+    """Whether performances agree in a feature, in posture and velocity together: (n_features,)."""
+    evidence = _evidence(postures, times) + _evidence(velocity, times)
+    return evidence / np.sqrt(2) > _DOUBT
+
+
+def _evidence(block, times):
+    """Mean correlation of two performances in every feature, in its standard errors.
+
+    Parameters
+    ----------
+    block : ndarray, shape (n_sequences, P, n_features)
+    times : ndarray, shape (n_sequences, n_sequences, P), or None
+        Matched ones, or the same for all.
+
+    Two series that have nothing to do with each other, of autocorrelation r, correlate by the
+    root of ``(1 + 2 sum r^2) / P``; every two performances are a pair of its own.
+    """
+    n_sequences, n_frames, n_features = block.shape
+    own = np.square(block).sum(axis=(0, 1))
+    if times is None:
+        cross = np.square(block.sum(axis=0)).sum(axis=0) - own
+        norm = own * (n_sequences - 1)
+    else:
+        cross, other = np.zeros((2, n_features))
+        for n, moving in enumerate(_others(block, times)):
+            cross += np.einsum("pk,mpk->k", block[n], moving)
+            other += np.square(moving).sum(axis=(0, 1))
+        norm = np.sqrt(own * (n_sequences - 1) * other)
+    power = _power(block).sum(axis=0)
+    correlation = irfft(power, 2 * len(power) - 2, axis=0)[:n_frames]
+    correlation /= np.where(own > 0, correlation[0], 1)
+    width = 1 + 2 * np.square(correlation[1:]).sum(axis=0)
+    error = np.sqrt(2 * width / (n_sequences * (n_sequences - 1) * n_frames))
+    return cross / np.where(norm > 0, norm, 1) / error
 
 
 def metric_matrix(block, covariance):
@@ -130,21 +179,30 @@ def _matched(block, times, weighted):
         Whether the moving sequence counts with the weight of its rate, as velocities do.
     """
     n_sequences, n_frames, n_features = block.shape
-    length = next_fast_len(2 * n_frames, real=True)
-    covariance, power = np.zeros((n_features, n_features)), np.zeros(length // 2 + 1)
-    for n in range(n_sequences):
-        others = np.arange(n_sequences) != n
-        moving = sample(list(block[others]), times[n, others], n_frames)
+    covariance, power = np.zeros((n_features, n_features)), 0
+    for n, moving in enumerate(_others(block, times)):
         if weighted:
-            rates = np.gradient(times[n, others], axis=1)
+            rates = np.gradient(np.delete(times[n], n, axis=0), axis=1)
             moving *= (1 + RATE_WEIGHT * (rates - 1))[:, :, np.newaxis]
         differences = block[n] - moving
         flat = differences.reshape(-1, n_features)
         covariance += flat.T @ flat
-        spectrum = rfft(differences, length, axis=1)
-        power += (np.square(spectrum.real) + np.square(spectrum.imag)).sum(axis=(0, 2))
+        power = power + _power(differences).sum(axis=(0, 2))
     covariance /= n_sequences * (n_sequences - 1) * n_frames
-    return covariance, _length(irfft(power, length)[: 1 + int(_LONGEST * n_frames)])
+    return covariance, _length(irfft(power)[: 1 + int(_LONGEST * n_frames)])
+
+
+def _others(block, times):
+    """Yield, for every sequence, all others at its times: (n_sequences - 1, P, n_features)."""
+    for n in range(len(block)):
+        others = np.delete(np.arange(len(block)), n)
+        yield sample(list(block[others]), times[n, others], block.shape[1])
+
+
+def _power(block):
+    """Power spectra along time, long enough for all lags: (n_sequences, n_frequencies, ...)."""
+    spectrum = rfft(block, 2 * next_fast_len(block.shape[1], real=True), axis=1)
+    return np.square(spectrum.real) + np.square(spectrum.imag)
 
 
 def _length(autocovariance):

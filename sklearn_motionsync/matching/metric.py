@@ -17,15 +17,18 @@ class Metric(NamedTuple):
 
     Attributes
     ----------
+    features : ndarray of int, shape (n_told,)
+        Features that tell the moments; the others are left out.
     energy : float
-        Mean squared speed of the training set.
-    velocity : ndarray, shape (n_features, n_compared)
+        Mean squared speed of the training set, in these features.
+    velocity : ndarray, shape (n_told, n_compared)
         Applied to compressed velocities.
-    posture : ndarray, shape (n_features, n_compared)
+    posture : ndarray, shape (n_told, n_compared)
         Applied to postures less their own mean over time: where a person stands or how they hold
         an arm throughout tells no moment.
     """
 
+    features: np.ndarray
     energy: float
     velocity: np.ndarray
     posture: np.ndarray
@@ -39,20 +42,24 @@ class Metric(NamedTuple):
             In the unit.
         """
         dtype = positions.dtype
+        velocity, postures = self._parts(velocity, positions)
         # Products of one sequence each: what a sequence gives does not depend on its company.
-        out = compressed(velocity, self.energy) @ self.velocity.astype(dtype, copy=False)
-        out += without_mean(positions) @ self.posture.astype(dtype, copy=False)
+        out = velocity @ self.velocity.astype(dtype, copy=False)
+        out += postures @ self.posture.astype(dtype, copy=False)
         return out
 
     def shares(self, velocity, positions):
         """The share of every feature in what is compared; that of noise is about 0."""
-        compared = self(velocity, positions)
-        parts = compressed(velocity, self.energy), without_mean(positions)
-        products = sum(
-            np.einsum("npk,npc,kc->k", part, compared, weights, optimize=True)
-            for part, weights in zip(parts, (self.velocity, self.posture), strict=True)
-        )
-        return products / products.sum()
+        compared, parts = self(velocity, positions), self._parts(velocity, positions)
+        shares = np.zeros(positions.shape[2])
+        for part, weights in zip(parts, (self.velocity, self.posture), strict=True):
+            with_all = np.einsum("npk,npc->kc", part, compared)
+            shares[self.features] += (with_all * weights).sum(axis=1)
+        return shares / shares.sum()
+
+    def _parts(self, velocity, positions):
+        fast = compressed(velocity[:, :, self.features], self.energy)
+        return fast, without_mean(positions[:, :, self.features])
 
 
 def energy_shares(velocity):
