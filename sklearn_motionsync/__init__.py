@@ -18,6 +18,7 @@ from .body.direction_cosines import DirectionCosines
 from .body.skeleton import Skeleton
 from .display import (
     ActionModelDisplay,
+    MetricDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
     TrellisDisplay,
@@ -40,6 +41,7 @@ __all__ = [
     "KeyframeSynchronizer",
     "LinearSynchronizer",
     "Match",
+    "MetricDisplay",
     "Skeleton",
     "SkeletonDisplay",
     "SynchronizationDisplay",

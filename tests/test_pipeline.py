@@ -20,6 +20,7 @@ from sklearn_motionsync import (
     KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
+    MetricDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
     TrellisDisplay,
@@ -149,6 +150,9 @@ def test_a_synchronizer_is_found_at_any_depth(name, few, no_figures):
     figures = SynchronizationDisplay.from_estimator(pipe, few.data)
     assert figures.feature_names == ["aspace0", "aspace1", "aspace2", "aspace3"]
     assert TrellisDisplay.from_estimator(pipe, few.data).costs.shape[0] == 40
+    one, other = (MetricDisplay.from_estimator(p) for p in (flat, pipe))
+    assert sorted(other.feature_names) == figures.feature_names
+    np.testing.assert_array_equal(one.share, other.share)
     one, other = (
         ActionModelDisplay.from_estimator(p, few.data, features="pelvis_height")
         for p in (flat, pipe)

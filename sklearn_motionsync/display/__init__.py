@@ -5,9 +5,16 @@ again, and the artists stay on the display as attributes that end in an undersco
 matplotlib, in the extra ``plot``, is imported only when something is drawn.
 """
 
+from .metric import MetricDisplay
 from .model import ActionModelDisplay
 from .stick_figures import SkeletonDisplay
 from .synchronization import SynchronizationDisplay
 from .trellis import TrellisDisplay
 
-__all__ = ["ActionModelDisplay", "SkeletonDisplay", "SynchronizationDisplay", "TrellisDisplay"]
+__all__ = [
+    "ActionModelDisplay",
+    "MetricDisplay",
+    "SkeletonDisplay",
+    "SynchronizationDisplay",
+    "TrellisDisplay",
+]

@@ -168,6 +168,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     LinearSynchronizer : The baseline without matching.
     KeyframeSynchronizer : Matching by key-frames.
     ActionModel : What the synchronised performances have in common.
+    MetricDisplay : Draws what the metric listens to, and what it takes for noise.
 
     References
     ----------

@@ -12,6 +12,7 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
+    MetricDisplay,
     Skeleton,
     SkeletonDisplay,
     SynchronizationDisplay,
@@ -176,6 +177,37 @@ def test_a_trellis_made_by_hand(change, message):
     given |= {"path": np.zeros(5), "warp": np.zeros(5)}
     assert TrellisDisplay(**given).plot().image_ is not None
     refuses(lambda: TrellisDisplay(**given | change), message)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"share": "all"}, "The share is not a numeric array"),
+        ({"share": []}, r"The share must have the shape \(n_shown,\), got \(0,\)"),
+        ({"energy": [1.0]}, r"The energy must have the shape \(2,\), got \(1,\)"),
+        ({"energy": [np.inf, 0]}, r"The energy is infinite at \(0,\)"),
+        ({"feature_names": ["a"]}, "feature_names .* each of the 2 features shown, got 1"),
+        *(({"n_performances": bad}, "n_performances must be a whole number above 0")
+          for bad in (0, -1, 2.5, "3", True)),
+    ],
+)  # fmt: skip
+def test_a_metric_made_by_hand(change, message):
+    given = {"share": [-0.1, 1.1], "energy": [0.5, np.nan], "feature_names": ["a", "b"]}
+    display = MetricDisplay(**given).plot()
+    assert repr(display) == "MetricDisplay(2 rows, learnt metric)"
+    display.figure_.canvas.draw()
+    refuses(lambda: MetricDisplay(**given | change), message)
+
+
+@pytest.mark.parametrize("features", [3, -1, True, "aspace9", [0, "x1"]])
+def test_a_feature_of_the_metric_that_does_not_exist(pipe, features):
+    message = "There is no feature .*there are 3: aspace0, aspace1, aspace2"
+    refuses(lambda: MetricDisplay.from_estimator(pipe, features=features), message)
+
+
+@pytest.mark.parametrize("estimator", [None, "dense", 3, LinearSynchronizer(9)])
+def test_what_has_no_metric(estimator):
+    refuses(lambda: MetricDisplay.from_estimator(estimator), "There is no DenseSynchronizer in")
 
 
 @pytest.mark.parametrize("performance", [99, -1, 1.5, "1", None, np.nan])

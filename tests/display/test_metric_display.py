@@ -1,0 +1,137 @@
+"""What the display of the learnt metric draws, read back from its bars."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.exceptions import NotFittedError
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, MetricDisplay
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display.drawing import COLORS
+
+BUNCH = make_bending(6, n_frames=60, random_state=1)
+COSINES = DirectionCosines(BUNCH.skeleton)
+POSTURES = COSINES.fit_transform(BUNCH.data)
+# As loud as the postures: so many of their typical standard deviation.
+LOUD = 2 * np.concatenate(POSTURES).std(axis=0).mean()
+
+
+def with_noise(columns=slice(None)):
+    rng = np.random.default_rng(0)
+    return [np.column_stack([x[:, columns], LOUD * rng.normal(size=len(x))]) for x in POSTURES]
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    """Of 38 features the last one is noise."""
+    return DenseSynchronizer(50).fit(with_noise())
+
+
+def widths(bars):
+    return np.array([bar.get_width() for bar in bars])
+
+
+def labels(display):
+    return [label.get_text() for label in display.ax_.get_yticklabels()]
+
+
+def test_the_bars_are_the_numbers_of_the_estimator(noisy):
+    display = MetricDisplay.from_estimator(noisy, features=[37, "x0", 5])
+    for bars, numbers in zip(
+        (display.share_, display.energy_), (noisy.metric_.share, noisy.metric_.energy), strict=True
+    ):
+        np.testing.assert_array_equal(widths(bars), numbers[[37, 0, 5]])
+    assert labels(display) == display.feature_names == ["x37", "x0", "x5"]
+    assert repr(display) == "MetricDisplay(3 rows, metric learnt from 6 performances)"
+
+
+def test_a_column_of_noise_is_seen_to_be_ignored(noisy):
+    """Its light bar is the longest of all, its dark one hardly there."""
+    display = MetricDisplay.from_estimator(noisy)
+    assert labels(display)[0] == "x37"
+    light, dark = widths(display.energy_), widths(display.share_)
+    assert light[0] == light.max() > 0.1
+    assert abs(dark[0]) < 0.1 * light[0]
+    dark_color, light_color = (
+        bars[0].get_facecolor() for bars in (display.share_, display.energy_)
+    )
+    assert plt.matplotlib.colors.same_color(dark_color, COLORS["performance"])
+    assert plt.matplotlib.colors.same_color(light_color[:3], COLORS["envelope"])
+    # Drawn behind, and from the top.
+    assert display.energy_[0].get_height() > display.share_[0].get_height()
+    assert display.ax_.yaxis_inverted()
+    assert "share of what is compared" in display.ax_.get_xlabel()
+    assert len(display.ax_.get_legend().get_texts()) == 2
+
+
+def test_many_features_are_drawn_in_part_and_summed(noisy):
+    display = MetricDisplay.from_estimator(noisy)
+    assert labels(display)[-1] == "19 others"
+    assert len(set(labels(display))) == len(display.share_) == 20
+    larger = np.maximum(display.share, display.energy)[:-1]
+    assert (np.diff(larger) <= 0).all()
+    np.testing.assert_allclose([display.share.sum(), display.energy.sum()], 1)
+    shown = [int(name[1:]) for name in labels(display)[:-1]]
+    rest = np.delete(noisy.metric_.share, shown)
+    np.testing.assert_allclose(display.share[-1], rest.sum())
+    assert (
+        np.delete(np.maximum(noisy.metric_.share, noisy.metric_.energy), shown).max() <= larger[-1]
+    )
+    all_of_them = MetricDisplay.from_estimator(noisy, features=range(38))
+    np.testing.assert_array_equal(widths(all_of_them.share_), noisy.metric_.share)
+
+
+@pytest.mark.parametrize(("kept", "others"), [(19, []), (20, ["2 others"])])
+def test_up_to_twenty_features_are_all_drawn(kept, others):
+    display = MetricDisplay.from_estimator(DenseSynchronizer(30).fit(with_noise(slice(kept))))
+    assert len(labels(display)) == 20
+    assert [name for name in labels(display) if "others" in name] == others
+
+
+def test_names_of_a_pipeline_and_of_columns():
+    inside = make_pipeline(make_pipeline(COSINES, ASpace(3)), make_pipeline(DenseSynchronizer(30)))
+    display = MetricDisplay.from_estimator(inside.fit(BUNCH.data))
+    assert sorted(display.feature_names) == ["aspace0", "aspace1", "aspace2"]
+    direct = make_pipeline(COSINES, DenseSynchronizer(30)).fit(BUNCH.data)
+    display = MetricDisplay.from_estimator(direct, features="pelvis_height")
+    np.testing.assert_array_equal(display.share, direct[-1].metric_.share[:1])
+    tables = [pd.DataFrame(x[:, 1:4], columns=["hip", "knee", "toe"]) for x in BUNCH.data]
+    display = MetricDisplay.from_estimator(DenseSynchronizer(30).fit(tables), features=["toe"])
+    assert labels(display) == ["toe"]
+
+
+def test_on_given_axes_and_again(noisy):
+    figure, axes = plt.subplots(1, 2)
+    display = MetricDisplay.from_estimator(noisy, features=[0, 37], ax=axes[1])
+    assert display.ax_ is axes[1]
+    assert display.figure_ is figure
+    assert display.plot() is display
+    assert display.figure_ is not figure
+    with pytest.raises(ValueError, match="ax must be Axes of matplotlib, got str"):
+        display.plot("left")
+
+
+STILL = [np.ones((40, 2))] * 4
+
+
+@pytest.mark.parametrize(
+    ("change", "X", "message"),
+    [
+        ({"metric": None}, POSTURES, "It has metric=None, cost='velocity', consensus=8"),
+        ({"cost": "elastic"}, POSTURES, "It has metric='learned', cost='elastic', consensus=8"),
+        ({"consensus": 0}, POSTURES, "It has metric='learned', cost='velocity', consensus=0"),
+        ({}, POSTURES[:2], "at least 3 performances .* was fitted to 2 performances; change"),
+        ({}, POSTURES[:1], "was fitted to 1 performance; change what is missing and fit it again"),
+        ({}, STILL, "in which something moves.* was fitted to 4 performances"),
+    ],
+)
+def test_no_metric_says_why(change, X, message):
+    with pytest.raises(ValueError, match=f"There is no metric to draw.*{message}"):
+        MetricDisplay.from_estimator(DenseSynchronizer(30, **change).fit(X))
+
+
+def test_not_fitted():
+    for estimator in (DenseSynchronizer(), make_pipeline(COSINES, DenseSynchronizer())):
+        with pytest.raises(NotFittedError):
+            MetricDisplay.from_estimator(estimator)
