@@ -3,11 +3,11 @@
     pip install . dtaidistance tslearn gdtw fdasrsf aeon
     python benchmarks/accuracy.py DATA_FOLDER
 
-DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect/utkinect_positions.npz; without it
-only known warps are run. Every peer is fed postures and velocities (smoothed as ours) and is
-reported at the best of its settings, for each number of each cell by itself; ours have one
-setting for all. Peers that are
-not installed are left out. Prints Markdown.
+DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect and cmu07_walk of the same form; without
+it only known warps are run. Every peer is fed postures and velocities (smoothed over 3 % of the
+clip) and is reported at the best of its settings, for each number of each cell by itself; ours
+have one setting for all. Peers that are not installed are left out; of people, events.py has what
+the best of them reached. Prints Markdown.
 """
 
 import importlib.metadata
@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 import peers
-from scipy.ndimage import gaussian_filter1d
-from sklearn.model_selection import GroupKFold
+from events import EVENTS, P
+from people import errors_of, geometric_means, ratio, read_people
 from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
@@ -28,24 +28,25 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     __version__,
 )
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.costs import cost_features
 from sklearn_motionsync.matching.filters import SMOOTHING, smooth
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error, timing_error
 
-P = 100
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
+LINEAR, PLAIN, DEFAULTS = "linear normalisation", "`metric=None`", "`DenseSynchronizer()`"
 OURS = {
-    "linear normalisation": lambda **kw: LinearSynchronizer(P, **kw),
+    LINEAR: lambda **kw: LinearSynchronizer(P, **kw),
     "the paper's method": lambda **kw: DenseSynchronizer(P, **PAPER, **kw),
-    "`DenseSynchronizer()`": lambda **kw: DenseSynchronizer(P, **kw),
+    DEFAULTS: lambda **kw: DenseSynchronizer(P, **kw),
+    PLAIN: lambda **kw: DenseSynchronizer(P, metric=None, **kw),
     "`consensus=0`": lambda **kw: DenseSynchronizer(P, consensus=0, **kw),
-    "`velocity_smoothing=0.1`": lambda **kw: DenseSynchronizer(P, velocity_smoothing=0.1, **kw),
     '`cost="elastic"`': lambda **kw: DenseSynchronizer(P, cost="elastic", **kw),
+    '`cost="posture"`': lambda **kw: DenseSynchronizer(P, cost="posture", **kw),
     "`refine=True` (single source)": lambda **kw: DenseSynchronizer(P, refine=True, **kw),
     "`warp_smoothing=0`": lambda **kw: DenseSynchronizer(P, warp_smoothing=0, **kw),
-    "`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw),
 }
+UNREFINED = {"`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw)}
 
 # -- known warps ------------------------------------------------------------------------
 
@@ -105,7 +106,8 @@ def known_table():
             for cell in CELLS
         ]
 
-    rows = {name: row(lambda X, m=m: ours_to(m, X, 0)) for name, m in OURS.items()}
+    ours = OURS | UNREFINED
+    rows = {name: row(lambda X, m=m: ours_to(m, X, 0)) for name, m in ours.items()}
     rows |= best_of_peers(lambda align, kind: row(lambda X: peer_to(align, kind, X, 0)))
     header = [f"{low}-{high}, noise {noise:.1%}" for low, high, noise in CELLS]
     print_table("known warps: rates, noise", header, rows, show_mean)
@@ -113,106 +115,75 @@ def known_table():
 
 # -- real people ------------------------------------------------------------------------
 
-EVENTS = {
-    # archive, action, joint, extreme of its height: the same moment in every clip
-    "bend, lowest pelvis": ("hdm05", "depositFloorR", "root", np.argmin),
-    "bend, lowest hand": ("hdm05", "depositFloorR", "rhand", np.argmin),
-    "elbow to knee, highest ankle": ("hdm05", "elbowToKnee1RepsLelbowStart", "rtibia", np.argmax),
-    "grab high, highest hand": ("hdm05", "grabHighR", "rhand", np.argmax),
-    "hop, highest ankle": ("hdm05", "hopBothLegs1hops", "rtibia", np.argmax),
-    "sneak, highest ankle": ("hdm05", "sneak2StepsLStart", "rtibia", np.argmax),
-    "Kinect pick up, lowest hand": ("utkinect", "pickUp", "HandRight", np.argmin),
-}
-ALL_PAIRS = list(EVENTS)[:3]
+
+def people_tables(folder):
+    """Actors held out, all ordered pairs, and the other settings."""
+    people = read_people(folder)
+    judged = {name: to_all(people, make) for name, make in OURS.items()}
+    pairs = {name: errors_of(j) for name, j in judged.items()}
+    strangers = {
+        name: errors_of([one.to_strangers(make) for one in people]) for name, make in OURS.items()
+    }
+    settings = (LINEAR, PLAIN, DEFAULTS)
+    event_table("actors held out", people, {name: strangers[name] for name in settings})
+    event_table("all ordered pairs", people, {name: pairs[name] for name in settings}, peers_of)
+    header = ["actors held out", "all ordered pairs", "stand still", "hurry", "spread of velocity"]
+    print_head("geometric means", header)
+    for name in OURS:
+        health = np.mean([one.health() for one in judged[name]], axis=0)
+        cells = [show_pair(geometric_means(of[name])) for of in (strangers, pairs)]
+        cells += [f"{health[0]:.0%}", f"{health[1]:.0%}", f"{health[2]:.2f}"]
+        print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
 
 
-class Clips:
-    """The clips of an event: points of their aSpace, when it happens, who performs."""
-
-    _archives: dict = {}
-
-    def __init__(self, folder, archive, action, joint, extreme):
-        if archive not in self._archives:
-            path = folder / archive / f"{archive}_positions.npz"
-            self._archives[archive] = load_performances(path)
-        bunch = self._archives[archive]
-        chosen = np.flatnonzero(bunch.target == action)
-        clips = [bunch.data[i] for i in chosen]
-        column = 3 * bunch.joints.index(joint) + 1
-        heights = [x[:, column].astype(float) for x in clips]
-        self.moments = np.array(
-            [extreme(gaussian_filter1d(h, 0.015 * len(h))) / (len(h) - 1) for h in heights]
-        ) * (P - 1)
-        self.actors = bunch.actor[chosen]
-        postures = DirectionCosines(bunch.skeleton).fit_transform(clips)
-        self.X = [x.astype(float) for x in ASpace().fit_transform(postures)]
-
-    def errors(self, n, times, others):
-        """Frames between where the moment of n lands in others, and where it is."""
-        landed = np.array([np.interp(self.moments[n], np.arange(P), tau) for tau in times])
-        return np.abs(landed - self.moments[others])
-
-    def all_pairs(self, times_to):
-        """Errors of all ordered pairs."""
-        everyone = np.arange(len(self.X))
-        errors = [np.delete(self.errors(n, times_to(self.X, n), everyone), n) for n in everyone]
-        return np.concatenate(errors)
-
-    def held_out_actors(self, make):
-        """Errors on actors that had no part in the choice of pattern and exemplars."""
-        errors = []
-        for train, test in self.folds():
-            sync = make().fit([self.X[i] for i in train])
-            times = sync.match([self.X[i] for i in test]).times
-            errors.append(self.errors(train[sync.pattern_index_], times, test))
-        return np.concatenate(errors)
-
-    def held_out_pairs(self, align, kind):
-        """The same for a peer: from our pattern to the held-out clips."""
-        features, errors = peer_features(self.X, kind), []
-        for train, test in self.folds():
-            sync = DenseSynchronizer(P).fit([self.X[i] for i in train])
-            n = train[sync.pattern_index_]
-            times = [align(features[n], features[i]) for i in test]
-            errors.append(self.errors(n, times, test))
-        return np.concatenate(errors)
-
-    def folds(self):
-        folds = min(4, len(set(self.actors)))
-        return GroupKFold(folds).split(self.X, groups=self.actors)
+def to_all(people, make):
+    """The warps of every action to its patterns."""
+    return [one.to_patterns(lambda X, n: ours_to(make, X, n)) for one in people]
 
 
-def real_table(folder):
-    """All ordered pairs."""
-    clips = {}
-    for name in ALL_PAIRS:
-        clips[name] = Clips(folder, *EVENTS[name])
+def event_table(corner, people, rows, peers_of=None):
+    """A line an event: mean / median error of every setting; then geometric means and ratios."""
+    best = {} if peers_of is None else peers_of(people)
+    header = ["clips", "pairs", *rows, *(["best peer"] if best else [])]
+    print_head(corner, header)
+    for one in people:
+        for event, moments in one.moments.items():
+            key = one.name, event
+            cells = [str(np.isfinite(moments).sum()), str(len(rows[LINEAR][key]))]
+            cells += [show_pair((np.mean(e[key]), np.median(e[key]))) for e in rows.values()]
+            cells += ([show_pair(best[key]) if key in best else "-"]) if best else []
+            print(f"| `{one.name}`, {event} | " + " | ".join(cells) + " |")
+    everything = list(rows[LINEAR])
+    groups = {"all events": everything}
+    if best:
+        groups["events with a peer"] = [key for key in everything if key in best]
+    for label, keys in groups.items():
+        some = {name: {key: errors[key] for key in keys} for name, errors in rows.items()}
+        cells = ["", "", *(show_pair(geometric_means(errors)) for errors in some.values())]
+        if best:
+            logs = np.log([np.array(best[key]) + 0.05 for key in keys if key in best])
+            cells += [show_pair(np.exp(logs.mean(axis=0))) if len(logs) == len(keys) else ""]
+        print(f"| geometric mean, {label} | " + " | ".join(cells) + " |")
+    found = ratio(rows[DEFAULTS], rows[PLAIN])
+    texts = [f"{r:.2f} (95 %: {low:.2f} to {high:.2f})" for r, low, high in found.T]
+    print(f"\n{DEFAULTS} over {PLAIN}: mean error {texts[0]}, median error {texts[1]}.", flush=True)
 
-    def row(times_to):
-        done, cells = {}, []
-        for name in ALL_PAIRS:
-            # Two events of one action are judged on the same warps.
-            action = EVENTS[name][1]
-            if action not in done:
-                X = clips[name].X
-                done[action] = [times_to(X, n) for n in range(len(X))]
-            cells.append(clips[name].all_pairs(lambda X, n, a=action: done[a][n]))
-        return cells
 
-    rows = {name: row(lambda X, n, m=m: ours_to(m, X, n)) for name, m in OURS.items()}
-    rows |= best_of_peers(lambda align, kind: row(lambda X, n: peer_to(align, kind, X, n)))
-    header = [f"{name} ({len(clips[name].X)} clips)" for name in ALL_PAIRS]
-    print_table("all ordered pairs", header, rows, show_errors)
+def peers_of(people):
+    """Mean and median error of the best peer: as measured here, or else as in events.py."""
+    given = {(event.action, event.name): event.peers for event in EVENTS if event.peers}
 
+    def row(align, kind):
+        return [one.to_patterns(lambda X, n: peer_to(align, kind, X, n)) for one in people]
 
-def actor_table(folder):
-    """GroupKFold by actor."""
-    clips = {name: Clips(folder, *event) for name, event in EVENTS.items()}
-    rows = {name: [c.held_out_actors(make) for c in clips.values()] for name, make in OURS.items()}
-    rows |= best_of_peers(
-        lambda align, kind: [c.held_out_pairs(align, kind) for c in clips.values()]
-    )
-    print_table("held-out actors", list(clips), rows, show_errors)
+    found = best_of_peers(lambda align, kind: list(errors_of(row(align, kind)).items()))
+    best: dict = {}
+    for settings in found.values():
+        for cell in settings:
+            key = cell[0][0]
+            figures = [(np.mean(errors), np.median(errors)) for _, errors in cell]
+            best[key] = np.min([*figures, best.get(key, figures[0])], axis=0)
+    return best or given
 
 
 def refinement_table(folder):
@@ -243,24 +214,30 @@ def refinement_cases(folder):
         points = ASpace().fit_transform(postures)
         name = f"make_bending, style {style:g}"
         yield name, points, "median", lambda times, n, b=bunch: group_timing_error(times, b.times)
-    for name, event in EVENTS.items() if folder is not None else ():
-        clips = Clips(folder, *event)
-        everyone = np.arange(len(clips.X))
+    for one in read_people(folder) if folder is not None else ():
+        everyone = np.arange(len(one.X))
         for n_features in (None, 3, 2, 1):
             some = "" if n_features is None else f", {n_features} dimension(s)"
-            X = [x[:, :n_features] for x in clips.X]
-            yield name + some, X, "median", event_error(clips, everyone)
-        for actor in sorted(set(clips.actors)) if event[0] == "hdm05" else ():
-            own = np.flatnonzero(clips.actors == actor)
-            X = [clips.X[i] for i in own]
-            yield f"{name}, actor {actor} alone", X, "median", event_error(clips, own)
+            X = [x[:, :n_features] for x in one.X]
+            yield f"`{one.name}`{some}", X, "median", error_of_events(one, everyone)
+        for actor in sorted(set(one.actors)) if one.archive == "hdm05" else ():
+            own = np.flatnonzero(one.actors == actor)
+            X = [one.X[i] for i in own]
+            if len(own) > 2:
+                yield f"`{one.name}`, actor {actor} alone", X, "median", error_of_events(one, own)
 
 
-def event_error(clips, chosen):
-    """The mean error of chosen clips, given their times to one of them."""
+def error_of_events(one, chosen):
+    """The mean error over the events of an action, of chosen clips to one of them, or NaN."""
 
     def error(times, n):
-        return np.delete(clips.errors(chosen[n], times, chosen), n).mean()
+        found = []
+        for moments in one.moments.values():
+            at = moments[chosen]
+            landed = np.array([np.interp(at[n], np.arange(P), tau) for tau in times])
+            found.append(np.delete(np.abs(landed - at), n))
+        found = np.concatenate(found)
+        return found[np.isfinite(found)].mean() if np.isfinite(found).any() else np.nan
 
     return error
 
@@ -332,18 +309,18 @@ def show_mean(settings):
     return f"{min(settings):.3f}"
 
 
-def show_errors(settings):
-    """Mean / median / share beyond five frames, each the best of the settings by itself."""
-    mean = min(np.mean(errors) for errors in settings)
-    median = min(np.median(errors) for errors in settings)
-    gross = min(np.mean(errors > 5) for errors in settings)
-    return f"{mean:.2f} / {median:.2f} / {gross:.0%}"
+def show_pair(figures):
+    return f"{figures[0]:.2f} / {figures[1]:.2f}"
+
+
+def print_head(corner, header):
+    print(f"\n| {corner} | " + " | ".join(header) + " |")
+    print("|---|" + "---|" * len(header))
 
 
 def print_table(corner, header, rows, show):
     """Markdown; a cell holds a tuple with one value a setting, or a single value."""
-    print(f"\n| {corner} | " + " | ".join(header) + " |")
-    print("|---|" + "---|" * len(header))
+    print_head(corner, header)
     for name, cells in rows.items():
         texts = [show(cell if isinstance(cell, tuple) else (cell,)) for cell in cells]
         print(f"| {name} | " + " | ".join(texts) + " |", flush=True)
@@ -362,8 +339,7 @@ def main():
     bending_table()
     known_table()
     if folder is not None:
-        actor_table(folder)
-        real_table(folder)
+        people_tables(folder)
 
 
 if __name__ == "__main__":
