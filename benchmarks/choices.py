@@ -15,7 +15,7 @@ import numpy as np
 from events import EVENTS, P
 from people import errors_of, geometric_means, read_people
 from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.matching import costs
+from sklearn_motionsync.matching import costs, learning
 
 CHOICES = {
     "metric": [None],
@@ -50,23 +50,27 @@ def row(label, people, times_to=matched, **params):
     judged = [one.to_patterns(lambda X, n: times_to(X, n, **params)) for one in people]
     mean, median = geometric_means(errors_of(judged))
     still, hurry, spread = np.mean([one.health() for one in judged], axis=0)
-    print(f"| {label} | {mean:.2f} / {median:.2f} | {still:.0%} | {hurry:.0%} | {spread:.2f} |")
-    sys.stdout.flush()
+    found = f"{mean:.2f} / {median:.2f} | {still:.0%} | {hurry:.0%} | {spread:.2f}"
+    print(f"| {label} | {found} |", flush=True)
+    return found
 
 
 def main():
     """Print the table."""
     people = read_people(Path(sys.argv[1]), [event for event in EVENTS if event.peers])
     print("| setting | error | stands still | hurries | spread of velocity |\n" + "|---" * 5 + "|")
-    row("defaults", people)
+    of_defaults = row("defaults", people)
     for name, values in CHOICES.items():
         for value in values:
-            row(f"`{name}={value}`", people, **{name: value})
+            if value == getattr(DenseSynchronizer(), name):
+                print(f"| `{name}={value}` | {of_defaults} |")
+            else:
+                row(f"`{name}={value}`", people, **{name: value})
     default = costs.RATE_WEIGHT
     for weight in RATE_WEIGHTS:
-        costs.RATE_WEIGHT = weight
+        costs.RATE_WEIGHT = learning.RATE_WEIGHT = weight
         row(f"w = {weight}", people)
-    costs.RATE_WEIGHT = default
+    costs.RATE_WEIGHT = learning.RATE_WEIGHT = default
     for rounds in (1, 3):
         label = f"no vote, re-matched to the running mean, rounds: {rounds}"
         row(label, people, rematched_to_mean, rounds=rounds)
