@@ -14,12 +14,14 @@ import importlib.metadata
 import sys
 import time
 import warnings
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import peers
 from events import EVENTS, P
-from people import errors_of, geometric_means, ratio, read_people
+from joblib import Parallel, delayed
+from people import figures, geometric_means, ratio, read_people
 from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
@@ -34,12 +36,15 @@ from sklearn_motionsync.matching.filters import SMOOTHING, smooth
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error, timing_error
 
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
+OF_WIDE = {"metric": None, "velocity_smoothing": 0.03}
+WIDE = "`metric=None, velocity_smoothing=0.03`"
 LINEAR, PLAIN, DEFAULTS = "linear normalisation", "`metric=None`", "`DenseSynchronizer()`"
 OURS = {
     LINEAR: lambda **kw: LinearSynchronizer(P, **kw),
     "the paper's method": lambda **kw: DenseSynchronizer(P, **PAPER, **kw),
     DEFAULTS: lambda **kw: DenseSynchronizer(P, **kw),
     PLAIN: lambda **kw: DenseSynchronizer(P, metric=None, **kw),
+    WIDE: lambda **kw: DenseSynchronizer(P, **OF_WIDE, **kw),
     "`consensus=0`": lambda **kw: DenseSynchronizer(P, consensus=0, **kw),
     '`cost="elastic"`': lambda **kw: DenseSynchronizer(P, cost="elastic", **kw),
     '`cost="posture"`': lambda **kw: DenseSynchronizer(P, cost="posture", **kw),
@@ -119,71 +124,77 @@ def known_table():
 def people_tables(folder):
     """Actors held out, all ordered pairs, and the other settings."""
     people = read_people(folder)
-    judged = {name: to_all(people, make) for name, make in OURS.items()}
-    pairs = {name: errors_of(j) for name, j in judged.items()}
-    strangers = {
-        name: errors_of([one.to_strangers(make) for one in people]) for name, make in OURS.items()
-    }
-    settings = (LINEAR, PLAIN, DEFAULTS)
-    event_table("actors held out", people, {name: strangers[name] for name in settings})
-    event_table("all ordered pairs", people, {name: pairs[name] for name in settings}, peers_of)
+    work = [delayed(judge)(one, make) for make in OURS.values() for one in people]
+    done = Parallel(n_jobs=-1)(work)
+    strangers, pairs, health = {}, {}, {}
+    for i, name in enumerate(OURS):
+        parts = zip(*done[i * len(people) : (i + 1) * len(people)], strict=True)
+        held_out, everyone, health[name] = parts
+        strangers[name], pairs[name] = merged(held_out), merged(everyone)
+    event_table("actors held out", strangers)
+    event_table("all ordered pairs", pairs, {"best peer": best_peer(people)})
+    print_head("ratio of geometric means", ["of the mean errors", "of the median errors"])
+    for label, errors in (("actors held out", strangers), ("all ordered pairs", pairs)):
+        for keys, which in ((list(errors[LINEAR]), "all"), (with_peer(), "with a peer")):
+            for name in (PLAIN, WIDE):
+                print_row(f"{label}, events: {which}; over {name}", compared(errors, name, keys))
     header = ["actors held out", "all ordered pairs", "stand still", "hurry", "spread of velocity"]
     print_head("geometric means", header)
     for name in OURS:
-        health = np.mean([one.health() for one in judged[name]], axis=0)
-        cells = [show_pair(geometric_means(of[name])) for of in (strangers, pairs)]
-        cells += [f"{health[0]:.0%}", f"{health[1]:.0%}", f"{health[2]:.2f}"]
-        print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
+        still, hurry, spread = np.mean(health[name], axis=0)
+        cells = [show_pair(geometric_means(figures(of[name]))) for of in (strangers, pairs)]
+        cells += [f"{still:.0%}", f"{hurry:.0%}", f"{spread:.2f}"]
+        print_row(name, cells)
 
 
-def to_all(people, make):
-    """The warps of every action to its patterns."""
-    return [one.to_patterns(lambda X, n: ours_to(make, X, n)) for one in people]
+def judge(one, make):
+    """Errors of an action with actors held out, and of all its pairs; the health of these."""
+    pairs = one.to_patterns(partial(ours_to, make))
+    return one.to_strangers(make).errors(), pairs.errors(), pairs.health()
 
 
-def event_table(corner, people, rows, peers_of=None):
-    """A line an event: mean / median error of every setting; then geometric means and ratios."""
-    best = {} if peers_of is None else peers_of(people)
-    header = ["clips", "pairs", *rows, *(["best peer"] if best else [])]
-    print_head(corner, header)
-    for one in people:
-        for event, moments in one.moments.items():
-            key = one.name, event
-            cells = [str(np.isfinite(moments).sum()), str(len(rows[LINEAR][key]))]
-            cells += [show_pair((np.mean(e[key]), np.median(e[key]))) for e in rows.values()]
-            cells += ([show_pair(best[key]) if key in best else "-"]) if best else []
-            print(f"| `{one.name}`, {event} | " + " | ".join(cells) + " |")
-    everything = list(rows[LINEAR])
-    groups = {"all events": everything}
-    if best:
-        groups["events with a peer"] = [key for key in everything if key in best]
-    for label, keys in groups.items():
-        some = {name: {key: errors[key] for key in keys} for name, errors in rows.items()}
-        cells = ["", "", *(show_pair(geometric_means(errors)) for errors in some.values())]
-        if best:
-            logs = np.log([np.array(best[key]) + 0.05 for key in keys if key in best])
-            cells += [show_pair(np.exp(logs.mean(axis=0))) if len(logs) == len(keys) else ""]
-        print(f"| geometric mean, {label} | " + " | ".join(cells) + " |")
-    found = ratio(rows[DEFAULTS], rows[PLAIN])
-    texts = [f"{r:.2f} (95 %: {low:.2f} to {high:.2f})" for r, low, high in found.T]
-    print(f"\n{DEFAULTS} over {PLAIN}: mean error {texts[0]}, median error {texts[1]}.", flush=True)
+def merged(of_actions):
+    return {event: errors for one in of_actions for event, errors in one.items()}
 
 
-def peers_of(people):
+def event_table(corner, errors, others=None):
+    """A line an event: mean / median error of three settings, and other figures; their means."""
+    columns = {name: figures(errors[name]) for name in (LINEAR, PLAIN, DEFAULTS)} | (others or {})
+    print_head(corner, ["pairs", *columns])
+    for key, found in errors[LINEAR].items():
+        cells = [show_pair(column[key]) if key in column else "-" for column in columns.values()]
+        print_row(f"`{key[0]}`, {key[1]}", [str(len(found)), *cells])
+    for label, keys in (("all", list(errors[LINEAR])), ("with a peer", with_peer())):
+        cells = [""]
+        for column in columns.values():
+            some = {key: column[key] for key in keys if key in column}
+            cells.append(show_pair(geometric_means(some)) if len(some) == len(keys) else "-")
+        print_row(f"geometric means, events: {label}", cells)
+
+
+def compared(errors, name, keys):
+    """The defaults over what they are without a metric, with 95 % intervals."""
+    ours, other = (figures({k: errors[one][k] for k in keys}) for one in (DEFAULTS, name))
+    return [f"{r:.2f} ({low:.2f} to {high:.2f})" for r, low, high in ratio(ours, other).T]
+
+
+def with_peer():
+    """The events that peers were measured on."""
+    return [(event.action, event.name) for event in EVENTS if event.peers]
+
+
+def best_peer(people):
     """Mean and median error of the best peer: as measured here, or else as in events.py."""
-    given = {(event.action, event.name): event.peers for event in EVENTS if event.peers}
 
     def row(align, kind):
-        return [one.to_patterns(lambda X, n: peer_to(align, kind, X, n)) for one in people]
+        warps = [one.to_patterns(partial(peer_to, align, kind)) for one in people]
+        return [list(figures(one.errors()).items()) for one in warps]
 
-    found = best_of_peers(lambda align, kind: list(errors_of(row(align, kind)).items()))
     best: dict = {}
-    for settings in found.values():
-        for cell in settings:
-            key = cell[0][0]
-            figures = [(np.mean(errors), np.median(errors)) for _, errors in cell]
-            best[key] = np.min([*figures, best.get(key, figures[0])], axis=0)
-    return best or given
+    for actions in best_of_peers(row).values():
+        for cell in (item for settings in actions for one in settings for item in one):
+            best[cell[0]] = np.min([cell[1], best.get(cell[0], cell[1])], axis=0)
+    return best or {(event.action, event.name): event.peers for event in EVENTS if event.peers}
 
 
 def refinement_table(folder):
@@ -318,12 +329,15 @@ def print_head(corner, header):
     print("|---|" + "---|" * len(header))
 
 
+def print_row(name, cells):
+    print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
+
+
 def print_table(corner, header, rows, show):
     """Markdown; a cell holds a tuple with one value a setting, or a single value."""
     print_head(corner, header)
     for name, cells in rows.items():
-        texts = [show(cell if isinstance(cell, tuple) else (cell,)) for cell in cells]
-        print(f"| {name} | " + " | ".join(texts) + " |", flush=True)
+        print_row(name, [show(cell if isinstance(cell, tuple) else (cell,)) for cell in cells])
 
 
 def main():

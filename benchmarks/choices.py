@@ -2,18 +2,20 @@
 
     python benchmarks/choices.py DATA_FOLDER
 
-The 16 events of events.py that peers were measured on, all ordered pairs: geometric means over the
-events of the mean and of the median error, in frames of 100. Health of the warps, in the mean over
-actions: share of frames that stand still (rate below 0.1) and that hurry (above 2), and the spread
-of velocities after synchronising over that after linear normalisation. Prints Markdown.
+The 16 events of events.py that peers were measured on, all ordered pairs with six patterns an
+action: geometric means over the events of the mean and of the median error, in frames of 100.
+Health of the warps, in the mean over actions: share of frames that stand still (rate below 0.1)
+and that hurry (above 2), and the spread of velocities after synchronising over that after linear
+normalisation. Prints Markdown.
 """
 
 import sys
+from collections import ChainMap
 from pathlib import Path
 
 import numpy as np
 from events import EVENTS, P
-from people import errors_of, geometric_means, read_people
+from people import figures, geometric_means, read_people
 from sklearn_motionsync import DenseSynchronizer
 from sklearn_motionsync.matching import costs, learning
 
@@ -27,6 +29,7 @@ CHOICES = {
     "consensus": [0, 4, 8, 16],
     "warp_smoothing": [0, 0.02, 0.03, 0.05],
 }
+PATTERNS = 6
 # Not a parameter: w of the velocity cost, costs.step_table.
 RATE_WEIGHTS = [0.0, 0.1, 0.2, 0.3, 1.0]
 
@@ -48,7 +51,8 @@ def rematched_to_mean(X, n, rounds):
 def row(label, people, times_to=matched, **params):
     """One line of the table."""
     judged = [one.to_patterns(lambda X, n: times_to(X, n, **params)) for one in people]
-    mean, median = geometric_means(errors_of(judged))
+    errors = ChainMap(*(one.errors() for one in judged))
+    mean, median = geometric_means(figures(errors))
     still, hurry, spread = np.mean([one.health() for one in judged], axis=0)
     found = f"{mean:.2f} / {median:.2f} | {still:.0%} | {hurry:.0%} | {spread:.2f}"
     print(f"| {label} | {found} |", flush=True)
@@ -57,7 +61,7 @@ def row(label, people, times_to=matched, **params):
 
 def main():
     """Print the table."""
-    people = read_people(Path(sys.argv[1]), [event for event in EVENTS if event.peers])
+    people = read_people(Path(sys.argv[1]), [event for event in EVENTS if event.peers], PATTERNS)
     print("| setting | error | stands still | hurries | spread of velocity |\n" + "|---" * 5 + "|")
     of_defaults = row("defaults", people)
     for name, values in CHOICES.items():

@@ -21,13 +21,13 @@ FLOOR = 0.05
 class People:
     """The clips of an action as postures and points of their aSpace, and who performs them."""
 
-    def __init__(self, action):
+    def __init__(self, action, patterns=PATTERNS):
         self.name, self.archive, self.moments = action.name, action.archive, action.moments
         self.actors = action.actors
         self.postures = DirectionCosines(action.skeleton).fit_transform(action.data)
         self.X = ASpace().fit_transform(self.postures)
         n = len(self.X)
-        self.patterns = np.unique(np.linspace(0, n - 1, min(n, PATTERNS)).astype(int))
+        self.patterns = np.unique(np.linspace(0, n - 1, min(n, patterns)).astype(int))
 
     def to_patterns(self, times_to):
         """Warps of all clips to every pattern, of ``times_to(X, pattern)``."""
@@ -57,8 +57,14 @@ class Judged:
     def __init__(self, people, times):
         self.people, self.times = people, times
 
-    def errors(self, event):
-        """Of every pair that shows an event: how far it lands from where it happens."""
+    def errors(self):
+        """How far an event lands from where it happens, of every pair that shows it.
+
+        Returns {(action, event): errors}.
+        """
+        return {(self.people.name, event): self._of(event) for event in self.people.moments}
+
+    def _of(self, event):
         moments, found = self.people.moments[event], []
         for n, times in zip(self.people.patterns, self.times, strict=True):
             landed = np.array([np.interp(moments[n], np.arange(P), tau) for tau in times])
@@ -76,41 +82,37 @@ class Judged:
         return np.array([(rates < 0.1).mean(), (rates > 2).mean(), np.mean(spread)])
 
 
-def read_people(folder, events=EVENTS):
+def read_people(folder, events=EVENTS, patterns=PATTERNS):
     """The actions of some events."""
-    return [People(action) for action in read_actions(folder, events)]
+    return [People(action, patterns) for action in read_actions(folder, events)]
 
 
-def errors_of(judged):
-    """The errors of all events, {(action, event): errors}."""
-    return {
-        (one.people.name, event): one.errors(event)
-        for one in judged
-        for event in one.people.moments
-    }
+def figures(errors):
+    """Mean and median error of every event."""
+    return {event: (np.mean(some), np.median(some)) for event, some in errors.items()}
 
 
-def geometric_means(errors):
-    """Geometric means over events of the mean and of the median error."""
-    return np.exp(_logs(errors).mean(axis=0))
+def geometric_means(of_events):
+    """Of the mean and of the median errors of events."""
+    return np.exp(np.mean([_logs(pair) for pair in of_events.values()], axis=0))
 
 
-def _logs(errors):
-    """Logarithms of mean and median errors, (n_events, 2)."""
-    return np.log([[e.mean() + FLOOR, np.median(e) + FLOOR] for e in errors.values()])
-
-
-def ratio(errors, to, draws=5000, random_state=0):
+def ratio(of_events, to, draws=5000, random_state=0):
     """Ratio of geometric means to those of another setting, and its 95 % interval.
 
     Actions are drawn anew, with all their events: events of one action are judged on the same
-    warps. Returns (3, 2): ratio, lower and upper end, of mean and median error.
+    warps. Returns (3, 2): ratio, lower and upper end, of mean and median errors.
     """
-    logs = _logs(errors) - _logs(to)
-    actions = np.array([action for action, _ in errors])
-    members = [np.flatnonzero(actions == action) for action in dict.fromkeys(actions)]
+    logs: dict = {}
+    for (action, event), pair in of_events.items():
+        logs.setdefault(action, []).append(_logs(pair) - _logs(to[action, event]))
+    actions = [np.array(some) for some in logs.values()]
     rng = np.random.default_rng(random_state)
-    drawn = rng.integers(len(members), size=(draws, len(members)))
-    means = [logs[np.concatenate([members[i] for i in row])].mean(axis=0) for row in drawn]
+    drawn = rng.integers(len(actions), size=(draws, len(actions)))
+    means = [np.concatenate([actions[i] for i in row]).mean(axis=0) for row in drawn]
     ends = np.quantile(means, [0.025, 0.975], axis=0)
-    return np.exp(np.concatenate([[logs.mean(axis=0)], ends]))
+    return np.exp([np.concatenate(actions).mean(axis=0), *ends])
+
+
+def _logs(pair):
+    return np.log(np.asarray(pair) + FLOOR)
