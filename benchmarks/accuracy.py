@@ -3,23 +3,25 @@
     pip install . dtaidistance tslearn gdtw fdasrsf aeon
     python benchmarks/accuracy.py DATA_FOLDER
 
-DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect/utkinect_positions.npz; without it
-only known warps are run. Every peer is fed postures and velocities (smoothed as ours) and is
-reported at the best of its settings, for each number of each cell by itself; ours have one
-setting for all. Peers that are
-not installed are left out. Prints Markdown.
+DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect and cmu07_walk of the same form; without
+it only known warps are run. Every peer is fed postures and velocities (smoothed over 3 % of the
+clip) and is reported at the best of its settings, for each number of each cell by itself; ours
+have one setting for all. Peers that are not installed are left out; of people, events.py has what
+the best of them reached. Prints Markdown.
 """
 
 import importlib.metadata
 import sys
 import time
 import warnings
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import peers
-from scipy.ndimage import gaussian_filter1d
-from sklearn.model_selection import GroupKFold
+from events import EVENTS, P
+from joblib import Parallel, delayed
+from people import figures, geometric_means, ratio, read_people
 from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
@@ -28,24 +30,28 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     __version__,
 )
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.costs import cost_features
 from sklearn_motionsync.matching.filters import SMOOTHING, smooth
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error, timing_error
 
-P = 100
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
+OF_WIDE = {"metric": None, "velocity_smoothing": 0.03}
+WIDE = "`metric=None, velocity_smoothing=0.03`"
+LINEAR, PLAIN, DEFAULTS = "linear normalisation", "`metric=None`", "`DenseSynchronizer()`"
 OURS = {
-    "linear normalisation": lambda **kw: LinearSynchronizer(P, **kw),
+    LINEAR: lambda **kw: LinearSynchronizer(P, **kw),
     "the paper's method": lambda **kw: DenseSynchronizer(P, **PAPER, **kw),
-    "`DenseSynchronizer()`": lambda **kw: DenseSynchronizer(P, **kw),
+    DEFAULTS: lambda **kw: DenseSynchronizer(P, **kw),
+    PLAIN: lambda **kw: DenseSynchronizer(P, metric=None, **kw),
+    WIDE: lambda **kw: DenseSynchronizer(P, **OF_WIDE, **kw),
     "`consensus=0`": lambda **kw: DenseSynchronizer(P, consensus=0, **kw),
-    "`velocity_smoothing=0.1`": lambda **kw: DenseSynchronizer(P, velocity_smoothing=0.1, **kw),
     '`cost="elastic"`': lambda **kw: DenseSynchronizer(P, cost="elastic", **kw),
+    '`cost="posture"`': lambda **kw: DenseSynchronizer(P, cost="posture", **kw),
     "`refine=True` (single source)": lambda **kw: DenseSynchronizer(P, refine=True, **kw),
     "`warp_smoothing=0`": lambda **kw: DenseSynchronizer(P, warp_smoothing=0, **kw),
-    "`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw),
 }
+UNREFINED = {"`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw)}
 
 # -- known warps ------------------------------------------------------------------------
 
@@ -105,7 +111,8 @@ def known_table():
             for cell in CELLS
         ]
 
-    rows = {name: row(lambda X, m=m: ours_to(m, X, 0)) for name, m in OURS.items()}
+    ours = OURS | UNREFINED
+    rows = {name: row(lambda X, m=m: ours_to(m, X, 0)) for name, m in ours.items()}
     rows |= best_of_peers(lambda align, kind: row(lambda X: peer_to(align, kind, X, 0)))
     header = [f"{low}-{high}, noise {noise:.1%}" for low, high, noise in CELLS]
     print_table("known warps: rates, noise", header, rows, show_mean)
@@ -113,106 +120,81 @@ def known_table():
 
 # -- real people ------------------------------------------------------------------------
 
-EVENTS = {
-    # archive, action, joint, extreme of its height: the same moment in every clip
-    "bend, lowest pelvis": ("hdm05", "depositFloorR", "root", np.argmin),
-    "bend, lowest hand": ("hdm05", "depositFloorR", "rhand", np.argmin),
-    "elbow to knee, highest ankle": ("hdm05", "elbowToKnee1RepsLelbowStart", "rtibia", np.argmax),
-    "grab high, highest hand": ("hdm05", "grabHighR", "rhand", np.argmax),
-    "hop, highest ankle": ("hdm05", "hopBothLegs1hops", "rtibia", np.argmax),
-    "sneak, highest ankle": ("hdm05", "sneak2StepsLStart", "rtibia", np.argmax),
-    "Kinect pick up, lowest hand": ("utkinect", "pickUp", "HandRight", np.argmin),
-}
-ALL_PAIRS = list(EVENTS)[:3]
+
+def people_tables(folder):
+    """Actors held out, all ordered pairs, and the other settings."""
+    people = read_people(folder)
+    work = [delayed(judge)(one, make) for make in OURS.values() for one in people]
+    done = Parallel(n_jobs=-1)(work)
+    strangers, pairs, health = {}, {}, {}
+    for i, name in enumerate(OURS):
+        parts = zip(*done[i * len(people) : (i + 1) * len(people)], strict=True)
+        held_out, everyone, health[name] = parts
+        strangers[name], pairs[name] = merged(held_out), merged(everyone)
+    event_table("actors held out", strangers)
+    event_table("all ordered pairs", pairs, {"best peer": best_peer(people)})
+    print_head("ratio of geometric means", ["of the mean errors", "of the median errors"])
+    for label, errors in (("actors held out", strangers), ("all ordered pairs", pairs)):
+        for keys, which in ((list(errors[LINEAR]), "all"), (with_peer(), "with a peer")):
+            for name in (PLAIN, WIDE):
+                print_row(f"{label}, events: {which}; over {name}", compared(errors, name, keys))
+    header = ["actors held out", "all ordered pairs", "stand still", "hurry", "spread of velocity"]
+    print_head("geometric means", header)
+    for name in OURS:
+        still, hurry, spread = np.mean(health[name], axis=0)
+        cells = [show_pair(geometric_means(figures(of[name]))) for of in (strangers, pairs)]
+        cells += [f"{still:.0%}", f"{hurry:.0%}", f"{spread:.2f}"]
+        print_row(name, cells)
 
 
-class Clips:
-    """The clips of an event: points of their aSpace, when it happens, who performs."""
-
-    _archives: dict = {}
-
-    def __init__(self, folder, archive, action, joint, extreme):
-        if archive not in self._archives:
-            path = folder / archive / f"{archive}_positions.npz"
-            self._archives[archive] = load_performances(path)
-        bunch = self._archives[archive]
-        chosen = np.flatnonzero(bunch.target == action)
-        clips = [bunch.data[i] for i in chosen]
-        column = 3 * bunch.joints.index(joint) + 1
-        heights = [x[:, column].astype(float) for x in clips]
-        self.moments = np.array(
-            [extreme(gaussian_filter1d(h, 0.015 * len(h))) / (len(h) - 1) for h in heights]
-        ) * (P - 1)
-        self.actors = bunch.actor[chosen]
-        postures = DirectionCosines(bunch.skeleton).fit_transform(clips)
-        self.X = [x.astype(float) for x in ASpace().fit_transform(postures)]
-
-    def errors(self, n, times, others):
-        """Frames between where the moment of n lands in others, and where it is."""
-        landed = np.array([np.interp(self.moments[n], np.arange(P), tau) for tau in times])
-        return np.abs(landed - self.moments[others])
-
-    def all_pairs(self, times_to):
-        """Errors of all ordered pairs."""
-        everyone = np.arange(len(self.X))
-        errors = [np.delete(self.errors(n, times_to(self.X, n), everyone), n) for n in everyone]
-        return np.concatenate(errors)
-
-    def held_out_actors(self, make):
-        """Errors on actors that had no part in the choice of pattern and exemplars."""
-        errors = []
-        for train, test in self.folds():
-            sync = make().fit([self.X[i] for i in train])
-            times = sync.match([self.X[i] for i in test]).times
-            errors.append(self.errors(train[sync.pattern_index_], times, test))
-        return np.concatenate(errors)
-
-    def held_out_pairs(self, align, kind):
-        """The same for a peer: from our pattern to the held-out clips."""
-        features, errors = peer_features(self.X, kind), []
-        for train, test in self.folds():
-            sync = DenseSynchronizer(P).fit([self.X[i] for i in train])
-            n = train[sync.pattern_index_]
-            times = [align(features[n], features[i]) for i in test]
-            errors.append(self.errors(n, times, test))
-        return np.concatenate(errors)
-
-    def folds(self):
-        folds = min(4, len(set(self.actors)))
-        return GroupKFold(folds).split(self.X, groups=self.actors)
+def judge(one, make):
+    """Errors of an action with actors held out, and of all its pairs; the health of these."""
+    pairs = one.to_patterns(partial(ours_to, make))
+    return one.to_strangers(make).errors(), pairs.errors(), pairs.health()
 
 
-def real_table(folder):
-    """All ordered pairs."""
-    clips = {}
-    for name in ALL_PAIRS:
-        clips[name] = Clips(folder, *EVENTS[name])
-
-    def row(times_to):
-        done, cells = {}, []
-        for name in ALL_PAIRS:
-            # Two events of one action are judged on the same warps.
-            action = EVENTS[name][1]
-            if action not in done:
-                X = clips[name].X
-                done[action] = [times_to(X, n) for n in range(len(X))]
-            cells.append(clips[name].all_pairs(lambda X, n, a=action: done[a][n]))
-        return cells
-
-    rows = {name: row(lambda X, n, m=m: ours_to(m, X, n)) for name, m in OURS.items()}
-    rows |= best_of_peers(lambda align, kind: row(lambda X, n: peer_to(align, kind, X, n)))
-    header = [f"{name} ({len(clips[name].X)} clips)" for name in ALL_PAIRS]
-    print_table("all ordered pairs", header, rows, show_errors)
+def merged(of_actions):
+    return {event: errors for one in of_actions for event, errors in one.items()}
 
 
-def actor_table(folder):
-    """GroupKFold by actor."""
-    clips = {name: Clips(folder, *event) for name, event in EVENTS.items()}
-    rows = {name: [c.held_out_actors(make) for c in clips.values()] for name, make in OURS.items()}
-    rows |= best_of_peers(
-        lambda align, kind: [c.held_out_pairs(align, kind) for c in clips.values()]
-    )
-    print_table("held-out actors", list(clips), rows, show_errors)
+def event_table(corner, errors, others=None):
+    """A line an event: mean / median error of three settings, and other figures; their means."""
+    columns = {name: figures(errors[name]) for name in (LINEAR, PLAIN, DEFAULTS)} | (others or {})
+    print_head(corner, ["pairs", *columns])
+    for key, found in errors[LINEAR].items():
+        cells = [show_pair(column[key]) if key in column else "-" for column in columns.values()]
+        print_row(f"`{key[0]}`, {key[1]}", [str(len(found)), *cells])
+    for label, keys in (("all", list(errors[LINEAR])), ("with a peer", with_peer())):
+        cells = [""]
+        for column in columns.values():
+            some = {key: column[key] for key in keys if key in column}
+            cells.append(show_pair(geometric_means(some)) if len(some) == len(keys) else "-")
+        print_row(f"geometric means, events: {label}", cells)
+
+
+def compared(errors, name, keys):
+    """The defaults over what they are without a metric, with 95 % intervals."""
+    ours, other = (figures({k: errors[one][k] for k in keys}) for one in (DEFAULTS, name))
+    return [f"{r:.2f} ({low:.2f} to {high:.2f})" for r, low, high in ratio(ours, other).T]
+
+
+def with_peer():
+    """The events that peers were measured on."""
+    return [(event.action, event.name) for event in EVENTS if event.peers]
+
+
+def best_peer(people):
+    """Mean and median error of the best peer: as measured here, or else as in events.py."""
+
+    def row(align, kind):
+        warps = [one.to_patterns(partial(peer_to, align, kind)) for one in people]
+        return [list(figures(one.errors()).items()) for one in warps]
+
+    best: dict = {}
+    for actions in best_of_peers(row).values():
+        for cell in (item for settings in actions for one in settings for item in one):
+            best[cell[0]] = np.min([cell[1], best.get(cell[0], cell[1])], axis=0)
+    return best or {(event.action, event.name): event.peers for event in EVENTS if event.peers}
 
 
 def refinement_table(folder):
@@ -243,24 +225,30 @@ def refinement_cases(folder):
         points = ASpace().fit_transform(postures)
         name = f"make_bending, style {style:g}"
         yield name, points, "median", lambda times, n, b=bunch: group_timing_error(times, b.times)
-    for name, event in EVENTS.items() if folder is not None else ():
-        clips = Clips(folder, *event)
-        everyone = np.arange(len(clips.X))
+    for one in read_people(folder) if folder is not None else ():
+        everyone = np.arange(len(one.X))
         for n_features in (None, 3, 2, 1):
             some = "" if n_features is None else f", {n_features} dimension(s)"
-            X = [x[:, :n_features] for x in clips.X]
-            yield name + some, X, "median", event_error(clips, everyone)
-        for actor in sorted(set(clips.actors)) if event[0] == "hdm05" else ():
-            own = np.flatnonzero(clips.actors == actor)
-            X = [clips.X[i] for i in own]
-            yield f"{name}, actor {actor} alone", X, "median", event_error(clips, own)
+            X = [x[:, :n_features] for x in one.X]
+            yield f"`{one.name}`{some}", X, "median", error_of_events(one, everyone)
+        for actor in sorted(set(one.actors)) if one.archive == "hdm05" else ():
+            own = np.flatnonzero(one.actors == actor)
+            X = [one.X[i] for i in own]
+            if len(own) > 2:
+                yield f"`{one.name}`, actor {actor} alone", X, "median", error_of_events(one, own)
 
 
-def event_error(clips, chosen):
-    """The mean error of chosen clips, given their times to one of them."""
+def error_of_events(one, chosen):
+    """The mean error over the events of an action, of chosen clips to one of them, or NaN."""
 
     def error(times, n):
-        return np.delete(clips.errors(chosen[n], times, chosen), n).mean()
+        found = []
+        for moments in one.moments.values():
+            at = moments[chosen]
+            landed = np.array([np.interp(at[n], np.arange(P), tau) for tau in times])
+            found.append(np.delete(np.abs(landed - at), n))
+        found = np.concatenate(found)
+        return found[np.isfinite(found)].mean() if np.isfinite(found).any() else np.nan
 
     return error
 
@@ -332,21 +320,24 @@ def show_mean(settings):
     return f"{min(settings):.3f}"
 
 
-def show_errors(settings):
-    """Mean / median / share beyond five frames, each the best of the settings by itself."""
-    mean = min(np.mean(errors) for errors in settings)
-    median = min(np.median(errors) for errors in settings)
-    gross = min(np.mean(errors > 5) for errors in settings)
-    return f"{mean:.2f} / {median:.2f} / {gross:.0%}"
+def show_pair(figures):
+    return f"{figures[0]:.2f} / {figures[1]:.2f}"
+
+
+def print_head(corner, header):
+    print(f"\n| {corner} | " + " | ".join(header) + " |")
+    print("|---|" + "---|" * len(header))
+
+
+def print_row(name, cells):
+    print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
 
 
 def print_table(corner, header, rows, show):
     """Markdown; a cell holds a tuple with one value a setting, or a single value."""
-    print(f"\n| {corner} | " + " | ".join(header) + " |")
-    print("|---|" + "---|" * len(header))
+    print_head(corner, header)
     for name, cells in rows.items():
-        texts = [show(cell if isinstance(cell, tuple) else (cell,)) for cell in cells]
-        print(f"| {name} | " + " | ".join(texts) + " |", flush=True)
+        print_row(name, [show(cell if isinstance(cell, tuple) else (cell,)) for cell in cells])
 
 
 def main():
@@ -362,8 +353,7 @@ def main():
     bending_table()
     known_table()
     if folder is not None:
-        actor_table(folder)
-        real_table(folder)
+        people_tables(folder)
 
 
 if __name__ == "__main__":
