@@ -36,15 +36,12 @@ from sklearn_motionsync.matching.filters import SMOOTHING, smooth
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error, timing_error
 
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
-OF_WIDE = {"metric": None, "velocity_smoothing": 0.03}
-WIDE = "`metric=None, velocity_smoothing=0.03`"
 LINEAR, PLAIN, DEFAULTS = "linear normalisation", "`metric=None`", "`DenseSynchronizer()`"
 OURS = {
     LINEAR: lambda **kw: LinearSynchronizer(P, **kw),
     "the paper's method": lambda **kw: DenseSynchronizer(P, **PAPER, **kw),
     DEFAULTS: lambda **kw: DenseSynchronizer(P, **kw),
     PLAIN: lambda **kw: DenseSynchronizer(P, metric=None, **kw),
-    WIDE: lambda **kw: DenseSynchronizer(P, **OF_WIDE, **kw),
     "`consensus=0`": lambda **kw: DenseSynchronizer(P, consensus=0, **kw),
     '`cost="elastic"`': lambda **kw: DenseSynchronizer(P, cost="elastic", **kw),
     '`cost="posture"`': lambda **kw: DenseSynchronizer(P, cost="posture", **kw),
@@ -136,8 +133,7 @@ def people_tables(folder):
     print_head("ratio of geometric means", ["of the mean errors", "of the median errors"])
     for label, errors in (("actors held out", strangers), ("all ordered pairs", pairs)):
         for keys, which in ((list(errors[LINEAR]), "all"), (with_peer(), "with a peer")):
-            for name in (PLAIN, WIDE):
-                print_row(f"{label}, events: {which}; over {name}", compared(errors, name, keys))
+            print_row(f"{label}, events: {which}", compared(errors, PLAIN, keys))
     header = ["actors held out", "all ordered pairs", "stand still", "hurry", "spread of velocity"]
     print_head("geometric means", header)
     for name in OURS:

@@ -11,7 +11,7 @@ from ..fitting import of_one_state
 from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
 from ..matching.holdout import RefinementTrial, Verdict, deal_features
-from ..matching.matcher import Features, Matcher
+from ..matching.matcher import Matcher
 from ..matching.median import Median, estimate_distances, rounding_of, search_median, sum_all
 from ..matching.refinement import choose_smoothing
 from ..matching.warper import RefinedWarper, Warper
@@ -20,7 +20,7 @@ from ..work import LongWorkMixin, run
 from .base import Synchronizer
 from .match import Match
 from .portions import compare_in_portions, in_portions, shared_training_set
-from .settings import Settings, learn_metric
+from .settings import Settings, features_of, learn_metric
 
 __all__ = ["DenseSynchronizer"]
 
@@ -71,10 +71,11 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         ``max_offset`` is a share of it.
     pattern : "median", int or array (n_frames, n_features), default="median"
         The median performance, one chosen by its index, or another one.
-    velocity_smoothing : float, default=0.02
+    velocity_smoothing : "auto" or float, default="auto"
         Standard deviation of the Gaussian under which velocities are taken, as a share of the
         clip, so that it does not depend on the frame rate; beyond its ends a clip is
-        continued by its point reflection. With the learnt metric it hardly matters.
+        continued by its point reflection. ``"auto"``: 0.02 with a learnt metric, which knows what
+        is noise, and 0.03 without.
     refine : "auto" or bool, default="auto"
         Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and it
         helps: on features of the training set that had no part in it (see ``refinement_``).
@@ -197,7 +198,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
     _parameter_constraints: dict = {
         **Synchronizer._parameter_constraints,
-        "velocity_smoothing": [Interval(Real, 0, 1, closed="both")],
+        "velocity_smoothing": [StrOptions({"auto"}), Interval(Real, 0, 1, closed="both")],
         "refine": [StrOptions({"auto"}), "boolean"],
         "max_offset": [StrOptions({"auto"}), Interval(Real, 0, 1, closed="both")],
         "metric": [StrOptions({"learned"}), None],
@@ -218,7 +219,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         n_frames=None,
         pattern="median",
         *,
-        velocity_smoothing=0.02,
+        velocity_smoothing="auto",
         refine="auto",
         max_offset="auto",
         metric="learned",
@@ -305,9 +306,9 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             learns = self.metric == "learned" and self.cost == "velocity" and self.consensus > 0
             Settings.of(self, learns).check(self.n_frames_, self.subframes)
             positions, self.metric_ = self._positions(training), None
-            features = Features(self.cost, self.subframes, self.velocity_smoothing, training.unit)
+            features = features_of(self, training.unit, learnt=False)
             if learns:
-                features, self.metric_ = learn_metric(features, positions, self)
+                features, self.metric_ = learn_metric(self, training.unit, positions)
             matcher, features = Matcher.learn(features, positions, **self._settings())
             self.mu_ = float(matcher.features.back(matcher.trellis.mu))
             shared = shared_training_set(matcher, positions, features)

@@ -6,13 +6,17 @@ from functools import partial
 import numpy as np
 from sklearn.utils import Bunch
 
+from ..matching.filters import SMOOTHING
+from ..matching.matcher import Features
 from ..work import run
 
-__all__ = ["Settings", "learn_metric"]
+__all__ = ["Settings", "features_of", "learn_metric"]
 
 # max_offset="auto". A wide band leads paths astray until a metric is learnt; after that gestures
 # need it: the table in docs/accuracy.md.
 _NARROW, _WIDE = 0.25, 0.4
+# velocity_smoothing="auto": what is noise a metric knows; without one it is smoothed away.
+_SMOOTH, _SHARP = SMOOTHING, 0.02
 # Steps that a path may take at a frame, all offsets together.
 _MOST_WAYS = 1e9
 # Of how many performances a metric is learnt, at least and at most. Two have no route but the
@@ -49,32 +53,41 @@ class Settings:
             )
 
 
-def learn_metric(features, positions, synchronizer):
-    """Features with the metric of a training set, learnt of evenly spaced ones of many.
+def features_of(synchronizer, unit, learnt):
+    """What a synchronizer compares, to be learnt with a metric or without one."""
+    smoothing = synchronizer.velocity_smoothing
+    if smoothing == "auto":
+        smoothing = _SHARP if learnt else _SMOOTH
+    return Features(synchronizer.cost, synchronizer.subframes, smoothing, unit)
+
+
+def learn_metric(synchronizer, unit, positions):
+    """What is compared, with the metric of a training set, learnt of evenly spaced ones of many.
 
     Parameters
     ----------
-    features : Features
+    synchronizer : DenseSynchronizer
+    unit : Unit
     positions : ndarray, shape (n_sequences, Q, n_features)
         The performances at all positions, in the unit.
-    synchronizer : DenseSynchronizer
 
     Returns
     -------
     features : Features
-        As they were if there is nothing to learn.
+        Without a metric if there is nothing to learn.
     learnt : Bunch or None
         ``metric_`` of the synchronizer.
     """
     n = len(positions)
     if n < _FEWEST:
-        return features, None
+        return features_of(synchronizer, unit, learnt=False), None
     some = np.unique(np.round(np.linspace(0, n - 1, min(n, _MOST))).astype(np.intp))
     settings = vars(Settings.of(synchronizer, learnt=False))
     settings = {**settings, "max_offset": min(settings["max_offset"], _NARROW)}
     vote = {name: getattr(synchronizer, name) for name in ("consensus", "warp_smoothing")}
-    (with_metric,) = run(partial(features.learn, **vote, **settings), [(positions[some],)])
-    if with_metric.metric is None:
-        return features, None
-    share, energy = with_metric.shares(positions[some])
-    return with_metric, Bunch(share=share, energy=energy, performances=some)
+    features = features_of(synchronizer, unit, learnt=True)
+    (features,) = run(partial(features.learn, **vote, **settings), [(positions[some],)])
+    if features.metric is None:
+        return features_of(synchronizer, unit, learnt=False), None
+    share, energy = features.shares(positions[some])
+    return features, Bunch(share=share, energy=energy, performances=some)

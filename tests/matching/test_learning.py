@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync.matching.learning import learn_metric, metric_matrix
+from sklearn_motionsync.matching.metric import Metric
 
 P = 24
 
@@ -137,7 +138,9 @@ def test_columns_of_nothing_change_nothing(curves):
     padding = learn_metric(lambda features: times, padded(positions), padded(velocity))
     found = padding(padded(velocity), padded(positions))
     np.testing.assert_allclose(inner(found), inner(alone(velocity, positions)), atol=1e-12)
-    np.testing.assert_array_equal(padding.posture[[1, 4, 5]], 0)
+    np.testing.assert_array_equal(padding.features, [0, 2, 3])
+    shares = padding.shares(padded(velocity), padded(positions))
+    np.testing.assert_array_equal(shares[[1, 4, 5]], 0)
 
 
 def test_turned_features_are_compared_alike(curves):
@@ -159,5 +162,36 @@ def test_shares_add_up_and_follow_what_is_compared(curves):
     metric = learn_metric(lambda features: some_times(5), positions, velocity)
     shares = metric.shares(velocity, positions)
     assert shares.sum() == pytest.approx(1)
-    only = metric._replace(velocity=metric.velocity * [[1], [0], [0]], posture=0 * metric.posture)
+    first = metric.velocity * [[1], [0], [0]], 0 * metric.posture
+    only = Metric(metric.features, metric.energy, *first)
     np.testing.assert_allclose(only.shares(velocity, positions), [1, 0, 0], atol=1e-12)
+
+
+def test_noise_however_loud_is_left_out(curves):
+    """And then it makes no difference at all; a feature that agrees once matched comes back."""
+    positions, velocity = curves
+    rng, times = np.random.default_rng(0), some_times(5)
+    noise = 100 * rng.standard_normal((2, 5, P, 4))
+    alone = learn_metric(lambda features: times, positions, velocity)
+    loud, fast = (np.concatenate(x, axis=2) for x in zip(noise, (positions, velocity), strict=True))
+    found = learn_metric(lambda features: times, loud, fast)
+    np.testing.assert_array_equal(found.features, alone.features + 4)
+    np.testing.assert_allclose(found(fast, loud), alone(velocity, positions), atol=1e-9)
+    np.testing.assert_array_equal(found.shares(fast, loud)[:4], 0)
+
+
+def test_a_feature_that_agrees_once_matched_comes_back():
+    """A ripple of which nothing is seen before matching."""
+    rng, t = np.random.default_rng(0), np.linspace(0, 1, 60)
+    bends = rng.uniform(-0.12, 0.12, 10)
+    phases = [t + b * np.sin(np.pi * t) for b in bends]
+
+    def ripple(p):
+        return np.sin(100 * p) * np.exp(-np.square((p - 0.5) / 0.15))
+
+    x = np.array([np.column_stack([np.sin(3 * p), ripple(p)]) for p in phases])
+    times = 59 * np.array([[np.interp(p, q, t) for q in phases] for p in phases])
+    velocity = np.gradient(x, axis=1)
+    even = np.broadcast_to(np.arange(60.0), times.shape)
+    assert learn_metric(lambda features: even, x, velocity).features.tolist() == [0]
+    assert learn_metric(lambda features: times, x, velocity).features.tolist() == [0, 1]

@@ -289,8 +289,8 @@ def test_people_that_nothing_was_chosen_on_are_not_refined(archive, action, real
 # and median over all ordered pairs: docs/accuracy.md.
 EVENTS = {
     # action, joint, extreme: (peers' mean, median), share of both that is asked for, settings.
-    # The pelvis of the bends is a price of the metric: its median is 15 % above that of gdtw.
-    ("depositFloorR", "root", np.argmin): ((6.33, 1.46), (0.7, 1.2), {}),
+    # The pelvis of the bends is a price of the metric: in the median gdtw is closer.
+    ("depositFloorR", "root", np.argmin): ((6.33, 1.46), (0.75, 1.25), {}),
     ("depositFloorR", "root", np.argmin, "plain"): ((6.33, 1.46), (0.7, 1), {"metric": None}),
     ("depositFloorR", "rhand", np.argmin): ((5.91, 2.56), (0.7, 0.8), {}),
     ("elbowToKnee1RepsLelbowStart", "rtibia", np.argmax): ((2.86, 2.10), (0.95, 1), {}),
