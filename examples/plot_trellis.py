@@ -29,7 +29,8 @@ TrellisDisplay.from_estimator(paper, points, performance=performance)
 # %%
 # With the defaults
 # -----------------
-# Velocities are compared, rates reach from 0 to 4, and the path is only one of several votes.
+# Velocities and postures are compared in the metric that was learnt of the set, rates reach from 0
+# to 4, and the path is only one of several votes.
 # The valley is narrower where the body moves and wide where it rests: there the penalty on
 # changes of pace decides.
 
