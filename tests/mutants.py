@@ -45,6 +45,7 @@ LIMIT_SECONDS = 400
 # of a module come before them. Modules that are not named have the tests of their folder.
 BROKEN = ["action_model", "gate", "sequences", "matching/*", "metrics/*"]
 DENSE = ["synchronizers/test_dense.py", "synchronizers/test_accuracy.py"]
+METRIC = ["synchronizers/test_metric.py"]
 ALONE = ["synchronizers/test_alone_or_together.py"]
 KEYFRAMES = ["synchronizers/test_keyframes.py"]
 SPACE = ["against_brute_force", "of_long_takes_is_thinned"]
@@ -69,6 +70,9 @@ TESTS = {
     "matching/narrow": TRELLIS,
     "matching/rows": TRELLIS,
     "matching/trellis": TRELLIS,
+    "matching/learning": ["matching/test_learning.py", *METRIC],
+    "matching/matcher": [*DENSE, *SPACE, *ALONE, *METRIC],
+    "matching/metric": ["matching/test_learning.py", *METRIC],
     "matching/warper": [*DENSE, *SPACE, *ALONE],
     "matching/warps": [
         "matching/test_warps.py",
@@ -116,7 +120,7 @@ EQUIVALENT = {
     ("matching/rows", "(stop - 1) * sub -> (stop - 0) * sub"): "a block longer than needed",
     ("matching/rows", "(stop - 1) * sub -> (stop + 1) * sub"): "a block longer than needed",
     ("matching/rows", "slice(0, len(self))"): "all of them, put together again",
-    ("matching/warper", "offsets[:, [0, -1]] -> offsets[:-1, [0, -1]]"): "0 but for rounding",
+    ("matching/consensus", "offsets[:, [0, -1]] -> offsets[:-1, [0, -1]]"): "0 but for rounding",
     ("metrics/arguments", "_ROUNDING = 1e-09 -> _ROUNDING = 2e-09"): "how much may be rounding",
     ("metrics/spread", "centred.shape[1] -> centred.shape[0]"): "how much may be rounding",
     ("sequences", "flat[by[0]] -> flat[by[-1]]"): "there is one",
@@ -133,15 +137,15 @@ EQUIVALENT = {
     ("matching/trellis", "moving.shape[1] // self.table.subframes"): SIZE,
     ("matching/warper", "DRAWN_CELLS = 4000000"): SIZE,
     (
-        "matching/warper",
+        "matching/matcher",
         "max_offset * n_frames * (1 + 1e-12) -> max_offset * n_frames * (1 + 5e-13)",
     ): "rounding is a thousandth of it",
     (
-        "matching/warper",
+        "matching/matcher",
         "max_offset * n_frames * (1 + 1e-12) -> max_offset * n_frames * (1 + 2e-12)",
     ): "rounding is a thousandth of it",
-    ("matching/warper", "get_config()['working_memory'] * 2 ** 20"): SIZE,
-    ("matching/warper", "get_config()['working_memory'] * 2 ** 20 // 2"): SIZE,
+    ("matching/matcher", "get_config()['working_memory'] * 2 ** 20"): SIZE,
+    ("matching/matcher", "get_config()['working_memory'] * 2 ** 20 // 2"): SIZE,
     ("matching/warps", "_SAMPLED_AT_ONCE = 64"): SIZE,
     (
         "metrics/measures",
