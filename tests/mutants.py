@@ -101,6 +101,7 @@ EQUIVALENT = {
     ("matching/filters", "get_config()['working_memory'] * 2 ** 20 / 6"): SIZE,
     ("matching/filters", "beyond > 0 -> beyond > -1"): "pads by nothing",
     ("matching/filters", "next_fast_len(sequences.shape[1] + 2 * margin, real=True)"): SIZE,
+    ("matching/learning", "return 1.0 -> return 2.0"): "of both blocks, whose ratio counts",
     ("matching/keyframes", "np.zeros(len(peaks)) -> np.ones(len(peaks))"): "every way pays it",
     (
         "matching/keyframes",

@@ -48,6 +48,21 @@ def test_noise_is_told_and_ignored(trials):
     assert moved() < 0.5 * moved(metric=None)
 
 
+def test_energy_is_that_of_plain_velocities(trials):
+    X = [x * [1, 2, 3] for x in trials[0]]
+    energy = np.array([DenseSynchronizer(60).fit(x).metric_.energy for x in (trials[0], X)])
+    assert energy.shape == (2, 3)
+    grown = energy[0] * [1, 4, 9]
+    np.testing.assert_allclose(energy[1], grown / grown.sum())
+
+
+def test_performances_that_are_equal_teach_to_compare_them(trials):
+    X = [trials[0][0]] * 4
+    sync = DenseSynchronizer(60).fit(X)
+    assert sync.metric_ is not None
+    np.testing.assert_array_equal(sync.match(X).offsets, 0)
+
+
 def test_noise_that_all_performances_share_is_no_noise(trials):
     """What is the same in all of them, whatever it looks like, tells the moment."""
     same = np.random.default_rng(0).standard_normal(300)
