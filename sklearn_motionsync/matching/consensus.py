@@ -8,7 +8,7 @@ from .warps import follow
 __all__ = ["choose_exemplars", "smoothed", "vote"]
 
 # How fast the say of a route falls with its length: exp(-1.5) for one of typical length beside
-# one without any distance. From the table in docs/accuracy.md.
+# one without any distance. Measured in docs/method.md.
 _FALL = 1.5
 # Share of the weight by which rounding may move a half.
 _ROUNDING = 2.0**-40

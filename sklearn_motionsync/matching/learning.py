@@ -27,7 +27,7 @@ _DOUBT = 2.0
 # Share of a feature's mean variance that is added to all of them, before anything is inverted.
 _RIDGE = 0.03
 # Eigenvalues of a metric are raised to this power: half-way to counting all directions alike,
-# which is what is known before anything is learnt. From the table in docs/accuracy.md.
+# which is what is known before anything is learnt. Measured in docs/method.md.
 _TRUST = 0.6
 # Directions that make so much of what is compared are enough.
 _KEPT = 0.99

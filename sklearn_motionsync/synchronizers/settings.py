@@ -13,7 +13,7 @@ from ..work import run
 __all__ = ["Settings", "features_of", "learn_metric"]
 
 # max_offset="auto". A wide band leads paths astray until a metric is learnt; after that gestures
-# need it: the table in docs/accuracy.md.
+# need it: docs/method.md.
 _NARROW, _WIDE = 0.25, 0.4
 # velocity_smoothing="auto": what is noise a metric knows; without one it is smoothed away.
 _SMOOTH, _SHARP = SMOOTHING, 0.02
