@@ -60,6 +60,9 @@ class Features(NamedTuple):
     def learn(self, positions, *, consensus, warp_smoothing, **settings):
         """These features with the metric of performances, at all positions in the unit.
 
+        And the share of every feature in what is compared, and in the energy of its velocities; or
+        None if there is nothing to learn.
+
         At most ``LEARNING_FRAMES`` frames of each are looked at, which the smoothing of velocities,
         a share of the clip, leaves without loss.
         """
@@ -74,14 +77,12 @@ class Features(NamedTuple):
             matcher = Matcher.of(self._replace(subframes=1), compared, **settings)
             return matcher.all_voted(compared, consensus, warp_smoothing)
 
-        metric = learn_metric(match, positions[:, some], velocity[:, some])
-        return self._replace(metric=metric)
-
-    def shares(self, positions):
-        """The share of every feature in what is compared, and in the energy of its velocities."""
-        positions = positions.astype(np.float64, copy=False)
-        velocity = self._of_cost(positions)
-        return self.metric.shares(velocity, positions), energy_shares(velocity)
+        positions, velocity = positions[:, some], velocity[:, some]
+        metric = learn_metric(match, positions, velocity)
+        if metric is None:
+            return None
+        shares = metric.shares(velocity, positions), energy_shares(velocity)
+        return self._replace(metric=metric), *shares
 
     def positions(self, arrays, n_frames):
         """Performances at every position of the clock (Eq. 7), in the unit."""

@@ -308,7 +308,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             positions, self.metric_ = self._positions(training), None
             features = features_of(self, training.unit, learnt=False)
             if learns:
-                features, self.metric_ = learn_metric(self, training.unit, positions)
+                features, self.metric_ = learn_metric(self, features, positions)
             matcher, features = Matcher.learn(features, positions, **self._settings())
             self.mu_ = float(matcher.features.back(matcher.trellis.mu))
             shared = shared_training_set(matcher, positions, features)

@@ -61,33 +61,34 @@ def features_of(synchronizer, unit, learnt):
     return Features(synchronizer.cost, synchronizer.subframes, smoothing, unit)
 
 
-def learn_metric(synchronizer, unit, positions):
+def learn_metric(synchronizer, plain, positions):
     """What is compared, with the metric of a training set, learnt of evenly spaced ones of many.
 
     Parameters
     ----------
     synchronizer : DenseSynchronizer
-    unit : Unit
+    plain : Features
+        What is compared without a metric.
     positions : ndarray, shape (n_sequences, Q, n_features)
         The performances at all positions, in the unit.
 
     Returns
     -------
     features : Features
-        Without a metric if there is nothing to learn.
+        Those without a metric if there is nothing to learn.
     learnt : Bunch or None
         ``metric_`` of the synchronizer.
     """
     n = len(positions)
     if n < _FEWEST:
-        return features_of(synchronizer, unit, learnt=False), None
+        return plain, None
     some = np.unique(np.round(np.linspace(0, n - 1, min(n, _MOST))).astype(np.intp))
     settings = vars(Settings.of(synchronizer, learnt=False))
     settings = {**settings, "max_offset": min(settings["max_offset"], _NARROW)}
     vote = {name: getattr(synchronizer, name) for name in ("consensus", "warp_smoothing")}
-    features = features_of(synchronizer, unit, learnt=True)
-    (features,) = run(partial(features.learn, **vote, **settings), [(positions[some],)])
-    if features.metric is None:
-        return features_of(synchronizer, unit, learnt=False), None
-    share, energy = features.shares(positions[some])
+    features = features_of(synchronizer, plain.unit, learnt=True)
+    (learnt,) = run(partial(features.learn, **vote, **settings), [(positions[some],)])
+    if learnt is None:
+        return plain, None
+    features, share, energy = learnt
     return features, Bunch(share=share, energy=energy, performances=some)
