@@ -1,42 +1,52 @@
 """The action model: mean performance, variance at every posture, envelope (section 4)."""
 
-from numbers import Integral, Real
+from numbers import Real
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 from sklearn.base import BaseEstimator, _fit_context
-from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
-from sklearn.utils.validation import check_is_fitted
 
-from .fitting import at_once, of_one_state
-from .gate import as_numbers, check_finite, check_names, check_squares
-from .notebook import DocumentedMixin
-from .performances import SequenceLevelMixin, names_of_input
+from ..fitting import at_once, of_one_state
+from ..gate import check_squares
+from ..notebook import DocumentedMixin
+from ..performances import SequenceLevelMixin
+from .envelope import EnvelopeMixin
+from .likeness import Neighbours, as_codes, learn_border, spread_out
 
 __all__ = ["ActionModel"]
 
 # Smallest variance of a density, as a share of the variance of all the data: a feature
 # in which nobody differed is not infinitely improbable to differ.
 _VARIANCE_FLOOR = 1e-9
+# Who stands still is as unlike to people who move as 1; that is never accepted.
+_STANDS_STILL = 1 - 1e-6
 
 
-class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
+class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstimator):
     """What an action looks like at every instant, and how much people vary there.
 
     1. The mean performance and the variance of every posture, over synchronised
-       performances (Fig. 3d).
+       performances (Fig. 3d), and with them the density of a performance: independent normal
+       distributions.
     2. The envelope: the mean, plus and minus ``n_std`` standard deviations. A posture is
        accepted at a frame if all of its features lie inside.
-    3. The density of a performance: independent normal distributions with that mean
-       and variance. A performance is inside if it is at least as probable as the envelope
-       itself, that is, if its root-mean-square deviation is at most ``n_std``
-       standard deviations.
+    3. Whether a performance is the action: its dissimilarity is the mean over the two most similar
+       training performances of
+
+       ``r(y, y_i) = |y - y_i|^2 / (|y|^2 + |y_i|^2)``,
+
+       half of postures less their own mean over time, to which a tenth of the squared distance of
+       these means is added, half of velocities: 0 is equal, 1 as unlike as standing still.
+    4. The border: every training performance is compared with those of *other people*, and the
+       border is what a new person stays below with probability ``coverage``. Standing still is
+       never inside, unless nobody moves.
 
     Parameters
     ----------
     n_std : float, default=3.0
         Half-width of the envelope, in standard deviations.
+    coverage : float, default=0.95
+        Share of performances of people not seen that ``predict`` is to accept, between 0 and 1.
 
     Attributes
     ----------
@@ -44,10 +54,13 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         The mean performance.
     variance_ : ndarray, shape (P, n_features)
         The variance of the performances (divided by their number) at every posture.
-    deviations_ : ndarray, shape (n_sequences, P, n_features)
-        The training performances less the mean, from which whole performances are drawn.
-    offset_ : float
-        Log-density of the envelope; ``predict`` gives 1 to performances not below it.
+    deviations_ : ndarray, shape (n_kept, P, n_features)
+        Training performances less the mean: those that others are compared with and drawn from.
+        At most 64, one of every group and the rest evenly spaced.
+    groups_ : ndarray of int, shape (n_kept,)
+        The groups of these, counted from 0 in the order in which they come.
+    threshold_ : float
+        The border: performances with a dissimilarity up to this are inside.
     n_frames_ : int
         ``P``.
     n_features_in_ : int
@@ -59,35 +72,49 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     --------
     DenseSynchronizer : Makes the input of this model.
 
+    Notes
+    -----
+    Give ``groups``, such as who performed, whenever people come more than once. Without them a
+    person's other performances tell how unlike performances are, and people not seen are refused
+    too often: docs/accuracy.md. In a pipeline they are given as
+    ``pipe.fit(X, actionmodel__groups=groups)``, or with scikit-learn's metadata routing as
+    ``pipe.fit(X, groups=groups)`` after ``set_fit_request(groups=True)``.
+
     Examples
     --------
     >>> import numpy as np
     >>> from sklearn_motionsync import ActionModel
     >>> t = np.linspace(0, 1, 20)[:, np.newaxis]
-    >>> model = ActionModel().fit([t, 2 * t, 3 * t])
-    >>> bool(np.allclose(model.mean_, 2 * t))
-    True
-    >>> model.predict([2.5 * t, -9 * t]).tolist()
-    [1, -1]
-    >>> model.accepts([[2.0], [9.0]], frame=19).tolist()
+    >>> performances = [a * np.sin(3 * t) for a in (0.9, 1.0, 1.1, 1.2)]
+    >>> model = ActionModel().fit(performances)
+    >>> model.predict([1.05 * np.sin(3 * t), 0 * t, np.sin(6 * t)]).tolist()
+    [1, -1, -1]
+    >>> model.accepts([[0.15], [0.9]], frame=19).tolist()
     [True, False]
     """
 
-    _parameter_constraints: dict = {"n_std": [Interval(Real, 0, None, closed="neither")]}
+    _parameter_constraints: dict = {
+        "n_std": [Interval(Real, 0, None, closed="neither")],
+        "coverage": [Interval(Real, 0, 1, closed="neither")],
+    }
 
-    def __init__(self, n_std=3.0):
+    def __init__(self, n_std=3.0, coverage=0.95):
         self.n_std = n_std
+        self.coverage = coverage
 
     @at_once
     @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None):
-        """Learn the mean performance and the variances.
+    def fit(self, X, y=None, groups=None):
+        """Learn the mean performance, the variances, and how unlike people may be.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
             Synchronised performances. The rows of a 2-D array are univariate ones.
         y : ignored
+        groups : array-like, shape (n_sequences,), default=None
+            Who performed, or what else makes performances resemble each other, such as a
+            session. By default every performance counts for itself.
 
         Returns
         -------
@@ -97,24 +124,27 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         ------
         ValueError
             If the performances have different lengths, or there is only one, or their unit is such
-            that variances are beyond the precision.
+            that variances are beyond the precision; if there are as many groups as one, or not one
+            for each performance.
         """
         X = np.stack(_alike(self._check_training_set(X)))
         if len(X) < 2:
             raise ValueError(
                 "A model of how performances vary needs at least 2 performances, got n_samples = 1."
             )
+        groups = as_codes(groups, len(X))
         self.n_frames_ = X.shape[1]
         with np.errstate(over="ignore", invalid="ignore"):
             self.mean_ = X.mean(axis=0)
-            self.deviations_ = X - self.mean_
-            self.variance_ = np.square(self.deviations_).mean(axis=0)
+            self.variance_ = X.var(axis=0)
             spread = float(X.var(axis=(0, 1)).max())
         check_squares(X, spread, "variances")
         self._floor = _VARIANCE_FLOOR * (spread if spread > 0 else 1.0)
-        with np.errstate(over="ignore"):
-            squares = np.square(np.float64(self.n_std)) * self.mean_.size
-        self.offset_ = float(self._log_density(squares))
+        kept = spread_out(groups)
+        self.deviations_, self.groups_ = X[kept] - self.mean_, groups[kept]
+        self._neighbours = Neighbours(X[kept].astype(np.float64), self.groups_)
+        border = learn_border(self._neighbours.dissimilarity(X, groups), self.coverage)
+        self.threshold_ = border if self._neighbours.stand_still else min(border, _STANDS_STILL)
         return self
 
     def check_performances(self, X):
@@ -147,7 +177,10 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
 
     @of_one_state
     def score_samples(self, X):
-        """Log-density of performances under the model.
+        """Log-density of performances: independent normal distributions at every posture.
+
+        It tells which of two models fits a performance better; it is not what ``predict`` asks,
+        as doing nothing is dense.
 
         Parameters
         ----------
@@ -180,8 +213,40 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return float(self.score_samples(X).mean())
 
     @of_one_state
+    def dissimilarity(self, X):
+        """How unlike performances are to the most similar training performances.
+
+        Parameters
+        ----------
+        X : as for ``score_samples``
+
+        Returns
+        -------
+        ndarray, shape (n_sequences,)
+            0 equal, 1 as unlike as standing still.
+        """
+        performances = self.check_performances(X)
+        return self._neighbours.dissimilarity(performances)
+
+    @of_one_state
+    def decision_function(self, X):
+        """How far inside the border performances are: ``threshold_`` less their dissimilarity.
+
+        Parameters
+        ----------
+        X : as for ``score_samples``
+
+        Returns
+        -------
+        ndarray, shape (n_sequences,)
+            Negative outside.
+        """
+        found = self.dissimilarity(X)
+        return self.threshold_ - found
+
+    @of_one_state
     def predict(self, X):
-        """Whether performances are inside the model.
+        """Whether performances are the action: at most as unlike as people are expected to be.
 
         Parameters
         ----------
@@ -192,102 +257,12 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         ndarray of int, shape (n_sequences,)
             1 inside, -1 outside.
         """
-        return np.where(self.score_samples(X) >= self.offset_, 1, -1)
-
-    @of_one_state
-    def accepts(self, postures, frame):
-        """Whether postures lie inside the envelope at a frame.
-
-        Parameters
-        ----------
-        postures : array-like, shape (n_postures, n_features)
-        frame : int
-            Frame of the model, 0 to P - 1.
-
-        Returns
-        -------
-        ndarray of bool, shape (n_postures,)
-        """
-        check_is_fitted(self)
-        frame = self._check_frame(frame)
-        check_names(postures, names_of_input(self), "postures")
-        postures = as_numbers(postures, "postures", dtype=self.mean_.dtype)
-        width = self.mean_.shape[1]
-        if postures.ndim != 2 or postures.shape[1] != width:
-            raise ValueError(
-                f"postures must have shape (n_postures, {width}), got {postures.shape}. Give one "
-                "posture as [posture]."
-            )
-        check_finite(postures, "postures, row", names_of_input(self))
-        lower, upper = self.envelope()
-        return ((postures >= lower[frame]) & (postures <= upper[frame])).all(axis=1)
-
-    @of_one_state
-    def envelope(self):
-        """The mean performance, minus and plus ``n_std`` standard deviations.
-
-        Returns
-        -------
-        lower, upper : ndarray, shape (P, n_features)
-        """
-        check_is_fitted(self)
-        reach = self.n_std * np.sqrt(self.variance_)
-        return self.mean_ - reach, self.mean_ + reach
-
-    @of_one_state
-    def sample(self, n=1, frame=None, random_state=None):
-        """Draw accepted postures at a frame (Fig. 4), or whole performances.
-
-        Postures are drawn feature by feature from the normal distributions cut off at the
-        envelope. Whole performances are random mixtures of the training performances'
-        deviations from the mean, with their variances and their smoothness; one that would
-        fall outside is drawn in to the border.
-
-        Parameters
-        ----------
-        n : int, default=1
-            How many.
-        frame : int, default=None
-            Frame of the model, 0 to P - 1; None for whole performances.
-        random_state : int, RandomState instance or None, default=None
-
-        Returns
-        -------
-        ndarray, shape (n, n_features) or (n, P, n_features)
-            (n, P) for whole performances of a model fitted on 2-D input.
-        """
-        check_is_fitted(self)
-        if not isinstance(n, Integral) or n < 1:
-            raise ValueError(f"n must be a whole number of samples, at least 1; got {n!r}.")
-        random_state = check_random_state(random_state)
-        dtype = self.mean_.dtype
-        if frame is not None:
-            frame = self._check_frame(frame)
-            shape = (n, self.mean_.shape[1])
-            # The normal distribution between -n_std and n_std, by inverting its integral.
-            z = ndtri(random_state.uniform(ndtr(-self.n_std), ndtr(self.n_std), size=shape))
-            lower, upper = (bound[frame] for bound in self.envelope())
-            postures = self.mean_[frame] + z * np.sqrt(self.variance_[frame])
-            return np.clip(postures.astype(dtype), lower, upper)
-        weights = random_state.standard_normal((n, len(self.deviations_)))
-        drawn = np.tensordot(weights / np.sqrt(len(self.deviations_)), self.deviations_, axes=1)
-        far = np.sqrt(np.square(drawn / self._std()).mean(axis=(1, 2), keepdims=True))
-        # A little inside, so that rounding does not put the border outside.
-        drawn *= np.minimum(1, self.n_std * (1 - 1e-6) / np.maximum(far, np.finfo(dtype).tiny))
-        samples = (self.mean_ + drawn).astype(dtype)
-        return samples[:, :, 0] if self._fitted_on_rows else samples
+        return np.where(self.decision_function(X) >= 0, 1, -1)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.three_d_array = True
         return tags
-
-    def _check_frame(self, frame):
-        if not isinstance(frame, Integral) or not 0 <= frame < self.n_frames_:
-            raise ValueError(
-                f"frame must be a whole number from 0 to {self.n_frames_ - 1}, got {frame!r}."
-            )
-        return int(frame)
 
     def _std(self):
         return np.sqrt(np.maximum(self.variance_, self._floor))
