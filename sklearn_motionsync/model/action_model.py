@@ -4,6 +4,7 @@ from numbers import Real
 
 import numpy as np
 from sklearn.base import BaseEstimator, _fit_context
+from sklearn.utils import check_consistent_length
 from sklearn.utils._param_validation import Interval
 
 from ..fitting import at_once, of_one_state
@@ -198,19 +199,24 @@ class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstima
         return self._log_density(squares)
 
     @of_one_state
-    def score(self, X, y=None):
+    def score(self, X, y=None, sample_weight=None):
         """Mean log-density of performances.
 
         Parameters
         ----------
         X : as for ``score_samples``
         y : ignored
+        sample_weight : array-like, shape (n_sequences,), default=None
+            How much each performance counts; by default all alike.
 
         Returns
         -------
         float
         """
-        return float(self.score_samples(X).mean())
+        densities = self.score_samples(X)
+        if sample_weight is not None:
+            check_consistent_length(densities, sample_weight)
+        return float(np.average(densities, weights=sample_weight))
 
     @of_one_state
     def dissimilarity(self, X):

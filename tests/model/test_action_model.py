@@ -45,6 +45,14 @@ def test_accepts_what_is_inside_in_every_feature(model):
 # -- sampling ---------------------------------------------------------------------------
 
 
+def test_a_score_counts_performances_by_their_weight(model, performances):
+    weights = np.arange(5.0)
+    expected = (weights * model.score_samples(performances[:5])).sum() / weights.sum()
+    np.testing.assert_allclose(model.score(performances[:5], sample_weight=weights), expected)
+    with pytest.raises(ValueError, match="inconsistent numbers of samples"):
+        model.score(performances[:5], sample_weight=[1, 2])
+
+
 @pytest.mark.parametrize("n_std", [0.3, 1.5, 3.0])
 def test_sampled_postures_are_accepted_and_cut_off_normal(performances, n_std):
     model = ActionModel(n_std).fit(performances)
