@@ -1,4 +1,4 @@
-"""A model seen in the features that are asked for, its own or those of postures before the aSpace."""
+"""A model seen in the features that are asked for: its own, or those of postures."""
 
 from typing import NamedTuple
 
