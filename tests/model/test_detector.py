@@ -9,6 +9,7 @@ from sklearn import clone, config_context
 from sklearn.exceptions import NotFittedError
 from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score, cross_validate
 from sklearn.pipeline import Pipeline, make_pipeline
+from sklearn.utils import estimator_html_repr
 from sklearn_motionsync import (
     ActionDetector,
     ActionModel,
@@ -334,7 +335,7 @@ def test_stored_copied_and_shown(detector):
     stored = pickle.loads(pickle.dumps(detector))
     assert stored.report(X).equals(detector.report(X))
     assert "ActionDetector(estimator=Pipeline(" in repr(detector)
-    assert "ActionModel" in detector._repr_html_()
+    assert "ActionModel" in estimator_html_repr(detector)
     deep = detector.get_params()
     assert deep["estimator__actionmodel__n_std"] == 3.0
     assert deep["coverage"] == 0.95
