@@ -1,0 +1,128 @@
+"""Postures and performances like those that were learnt, drawn at random."""
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+__all__ = ["sample_performances", "sample_postures"]
+
+# Shares of the variance that a drawn posture owes to one training performance, to a mixture of
+# all, and to chance in every feature by itself; and a drawn performance to the first two. More of
+# the second covers people better, less keeps the body in one piece and the styles apart.
+_POSTURE = (0.84, 0.14, 0.02)
+_PERFORMANCE = (0.64, 0.36)
+# In so many steps a performance that is outside is drawn in to its training performance.
+_STEPS = 4
+
+
+def sample_postures(mean, variance, deviations, n, n_std, random_state):
+    """Postures at a frame, inside the envelope there.
+
+    Each lies about the posture of a training performance chosen at random. As far as nothing is
+    cut off their mean is that of the training postures, their variance ``variance``, and their
+    covariance is that of the training postures, shrunk a little (2 %) towards its diagonal. They
+    are cut off feature by feature, by the monotone function that makes a normal distribution one
+    that ends at ``n_std``: nothing is rejected, and what belongs together stays together.
+
+    Parameters
+    ----------
+    mean, variance : ndarray, shape (n_features,)
+        Of the training postures.
+    deviations : ndarray, shape (n_kept, n_features)
+        Training postures less the mean, in the same units.
+    n : int
+        How many.
+    n_std : float
+        Half-width of the envelope, in standard deviations.
+    random_state : RandomState
+
+    Returns
+    -------
+    ndarray, shape (n, n_features), of the mean's dtype
+        From ``mean - n_std * sqrt(variance)`` to ``mean + n_std * sqrt(variance)``.
+    """
+    spread = np.sqrt(np.square(deviations).mean(axis=0))
+    shapes = deviations / np.where(spread > 0, spread, 1)
+    own = random_state.randint(len(shapes), size=n)
+    one, mixed, chance = _POSTURE
+    z = _mixtures(own, len(shapes), one, mixed, random_state) @ shapes
+    z += np.sqrt(chance) * random_state.standard_normal(z.shape)
+    with np.errstate(over="ignore"):
+        std = np.sqrt(variance)
+        lower, upper = mean - n_std * std, mean + n_std * std
+    postures = mean + _cut_off(z, n_std) * std
+    return np.clip(postures.astype(mean.dtype), lower, upper)
+
+
+def sample_performances(mean, variance, deviations, n, dissimilarity, threshold, random_state):
+    """Whole performances, none more unlike the training ones than a threshold.
+
+    Each is a random mixture of the training performances' deviations, most of it one of them
+    that is inside itself, with the variance of all. One that comes out outside is drawn in to that
+    training performance, at last as far as it: the mean is no way out, it need not be inside.
+
+    Parameters
+    ----------
+    mean, variance : ndarray, shape (P, n_features)
+        Of the training performances.
+    deviations : ndarray, shape (n_kept, P, n_features)
+        Training performances less the mean.
+    n : int
+        How many.
+    dissimilarity : callable
+        Of performances (m, P, n_features) gives m numbers, none depending on the others.
+    threshold : float
+        What is inside has no larger one.
+    random_state : RandomState
+
+    Returns
+    -------
+    ndarray, shape (n, P, n_features), of the mean's dtype
+        If no training performance is inside, some may be as unlike as the most typical one.
+    """
+    dtype, scale = mean.dtype, _scale(variance, deviations)
+    unlike = dissimilarity((mean + deviations).astype(dtype))
+    inside = np.flatnonzero(unlike <= threshold)
+    homes = inside if len(inside) else np.array([np.argmin(unlike)])
+    own = homes[random_state.randint(len(homes), size=n)]
+    weights = _mixtures(own, len(deviations), *_PERFORMANCE, random_state)
+
+    def performances(rows, drawn_in):
+        mixed = (1 - drawn_in) * weights[rows]
+        mixed[np.arange(len(mixed)), own[rows]] += drawn_in
+        deviation = scale ** (1 - drawn_in) * np.tensordot(mixed, deviations, axes=1)
+        return (mean + deviation).astype(dtype)
+
+    outside = np.arange(n)
+    samples = np.empty((n, *mean.shape), dtype=dtype)
+    for step in range(_STEPS + 1):
+        samples[outside] = performances(outside, step / _STEPS)
+        # What is no number is not inside.
+        outside = outside[~(dissimilarity(samples[outside]) <= threshold)]
+        if not len(outside):
+            break
+    return samples
+
+
+def _mixtures(own, n_kept, one, mixed, random_state):
+    """Weights (n, n_kept) of sums with these shares of the variance: one's own, and all."""
+    weights = random_state.standard_normal((len(own), n_kept)) * np.sqrt(mixed / n_kept)
+    weights[np.arange(len(own)), own] += np.sqrt(one)
+    return weights
+
+
+def _cut_off(z, n_std):
+    """Standard normal numbers as ones between -n_std and n_std, in the same order."""
+    tail = ndtr(-n_std)
+    below = tail + (1 - 2 * tail) * ndtr(-np.abs(z))
+    return np.copysign(ndtri(np.maximum(below, np.finfo(float).tiny)), z)
+
+
+def _scale(variance, deviations):
+    """What gives mixtures of the kept deviations the variance of all of them.
+
+    At most twice or half: few that differ in a feature say little of how all do.
+    """
+    kept = np.square(deviations).mean(axis=0)
+    with np.errstate(over="ignore"):
+        ratio = np.divide(variance, kept, out=np.ones_like(kept), where=kept > 0)
+    return np.clip(np.sqrt(ratio), 0.5, 2)
