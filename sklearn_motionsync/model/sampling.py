@@ -3,23 +3,23 @@
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-__all__ = ["sample_performances", "sample_postures"]
+__all__ = ["PERFORMANCE", "POSTURE", "sample_performances", "sample_postures"]
 
 # Shares of the variance that a drawn posture owes to one training performance, to a mixture of
-# all, and to chance in every feature by itself; and a drawn performance to the first two. More of
-# the second covers people better, less keeps the body in one piece and the styles apart.
-_POSTURE = (0.84, 0.14, 0.02)
-_PERFORMANCE = (0.64, 0.36)
+# all, and to chance in every feature by itself; and a drawn performance to the first two. Chance
+# makes tangles; the first keeps bodies in one piece and styles apart (benchmarks/samples.py).
+POSTURE = (0.84, 0.14, 0.02)
+PERFORMANCE = (0.64, 0.36)
 # In so many steps a performance that is outside is drawn in to its training performance.
 _STEPS = 4
 
 
-def sample_postures(mean, variance, deviations, n, n_std, random_state):
+def sample_postures(mean, variance, deviations, n, n_std, random_state, shares=POSTURE):
     """Postures at a frame, inside the envelope there.
 
     Each lies about the posture of a training performance chosen at random. As far as nothing is
     cut off their mean is that of the training postures, their variance ``variance``, and their
-    covariance is that of the training postures, shrunk a little (2 %) towards its diagonal. They
+    covariance is that of the training postures, shrunk a little towards its diagonal (2 %). They
     are cut off feature by feature, by the monotone function that makes a normal distribution one
     that ends at ``n_std``: nothing is rejected, and what belongs together stays together.
 
@@ -34,6 +34,8 @@ def sample_postures(mean, variance, deviations, n, n_std, random_state):
     n_std : float
         Half-width of the envelope, in standard deviations.
     random_state : RandomState
+    shares : tuple of 3 floats, default=(0.84, 0.14, 0.02)
+        Shares of the variance, of sum 1: one training performance's, a mixture's, chance's.
 
     Returns
     -------
@@ -43,7 +45,7 @@ def sample_postures(mean, variance, deviations, n, n_std, random_state):
     spread = np.sqrt(np.square(deviations).mean(axis=0))
     shapes = deviations / np.where(spread > 0, spread, 1)
     own = random_state.randint(len(shapes), size=n)
-    one, mixed, chance = _POSTURE
+    one, mixed, chance = shares
     z = _mixtures(own, len(shapes), one, mixed, random_state) @ shapes
     z += np.sqrt(chance) * random_state.standard_normal(z.shape)
     with np.errstate(over="ignore"):
@@ -53,7 +55,9 @@ def sample_postures(mean, variance, deviations, n, n_std, random_state):
     return np.clip(postures.astype(mean.dtype), lower, upper)
 
 
-def sample_performances(mean, variance, deviations, n, dissimilarity, threshold, random_state):
+def sample_performances(
+    mean, variance, deviations, n, dissimilarity, threshold, random_state, shares=PERFORMANCE
+):
     """Whole performances, none more unlike the training ones than a threshold.
 
     Each is a random mixture of the training performances' deviations, most of it one of them
@@ -73,6 +77,8 @@ def sample_performances(mean, variance, deviations, n, dissimilarity, threshold,
     threshold : float
         What is inside has no larger one.
     random_state : RandomState
+    shares : tuple of 2 floats, default=(0.64, 0.36)
+        Shares of the variance, of sum 1: one training performance's, and a mixture's.
 
     Returns
     -------
@@ -84,7 +90,7 @@ def sample_performances(mean, variance, deviations, n, dissimilarity, threshold,
     inside = np.flatnonzero(unlike <= threshold)
     homes = inside if len(inside) else np.array([np.argmin(unlike)])
     own = homes[random_state.randint(len(homes), size=n)]
-    weights = _mixtures(own, len(deviations), *_PERFORMANCE, random_state)
+    weights = _mixtures(own, len(deviations), *shares, random_state)
 
     def performances(rows, drawn_in):
         mixed = (1 - drawn_in) * weights[rows]
