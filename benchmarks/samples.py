@@ -124,7 +124,7 @@ def likeness(X, groups, labels, new):
     answers = []
     for k in np.unique(labels):
         rows = labels == k
-        if rows.sum() > 3:
+        if rows.sum() > 1:
             several = len(set(groups[rows])) > 1
             model = ActionModel().fit(X[rows], groups=groups[rows] if several else None)
             answers.append(

@@ -42,8 +42,8 @@ def sample_postures(mean, variance, deviations, n, n_std, random_state, shares=P
     ndarray, shape (n, n_features), of the mean's dtype
         From ``mean - n_std * sqrt(variance)`` to ``mean + n_std * sqrt(variance)``.
     """
-    spread = np.sqrt(np.square(deviations).mean(axis=0))
-    shapes = deviations / np.where(spread > 0, spread, 1)
+    spread = deviations.std(axis=0)
+    shapes = (deviations - deviations.mean(axis=0)) / np.where(spread > 0, spread, 1)
     own = random_state.randint(len(shapes), size=n)
     one, mixed, chance = shares
     z = _mixtures(own, len(shapes), one, mixed, random_state) @ shapes
@@ -85,27 +85,23 @@ def sample_performances(
     ndarray, shape (n, P, n_features), of the mean's dtype
         If no training performance is inside, some may be as unlike as the most typical one.
     """
-    dtype, scale = mean.dtype, _scale(variance, deviations)
-    unlike = dissimilarity((mean + deviations).astype(dtype))
+    unlike = dissimilarity((mean + deviations).astype(mean.dtype))
     inside = np.flatnonzero(unlike <= threshold)
     homes = inside if len(inside) else np.array([np.argmin(unlike)])
     own = homes[random_state.randint(len(homes), size=n)]
     weights = _mixtures(own, len(deviations), *shares, random_state)
-
-    def performances(rows, drawn_in):
-        mixed = (1 - drawn_in) * weights[rows]
-        mixed[np.arange(len(mixed)), own[rows]] += drawn_in
-        deviation = scale ** (1 - drawn_in) * np.tensordot(mixed, deviations, axes=1)
-        return (mean + deviation).astype(dtype)
-
+    drawn = np.tensordot(weights, deviations - deviations.mean(axis=0), axes=1)
+    drawn *= _scale(variance, deviations)
+    samples = (mean + drawn).astype(mean.dtype)
     outside = np.arange(n)
-    samples = np.empty((n, *mean.shape), dtype=dtype)
-    for step in range(_STEPS + 1):
-        samples[outside] = performances(outside, step / _STEPS)
+    for step in range(1, _STEPS + 1):
         # What is no number is not inside.
         outside = outside[~(dissimilarity(samples[outside]) <= threshold)]
         if not len(outside):
             break
+        nearer = step / _STEPS
+        deviation = (1 - nearer) * drawn[outside] + nearer * deviations[own[outside]]
+        samples[outside] = (mean + deviation).astype(mean.dtype)
     return samples
 
 
@@ -128,7 +124,7 @@ def _scale(variance, deviations):
 
     At most twice or half: few that differ in a feature say little of how all do.
     """
-    kept = np.square(deviations).mean(axis=0)
+    kept = deviations.var(axis=0)
     with np.errstate(over="ignore"):
         ratio = np.divide(variance, kept, out=np.ones_like(kept), where=kept > 0)
     return np.clip(np.sqrt(ratio), 0.5, 2)
