@@ -39,14 +39,13 @@ _REASONS = {
 class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
     """Whether performances are the action, seen as they were recorded.
 
-    After synchronisation nobody is too slow, nobody does it twice, and an `ActionModel` compares
-    shapes, not sizes. The detector asks four questions of a performance. Each is answered within
+    After synchronisation nobody is slow, a movement that comes twice is nearly one that comes
+    once, and an `ActionModel` compares shapes more than sizes. The detector asks four questions of a performance. Each is answered within
     what people of the other groups leave open, and all four must be answered with yes.
 
     1. **movement**: how unlike it is to the model *after* synchronisation, as
        `ActionModel.dissimilarity`.
-    2. **course**: the same after linear normalisation alone, where halves that are exchanged,
-       pauses and repetitions are still seen.
+    2. **course**: the same after linear normalisation alone, where every part stays when it was.
     3. **duration**: its number of frames, as a ratio to the usual one.
     4. **energy**: the mean squared distance of its postures from their own mean, as a ratio to the
        usual one.
@@ -72,7 +71,6 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
     borders_ : DataFrame, shape (n_questions, 2)
         What is accepted, ``lower`` to ``upper``: dissimilarities, frames, and the unit of the
         features squared.
-
     offset_ : float
         The border of ``score_samples``, -1.
     n_features_in_ : int

@@ -367,14 +367,15 @@ def test_the_unit_does_not_matter(scale, detector):
     [
         ([wave(40), wave(44)], wave(40)),
         ([wave(40)] * 4, wave(40)),
+        (people(80)[0], wave()),
         ([np.full((n, 2), 3.0) for n in (20, 22, 24)], np.full((22, 2), 3.0)),
         ([x[:, :1] for x in X], wave()[:, :1]),
         ([x.astype(np.float32) for x in X], wave().astype(np.float32)),
         ([np.stack([0.1 * np.ones(2), k + np.ones(2)]) for k in range(4)], np.ones((2, 2))),
     ],
-    ids=["two", "identical", "still", "univariate", "float32", "two frames"],
+    ids=["two", "identical", "many", "still", "univariate", "float32", "two frames"],
 )
-def test_small_training_sets(training, own):
+def test_training_sets_of_all_kinds(training, own):
     """Warnings are errors here."""
     found = make(LinearSynchronizer()).fit(training)
     numbers = found.report([*training, own])[QUESTIONS]
