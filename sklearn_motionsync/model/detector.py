@@ -40,8 +40,9 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
     """Whether performances are the action, seen as they were recorded.
 
     After synchronisation nobody is slow, a movement that comes twice is nearly one that comes
-    once, and an `ActionModel` compares shapes more than sizes. The detector asks four questions of a performance. Each is answered within
-    what people of the other groups leave open, and all four must be answered with yes.
+    once, and an `ActionModel` compares shapes more than sizes. The detector asks four questions of
+    a performance. Each is answered within what people of the other groups leave open, and all four
+    must be answered with yes.
 
     1. **movement**: how unlike it is to the model *after* synchronisation, as
        `ActionModel.dissimilarity`.
