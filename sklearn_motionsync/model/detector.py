@@ -283,14 +283,10 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         if not self.duration:
             del self._questions["duration"]
         self.offset_ = -1.0
-        self.borders_ = pd.DataFrame(
-            [
-                (0.0, asked.border) if isinstance(asked, Course) else (asked.lower, asked.upper)
-                for asked in self._questions.values()
-            ],
-            index=list(self._questions),
-            columns=["lower", "upper"],
-        )
+        self.borders_ = {
+            name: (0.0, asked.border) if isinstance(asked, Course) else (asked.lower, asked.upper)
+            for name, asked in self._questions.items()
+        }
 
     # -- what is asked ----------------------------------------------------------------------
 
