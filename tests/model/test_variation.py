@@ -159,14 +159,18 @@ def test_people_who_come_often_must_be_named():
     assert unnamed < 0.8
 
 
-@pytest.mark.parametrize("sizes", [[1] * 4, [5] * 4, [2] * 6, [1] * 10, [2] * 20, [5, 2, 1, 4, 3]])
-def test_the_mean_lies_in_its_band(sizes):
-    hits = []
-    for seed in range(100):
-        X, groups = people(sizes, seed)
-        band = mean_band(X, groups, 0.95, seed)
-        hits.append((np.abs(X.mean(axis=0)) <= band).all())
-    assert 0.9 <= np.mean(hits) <= 0.99
+def test_the_mean_lies_in_its_band():
+    """Of few people and many, who come once or often, or some more often than others."""
+    shares = []
+    for sizes in ([1] * 4, [5] * 4, [2] * 6, [1] * 10, [2] * 20, [5, 2, 1, 4, 3]):
+        hits = []
+        for seed in range(50):
+            X, groups = people(sizes, seed)
+            band = mean_band(X, groups, 0.95, seed)
+            hits.append((np.abs(X.mean(axis=0)) <= band).all())
+        shares.append(np.mean(hits))
+    assert 0.92 <= np.mean(shares) <= 0.98
+    assert min(shares) >= 0.86
 
 
 # -- limits -----------------------------------------------------------------------------
