@@ -1,0 +1,220 @@
+"""What is to be expected of a new person: against loops, closed forms and simulated people."""
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+from sklearn_motionsync.model.variation import (
+    mean_band,
+    predictive_variance,
+    simultaneous_factor,
+)
+
+GROUPS = np.array([3, 0, 0, 7, 7, 7, 3, 1])
+
+
+def people(sizes, seed=0, n_frames=15, n_features=2, own=0.5):
+    """Smooth performances of people who differ, with a mean of 0, and whose they are."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 1, n_frames)
+    waves = np.stack([np.ones_like(t), np.sin(3 * t), np.cos(5 * t), np.sin(8 * t)])
+    groups = np.repeat(np.arange(len(sizes)), sizes)
+    persons, moods = (
+        np.einsum("nkf,kp->npf", rng.standard_normal((n, 4, n_features)), waves)
+        for n in (len(sizes), len(groups))
+    )
+    amplitudes = (1 + 0.6 * np.sin(4 * t))[:, np.newaxis] * 10.0 ** np.arange(n_features)
+    return (persons[groups] + own * moods) * amplitudes, groups
+
+
+def slow_variance(X, groups):
+    n = len(X)
+    squares = []
+    for x, group in zip(X, groups, strict=True):
+        others = [y for y, other in zip(X, groups, strict=True) if other != group]
+        squares.append((x - np.mean(others, axis=0)) ** 2)
+    s2 = np.mean(squares, axis=0)
+    v = np.empty_like(s2)
+    for p, k in np.ndindex(s2.shape):
+        v[p, k] = ((n - 1) * s2[p, k] + 5 * s2[:, k].mean()) / (n + 4) * (1 + 1 / n)
+    return v
+
+
+def slow_factor(X, groups, coverage):
+    logs = []
+    for group in set(groups):
+        others, whose = X[groups != group], groups[groups != group]
+        mean, std = others.mean(axis=0), np.sqrt(slow_variance(others, whose))
+        logs += [np.log(np.max(np.abs((x - mean) / std))) for x in X[groups == group]]
+    n = len(logs)
+    variance = ((n - 1) * np.var(logs, ddof=1) + 3 * 0.1) / (n + 2)
+    return np.exp(np.mean(logs) + student(n + 2).ppf(coverage) * np.sqrt(variance * (1 + 1 / n)))
+
+
+def inside(new, X, groups, coverage):
+    """The share of new performances that lie within the simultaneous band as a whole."""
+    reach = simultaneous_factor(X, groups, coverage) * np.sqrt(predictive_variance(X, groups))
+    return (np.abs(new - X.mean(axis=0)) <= reach).all(axis=(1, 2)).mean()
+
+
+# -- what the formulas say --------------------------------------------------------------
+
+
+def test_the_variance_is_what_the_formula_says():
+    X, _ = people([1] * 8)
+    for groups in (GROUPS, np.arange(8)):
+        np.testing.assert_allclose(predictive_variance(X, groups), slow_variance(X, groups))
+
+
+@pytest.mark.parametrize("coverage", [0.5, 0.8, 0.95, 0.99])
+def test_the_factor_is_what_leaving_out_says(coverage):
+    X, _ = people([1] * 8)
+    for groups in (GROUPS, np.arange(8)):
+        expected = slow_factor(X, groups, coverage)
+        np.testing.assert_allclose(simultaneous_factor(X, groups, coverage), expected)
+
+
+def test_the_factor_of_two_performances():
+    """Of one there is no variance to judge the other by: the log's is taken to be large."""
+    X, groups = people([1, 1])
+    z = np.abs(X[0] - X[1]) / np.sqrt(slow_variance(X, groups))
+    expected = z.max() * np.exp(student(4).ppf(0.9) * np.sqrt(3 / 4 * 1.5))
+    np.testing.assert_allclose(simultaneous_factor(X, groups, 0.9), expected)
+
+
+@pytest.mark.parametrize("n", [3, 8, 30])
+def test_one_number_has_the_band_of_student(n):
+    """One frame of one feature of people who come once: mean +- t s / sqrt(n)."""
+    x = np.random.default_rng(n).standard_normal((n, 1, 1))
+    found = np.mean([mean_band(x, np.arange(n), 0.9, seed) for seed in range(10)])
+    expected = student(n - 1).ppf(0.95) * x.std(ddof=1) / np.sqrt(n)
+    np.testing.assert_allclose(found, expected, rtol=0.02)
+
+
+@pytest.mark.parametrize("sizes", [[1] * 6, [2, 2, 2], [4, 1, 2]])
+def test_the_band_is_as_wide_as_the_jackknife_says(sizes):
+    """By the mean without a group, drawn to its mean over the frames; times one factor."""
+    X, groups = people(sizes)
+    n = len(sizes)
+    moved = [X[groups != g].mean(axis=0) - X.mean(axis=0) for g in range(n)]
+    squares = (n - 1) / n * np.square(moved).sum(axis=0)
+    shrunk = ((n - 1) * squares + 5 * squares.mean(axis=0)) / (n + 4)
+    factors = mean_band(X, groups, 0.95, 0) / np.sqrt(shrunk)
+    np.testing.assert_allclose(factors, factors[0, 0])
+    pointwise = student(n - 1).ppf(0.975)
+    assert 0.8 * pointwise < factors[0, 0] < 5 * pointwise
+
+
+def test_units_and_places_do_not_matter():
+    X, _ = people([1] * 8)
+    unit, place = np.array([1e-3, 40.0]), np.array([[5.0, -300.0]])
+    Y = X * unit + place
+    v, reach = predictive_variance(X, GROUPS), mean_band(X, GROUPS, 0.95, 0)
+    np.testing.assert_allclose(predictive_variance(Y, GROUPS), v * unit**2, rtol=1e-6)
+    np.testing.assert_allclose(mean_band(Y, GROUPS, 0.95, 0), reach * unit, rtol=1e-6)
+    c = simultaneous_factor(X, GROUPS, 0.95)
+    np.testing.assert_allclose(simultaneous_factor(Y, GROUPS, 0.95), c, rtol=1e-6)
+
+
+def test_more_is_held_by_wider_bands():
+    X, groups = people([2] * 6)
+    factors = [simultaneous_factor(X, groups, c) for c in (0.5, 0.8, 0.9, 0.95, 0.99)]
+    bands = [mean_band(X, groups, c, 0).mean() for c in (0.5, 0.8, 0.9, 0.95, 0.99)]
+    assert sorted(factors) == factors
+    assert sorted(bands) == bands
+
+
+def test_a_band_of_the_mean_repeats_with_its_random_state():
+    X, groups = people([2] * 6)
+    a, b, c = (mean_band(X, groups, 0.95, seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(a, b)
+    assert not np.array_equal(a, c)
+    np.testing.assert_allclose(a, c, rtol=0.1)
+    # It says where the mean is, not where people are.
+    c = simultaneous_factor(X, groups, 0.95)
+    assert (a < c * np.sqrt(predictive_variance(X, groups))).all()
+
+
+# -- what they promise ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("coverage", [0.8, 0.95])
+@pytest.mark.parametrize("sizes", [[1] * 5, [1] * 20, [3] * 8])
+def test_new_people_lie_in_the_simultaneous_band(sizes, coverage):
+    shares = [
+        inside(people([1] * 50, 1000 + seed)[0], *people(sizes, seed), coverage)
+        for seed in range(60)
+    ]
+    assert coverage - 0.03 <= np.mean(shares) <= coverage + 0.05
+
+
+def test_people_who_come_often_must_be_named():
+    """Without groups, how people repeat themselves is taken for how people differ."""
+    shares = []
+    for seed in range(30):
+        new = people([1] * 50, 1000 + seed, own=0.3)[0]
+        X, groups = people([6] * 4, seed, own=0.3)
+        shares.append([inside(new, X, g, 0.95) for g in (groups, np.arange(len(X)))])
+    named, unnamed = np.mean(shares, axis=0)
+    assert named > 0.92
+    assert unnamed < 0.8
+
+
+def test_the_mean_lies_in_its_band():
+    """Of few people and many, who come once or often, or some more often than others."""
+    shares = []
+    for sizes in ([1] * 4, [5] * 4, [2] * 6, [1] * 10, [2] * 20, [5, 2, 1, 4, 3]):
+        hits = []
+        for seed in range(50):
+            X, groups = people(sizes, seed)
+            band = mean_band(X, groups, 0.95, seed)
+            hits.append((np.abs(X.mean(axis=0)) <= band).all())
+        shares.append(np.mean(hits))
+    assert 0.92 <= np.mean(shares) <= 0.98
+    assert min(shares) >= 0.86
+
+
+# -- limits -----------------------------------------------------------------------------
+
+
+def test_nobody_differs():
+    X = np.repeat(people([1])[0], 5, axis=0)
+    v = predictive_variance(X, np.arange(5))
+    np.testing.assert_allclose(v, np.broadcast_to(1e-9 * X[0].var(axis=0), v.shape))
+    # Rounding is not a departure, anything else is.
+    assert inside(X[:1] * (1 + 1e-12), X, np.arange(5), 0.95) == 1
+    assert inside(X[:1] * 1.01, X, np.arange(5), 0.95) == 0
+    assert (mean_band(X, np.arange(5), 0.95, 0) <= 1e-12).all()
+    # Nor does anything move.
+    assert (predictive_variance(np.zeros((3, 4, 1)), np.arange(3)) == 1e-9).all()
+
+
+def test_a_feature_in_which_nobody_differs():
+    """It must neither be infinitely surprising nor change what is said of the others."""
+    X, groups = people([2] * 4)
+    Y = np.concatenate([X, np.full((8, 15, 1), 0.1)], axis=2)
+    v = predictive_variance(Y, groups)
+    np.testing.assert_allclose(v[:, :2], predictive_variance(X, groups))
+    np.testing.assert_allclose(v[:, 2], 1e-9 * X.var(axis=(0, 1)).max())
+    c = simultaneous_factor(X, groups, 0.95)
+    np.testing.assert_allclose(simultaneous_factor(Y, groups, 0.95), c)
+    expected = mean_band(X, groups, 0.95, 0)
+    np.testing.assert_allclose(mean_band(Y, groups, 0.95, 0)[:, :2], expected)
+
+
+@pytest.mark.parametrize("shape", [(2, 1, 1), (2, 6, 3), (3, 1, 4), (5, 9, 1)])
+@pytest.mark.parametrize("whose", [np.arange, np.zeros, lambda n: np.arange(n) > 0])
+def test_few_numbers_give_numbers(shape, whose):
+    X, groups = np.random.default_rng(0).standard_normal(shape), whose(shape[0])
+    for found in (predictive_variance(X, groups), mean_band(X, groups, 0.95, 0)):
+        assert found.shape == shape[1:]
+        assert (found > 0).all()
+        assert np.isfinite(found).all()
+    assert 1 < simultaneous_factor(X, groups, 0.95) < 100
+
+
+def test_people_of_one_group_count_each_for_themselves():
+    X, _ = people([1] * 5)
+    one, each = np.full(5, 3), np.arange(5)
+    np.testing.assert_array_equal(predictive_variance(X, one), predictive_variance(X, each))
+    assert simultaneous_factor(X, one, 0.9) == simultaneous_factor(X, each, 0.9)
+    np.testing.assert_array_equal(mean_band(X, one, 0.9, 0), mean_band(X, each, 0.9, 0))
