@@ -24,6 +24,7 @@ from .display import (
     TrellisDisplay,
 )
 from .model.action_model import ActionModel
+from .model.departures import find_departures
 from .model.detector import ActionDetector
 from .sequences import to_frame, to_sequences
 from .synchronizers.base import Synchronizer
@@ -52,6 +53,7 @@ __all__ = [
     "TrellisDisplay",
     "datasets",
     "display",
+    "find_departures",
     "metrics",
     "to_frame",
     "to_sequences",

@@ -13,6 +13,7 @@ from ..notebook import DocumentedMixin
 from ..performances import SequenceLevelMixin
 from .envelope import EnvelopeMixin
 from .likeness import Neighbours, as_codes, spread_out
+from .variation import predictive_variance
 
 __all__ = ["ActionModel"]
 
@@ -53,6 +54,9 @@ class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstima
         The mean performance.
     variance_ : ndarray, shape (P, n_features)
         The variance of the performances (divided by their number) at every posture.
+    predictive_variance_ : ndarray, shape (P, n_features)
+        The variance to be expected of a new person about the mean: learnt by leaving groups out,
+        drawn a little towards its mean over the frames, never 0.
     deviations_ : ndarray, shape (n_kept, P, n_features)
         Training performances less the mean: those that others are compared with and drawn from.
         At most 64, one of every group and the rest evenly spaced.
@@ -141,7 +145,9 @@ class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstima
         self._floor = _VARIANCE_FLOOR * (spread if spread > 0 else 1.0)
         kept = spread_out(groups)
         self.deviations_, self.groups_ = X[kept] - self.mean_, groups[kept]
-        self._neighbours = Neighbours(X[kept].astype(np.float64), self.groups_)
+        known = X[kept].astype(np.float64)
+        self.predictive_variance_ = predictive_variance(known, self.groups_).astype(X.dtype)
+        self._neighbours = Neighbours(known, self.groups_)
         self.threshold_ = self._neighbours.border(X, groups, self.coverage)
         return self
 

@@ -1,10 +1,87 @@
 """Where a performance departs from what is expected: runs of frames beyond a limit."""
 
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-__all__ = ["Runs", "runs"]
+from ..features import choose_features
+from .views import view_of
+
+__all__ = ["Runs", "find_departures", "runs"]
+
+
+def find_departures(estimator, X, *, features=None, limit=None, **params):
+    """Where performances leave what the action does: when, in which feature, and how far.
+
+    A posture departs if it is further from the mean than what is expected of a *new person*, in
+    standard deviations that are learnt by leaving groups out (`ActionModel.standard_scores`).
+
+    Parameters
+    ----------
+    estimator : ActionModel, or Pipeline with one
+        Fitted.
+    X : performances, as the estimator takes them
+    features : int, str or list of them, default=None
+        Features of the model, or of the postures before its `ASpace`, by index or name. By default
+        those of postures, if there is such an aSpace, otherwise all of the model.
+    limit : float, default=None
+        Standard deviations from which on a posture departs. By default so many that
+        ``coverage`` of the performances of new people depart nowhere in these features (see
+        ``ActionModel.envelope(simultaneous=True)``); 3 shows more, and departures that are none.
+    **params : dict
+        What synchronizing X takes besides, such as ``keyframes``.
+
+    Returns
+    -------
+    DataFrame
+        One row a run of frames, by performance and then the worst first: ``performance``, its
+        number or label; ``feature``; ``first`` and ``last``, frames of the model, counted from 0;
+        ``peak``, the worst of them; ``deviation``, standard deviations there, negative below the
+        mean. No row says that a performance departs nowhere.
+
+    Raises
+    ------
+    ValueError
+        If there is no ActionModel, no such feature, or the limit is not above 0.
+
+    See Also
+    --------
+    SkeletonDisplay.from_departures : The same as stick figures.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn_motionsync import ActionModel, find_departures
+    >>> t = np.linspace(0, 1, 50)[:, np.newaxis]
+    >>> model = ActionModel().fit([a * np.sin(3 * t) for a in (0.8, 0.9, 1.0, 1.1, 1.2)])
+    >>> new = np.sin(3 * t)
+    >>> new[20:25] += 3
+    >>> find_departures(model, [np.sin(3 * t), new]).round(0)
+       performance feature  first  last  peak  deviation
+    0            1      x0     20    24    20       19.0
+    """
+    is_number = isinstance(limit, Real) and not isinstance(limit, bool)
+    if limit is not None and not (is_number and 0 < limit < np.inf):
+        raise ValueError(f"limit must be a number above 0, or None; got {limit!r}.")
+    caller = "find_departures"
+    view = view_of(estimator, X, params, caller, features=features, postures=features is None)
+    if features is not None:
+        view = view.only(choose_features(features, view.names))
+    found = runs(view.scores, view.model.simultaneous_factor() if limit is None else limit)
+    table = pd.DataFrame(
+        {
+            "performance": np.array(view.labels, dtype=object)[found.performance],
+            "feature": np.array(view.names, dtype=object)[found.feature],
+            "first": found.first,
+            "last": found.last,
+            "peak": found.peak,
+            "deviation": found.score,
+        }
+    )
+    order = np.lexsort((found.first, found.feature, -np.abs(found.score), found.performance))
+    return table.iloc[order].reset_index(drop=True).infer_objects()
 
 
 class Runs(NamedTuple):

@@ -10,6 +10,7 @@ from ..fitting import of_one_state
 from ..gate import as_numbers, check_finite, check_names
 from ..performances import names_of_input
 from .sampling import sample_performances, sample_postures
+from .variation import mean_band, simultaneous_factor
 
 __all__ = ["EnvelopeMixin"]
 
@@ -49,16 +50,89 @@ class EnvelopeMixin:
         return ((postures >= lower[frame]) & (postures <= upper[frame])).all(axis=1)
 
     @of_one_state
-    def envelope(self):
-        """The mean performance, minus and plus ``n_std`` standard deviations.
+    def envelope(self, simultaneous=False):
+        """A band about the mean performance, for postures or for whole performances.
+
+        Parameters
+        ----------
+        simultaneous : bool, default=False
+            False: ``n_std`` standard deviations of the training performances on both sides. At 3
+            it holds nearly all *postures* of people, but few whole performances: those leave it
+            somewhere. True: it holds ``coverage`` of the *whole performances* of new people, at
+            all frames and in all features: `simultaneous_factor` predicted standard deviations.
+
+        Returns
+        -------
+        lower, upper : ndarray, shape (P, n_features)
+
+        See Also
+        --------
+        mean_envelope : Holds the mean, not performances.
+        """
+        check_is_fitted(self)
+        if simultaneous:
+            reach = self.simultaneous_factor() * np.sqrt(self.predictive_variance_)
+        else:
+            reach = self.n_std * np.sqrt(self.variance_)
+        return self.mean_ - reach, self.mean_ + reach
+
+    @of_one_state
+    def mean_envelope(self, random_state=None):
+        """A band that holds the mean of all people at all frames and in all features.
+
+        With probability ``coverage``, by a bootstrap over groups: what is to be expected
+        of the mean if other people had been recorded, as many with as many performances. Of more
+        than 64 performances it is the band of those that are kept, wider than need be.
+
+        Parameters
+        ----------
+        random_state : int, RandomState instance or None, default=None
 
         Returns
         -------
         lower, upper : ndarray, shape (P, n_features)
         """
         check_is_fitted(self)
-        reach = self.n_std * np.sqrt(self.variance_)
+        reach = mean_band(self._known(), self.groups_, self.coverage, random_state)
+        reach = reach.astype(self.mean_.dtype)
         return self.mean_ - reach, self.mean_ + reach
+
+    @of_one_state
+    def simultaneous_factor(self):
+        """How many predicted standard deviations the performances of new people stay within.
+
+        Whole performances, at all frames and in all features, with probability ``coverage``:
+        learnt by leaving out group by group, of the largest deviation of each performance.
+
+        Returns
+        -------
+        float
+        """
+        check_is_fitted(self)
+        return simultaneous_factor(self._known(), self.groups_, self.coverage)
+
+    @of_one_state
+    def standard_scores(self, X):
+        """How far performances are from the mean, in standard deviations predicted for new people.
+
+        Parameters
+        ----------
+        X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
+            Synchronised performances.
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P, n_features)
+            Negative below the mean; the root of ``predictive_variance_`` is 1.
+
+        See Also
+        --------
+        find_departures : Where they are large, as a table.
+        """
+        performances = np.stack(self.check_performances(X))
+        # What is too far away for any number is infinitely far.
+        with np.errstate(over="ignore"):
+            return (performances - self.mean_) / np.sqrt(self.predictive_variance_)
 
     @of_one_state
     def sample(self, n=1, frame=None, random_state=None):
@@ -100,6 +174,10 @@ class EnvelopeMixin:
             random_state,
         )
         return samples[:, :, 0] if self._fitted_on_rows else samples
+
+    def _known(self):
+        """The training performances that are kept."""
+        return np.asarray(self.mean_ + self.deviations_, dtype=np.float64)
 
     def _check_frame(self, frame):
         if not isinstance(frame, Integral) or not 0 <= frame < self.n_frames_:

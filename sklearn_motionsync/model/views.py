@@ -34,6 +34,21 @@ class View(NamedTuple):
     synchronised: np.ndarray | None
     labels: list
 
+    @property
+    def scores(self):
+        """The `ActionModel.standard_scores` of the performances."""
+        with np.errstate(over="ignore"):
+            away = self.synchronised - self.model.mean_
+            return away / np.sqrt(self.model.predictive_variance_)
+
+    def only(self, chosen):
+        """The same in some of the features, by index."""
+        if list(chosen) == list(range(len(self.names))):
+            return self
+        some = None if self.synchronised is None else self.synchronised[:, :, chosen]
+        model = _seen(self.model, lambda points: points[:, :, chosen])
+        return View(model, [self.names[i] for i in chosen], some, self.labels)
+
 
 def view_of(estimator, X=None, params=None, caller="", *, features=None, postures=False):
     """The model of an estimator in the features that are asked for.
@@ -79,10 +94,14 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
     def back(points):
         return points @ aspace.components_ + aspace.mean_
 
+    return View(_seen(model, back), names, None if X is None else back(synchronised), labels)
+
+
+def _seen(model, through):
+    """A model in features that are linear in its own, of the performances that it keeps."""
     # About the mean of all training performances, not of those that were kept.
     kept = model.mean_ + model.deviations_ - model.deviations_.mean(axis=0)
-    in_postures = clone(model).fit(back(kept), groups=model.groups_)
-    return View(in_postures, names, None if X is None else back(synchronised), labels)
+    return clone(model).fit(through(kept), groups=model.groups_)
 
 
 def _space_before(before, names, must):

@@ -1,0 +1,195 @@
+"""Bands that hold what they say, and where performances leave them, through the estimator."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    find_departures,
+)
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.model.variation import (
+    mean_band,
+    predictive_variance,
+    simultaneous_factor,
+)
+
+
+def people(n_people, n_times, seed):
+    """Smooth performances of two features, of people and about them, in two units."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 1, 30)
+    shapes = np.stack([np.ones_like(t), t, t**2, np.sin(9 * t), np.cos(9 * t)], axis=1)
+
+    def vary(n, size):
+        return size * np.einsum("tk,nkf->ntf", shapes, rng.standard_normal((n, 5, 2)))
+
+    style = np.repeat(vary(n_people, 0.2), n_times, axis=0)
+    X = np.stack([np.sin(5 * t), t], axis=1) + style + vary(n_people * n_times, 0.1)
+    return X * [1, 100], np.repeat(np.arange(n_people), n_times)
+
+
+X, GROUPS = people(8, 3, 0)
+MODEL = ActionModel().fit(X, groups=GROUPS)
+
+
+def test_the_bands_are_those_of_the_functions():
+    variance = predictive_variance(X, GROUPS)
+    np.testing.assert_allclose(MODEL.predictive_variance_, variance)
+    factor = simultaneous_factor(X, GROUPS, 0.95)
+    np.testing.assert_allclose(MODEL.simultaneous_factor(), factor)
+    bands = [
+        (MODEL.envelope(), 3 * X.std(axis=0)),
+        (MODEL.envelope(simultaneous=True), factor * np.sqrt(variance)),
+        (MODEL.mean_envelope(random_state=3), mean_band(X, GROUPS, 0.95, 3)),
+    ]
+    for (lower, upper), half in bands:
+        np.testing.assert_allclose(upper - lower, 2 * half)
+        np.testing.assert_allclose(upper + lower, 2 * X.mean(axis=0))
+    for change in ({"coverage": 0.8}, {"coverage": 0.99}):
+        other = ActionModel(**change).fit(X, groups=GROUPS)
+        wider = other.simultaneous_factor() > factor
+        assert wider == (change["coverage"] > 0.95)
+
+
+@pytest.mark.parametrize("coverage", [0.8, 0.95])
+def test_a_simultaneous_band_holds_its_share_of_whole_performances(coverage):
+    held, points = [], []
+    for seed in range(25):
+        X, groups = people(8, 3, seed)
+        model = ActionModel(coverage=coverage).fit(X, groups=groups)
+        new, _ = people(60, 1, 1000 + seed)
+        lower, upper = model.envelope(simultaneous=True)
+        held.append(((new >= lower) & (new <= upper)).all(axis=(1, 2)).mean())
+        lower, upper = model.envelope()
+        points.append(((new >= lower) & (new <= upper)).mean())
+    assert abs(np.mean(held) - coverage) < 0.05
+    # Three standard deviations hold postures.
+    assert np.mean(points) > 0.95
+
+
+def test_standard_scores():
+    expected = (X - MODEL.mean_) / np.sqrt(MODEL.predictive_variance_)
+    np.testing.assert_allclose(MODEL.standard_scores(X), expected)
+    assert MODEL.standard_scores([np.full((30, 2), 1e308)]).max() > 1e300
+    with pytest.raises(ValueError, match="have 20 frames, the model 30"):
+        MODEL.standard_scores([np.zeros((20, 2))])
+
+
+# -- departures -------------------------------------------------------------------------
+
+
+def spoilt():
+    """The mean, and two that leave it: one at two places, one in both features."""
+    std = np.sqrt(MODEL.predictive_variance_)
+    two, both = MODEL.mean_.copy(), MODEL.mean_.copy()
+    two[3:6, 0] += 30 * std[3:6, 0]
+    two[4, 0] += std[4, 0]
+    two[20:30, 0] -= 50 * std[20:30, 0]
+    two[25, 0] -= std[25, 0]
+    both[7] += [20, -40] * std[7]
+    return [MODEL.mean_, two, both]
+
+
+def test_departures_are_runs_of_frames_the_worst_first():
+    table = find_departures(MODEL, spoilt())
+    rows = [
+        (1, "x0", 20, 29, 25, -51),
+        (1, "x0", 3, 5, 4, 31),
+        (2, "x1", 7, 7, 7, -40),
+        (2, "x0", 7, 7, 7, 20),
+    ]
+    names = ["performance", "feature", "first", "last", "peak", "deviation"]
+    expected = pd.DataFrame(rows, columns=names)
+    pd.testing.assert_frame_equal(table, expected, check_dtype=False, rtol=1e-9)
+    assert table.dtypes[["performance", "first", "last", "peak"]].eq(np.int64).all()
+
+
+def test_departures_within_a_limit_are_none():
+    for features, expected in ((0, ["x0", "x0", "x0"]), ("x1", ["x1"]), ([1, 0], ["x1", "x0"])):
+        table = find_departures(MODEL, spoilt(), features=features)
+        assert sorted(table["feature"]) == sorted(expected) or len(expected) == 2
+        assert set(table["feature"]) == set(expected)
+    assert len(find_departures(MODEL, spoilt(), limit=35)) == 2
+    none = find_departures(MODEL, spoilt(), limit=1e6)
+    assert len(none) == 0
+    assert list(none.columns) == list(find_departures(MODEL, spoilt()).columns)
+
+
+def test_few_people_depart_anywhere_and_many_beyond_three():
+    new, _ = people(200, 1, 77)
+    table = find_departures(MODEL, new)
+    assert table["performance"].nunique() < 0.12 * 200
+    lower, upper = MODEL.envelope(simultaneous=True)
+    outside = ((new < lower) | (new > upper)).any(axis=(1, 2))
+    np.testing.assert_array_equal(table["performance"].unique(), np.flatnonzero(outside))
+    assert find_departures(MODEL, new, limit=3)["performance"].nunique() > outside.sum()
+
+
+@pytest.fixture(scope="module")
+def pipe():
+    bunch = make_bending(12, n_frames=40, random_state=0)
+    steps = DirectionCosines(bunch.skeleton), ASpace(0.95), DenseSynchronizer(30), ActionModel()
+    return bunch, make_pipeline(*steps).fit(bunch.data, actionmodel__groups=bunch.actor)
+
+
+def test_departures_of_a_pipeline_are_those_of_limbs(pipe):
+    """A bend in which the left arm is lifted for a while."""
+    bunch, pipe = pipe
+    x = bunch.data[0].reshape(len(bunch.data[0]), -1, 3).copy()
+    joint = {name: i for i, name in enumerate(bunch.skeleton.joints)}
+    middle = slice(int(0.4 * len(x)), int(0.6 * len(x)))
+    arm = x[middle, joint["left_elbow"]] - x[middle, joint["left_shoulder"]]
+    lifted = np.linalg.norm(arm, axis=1)[:, np.newaxis] * [0, 1, 0]
+    for name in ("left_elbow", "left_wrist"):
+        x[middle, joint[name]] += lifted - arm
+    table = find_departures(pipe, [bunch.data[0], x.reshape(len(x), -1)])
+    assert set(table["performance"]) == {1}
+    worst = table.iloc[0]
+    assert worst["feature"].startswith("left_arm")
+    assert 8 < worst["peak"] < 22
+    own = find_departures(pipe, [x.reshape(len(x), -1)], features=["aspace0", "aspace1"], limit=1)
+    assert set(own["feature"]) <= {"aspace0", "aspace1"}
+
+
+def test_departures_keep_the_labels_of_performances(pipe):
+    frames = {"walk": 0, "run": 1}
+    table = pd.concat(
+        {name: pd.DataFrame(spoilt()[i], columns=["hip", "knee"]) for name, i in frames.items()},
+        names=["trial", "frame"],
+    )
+    known = pd.concat({i: pd.DataFrame(x, columns=["hip", "knee"]) for i, x in enumerate(X)})
+    model = ActionModel().fit(known, groups=GROUPS)
+    found = find_departures(model, table)
+    assert set(found["performance"]) == {"run"}
+    assert set(found["feature"]) == {"hip"}
+
+
+@pytest.mark.parametrize("limit", [0, -1, np.inf, np.nan, "3", True])
+def test_limits_that_are_none(limit):
+    with pytest.raises(ValueError, match="limit must be a number above 0, or None"):
+        find_departures(MODEL, X, limit=limit)
+
+
+def test_what_cannot_be_taken_back_is_told_in_features_of_the_model(pipe):
+    bunch, _ = pipe
+    steps = (
+        DirectionCosines(bunch.skeleton),
+        ASpace(3),
+        FunctionTransformer(),
+        DenseSynchronizer(30),
+    )
+    other = make_pipeline(*steps, ActionModel()).fit(bunch.data)
+    found = find_departures(other, bunch.data[:2], limit=1e-3)
+    assert found["feature"].nunique() == 3
+    with pytest.raises(ValueError, match="cannot be taken back"):
+        find_departures(other, bunch.data[:2], features="left_leg_y")
+    with pytest.raises(ValueError, match="There is no feature 'elbow'"):
+        find_departures(MODEL, X, features="elbow")
+    with pytest.raises(ValueError, match="no ActionModel in ASpace"):
+        find_departures(ASpace(2).fit(X), X)
