@@ -103,6 +103,9 @@ def mean_band(performances, groups, coverage, random_state=None):
     drawn anew from the normal distribution with the covariance of the group means, mean and
     variance being estimated anew (a studentised bootstrap over groups).
 
+    In simulations with 4 to 20 people who come 1 to 5 times a band of nominal 95 % holds the mean
+    in 92 to 99 % of the cases; one of nominal 80 % in 67 to 78 %.
+
     Parameters
     ----------
     performances : ndarray, shape (n, P, n_features)
