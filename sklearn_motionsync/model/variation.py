@@ -60,6 +60,10 @@ def simultaneous_factor(performances, groups, coverage):
     and features, say where that of a new person's lies, by a Student t distribution. Their
     variance is 3 performances' worth 0.1 from the start.
 
+    Of unseen people of HDM05 and UTKinect a band of nominal 95 % holds 94 to 97 % of the
+    performances in action space and 97 to 100 % in postures, of 5 to 20 training ones; without
+    groups, of 10 or more, 76 to 85 % of those of HDM05, where people came about six times.
+
     Parameters
     ----------
     performances : ndarray, shape (n, P, n_features)
