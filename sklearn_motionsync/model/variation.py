@@ -60,6 +60,10 @@ def simultaneous_factor(performances, groups, coverage):
     and features, say where that of a new person's lies, by a Student t distribution. Their
     variance is 3 performances' worth 0.1 from the start.
 
+    Of unseen people of HDM05 and UTKinect a band of nominal 95 % holds 94 to 97 % of the
+    performances in action space and 97 to 100 % in postures, of 5 to 20 training ones; without
+    groups, of 10 or more, 76 to 85 % of those of HDM05, where people came about six times.
+
     Parameters
     ----------
     performances : ndarray, shape (n, P, n_features)
@@ -102,6 +106,9 @@ def mean_band(performances, groups, coverage, random_state=None):
     largest ``|t|`` over all frames and features when as many people with as many performances are
     drawn anew from the normal distribution with the covariance of the group means, mean and
     variance being estimated anew (a studentised bootstrap over groups).
+
+    In simulations with 4 to 20 people who come 1 to 5 times a band of nominal 95 % holds the mean
+    in 92 to 99 % of the cases; one of nominal 80 % in 67 to 78 %.
 
     Parameters
     ----------
