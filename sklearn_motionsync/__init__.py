@@ -12,7 +12,6 @@
 """
 
 from . import datasets, display, metrics
-from .action_model import ActionModel
 from .aspace import ASpace
 from .body.direction_cosines import DirectionCosines
 from .body.skeleton import Skeleton
@@ -23,6 +22,7 @@ from .display import (
     SynchronizationDisplay,
     TrellisDisplay,
 )
+from .model.action_model import ActionModel
 from .sequences import to_frame, to_sequences
 from .synchronizers.base import Synchronizer
 from .synchronizers.dense import DenseSynchronizer

@@ -43,7 +43,7 @@ LIMIT_SECONDS = 400
 
 # What is broken, and the tests that concern it, the fastest and most telling first; the doctests
 # of a module come before them. Modules that are not named have the tests of their folder.
-BROKEN = ["action_model", "gate", "sequences", "matching/*", "metrics/*"]
+BROKEN = ["model/*", "gate", "sequences", "matching/*", "metrics/*"]
 DENSE = ["synchronizers/test_dense.py", "synchronizers/test_accuracy.py"]
 METRIC = ["synchronizers/test_metric.py"]
 ALONE = ["synchronizers/test_alone_or_together.py"]
@@ -56,7 +56,11 @@ INPUT += ["synchronizers/test_match.py"]
 ANY = ["test_properties.py"]
 TRELLIS = ["matching/test_trellis.py", *DENSE, *ALONE]
 TESTS = {
-    "action_model": ["test_action_model.py", "test_contract.py"],
+    "model/action_model": [
+        "model/test_action_model.py",
+        "model/test_likeness.py",
+        "test_contract.py",
+    ],
     "gate": INPUT,
     "sequences": INPUT,
     "matching/consensus": ["matching/test_warps.py", *DENSE, "matching/test_median.py"],

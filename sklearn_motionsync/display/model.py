@@ -3,8 +3,8 @@
 import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
-from ..action_model import ActionModel
 from ..aspace import ASpace
+from ..model.action_model import ActionModel
 from ..pipelines import find_step, flat_steps, transform_through
 from .drawing import COLORS, as_features, choose_features, curves, names_of, panels
 from .given import as_drawn, as_names, is_number

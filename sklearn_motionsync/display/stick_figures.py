@@ -3,9 +3,9 @@
 import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
-from ..action_model import ActionModel
 from ..body.direction_cosines import DirectionCosines
 from ..body.skeleton import Skeleton
+from ..model.action_model import ActionModel
 from ..pipelines import find_step, find_synchronizer, index_of_pattern, reach_synchronizer
 from ..sequences import as_collection
 from ..synchronizers.match import as_match

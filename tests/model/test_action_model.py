@@ -35,18 +35,6 @@ def test_density_is_that_of_normal_distributions(model, performances):
     np.testing.assert_allclose(model.score(performances), expected.sum(axis=(1, 2)).mean())
 
 
-@pytest.mark.parametrize("n_std", [0.5, 1.0, 3.0])
-def test_predict_cuts_at_the_density_of_the_envelope(performances, n_std):
-    model = ActionModel(n_std).fit(performances)
-    z = (performances - model.mean_) / np.sqrt(model.variance_)
-    inside = np.sqrt(np.square(z).mean(axis=(1, 2))) <= n_std
-    np.testing.assert_array_equal(model.predict(performances), np.where(inside, 1, -1))
-    reach = n_std * np.sqrt(model.variance_)
-    borders = [model.mean_ + f * reach for f in (0.999, -0.999, 1.001, -1.001)]
-    assert model.predict(borders).tolist() == [1, 1, -1, -1]
-    np.testing.assert_allclose(model.score_samples([model.mean_ + reach])[0], model.offset_)
-
-
 def test_accepts_what_is_inside_in_every_feature(model):
     mean, std = model.mean_[4], np.sqrt(model.variance_[4])
     postures = [mean, mean + 2.99 * std, mean - 2.99 * std, mean + [0, 0, 3.01] * std]
@@ -55,6 +43,14 @@ def test_accepts_what_is_inside_in_every_feature(model):
 
 
 # -- sampling ---------------------------------------------------------------------------
+
+
+def test_a_score_counts_performances_by_their_weight(model, performances):
+    weights = np.arange(5.0)
+    expected = (weights * model.score_samples(performances[:5])).sum() / weights.sum()
+    np.testing.assert_allclose(model.score(performances[:5], sample_weight=weights), expected)
+    with pytest.raises(ValueError, match="inconsistent numbers of samples"):
+        model.score(performances[:5], sample_weight=[1, 2])
 
 
 @pytest.mark.parametrize("n_std", [0.3, 1.5, 3.0])
@@ -73,7 +69,15 @@ def test_sampled_performances_vary_like_the_training_ones(model, performances):
     drawn = model.sample(5000, random_state=0)
     assert drawn.shape == (5000, 15, 3)
     assert (model.predict(drawn) == 1).all()
-    np.testing.assert_allclose(drawn.var(axis=0), model.variance_, rtol=0.1)
+    # Of normal mixtures, those that are the action.
+    weights = np.random.default_rng(1).standard_normal((9000, len(model.deviations_)))
+    mixed = (
+        model.mean_ + np.tensordot(weights, model.deviations_, 1) / len(model.deviations_) ** 0.5
+    )
+    inside = mixed[model.predict(mixed) == 1]
+    assert 0.85 < len(inside) / len(mixed) < 1
+    np.testing.assert_allclose(drawn.var(axis=0), inside.var(axis=0), rtol=0.1)
+    np.testing.assert_allclose(drawn.mean(axis=0), inside.mean(axis=0), atol=0.1)
     # As smooth as people are: frame to frame changes as large as in the training set.
     steps = [np.diff(x, axis=1).std() for x in (drawn - model.mean_, performances - model.mean_)]
     np.testing.assert_allclose(*steps, rtol=0.1)
@@ -119,7 +123,11 @@ def test_a_feature_in_which_nobody_differs(performances):
     expected = norm(X.mean(axis=0), std).logpdf(X).sum(axis=(1, 2))
     np.testing.assert_allclose(model.score_samples(X), expected)
     other = X[:1] + [0, 0.5, 0]
-    assert model.predict(other).tolist() == [-1]
+    assert model.score_samples(other)[0] < model.score_samples(X).min() - 1e6
+    assert not model.accepts(other[0], 0).any()
+    # It takes no part in what is alike.
+    alike = ActionModel().fit(X[:, :, [0, 2]]).dissimilarity(X[:, :, [0, 2]])
+    np.testing.assert_allclose(model.dissimilarity(X), alike, atol=1e-12)
     assert model.accepts(model.sample(5, frame=2, random_state=0), 2).all()
 
 

@@ -1,0 +1,209 @@
+"""How unlike a performance is to those that were learnt, and how unlike people may be."""
+
+import numpy as np
+from scipy.stats import t as student
+
+from ..matching.filters import smooth
+
+__all__ = ["Neighbours", "as_codes", "learn_border", "spread_out"]
+
+# Most performances that others are compared with: predicting takes time and memory in proportion.
+_MOST_KEPT = 64
+# Of the nearest ones, so many count: one alone may be a stray.
+_NEAREST = 2
+# Say of the mean posture: people stand differently, but a movement elsewhere is another one.
+_SAY_OF_MEAN = 0.1
+# Under which Gaussian velocities are taken, as a share of the clock.
+_SMOOTHING = 0.01
+# The variance of the logarithm over performances of one action, as found over 16 actions of
+# people; it counts like that of so many performances.
+_PRIOR_VARIANCE, _PRIOR_COUNT = 0.07, 3
+# What is less is rounding, or nobody differs.
+_LEAST = 1e-9
+# Performances that are multiplied at a time, always so many, so that no result depends on the
+# others; and those that are in memory at a time.
+_TILE, _PORTION = 8, 64
+
+
+class Neighbours:
+    """Performances that others are compared with.
+
+    Parameters
+    ----------
+    performances : ndarray (n_kept, P, n_features), float64
+    groups : ndarray of int (n_kept,)
+
+    Attributes
+    ----------
+    stand_still : bool
+        Whether nobody moves, so that only postures can be compared.
+    """
+
+    def __init__(self, performances, groups):
+        self._groups = groups
+        self._center = performances.mean(axis=(0, 1))
+        self._postures, self._energy = self._move(performances)
+        self._velocities = self._velocity(performances)
+        self._speed = np.square(self._velocities).sum(axis=1)
+        about = np.square(performances - self._center).sum(axis=(1, 2)).mean()
+        largest = np.abs(performances).max()
+        rounding = np.square(64 * np.finfo(float).eps * largest) * performances[0].size
+        self._scale = max(about, rounding, np.finfo(float).tiny)
+        self.stand_still = bool(self._energy.max() <= _LEAST * self._scale)
+
+    def dissimilarity(self, performances, groups=None):
+        """How unlike performances are to the most similar neighbours: the mean over these.
+
+        Parameters
+        ----------
+        performances : sequence of ndarray (P, n_features)
+        groups : ndarray of int (n,), default=None
+            Their groups; then only neighbours of other groups are asked.
+
+        Returns
+        -------
+        ndarray (n,)
+            Infinite if no neighbour is a number away.
+        """
+        found = np.empty(len(performances))
+        for start in range(0, len(found), _PORTION):
+            rows = slice(start, start + _PORTION)
+            ratios = self._ratios(np.asarray(performances[rows], dtype=np.float64))
+            if groups is not None:
+                ratios[groups[rows, np.newaxis] == self._groups] = np.inf
+            found[rows] = _mean_of_smallest(ratios)
+        return found
+
+    def _ratios(self, performances):
+        """How unlike performances (n, P, n_features) are to each of the neighbours (n, n_kept).
+
+        The mean of ``|y - y_i|^2 / (|y|^2 + |y_i|^2)`` of postures less their own mean over time,
+        and the same of velocities: 0 equal, 1 one of them stands still, 2 opposite. The distance
+        of the mean postures adds to the first, with a tenth of its weight.
+        """
+        # What is too far away for any number is nobody's neighbour.
+        with np.errstate(over="ignore", invalid="ignore"):
+            postures, energy = self._move(performances)
+            apart = _squared_distances(postures, self._postures)
+            if self.stand_still:
+                return np.nan_to_num(apart / self._scale, nan=np.inf, posinf=np.inf)
+            velocities = self._velocity(performances)
+            hurried = _squared_distances(velocities, self._velocities)
+            speed = np.square(velocities).sum(axis=1)
+            ratio = apart / _sums(energy, self._energy) + hurried / _sums(speed, self._speed)
+        return np.nan_to_num(ratio / 2, nan=np.inf, posinf=np.inf)
+
+    def _move(self, performances):
+        """Postures less their mean over time, beside that mean; squares of the first alone."""
+        n, n_frames, _ = performances.shape
+        mean = performances.mean(axis=1)
+        moved = (performances - mean[:, np.newaxis]).reshape(n, -1)
+        stood = np.sqrt(_SAY_OF_MEAN * n_frames) * (mean - self._center)
+        return np.hstack([moved, stood]), np.square(moved).sum(axis=1)
+
+    def _velocity(self, performances):
+        n, n_frames, _ = performances.shape
+        if n_frames == 1:
+            return np.zeros((n, performances[0].size))
+        return smooth(performances, _SMOOTHING * (n_frames - 1), order=1).reshape(n, -1)
+
+
+def learn_border(values, coverage):
+    """Up to where values like these are to be expected of somebody new.
+
+    The logarithms are taken for normal, and their variance for known as well as if a few more
+    performances had shown the usual one: the bound of a new value is Student's.
+
+    Parameters
+    ----------
+    values : ndarray (n,)
+        Not negative.
+    coverage : float
+        Share of new values below the border.
+
+    Returns
+    -------
+    float
+    """
+    logs, n = np.log(np.maximum(values, _LEAST)), len(values)
+    freedom = n - 1 + _PRIOR_COUNT
+    squares = np.square(logs - logs.mean()).sum() + _PRIOR_COUNT * _PRIOR_VARIANCE
+    spread = np.sqrt(squares / freedom * (1 + 1 / n))
+    with np.errstate(over="ignore"):
+        return float(np.exp(logs.mean() + student.ppf(coverage, freedom) * spread))
+
+
+def as_codes(groups, n_performances):
+    """Groups as whole numbers from 0; without any every performance is its own.
+
+    Raises
+    ------
+    ValueError
+        If there is not one for each performance, or only one in all.
+    """
+    if groups is None:
+        return np.arange(n_performances)
+    if isinstance(groups, (str, bytes, dict)) or np.ndim(groups) != 1:
+        raise ValueError(
+            "groups must be a list with one label for each performance, such as who performed "
+            f"it; got {groups!r}."
+        )
+    if len(groups) != n_performances:
+        raise ValueError(
+            f"groups has {len(groups)} labels, and there are {n_performances} performances: give "
+            "one for each."
+        )
+    labels = list(dict.fromkeys(groups))
+    if len(labels) < 2:
+        raise ValueError(
+            f"All performances are of the group {labels[0]!r}: how groups differ cannot be learnt "
+            "of one. Give no groups, and every performance counts for itself."
+        )
+    code = {label: i for i, label in enumerate(labels)}
+    return np.array([code[label] for label in groups])
+
+
+def spread_out(groups, most=_MOST_KEPT):
+    """Which performances are kept: one of every group, then evenly spaced, in order.
+
+    Parameters
+    ----------
+    groups : ndarray of int (n,)
+    most : int, default=64
+
+    Returns
+    -------
+    ndarray of int
+    """
+    n = len(groups)
+    if n <= most:
+        return np.arange(n)
+    first = _evenly(np.sort(np.unique(groups, return_index=True)[1]), most)
+    rest = np.setdiff1d(np.arange(n), first)
+    return np.sort(np.concatenate([first, _evenly(rest, most - len(first))]))
+
+
+def _evenly(indices, most):
+    if len(indices) <= most:
+        return indices
+    return indices[np.linspace(0, len(indices) - 1, most).round().astype(int)]
+
+
+def _mean_of_smallest(ratios):
+    nearest = np.sort(ratios, axis=1)[:, :_NEAREST]
+    counts = np.isfinite(nearest)
+    total = np.where(counts, nearest, 0).sum(axis=1)
+    return np.where(counts.any(axis=1), total / np.maximum(counts.sum(axis=1), 1), np.inf)
+
+
+def _squared_distances(a, b):
+    squares = np.square(a).sum(axis=1)[:, np.newaxis] + np.square(b).sum(axis=1)
+    tiles = np.zeros((-(-len(a) // _TILE), _TILE, a.shape[1]))
+    tiles.reshape(-1, a.shape[1])[: len(a)] = a
+    products = np.matmul(tiles, b.T).reshape(-1, len(b))[: len(a)]
+    return np.maximum(squares - 2 * products, 0)
+
+
+def _sums(a, b):
+    """Sums of all pairs, none 0: where neither moves both are 0 apart."""
+    return np.maximum(a[:, np.newaxis] + b, np.finfo(float).tiny)

@@ -1,0 +1,59 @@
+"""Who performed reaches the model: through pipelines, cross-validation and searches."""
+
+import numpy as np
+import pytest
+from sklearn import config_context
+from sklearn.model_selection import GridSearchCV, GroupKFold, cross_validate
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
+from sklearn_motionsync.datasets import make_bending
+
+BUNCH = make_bending(12, n_frames=30, style=1, random_state=0)
+GROUPS = np.array([3, 1, 2, 1, 3, 2, 3, 1, 2, 1, 3, 2])
+CV = GroupKFold(3)
+
+
+def make(model=None):
+    steps = DirectionCosines(BUNCH.skeleton), ASpace(3), DenseSynchronizer(20)
+    return make_pipeline(*steps, ActionModel() if model is None else model)
+
+
+@pytest.fixture(scope="module")
+def expected():
+    """The borders of the folds, and of all: fitted by hand."""
+    folds = [train for train, _ in CV.split(BUNCH.data, groups=GROUPS)]
+    found = []
+    for train in [*folds, range(12)]:
+        some = [BUNCH.data[i] for i in train]
+        found.append(make().fit(some, actionmodel__groups=GROUPS[train])[-1].threshold_)
+    return found
+
+
+def test_groups_change_the_border(expected):
+    assert make().fit(BUNCH.data)[-1].threshold_ != expected[-1]
+
+
+def test_without_routing_groups_are_fit_parameters(expected):
+    given = {"actionmodel__groups": GROUPS}
+    found = cross_validate(
+        make(), BUNCH.data, groups=GROUPS, cv=CV, params=given, return_estimator=True
+    )
+    assert [pipe[-1].threshold_ for pipe in found["estimator"]] == expected[:3]
+    search = GridSearchCV(make(), {"actionmodel__coverage": [0.9, 0.95]}, cv=CV)
+    search.fit(BUNCH.data, groups=GROUPS, **given)
+    best = search.best_params_["actionmodel__coverage"]
+    assert (search.best_estimator_[-1].threshold_ == expected[-1]) is (best == 0.95)
+
+
+def test_groups_are_routed(expected):
+    with config_context(enable_metadata_routing=True):
+        pipe = make(ActionModel().set_fit_request(groups=True))
+        assert pipe.fit(BUNCH.data, groups=GROUPS)[-1].threshold_ == expected[-1]
+        found = cross_validate(
+            pipe, BUNCH.data, cv=CV, params={"groups": GROUPS}, return_estimator=True
+        )
+        assert [p[-1].threshold_ for p in found["estimator"]] == expected[:3]
+        assert np.isfinite(found["test_score"]).all()
+        search = GridSearchCV(pipe, {"actionmodel__coverage": [0.95]}, cv=CV)
+        search.fit(BUNCH.data, groups=GROUPS)
+        assert search.best_estimator_[-1].threshold_ == expected[-1]
