@@ -71,7 +71,7 @@ def one_class_svm(n_performances, nu, gamma):
 
 
 def isolation_forest(n_performances, max_features):
-    return IsolationForest(n_estimators=50, max_features=max_features, random_state=0)
+    return IsolationForest(n_estimators=30, max_features=max_features, random_state=0)
 
 
 def flat_judge(make, settings, fold: Fold):

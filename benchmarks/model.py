@@ -38,7 +38,10 @@ from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, Direction
 from sklearn_motionsync.datasets import load_performances
 
 NOMINAL = (0.80, 0.90, 0.95, 0.99)
-FEW, DRAWS = (5, 10, 20), 3
+# The last is that of three standard deviations.
+HELD = (*NOMINAL, 0.9973)
+FEW, DRAWS = (5, 10, 20), 2
+REACHED = [(n, given) for n in ("all", *FEW) for given in (True, False)]
 
 
 # -- what is found on a fold ------------------------------------------------------------
@@ -49,7 +52,7 @@ class Found(NamedTuple):
 
     verdicts : {judge: {setting: {kind: decisions}}}
     reached : {(training performances, groups given): accepted (n, nominal)}
-    held : {band: (shares of points, whole performances held) (nominal, 2)}
+    held : {band: shares of points held, and whether all (n, nominal, 2)}
     border : float
     reversal : dissimilarities of the right performances to themselves backwards
     """
@@ -90,20 +93,22 @@ def accepted_at(on_clock, groups, own, label):
 
 
 def held_by(fold):
-    """What bands of every nominal share hold of right performances."""
-    makers = {"points": lambda c: ActionModel(n_std=ndtri((1 + c) / 2))}
+    """Shares of points, and whether the whole, of right performances that bands hold."""
+    bands = {"points": (lambda c: ActionModel(n_std=ndtri((1 + c) / 2)), {})}
     if has_simultaneous_band():
-        makers["performances"] = lambda c: ActionModel(coverage=c)
+        bands["performances"] = (lambda c: ActionModel(coverage=c), {"simultaneous": True})
     found = {}
-    for which, make in makers.items():
-        options = {"simultaneous": True} if which == "performances" else {}
-        found[which] = []
-        for nominal in NOMINAL:
-            model = make(nominal).fit(fold.on_clock, groups=fold.groups)
-            lower, upper = model.envelope(**options)
-            inside = (fold.synchronised[OWN] >= lower) & (fold.synchronised[OWN] <= upper)
-            found[which].append((inside.mean(), inside.all(axis=(1, 2)).mean()))
+    for band, (make, options) in bands.items():
+        models = [make(c).fit(fold.on_clock, groups=fold.groups) for c in HELD]
+        found[band] = np.stack([held(model.envelope(**options), fold) for model in models], axis=1)
     return found
+
+
+def held(bounds, fold):
+    """(n, 2) shares of points, and whether all, of right performances within bounds."""
+    own = fold.synchronised[OWN]
+    inside = (own >= bounds[0]) & (own <= bounds[1])
+    return np.column_stack([inside.mean(axis=(1, 2)), inside.all(axis=(1, 2))])
 
 
 def has_simultaneous_band():
@@ -156,7 +161,7 @@ def area(right, wrong):
 
 def mean(values):
     values = list(values)
-    return np.mean(values) if values else np.nan
+    return np.mean(values, axis=0) if values else np.nan
 
 
 def mean_areas(actions):
@@ -202,24 +207,22 @@ def verdict_tables(name, found):
         cells += [refused(actions, BACKWARDS, apart) for apart in (BENDS, THERE_AND_BACK)]
         print_row(label, map(percent, cells))
     print_head(f"{name}: area under the curve", [*KINDS, "mean"])
-    for label, actions in decided.items():
-        of_kinds = mean_areas(actions)
-        print_row(label, map(two_digits, [*of_kinds, np.nanmean(of_kinds)]))
+    areas_of = {label: mean_areas(actions) for label, actions in decided.items()}
     every = [
         mean_areas(pooled(found, judge, setting))
-        for judge, settings in found[0].verdicts.items()
-        for setting in settings
-        if judge in PEERS
+        for judge in PEERS.keys() & best.keys()
+        for setting in found[0].verdicts[judge]
     ]
-    cells = [*np.max(every, axis=0), np.nanmean(np.max(every, axis=0))]
-    print_row("*the best of others' settings, every number by itself*", map(two_digits, cells))
+    areas_of["*the best of others' settings, every number by itself*"] = np.max(every, axis=0)
+    for label, of_kinds in areas_of.items():
+        print_row(label, map(two_digits, [*of_kinds, np.nanmean(of_kinds)]))
 
 
 def action_table(found_by_set, judge):
     """What a judge of ours accepts and refuses, action by action."""
     header = ["performances", "own", *KINDS, "border", "unlike itself backwards"]
     print_head(f"{judge}: accepted / refused", header)
-    for found in found_by_set.values():
+    for name, found in found_by_set.items():
         for action, by in pooled(found, judge, "").items():
             folds = [one for one in found if one.action == action]
             shares = [np.mean(by[OWN] >= 0), *(refused({action: by}, kind) for kind in KINDS)]
@@ -227,41 +230,40 @@ def action_table(found_by_set, judge):
             cells = [str(len(by[OWN])), *map(percent, shares)]
             cells += [f"{min(borders):.2f} to {max(borders):.2f}"]
             cells += [two_digits(np.median(np.concatenate([one.reversal for one in folds])))]
-            print_row(f"`{action}`", cells)
+            print_row(f"{name}, `{action}`", cells)
 
 
 def border_table(found_by_set):
     """The share of right performances that is accepted, beside what was asked for."""
-    print_head("accepted, nominal share", [f"{c:.0%}" for c in NOMINAL])
+    print_head("accepted, nominal share", ["actions", *(f"{c:.0%}" for c in NOMINAL)])
     for name, found in found_by_set.items():
-        for n in ("all", *reversed(FEW)):
-            for given in (True, False):
-                shares = by_action(found, lambda one, key=(n, given): one.reached.get(key))
-                if shares is not None:
-                    which = "groups given" if given else "no groups"
-                    print_row(f"{name}, {n} performances, {which}", map(one_digit, shares))
+        for key in REACHED:
+            shares, n_actions = by_action(found, lambda one, key=key: one.reached.get(key))
+            if n_actions:
+                label = (
+                    f"{name}, {key[0]} performances, {'groups given' if key[1] else 'no groups'}"
+                )
+                print_row(label, [str(n_actions), *map(one_digit, shares)])
 
 
 def band_table(found_by_set):
     """The share of right points and whole performances that bands hold."""
-    header = [f"{c:.0%} of {what}" for what in ("points", "performances") for c in NOMINAL]
-    print_head("held, nominal share", header)
+    header = [f"{what}, {c:.4g}" for what in ("points", "performances") for c in HELD]
+    print_head("held", header)
     for name, found in found_by_set.items():
         for band in found[0].held:
-            shares = by_action(found, lambda one, band=band: np.array(one.held[band])[np.newaxis])
+            shares, _ = by_action(found, lambda one, band=band: one.held[band])
             print_row(f"{name}, band of {band}", map(one_digit, shares.T.ravel()))
 
 
 def by_action(found, rows_of):
-    """Mean over actions of the means of rows; None if nobody has any."""
+    """Mean over actions of the means of rows, and how many actions have any."""
     actions: dict = {}
     for one in found:
         rows = rows_of(one)
         if rows is not None:
             actions.setdefault(one.action, []).extend(rows)
-    return (
-        np.mean([np.mean(rows, axis=0) for rows in actions.values()], axis=0) if actions else None
-    )
+    return mean(np.mean(rows, axis=0) for rows in actions.values()), len(actions)
 
 
 def one_digit(share):
@@ -282,6 +284,7 @@ def feet_table(folder):
     data, actors = [bunch.data[i] for i in chosen], bunch.actor[chosen]
     model = pipe.fit(data, actionmodel__groups=actors)[-1]
     on_clock = np.asarray(pipe[:-1].transform(data))
+    ankles = [Skeleton.paper().index_of(side + "_ankle") for side in ("left", "right")]
     rng = np.random.RandomState(0)
     drawn = {
         "training performances": lambda frame: on_clock[:, frame],
@@ -295,9 +298,7 @@ def feet_table(folder):
         heights = np.concatenate(
             [above_floor(pipe[:2], model.mean_, postures(t)) for t in range(len(model.mean_))]
         )
-        of_feet = heights[
-            :, [Skeleton.paper().index_of(side + "_ankle") for side in ("left", "right")]
-        ]
+        of_feet = heights[:, ankles]
         cells = [f"{100 * some.min():.0f}" for some in (of_feet, heights)]
         cells += [f"{np.mean(some.min(axis=1) < -0.1):.1%}" for some in (of_feet, heights)]
         print_row(label, cells)
