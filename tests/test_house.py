@@ -24,6 +24,7 @@ FLOORS = [
     "sequences",
     "performances",
     "pipelines",
+    "features",
     "aspace",
     "body",
     "matching",

@@ -1,18 +1,13 @@
 """One way to draw: the panels, colours and curves that all displays share."""
 
-from numbers import Integral
-
 import numpy as np
 
 from .given import as_names
 
 __all__ = [
     "COLORS",
-    "as_features",
-    "choose_features",
     "curves",
     "group_colors",
-    "names_of",
     "panels",
     "pyplot",
     "stage",
@@ -29,8 +24,6 @@ COLORS = {
     "right": "#D55E00",
 }
 _GROUPS = ["#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9", "#000000"]
-# Features drawn when none are named.
-_FEW_FEATURES = 4
 
 
 def pyplot():
@@ -120,48 +113,3 @@ def group_colors(groups, n_sequences):
         palette = pyplot().colormaps["viridis"](np.linspace(0, 0.95, len(names)))
     color_of = dict(zip(names, palette, strict=False))
     return [color_of[group] for group in groups], color_of
-
-
-def choose_features(features, names):
-    """Indices of features given by index or name; by default the first few."""
-    names = list(names)
-    if features is None:
-        return list(range(min(_FEW_FEATURES, len(names))))
-    chosen = [_index_of(feature, names) for feature in as_features(features)]
-    if not chosen:
-        raise ValueError("features must name at least one feature to draw.")
-    return chosen
-
-
-def _index_of(feature, names):
-    if isinstance(feature, str) and names.count(feature) > 1:
-        raise ValueError(f"The feature {feature!r} comes {names.count(feature)} times; say which.")
-    if isinstance(feature, str) and feature in names:
-        return names.index(feature)
-    is_index = isinstance(feature, Integral) and not isinstance(feature, bool)
-    if not (is_index and 0 <= feature < len(names)):
-        raise ValueError(
-            f"There is no feature {feature!r}; there are {len(names)}: {', '.join(names)}."
-        )
-    return int(feature)
-
-
-def as_features(features):
-    """Features by index or name as a list, of one or several; empty for None."""
-    if features is None:
-        return []
-    single = isinstance(features, str) or not hasattr(features, "__iter__")
-    return [features] if single or getattr(features, "ndim", 1) == 0 else list(features)
-
-
-def names_of(before, step, width):
-    """Names of the ``width`` features that reach a step of a pipeline, after those before it."""
-    names = getattr(step, "feature_names_in_", None)
-    if names is None and before is not None:
-        try:
-            names = before.get_feature_names_out()
-        except AttributeError:  # of a pipeline in which some step does not name its features
-            names = None
-    if names is None or len(names) != width:
-        names = [f"x{i}" for i in range(width)]
-    return [str(name) for name in names]

@@ -4,9 +4,10 @@ import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
 from ..body.checks import is_whole
+from ..features import choose_features, names_of
 from ..pipelines import find_step
 from ..synchronizers.dense import DenseSynchronizer
-from .drawing import COLORS, choose_features, names_of, panels
+from .drawing import COLORS, panels
 from .given import as_drawn, as_names
 
 __all__ = ["MetricDisplay"]

@@ -4,9 +4,10 @@ import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
 from ..aspace import ASpace
+from ..features import as_features, choose_features, names_of
 from ..model.action_model import ActionModel
 from ..pipelines import find_step, flat_steps, transform_through
-from .drawing import COLORS, as_features, choose_features, curves, names_of, panels
+from .drawing import COLORS, curves, panels
 from .given import as_drawn, as_names, is_number
 
 __all__ = ["ActionModelDisplay"]

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from ..features import choose_features, names_of
 from ..gate import check_names
 from ..performances import read_collection
 from ..pipelines import index_of_pattern, reach_synchronizer
 from ..synchronizers.match import as_match
-from .drawing import COLORS, choose_features, curves, group_colors, names_of, panels
+from .drawing import COLORS, curves, group_colors, panels
 from .given import as_drawn, as_names, mean_of_seen
 
 __all__ = ["SynchronizationDisplay"]
