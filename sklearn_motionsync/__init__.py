@@ -6,9 +6,10 @@
 >>> bending = make_bending(random_state=0)
 >>> pipe = make_pipeline(
 ...     DirectionCosines(bending.skeleton), ASpace(0.95), DenseSynchronizer(), ActionModel()
-... ).fit(bending.data)
->>> pipe.predict(bending.data[:3]).tolist()
-[1, 1, 1]
+... ).fit(bending.data, actionmodel__groups=bending.actor)
+>>> new = make_bending(2, random_state=1).data
+>>> pipe.predict([*new, new[0][::-1]]).tolist()  # people not seen, and a bend backwards
+[1, 1, -1]
 """
 
 from . import datasets, display, metrics

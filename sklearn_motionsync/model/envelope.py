@@ -3,18 +3,15 @@
 from numbers import Integral
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_is_fitted
 
 from ..fitting import of_one_state
 from ..gate import as_numbers, check_finite, check_names
 from ..performances import names_of_input
+from .sampling import sample_performances, sample_postures
 
 __all__ = ["EnvelopeMixin"]
-
-# A sample outside is drawn anew so many times; then it comes half-way home so many times.
-_DRAWS, _STEPS_HOME = 10, 10
 
 
 class EnvelopeMixin:
@@ -67,10 +64,10 @@ class EnvelopeMixin:
     def sample(self, n=1, frame=None, random_state=None):
         """Draw accepted postures at a frame (Fig. 4), or whole performances.
 
-        Postures are drawn feature by feature from the normal distributions cut off at the
-        envelope. Whole performances are random mixtures of the training performances'
-        deviations from the mean, with their variances and their smoothness; one that falls
-        outside is drawn again, and at last moved to a training performance until it is inside.
+        Both are drawn about those of training performances chosen at random, with mean, variance
+        and covariance of all: what belongs together stays together, and styles stay apart.
+        Postures are cut off at the envelope. Performances are inside for ``predict``; one that
+        would fall outside is drawn in to its training performance.
 
         Parameters
         ----------
@@ -89,45 +86,20 @@ class EnvelopeMixin:
         if not isinstance(n, Integral) or n < 1:
             raise ValueError(f"n must be a whole number of samples, at least 1; got {n!r}.")
         random_state = check_random_state(random_state)
-        dtype = self.mean_.dtype
         if frame is not None:
             frame = self._check_frame(frame)
-            shape = (n, self.mean_.shape[1])
-            # The normal distribution between -n_std and n_std, by inverting its integral.
-            z = ndtri(random_state.uniform(ndtr(-self.n_std), ndtr(self.n_std), size=shape))
-            lower, upper = (bound[frame] for bound in self.envelope())
-            postures = self.mean_[frame] + z * np.sqrt(self.variance_[frame])
-            return np.clip(postures.astype(dtype), lower, upper)
-        samples = self._mixtures(n, random_state)
-        outside = np.arange(n)
-        for _ in range(_DRAWS):
-            outside = outside[~self._inside(samples[outside])]
-            samples[outside] = self._mixtures(len(outside), random_state)
-        self._bring_home(samples, random_state)
+            of_frame = self.mean_[frame], self.variance_[frame], self.deviations_[:, frame]
+            return sample_postures(*of_frame, n, self.n_std, random_state)
+        samples = sample_performances(
+            self.mean_,
+            self.variance_,
+            self.deviations_,
+            n,
+            self._neighbours.dissimilarity,
+            self.threshold_,
+            random_state,
+        )
         return samples[:, :, 0] if self._fitted_on_rows else samples
-
-    def _mixtures(self, n, random_state):
-        """Performances that deviate by random mixtures of the training ones' deviations."""
-        n_kept = len(self.deviations_)
-        weights = random_state.standard_normal((n, n_kept)) / np.sqrt(n_kept)
-        drawn = np.tensordot(weights, self.deviations_, axes=1)
-        return (self.mean_ + drawn).astype(self.mean_.dtype)
-
-    def _bring_home(self, samples, random_state):
-        """Move performances that are not the action half-way to training ones, until they are."""
-        known = self.mean_ + self.deviations_
-        outside = np.flatnonzero(~self._inside(samples))
-        goals = known[random_state.choice(np.flatnonzero(self._inside(known)), len(outside))]
-        for step in range(_STEPS_HOME):
-            part = 2 if step < _STEPS_HOME - 1 else 1
-            samples[outside] += (goals - samples[outside]) / part
-            still = ~self._inside(samples[outside])
-            outside, goals = outside[still], goals[still]
-
-    def _inside(self, performances):
-        # A little inside, so that rounding does not put the border outside.
-        found = self._neighbours.dissimilarity(performances)
-        return found <= self.threshold_ * (1 - 1e-6)
 
     def _check_frame(self, frame):
         if not isinstance(frame, Integral) or not 0 <= frame < self.n_frames_:

@@ -1,0 +1,274 @@
+"""Samples of an action: their moments, that they are inside, and that they are bodies."""
+
+import numpy as np
+import pytest
+from scipy.stats import truncnorm
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, Skeleton
+from sklearn_motionsync.model.sampling import sample_performances, sample_postures
+
+
+def moments(X):
+    return X.mean(axis=0), X.var(axis=0), X - X.mean(axis=0)
+
+
+def postures_of(X, n=20_000, n_std=3.0, seed=0):
+    return sample_postures(*moments(X), n, n_std, np.random.RandomState(seed))
+
+
+def performances_of(X, n=200, unlike=None, threshold=np.inf, seed=0):
+    unlike = unlike or (lambda Y: np.zeros(len(Y)))
+    return sample_performances(*moments(X), n, unlike, threshold, np.random.RandomState(seed))
+
+
+def to_nearest(X):
+    """Root-mean-square distance to the nearest training performance."""
+    return lambda Y: np.sqrt(np.square(Y[:, None] - X).mean(axis=(2, 3)).min(axis=1))
+
+
+def waves(n=200, seed=0):
+    """Performances of 15 frames x 3 features, smooth, of unequal variance."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 1, 15)
+    shapes = np.stack([np.ones_like(t), t, t**2])
+    weights = rng.standard_normal((n, 3, 3)) * [[[1.0], [0.5], [0.2]]]
+    return np.sin(3 * t)[:, None] + np.einsum("npk,kt->ntp", weights, shapes)
+
+
+def two_styles(n=20, seed=0):
+    """Performances that end up or down; nobody's ends near the mean."""
+    X = 0.05 * waves(n, seed)
+    X[::2] += np.linspace(0, 1, 15)[:, None]
+    X[1::2] -= np.linspace(0, 1, 15)[:, None]
+    return X
+
+
+def inside(postures, X, n_std):
+    reach = n_std * np.sqrt(X.var(axis=0))
+    return (postures >= X.mean(axis=0) - reach).all() and (postures <= X.mean(axis=0) + reach).all()
+
+
+# -- postures ---------------------------------------------------------------------------
+
+
+def test_postures_have_the_covariance_of_the_training_ones():
+    """Shrunk by a fiftieth: features that go together do so in the samples."""
+    rng = np.random.default_rng(0)
+    X = rng.standard_normal((30, 4)) @ rng.standard_normal((4, 4)) + 5
+    covariance = np.cov(X.T, bias=True)
+    expected = 0.98 * covariance + 0.02 * np.diag(np.diag(covariance))
+    drawn = postures_of(X, 200_000, n_std=50)
+    size = np.sqrt(np.outer(X.var(axis=0), X.var(axis=0)))
+    assert np.abs((np.cov(drawn.T) - expected) / size).max() < 0.01
+    assert np.abs((drawn.mean(axis=0) - X.mean(axis=0)) / X.std(axis=0)).max() < 0.01
+
+
+@pytest.mark.parametrize("n_std", [0.3, 1.0, 1.5, 3.0])
+def test_normal_features_are_cut_off_like_normal_distributions(n_std):
+    X = np.random.default_rng(0).standard_normal((2000, 2)) @ [[1.0, 0.9], [0.0, 0.1]]
+    drawn = postures_of(X, n_std=n_std)
+    assert inside(drawn, X, n_std)
+    expected = X.std(axis=0) * truncnorm(-n_std, n_std).std()
+    np.testing.assert_allclose(drawn.std(axis=0), expected, rtol=0.03)
+    # What belongs together still does, however little is left of it.
+    assert np.corrcoef(drawn.T)[0, 1] > 0.95 * np.corrcoef(X.T)[0, 1]
+
+
+@pytest.mark.parametrize("n_std", [1e-300, 1e-6, 0.01, 3.0, 1e3, 1e300])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_every_posture_is_inside(n_std, dtype):
+    rng = np.random.default_rng(1)
+    for X in (
+        rng.standard_normal((9, 5)) ** 3,
+        np.array([[0.0, 1], [1, -1]]),  # two performances
+        rng.standard_normal((5, 1)) + 1e4,  # one feature
+        np.column_stack([np.full(6, 0.1), rng.standard_normal(6)]),  # nobody differs in the first
+        np.full((4, 3), 0.1),
+        np.concatenate([np.zeros((4000, 1)), np.ones((1, 1))]),  # one stray, 63 deviations away
+    ):
+        X = X.astype(dtype)
+        if dtype == np.float32 and n_std == 1e300:
+            continue  # which is no float32
+        drawn = postures_of(X, 500, n_std)
+        assert (drawn.dtype, drawn.shape) == (dtype, (500, X.shape[1]))
+        assert np.isfinite(drawn).all()
+        assert inside(drawn, X, n_std)
+
+
+def test_what_nobody_differs_in_is_what_it_is():
+    X = np.column_stack([np.full(8, 2.5), np.arange(8.0)])
+    drawn = postures_of(X, 100)
+    assert (drawn[:, 0] == 2.5).all()
+    assert np.ptp(drawn[:, 1]) > 1
+    np.testing.assert_array_equal(postures_of(np.full((3, 2), 7.0), 5), np.full((5, 2), 7.0))
+
+
+def test_the_mean_of_two_styles_is_nobodys_posture():
+    X = two_styles()[:, -1]
+    drawn = postures_of(X)
+    share = (np.abs(drawn[:, 0] - X[:, 0].mean()) < 0.2 * X[:, 0].std()).mean()
+    assert share < 0.05  # 16 % of a normal distribution
+    # And a person is of one style in all features.
+    signs = np.sign(drawn - X.mean(axis=0))
+    assert (np.abs(signs.sum(axis=1)) == 3).mean() > 0.95
+
+
+def test_mean_and_variance_are_those_of_all_where_few_are_kept():
+    mean, variance, deviations = moments(np.random.default_rng(0).standard_normal((40, 3)))
+    state = np.random.RandomState(0)
+    drawn = sample_postures(mean, 4 * variance, deviations + 0.5, 50_000, 40, state)
+    np.testing.assert_allclose(drawn.var(axis=0), 4 * variance, rtol=0.03)
+    np.testing.assert_allclose(drawn.mean(axis=0), mean, atol=0.03)
+
+
+def test_units_change_nothing():
+    X = waves(12)[:, 4]
+    np.testing.assert_array_equal(postures_of(X, 9) * 2.0**40, postures_of(X * 2.0**40, 9))
+
+
+# -- whole performances -----------------------------------------------------------------
+
+
+def test_performances_vary_like_the_training_ones_and_are_as_smooth():
+    X = waves()
+    drawn = performances_of(X, 5000)
+    np.testing.assert_allclose(drawn.var(axis=0), X.var(axis=0), rtol=0.1)
+    steps = [np.diff(Y - X.mean(axis=0), axis=1).std() for Y in (drawn, X)]
+    np.testing.assert_allclose(*steps, rtol=0.1)
+
+
+@pytest.mark.parametrize("share", [1e-6, 0.05, 0.3, 0.7])
+def test_performances_are_inside(share):
+    """Also where the mean is not, and where hardly anything is."""
+    for X in (waves(20), two_styles()):
+        unlike = to_nearest(X)
+        threshold = share * unlike(X.mean(axis=0, keepdims=True))[0]
+        drawn = performances_of(X, unlike=unlike, threshold=threshold)
+        assert (unlike(drawn) <= threshold).all()
+
+
+def test_strays_are_nobodys_home():
+    """A training performance that is outside itself does not draw others in."""
+    X = two_styles()
+    X[3] += 50
+
+    def unlike(Y):
+        return np.abs(Y).max(axis=(1, 2))
+
+    drawn = performances_of(X, unlike=unlike, threshold=2.0)
+    assert (unlike(drawn) <= 2).all()
+    assert len(np.unique(drawn.round(6), axis=0)) > len(X) / 2
+
+
+def test_where_nobody_is_inside_the_most_typical_one_is_given():
+    X = waves(6)
+    drawn = performances_of(X, 3, lambda Y: 1 + np.abs(Y - X[4]).max(axis=(1, 2)), threshold=0.5)
+    np.testing.assert_allclose(drawn, np.repeat(X[4:5], 3, axis=0))
+    # What is no number is not inside, and ends.
+    assert performances_of(X, 3, lambda Y: np.full(len(Y), np.nan), 0.5).shape == (3, 15, 3)
+
+
+def test_the_search_ends():
+    """It asks of every performance a handful of times, and never of none."""
+    asked = []
+
+    def unlike(Y):
+        asked.append(len(Y))
+        return np.ones(len(Y))
+
+    performances_of(waves(6), 10, unlike, 0.5)
+    assert asked == [6, 10, 10, 10, 10]
+    asked.clear()
+    performances_of(waves(6), 10, unlike, 1.5)
+    assert asked == [6, 10]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize(
+    "X", [np.full((3, 5, 2), 0.1), np.array([[[0.0]], [[1]]]), 3 + waves(2), waves(9)[:, :1]]
+)
+def test_degenerate_training_sets(X, dtype):
+    X = X.astype(dtype)
+    drawn = performances_of(X, 7, to_nearest(X), 1e-3)
+    assert (drawn.dtype, drawn.shape) == (dtype, (7, *X.shape[1:]))
+    assert (to_nearest(X)(drawn) <= 1e-3).all()
+
+
+def test_kept_ones_that_differ_less_than_all_are_stretched_within_bounds():
+    mean, variance, deviations = moments(waves())
+    for factor, expected in ((1.5, 1.5), (0.9, 0.9), (100, 4), (0.001, 0.25), (0, 0.25)):
+        drawn = sample_performances(
+            mean,
+            factor * variance,
+            deviations + 0.5,
+            4000,
+            lambda Y: np.zeros(len(Y)),
+            1,
+            np.random.RandomState(0),
+        )
+        np.testing.assert_allclose(drawn.var(axis=0), expected * variance, rtol=0.1)
+        assert (np.abs(drawn.mean(axis=0) - mean) < 0.06 * drawn.std(axis=0)).all()
+
+
+def test_samples_repeat_with_their_random_state():
+    for draw in (postures_of, performances_of):
+        X = waves(9) if draw is performances_of else waves(9)[:, 3]
+        np.testing.assert_array_equal(draw(X, 4, seed=3), draw(X, 4, seed=3))
+        assert not np.array_equal(draw(X, 4, seed=3), draw(X, 4, seed=4))
+
+
+# -- people -----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def bends_on_one_clock(bends):
+    space = make_pipeline(DirectionCosines(bends.skeleton), ASpace(0.95))
+    points = space.fit_transform(bends.data)
+    return space, np.asarray(DenseSynchronizer(n_frames=100).fit_transform(points), dtype=float)
+
+
+def built(space, mean, points):
+    """Bodies (n, joint names: (n, 3)) with the hips where those of the mean performance are."""
+    at = Skeleton.paper().joints.index
+
+    def bodies(x):
+        return np.asarray(space.inverse_transform(x)).reshape(len(x), 15, 3)
+
+    def below(x):
+        return (x[:, at("left_hip"), 1] + x[:, at("right_hip"), 1]) / 2 - x[:, at("pelvis"), 1]
+
+    floor, usual = bodies(mean)[..., 1].min(), below(bodies(mean)).mean()
+    found = bodies(np.concatenate([mean, points]))[len(mean) :]
+    moved = below(found) - usual
+    joints = {name: found[:, at(name)].copy() for name in Skeleton.paper().joints}
+    for name in ("left_hip", "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle"):
+        joints[name][:, 1] -= moved
+    for joint in joints.values():
+        joint[:, 1] -= floor
+    return joints
+
+
+def crossed(joints):
+    """How far each left knee is on the right one's side, along the line of the hips."""
+    across = joints["left_hip"] - joints["right_hip"]
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return -((joints["left_knee"] - joints["right_knee"]) * across).sum(axis=1)
+
+
+def test_sampled_bends_are_bodies(bends_on_one_clock):
+    """200 samples a frame: no foot deep in the floor, no thighs through each other."""
+    space, X = bends_on_one_clock
+    mean, variance, deviations = moments(X)
+    ankles, knees, hands = [], [], []
+    for f in range(100):
+        drawn = sample_postures(
+            mean[f], variance[f], deviations[:, f], 200, 3.0, np.random.RandomState(f)
+        )
+        joints = built(space, mean, drawn)
+        ankles.append([joints[f"{side}_ankle"][:, 1] for side in ("left", "right")])
+        hands.append([joints[f"{side}_wrist"][:, 1] for side in ("left", "right")])
+        knees.append(crossed(joints))
+    # In metres. Drawn feature by feature: -0.17, -0.8, and 0.06 crossed.
+    assert np.min(ankles) > -0.10
+    assert np.min(hands) > -0.20
+    assert np.max(knees) < 0
