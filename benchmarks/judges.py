@@ -61,6 +61,8 @@ if ActionDetector is not None:
 
 # -- of scikit-learn --------------------------------------------------------------------
 
+TREES = 30
+
 
 def lof(n_performances, n_neighbors):
     return LocalOutlierFactor(n_neighbors=min(n_neighbors, n_performances - 1), novelty=True)
@@ -71,7 +73,7 @@ def one_class_svm(n_performances, nu, gamma):
 
 
 def isolation_forest(n_performances, max_features):
-    return IsolationForest(n_estimators=30, max_features=max_features, random_state=0)
+    return IsolationForest(n_estimators=TREES, max_features=max_features, random_state=0)
 
 
 def flat_judge(make, settings, fold: Fold):

@@ -104,9 +104,9 @@ def test_a_few_training_performances_are_of_two_people_at_least(negatives, clips
 def test_the_border_of_others_is_that_of_a_new_value(judges):
     rng = np.random.default_rng(0)
     for n in (5, 20):
-        values = np.exp(rng.standard_normal((4000, n + 1)))
+        values = np.exp(rng.standard_normal((2000, n + 1)))
         inside = [judges.border_of(some[1:]) >= some[0] for some in values]
-        assert np.mean(inside) == pytest.approx(judges.COVERAGE, abs=0.012)
+        assert np.mean(inside) == pytest.approx(judges.COVERAGE, abs=0.015)
 
 
 def test_unlikeness_is_0_of_the_same_1_of_who_stands_still_and_2_of_the_opposite(model):
@@ -128,7 +128,8 @@ def test_figures_are_means_over_actions(model):
     assert model.areas(actions, "backwards") == [6 / 8, 1 / 2]
 
 
-def test_all_tables_of_a_tiny_set(model, clips, capsys, monkeypatch):
+def test_all_tables_of_a_tiny_set(model, judges, clips, capsys, monkeypatch):
+    monkeypatch.setattr(judges, "TREES", 3)
     for name, value in (("FEW", (5,)), ("DRAWS", 1), ("REPETITIONS", 2)):
         monkeypatch.setattr(model, name, value)
     with parallel_config(backend="sequential"):
