@@ -24,6 +24,7 @@ from .display import (
     TrellisDisplay,
 )
 from .model.action_model import ActionModel
+from .model.detector import ActionDetector
 from .sequences import to_frame, to_sequences
 from .synchronizers.base import Synchronizer
 from .synchronizers.dense import DenseSynchronizer
@@ -35,6 +36,7 @@ __version__ = "0.1.0.dev0"
 
 __all__ = [
     "ASpace",
+    "ActionDetector",
     "ActionModel",
     "ActionModelDisplay",
     "DenseSynchronizer",

@@ -15,6 +15,7 @@ __all__ = [
     "flat_steps",
     "index_of_pattern",
     "reach_synchronizer",
+    "steps_to_fit",
     "taken_by",
     "transform_through",
 ]
@@ -189,6 +190,28 @@ def flat_steps(estimator):
         return [estimator]
     steps = [step for _, step in estimator.steps if step is not None and step != "passthrough"]
     return [inner for step in steps for inner in flat_steps(step)]
+
+
+def steps_to_fit(estimator, prefix=""):
+    """The same before a fit, each with what the names of its params begin with in that fit.
+
+    Searches are looked into, not fitted.
+
+    Parameters
+    ----------
+    estimator : estimator, Pipeline or search
+    prefix : str, default=""
+        What the names of its own params begin with.
+
+    Returns
+    -------
+    list of (str, estimator)
+    """
+    if isinstance(estimator, Pipeline):
+        steps = [(name, s) for name, s in estimator.steps if s is not None and s != "passthrough"]
+        return [found for name, step in steps for found in steps_to_fit(step, f"{prefix}{name}__")]
+    inner = getattr(estimator, "estimator", None)
+    return [(prefix, estimator)] if inner is None else steps_to_fit(inner, prefix)
 
 
 def index_of_pattern(synchronizer, performances):

@@ -11,6 +11,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.utils import estimator_checks
 from sklearn.utils.estimator_checks import parametrize_with_checks
 from sklearn_motionsync import (
+    ActionDetector,
     ActionModel,
     ASpace,
     DenseSynchronizer,
@@ -33,7 +34,8 @@ SYNCHRONIZERS = [
     DenseSynchronizer(),
     ShiftSynchronizer(),
 ]
-ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, ActionModel()]
+DETECTOR = ActionDetector(make_pipeline(DenseSynchronizer(), ActionModel()))
+ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, ActionModel(), DETECTOR]
 ESTIMATORS = [DirectionCosines(Skeleton.paper()), *ROW_ESTIMATORS]
 TRANSFORMERS = [e for e in ESTIMATORS if hasattr(e, "transform")]
 
@@ -127,7 +129,10 @@ def outputs(estimator, X):
     if hasattr(estimator, "match"):
         answers += list(estimator.match(X))
     if hasattr(estimator, "score_samples"):
-        answers += [estimator.score_samples(X), estimator.predict(X), np.array(estimator.score(X))]
+        answers += [estimator.score_samples(X), estimator.decision_function(X)]
+        answers += [estimator.predict(X)]
+    if hasattr(estimator, "score"):
+        answers += [np.array(estimator.score(X))]
     return answers
 
 
@@ -424,7 +429,7 @@ def test_unfitted(estimator, performances):
         outputs(clone(estimator), performances)
 
 
-@pytest.mark.parametrize("estimator", [*SYNCHRONIZERS, ActionModel()], ids=by_name)
+@pytest.mark.parametrize("estimator", [*SYNCHRONIZERS, ActionModel(), DETECTOR], ids=by_name)
 def test_sequence_level_estimators_keep_to_the_kind_of_fit(estimator, performances):
     fitted = clone(estimator).fit(performances)
     with pytest.raises(ValueError, match=r"wrap one sequence as \[X\]"):

@@ -12,15 +12,13 @@ from ..gate import check_squares
 from ..notebook import DocumentedMixin
 from ..performances import SequenceLevelMixin
 from .envelope import EnvelopeMixin
-from .likeness import Neighbours, as_codes, learn_border, spread_out
+from .likeness import Neighbours, as_codes, spread_out
 
 __all__ = ["ActionModel"]
 
 # Smallest variance of a density, as a share of the variance of all the data: a feature
 # in which nobody differed is not infinitely improbable to differ.
 _VARIANCE_FLOOR = 1e-9
-# Who stands still is as unlike to people who move as 1; that is never accepted.
-_STANDS_STILL = 1 - 1e-6
 
 
 class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstimator):
@@ -144,8 +142,7 @@ class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstima
         kept = spread_out(groups)
         self.deviations_, self.groups_ = X[kept] - self.mean_, groups[kept]
         self._neighbours = Neighbours(X[kept].astype(np.float64), self.groups_)
-        border = learn_border(self._neighbours.dissimilarity(X, groups), self.coverage)
-        self.threshold_ = border if self._neighbours.stand_still else min(border, _STANDS_STILL)
+        self.threshold_ = self._neighbours.border(X, groups, self.coverage)
         return self
 
     def check_performances(self, X):

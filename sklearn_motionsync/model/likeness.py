@@ -5,7 +5,7 @@ from scipy.stats import t as student
 
 from ..matching.filters import smooth
 
-__all__ = ["Neighbours", "as_codes", "learn_border", "spread_out"]
+__all__ = ["Neighbours", "as_codes", "learn_border", "learn_reach", "spread_out"]
 
 # Most performances that others are compared with: predicting takes time and memory in proportion.
 _MOST_KEPT = 64
@@ -20,6 +20,8 @@ _SMOOTHING = 0.01
 _PRIOR_VARIANCE, _PRIOR_COUNT = 0.07, 3
 # What is less is rounding, or nobody differs.
 _LEAST = 1e-9
+# Who stands still is as unlike to people who move as 1; that is never accepted.
+_STANDS_STILL = 1 - 1e-6
 # Performances that are multiplied at a time, always so many, so that no result depends on the
 # others; and those that are in memory at a time.
 _TILE, _PORTION = 8, 64
@@ -74,6 +76,24 @@ class Neighbours:
             found[rows] = _mean_of_smallest(ratios)
         return found
 
+    def border(self, performances, groups, coverage):
+        """Up to how unlike somebody new is to be expected, as those are to other groups.
+
+        Parameters
+        ----------
+        performances : sequence of ndarray (P, n_features)
+        groups : ndarray of int (n,)
+        coverage : float
+            Share of new performances within the border.
+
+        Returns
+        -------
+        float
+            Less than standing still, unless nobody moves.
+        """
+        border = learn_border(self.dissimilarity(performances, groups), coverage)
+        return border if self.stand_still else min(border, _STANDS_STILL)
+
     def _ratios(self, performances):
         """How unlike performances (n, P, n_features) are to each of the neighbours (n, n_kept).
 
@@ -125,12 +145,29 @@ def learn_border(values, coverage):
     -------
     float
     """
-    logs, n = np.log(np.maximum(values, _LEAST)), len(values)
-    freedom = n - 1 + _PRIOR_COUNT
-    squares = np.square(logs - logs.mean()).sum() + _PRIOR_COUNT * _PRIOR_VARIANCE
-    spread = np.sqrt(squares / freedom * (1 + 1 / n))
+    logs = np.log(np.maximum(values, _LEAST))
     with np.errstate(over="ignore"):
-        return float(np.exp(logs.mean() + student.ppf(coverage, freedom) * spread))
+        return float(np.exp(logs.mean() + learn_reach(logs - logs.mean(), coverage)))
+
+
+def learn_reach(deviations, coverage):
+    """How far a new logarithm may lie above what is usual.
+
+    Parameters
+    ----------
+    deviations : ndarray (n,)
+        Of the logarithms that are known, from what is usual.
+    coverage : float
+        Share of new values below it.
+
+    Returns
+    -------
+    float
+    """
+    n = len(deviations)
+    freedom = n - 1 + _PRIOR_COUNT
+    squares = np.square(deviations).sum() + _PRIOR_COUNT * _PRIOR_VARIANCE
+    return float(student.ppf(coverage, freedom) * np.sqrt(squares / freedom * (1 + 1 / n)))
 
 
 def as_codes(groups, n_performances):

@@ -1,0 +1,426 @@
+"""What synchronisation hides is seen by a detector: against loops, closed forms and real people."""
+
+import pickle
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+from sklearn import clone, config_context
+from sklearn.exceptions import NotFittedError
+from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score, cross_validate
+from sklearn.pipeline import Pipeline, make_pipeline
+from sklearn.utils import estimator_html_repr
+from sklearn_motionsync import (
+    ActionDetector,
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    KeyframeSynchronizer,
+    LinearSynchronizer,
+    to_frame,
+)
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.metrics import SpreadScorer
+from sklearn_motionsync.model.manner import Usual, energies
+
+QUESTIONS = ["movement", "course", "duration", "energy"]
+
+
+def make(synchronizer=None, **params):
+    synchronizer = DenseSynchronizer(30) if synchronizer is None else synchronizer
+    return ActionDetector(make_pipeline(synchronizer, ActionModel()), **params)
+
+
+def wave(n_frames=60, size=1.0, middle=0.5):
+    """A movement there and, at a time of its own, half back again; two features."""
+    t = np.linspace(0, 1, n_frames)
+    t = np.interp(t, [0, middle, 1], [0, 0.5, 1])
+    return size * np.stack([np.sin(1.5 * np.pi * t), 1 - np.cos(2 * np.pi * t)], axis=1)
+
+
+def people(n=20, seed=0):
+    """Performances of five people, who differ in what each does alike."""
+    rng = np.random.default_rng(seed)
+    groups = np.arange(n) % 5
+    length, size = 60 * np.exp(0.1 * rng.standard_normal(5)), np.exp(0.1 * rng.standard_normal(5))
+    X = []
+    for g in groups:
+        x = wave(int(length[g] * rng.uniform(0.9, 1.1)), size[g] * rng.uniform(0.9, 1.1))
+        t = np.linspace(0, np.pi, len(x))[:, np.newaxis]
+        for k in (1, 2, 3):
+            x += 0.3 * rng.standard_normal(2) * np.sin(k * t)
+        X.append(x)
+    return X, groups
+
+
+X, GROUPS = people()
+
+
+@pytest.fixture(scope="module")
+def detector():
+    return make().fit(X, groups=GROUPS)
+
+
+# -- the four questions -----------------------------------------------------------------
+
+
+def slow_usual(values, groups, coverage):
+    """The mean logarithm, and how far from it a new one may be."""
+    logs = np.log(values)
+    left = [x - np.mean(logs[groups != g]) for x, g in zip(logs, groups, strict=True)]
+    n = len(logs)
+    variance = (np.sum(np.square(left)) * (n - 1) / (n + 1) + 3 * 0.07) / (n + 2)
+    return logs.mean(), student(n + 2).ppf((1 + coverage) / 2) * np.sqrt(variance * (1 + 1 / n))
+
+
+@pytest.mark.parametrize(("duration", "questions"), [(True, 4), (False, 3)])
+@pytest.mark.parametrize("grouped", [True, False])
+def test_the_report_is_what_the_formulas_say(duration, questions, grouped):
+    groups = GROUPS if grouped else None
+    codes = GROUPS if grouped else np.arange(len(X))
+    found = make(coverage=0.9, duration=duration).fit(X, groups=groups)
+    new = [wave(80), wave(30, 0.5), *people(7, seed=1)[0]]
+    report = found.report(new)
+    each = 1 - 0.1 / questions
+    for name, steps in (
+        ("movement", make_pipeline(DenseSynchronizer(30))),
+        ("course", LinearSynchronizer(30)),
+    ):
+        on_clock = steps.fit_transform(X)
+        model = ActionModel(coverage=each).fit(on_clock, groups=groups)
+        expected = model.dissimilarity(steps.transform(new)) / model.threshold_
+        np.testing.assert_allclose(report[name], expected, rtol=1e-9)
+        np.testing.assert_allclose(found.borders_.loc[name], [0, model.threshold_], rtol=1e-9)
+
+    def energy(performances):
+        on_clock = LinearSynchronizer(30).fit(X).transform(performances)
+        return np.array([((x - x.mean(axis=0)) ** 2).sum(axis=1).mean() for x in on_clock])
+
+    def frames(performances):
+        return np.array([len(x) for x in performances])
+
+    for name, measure in [("energy", energy), *([("duration", frames)] if duration else [])]:
+        middle, reach = slow_usual(measure(X), codes, each)
+        np.testing.assert_allclose(report[name], (np.log(measure(new)) - middle) / reach)
+        ends = np.exp([middle - reach, middle + reach])
+        np.testing.assert_allclose(found.borders_.loc[name], ends)
+    asked = [name for name in QUESTIONS if duration or name != "duration"]
+    assert list(report.columns) == [*asked, "reason"]
+    worst = report[asked].abs().max(axis=1)
+    np.testing.assert_array_equal(found.score_samples(new), -worst)
+    np.testing.assert_array_equal(found.decision_function(new), -worst - found.offset_)
+    np.testing.assert_array_equal(found.predict(new), np.where(worst <= 1, 1, -1))
+    assert ((report["reason"] == "") == (worst <= 1)).all()
+    assert set(found.predict(new)) == {-1, 1}
+
+
+WRONG = {
+    "too long": wave(120),
+    "too short": wave(30),
+    "too weak": wave(size=0.54),
+    "too strong": wave(size=2),
+    "another course": wave(middle=0.8),
+    "too short, too weak": wave(20, size=0.54),
+    "another movement": wave()[:, ::-1],
+    "another movement, too weak": 0 * wave(),
+}
+
+
+@pytest.mark.parametrize("reason", WRONG)
+def test_it_says_why(reason, detector):
+    assert detector.report([wave(), WRONG[reason]])["reason"].tolist() == ["", reason]
+    assert detector.predict([wave(), WRONG[reason]]).tolist() == [1, -1]
+
+
+def test_the_model_alone_does_not_see_the_pace(detector):
+    assert detector.estimator_.predict([wave(120), wave(30)]).tolist() == [1, 1]
+
+
+def test_duration_may_count_for_nothing(detector):
+    """As where frame rates differ."""
+    blind = clone(detector).set_params(duration=False).fit(X, groups=GROUPS)
+    assert blind.predict([wave(), wave(120), wave(30)]).tolist() == [1, 1, 1]
+    assert blind.predict([wave(120, size=0.4)]).tolist() == [-1]
+    assert "duration" not in blind.borders_.index
+
+
+def test_people_who_differ_leave_more_open():
+    """Performances of one person resemble each other, which is no measure of others."""
+    rng = np.random.default_rng(0)
+    groups = np.arange(24) // 6
+    values = np.exp(np.repeat([-0.4, -0.1, 0.2, 0.3], 6) + 0.01 * rng.standard_normal(24))
+    apart, together = (Usual(values, g, 0.95) for g in (groups, np.arange(24)))
+    assert apart.upper / apart.lower > 1.3 * together.upper / together.lower
+    np.testing.assert_allclose(apart([apart.lower, apart.upper]), [-1, 1])
+
+
+@pytest.mark.parametrize("coverage", [0.8, 0.95])
+def test_what_is_usual_holds_the_share_it_says(coverage):
+    rng = np.random.default_rng(0)
+    held = []
+    for _ in range(300):
+        logs = np.sqrt(0.07) * rng.standard_normal(120)
+        usual = Usual(np.exp(logs[:20]), np.arange(20), coverage)
+        held.append(np.mean(np.abs(usual(np.exp(logs[20:]))) <= 1))
+    assert abs(np.mean(held) - coverage) < 0.01
+
+
+# -- real people ------------------------------------------------------------------------
+
+
+def test_bends_of_people_not_seen(bends):
+    """A whole actor held out; twice in a row, half of it, slow motion and weak copies."""
+    new = bends.actor == bends.actor[0]
+    bodies = DirectionCosines(bends.skeleton).fit(bends.data)
+    points = ASpace(0.95).fit_transform(bodies.transform(bends.data))
+    known = [x for x, n in zip(points, new, strict=True) if not n]
+    detector = make(DenseSynchronizer(60)).fit(known, groups=bends.actor[~new])
+    own = [x for x, n in zip(points, new, strict=True) if n]
+    assert (detector.predict(own) == 1).mean() >= 0.8
+    wrong = {
+        "twice": [np.concatenate([x, x]) for x in own],
+        "half": [x[: len(x) // 2] for x in own],
+        "weak": [x.mean(axis=0) + 0.4 * (x - x.mean(axis=0)) for x in own],
+        "still": [np.repeat(x[:1], len(x), axis=0) for x in own],
+        "in slow motion": [np.repeat(x, 3, axis=0) for x in own],
+    }
+    for name, performances in wrong.items():
+        assert (detector.predict(performances) == -1).mean() > 0.9, name
+    slow = detector.report(wrong["in slow motion"])
+    assert (slow["reason"] == "too long").mean() > 0.9
+
+
+# -- at any depth, with groups and key-frames -------------------------------------------
+
+BUNCH = make_bending(12, n_frames=30, style=1, random_state=0)
+ACTORS = np.array([3, 1, 2, 1, 3, 2, 3, 1, 2, 1, 3, 2])
+CV = GroupKFold(3)
+GRID = {"actionmodel__n_std": [3.0]}
+
+
+def nestings(synchronizer):
+    steps = DirectionCosines(BUNCH.skeleton), ASpace(3), synchronizer, ActionModel()
+    search = GridSearchCV(synchronizer, {"n_frames": [20]}, cv=2, scoring=SpreadScorer())
+    return {
+        "flat": make_pipeline(*steps),
+        "inside": make_pipeline(make_pipeline(*steps[:2]), make_pipeline(*steps[2:])),
+        "across": make_pipeline(steps[0], make_pipeline(*steps[1:3]), steps[3]),
+        "nothing between": Pipeline([("a", make_pipeline(*steps)), ("b", None)][:1]),
+        "more after": make_pipeline(*steps[:3], ASpace(3), steps[3]),
+        "search": make_pipeline(*steps[:2], search, steps[3]),
+        "searched": GridSearchCV(make_pipeline(*steps), GRID, cv=2),
+    }
+
+
+@pytest.mark.parametrize("routed", [False, True])
+@pytest.mark.parametrize("name", nestings(None))
+def test_pipelines_of_any_depth(name, routed):
+    pipes = nestings(DenseSynchronizer(20))
+    expected = ActionDetector(pipes["flat"]).fit(BUNCH.data, groups=ACTORS).report(BUNCH.data)
+    with config_context(enable_metadata_routing=routed):
+        found = ActionDetector(pipes[name]).fit(BUNCH.data, groups=ACTORS)
+        report = found.report(BUNCH.data)
+    if name != "more after":
+        np.testing.assert_allclose(report[QUESTIONS], expected[QUESTIONS], rtol=1e-9)
+    np.testing.assert_allclose(report[QUESTIONS[1:]], expected[QUESTIONS[1:]], rtol=1e-9)
+    assert not hasattr(pipes[name], "n_features_in_")
+
+
+def test_groups_reach_the_model_and_the_detector():
+    pipe = nestings(DenseSynchronizer(20))["flat"]
+    given = pipe.fit(BUNCH.data, actionmodel__groups=ACTORS)[-1]
+    detector = ActionDetector(pipe).fit(BUNCH.data, groups=ACTORS)
+    model = detector.estimator_[-1]
+    assert model.threshold_ == given.threshold_
+    np.testing.assert_array_equal(model.groups_, given.groups_)
+    # By the name that the model's have in the pipeline, too.
+    other = ActionDetector(pipe).fit(BUNCH.data, actionmodel__groups=ACTORS)
+    assert detector.borders_.equals(other.borders_)
+    assert not detector.borders_.equals(ActionDetector(pipe).fit(BUNCH.data).borders_)
+
+
+@pytest.mark.parametrize("routed", [False, True])
+def test_cross_validation_with_groups(routed):
+    detector = ActionDetector(nestings(DenseSynchronizer(20))["flat"])
+    expected = [
+        clone(detector).fit([BUNCH.data[i] for i in train], groups=ACTORS[train]).borders_
+        for train, _ in CV.split(BUNCH.data, groups=ACTORS)
+    ]
+    with config_context(enable_metadata_routing=routed):
+        if routed:
+            detector.set_fit_request(groups=True)
+        found = cross_validate(
+            detector,
+            BUNCH.data,
+            np.ones(12),
+            cv=CV,
+            scoring="accuracy",
+            params={"groups": ACTORS},
+            return_estimator=True,
+            error_score="raise",
+            **({} if routed else {"groups": ACTORS}),
+        )
+    for one, borders in zip(found["estimator"], expected, strict=True):
+        assert one.borders_.equals(borders)
+    assert 0.5 < found["test_score"].mean() <= 1
+
+
+def test_scored_on_what_is_the_action_and_what_is_not(detector):
+    wrong = [wave(middle=m) for m in np.linspace(0.8, 0.9, 10)]
+    y = np.repeat([1, -1], [len(X), len(wrong)])
+    own = np.arange(len(X))
+    # Wrong ones are never learnt from.
+    folds = [
+        (np.flatnonzero(g != GROUPS), np.append(own[g == GROUPS], 20 + np.arange(10)))
+        for g in range(5)
+    ]
+    scores = cross_val_score(make(), X + wrong, y, cv=folds, scoring="roc_auc")
+    assert (scores == 1).all()
+    search = GridSearchCV(make(), {"duration": [True, False]}, cv=folds, scoring="accuracy")
+    assert search.fit(X + wrong, y).best_score_ > 0.9
+
+
+@pytest.mark.parametrize("routed", [False, True])
+def test_key_frames_go_along(routed):
+    marked = make_bending(8, random_state=0)
+    how = "keyframes" if routed else "keyframesynchronizer__keyframes"
+    with config_context(enable_metadata_routing=routed):
+        sync = KeyframeSynchronizer(30)
+        if routed:
+            sync.set_fit_request(keyframes=True).set_transform_request(keyframes=True)
+        steps = DirectionCosines(marked.skeleton), ASpace(3), sync, ActionModel()
+        detector = ActionDetector(make_pipeline(*steps))
+        detector.fit(marked.data, groups=marked.actor, **{how: marked.keyframes})
+        report = detector.report(marked.data, keyframes=marked.keyframes)
+        synchronised = detector.estimator_[:2].transform(marked.data)
+        model = detector.estimator_[-1]
+        matched = detector.estimator_[2].transform(synchronised, keyframes=marked.keyframes)
+        expected = model.dissimilarity(matched) / detector.borders_.loc["movement", "upper"]
+        np.testing.assert_allclose(report["movement"], expected, rtol=1e-9, atol=1e-9)
+        with pytest.raises(ValueError, match=r"ActionDetector.predict\(X, keyframes=\[...\]\)"):
+            detector.predict(marked.data)
+    with pytest.raises(TypeError, match=r"ActionDetector.report got 'weights', which is no"):
+        detector.report(marked.data, weights=[1] * 8)
+
+
+# -- what it owes its users -------------------------------------------------------------
+
+
+def test_labels_of_a_table_are_kept(detector):
+    table = to_frame([wave(), wave(120)], performances=[("ann", 1), ("bob", 2)])
+    table.columns = ["x", "y"]
+    named = to_frame(X)
+    named.columns = ["x", "y"]
+    found = make().fit(named.rename_axis(["trial", "frame"]), groups=GROUPS)
+    report = found.report(table.rename_axis(["trial", "frame"]))
+    assert list(report.index) == [("ann", 1), ("bob", 2)]
+    assert report.index.name == "trial"
+    assert report["reason"].tolist() == ["", "too long"]
+    assert list(found.feature_names_in_) == ["x", "y"]
+    with config_context(transform_output="pandas"):
+        pandas = make().fit(X, groups=GROUPS).report([wave(), wave(120)])
+    assert pandas.equals(detector.report([wave(), wave(120)]))
+    assert list(pandas.index) == [0, 1]
+
+
+def test_alone_or_together(detector):
+    new = [*people(70, seed=3)[0], *WRONG.values()]
+    together = detector.report(new)
+    for i in (0, 1, 69, 70, 77):
+        assert detector.report([new[i]]).iloc[0].tolist() == together.iloc[i].tolist()
+
+
+def test_stored_copied_and_shown(detector):
+    stored = pickle.loads(pickle.dumps(detector))
+    assert stored.report(X).equals(detector.report(X))
+    assert "ActionDetector(estimator=Pipeline(" in repr(detector)
+    assert "ActionModel" in estimator_html_repr(detector)
+    deep = detector.get_params()
+    assert deep["estimator__actionmodel__n_std"] == 3.0
+    assert deep["coverage"] == 0.95
+    with pytest.raises(NotFittedError):
+        clone(detector).predict(X)
+
+
+def test_the_borders_of_the_pipeline_are_its_own(detector):
+    own = make_pipeline(DenseSynchronizer(30), ActionModel(coverage=0.5)).fit(X, None)
+    found = ActionDetector(clone(own)).fit(X, groups=GROUPS)
+    assert found.borders_.equals(detector.borders_)
+    assert found.estimator_[-1].coverage == 0.5
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-150, 1e30])
+def test_the_unit_does_not_matter(scale, detector):
+    found = make().fit([scale * x for x in X], groups=GROUPS)
+    new = [*WRONG.values()]
+    report, expected = found.report([scale * x for x in new]), detector.report(new)
+    assert report["reason"].tolist() == expected["reason"].tolist()
+    moving = slice(0, 7)
+    np.testing.assert_allclose(
+        report[QUESTIONS].iloc[moving], expected[QUESTIONS].iloc[moving], rtol=1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    ("training", "own"),
+    [
+        ([wave(40), wave(44)], wave(40)),
+        ([wave(40)] * 4, wave(40)),
+        (people(80)[0], wave()),
+        ([np.full((n, 2), 3.0) for n in (20, 22, 24)], np.full((22, 2), 3.0)),
+        ([x[:, :1] for x in X], wave()[:, :1]),
+        ([x.astype(np.float32) for x in X], wave().astype(np.float32)),
+        ([np.stack([0.1 * np.ones(2), k + np.ones(2)]) for k in range(4)], np.ones((2, 2))),
+    ],
+    ids=["two", "identical", "many", "still", "univariate", "float32", "two frames"],
+)
+def test_training_sets_of_all_kinds(training, own):
+    """Warnings are errors here."""
+    found = make(LinearSynchronizer()).fit(training)
+    numbers = found.report([*training, own])[QUESTIONS]
+    assert np.isfinite(numbers).all(axis=None)
+    assert np.isfinite(found.borders_).all(axis=None)
+    if len(own) > 2:
+        assert found.predict([own]).tolist() == [1]
+        assert found.predict([own + np.linspace(0, 99, len(own))[:, None]]).tolist() == [-1]
+
+
+def test_who_stands_still_has_an_energy():
+    energy, floor = energies(np.zeros((3, 5, 2)))
+    assert floor > 0
+    assert (energy == floor).all()
+    energy, floor = energies(np.stack([wave(20), 0 * wave(20)]))
+    assert energy[1] == floor < 1e-8 * energy[0]
+    energy, _ = energies([np.array([[-1e200], [1e200]])], 1.0)
+    assert energy == np.inf
+
+
+@pytest.mark.parametrize(
+    ("estimator", "message"),
+    [
+        (make_pipeline(ASpace(), ActionModel()), r"got the steps \['ASpace', 'ActionModel'\]"),
+        (make_pipeline(ASpace(), DenseSynchronizer()), r"ends in an ActionModel .*; got the steps"),
+        (ActionModel(), r"got the steps \['ActionModel'\]"),
+        (Pipeline([("a", "passthrough")]), r"got the steps \[\]"),
+        (make_pipeline(ActionModel(), DenseSynchronizer()), r"such as make_pipeline\(DenseSync"),
+    ],
+)
+def test_what_is_no_such_pipeline(estimator, message):
+    with pytest.raises(ValueError, match=message):
+        ActionDetector(estimator).fit(X)
+
+
+@pytest.mark.parametrize(
+    "params", [{"coverage": 1.0}, {"coverage": 0}, {"duration": "frames"}, {"estimator": "bends"}]
+)
+def test_parameters_are_checked(params):
+    with pytest.raises(ValueError, match=f"The '{next(iter(params))}' parameter"):
+        make().set_params(**params).fit(X)
+
+
+def test_groups_are_checked():
+    with pytest.raises(ValueError, match="groups has 3 labels, and there are 20 performances"):
+        make().fit(X, groups=[1, 2, 3])
+    with pytest.raises(ValueError, match="All performances are of the group 'ann'"):
+        make().fit(X, groups=["ann"] * 20)
