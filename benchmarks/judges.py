@@ -12,7 +12,6 @@ import importlib.metadata
 from functools import partial
 
 import numpy as np
-import sklearn_motionsync
 from negatives import Fold, P
 from scipy.stats import t as student
 from sklearn.ensemble import IsolationForest
@@ -20,11 +19,9 @@ from sklearn.model_selection import LeaveOneGroupOut
 from sklearn.neighbors import LocalOutlierFactor
 from sklearn.pipeline import make_pipeline
 from sklearn.svm import OneClassSVM
-from sklearn_motionsync import ActionModel, DenseSynchronizer, LinearSynchronizer
+from sklearn_motionsync import ActionDetector, ActionModel, DenseSynchronizer, LinearSynchronizer
 
 COVERAGE = 0.95
-# Not there before it is merged.
-ActionDetector = getattr(sklearn_motionsync, "ActionDetector", None)
 
 # -- ours -------------------------------------------------------------------------------
 
@@ -47,17 +44,21 @@ def density(fold: Fold):
     return {"": {kind: decisions(X) for kind, X in fold.synchronised.items()}}
 
 
-def action_detector(fold: Fold):
+def action_detector(fold: Fold, duration):
     """The action model, and what synchronisation takes away."""
-    pipeline = make_pipeline(DenseSynchronizer(P), ActionModel(coverage=COVERAGE))
-    detector = ActionDetector(pipeline).fit(fold.train, groups=fold.groups)
+    pipeline = make_pipeline(DenseSynchronizer(P), ActionModel())
+    detector = ActionDetector(pipeline, COVERAGE, duration).fit(fold.train, groups=fold.groups)
     return {"": {kind: detector.decision_function(X) for kind, X in fold.raw.items()}}
 
 
-BEFORE = "the density of before"
-OURS = {BEFORE: density, "`ActionModel`": action_model}
-if ActionDetector is not None:
-    OURS["`ActionDetector`"] = action_detector
+DENSITY = "the density, 3 standard deviations"
+MODEL, DETECTOR = "`ActionModel`", "`ActionDetector`"
+OURS = {
+    DENSITY: density,
+    MODEL: action_model,
+    "`ActionDetector(duration=False)`": partial(action_detector, duration=False),
+    DETECTOR: partial(action_detector, duration=True),
+}
 
 # -- of scikit-learn --------------------------------------------------------------------
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from accuracy import print_head, print_row
 from joblib import Parallel, delayed
-from judges import BEFORE, OURS, PEERS, judges, version_of
+from judges import DETECTOR, MODEL, PEERS, judges, version_of
 from negatives import (
     BACKWARDS,
     BENDS,
@@ -372,7 +372,7 @@ def print_tables(sets):
     found_by_set = examine_all(sets)
     for name, found in found_by_set.items():
         verdict_tables(name, found)
-    for judge in (name for name in OURS if name != BEFORE):
+    for judge in (MODEL, DETECTOR):
         action_table(found_by_set, judge)
     border_table(found_by_set)
     band_table(found_by_set)
