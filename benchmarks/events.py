@@ -97,6 +97,8 @@ JOINTS = {
 # Width of the Gaussian under which curves are looked at: a share of the clip, and frames at least.
 SMOOTHING = {"hdm05": 0.015, "utkinect": 0.03, "cmu07_walk": 0.015}
 LEAST_FRAMES = 0.6
+# Clips of fewer frames show no action.
+LEAST_LENGTH = 8
 
 # -- the rule of unambiguous moments ----------------------------------------------------
 
@@ -211,9 +213,10 @@ def read_actions(folder, events=EVENTS):
     bunches, actions = {}, []
     for archive, name in dict.fromkeys((event.archive, event.action) for event in events):
         if archive not in bunches:
-            bunches[archive] = _read(Path(folder) / archive / f"{archive}_positions.npz", archive)
-        bunch, parts = bunches[archive]
-        chosen = [i for i in np.flatnonzero(bunch.target == name) if len(bunch.data[i]) >= 8]
+            bunches[archive] = read_archive(folder, archive)
+        bunch = bunches[archive]
+        parts = _joints_of_parts(bunch, archive)
+        chosen = np.flatnonzero(bunch.target == name)
         data = [bunch.data[i] for i in chosen]
         by_part = [_by_part(x, parts) for x in data]
         moments = {
@@ -221,16 +224,24 @@ def read_actions(folder, events=EVENTS):
             for e in events
             if (e.archive, e.action) == (archive, name)
         }
-        actors = np.asarray(bunch.actor)[chosen]
-        actions.append(Action(archive, name, data, actors, bunch.skeleton, moments))
+        actions.append(Action(archive, name, data, bunch.actor[chosen], bunch.skeleton, moments))
     return actions
 
 
-def _read(path, archive):
-    bunch = load_performances(path)
+def read_archive(folder, archive):
+    """The clips of an archive that have eight frames at least; takes of walking cut into cycles."""
+    bunch = load_performances(Path(folder) / archive / f"{archive}_positions.npz")
+    if archive == "cmu07_walk":
+        bunch = _cut_into_cycles(bunch, _joints_of_parts(bunch, archive))
+    chosen = [i for i, x in enumerate(bunch.data) if len(x) >= LEAST_LENGTH]
+    bunch.data = [bunch.data[i] for i in chosen]
+    bunch.target, bunch.actor = np.asarray(bunch.target)[chosen], np.asarray(bunch.actor)[chosen]
+    return bunch
+
+
+def _joints_of_parts(bunch, archive):
     joints = list(bunch.joints)
-    parts = dict(zip(PARTS, map(joints.index, JOINTS[archive].split()), strict=True))
-    return (_cut_into_cycles(bunch, parts) if archive == "cmu07_walk" else bunch), parts
+    return dict(zip(PARTS, map(joints.index, JOINTS[archive].split()), strict=True))
 
 
 def _by_part(x, parts):

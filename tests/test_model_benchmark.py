@@ -1,0 +1,159 @@
+"""The benchmark of action models: wrong performances, people held out, and the tables."""
+
+import importlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from joblib import parallel_config
+from sklearn_motionsync.datasets import make_bending
+
+BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _beside_each_other():
+    """The modules of the benchmarks import each other as they lie there."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(BENCHMARKS)
+        yield
+
+
+@pytest.fixture(scope="module")
+def negatives():
+    return importlib.import_module("negatives")
+
+
+@pytest.fixture(scope="module")
+def judges():
+    return importlib.import_module("judges")
+
+
+@pytest.fixture(scope="module")
+def model():
+    return importlib.import_module("model")
+
+
+@pytest.fixture(scope="module")
+def clips(negatives):
+    """Nine bends of three people, who each do three of them the other way round as well."""
+    clips = negatives.as_clips("few", make_bending(9, n_actors=3, n_frames=40, random_state=0))
+    postures = clips.postures + [x[::-1] for x in clips.postures]
+    return negatives.Clips(
+        "few", postures, np.repeat(["bending", "rising"], 9), np.tile(clips.actors, 2)
+    )
+
+
+X = np.array([[0.0, 1], [2, 3], [4, 5], [6, 7], [13, 14]])
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [
+        ("standing still", [[0, 1]] * 5),
+        ("amplitude x 0.3", [[3.5, 4.5], [4.1, 5.1], [4.7, 5.7], [5.3, 6.3], [7.4, 8.4]]),
+        ("first half", [[0, 1], [2, 3], [4, 5]]),
+        ("twice in a row", [*X, *X]),
+        ("halves exchanged", [[4, 5], [6, 7], [13, 14], [0, 1], [2, 3]]),
+        ("backwards", [[13, 14], [6, 7], [4, 5], [2, 3], [0, 1]]),
+    ],
+)
+def test_right_performances_are_spoilt(negatives, kind, expected):
+    given = X.copy()
+    np.testing.assert_allclose(negatives.SPOILT[kind](given), expected)
+    np.testing.assert_array_equal(given, X)
+
+
+def test_who_is_tried_had_no_part_in_what_is_learnt(negatives, clips):
+    assert clips.folds() == [(a, k) for a in ("bending", "rising") for k in clips.actors[:3]]
+    held = clips.actors[0]
+    fold = negatives.hold_out(clips, "bending", held)
+    assert held not in fold.groups
+    assert len(fold.train) == len(fold.groups) == len(fold.on_clock) == 6
+    assert list(fold.raw) == list(fold.synchronised) == [negatives.OWN, *negatives.KINDS]
+    for some in fold.synchronised.values():
+        assert some.shape == (3, negatives.P, fold.on_clock.shape[2])
+    # The other action of the same person is in the same space, there the right one backwards.
+    for right, wrong in zip(fold.raw["own"], fold.raw["other actions"], strict=True):
+        np.testing.assert_allclose(wrong, right[::-1])
+    # Changing who is held out changes nothing that is learnt.
+    changed = [x + (clips.actors[i] == held) for i, x in enumerate(clips.postures)]
+    changed = negatives.Clips(clips.name, changed, clips.actions, clips.actors)
+    again = negatives.hold_out(changed, "bending", held)
+    np.testing.assert_array_equal(again.on_clock, fold.on_clock)
+    assert np.abs(again.raw["own"][0] - fold.raw["own"][0]).max() > 0.1
+
+
+def test_a_kind_that_nobody_shows_is_left_out(negatives):
+    clips = negatives.as_clips("few", make_bending(4, n_actors=2, n_frames=30, random_state=0))
+    fold = negatives.hold_out(clips, *clips.folds()[0])
+    assert negatives.OTHERS not in fold.synchronised
+
+
+def test_a_few_training_performances_are_of_two_people_at_least(negatives, clips):
+    rng = np.random.default_rng(0)
+    held = clips.actors[0]
+    for _ in range(10):
+        on_clock, groups, own = negatives.hold_out_few(clips, "bending", held, 2, rng)
+        assert len(on_clock) == len(set(groups)) == 2
+        assert held not in groups
+        assert len(own) == 3
+    assert negatives.hold_out_few(clips, "bending", held, 7, rng) is None
+
+
+def test_the_border_of_others_is_that_of_a_new_value(judges):
+    rng = np.random.default_rng(0)
+    for n in (5, 20):
+        values = np.exp(rng.standard_normal((2000, n + 1)))
+        inside = [judges.border_of(some[1:]) >= some[0] for some in values]
+        assert np.mean(inside) == pytest.approx(judges.COVERAGE, abs=0.015)
+
+
+def test_unlikeness_is_0_of_the_same_1_of_who_stands_still_and_2_of_the_opposite(model):
+    x = np.sin(np.linspace(0, 7, 50))[:, np.newaxis]
+    for y, expected in ((x + 3, 0), (0 * x, 1), (-x, 2)):
+        assert model.unlikeness(x, y) == pytest.approx(expected, abs=1e-12)
+
+
+def test_figures_are_means_over_actions(model):
+    actions = {
+        "a": {"own": np.array([1.0, 2, -1, 3]), "backwards": np.array([-2.0, 1.5])},
+        "b": {"own": np.array([1.0])},
+        "bending": {"own": np.array([1.0, -1]), "backwards": np.array([0.0])},
+    }
+    assert model.accepted(actions) == {"a": 0.75, "b": 1.0, "bending": 0.5}
+    assert model.refused(actions, "backwards") == pytest.approx((0.5 + 0) / 2)
+    assert model.refused(actions, "backwards", model.BENDS) == 0.5
+    assert np.isnan(model.refused(actions, "other actions"))
+    assert model.areas(actions, "backwards") == [6 / 8, 1 / 2]
+
+
+def test_all_tables_of_a_tiny_set(model, judges, clips, capsys, monkeypatch):
+    monkeypatch.setattr(judges, "TREES", 3)
+    for name, value in (("FEW", (5,)), ("DRAWS", 1), ("REPETITIONS", 2)):
+        monkeypatch.setattr(model, name, value)
+    with parallel_config(backend="sequential"):
+        model.print_tables([clips])
+    tables = capsys.readouterr().out.strip().split("\n\n")
+    rows = [[line.strip("| ").split(" | ") for line in table.splitlines()] for table in tables]
+    for head, _, *body in rows:
+        assert len(body) > 0
+        assert {len(row) for row in body} == {len(head)}
+    verdicts = {row[0]: row[1:] for row in rows[0][2:]}
+    own, lowest, *wrong = verdicts["`ActionModel`"]
+    assert int(own) >= 80
+    assert int(lowest) <= int(own)
+    assert wrong[1] == "100"
+    assert {label.split(",")[0] for label in verdicts} >= {"LOF", "OneClassSVM", "IsolationForest"}
+
+
+def test_as_many_real_clips_are_held_out_as_were_measured(negatives, real_data):
+    found = {c.name: (len(c.postures), len(c.folds())) for c in negatives.read_clips(real_data)}
+    assert found == {
+        "HDM05": (132, 24),
+        "UTKinect": (189, 99),
+        "CMU, walking cycles": (13, 12),
+        "make_bending": (40, 4),
+    }
+    spoken = {action for c in negatives.read_clips(real_data) for action in c.actions}
+    assert set(negatives.THERE_AND_BACK) <= spoken
