@@ -27,9 +27,8 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
         Features of the model, or of the postures before its `ASpace`, by index or name. By default
         those of postures, if there is such an aSpace, otherwise all of the model.
     limit : float, default=None
-        Standard deviations from which on a posture departs. By default so many that
-        ``coverage`` of the performances of new people depart nowhere in these features (see
-        ``ActionModel.envelope(simultaneous=True)``); 3 shows more, and departures that are none.
+        Standard deviations from which on a posture departs; by default ``n_std`` of the model.
+        About half of all right performances go beyond 3 somewhere, few beyond it by much.
     **params : dict
         What synchronizing X takes besides, such as ``keyframes``.
 
@@ -39,7 +38,8 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
         One row a run of frames, by performance and then the worst first: ``performance``, its
         number or label; ``feature``; ``first`` and ``last``, frames of the model, counted from 0;
         ``peak``, the worst of them; ``deviation``, standard deviations there, negative below the
-        mean. No row says that a performance departs nowhere.
+        mean; ``rare``, whether a share of ``coverage`` of the performances of new people goes so
+        far at no frame and in none of these features (`ActionModel.simultaneous_factor`).
 
     Raises
     ------
@@ -59,8 +59,8 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
     >>> new = np.sin(3 * t)
     >>> new[20:25] += 3
     >>> find_departures(model, [np.sin(3 * t), new]).round(0)
-       performance feature  first  last  peak  deviation
-    0            1      x0     20    24    20       19.0
+       performance feature  first  last  peak  deviation  rare
+    0            1      x0     20    24    20       19.0  True
     """
     is_number = isinstance(limit, Real) and not isinstance(limit, bool)
     if limit is not None and not (is_number and 0 < limit < np.inf):
@@ -69,7 +69,7 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
     view = view_of(estimator, X, params, caller, features=features, postures=features is None)
     if features is not None:
         view = view.only(choose_features(features, view.names))
-    found = runs(view.scores, view.model.simultaneous_factor() if limit is None else limit)
+    found = runs(view.scores, view.model.n_std if limit is None else limit)
     table = pd.DataFrame(
         {
             "performance": np.array(view.labels, dtype=object)[found.performance],
@@ -78,6 +78,7 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
             "last": found.last,
             "peak": found.peak,
             "deviation": found.score,
+            "rare": np.abs(found.score) > view.model.simultaneous_factor(),
         }
     )
     order = np.lexsort((found.first, found.feature, -np.abs(found.score), found.performance))
