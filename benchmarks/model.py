@@ -36,7 +36,6 @@ from sklearn.metrics import roc_auc_score
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines, Skeleton
 from sklearn_motionsync.datasets import load_performances
-from threadpoolctl import threadpool_limits
 
 NOMINAL = (0.80, 0.90, 0.95, 0.99)
 # The last is that of three standard deviations.
@@ -66,7 +65,6 @@ class Found(NamedTuple):
     reversal: np.ndarray
 
 
-@threadpool_limits.wrap(limits=1)
 def examine(clips, action, actor):
     """Everything that is measured on a fold."""
     fold = hold_out(clips, action, actor)

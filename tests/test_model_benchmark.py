@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from joblib import parallel_config
 from sklearn_motionsync.datasets import make_bending
+from threadpoolctl import threadpool_limits
 
 BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 
@@ -132,7 +133,7 @@ def test_all_tables_of_a_tiny_set(model, judges, clips, capsys, monkeypatch):
     monkeypatch.setattr(judges, "TREES", 3)
     for name, value in (("FEW", (5,)), ("DRAWS", 1), ("REPETITIONS", 2)):
         monkeypatch.setattr(model, name, value)
-    with parallel_config(backend="sequential"):
+    with threadpool_limits(1), parallel_config(backend="sequential"):
         model.print_tables([clips])
     tables = capsys.readouterr().out.strip().split("\n\n")
     rows = [[line.strip("| ").split(" | ") for line in table.splitlines()] for table in tables]
