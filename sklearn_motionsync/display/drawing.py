@@ -9,11 +9,14 @@ __all__ = [
     "curves",
     "group_colors",
     "panels",
+    "parts_outside",
     "pyplot",
     "stage",
+    "sticks",
 ]
 
-# Okabe and Ito's colours, told apart by colour-blind people. One role each, in every figure.
+# Okabe and Ito's colours and a violet, told apart by colour-blind people. One role each, in every
+# figure.
 COLORS = {
     "performance": "#0072B2",
     "pattern": "#000000",
@@ -22,6 +25,10 @@ COLORS = {
     "left": "#0072B2",
     "middle": "#4D4D4D",
     "right": "#D55E00",
+    # Where something departs from the action, all else is grey.
+    "departure": "#A000F0",
+    "quiet": "#808080",
+    "shadow": "#D9D9D9",
 }
 _GROUPS = ["#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9", "#000000"]
 
@@ -100,6 +107,43 @@ def curves(axis, xs, ys, **style):
     axis.add_collection(lines)
     axis.autoscale_view()
     return lines
+
+
+def sticks(axis, color, width, alpha=1.0, zorder=2):
+    """An empty artist for the bones of bodies."""
+    from matplotlib.collections import LineCollection
+
+    style = {"colors": color, "linewidths": width, "alpha": alpha, "zorder": zorder}
+    lines = LineCollection([], **style)
+    lines.set_capstyle("round")
+    return axis.add_collection(lines, autolim=False)
+
+
+def parts_outside(ys, lower, upper):
+    """Pieces of polylines beyond two others, up to where they cross.
+
+    Parameters
+    ----------
+    ys : ndarray, shape (n, P)
+        NaN leaves a gap.
+    lower, upper : ndarray, shape (P,)
+
+    Returns
+    -------
+    xs, ys : ndarray, shape (n_pieces, 2)
+        Both ends of straight pieces, of which none is longer than a frame.
+    """
+    pieces = []
+    for beyond in (ys - upper, lower - ys):
+        out = beyond > 0
+        curve, p = np.nonzero((out[:, :-1] | out[:, 1:]) & np.isfinite(np.diff(beyond)))
+        here, there = beyond[curve, p], beyond[curve, p + 1]
+        crossed = (here > 0) != (there > 0)
+        share = here / np.where(crossed, here - there, 1)
+        ends = np.stack([np.where(here > 0, 0, share), np.where(there > 0, 1, share)], axis=1)
+        start, step = ys[curve, p], ys[curve, p + 1] - ys[curve, p]
+        pieces.append((p[:, np.newaxis] + ends, start[:, np.newaxis] + ends * step[:, np.newaxis]))
+    return tuple(np.concatenate(of_both) for of_both in zip(*pieces, strict=True))
 
 
 def group_colors(groups, n_sequences):

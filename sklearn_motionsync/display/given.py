@@ -8,15 +8,21 @@ import numpy as np
 from ..body.checks import is_whole
 from ..body.skeleton import Skeleton
 from ..gate import as_numbers
+from ..sequences import as_collection
 
 __all__ = [
+    "as_behind",
     "as_drawn",
     "as_durations",
     "as_frames",
     "as_indices",
     "as_labels",
+    "as_limit",
+    "as_marked",
     "as_moments",
     "as_names",
+    "as_performance",
+    "as_performances",
     "as_pictures",
     "as_scenes",
     "as_skeleton",
@@ -83,6 +89,33 @@ def as_pictures(seconds, fps):
     return max(2, round(seconds * fps))
 
 
+def as_performance(performance, count):
+    """The index of one of so many performances."""
+    if not (is_whole(performance) and 0 <= performance < count):
+        raise ValueError(
+            f"performance={performance!r} is out of range: there are {count} performances, from 0 "
+            f"to {count - 1}."
+        )
+    return int(performance)
+
+
+def as_limit(limit):
+    """A number of standard deviations, above 0."""
+    if not is_number(limit, 0) or limit == 0:
+        raise ValueError(
+            f"limit must be a number of standard deviations above 0, or None; got {limit!r}."
+        )
+    return float(limit)
+
+
+def as_performances(X):
+    """Performances one by one, of a collection or a single one."""
+    collection = as_collection(X)
+    if collection is not None and len(collection) == 0:
+        raise ValueError("Found 0 performances (n_samples=0); there is nothing to draw.")
+    return [X] if collection is None else collection
+
+
 def as_moments(frames, n_frames):
     """Frames of a model by their numbers, or as shares of the action below 1."""
     listed = [frames] if isinstance(frames, Real) else _listed(frames)
@@ -139,19 +172,57 @@ def as_skeleton(skeleton):
 
 def as_scenes(scenes, skeleton):
     """For each panel a list of performances (n_frames_i, n_joints, 3)."""
+    checked = _as_performances_of_panels(scenes, skeleton, "scenes", "Panel")
+    if not any(np.isfinite(x).any() for scene in checked for x in scene):
+        raise ValueError("scenes must hold positions to draw; they are empty, or all NaN.")
+    return checked
+
+
+def as_behind(behind, n_panels, skeleton):
+    """For each panel a list of performances that stand behind."""
+    checked = _as_performances_of_panels(behind, skeleton, "behind", "Behind panel")
+    if len(checked) != n_panels or skeleton is None:
+        raise ValueError(
+            f"behind must hold a list of performances for each of the {n_panels} panels, and there "
+            f"must be a skeleton; got {len(checked)}, and skeleton={skeleton!r}."
+        )
+    return checked
+
+
+def _as_performances_of_panels(scenes, skeleton, name, panel):
     listed = _listed(scenes)
     if listed is None or any(_listed(scene) is None for scene in listed):
         raise ValueError(
-            "scenes must be a list with, for each panel, a list of its performances (n_frames, "
+            f"{name} must be a list with, for each panel, a list of its performances (n_frames, "
             f"n_joints, 3); got {type(scenes).__name__}."
         )
     shape = ("n_frames", "n_joints" if skeleton is None else len(skeleton.joints), 3)
-    checked = [
-        [as_drawn(x, f"Panel {k}, performance {i}", shape) for i, x in enumerate(scene)]
+    return [
+        [as_drawn(x, f"{panel} {k}, performance {i}", shape) for i, x in enumerate(scene)]
         for k, scene in enumerate(listed)
     ]
-    if not any(np.isfinite(x).any() for scene in checked for x in scene):
-        raise ValueError("scenes must hold positions to draw; they are empty, or all NaN.")
+
+
+def as_marked(marked, n_panels, skeleton):
+    """For each panel the marked bones, pairs of joint indices."""
+    bones = [] if skeleton is None else skeleton.bones
+    listed = _listed(marked)
+    panels = None if listed is None else [_listed(of_panel) for of_panel in listed]
+    if panels is None or None in panels or len(panels) != n_panels:
+        raise ValueError(
+            f"marked must be a list with, for each of the {n_panels} panels, a list of bones, "
+            f"pairs (parent, joint) of skeleton.bones; got {marked!r}."
+        )
+    checked = []
+    for k, of_panel in enumerate(panels):
+        pairs = [_listed(bone) for bone in of_panel]
+        for bone, pair in zip(of_panel, pairs, strict=True):
+            if pair is None or not all(map(is_whole, pair)) or tuple(pair) not in bones:
+                raise ValueError(
+                    f"marked, panel {k}: {bone!r} is no bone of the skeleton; its bones are "
+                    f"{bones}."
+                )
+        checked.append([tuple(int(j) for j in pair) for pair in pairs])
     return checked
 
 

@@ -1,54 +1,46 @@
 """Stick figures: strips of postures, samples of a model (Fig. 4), and people moving in step."""
 
 import numpy as np
-from sklearn.utils.validation import check_is_fitted
 
-from ..body.direction_cosines import DirectionCosines
 from ..body.skeleton import Skeleton
-from ..model.action_model import ActionModel
-from ..pipelines import find_step, find_synchronizer, index_of_pattern, reach_synchronizer
-from ..sequences import as_collection
 from ..synchronizers.match import as_match
 from .animation import playable
-from .bodies import (
-    bodies_of,
-    bodies_of_postures,
-    bones_by_side,
-    limits,
-    on_screen,
-    placed,
-    upright,
-)
-from .drawing import COLORS, panels, stage
+from .bodies import bodies_of_postures, bones_by_side, limits, on_screen, placed, upright
+from .drawing import COLORS, panels, stage, sticks
 from .given import (
+    as_behind,
     as_durations,
     as_frames,
-    as_indices,
     as_labels,
-    as_moments,
+    as_marked,
     as_names,
+    as_performances,
     as_pictures,
     as_scenes,
     as_skeleton,
     check_view,
 )
+from .pipeline_figures import PipelineFigures
 
 __all__ = ["SkeletonDisplay"]
 
-# Performances side by side in a moving picture, if not chosen; panels in one row of a strip.
-_FEW_PERFORMANCES, _PANELS_A_ROW = 6, 6
+# Panels in one row of a strip.
+_PANELS_A_ROW = 6
+# Inches across that a heading needs, and up.
+_HEADING = 7.8, 0.4
 # Between two stick figures, in heights of the tallest.
 _SPACING = 0.7
 
 
-class SkeletonDisplay:
+class SkeletonDisplay(PipelineFigures):
     """Stick figures of joint positions: strips of postures, or performances in motion.
 
     Make one with `from_positions`, `from_postures` (strips), `from_model` (Fig. 4),
-    `from_estimator` or `from_predictions` (performances before and after synchronisation, to
-    `animate`). Left limbs are blue, right ones orange. People are turned to face the same way
-    at first. Their lowest joint ever is on the floor; the pictures of a strip, and those of people
-    who walk away, go with the pelvis.
+    `from_departures` (what is wrong with a performance), `from_estimator` or `from_predictions`
+    (performances before and after synchronisation, to `animate`). Left limbs are blue, right ones
+    orange; limbs that depart from an action are violet, and then all others grey. People are turned
+    to face the same way at first. Their lowest joint ever is on the floor; the pictures of a strip,
+    and those of people who walk away, go with the pelvis.
 
     Parameters
     ----------
@@ -64,15 +56,26 @@ class SkeletonDisplay:
     labels : list of str, default=None
         Names under the performances of a panel, which then stand side by side instead of in one
         place.
+    marked : list of list of (int, int), default=None
+        For each panel the bones to be seen at once, such as those of limbs that depart from the
+        action: pairs of ``skeleton.bones``. They are violet, all others grey.
+    behind : list of list of ndarray (n_frames_i, n_joints, 3), default=None
+        For each panel performances that stand behind as pale shadows, such as the mean.
+    heading : str, default=None
+        What stands above all panels, if the figure is the display's own.
 
     Attributes
     ----------
     figure_ : Figure
     axes_ : list of Axes
     bones_ : list of dict
-        For each panel the LineCollections of the ``"left"``, ``"middle"`` and ``"right"`` bones.
+        For each panel the LineCollections of the ``"left"``, ``"middle"`` and ``"right"`` bones,
+        and of the ``"departing"`` ones if bones are marked.
     heads_ : list of Line2D
         Without a skeleton, all joints.
+    behind_ : list of LineCollection
+        One a panel, if something stands behind.
+    heading_ : Text or None
 
     Examples
     --------
@@ -84,12 +87,27 @@ class SkeletonDisplay:
     5
     """
 
-    def __init__(self, scenes, skeleton, titles, *, durations=None, labels=None):
+    def __init__(
+        self,
+        scenes,
+        skeleton,
+        titles,
+        *,
+        durations=None,
+        labels=None,
+        marked=None,
+        behind=None,
+        heading=None,
+    ):
         self.skeleton = as_skeleton(skeleton)
         self.scenes = as_scenes(scenes, skeleton)
         self.titles = as_names(titles, len(self.scenes), "titles", "panels")
         self.durations = None if durations is None else as_durations(durations, self.scenes)
         self.labels = None if labels is None else as_labels(labels, self.scenes)
+        n_panels = len(self.scenes)
+        self.marked = None if marked is None else as_marked(marked, n_panels, skeleton)
+        self.behind = None if behind is None else as_behind(behind, n_panels, skeleton)
+        self.heading = None if heading is None else str(heading)
 
     def __repr__(self):
         return f"SkeletonDisplay({len(self.scenes)} panels)"
@@ -116,7 +134,7 @@ class SkeletonDisplay:
         SkeletonDisplay
         """
         as_skeleton(skeleton)
-        performances = [upright(x, skeleton, i) for i, x in enumerate(_as_performances(X))]
+        performances = [upright(x, skeleton, i) for i, x in enumerate(as_performances(X))]
         n_frames = min(len(x) for x in performances)
         frames = as_frames(frames, n_frames)
         standing = [placed(x, skeleton, follow=True) for x in performances]
@@ -140,88 +158,8 @@ class SkeletonDisplay:
         -------
         SkeletonDisplay
         """
-        positions = bodies_of_postures(_as_performances(X), cosines)
+        positions = bodies_of_postures(as_performances(X), cosines)
         return cls.from_positions(positions, Skeleton.paper(), frames=frames, ax=ax, **view)
-
-    @classmethod
-    def from_model(
-        cls, estimator, *, frames=(0.1, 0.4), n_samples=12, random_state=0, ax=None, **view
-    ):
-        """Draw mean postures of a model, and postures that it accepts (Fig. 4).
-
-        Parameters
-        ----------
-        estimator : Pipeline
-            Fitted, from `DirectionCosines` to an `ActionModel`; the steps before the
-            synchronizer need ``inverse_transform``.
-        frames : list of int or float, default=(0.1, 0.4)
-            Frames of the model; fractions below 1 are shares of the action.
-        n_samples : int, default=12
-            Accepted postures a frame.
-        random_state : int, RandomState instance or None, default=0
-        ax, **view : as for `from_positions`
-
-        Returns
-        -------
-        SkeletonDisplay
-        """
-        _, model = find_step(estimator, ActionModel)
-        space, _ = _before_synchronizer(estimator)
-        check_is_fitted(model)
-        bodies = bodies_of(space, model.mean_)
-        # The floor is the lowest that the mean performance ever reaches.
-        floor = [0, bodies(model.mean_)[..., 1].min(), 0]
-        scenes, titles = [], []
-        for frame in as_moments(frames, model.n_frames_):
-            samples = model.sample(n_samples, frame=frame, random_state=random_state)
-            accepted = model.accepts(samples, frame)
-            for points in (model.mean_[[frame]], samples[accepted]):
-                scenes.append([x[np.newaxis] - floor for x in bodies(points)])
-            titles += [f"frame {frame}\nmean posture", f"frame {frame}\n{sum(accepted)} samples"]
-        return cls(scenes, Skeleton.paper(), titles).plot(ax, **view)
-
-    @classmethod
-    def from_estimator(
-        cls, estimator, X, *, performances=None, ax=None, at=0.0, azimuth=-60, **params
-    ):
-        """Performances as they were recorded, above the same ones synchronised.
-
-        Parameters
-        ----------
-        estimator : Pipeline
-            Fitted, from `DirectionCosines` to a synchronizer or further.
-        X : list of arrays (n_frames_i, 3 * n_joints)
-            Joint positions.
-        performances : list of int, default=None
-            Which of them to draw; by default the pattern, if it is one of them, and others up to
-            six in all.
-        ax, at, azimuth : as for `plot`
-        **params : dict
-            What the ``match`` of the synchronizer takes besides, such as ``keyframes``.
-
-        Returns
-        -------
-        SkeletonDisplay
-            At the beginning; see `animate`.
-        """
-        _, cosines = _before_synchronizer(estimator)
-        reached = reach_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
-        match = reached.match()
-        pattern = index_of_pattern(reached.synchronizer, reached.performances)
-        if performances is None:
-            others = [i for i in range(len(match.times)) if i != pattern]
-            performances = ([] if pattern is None else [pattern]) + others
-            performances = performances[:_FEW_PERFORMANCES]
-        performances = as_indices(performances, len(match.times), "performances")
-        return cls.from_predictions(
-            [_as_performances(X)[i] for i in performances],
-            match.times[performances],
-            cosines.skeleton,
-            names=[f"{i} (pattern)" if i == pattern else str(i) for i in performances],
-            ax=ax,
-            at=at,
-            azimuth=azimuth,
-        )
 
     @classmethod
     def from_predictions(cls, X, times, skeleton, *, names=None, ax=None, **view):
@@ -243,7 +181,7 @@ class SkeletonDisplay:
         -------
         SkeletonDisplay
         """
-        X, skeleton = _as_performances(X), as_skeleton(skeleton)
+        X, skeleton = as_performances(X), as_skeleton(skeleton)
         raw = [placed(upright(x, skeleton, i), skeleton) for i, x in enumerate(X)]
         match = as_match(times, len(X))
         labels = list(range(len(X))) if names is None else names
@@ -279,28 +217,42 @@ class SkeletonDisplay:
         self
         """
         check_view(at, azimuth)
-        drawn = [[on_screen(x, azimuth) for x in scene] for scene in self.scenes]
+        n_panels = len(self.scenes)
+        behind = [[] for _ in range(n_panels)] if self.behind is None else self.behind
+        drawn, behind = (
+            [[on_screen(x, azimuth) for x in scene] for scene in scenes]
+            for scenes in (self.scenes, behind)
+        )
         places = None
         if self.labels is not None:
             gap = _SPACING * max(np.nanmax(x[..., 1]) - np.nanmin(x[..., 1]) for x in drawn[0])
             places = gap * np.arange(len(self.labels))
-            drawn = [[x + [gap * i, 0] for i, x in enumerate(scene)] for scene in drawn]
+            drawn, behind = (
+                [[x + [gap * i, 0] for i, x in enumerate(scene)] for scene in scenes]
+                for scenes in (drawn, behind)
+            )
         n_cols = 1 if self.labels is not None else min(len(drawn), _PANELS_A_ROW)
         n_rows = -(-len(drawn) // n_cols)
-        everything = np.concatenate([x.reshape(-1, 2) for scene in drawn for x in scene])
+        everything = np.concatenate([x.reshape(-1, 2) for scene in drawn + behind for x in scene])
         low, high = limits(everything)
         width, height = high - low
         # All panels have one scale, which makes figures of about 10 inches.
         scale = min(9.5 / (1.1 * n_cols * width), 3 / height)
         size = n_cols * (1.1 * width * scale + 0.15), n_rows * (1.1 * height * scale + 0.75)
+        if self.heading is not None:
+            size = max(size[0], _HEADING[0]), size[1] + _HEADING[1]
         spots = [divmod(i, n_cols) for i in range(len(drawn))]
         before = getattr(self, "axes_", [])
         self.figure_, self.axes_ = panels(ax, spots, n_rows, n_cols, size)
         for axis in self.axes_:
             if axis in before:
                 axis.clear()
-        self._drawn, self.bones_, self.heads_ = drawn, [], []
-        self._bones_by_side = bones_by_side(self.skeleton)
+        self.heading_ = None
+        if ax is None and self.heading is not None:
+            self.heading_ = self.figure_.suptitle(self.heading, fontsize="medium")
+        self._drawn, self._behind, self.bones_, self.heads_ = drawn, behind, [], []
+        self.behind_ = []
+        self._bones = self._sorted_bones()
         for axis, title, scene in zip(self.axes_, self.titles, drawn, strict=True):
             self._prepare(axis, title, len(scene), low, high)
             if places is not None:
@@ -337,19 +289,31 @@ class SkeletonDisplay:
             closes=ax is None,
         )
 
-    def _prepare(self, axis, title, n_bodies, low, high):
-        from matplotlib.collections import LineCollection
+    def _sorted_bones(self):
+        """For each panel the bones of each side of the body, and the marked ones apart."""
+        by_side = bones_by_side(self.skeleton)
+        if self.marked is None:
+            return [by_side] * len(self.scenes)
+        return [
+            {side: [b for b in bones if b not in marked] for side, bones in by_side.items()}
+            | {"departing": marked}
+            for marked in self.marked
+        ]
 
+    def _prepare(self, axis, title, n_bodies, low, high):
         alpha = 1.0 if self.labels is not None or n_bodies == 1 else 0.45
         width = 2.2 if alpha == 1 else 1.1
-        sides = {}
-        for side in ("middle", "left", "right"):
-            lines = LineCollection([], colors=COLORS[side], linewidths=width, alpha=alpha)
-            lines.set_capstyle("round")
-            sides[side] = axis.add_collection(lines, autolim=False)
-        self.bones_.append(sides)
+        colors = {side: COLORS[side] for side in ("middle", "left", "right")}
+        if self.marked is not None:
+            colors = dict.fromkeys(colors, COLORS["quiet"])
+        drawn = {side: sticks(axis, color, width, alpha) for side, color in colors.items()}
+        if self.marked is not None:
+            drawn["departing"] = sticks(axis, COLORS["departure"], 2 * width, alpha, zorder=3)
+        self.bones_.append(drawn)
+        if self.behind is not None:
+            self.behind_.append(sticks(axis, COLORS["shadow"], 3 * width, zorder=1))
         size = 3 * width if self.skeleton is not None else 1.5 * width
-        style = {"color": COLORS["middle"], "alpha": alpha, "markersize": size}
+        style = {"color": colors["middle"], "alpha": alpha, "markersize": size}
         self.heads_ += axis.plot([], [], "o", **style)
         stage(axis, title, low, high)
 
@@ -360,7 +324,6 @@ class SkeletonDisplay:
             durations = [[len(x) - 1 for x in scene] for scene in self._drawn]
         longest = max(max(of_scene, default=0) for of_scene in durations)
         heads = slice(None) if self.skeleton is None else [self.skeleton.index_of("head")]
-        bones = self._bones_by_side
         artists = []
         for i, (scene, taking) in enumerate(zip(self._drawn, durations, strict=True)):
             shares = [min(1.0, at * longest / d) if d > 0 else 0.0 for d in taking]
@@ -368,28 +331,17 @@ class SkeletonDisplay:
                 x[round(share * (len(x) - 1))] for x, share in zip(scene, shares, strict=True)
             ]
             for side, lines in self.bones_[i].items():
-                lines.set_segments([body[list(bone)] for body in bodies for bone in bones[side]])
+                lines.set_segments(_segments(bodies, self._bones[i][side]))
                 artists.append(lines)
             dots = [body[heads] for body in bodies]
             self.heads_[i].set_data(np.concatenate(dots).T if dots else ([], []))
             artists.append(self.heads_[i])
+        for lines, scene in zip(self.behind_, self._behind, strict=bool(self.behind_)):
+            bodies = [x[round(at * (len(x) - 1))] for x in scene]
+            lines.set_segments(_segments(bodies, self.skeleton.bones))
+            artists.append(lines)
         return artists
 
 
-def _as_performances(X):
-    """Performances one by one, of a collection or a single one."""
-    collection = as_collection(X)
-    if collection is not None and len(collection) == 0:
-        raise ValueError("Found 0 performances (n_samples=0); there is nothing to draw.")
-    return [X] if collection is None else collection
-
-
-def _before_synchronizer(estimator):
-    """The steps of a pipeline before its synchronizer, and the DirectionCosines among them."""
-    before, _ = find_synchronizer(estimator)
-    if before is None:
-        raise ValueError(
-            "Stick figures need a pipeline that begins with DirectionCosines; for a synchronizer "
-            "by itself use from_predictions with the joint positions."
-        )
-    return before, find_step(before, DirectionCosines)[1]
+def _segments(bodies, bones):
+    return [body[list(bone)] for body in bodies for bone in bones]

@@ -27,12 +27,18 @@ class View(NamedTuple):
         Performances in these features.
     labels : list
         Of these performances.
+    own : ActionModel
+        The model of the estimator, in its own features.
+    given : sequence of ndarray (P, n_own_features) or None
+        Performances in those, checked: the methods of that model take them as they are.
     """
 
     model: ActionModel
     names: list
     synchronised: np.ndarray | None
     labels: list
+    own: ActionModel
+    given: tuple | None
 
     @property
     def scores(self):
@@ -47,7 +53,8 @@ class View(NamedTuple):
             return self
         some = None if self.synchronised is None else self.synchronised[:, :, chosen]
         model = _seen(self.model, lambda points: points[:, :, chosen])
-        return View(model, [self.names[i] for i in chosen], some, self.labels)
+        names = [self.names[i] for i in chosen]
+        return self._replace(model=model, names=names, synchronised=some)
 
 
 def view_of(estimator, X=None, params=None, caller="", *, features=None, postures=False):
@@ -79,22 +86,23 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
     """
     before, model = find_step(estimator, ActionModel)
     check_is_fitted(model)
-    synchronised, labels = None, []
+    given, points, labels = None, None, []
     if X is not None:
-        performances = model.check_performances(transform_through(before, X, params or {}, caller))
-        synchronised, labels = np.stack(performances), performances.labels
+        given = model.check_performances(transform_through(before, X, params or {}, caller))
+        points, labels = np.stack(given), given.labels
     names = names_of(before, model, model.mean_.shape[1])
     asked = any(isinstance(f, str) and f not in names for f in as_features(features))
     aspace = None
     if before is not None and (asked or postures):
         aspace, names = _space_before(before, names, must=asked)
     if aspace is None:
-        return View(model, names, synchronised, labels)
+        return View(model, names, points, labels, model, given)
 
     def back(points):
         return points @ aspace.components_ + aspace.mean_
 
-    return View(_seen(model, back), names, None if X is None else back(synchronised), labels)
+    synchronised = None if X is None else back(points)
+    return View(_seen(model, back), names, synchronised, labels, model, given)
 
 
 def _seen(model, through):

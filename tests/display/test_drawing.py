@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
-from sklearn_motionsync.display.drawing import COLORS, group_colors
+from sklearn_motionsync.display.drawing import COLORS, group_colors, parts_outside
 
 # How colours look to people who lack one kind of cones: Machado, Oliveira and Fernandes, "A
 # physiologically-based model for simulation of color vision deficiency", 2009, severity 1.
@@ -34,6 +34,8 @@ TOGETHER = [
     ("left", "right"),
     ("left", "middle"),
     ("right", "middle"),
+    *(("departure", other) for other in ("performance", "mean", "envelope", "pattern")),
+    *itertools.combinations(("departure", "quiet", "shadow"), 2),
 ]
 
 
@@ -59,3 +61,33 @@ def test_the_colors_of_a_few_groups_are_told_apart(seen_by):
     _, color_of = group_colors(list("abcd"), 4)
     for one, other in itertools.combinations(color_of.values(), 2):
         assert np.linalg.norm(lab(one, seen_by) - lab(other, seen_by)) > 15
+
+
+def test_what_of_a_curve_is_outside_a_band():
+    rng = np.random.default_rng(0)
+    ys, center = rng.normal(size=(5, 12)).cumsum(axis=1), rng.normal(size=12)
+    ys[1, 4], ys[2] = np.nan, center
+    lower, upper = center - rng.uniform(size=12), center + 1
+    xs, heights = parts_outside(ys, lower, upper)
+    fine, clock = np.linspace(0, 11, 11 * 400 + 1)[:-1] + 1e-4, np.arange(12)
+    at = {name: np.interp(fine, clock, y) for name, y in (("lower", lower), ("upper", upper))}
+    for x, y in zip(xs, heights, strict=True):
+        middle = x.mean()
+        bounds = (np.interp(middle, clock, bound) for bound in (lower, upper))
+        assert not next(bounds) <= y.mean() <= next(bounds)
+        assert 0 < x[1] - x[0] <= 1
+    outside = 0
+    for y in ys:
+        drawn = np.interp(fine, clock, y)
+        drawn[np.isnan(y[np.floor(fine).astype(int)] + y[np.ceil(fine).astype(int)])] = np.nan
+        outside += ((drawn < at["lower"]) | (drawn > at["upper"])).sum() / 400
+    np.testing.assert_allclose(np.diff(xs).sum(), outside, atol=0.05)
+    # Nothing is outside of a band that only touches.
+    assert len(parts_outside(ys[2:3], center, center)[0]) == 0
+
+
+def test_a_curve_from_above_a_band_to_below_it():
+    xs, ys = parts_outside(np.array([[3.0, -3.0]]), np.full(2, -1.0), np.full(2, 1.0))
+    order = np.argsort(xs[:, 0])
+    np.testing.assert_allclose(xs[order], [[0, 1 / 3], [2 / 3, 1]])
+    np.testing.assert_allclose(ys[order], [[3, 1], [-1, -3]])

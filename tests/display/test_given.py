@@ -151,6 +151,11 @@ def test_a_synchronization_made_by_hand(change, message):
         ({"feature_names": ["a"]}, "each of the 2 features, got 1"),
         ({"n_std": "3"}, "n_std must be a number of at least 0, got '3'"),
         ({"n_std": np.nan}, "n_std must be a number of at least 0, got nan"),
+        ({"n_std": None}, "n_std must be a number of at least 0, got None"),
+        ({"band": "all"}, r"band must be one of \['points', 'performances', 'mean'\], got 'all'"),
+        ({"band": ["mean"]}, "band must be one of"),
+        ({"band": "performances"}, "coverage must be a share between 0 and 1, got None"),
+        ({"coverage": 95}, "coverage must be a share between 0 and 1, got 95"),
         ({"performances": MEAN}, r"behind must have the shape \(n_sequences, 5, 2\)"),
         ({"performances": [MEAN + np.inf]}, r"behind is infinite at \(0, 0, 0\)"),
     ],
@@ -353,8 +358,18 @@ def test_postures_of_all_kinds(pipe):
         ({"durations": [[3, 4]]}, "durations must be a list"),
         ({"durations": [[-1]]}, "durations must be numbers of at least 0"),
         ({"durations": [["1"]]}, "durations must be numbers of at least 0"),
+        *(({"marked": bad}, "marked must be a list with, for each of the 1 panels, a list of bones")
+          for bad in (3, "left", [], [[], []], [3], [(0, 1), (1, 2)], {(0, 1)})),
+        *(({"marked": [bad]}, "marked, panel 0: .* is no bone of the skeleton; its bones are")
+          for bad in ([1], ["ab"], [(0, 2)], [(1, 0)], [(0, True)], [(0, 1, 2)], [(0, 1), None])),
+        ({"marked": [[(0, 1)]], "skeleton": None}, r"is no bone .* its bones are \[\]"),
+        ({"behind": 5}, "behind must be a list with, for each panel"),
+        ({"behind": [BODY]}, "behind must be a list with, for each panel"),
+        ({"behind": [[BODY], [BODY]]}, "performances for each of the 1 panels, .* got 2"),
+        ({"behind": [[BODY[:, :9]]]}, r"Behind panel 0, performance 0 .* \(n_frames, 15, 3\)"),
+        ({"behind": [[BODY]], "skeleton": None}, "there must be a skeleton"),
     ],
-)
+)  # fmt: skip
 def test_stick_figures_made_by_hand(change, message):
     given = {"scenes": [[BODY]], "skeleton": PAPER, "titles": ["one"]}
     assert len(SkeletonDisplay(**given).plot().axes_) == 1

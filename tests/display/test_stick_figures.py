@@ -88,6 +88,47 @@ def test_left_and_right_have_colors_of_their_own():
     assert len(set(colors.values())) == 3
 
 
+def test_marked_bones_are_seen_at_once():
+    skeleton, body = Skeleton.paper(), standing()[np.newaxis]
+    thigh = next(b for b in skeleton.bones if skeleton.joints[b[1]] == "left_knee")
+    plain = SkeletonDisplay([[body]] * 2, skeleton, ["one", "two"]).plot()
+    marked = [[], [np.array(thigh)]]
+    display = SkeletonDisplay([[body]] * 2, skeleton, ["one", "two"], marked=marked).plot()
+    counts = [{side: len(bones_drawn(display, k, side)) for side in display.bones_[k]}
+              for k in (0, 1)]  # fmt: skip
+    assert counts[0] == {"left": 6, "middle": 2, "right": 6, "departing": 0}
+    assert counts[1] == {"left": 5, "middle": 2, "right": 6, "departing": 1}
+    x, y = (body[0, list(thigh)] @ axis for axis in ([0.5, 0, 3**0.5 / 2], [0, 1, 0]))
+    np.testing.assert_allclose(bones_drawn(display, 1, "departing")[0], np.transpose([x, y]))
+    # Nothing is lost, all else is of one grey, and what departs is thicker and in front.
+    assert sorted(bones_drawn(plain, 1).tolist()) == sorted(bones_drawn(display, 1).tolist())
+    departing = display.bones_[1].pop("departing")
+    assert len({tuple(lines.get_colors()[0]) for lines in display.bones_[1].values()}) == 1
+    for lines in display.bones_[1].values():
+        assert departing.get_zorder() > lines.get_zorder()
+        assert departing.get_linewidths()[0] > 1.5 * lines.get_linewidths()[0]
+    assert "departing" not in plain.bones_[0]
+
+
+def test_shadows_stand_behind_and_move_along():
+    skeleton, body = Skeleton.paper(), standing()
+    moving = body + np.arange(3)[:, np.newaxis, np.newaxis] * [0, 0.2, 0]
+    given = {"behind": [[moving]], "heading": "all of it"}
+    display = SkeletonDisplay([[moving[::2]]], skeleton, ["one"], **given)
+    assert display.plot(at=1).heading_.get_text() == "all of it"
+    (shadow,) = display.behind_
+    assert shadow.get_zorder() < min(lines.get_zorder() for lines in display.bones_[0].values())
+    drawn = sorted(path.vertices.tolist() for path in shadow.get_paths())
+    assert drawn == sorted(bones_drawn(display, 0).tolist())
+    # Also where bodies stand side by side; the heading of a figure of others is theirs.
+    scenes = {"scenes": [[moving, moving]], "behind": [[moving, moving]]}
+    display = SkeletonDisplay(**scenes, skeleton=skeleton, titles=["one"], labels=["a", "b"])
+    display.plot(plt.subplots()[1], at=0.5)
+    assert display.heading_ is None
+    drawn = sorted(path.vertices.tolist() for path in display.behind_[0].get_paths())
+    assert drawn == sorted(bones_drawn(display, 0).tolist())
+
+
 def test_place_heading_and_vertical_axis_do_not_matter():
     pictures = []
     skeleton = Skeleton.paper()

@@ -1,0 +1,211 @@
+"""Stick figures of what a fitted pipeline knows: its model (Fig. 4), people on its clock."""
+
+import numpy as np
+from sklearn.utils.validation import check_is_fitted
+
+from ..body.direction_cosines import DirectionCosines
+from ..body.skeleton import Skeleton
+from ..model.action_model import ActionModel
+from ..model.views import view_of
+from ..pipelines import find_step, find_synchronizer, index_of_pattern, reach_synchronizer
+from .bodies import bodies_of
+from .departing import strip_of
+from .given import as_indices, as_limit, as_moments, as_performance, as_performances
+
+__all__ = ["PipelineFigures"]
+
+# Performances side by side in a moving picture, if not chosen.
+_FEW_PERFORMANCES = 6
+
+
+class PipelineFigures:
+    """Ways to make a `SkeletonDisplay` of a fitted pipeline."""
+
+    @classmethod
+    def from_model(
+        cls, estimator, *, frames=(0.1, 0.4), n_samples=12, random_state=0, ax=None, **view
+    ):
+        """Draw mean postures of a model, and postures that it accepts (Fig. 4).
+
+        Parameters
+        ----------
+        estimator : Pipeline
+            Fitted, from `DirectionCosines` to an `ActionModel`; the steps before the
+            synchronizer need ``inverse_transform``.
+        frames : list of int or float, default=(0.1, 0.4)
+            Frames of the model; fractions below 1 are shares of the action.
+        n_samples : int, default=12
+            Accepted postures a frame.
+        random_state : int, RandomState instance or None, default=0
+        ax, **view : as for `from_positions`
+
+        Returns
+        -------
+        SkeletonDisplay
+        """
+        _, model = find_step(estimator, ActionModel)
+        space, _ = _before_synchronizer(estimator)
+        check_is_fitted(model)
+        bodies = bodies_of(space, model.mean_)
+        # The floor is the lowest that the mean performance ever reaches.
+        floor = [0, bodies(model.mean_)[..., 1].min(), 0]
+        scenes, titles = [], []
+        for frame in as_moments(frames, model.n_frames_):
+            samples = model.sample(n_samples, frame=frame, random_state=random_state)
+            accepted = model.accepts(samples, frame)
+            for points in (model.mean_[[frame]], samples[accepted]):
+                scenes.append([x[np.newaxis] - floor for x in bodies(points)])
+            titles += [f"frame {frame}\nmean posture", f"frame {frame}\n{sum(accepted)} samples"]
+        return cls(scenes, Skeleton.paper(), titles).plot(ax, **view)
+
+    @classmethod
+    def from_departures(
+        cls,
+        estimator,
+        X,
+        *,
+        performance=0,
+        frames=6,
+        limit=None,
+        ax=None,
+        at=0.0,
+        azimuth=-60,
+        **params,
+    ):
+        """Draw where a performance departs from the action, and with which limbs.
+
+        A strip of the performance on the model's clock, as the model sees it: what an `ASpace`
+        left out is not there. Limbs that depart are violet, and the mean performance stands
+        behind as a pale shadow. A limb departs where one of its cosines is farther from the mean
+        than ``limit``; for the height of the pelvis the hips are marked. The titles name the limb
+        that departs most, and above them stands whether the model accepts the performance.
+
+        Parameters
+        ----------
+        estimator : Pipeline
+            Fitted, from `DirectionCosines` to an `ActionModel`, with an `ASpace` or without.
+        X : list of arrays (n_frames_i, 3 * n_joints)
+            Joint positions.
+        performance : int, default=0
+            Which of them is drawn.
+        frames : int or list of int, default=6
+            How many: the clock is cut into as many equal parts, and each is shown at the frame of
+            its worst departure, in its middle if there is none. Or which frames of the model:
+            each stands for those that are nearer to it than to the others, at most a twelfth of
+            the clock away. A limb is marked if it departs anywhere in that part.
+        limit : float, default=None
+            In standard deviations that are predicted for a new person; by default ``n_std`` of
+            the model. Right performances go somewhat beyond 3 here and there; what is rare
+            (`ActionModel.simultaneous_factor`) stands above the panels.
+        ax, at, azimuth : as for `plot`
+        **params : dict
+            What synchronizing X takes besides, such as ``keyframes``.
+
+        Returns
+        -------
+        SkeletonDisplay
+
+        Raises
+        ------
+        ValueError
+            If there is no such performance or frame, ``limit`` is not above 0, or the features of
+            the model cannot be taken back to those of `DirectionCosines`.
+
+        See Also
+        --------
+        find_departures : The same in a table.
+        ActionModelDisplay : The curves of the performance, and the band that they leave.
+        """
+        caller = f"{cls.__name__}.from_departures"
+        view, cosines = _in_limbs(estimator, X, params, caller)
+        i = as_performance(performance, len(view.given))
+        limit = view.model.n_std if limit is None else as_limit(limit)
+        strip = strip_of(view.scores[i], view.names, frames, limit)
+        # Each on a floor of its own, as heights of the pelvis are.
+        bodies, shadows = (
+            np.asarray(cosines.inverse_transform(x)).reshape(len(x), -1, 3)
+            for x in (view.synchronised[i], view.model.mean_)
+        )
+        label = view.labels[i]
+        called = f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
+        verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
+        display = cls(
+            [[bodies[[frame]]] for frame in strip.frames],
+            Skeleton.paper(),
+            strip.titles,
+            marked=strip.marked,
+            behind=[[shadows[[frame]]] for frame in strip.frames],
+            heading=f"{called} is {verdict}. Violet: limbs more than {limit:.3g} standard "
+            "deviations from what is expected of a new\nperson, at or around that frame; beyond "
+            f"{view.model.simultaneous_factor():.2g} is rare. Pale: the mean performance.",
+        )
+        return display.plot(ax, at=at, azimuth=azimuth)
+
+    @classmethod
+    def from_estimator(
+        cls, estimator, X, *, performances=None, ax=None, at=0.0, azimuth=-60, **params
+    ):
+        """Performances as they were recorded, above the same ones synchronised.
+
+        Parameters
+        ----------
+        estimator : Pipeline
+            Fitted, from `DirectionCosines` to a synchronizer or further.
+        X : list of arrays (n_frames_i, 3 * n_joints)
+            Joint positions.
+        performances : list of int, default=None
+            Which of them to draw; by default the pattern, if it is one of them, and others up to
+            six in all.
+        ax, at, azimuth : as for `plot`
+        **params : dict
+            What the ``match`` of the synchronizer takes besides, such as ``keyframes``.
+
+        Returns
+        -------
+        SkeletonDisplay
+            At the beginning; see `animate`.
+        """
+        _, cosines = _before_synchronizer(estimator)
+        reached = reach_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
+        match = reached.match()
+        pattern = index_of_pattern(reached.synchronizer, reached.performances)
+        if performances is None:
+            others = [i for i in range(len(match.times)) if i != pattern]
+            performances = ([] if pattern is None else [pattern]) + others
+            performances = performances[:_FEW_PERFORMANCES]
+        performances = as_indices(performances, len(match.times), "performances")
+        return cls.from_predictions(
+            [as_performances(X)[i] for i in performances],
+            match.times[performances],
+            cosines.skeleton,
+            names=[f"{i} (pattern)" if i == pattern else str(i) for i in performances],
+            ax=ax,
+            at=at,
+            azimuth=azimuth,
+        )
+
+
+def _in_limbs(estimator, X, params, caller):
+    """The model and performances in the cosines of limbs, and the DirectionCosines."""
+    _, cosines = _before_synchronizer(estimator)
+    if X is None:
+        raise ValueError(f"{caller} needs performances X, whose departures are drawn; got None.")
+    view = view_of(estimator, X, params, caller, postures=True)
+    if view.names != list(cosines.get_feature_names_out()):
+        raise ValueError(
+            "Limbs that depart need a pipeline of DirectionCosines, an ASpace if you like, "
+            "synchronizers and an ActionModel, whose features lead back to limbs; those found "
+            f"are {', '.join(view.names[:4])}, ..."
+        )
+    return view, cosines
+
+
+def _before_synchronizer(estimator):
+    """The steps of a pipeline before its synchronizer, and the DirectionCosines among them."""
+    before, _ = find_synchronizer(estimator)
+    if before is None:
+        raise ValueError(
+            "Stick figures need a pipeline that begins with DirectionCosines; for a synchronizer "
+            "by itself use from_predictions with the joint positions."
+        )
+    return before, find_step(before, DirectionCosines)[1]
