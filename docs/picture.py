@@ -62,6 +62,7 @@ def main():
         axis.set_yticks([])
     below[0].set_ylabel("second dimension\nof the aSpace")
     below[2].sharey(below[1])
+    below[2].get_legend().set_title(None)
     below[2].get_legend().set_loc("lower right")
     figure.savefig(Path(__file__).parent / "_static" / "bends.png", dpi=110)
 

@@ -313,18 +313,83 @@ def test_a_model_in_posture_features(bunch, pipe):
     display = ActionModelDisplay.from_estimator(pipe, features=["left_leg_y", "pelvis_height"])
     names = list(pipe[0].get_feature_names_out())
     chosen = [names.index("left_leg_y"), names.index("pelvis_height")]
-    model, rng = pipe[-1], np.random.default_rng(0)
-    postures = pipe[1].inverse_transform(model.mean_)[:, chosen]
+    postures = pipe[1].inverse_transform(pipe[-1].mean_)[:, chosen]
     np.testing.assert_allclose(display.mean, postures, atol=1e-12)
-    assert display.performances_ == []
-    # The variance of postures, from postures.
-    frame = 14
-    points = model.mean_[frame] + rng.standard_normal((200_000, 3)) * np.sqrt(
-        model.variance_[frame]
+    assert display.performances_ == display.departures_ == []
+    # The variance of postures, from postures: dimensions of the aSpace vary together.
+    postures = pipe[1].inverse_transform(pipe[:3].transform(bunch.data))[:, :, chosen]
+    std = postures.std(axis=0)
+    np.testing.assert_allclose(display.upper - display.mean, 3 * std, atol=1e-9)
+    np.testing.assert_allclose(display.mean - display.lower, 3 * std, atol=1e-9)
+
+
+def said(display):
+    """The legend: what the band holds, what it is, and how many performances leave it."""
+    legend = display.axes_[0].get_legend()
+    texts = [text.get_text() for text in legend.get_texts()]
+    outside = [int(text.split()[3]) for text in texts if text.startswith("outside the band")]
+    return legend.get_title().get_text(), texts[0], *outside
+
+
+def test_bands_say_what_they_hold(bunch, pipe):
+    model = ActionModel(n_std=2, coverage=0.9).fit(pipe[:3].transform(bunch.data))
+    factor = model.simultaneous_factor()
+    expected = {
+        "points": (model.envelope(), "single postures", "mean ± 2 standard deviations"),
+        "performances": (
+            model.envelope(simultaneous=True),
+            "90 % of new people's performances",
+            f"mean ± {factor:.3g} predicted standard deviations",
+        ),
+        "mean": (
+            model.mean_envelope(random_state=0),
+            "the mean of all people, 90 % sure",
+            "where the mean may be",
+        ),
+    }
+    for band, ((lower, upper), holds, label) in expected.items():
+        display = ActionModelDisplay.from_estimator(model, features=[1], band=band)
+        np.testing.assert_array_equal(display.lower, lower[:, [1]])
+        np.testing.assert_array_equal(display.upper, upper[:, [1]])
+        title, text = said(display)
+        assert holds in title
+        assert text == label
+    for features in ("torso_z", "aspace0"):
+        wide, narrow = (
+            ActionModelDisplay.from_estimator(pipe, features=features, band=band)
+            for band in ("performances", "mean")
+        )
+        assert (wide.upper > narrow.upper).all()
+        assert (wide.lower < narrow.lower).all()
+
+
+@pytest.mark.parametrize("band", ["points", "performances"])
+def test_what_leaves_the_band_is_seen_at_once(bunch, pipe, band):
+    still = np.repeat(bunch.data[0][:1], 40, axis=0)
+    people, features = [*bunch.data[:3], still], ["pelvis_height", "torso_z"]
+    display = ActionModelDisplay.from_estimator(pipe, people, features=features, band=band)
+    outside = (display.performances < display.lower) | (display.performances > display.upper)
+    assert outside[3].any()
+    assert said(display)[2] == outside.any(axis=(1, 2)).sum()
+    for i, departures in enumerate(display.departures_):
+        assert tuple(departures.get_colors()[0]) != tuple(display.performances_[i].get_colors()[0])
+        drawn = {(x, y) for piece in segments(departures) for x, y in piece.round(9) if x % 1 == 0}
+        seen = np.argwhere(outside[:, :, i])
+        assert drawn == {(p, display.performances[n, p, i].round(9)) for n, p in seen}
+    given = {"features": features, "band": band}
+    assert (
+        ActionModelDisplay.from_estimator(pipe, people, departures=False, **given).departures_ == []
     )
-    std = pipe[1].inverse_transform(points)[:, chosen].std(axis=0)
-    np.testing.assert_allclose(display.upper[frame] - display.mean[frame], 3 * std, rtol=0.01)
-    np.testing.assert_allclose(display.mean[frame] - display.lower[frame], 3 * std, rtol=0.01)
+    assert ActionModelDisplay.from_estimator(pipe, people, band="mean").departures_ == []
+
+
+def test_what_is_as_the_mean_leaves_no_band():
+    """Features in which nobody differs, whatever rounding says."""
+    X = np.tile(np.random.default_rng(0).normal(size=(9, 2)), (3, 1, 1)).astype(np.float32)
+    X[:, :, 0] += np.array([0, 0.1, 0.3], dtype=np.float32)[:, np.newaxis]
+    for band in ("points", "performances"):
+        display = ActionModelDisplay.from_estimator(ActionModel().fit(X), X, band=band)
+        assert said(display)[2] == 0
 
 
 @pytest.mark.parametrize("features", [1, np.int64(1), [1], np.array([1]), range(1, 2), "aspace1"])
