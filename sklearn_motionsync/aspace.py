@@ -48,6 +48,8 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         ``b``.
     residual_variance_ : float
         ``eps_b`` of Eq. 4: the variance left out, the sum of the other eigenvalues.
+    left_out_variance_ : ndarray, shape (n_features,)
+        The same of every parameter of a posture by itself; their sum is ``eps_b``.
     n_features_in_ : int
         Parameters of a posture.
     feature_names_in_ : ndarray of str
@@ -131,6 +133,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
             variance[:b] / whole if whole > 0 else np.zeros_like(variance[:b])
         )
         self.residual_variance_ = float(variance[b:].sum())
+        self.left_out_variance_ = variance[b:] @ np.square(pca.components_[b:])
         self.n_components_ = b
         return self
 

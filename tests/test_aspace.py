@@ -39,6 +39,8 @@ def test_residual_variance_is_the_reconstruction_error(postures):
     back = aspace.inverse_transform(aspace.transform(postures))
     error = np.concatenate(back) - np.concatenate(postures)
     np.testing.assert_allclose(np.square(error).sum() / (len(error) - 1), aspace.residual_variance_)
+    by_parameter = np.square(error).sum(axis=0) / (len(error) - 1)
+    np.testing.assert_allclose(aspace.left_out_variance_, by_parameter)
 
 
 def test_inverse_is_exact_when_nothing_is_left_out(postures):

@@ -123,7 +123,9 @@ class ActionModelDisplay:
               itself. It holds most postures of new people, but few of their performances from
               the first frame to the last;
             - ``"performances"``: ``model.envelope(simultaneous=True)``, which holds the share
-              ``coverage`` of whole performances of new people, in all features and at all frames;
+              ``coverage`` of whole performances of new people, in all features and at all frames.
+              In features of postures it allows for what the `ASpace` leaves out, and performances
+              are drawn with that;
             - ``"mean"``: ``model.mean_envelope()``, which holds the mean of all people with
               probability ``coverage``: how well the mean is known.
         departures : bool, default=True
@@ -151,15 +153,15 @@ class ActionModelDisplay:
         caller = f"{cls.__name__}.from_estimator"
         view = view_of(estimator, X, params, caller, features=features)
         chosen = choose_features(features, view.names)
-        lower, upper, n_std = _bounds(view.model, band)
-        shown = None if view.synchronised is None else view.synchronised[:, :, chosen]
+        lower, upper, n_std = _bounds(view, band)
+        shown = view.whole if band == "performances" else view.synchronised
         display = cls(
             view.model.mean_[:, chosen],
             lower[:, chosen],
             upper[:, chosen],
             feature_names=[view.names[i] for i in chosen],
             n_std=n_std,
-            performances=shown,
+            performances=None if shown is None else shown[:, :, chosen],
             band=band,
             coverage=None if band == "points" else view.model.coverage,
             departures=departures,
@@ -200,7 +202,7 @@ class ActionModelDisplay:
             axis.set_ylabel(name)
             if i + n_cols >= count:
                 axis.set_xlabel("frame of the pattern")
-        self._explain(self.axes_[0])
+        self._explain(self.axes_[0], above=ax is None)
         return self
 
     def _draw_performances(self, axis, clock, i):
@@ -233,11 +235,13 @@ class ActionModelDisplay:
         predicted = "predicted " if self.band == "performances" else ""
         return f"mean ± {self.n_std:.3g} {predicted}standard deviations"
 
-    def _explain(self, axis):
-        """A legend, with what the band holds as its title."""
+    def _explain(self, axis, above):
+        """A legend, with what the band holds as its title; above the panel it hides nothing."""
         title = _HOLDS[self.band].format(share=100 * (self.coverage or 0))
         style = {"fontsize": "small", "title_fontsize": "small", "alignment": "left"}
-        axis.legend(loc="best", frameon=True, title=title, **style)
+        if above:
+            style |= {"loc": "lower left", "bbox_to_anchor": (0, 1)}
+        axis.legend(frameon=not above, title=title, **style)
 
 
 def _as_band(band):
@@ -246,11 +250,11 @@ def _as_band(band):
     return band
 
 
-def _bounds(model, band):
-    """Lower and upper bound of a model's band, and its half-width in standard deviations."""
+def _bounds(view, band):
+    """Lower and upper bound of a band, and its half-width in standard deviations."""
     if band == "mean":
         # The same picture every time.
-        return *model.mean_envelope(random_state=0), None
+        return *view.model.mean_envelope(random_state=0), None
     if band == "points":
-        return *model.envelope(), model.n_std
-    return *model.envelope(simultaneous=True), model.simultaneous_factor()
+        return *view.model.envelope(), view.model.n_std
+    return *view.band, view.model.simultaneous_factor()

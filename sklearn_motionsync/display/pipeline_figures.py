@@ -74,11 +74,11 @@ class PipelineFigures:
     ):
         """Draw where a performance departs from the action, and with which limbs.
 
-        A strip of the performance on the model's clock, as the model sees it: what an `ASpace`
-        left out is not there. Limbs that depart are violet, and the mean performance stands
-        behind as a pale shadow. A limb departs where one of its cosines is farther from the mean
-        than ``limit``; for the height of the pelvis the hips are marked. The titles name the limb
-        that departs most, and above them stands whether the model accepts the performance.
+        A strip of the performance on the model's clock. Limbs that depart are violet, and the mean
+        performance stands behind as a pale shadow. A limb departs where one of its cosines is
+        farther from the mean than ``limit``; for the height of the pelvis the hips are marked. The
+        titles name the limb that departs most, and above them stands whether the model accepts
+        the performance.
 
         Parameters
         ----------
@@ -124,7 +124,7 @@ class PipelineFigures:
         # Each on a floor of its own, as heights of the pelvis are.
         bodies, shadows = (
             np.asarray(cosines.inverse_transform(x)).reshape(len(x), -1, 3)
-            for x in (view.synchronised[i], view.model.mean_)
+            for x in (view.whole[i], view.model.mean_)
         )
         label = view.labels[i]
         called = f"Performance {i}" if label == i else f"Performance {i} ({label!r})"

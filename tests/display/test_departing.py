@@ -14,6 +14,7 @@ from sklearn_motionsync import (
     DirectionCosines,
     KeyframeSynchronizer,
     LinearSynchronizer,
+    Match,
     Skeleton,
     SkeletonDisplay,
     find_departures,
@@ -120,10 +121,11 @@ def test_who_stands_still_does_not_bend(bunch, pipe):
     assert bad.heading_.get_text().startswith("Performance 1 is not accepted.")
     assert sum(map(len, good.marked)) < 3 < sum(map(len, bad.marked))
     assert "neck" in marked_joints(bad, 1), "the torso"
-    # What is drawn: the posture as the model sees it, and the mean at the same frame.
-    points = pipe[:3].transform(people)[1]
-    for x, scenes in ((points, bad.scenes), (pipe[-1].mean_, bad.behind)):
-        bodies = pipe[:2].inverse_transform(x).reshape(40, 15, 3)
+    # What is drawn: the whole posture, also what the aSpace leaves out, and the mean at the frame.
+    postures = Match.from_estimator(pipe, people).warp(pipe[0].transform(people))[1]
+    mean = pipe[1].inverse_transform([pipe[-1].mean_])[0]
+    for x, scenes in ((postures, bad.scenes), (mean, bad.behind)):
+        bodies = pipe[0].inverse_transform([x])[0].reshape(40, 15, 3)
         for title, scene in zip(bad.titles, scenes, strict=True):
             frame = int(title.split("\n")[0].removeprefix("frame "))
             np.testing.assert_allclose(scene[0], bodies[[frame]], atol=1e-9)

@@ -151,10 +151,13 @@ def test_departures_of_a_pipeline_are_those_of_limbs(pipe):
     for name in ("left_elbow", "left_wrist"):
         x[middle, joint[name]] += lifted - arm
     table = find_departures(pipe, [bunch.data[0], x.reshape(len(x), -1)])
-    assert set(table["performance"][table["rare"]]) == {1}
-    worst = table[table["rare"]].iloc[0]
-    assert worst["feature"].startswith("left_arm")
-    assert 8 < worst["peak"] < 22
+    # Though the aSpace, of four dimensions, has no room for it.
+    rare = table[table["rare"]]
+    assert set(rare["performance"]) == {1}
+    assert set(rare["feature"]) <= {
+        f"left_{limb}_{axis}" for limb in ("arm", "forearm") for axis in "xyz"
+    }
+    assert 8 < rare.iloc[0]["peak"] < 22
     own = find_departures(pipe, [x.reshape(len(x), -1)], features=["aspace0", "aspace1"], limit=1)
     assert set(own["feature"]) <= {"aspace0", "aspace1"}
 
