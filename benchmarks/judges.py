@@ -62,7 +62,7 @@ OURS = {
 
 # -- of scikit-learn --------------------------------------------------------------------
 
-TREES = 30
+TREES = 20
 
 
 def lof(n_performances, n_neighbors):

@@ -11,7 +11,6 @@ packages are shown at the best of a few settings (judges.py), chosen by the resu
 area under the curve on that data set. Prints Markdown.
 """
 
-import inspect
 import sys
 import time
 from pathlib import Path
@@ -94,13 +93,14 @@ def accepted_at(on_clock, groups, own, label):
 
 def held_by(fold):
     """Shares of points, and whether the whole, of right performances that bands hold."""
-    bands = {"points": (lambda c: ActionModel(n_std=ndtri((1 + c) / 2)), {})}
-    if has_simultaneous_band():
-        bands["performances"] = (lambda c: ActionModel(coverage=c), {"simultaneous": True})
+    bands = {
+        "points": (lambda c: ActionModel(n_std=ndtri((1 + c) / 2)), False),
+        "performances": (lambda c: ActionModel(coverage=c), True),
+    }
     found = {}
-    for band, (make, options) in bands.items():
+    for band, (make, whole) in bands.items():
         models = [make(c).fit(fold.on_clock, groups=fold.groups) for c in HELD]
-        found[band] = np.stack([held(model.envelope(**options), fold) for model in models], axis=1)
+        found[band] = np.stack([held(model.envelope(whole), fold) for model in models], axis=1)
     return found
 
 
@@ -109,10 +109,6 @@ def held(bounds, fold):
     own = fold.synchronised[OWN]
     inside = (own >= bounds[0]) & (own <= bounds[1])
     return np.column_stack([inside.mean(axis=(1, 2)), inside.all(axis=(1, 2))])
-
-
-def has_simultaneous_band():
-    return "simultaneous" in inspect.signature(ActionModel.envelope).parameters
 
 
 def unlikeness(x, y):
@@ -198,7 +194,8 @@ def verdict_tables(name, found):
         f"{judge}, {setting}" if setting else judge: pooled(found, judge, setting)
         for judge, setting in best.items()
     }
-    header = ["own", "lowest action", *KINDS, "bends apart", "there and back apart"]
+    header = ["own", "lowest action", *KINDS]
+    header += [f"{BACKWARDS}: {apart} apart" for apart in ("bends", "there and back")]
     print_head(f"{name}: accepted / refused", header)
     for label, actions in decided.items():
         own = list(accepted(actions).values())
@@ -314,12 +311,25 @@ def by_feature(model, frame, rng):
 def above_floor(space, mean_performance, postures):
     """Heights (n, 15) of joints above the lowest that the mean performance reaches, in metres.
 
-    Bodies are built together with the mean performance, whose feet are then where they belong.
+    Postures do not tell how far the hips are below the pelvis, and bodies that are built together
+    have their legs moved until the lowest ankle is on the floor: here they hang as in the mean.
     """
-    together = np.concatenate([mean_performance, postures])
-    heights = np.asarray(space.inverse_transform(together)).reshape(len(together), -1, 3)[..., 1]
-    n_frames = len(mean_performance)
-    return heights[n_frames:] - heights[:n_frames].min()
+
+    def heights(points):
+        return np.asarray(space.inverse_transform(points)).reshape(len(points), -1, 3)[..., 1]
+
+    def drop(found):
+        return (
+            found[:, of("hip")].mean(axis=1, keepdims=True) - found[:, [paper.index_of("pelvis")]]
+        )
+
+    def of(joint):
+        return [paper.index_of(f"{side}_{joint}") for side in ("left", "right")]
+
+    paper, mean = Skeleton.paper(), heights(mean_performance)
+    found = heights(postures)
+    found[:, [*of("hip"), *of("knee"), *of("ankle")]] -= drop(found) - drop(mean).mean()
+    return found - mean.min()
 
 
 # -- time -------------------------------------------------------------------------------

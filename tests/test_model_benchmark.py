@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from joblib import parallel_config
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import ASpace, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending
 from threadpoolctl import threadpool_limits
 
@@ -127,6 +129,16 @@ def test_figures_are_means_over_actions(model):
     assert model.refused(actions, "backwards", model.BENDS) == 0.5
     assert np.isnan(model.refused(actions, "other actions"))
     assert model.areas(actions, "backwards") == [6 / 8, 1 / 2]
+
+
+def test_a_body_alone_is_as_high_above_the_floor_as_among_others(model, bending):
+    space = make_pipeline(DirectionCosines(bending.skeleton), ASpace()).fit(bending.data)
+    mean = LinearSynchronizer(60).fit_transform(space.transform(bending.data)).mean(axis=0)
+    together = model.above_floor(space, mean, mean)
+    assert together.min() == pytest.approx(0, abs=1e-6)
+    for frame in (0, 30):
+        alone = model.above_floor(space, mean, mean[[frame]])
+        np.testing.assert_allclose(alone, together[[frame]], atol=1e-6)
 
 
 def test_all_tables_of_a_tiny_set(model, judges, clips, capsys, monkeypatch):
