@@ -150,7 +150,7 @@ def learn_border(values, coverage):
         return float(np.exp(logs.mean() + learn_reach(logs - logs.mean(), coverage)))
 
 
-def learn_reach(deviations, coverage):
+def learn_reach(deviations, coverage, usual=_PRIOR_VARIANCE):
     """How far a new logarithm may lie above what is usual.
 
     Parameters
@@ -159,6 +159,8 @@ def learn_reach(deviations, coverage):
         Of the logarithms that are known, from what is usual.
     coverage : float
         Share of new values below it.
+    usual : float, default=0.07
+        Their usual variance, which counts like that of three of them.
 
     Returns
     -------
@@ -166,7 +168,7 @@ def learn_reach(deviations, coverage):
     """
     n = len(deviations)
     freedom = n - 1 + _PRIOR_COUNT
-    squares = np.square(deviations).sum() + _PRIOR_COUNT * _PRIOR_VARIANCE
+    squares = np.square(deviations).sum() + _PRIOR_COUNT * usual
     return float(student.ppf(coverage, freedom) * np.sqrt(squares / freedom * (1 + 1 / n)))
 
 

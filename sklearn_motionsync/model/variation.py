@@ -5,17 +5,17 @@ people. Functions of plain arrays; features may have different units.
 """
 
 import numpy as np
-from scipy.special import stdtrit
 from sklearn.utils import check_random_state
+
+from .likeness import learn_reach
 
 __all__ = ["mean_band", "predictive_variance", "simultaneous_factor"]
 
 # A variance is drawn to its mean over the frames as if so many more performances had shown that.
 _FRAMES_SHARE = 5
-# The variance of the log of the largest deviation counts like that of so many performances from
-# the start; that is the variance of HDM05 and UTKinect (it is 0.05 to 0.3 in their classes), or
-# one for performances of which no variance can be left out.
-_PRIOR, _TYPICAL, _UNKNOWN = 3, 0.1, 1.0
+# The usual variance of the log of the largest deviation: it is 0.05 to 0.3 in the classes of HDM05
+# and UTKinect; and one for performances of which no variance can be left out.
+_TYPICAL, _UNKNOWN = 0.1, 1.0
 # A largest deviation below so many standard deviations, or by so much below the median one in the
 # log, says nothing of how large others are.
 _LEAST, _BELOW = 0.1, 1.0
@@ -61,7 +61,7 @@ def simultaneous_factor(performances, groups, coverage):
     variance is 3 performances' worth 0.1 from the start.
 
     Of unseen people of HDM05 and UTKinect a band of nominal 95 % holds 94 to 97 % of the
-    performances in action space and 97 to 100 % in postures, of 5 to 20 training ones; without
+    performances in the aSpace and 97 to 100 % in postures, of 5 to 20 training ones; without
     groups, of 10 or more, 76 to 85 % of those of HDM05, where people came about six times.
 
     Parameters
@@ -90,10 +90,7 @@ def simultaneous_factor(performances, groups, coverage):
         largest[~left] = np.abs(z).max(axis=(1, 2))
     logs = np.log(np.maximum(largest, _LEAST))
     logs = np.maximum(logs, np.median(logs) - _BELOW)
-    freedom = len(logs) - 1 + _PRIOR
-    variance = ((len(logs) - 1) * logs.var(ddof=1) + _PRIOR * typical) / freedom
-    reach = stdtrit(freedom, coverage) * np.sqrt(variance * (1 + 1 / len(logs)))
-    return float(np.exp(logs.mean() + reach))
+    return float(np.exp(logs.mean() + learn_reach(logs - logs.mean(), coverage, typical)))
 
 
 def mean_band(performances, groups, coverage, random_state=None):
