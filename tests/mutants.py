@@ -56,11 +56,13 @@ INPUT += ["synchronizers/test_match.py"]
 ANY = ["test_properties.py"]
 TRELLIS = ["matching/test_trellis.py", *DENSE, *ALONE]
 TESTS = {
-    "model/action_model": [
-        "model/test_action_model.py",
-        "model/test_likeness.py",
-        "test_contract.py",
-    ],
+    "model/action_model": ["model/test_likeness.py", "model/test_[abd]*.py", "test_contract.py"],
+    "model/likeness": ["model/test_likeness.py", "model/test_detector.py"],
+    "model/manner": ["model/test_detector.py"],
+    "model/sampling": ["model/test_sampling.py"],
+    "model/variation": ["model/test_variation.py", "model/test_bands.py"],
+    "model/views": ["model/test_bands.py", "display/test_departing.py", "display/test_displays.py"],
+    "model": ["model/test_[abd]*.py"],
     "gate": INPUT,
     "sequences": INPUT,
     "matching/consensus": ["matching/test_warps.py", *DENSE, "matching/test_median.py"],
