@@ -5,7 +5,14 @@ from scipy.stats import t as student
 
 from ..matching.filters import smooth
 
-__all__ = ["Neighbours", "as_codes", "learn_border", "learn_reach", "spread_out"]
+__all__ = [
+    "Neighbours",
+    "as_codes",
+    "learn_border",
+    "learn_reach",
+    "power_of_two",
+    "spread_out",
+]
 
 # Most performances that others are compared with: predicting takes time and memory in proportion.
 _MOST_KEPT = 64
@@ -43,6 +50,8 @@ class Neighbours:
 
     def __init__(self, performances, groups):
         self._groups = groups
+        self._unit = power_of_two(performances)
+        performances = performances * self._unit
         self._center = performances.mean(axis=(0, 1))
         self._postures, self._energy = self._move(performances)
         self._velocities = self._velocity(performances)
@@ -103,6 +112,7 @@ class Neighbours:
         """
         # What is too far away for any number is nobody's neighbour.
         with np.errstate(over="ignore", invalid="ignore"):
+            performances = performances * self._unit
             postures, energy = self._move(performances)
             apart = _squared_distances(postures, self._postures)
             if self.stand_still:
@@ -126,6 +136,12 @@ class Neighbours:
         if n_frames == 1:
             return np.zeros((n, performances[0].size))
         return smooth(performances, _SMOOTHING * (n_frames - 1), order=1).reshape(n, -1)
+
+
+def power_of_two(performances):
+    """What to multiply them by, for squares that are numbers; no bit is lost by it."""
+    largest = np.abs(performances).max()
+    return np.ldexp(1.0, -int(np.frexp(largest)[1])) if largest > 0 else 1.0
 
 
 def learn_border(values, coverage):

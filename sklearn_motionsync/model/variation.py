@@ -7,7 +7,7 @@ people. Functions of plain arrays; features may have different units.
 import numpy as np
 from sklearn.utils import check_random_state
 
-from .likeness import learn_reach
+from .likeness import learn_reach, power_of_two
 
 __all__ = ["mean_band", "predictive_variance", "simultaneous_factor"]
 
@@ -45,11 +45,14 @@ def predictive_variance(performances, groups):
     ndarray, shape (P, n_features)
         Positive, also where nobody differed.
     """
-    n = len(performances)
+    n, unit = len(performances), power_of_two(performances)
+    performances = performances * unit
     codes, sums, counts = _grouped(performances, groups)
     others = (sums.sum(axis=0) - sums) / (n - counts)
     squares = np.square(performances - others[codes]).mean(axis=0)
-    return np.maximum(_shrunk(squares, n) * (1 + 1 / n), _floor(performances))
+    variance = np.maximum(_shrunk(squares, n) * (1 + 1 / n), _floor(performances))
+    with np.errstate(over="ignore"):
+        return variance / unit / unit
 
 
 def simultaneous_factor(performances, groups, coverage):
@@ -75,6 +78,7 @@ def simultaneous_factor(performances, groups, coverage):
     -------
     float
     """
+    performances = performances * power_of_two(performances)
     codes, sums, counts = _grouped(performances, groups)
     largest = np.empty(len(performances))
     typical = _TYPICAL
