@@ -113,6 +113,8 @@ EQUIVALENT = {
         "matching/keyframes",
         "[[True], smallest[1:] < smallest[:-1]] -> [[False], smallest[1:] < smallest[:-1]]",
     ): "the first index is 0 either way",
+    ("model/departures", "(performance[0], feature[0], peak)"): "both edges of a run say the same",
+    ("model/likeness", "_PORTION = 64"): SIZE,
     ("matching/narrow", "NARROW_CELLS = 30000"): SIZE,
     ("matching/narrow", "_NARROW_WAYS = 1000000"): SIZE,
     ("matching/narrow", "_FEW_PAIRS = 4"): SIZE,
