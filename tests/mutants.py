@@ -114,7 +114,18 @@ EQUIVALENT = {
         "[[True], smallest[1:] < smallest[:-1]] -> [[False], smallest[1:] < smallest[:-1]]",
     ): "the first index is 0 either way",
     ("model/departures", "(performance[0], feature[0], peak)"): "both edges of a run say the same",
-    ("model/likeness", "_PORTION = 64"): SIZE,
+    (
+        "model/likeness",
+        "np.abs(performances).max -> np.abs(performances).min",
+    ): "how much may be rounding",
+    (
+        "model/likeness",
+        "np.ldexp(1.0, -int(np.frexp(largest)[1])) -> np.ldexp(2.0, -int(np.frexp(largest)[1]))",
+    ): "any power of two will do",
+    (
+        "model/manner",
+        "np.square(on_clock - on_clock.mean(axis=(0, 1))) -> on_clock - on_clock.mean(axis=(0, 1))",
+    ): "how little is no movement",
     ("matching/narrow", "NARROW_CELLS = 30000"): SIZE,
     ("matching/narrow", "_NARROW_WAYS = 1000000"): SIZE,
     ("matching/narrow", "_FEW_PAIRS = 4"): SIZE,
