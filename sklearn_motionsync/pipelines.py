@@ -81,7 +81,8 @@ def find_step(estimator, kind):
     Parameters
     ----------
     estimator : estimator or Pipeline
-        Pipelines within pipelines are searched, and the best estimators of searches.
+        Pipelines within pipelines are searched, the best estimators of searches, and what detectors
+        have fitted.
     kind : class
 
     Returns
@@ -185,7 +186,7 @@ def flat_steps(estimator):
 
     Steps that pass everything through are left out.
     """
-    estimator = getattr(estimator, "best_estimator_", estimator)
+    estimator = _what_was_fitted(estimator)
     if not isinstance(estimator, Pipeline):
         return [estimator]
     steps = [step for _, step in estimator.steps if step is not None and step != "passthrough"]
@@ -226,11 +227,18 @@ def index_of_pattern(synchronizer, performances):
 # -- helpers ------------------------------------------------------------------------------
 
 
+def _what_was_fitted(estimator):
+    """What a search found best, or what a detector has fitted; else the estimator itself."""
+    for name in ("best_estimator_", "estimator_"):
+        estimator = getattr(estimator, name, estimator)
+    return estimator
+
+
 def _first(estimator, fits, name):
     found = _search(estimator, fits)
     if found is None:
         # What a search found.
-        estimator = getattr(estimator, "best_estimator_", estimator)
+        estimator = _what_was_fitted(estimator)
         names = [type(step).__name__ for step in flat_steps(estimator)]
         raise ValueError(
             f"There is no {name} in {type(estimator).__name__}; its steps are {names}."
@@ -240,7 +248,7 @@ def _first(estimator, fits, name):
 
 def _search(estimator, fits):
     """The steps before the first one that fits, and that one; None if there is none."""
-    estimator = getattr(estimator, "best_estimator_", estimator)
+    estimator = _what_was_fitted(estimator)
     if not isinstance(estimator, Pipeline):
         return (None, estimator) if fits(estimator) else None
     for i, (name, step) in enumerate(estimator.steps):

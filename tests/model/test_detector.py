@@ -3,6 +3,7 @@
 import pickle
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import t as student
 from sklearn import clone, config_context
@@ -18,6 +19,8 @@ from sklearn_motionsync import (
     DirectionCosines,
     KeyframeSynchronizer,
     LinearSynchronizer,
+    Match,
+    find_departures,
     to_frame,
 )
 from sklearn_motionsync.datasets import make_bending
@@ -348,6 +351,13 @@ def test_the_borders_of_the_pipeline_are_its_own(detector):
     found = ActionDetector(clone(own)).fit(X, groups=GROUPS)
     assert found.borders_ == detector.borders_
     assert found.estimator_[-1].coverage == 0.5
+
+
+def test_what_looks_into_pipelines_looks_into_detectors(detector):
+    pipe = detector.estimator_
+    pd.testing.assert_frame_equal(find_departures(detector, X), find_departures(pipe, X))
+    times = Match.from_estimator(pipe, X).times
+    np.testing.assert_array_equal(Match.from_estimator(detector, X).times, times)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-150, 1e30])
