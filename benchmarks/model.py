@@ -18,13 +18,16 @@ from typing import NamedTuple
 
 import numpy as np
 from accuracy import print_head, print_row
+from events import P
 from joblib import Parallel, delayed
 from judges import DETECTOR, MODEL, PEERS, judges, version_of
 from negatives import (
     BACKWARDS,
     BENDS,
     KINDS,
+    OTHERS,
     OWN,
+    SPOILT,
     THERE_AND_BACK,
     hold_out,
     hold_out_few,
@@ -33,7 +36,14 @@ from negatives import (
 from scipy.special import ndtr, ndtri
 from sklearn.metrics import roc_auc_score
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines, Skeleton
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    Skeleton,
+    find_departures,
+)
 from sklearn_motionsync.datasets import load_performances
 
 NOMINAL = (0.80, 0.90, 0.95, 0.99)
@@ -267,6 +277,53 @@ def one_digit(share):
     return f"{100 * share:.1f}"
 
 
+# -- departures -------------------------------------------------------------------------
+
+
+def departures_of(clips, action, actor):
+    """How right and refused performances of an actor held out depart, in whole postures.
+
+    {kind: (n, 3) whether it departs, whether rarely, number of departures}
+    """
+    does_it, is_held = clips.actions == action, clips.actors == actor
+    pipe = make_pipeline(ASpace(), DenseSynchronizer(P), ActionModel())
+    known = does_it & ~is_held
+    pipe.fit(clips.some(known), actionmodel__groups=clips.actors[known])
+    right = clips.some(does_it & is_held)
+    tried = {OWN: right, OTHERS: clips.some(~does_it & is_held)}
+    tried |= {kind: [spoil(x) for x in right] for kind, spoil in SPOILT.items()}
+    found = {}
+    for kind, some in tried.items():
+        if kind != OWN and some:
+            some = [x for x, verdict in zip(some, pipe.predict(some), strict=True) if verdict < 0]
+        if some:
+            found[kind] = counted(find_departures(pipe, some), len(some))
+    return found
+
+
+def counted(table, n):
+    """(n, 3) of performances: any departure, any rare one, how many."""
+    counts = np.bincount(table["performance"].astype(int), minlength=n)
+    rare = np.bincount(table["performance"][table["rare"]].astype(int), minlength=n)
+    return np.column_stack([counts > 0, rare > 0, counts])
+
+
+def departure_table(sets):
+    """Of right performances, accepted or not, and of those of other kinds that are refused."""
+    header = ["performances", "with a departure", "with a rare one", "departures each"]
+    print_head("departures of whole postures", header)
+    for clips in sets:
+        work = [delayed(departures_of)(clips, *fold) for fold in clips.folds()]
+        found: dict = {}
+        for one in Parallel(n_jobs=-1)(work):
+            found = joined(found, one)
+        for kind in (k for k in (OWN, *KINDS) if k in found):
+            any_, rare, counts = found[kind].T
+            cells = [str(len(counts)), percent(any_.mean()), percent(rare.mean())]
+            which = "right" if kind == OWN else f"{kind}, refused"
+            print_row(f"{clips.name}, {which}", [*cells, f"{counts.mean():.1f}"])
+
+
 # -- sampled feet -----------------------------------------------------------------------
 
 SAMPLES = 200
@@ -384,6 +441,7 @@ def print_tables(sets):
         action_table(found_by_set, judge)
     border_table(found_by_set)
     band_table(found_by_set)
+    departure_table(sets)
     time_table([hold_out(clips, *clips.folds()[0]) for clips in sets])
 
 

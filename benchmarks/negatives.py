@@ -77,6 +77,10 @@ class Clips(NamedTuple):
         """Every action with every actor who does it."""
         return list(dict.fromkeys(zip(self.actions, self.actors, strict=True)))
 
+    def some(self, which):
+        """The postures of those that are chosen by a mask."""
+        return [self.postures[i] for i in np.flatnonzero(which)]
+
 
 ARCHIVES = {"hdm05": "HDM05", "utkinect": "UTKinect", "cmu07_walk": "CMU, walking cycles"}
 
@@ -117,7 +121,7 @@ def hold_out(clips, action, actor):
     """Everything learnt without an actor: aSpace, synchronizer; then the actor's performances."""
     does_it, is_held = clips.actions == action, clips.actors == actor
     train = np.flatnonzero(does_it & ~is_held)
-    space = ASpace().fit([clips.postures[i] for i in train])
+    space = ASpace().fit(clips.some(does_it & ~is_held))
     raw = {OWN: _points(space, clips, does_it & is_held)}
     raw[OTHERS] = _points(space, clips, ~does_it & is_held)
     raw |= {kind: [spoil(x) for x in raw[OWN]] for kind, spoil in SPOILT.items()}
@@ -150,5 +154,5 @@ def hold_out_few(clips, action, actor, n_performances, rng):
 
 
 def _points(space, clips, which):
-    chosen = [clips.postures[i] for i in np.flatnonzero(which)]
+    chosen = clips.some(which)
     return list(space.transform(chosen)) if chosen else []

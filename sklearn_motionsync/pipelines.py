@@ -10,9 +10,11 @@ from sklearn.utils.validation import check_is_fitted
 __all__ = [
     "MissingMetadata",
     "Reached",
+    "asking",
     "find_step",
     "find_synchronizer",
     "flat_steps",
+    "how_to_give",
     "index_of_pattern",
     "reach_synchronizer",
     "steps_to_fit",
@@ -71,7 +73,7 @@ class Reached(NamedTuple):
 
     def match(self):
         """The performances matched to the pattern."""
-        with _asking(self.how):
+        with asking(self.how):
             return self.synchronizer.match(self.performances, **self.params)
 
 
@@ -137,7 +139,7 @@ def reach_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match"
     features = transform_through(before, X, params, caller, hint=hint, also=also)
     performances = synchronizer.check_performances(features)
     taken = taken_by(synchronizer.match, params)
-    return Reached(before, synchronizer, performances, taken, _how(caller, hint))
+    return Reached(before, synchronizer, performances, taken, how_to_give(caller, hint))
 
 
 def transform_through(before, X, params, caller, *, hint="", also=()):
@@ -164,7 +166,7 @@ def transform_through(before, X, params, caller, *, hint="", also=()):
                 f"{caller} got {name!r}, which is no argument of its own, and is not taken by "
                 f"{' or '.join(names) or 'a step before'}."
             )
-    with _asking(_how(caller, hint)):
+    with asking(how_to_give(caller, hint)):
         for method in methods:
             X = method(X, **taken_by(method, params))
     return X
@@ -224,6 +226,21 @@ def index_of_pattern(synchronizer, performances):
     return index if (same == synchronizer.pattern_).all() else None
 
 
+def how_to_give(caller, hint=""):
+    """How to give what is missing to a function that is called with (estimator, X)."""
+    return f"{caller}(estimator, X, {{name}}=[...]){hint}"
+
+
+@contextmanager
+def asking(how):
+    """Whoever misses something in here says how to give it to the function that was called."""
+    try:
+        yield
+    except MissingMetadata as error:
+        reason, name, _ = error.args
+        raise MissingMetadata(reason, name, how) from error
+
+
 # -- helpers ------------------------------------------------------------------------------
 
 
@@ -262,17 +279,3 @@ def _search(estimator, fits):
 
 def _name_of(method):
     return f"{type(method.__self__).__name__}.{method.__name__}"
-
-
-def _how(caller, hint):
-    return f"{caller}(estimator, X, {{name}}=[...]){hint}"
-
-
-@contextmanager
-def _asking(how):
-    """Whoever misses something says how to give it to the function that was called."""
-    try:
-        yield
-    except MissingMetadata as error:
-        reason, name, _ = error.args
-        raise MissingMetadata(reason, name, how) from error

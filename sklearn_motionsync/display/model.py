@@ -257,4 +257,6 @@ def _bounds(view, band):
         return *view.model.mean_envelope(random_state=0), None
     if band == "points":
         return *view.model.envelope(), view.model.n_std
-    return *view.band, view.model.simultaneous_factor()
+    factor = view.model.simultaneous_factor()
+    mean, reach = view.model.mean_, factor * view.predicted
+    return mean - reach, mean + reach, factor

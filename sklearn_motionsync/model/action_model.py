@@ -6,6 +6,7 @@ import numpy as np
 from sklearn.base import BaseEstimator, _fit_context
 from sklearn.utils import check_consistent_length
 from sklearn.utils._param_validation import Interval
+from sklearn.utils.validation import check_is_fitted
 
 from ..fitting import at_once, of_one_state
 from ..gate import check_squares
@@ -62,6 +63,8 @@ class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstima
         At most 64, one of every group and the rest evenly spaced.
     groups_ : ndarray of int, shape (n_kept,)
         The groups of these, counted from 0 in the order in which they come.
+    dissimilarities_ : ndarray, shape (n_sequences,)
+        Of every training performance to those of other groups that are kept.
     threshold_ : float
         The border: performances with a dissimilarity up to this are inside.
     n_frames_ : int
@@ -127,8 +130,8 @@ class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstima
         ------
         ValueError
             If the performances have different lengths, or there is only one, or their unit is such
-            that variances are beyond the precision; if there are as many groups as one, or not one
-            for each performance.
+            that variances are beyond the precision; if all are of one group, or there is not a
+            group for each performance.
         """
         X = np.stack(_alike(self._check_training_set(X)))
         if len(X) < 2:
@@ -148,7 +151,8 @@ class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstima
         known = X[kept].astype(np.float64)
         self.predictive_variance_ = predictive_variance(known, self.groups_).astype(X.dtype)
         self._neighbours = Neighbours(known, self.groups_)
-        self.threshold_ = self._neighbours.border(X, groups, self.coverage)
+        self.dissimilarities_ = self._neighbours.dissimilarity(X, groups)
+        self.threshold_ = self._neighbours.border(self.dissimilarities_, self.coverage)
         return self
 
     def check_performances(self, X):
@@ -236,6 +240,30 @@ class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstima
         """
         performances = self.check_performances(X)
         return self._neighbours.dissimilarity(performances)
+
+    @of_one_state
+    def threshold_at(self, coverage):
+        """The border of another coverage.
+
+        Parameters
+        ----------
+        coverage : float
+            Share of performances of people not seen to be accepted, between 0 and 1.
+
+        Returns
+        -------
+        float
+            ``threshold_`` for the ``coverage`` of the model.
+
+        Raises
+        ------
+        ValueError
+            If it is no share.
+        """
+        check_is_fitted(self)
+        if not (isinstance(coverage, Real) and 0 < coverage < 1):
+            raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
+        return self._neighbours.border(self.dissimilarities_, coverage)
 
     @of_one_state
     def decision_function(self, X):

@@ -17,6 +17,7 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
 
     A posture departs if it is further from the mean than what is expected of a *new person*, in
     standard deviations that are learnt by leaving groups out (`ActionModel.standard_scores`).
+    Postures are taken whole, also with what an `ASpace` leaves out of them.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
         number or label; ``feature``; ``first`` and ``last``, frames of the model, counted from 0;
         ``peak``, the worst of them; ``deviation``, standard deviations there, negative below the
         mean; ``rare``, whether a share of ``coverage`` of the performances of new people goes so
-        far at no frame and in none of these features (`ActionModel.simultaneous_factor`).
+        far at no frame and in no feature (`ActionModel.simultaneous_factor`).
 
     Raises
     ------
@@ -67,13 +68,15 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
         raise ValueError(f"limit must be a number above 0, or None; got {limit!r}.")
     caller = "find_departures"
     view = view_of(estimator, X, params, caller, features=features, postures=features is None)
+    names, scores = view.names, view.scores
     if features is not None:
-        view = view.only(choose_features(features, view.names))
-    found = runs(view.scores, view.model.n_std if limit is None else limit)
+        chosen = choose_features(features, names)
+        names, scores = [names[i] for i in chosen], scores[:, :, chosen]
+    found = runs(scores, view.model.n_std if limit is None else limit)
     table = pd.DataFrame(
         {
             "performance": np.array(view.labels, dtype=object)[found.performance],
-            "feature": np.array(view.names, dtype=object)[found.feature],
+            "feature": np.array(names, dtype=object)[found.feature],
             "first": found.first,
             "last": found.last,
             "peak": found.peak,

@@ -273,20 +273,17 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         energy, self._floor = energies(on_clock)
         coverage = 1 - (1 - self.coverage) / (4 if self.duration else 3)
         _, model = find_step(self.estimator_, ActionModel)
-        learnt = model.mean_ + model.deviations_
-        self._questions = {
-            "movement": Course(learnt, model.groups_, coverage),
-            "course": Course(on_clock, codes, coverage),
-            "duration": Usual(_durations(performances), codes, coverage),
-            "energy": Usual(energy, codes, coverage),
-        }
-        if not self.duration:
-            del self._questions["duration"]
-        self.offset_ = -1.0
+        course = Course(on_clock, codes, coverage)
+        self._questions = {"course": course}
         self.borders_ = {
-            name: (0.0, asked.border) if isinstance(asked, Course) else (asked.lower, asked.upper)
-            for name, asked in self._questions.items()
+            "movement": (0.0, model.threshold_at(coverage)),
+            "course": (0.0, course.border),
         }
+        values = {"duration": _durations(performances)} if self.duration else {}
+        for name, some in (values | {"energy": energy}).items():
+            self._questions[name] = usual = Usual(some, codes, coverage)
+            self.borders_[name] = usual.lower, usual.upper
+        self.offset_ = -1.0
 
     # -- what is asked ----------------------------------------------------------------------
 
@@ -307,12 +304,13 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         _, model = find_step(self.estimator_, ActionModel)
         on_clock = reached.synchronizer.normalize(performances)
         seen = {
-            "movement": model.check_performances(synchronised),
             "course": on_clock,
             "duration": _durations(performances),
             "energy": energies(on_clock, self._floor)[0],
         }
-        return {name: asked(seen[name]) for name, asked in self._questions.items()}, performances
+        answers = {name: asked(seen[name]) for name, asked in self._questions.items()}
+        moved = model.dissimilarity(synchronised) / self.borders_["movement"][1]
+        return {"movement": moved} | answers, performances
 
     def _worst(self, X, params, method):
         table, _ = self._ask(X, params, method)

@@ -46,8 +46,8 @@ class EnvelopeMixin:
                 "posture as [posture]."
             )
         check_finite(postures, "postures, row", names_of_input(self))
-        lower, upper = self.envelope()
-        return ((postures >= lower[frame]) & (postures <= upper[frame])).all(axis=1)
+        mean, reach = self.mean_[frame], self.n_std * np.sqrt(self.variance_[frame])
+        return ((postures >= mean - reach) & (postures <= mean + reach)).all(axis=1)
 
     @of_one_state
     def envelope(self, simultaneous=False):

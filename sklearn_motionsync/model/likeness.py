@@ -85,13 +85,13 @@ class Neighbours:
             found[rows] = _mean_of_smallest(ratios)
         return found
 
-    def border(self, performances, groups, coverage):
-        """Up to how unlike somebody new is to be expected, as those are to other groups.
+    def border(self, dissimilarities, coverage):
+        """Up to how unlike somebody new is to be expected.
 
         Parameters
         ----------
-        performances : sequence of ndarray (P, n_features)
-        groups : ndarray of int (n,)
+        dissimilarities : ndarray (n,)
+            Those of performances to neighbours of other groups.
         coverage : float
             Share of new performances within the border.
 
@@ -100,7 +100,7 @@ class Neighbours:
         float
             Less than standing still, unless nobody moves.
         """
-        border = learn_border(self.dissimilarity(performances, groups), coverage)
+        border = learn_border(dissimilarities, coverage)
         return border if self.stand_still else min(border, _STANDS_STILL)
 
     def _ratios(self, performances):

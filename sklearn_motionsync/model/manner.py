@@ -31,7 +31,8 @@ class Course:
         kept = spread_out(groups)
         on_clock = np.asarray(performances, dtype=np.float64)
         self._neighbours = Neighbours(on_clock[kept], groups[kept])
-        self.border = self._neighbours.border(on_clock, groups, coverage)
+        dissimilarities = self._neighbours.dissimilarity(on_clock, groups)
+        self.border = self._neighbours.border(dissimilarities, coverage)
 
     def __call__(self, performances):
         return self._neighbours.dissimilarity(performances) / self.border

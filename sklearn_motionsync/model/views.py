@@ -10,7 +10,7 @@ from sklearn.utils.validation import check_is_fitted
 from ..aspace import ASpace
 from ..features import as_features, names_of
 from ..performances import check_performances
-from ..pipelines import find_step, flat_steps, taken_by, transform_through
+from ..pipelines import asking, find_step, flat_steps, how_to_give, taken_by, transform_through
 from .action_model import ActionModel
 
 __all__ = ["View", "view_of"]
@@ -58,33 +58,12 @@ class View(NamedTuple):
     def scores(self):
         """How far the whole performances are from the mean, in predicted standard deviations."""
         with np.errstate(over="ignore"):
-            return (self.whole - self.model.mean_) / self._predicted
+            return (self.whole - self.model.mean_) / self.predicted
 
     @property
-    def band(self):
-        """Lower and upper bounds that hold a share of whole performances of new people."""
-        reach = self.model.simultaneous_factor() * self._predicted
-        return self.model.mean_ - reach, self.model.mean_ + reach
-
-    @property
-    def _predicted(self):
+    def predicted(self):
+        """The standard deviations to be expected of whole performances of a new person."""
         return np.sqrt(self.model.predictive_variance_ + self.left_out)
-
-    def only(self, chosen):
-        """The same in some of the features, by index."""
-        if list(chosen) == list(range(len(self.names))):
-            return self
-
-        def some(values):
-            return None if values is None else values[..., chosen]
-
-        return self._replace(
-            model=_seen(self.model, some),
-            names=[self.names[i] for i in chosen],
-            synchronised=some(self.synchronised),
-            whole=some(self.whole),
-            left_out=some(self.left_out),
-        )
 
 
 def view_of(estimator, X=None, params=None, caller="", *, features=None, postures=False):
@@ -116,26 +95,26 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
     """
     before, model = find_step(estimator, ActionModel)
     check_is_fitted(model)
-    given, points, labels = None, None, []
-    if X is not None:
-        given = model.check_performances(transform_through(before, X, params or {}, caller))
-        points, labels = np.stack(given), given.labels
-    names = names_of(before, model, model.mean_.shape[1])
+    names, params = names_of(before, model, model.mean_.shape[1]), params or {}
     asked = any(isinstance(f, str) and f not in names for f in as_features(features))
     way = None
     if before is not None and (asked or postures):
         way = _way_back(before, names, must=asked)
+    given, points, whole, labels = None, None, None, []
+    if X is not None:
+        if way is None:
+            given = model.check_performances(transform_through(before, X, params, caller))
+        else:
+            synchronised, whole = way.follow(X, params, caller)
+            given = model.check_performances(synchronised)
+        points, labels = np.stack(given), given.labels
     if way is None:
         nothing = np.zeros(len(names))
         return View(model, names, points, points, labels, model, given, nothing)
     names = names_of(way.before, way.aspace, way.aspace.n_features_in_)
-    synchronised = whole = None
-    if X is not None:
-        synchronised = way.back(points)
-        whole = synchronised + way.residuals(X, params or {}, caller)
+    seen = None if points is None else way.back(points)
     left_out = _NEWCOMER * way.aspace.left_out_variance_
-    seen = _seen(model, way.back)
-    return View(seen, names, synchronised, whole, labels, model, given, left_out)
+    return View(_seen(model, way.back), names, seen, whole, labels, model, given, left_out)
 
 
 def _seen(model, through):
@@ -156,21 +135,17 @@ class _Way(NamedTuple):
         """Postures of points of the aSpace."""
         return points @ self.aspace.components_ + self.aspace.mean_
 
-    def residuals(self, X, params, caller):
-        """What the aSpace leaves out of performances, on the clock: (n, P, n_features)."""
-        postures = transform_through(self.before, X, params, caller, also=self._takers())
-        arrays = check_performances(self.aspace, postures, reset=False, level="posture")
-        seen = [(x - self.aspace.mean_) @ self.aspace.components_.T for x in arrays]
-        left = [x - self.back(p) for x, p in zip(arrays, seen, strict=True)]
+    def follow(self, X, params, caller):
+        """What reaches the model, and the postures of it, whole, on the same clock."""
+        takers = [method for step in self.after for method in (step.match, step.transform)]
+        postures = transform_through(self.before, X, params, caller, also=takers)
+        whole = check_performances(self.aspace, postures, reset=False, level="posture")
         points = self.aspace.transform(postures)
-        for step in self.after:
-            left = step.match(points, **taken_by(step.match, params)).warp(left)
-            points = step.transform(points, **taken_by(step.transform, params))
-        return np.asarray(left)
-
-    def _takers(self):
-        methods = [(step.match, step.transform) for step in self.after]
-        return [method for pair in methods for method in pair]
+        with asking(how_to_give(caller)):
+            for step in self.after:
+                whole = step.match(points, **taken_by(step.match, params)).warp(whole)
+                points = step.transform(points, **taken_by(step.transform, params))
+        return points, np.stack(whole)
 
 
 def _way_back(before, names, must):

@@ -63,6 +63,8 @@ def test_predict_is_what_the_formulas_say(grouped, coverage):
     expected = np.array([slow_dissimilarity(x, X) for x in new])
     np.testing.assert_allclose(model.dissimilarity(new), expected, rtol=1e-9)
     np.testing.assert_allclose(model.decision_function(new), model.threshold_ - expected, atol=1e-9)
+    assert model.threshold_at(coverage) == model.threshold_
+    np.testing.assert_allclose(model.threshold_at(0.6), slow_border(left, 0.6), rtol=1e-9)
     inside = expected <= model.threshold_
     assert 5 < inside.sum() < 65
     np.testing.assert_array_equal(model.predict(new), np.where(inside, 1, -1))
@@ -85,6 +87,12 @@ def test_the_ends_of_the_scale():
 # -- the border -------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("coverage", [0, 1, 1.5, np.nan, "0.9"])
+def test_the_border_of_no_share(coverage):
+    with pytest.raises(ValueError, match="coverage must be a share between 0 and 1, got"):
+        ActionModel().fit(curves(4)).threshold_at(coverage)
+
+
 def test_the_border_of_many_values_is_their_quantile():
     values = lognorm(0.5).rvs(20_000, random_state=0)
     for coverage in (0.5, 0.8, 0.95, 0.99):
@@ -92,8 +100,7 @@ def test_the_border_of_many_values_is_their_quantile():
         np.testing.assert_allclose(learn_border(values, coverage), exact, rtol=0.02)
 
 
-@pytest.mark.parametrize("n", [2, 3, 5, 20])
-@pytest.mark.parametrize("coverage", [0.8, 0.95])
+@pytest.mark.parametrize(("n", "coverage"), [(2, 0.8), (3, 0.95), (20, 0.95)])
 def test_the_border_of_few_values_holds_what_it_says(n, coverage):
     """Exactly so where variances differ between actions as three values tell them."""
     rng = np.random.default_rng(0)

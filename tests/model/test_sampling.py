@@ -63,7 +63,7 @@ def test_postures_have_the_covariance_of_the_training_ones():
     assert np.abs((drawn.mean(axis=0) - X.mean(axis=0)) / X.std(axis=0)).max() < 0.01
 
 
-@pytest.mark.parametrize("n_std", [0.3, 1.0, 1.5, 3.0])
+@pytest.mark.parametrize("n_std", [0.3, 1.5])
 def test_normal_features_are_cut_off_like_normal_distributions(n_std):
     X = np.random.default_rng(0).standard_normal((2000, 2)) @ [[1.0, 0.9], [0.0, 0.1]]
     drawn = postures_of(X, n_std=n_std)
