@@ -26,6 +26,7 @@ from .display import (
 from .model.action_model import ActionModel
 from .model.departures import find_departures
 from .model.detector import ActionDetector
+from .recognition import ActionClassifier, synchronization_distances
 from .sequences import to_frame, to_sequences
 from .synchronizers.base import Synchronizer
 from .synchronizers.dense import DenseSynchronizer
@@ -37,6 +38,7 @@ __version__ = "0.1.0.dev0"
 
 __all__ = [
     "ASpace",
+    "ActionClassifier",
     "ActionDetector",
     "ActionModel",
     "ActionModelDisplay",
@@ -55,6 +57,7 @@ __all__ = [
     "display",
     "find_departures",
     "metrics",
+    "synchronization_distances",
     "to_frame",
     "to_sequences",
 ]

@@ -30,6 +30,7 @@ FLOORS = [
     "matching",
     "synchronizers",
     "model",
+    "recognition",
     "datasets",
     "metrics",
     "display",
