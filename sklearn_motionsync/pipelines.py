@@ -11,6 +11,7 @@ __all__ = [
     "MissingMetadata",
     "Reached",
     "asking",
+    "find_classifier",
     "find_step",
     "find_synchronizer",
     "flat_steps",
@@ -102,6 +103,11 @@ def find_synchronizer(estimator):
         return hasattr(step, "match") and hasattr(step, "check_performances")
 
     return _first(estimator, matches, "synchronizer")
+
+
+def find_classifier(estimator):
+    """The same for a classifier that has a model of each class; None if there is none."""
+    return _search(estimator, lambda step: hasattr(step, "model_of"))
 
 
 def reach_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",), hint=""):

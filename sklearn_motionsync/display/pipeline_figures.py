@@ -1,11 +1,14 @@
 """Stick figures of what a fitted pipeline knows: its model (Fig. 4), people on its clock."""
 
+from functools import partial
+
 import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
 from ..body.direction_cosines import DirectionCosines
 from ..body.skeleton import Skeleton
 from ..model.action_model import ActionModel
+from ..model.classes import models_of_classes
 from ..model.views import view_of
 from ..pipelines import find_step, find_synchronizer, index_of_pattern, reach_synchronizer
 from .bodies import bodies_of
@@ -83,7 +86,8 @@ class PipelineFigures:
         Parameters
         ----------
         estimator : Pipeline
-            Fitted, from `DirectionCosines` to an `ActionModel`, with an `ASpace` or without.
+            Fitted, from `DirectionCosines` to an `ActionModel`, with an `ASpace` or without; or to
+            an `ActionClassifier`, and the model is that of the class the performance is given.
         X : list of arrays (n_frames_i, 3 * n_joints)
             Joint positions.
         performance : int, default=0
@@ -117,8 +121,17 @@ class PipelineFigures:
         ActionModelDisplay : The curves of the performance, and the band that they leave.
         """
         caller = f"{cls.__name__}.from_departures"
-        view, cosines = _in_limbs(estimator, X, params, caller)
-        i = as_performance(performance, len(view.given))
+        chosen = partial(as_performance, performance)
+        models = models_of_classes(estimator, X, params, caller, chosen)
+        if models is None:
+            view, cosines = _in_limbs(estimator, X, params, caller)
+            i = chosen(len(view.given))
+            called, by = _called(i, view.labels[i]), ""
+        else:
+            (of_class,) = models
+            view, cosines = _in_limbs(of_class.estimator, of_class.performances, {}, caller)
+            i, by = 0, f" as {of_class.label!s}"
+            called = _called(int(of_class.indices[0]), of_class.labels[0])
         limit = view.model.n_std if limit is None else as_limit(limit)
         strip = strip_of(view.scores[i], view.names, frames, limit)
         # Each on a floor of its own, as heights of the pelvis are.
@@ -126,8 +139,6 @@ class PipelineFigures:
             np.asarray(cosines.inverse_transform(x)).reshape(len(x), -1, 3)
             for x in (view.whole[i], view.model.mean_)
         )
-        label = view.labels[i]
-        called = f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
         verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
         display = cls(
             [[bodies[[frame]]] for frame in strip.frames],
@@ -135,7 +146,7 @@ class PipelineFigures:
             strip.titles,
             marked=strip.marked,
             behind=[[shadows[[frame]]] for frame in strip.frames],
-            heading=f"{called} is {verdict}. Violet: limbs more than {limit:.3g} standard "
+            heading=f"{called} is {verdict}{by}. Violet: limbs more than {limit:.3g} standard "
             "deviations from what is expected of a new\nperson, at or around that frame; beyond "
             f"{view.model.simultaneous_factor():.2g} is rare. Pale: the mean performance.",
         )
@@ -183,6 +194,10 @@ class PipelineFigures:
             at=at,
             azimuth=azimuth,
         )
+
+
+def _called(i, label):
+    return f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
 
 
 def _in_limbs(estimator, X, params, caller):
