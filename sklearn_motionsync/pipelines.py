@@ -4,18 +4,20 @@ import inspect
 from contextlib import contextmanager
 from typing import NamedTuple
 
-from sklearn.pipeline import Pipeline
+from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils.validation import check_is_fitted
 
 __all__ = [
     "MissingMetadata",
     "Reached",
     "asking",
+    "find_classifier",
     "find_step",
     "find_synchronizer",
     "flat_steps",
     "how_to_give",
     "index_of_pattern",
+    "parts_of",
     "reach_synchronizer",
     "steps_to_fit",
     "taken_by",
@@ -104,6 +106,11 @@ def find_synchronizer(estimator):
     return _first(estimator, matches, "synchronizer")
 
 
+def find_classifier(estimator):
+    """The same for a classifier that has a model of each class; None if there is none."""
+    return _search(estimator, lambda step: hasattr(step, "model_of"))
+
+
 def reach_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",), hint=""):
     """The synchronizer of an estimator, and what reaches it of raw performances.
 
@@ -175,6 +182,11 @@ def transform_through(before, X, params, caller, *, hint="", also=()):
 def taken_by(method, params):
     """Those params that a method takes by name, or all if it takes any; None is not given."""
     given = {name: value for name, value in params.items() if value is not None}
+    owner = getattr(method, "__self__", None)
+    if isinstance(owner, FeatureUnion):
+        # It takes anything by its signature, and hands on what its transformers take.
+        parts = [taken_by(part.transform, given) for part in parts_of(owner)]
+        return {name: value for part in parts for name, value in part.items()}
     accepted = list(inspect.signature(method).parameters.values())
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
         return given
@@ -193,6 +205,14 @@ def flat_steps(estimator):
         return [estimator]
     steps = [step for _, step in estimator.steps if step is not None and step != "passthrough"]
     return [inner for step in steps for inner in flat_steps(step)]
+
+
+def parts_of(step):
+    """The transformers that a union puts side by side; any other step is its own only one."""
+    if not isinstance(step, FeatureUnion):
+        return [step]
+    views = [view for _, view in step.transformer_list if view not in ("drop", "passthrough")]
+    return [part for view in views for inner in flat_steps(view) for part in parts_of(inner)]
 
 
 def steps_to_fit(estimator, prefix=""):

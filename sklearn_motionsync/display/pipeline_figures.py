@@ -1,13 +1,24 @@
 """Stick figures of what a fitted pipeline knows: its model (Fig. 4), people on its clock."""
 
+from functools import partial
+
 import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
+from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
 from ..body.skeleton import Skeleton
 from ..model.action_model import ActionModel
+from ..model.classes import models_of_classes
 from ..model.views import view_of
-from ..pipelines import find_step, find_synchronizer, index_of_pattern, reach_synchronizer
+from ..pipelines import (
+    find_step,
+    find_synchronizer,
+    flat_steps,
+    index_of_pattern,
+    parts_of,
+    reach_synchronizer,
+)
 from .bodies import bodies_of
 from .departing import strip_of
 from .given import as_indices, as_limit, as_moments, as_performance, as_performances
@@ -83,7 +94,9 @@ class PipelineFigures:
         Parameters
         ----------
         estimator : Pipeline
-            Fitted, from `DirectionCosines` to an `ActionModel`, with an `ASpace` or without.
+            Fitted, from `DirectionCosines` to an `ActionModel`, with an `ASpace` or without; or to
+            an `ActionClassifier`, and the model is that of the class the performance is given. The
+            cosines may be one part of a union, whose other features decide but are not drawn.
         X : list of arrays (n_frames_i, 3 * n_joints)
             Joint positions.
         performance : int, default=0
@@ -117,17 +130,26 @@ class PipelineFigures:
         ActionModelDisplay : The curves of the performance, and the band that they leave.
         """
         caller = f"{cls.__name__}.from_departures"
-        view, cosines = _in_limbs(estimator, X, params, caller)
-        i = as_performance(performance, len(view.given))
+        chosen = partial(as_performance, performance)
+        models = models_of_classes(estimator, X, params, caller, chosen)
+        if models is None:
+            view, cosines, columns = _in_limbs(estimator, X, params, caller)
+            i = chosen(len(view.given))
+            called, by = _called(i, view.labels[i]), ""
+        else:
+            (of_class,) = models
+            given = of_class.estimator, of_class.performances, {}, caller
+            view, cosines, columns = _in_limbs(*given)
+            i, by = 0, f" as {of_class.label!s}"
+            called = _called(int(of_class.indices[0]), of_class.labels[0])
         limit = view.model.n_std if limit is None else as_limit(limit)
-        strip = strip_of(view.scores[i], view.names, frames, limit)
+        names = list(cosines.get_feature_names_out())
+        strip = strip_of(view.scores[i][:, columns], names, frames, limit)
         # Each on a floor of its own, as heights of the pelvis are.
         bodies, shadows = (
             np.asarray(cosines.inverse_transform(x)).reshape(len(x), -1, 3)
-            for x in (view.whole[i], view.model.mean_)
+            for x in (view.whole[i][:, columns], view.model.mean_[:, columns])
         )
-        label = view.labels[i]
-        called = f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
         verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
         display = cls(
             [[bodies[[frame]]] for frame in strip.frames],
@@ -135,7 +157,7 @@ class PipelineFigures:
             strip.titles,
             marked=strip.marked,
             behind=[[shadows[[frame]]] for frame in strip.frames],
-            heading=f"{called} is {verdict}. Violet: limbs more than {limit:.3g} standard "
+            heading=f"{called} is {verdict}{by}. Violet: limbs more than {limit:.3g} standard "
             "deviations from what is expected of a new\nperson, at or around that frame; beyond "
             f"{view.model.simultaneous_factor():.2g} is rare. Pale: the mean performance.",
         )
@@ -150,7 +172,7 @@ class PipelineFigures:
         Parameters
         ----------
         estimator : Pipeline
-            Fitted, from `DirectionCosines` to a synchronizer or further.
+            Fitted, from `DirectionCosines`, `JointPositions` or both to a synchronizer or further.
         X : list of arrays (n_frames_i, 3 * n_joints)
             Joint positions.
         performances : list of int, default=None
@@ -165,7 +187,7 @@ class PipelineFigures:
         SkeletonDisplay
             At the beginning; see `animate`.
         """
-        _, cosines = _before_synchronizer(estimator)
+        _, views = _before_synchronizer(estimator)
         reached = reach_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
         match = reached.match()
         pattern = index_of_pattern(reached.synchronizer, reached.performances)
@@ -177,7 +199,7 @@ class PipelineFigures:
         return cls.from_predictions(
             [as_performances(X)[i] for i in performances],
             match.times[performances],
-            cosines.skeleton,
+            views[0].skeleton,
             names=[f"{i} (pattern)" if i == pattern else str(i) for i in performances],
             ax=ax,
             at=at,
@@ -185,27 +207,49 @@ class PipelineFigures:
         )
 
 
+def _called(i, label):
+    return f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
+
+
 def _in_limbs(estimator, X, params, caller):
-    """The model and performances in the cosines of limbs, and the DirectionCosines."""
-    _, cosines = _before_synchronizer(estimator)
+    """A view of the model and performances, its DirectionCosines, and which columns are theirs."""
+    _, views = _before_synchronizer(estimator)
     if X is None:
         raise ValueError(f"{caller} needs performances X, whose departures are drawn; got None.")
     view = view_of(estimator, X, params, caller, postures=True)
-    if view.names != list(cosines.get_feature_names_out()):
+    cosines = [part for part in views if isinstance(part, DirectionCosines)]
+    # Of several there is no telling whose columns they are.
+    columns = _columns_of(cosines[0], view.names) if len(cosines) == 1 else None
+    if columns is None:
         raise ValueError(
             "Limbs that depart need a pipeline of DirectionCosines, an ASpace if you like, "
             "synchronizers and an ActionModel, whose features lead back to limbs; those found "
             f"are {', '.join(view.names[:4])}, ..."
         )
-    return view, cosines
+    return view, cosines[0], columns
+
+
+def _columns_of(cosines, names):
+    """Where the features of DirectionCosines are, by themselves or in a union; None if nowhere."""
+    own = list(cosines.get_feature_names_out())
+    for k, name in enumerate(names):
+        prefix = name.removesuffix(own[0])
+        if names[k : k + len(own)] == [f"{prefix}{x}" for x in own]:
+            return slice(k, k + len(own))
+    return None
 
 
 def _before_synchronizer(estimator):
-    """The steps of a pipeline before its synchronizer, and the DirectionCosines among them."""
+    """The steps of a pipeline before its synchronizer, and those of them that see bodies."""
     before, _ = find_synchronizer(estimator)
     if before is None:
         raise ValueError(
             "Stick figures need a pipeline that begins with DirectionCosines; for a synchronizer "
             "by itself use from_predictions with the joint positions."
         )
-    return before, find_step(before, DirectionCosines)[1]
+    parts = [part for step in flat_steps(before) for part in parts_of(step)]
+    views = [part for part in parts if isinstance(part, PositionsTransformer)]
+    if not views:
+        # Which tells that there are none.
+        find_step(before, DirectionCosines)
+    return before, views

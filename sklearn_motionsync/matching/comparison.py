@@ -72,7 +72,7 @@ class Comparison:
         return COSTS[self.cost].degree * self.exponent
 
     def features(self, on_clock):
-        """What is compared of performances (n, P, n_features) on the clock: the same shape."""
+        """What is compared of performances (n, P, n_features) on the clock: (n, P, n_compared)."""
         exponents = np.full(len(on_clock), self.exponent)
         if self.normalize:
             exponents[:] = [exponent_of(x) for x in on_clock]
@@ -81,9 +81,13 @@ class Comparison:
         still = np.ptp(scaled, axis=1, keepdims=True) <= _STILL * size
         scaled = np.where(still, scaled[:, :1], scaled)
         features = cost_features(scaled, self.cost, smoothing=self.smoothing)
-        if self.normalize:
-            features /= np.sqrt(_unless_0(energies(features) / self.n_frames))
-        return features
+        if not self.normalize:
+            return features
+        energy = energies(features) / self.n_frames
+        # Who does not move has all energy in a feature that nobody else has.
+        rest = np.broadcast_to(energy == 0, (*features.shape[:2], 1))
+        features /= np.sqrt(np.where(energy > 0, energy, 1))
+        return np.concatenate([features, rest], axis=2)
 
     def block(self, bases, moving):
         """Distances, without symmetry, of at most ``BLOCK`` bases to as many moving sequences.
@@ -113,10 +117,6 @@ def energies(features):
     """``sum_p |x(p)|^2`` of every performance: (n, 1, 1)."""
     flat = features.reshape(len(features), -1)
     return np.vecdot(flat, flat)[:, np.newaxis, np.newaxis]
-
-
-def _unless_0(values):
-    return np.where(values > 0, values, 1)
 
 
 def _filled(sequences):

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from ..features import choose_features
+from .classes import models_of_classes
 from .views import view_of
 
 __all__ = ["Runs", "find_departures", "runs"]
@@ -21,8 +22,9 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
 
     Parameters
     ----------
-    estimator : ActionModel, or Pipeline with one
-        Fitted.
+    estimator : ActionModel, ActionClassifier, or Pipeline with one
+        Fitted. Of a classifier each performance is seen by the model of the class it is given, also
+        if it is rejected; the models are fitted now (`ActionClassifier.model_of`).
     X : performances, as the estimator takes them
     features : int, str or list of them, default=None
         Features of the model, or of the postures before its `ASpace`, by index or name. By default
@@ -37,10 +39,11 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
     -------
     DataFrame
         One row a run of frames, by performance and then the worst first: ``performance``, its
-        number or label; ``feature``; ``first`` and ``last``, frames of the model, counted from 0;
-        ``peak``, the worst of them; ``deviation``, standard deviations there, negative below the
-        mean; ``rare``, whether a share of ``coverage`` of the performances of new people goes so
-        far at no frame and in no feature (`ActionModel.simultaneous_factor`).
+        number or label; with a classifier ``class``, the one it is given; ``feature``; ``first``
+        and ``last``, frames of the model, counted from 0; ``peak``, the worst of them;
+        ``deviation``, standard deviations there, negative below the mean; ``rare``, whether a
+        share of ``coverage`` of the performances of new people goes so far at no frame and in no
+        feature (`ActionModel.simultaneous_factor`).
 
     Raises
     ------
@@ -67,23 +70,43 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
     if limit is not None and not (is_number and 0 < limit < np.inf):
         raise ValueError(f"limit must be a number above 0, or None; got {limit!r}.")
     caller = "find_departures"
+    models = models_of_classes(estimator, X, params, caller)
+    if models is None:
+        return _departures(estimator, X, params, caller, features, limit)
+    # The steps before a classifier have taken their params, its models take none.
+    parts = [
+        _departures(part.estimator, part.performances, {}, caller, features, limit, part)
+        for part in models
+    ]
+    order = np.concatenate(
+        [part.indices[t.pop("index")] for part, t in zip(models, parts, strict=True)]
+    )
+    table = pd.concat(parts).iloc[np.argsort(order, kind="stable")]
+    return table.reset_index(drop=True).infer_objects()
+
+
+def _departures(estimator, X, params, caller, features, limit, part=None):
+    """The table of one model; of the class of a classifier with the class, and indices in it."""
     view = view_of(estimator, X, params, caller, features=features, postures=features is None)
     names, scores = view.names, view.scores
     if features is not None:
         chosen = choose_features(features, names)
         names, scores = [names[i] for i in chosen], scores[:, :, chosen]
     found = runs(scores, view.model.n_std if limit is None else limit)
-    table = pd.DataFrame(
-        {
-            "performance": np.array(view.labels, dtype=object)[found.performance],
-            "feature": np.array(names, dtype=object)[found.feature],
-            "first": found.first,
-            "last": found.last,
-            "peak": found.peak,
-            "deviation": found.score,
-            "rare": np.abs(found.score) > view.model.simultaneous_factor(),
-        }
-    )
+    labels = view.labels if part is None else part.labels
+    columns = {"performance": np.array(labels, dtype=object)[found.performance]}
+    if part is not None:
+        columns["class"] = np.full(len(found.first), part.label, dtype=object)
+        columns["index"] = found.performance
+    columns |= {
+        "feature": np.array(names, dtype=object)[found.feature],
+        "first": found.first,
+        "last": found.last,
+        "peak": found.peak,
+        "deviation": found.score,
+        "rare": np.abs(found.score) > view.model.simultaneous_factor(),
+    }
+    table = pd.DataFrame(columns)
     order = np.lexsort((found.first, found.feature, -np.abs(found.score), found.performance))
     return table.iloc[order].reset_index(drop=True).infer_objects()
 

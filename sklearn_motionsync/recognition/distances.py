@@ -73,7 +73,7 @@ def synchronization_distances(
     normalize : bool, default=True
         Whether what is compared of each performance is divided by its own root mean square:
         then it does not matter who moves more, nor in which unit. A performance that stands still
-        is as far from all others as they are from nothing.
+        has nothing in common with any that moves: they are ``2 * n_frames`` apart.
     symmetric : bool, default=True
         Whether to average both directions. Otherwise the rows are the performances whose
         clock is kept, ``n`` of ``D_{n,m}``, and the columns those that are warped, ``m``.

@@ -10,7 +10,7 @@ __all__ = ["MotionKernel"]
 
 # So many times the training set, what differs in it is lost beside a performance.
 _FAR = 1e30
-# What differs by less than this share of its size is rounding.
+# What differs by less than this share of the size of all is rounding.
 _STILL = 2.0**-44
 # Frames that are averaged for the start and the end of a performance.
 _ENDS = 3
@@ -59,9 +59,9 @@ class MotionKernel:
         if self.summaries:
             seen = np.array([summary(x) for x in scaled])
             self._mean, self._std = seen.mean(axis=0), seen.std(axis=0)
-            size = np.abs(seen).max(axis=0)
+            rounding = _STILL * max(1.0, np.abs(self._centre).max() / self._unit)
             # What all have in common tells nothing, not even of those who do not have it.
-            self._std = np.where(self._std > _STILL * size, self._std, np.inf)
+            self._std = np.where(self._std > rounding, self._std, np.inf)
             self._summaries = (seen - self._mean) / self._std
             distances.append(cdist(self._summaries, self._summaries, "sqeuclidean"))
         pairs = np.triu_indices(len(scaled), 1)

@@ -10,7 +10,7 @@ __all__ = ["KernelRegression", "deal", "decide", "held_out", "learn_temperature"
 
 # Directions with less than this share of the largest eigenvalue are rounding.
 _ROUNDING = 1e-10
-_MOST_ITERATIONS = 10_000
+_MOST_ITERATIONS, _TOLERANCE = 10_000, 1e-6
 # The temperature that is expected before anything is held out, and the standard deviation of its
 # logarithm, which counts as one performance: on UTKinect it is 3.3 to 4.4.
 _USUAL, _SPREAD = 4.0, 1.0
@@ -45,7 +45,7 @@ class KernelRegression:
             Classes that are none of theirs have minus infinity.
         """
         n_classes = codes.max() + 1
-        model = LogisticRegression(C=self.C, max_iter=_MOST_ITERATIONS)
+        model = LogisticRegression(C=self.C, max_iter=_MOST_ITERATIONS, tol=_TOLERANCE)
         model.fit(self._z[rows], codes[rows])
         weights, intercepts = model.coef_, model.intercept_
         if len(weights) == 1:

@@ -1,0 +1,244 @@
+"""Distances between performances: against plain loops, closed forms and people."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from joblib import parallel_config
+from sklearn.neighbors import KNeighborsClassifier
+from sklearn_motionsync import DirectionCosines, synchronization_distances, to_frame
+from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.matching.comparison import BLOCK, Comparison
+
+import oracle
+
+
+def walks(n, n_features=3, seed=0, shortest=3, longest=60):
+    """Random walks of any lengths."""
+    rng = np.random.default_rng(seed)
+    lengths = rng.integers(shortest, longest, n)
+    return [np.cumsum(rng.standard_normal((k, n_features)), axis=0) for k in lengths]
+
+
+# -- the distance, written out ----------------------------------------------------------
+
+RATES = np.arange(5)
+COSTS = {
+    "posture": {s: (1.0, 2.0, abs(s - 1.0)) for s in RATES},
+    "velocity": {s: ((0.8 + 0.2 * s) ** 2, 2 * (0.8 + 0.2 * s), (s - 1.0) ** 2) for s in RATES},
+    "elastic": {s: (float(s), 2 * np.sqrt(s), (s - 1.0) ** 2) for s in RATES},
+}
+
+
+def slow_features(x, cost, n_frames, smoothing, normalize):
+    at = np.linspace(0, len(x) - 1, n_frames)
+    x = np.column_stack([np.interp(at, np.arange(len(x)), column) for column in x.T])
+    if cost != "posture":
+        x = oracle.slow_filter(x, smoothing * (n_frames - 1), 1)
+    if cost == "elastic":
+        x = x / np.sqrt(np.linalg.norm(x, axis=1, keepdims=True))
+    return x / np.sqrt((x**2).sum(axis=1).mean()) if normalize else x
+
+
+def slow_distance(x, y, cost, n_frames, normalize, symmetric=True, mu=0.003):
+    a, b = (slow_features(z, cost, n_frames, 0.06, normalize) for z in (x, y))
+    reach = int(0.25 * n_frames)
+    ways = [(a, b), (b, a)] if symmetric else [(a, b)]
+    return np.mean([oracle.plain_loops(*way, COSTS[cost], mu, 1, reach) for way in ways])
+
+
+@pytest.mark.parametrize("cost", COSTS)
+@pytest.mark.parametrize("normalize", [True, False])
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_distances_are_those_of_plain_loops(cost, normalize, symmetric):
+    X, Y = walks(4), walks(3, seed=1)
+    settings = {"cost": cost, "normalize": normalize, "symmetric": symmetric, "n_frames": 14}
+    expected = [[slow_distance(x, y, cost, 14, normalize, symmetric) for y in Y] for x in X]
+    np.testing.assert_allclose(synchronization_distances(X, Y, **settings), expected, rtol=1e-9)
+    within = synchronization_distances(X, **settings)
+    assert (np.diag(within) == 0).all()
+    np.testing.assert_allclose(within, synchronization_distances(X, X, **settings))
+    expected = slow_distance(X[2], X[0], cost, 14, normalize, symmetric)
+    np.testing.assert_allclose(within[2, 0], expected, rtol=1e-9)
+    assert ((within == within.T).all()) is np.bool_(symmetric)
+
+
+def test_changes_of_pace_cost_what_smoothness_says():
+    X = walks(6, shortest=30)
+    free, usual, dear = (
+        synchronization_distances(X, smoothness=s, n_frames=20) for s in (0, 0.003, 1e9)
+    )
+    assert (free <= usual).all()
+    assert (usual < dear)[np.triu_indices(6, 1)].all()
+    # If none is worth its cost, every frame is compared with the same frame.
+    features = np.array([slow_features(x, "elastic", 20, 0.06, True) for x in X])
+    unwarped = np.square(features[:, np.newaxis] - features).sum(axis=(2, 3))
+    np.testing.assert_allclose(dear, unwarped, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(synchronization_distances(X, max_offset=0, n_frames=20), unwarped)
+
+
+# -- nothing but the pair counts --------------------------------------------------------
+
+
+@pytest.mark.parametrize("cost", COSTS)
+@pytest.mark.parametrize("normalize", [True, False])
+def test_a_distance_is_that_of_the_pair_to_the_last_bit(cost, normalize):
+    X = walks(2 * BLOCK + 7, n_features=5)
+    settings = {"cost": cost, "normalize": normalize, "n_frames": 30}
+    D = synchronization_distances(X, **settings)
+    order = np.random.default_rng(0).permutation(len(X))
+    again = synchronization_distances([X[i] for i in order], **settings)
+    np.testing.assert_array_equal(again, D[np.ix_(order, order)])
+    part = synchronization_distances(X[3:20], X[30:], **settings)
+    np.testing.assert_array_equal(part, D[3:20, 30:])
+    assert synchronization_distances([X[5]], [X[33]], **settings) == D[5, 33]
+    huge = [*X, *(1e20 * x for x in X[:2])]
+    np.testing.assert_array_equal(synchronization_distances(huge, **settings)[:-2, :-2], D)
+
+
+@pytest.mark.parametrize("backend", ["threading", "loky"])
+def test_jobs_share_the_pairs_and_change_nothing(backend):
+    X = walks(BLOCK * 8)
+    D = synchronization_distances(X, n_frames=12)
+    with parallel_config(backend=backend):
+        np.testing.assert_array_equal(synchronization_distances(X, n_frames=12, n_jobs=2), D)
+
+
+def test_only_what_is_needed_is_computed(monkeypatch):
+    blocks = []
+    block = Comparison.block
+
+    def counted(self, bases, moving):
+        blocks.append((len(bases), len(moving)))
+        return block(self, bases, moving)
+
+    monkeypatch.setattr(Comparison, "block", counted)
+    X, Y = walks(2 * BLOCK), walks(5, seed=1)
+    synchronization_distances(X, Y, n_frames=8)
+    assert blocks == [(BLOCK, 5)] * 2 + [(5, BLOCK)] * 2
+    blocks.clear()
+    synchronization_distances(X, Y, n_frames=8, symmetric=False)
+    assert blocks == [(BLOCK, 5)] * 2
+    blocks.clear()
+    synchronization_distances(X, n_frames=8)
+    assert blocks == [(BLOCK, BLOCK)] * 4
+
+
+def test_progress_is_told(capsys):
+    synchronization_distances(walks(20), walks(3), n_frames=8, verbose=1)
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in lines] == [
+        "[synchronization_distances] comparing 20 with 3 performances",
+        "[synchronization_distances] comparing 3 with 20 performances",
+    ]
+
+
+# -- units, and what stands still -------------------------------------------------------
+
+
+@pytest.mark.parametrize("cost", COSTS)
+def test_units(cost):
+    X = walks(7)
+    D = synchronization_distances(X, cost=cost)
+    each = [x * 2.0 ** (40 * i) for i, x in enumerate(X)]
+    np.testing.assert_array_equal(synchronization_distances(each, cost=cost), D)
+    np.testing.assert_allclose(synchronization_distances([x * 1e-200 for x in X], cost=cost), D)
+    degree = 1 if cost == "elastic" else 2
+    raw = {"cost": cost, "normalize": False}
+    plain = synchronization_distances(X, smoothness=0.1, **raw)
+    large = [x * 2.0**200 for x in X]
+    scaled = synchronization_distances(large, smoothness=0.1 * 2.0 ** (200 * degree), **raw)
+    np.testing.assert_array_equal(scaled, np.ldexp(plain, 200 * degree))
+    with np.errstate(over="raise"):
+        vast = synchronization_distances([x * 1e200 for x in X], smoothness=0, **raw)
+    assert np.isfinite(vast).all() == (cost == "elastic")
+
+
+@pytest.mark.parametrize("cost", ["velocity", "elastic"])
+@pytest.mark.parametrize("at", [0, 1e6 / 3, -7e-9])
+def test_who_stands_still(cost, at):
+    """Has nothing in common with those that move, whatever rounding says."""
+    X = walks(4, longest=30)
+    still = [np.full((n, 3), at) for n in (2, 9, 40)]
+    D = synchronization_distances(still, [*X, *still], cost=cost, smoothness=0, max_offset=0)
+    np.testing.assert_allclose(D[:, :4], 100)
+    assert (D[:, 4:] == 0).all()
+
+
+def test_who_moves_faster_or_more_is_the_same():
+    t = np.linspace(0, 1, 400)[:, np.newaxis]
+    waves = np.concatenate([np.sin(5 * t), np.cos(9 * t)], axis=1)
+    eased = np.concatenate([np.sin(5 * t**1.3), np.cos(9 * t**1.3)], axis=1)
+    other = np.concatenate([np.sin(9 * t), np.cos(5 * t)], axis=1)
+    X = [waves, 3 * waves[::4] + 7, eased, other]
+    D = synchronization_distances(X, n_frames=100)
+    assert D[0, 1] < 1e-3 * D[0, 3]
+    assert D[0, 2] < 0.06 * D[0, 3]
+    assert synchronization_distances(X, cost="posture")[0, 1] > 10
+
+
+# -- what is given ----------------------------------------------------------------------
+
+
+def test_every_kind_of_collection():
+    X = walks(5, shortest=20, longest=21)
+    D = synchronization_distances(X)
+    table = to_frame(X, columns=list("abc"))
+    names = [pd.DataFrame(x, columns=list("abc")) for x in X]
+    for given in (np.stack(X), table, names, [x.tolist() for x in X]):
+        np.testing.assert_array_equal(synchronization_distances(given), D)
+        np.testing.assert_array_equal(synchronization_distances(given, given), D)
+    rows = np.stack([x[:, 0] for x in X])
+    expected = synchronization_distances([x[:, :1] for x in X])
+    np.testing.assert_array_equal(synchronization_distances(rows), expected)
+    np.testing.assert_array_equal(synchronization_distances(rows, rows[:2]), expected[:, :2])
+    single = synchronization_distances([x.astype(np.float32) for x in X])
+    assert single.dtype == np.float64
+    np.testing.assert_allclose(single, D, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"Y": walks(2, 4)}, "Performance 0 has 4 features a frame, but synchronization_distances"),
+        ({"Y": np.ones((2, 9))}, "wrap one sequence as"),
+        ({"Y": [np.full((5, 3), np.nan)]}, "Performance 0, frame 0, feature 0 is NaN"),
+        ({"X": []}, "0 performances"),
+        ({"cost": "speed"}, "'cost' parameter of synchronization_distances"),
+        ({"n_frames": 1}, "'n_frames' parameter"),
+        ({"max_offset": 2}, "'max_offset' parameter"),
+        ({"normalize": "rms"}, "'normalize' parameter"),
+    ],
+)
+def test_what_is_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        synchronization_distances(**({"X": walks(3)} | change))
+
+
+def test_two_frames_and_more_rate_than_frames():
+    X = [np.array([[0.0], [1]]), np.array([[0.0], [-1]]), np.array([[5.0], [6], [7]])]
+    for cost in COSTS:
+        D = synchronization_distances(X, cost=cost, n_frames=2, max_rate=50, smoothness=0)
+        assert np.isfinite(D).all()
+    expected = [[0, 8, 0], [8, 0, 8], [0, 8, 0]]
+    np.testing.assert_allclose(synchronization_distances(X, n_frames=2), expected)
+
+
+# -- people -----------------------------------------------------------------------------
+
+
+def test_neighbours_of_people_not_seen(real_data):
+    """The nearest clip of nine other people: who moves more must not count."""
+    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
+    X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+    right = {}
+    for normalize in (True, False):
+        D = synchronization_distances(X, cost="velocity", normalize=normalize, n_frames=30)
+        found = np.empty_like(bunch.target)
+        for actor in np.unique(bunch.actor):
+            out = bunch.actor == actor
+            nearest = KNeighborsClassifier(1, metric="precomputed")
+            nearest.fit(D[np.ix_(~out, ~out)], bunch.target[~out])
+            found[out] = nearest.predict(D[np.ix_(out, ~out)])
+        right[normalize] = np.mean(found == bunch.target)
+    assert right[True] > 0.8
+    assert right[False] < 0.75

@@ -1,0 +1,115 @@
+"""The regression in a kernel's space: against its objective, loops and simulated labels."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.special import logsumexp, softmax
+from sklearn_motionsync.recognition.regression import (
+    KernelRegression,
+    deal,
+    decide,
+    held_out,
+    learn_temperature,
+)
+
+
+def points(n=24, n_classes=3, seed=0):
+    """A kernel of points of overlapping classes, and their classes."""
+    rng = np.random.default_rng(seed)
+    codes = np.arange(n) % n_classes
+    X = rng.standard_normal((n, 2)) + 1.5 * np.column_stack([np.cos(2 * codes), np.sin(2 * codes)])
+    squares = ((X[:, np.newaxis] - X) ** 2).sum(axis=2)
+    return np.exp(-squares / 4), codes
+
+
+@pytest.mark.parametrize("n_classes", [2, 3])
+@pytest.mark.parametrize("C", [0.3, 10])
+def test_the_regression_minimises_its_objective(n_classes, C):
+    """Over f = K A + b: C times the log-loss and half the squared norm in the kernel's space."""
+    K, codes = points(n_classes=n_classes)
+    n = len(K)
+
+    # Of two classes the library penalises the difference, half as much.
+    weight = 1 if n_classes > 2 else 2
+
+    def objective(z):
+        A, b = z[:-n_classes].reshape(n, n_classes), z[-n_classes:]
+        f = K @ A + b
+        loss = (logsumexp(f, axis=1) - f[np.arange(n), codes]).sum()
+        by_f = C * (softmax(f, axis=1) - np.eye(n_classes)[codes])
+        slope = np.r_[(K @ (by_f + weight * A)).ravel(), by_f.sum(axis=0)]
+        return C * loss + weight * np.einsum("nk,nm,mk->", A, K, A) / 2, slope
+
+    start = np.zeros(n * n_classes + n_classes)
+    best = minimize(objective, start, jac=True, options={"maxiter": 5000})
+    A, b = KernelRegression(K, C).fit(codes)
+    assert objective(np.r_[A.ravel(), b])[0] <= best.fun * (1 + 1e-6)
+    np.testing.assert_allclose(decide(K, A, b).sum(axis=1), 0, atol=1e-6)
+
+
+def test_some_rows_are_learnt_as_if_there_were_no_others():
+    K, codes = points()
+    some = np.arange(len(K)) % 4 != 0
+    A, b = KernelRegression(K, 5).fit(codes, some)
+    alone = KernelRegression(K[np.ix_(some, some)], 5).fit(codes[some])
+    expected = decide(K[:, some], *alone)
+    np.testing.assert_allclose(decide(K, A, b), expected, atol=2e-3)
+
+
+def test_held_out_is_what_the_others_say():
+    K, codes = points()
+    codes[codes == 2] = np.where(np.arange(8) < 4, 2, 1)
+    folds = np.arange(24) % 5
+    # The third class is in two of the folds only, all of one in the last.
+    folds[codes == 2] = 1
+    regression = KernelRegression(K, 5)
+    found = held_out(regression, K, codes, folds)
+    for fold in range(5):
+        out = folds == fold
+        expected = decide(K[out], *regression.fit(codes, ~out))
+        np.testing.assert_array_equal(found[out], expected)
+    assert (found[folds == 1, 2] == -np.inf).all()
+    assert np.isfinite(found[folds != 1]).all()
+    one_left = np.where(codes == 0, 0, 1)
+    found = held_out(regression, K, codes, one_left)
+    assert np.isnan(found[one_left == 1]).all()
+    assert np.isfinite(found[one_left == 0, 1:]).all()
+
+
+# -- folds ------------------------------------------------------------------------------
+
+
+def test_nobody_is_in_two_folds():
+    groups = np.repeat(np.arange(7), [9, 1, 4, 4, 2, 8, 5])
+    folds = deal(np.zeros(len(groups), int), groups, 3)
+    assert all(len(set(folds[groups == g])) == 1 for g in range(7))
+    assert sorted(np.bincount(folds)) == [10, 11, 12]
+
+
+def test_without_groups_every_class_is_dealt_out():
+    codes = np.array([0, 1, 0, 0, 1, 0, 0, 2, 0, 0, 0])
+    folds = deal(codes, None, 5)
+    assert folds.tolist() == [0, 0, 1, 2, 1, 3, 4, 0, 0, 1, 2]
+
+
+# -- temperature ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("temperature", [0.5, 4, 30])
+def test_the_temperature_of_labels_drawn_with_it(temperature):
+    rng = np.random.default_rng(0)
+    f = rng.standard_normal((20_000, 4)) / temperature
+    cumulated = softmax(temperature * f, axis=1).cumsum(axis=1)
+    codes = (rng.uniform(size=(len(f), 1)) > cumulated).sum(axis=1)
+    assert learn_temperature(f, codes) == pytest.approx(temperature, rel=0.05)
+    unknown = np.full((5, 4), np.nan)
+    more = np.concatenate([f, unknown, np.tile([-np.inf, 0, 0, 0], (3, 1))])
+    given = np.concatenate([codes, np.zeros(8, int)])
+    assert learn_temperature(more, given) == learn_temperature(f, codes)
+
+
+def test_few_performances_and_perfect_ones_leave_it_near_what_is_usual():
+    assert learn_temperature(np.full((3, 2), np.nan), np.zeros(3, int)) == pytest.approx(4)
+    right = np.tile([1.0, -1], (50, 1))
+    assert 4 < learn_temperature(right, np.zeros(50, int)) < 10
+    assert 0.5 < learn_temperature(right[:1], np.ones(1, int)) < 4
