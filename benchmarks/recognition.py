@@ -1,0 +1,304 @@
+"""Which action it is, of people not seen: the classifier, and other packages' and other ways.
+
+    pip install . aeon dtaidistance
+    python benchmarks/recognition.py DATA_FOLDER
+
+DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect of the same form, with
+utkinect/utkinect_splits.json: ten halves of the actors to learn from, on which published results
+stand. Nothing of `ActionClassifier` is chosen here. Of every other way the best setting is shown,
+chosen by the result: view (cosines, positions or both), length, C and scale with the largest
+accuracy; and in a row of its own the best that any of their settings reaches, every number by
+itself. Probabilities of theirs have one temperature, learnt of training actors left out in turn.
+Unknown actions are those of UTKinect, left out of the training in turn: the area under the curve
+of the novelty of all test clips (theirs: minus the largest score), mean over splits and actions.
+Prints Markdown.
+"""
+
+import json
+import re
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from accuracy import print_head, print_row
+from joblib import Parallel, delayed
+from judges import version_of
+from recognizers import (
+    BOTH,
+    CLASSIFIER,
+    COSINES,
+    as_recordings,
+    classifier,
+    on_clock,
+    ways,
+)
+from sklearn.metrics import roc_auc_score
+from sklearn.model_selection import LeaveOneGroupOut
+from sklearn_motionsync import ActionClassifier, synchronization_distances
+from sklearn_motionsync.datasets import load_performances
+from threadpoolctl import threadpool_limits
+
+# -- folds ------------------------------------------------------------------------------
+
+
+def published_splits(path, actors):
+    """Indices of the training and of the test clips of every split; 1 is actor s01."""
+    splits = json.loads(Path(path).read_text())
+    numbers = np.array([int(re.search(r"\d+$", actor).group()) for actor in actors])
+    halves = zip(splits["train_actors"], splits["test_actors"], strict=True)
+    return [tuple(np.flatnonzero(np.isin(numbers, half)) for half in both) for both in halves]
+
+
+def actors_left_out(actors):
+    """Folds (train, test) with an actor each to be tested."""
+    return list(LeaveOneGroupOut().split(actors, groups=actors))
+
+
+def actors_alone(actors):
+    """Folds (train, test) with an actor each to learn from."""
+    return [(alone, others) for others, alone in actors_left_out(actors)]
+
+
+# -- what is found on a fold ------------------------------------------------------------
+
+SPLITS, LEFT_OUT, ALONE = "ten splits", "leave one actor out", "learn from one actor"
+LOSS, ERROR, AREA = "log-loss", "ECE", "AUC of unknown actions"
+
+
+def examine_split(recognizer, recordings, train, test):
+    """{figure: values} of everything that is told of a split."""
+    actions = recordings.actions
+    classes, probabilities = recognizer.probabilities(train, test)
+    right = classes[probabilities.argmax(axis=1)] == actions[test]
+    true = probabilities[np.arange(len(test)), np.searchsorted(classes, actions[test])]
+    loss = -np.log(np.maximum(true, np.finfo(float).eps)).mean()
+    error = calibration_error(probabilities.max(axis=1), right)
+    return {
+        SPLITS: [right.mean()],
+        LOSS: [loss if recognizer.tempered else np.nan],
+        ERROR: [error if recognizer.tempered else np.nan],
+        AREA: [unknown_area(recognizer, actions, action, train, test) for action in classes],
+    }
+
+
+def calibration_error(confidence, right, n_bins=10):
+    """How far shares of right answers are from confidence: mean over bins, by their counts."""
+    bins = np.minimum((confidence * n_bins).astype(int), n_bins - 1)
+    apart = [np.abs(np.sum((confidence - right)[bins == i])) for i in range(n_bins)]
+    return np.sum(apart) / len(right)
+
+
+def unknown_area(recognizer, actions, action, train, test):
+    """How well the novelty tells an action that nothing was learnt of; NaN if nobody tests it."""
+    unknown = actions[test] == action
+    if unknown.all() or not unknown.any():
+        return np.nan
+    return roc_auc_score(unknown, recognizer.novelty(train[actions[train] != action], test))
+
+
+def examine_fold(figure, recognizer, recordings, train, test):
+    """{figure: share that is recognised}"""
+    return {figure: [np.mean(recognizer.predict(train, test) == recordings.actions[test])]}
+
+
+def examine(way, view, n_frames, recordings, tasks):
+    """{name: {setting: {figure: values}}} of tasks, each a function and folds."""
+    found: dict = {}
+    for name, settings in way(recordings, view, n_frames).items():
+        for setting, recognizer in settings.items():
+            lengths = [f"{n_frames} frames"] if n_frames else []
+            text = ", ".join([view, *lengths, *filter(None, [setting])])
+            figures = found.setdefault(name, {}).setdefault(text, {})
+            for look, folds in tasks:
+                for fold in folds:
+                    for figure, values in look(recognizer, recordings, *fold).items():
+                        figures.setdefault(figure, []).extend(values)
+    return found
+
+
+def examine_all(recordings, tasks):
+    """Of all ways; those that know nothing to share between folds are given one at a time."""
+    work = []
+    for way, view, n_frames in ways():
+        parts = [tasks]
+        if way is classifier:
+            parts = [[(look, [fold])] for look, folds in tasks for fold in folds]
+        work += [(way, view, n_frames, recordings, part) for part in parts]
+    found: dict = {}
+    for part in Parallel(n_jobs=-1)(delayed(examine)(*one) for one in work):
+        for name, settings in part.items():
+            for setting, figures in settings.items():
+                known = found.setdefault(name, {}).setdefault(setting, {})
+                for figure, values in figures.items():
+                    known[figure] = known.get(figure, []) + values
+    return found
+
+
+# -- tables -----------------------------------------------------------------------------
+
+
+def share(value):
+    return f"{100 * value:.1f}"
+
+
+def three_digits(value):
+    return "-" if np.isnan(value) else f"{value:.3f}"
+
+
+# Header, figure, what is made of its values, how it is shown, and which is best.
+SPLIT_COLUMNS = [
+    (f"{SPLITS}, mean", SPLITS, np.mean, share, max),
+    ("worst split", SPLITS, np.min, share, max),
+    (LEFT_OUT, LEFT_OUT, np.mean, share, max),
+    (LOSS, LOSS, np.mean, three_digits, min),
+    (ERROR, ERROR, np.mean, three_digits, min),
+    (AREA, AREA, np.nanmean, three_digits, max),
+]
+FOLD_COLUMNS = [
+    (LEFT_OUT, LEFT_OUT, np.mean, share, max),
+    (ALONE, ALONE, np.mean, share, max),
+    (f"{ALONE}, worst", ALONE, np.min, share, max),
+]
+
+
+def recognition_table(name, found, columns):
+    """Ours on both views, others' best settings, and the best of all of those."""
+    print_head(name, [column[0] for column in columns])
+    rows = {
+        f"{CLASSIFIER}, {view}": numbers(figures, columns)
+        for view, figures in found[CLASSIFIER].items()
+    }
+    others = {way: settings for way, settings in found.items() if way != CLASSIFIER}
+    for way, settings in others.items():
+        best = max(settings, key=lambda s: np.mean(settings[s][columns[0][1]]))
+        rows[f"{way}, {best}"] = numbers(settings[best], columns)
+    every = [numbers(figures, columns) for of in others.values() for figures in of.values()]
+    best = [
+        better([n for n in column if not np.isnan(n)])
+        for column, (*_, better) in zip(zip(*every, strict=True), columns, strict=True)
+    ]
+    rows["*the best of others' settings, every number by itself*"] = best
+    for row, values in rows.items():
+        print_row(row, [show(v) for v, (*_, show, _) in zip(values, columns, strict=True)])
+
+
+def numbers(figures, columns):
+    """One of a column."""
+    return [summary(figures[figure]) for _, figure, summary, *_ in columns]
+
+
+# -- time -------------------------------------------------------------------------------
+
+ROUNDS, PAIRS = 5, 300
+BAND = 0.25
+
+
+def in_turns(functions):
+    """Median seconds of every function, and of ratios of the first to it."""
+    for function in functions:
+        function()
+    seconds = np.array([[took(function) for function in functions] for _ in range(ROUNDS)])
+    return np.median(seconds, axis=0), np.median(seconds[:, :1] / seconds, axis=0)
+
+
+def took(function):
+    start = time.perf_counter()
+    function()
+    return time.perf_counter() - start
+
+
+def time_table(recordings, train, test):
+    """Learning from the first split and asking, against the nearest neighbour by aeon's DTW."""
+    peers = {}
+    if version_of("aeon") is not None:
+        peers = {"aeon's 1-NN DTW": {}, "the same, band of 0.25": {"window": BAND}}
+    print_head("learn and predict, seconds (ours / theirs)", ["`ActionClassifier`", *peers])
+    actions, actors = recordings.actions, recordings.actors
+    for view in (COSINES, BOTH):
+        known, asked = (recordings.some(view, chosen) for chosen in (train, test))
+        X = np.ascontiguousarray(on_clock(recordings, view, 50).transpose(0, 2, 1))
+
+        def ours(known=known, asked=asked):
+            ActionClassifier().fit(known, actions[train], groups=actors[train]).predict(asked)
+
+        theirs = [partial(nearest, X, actions, train, test, params) for params in peers.values()]
+        print_times(f"{len(train)} and {len(test)} clips, {view}", [ours, *theirs])
+
+
+def nearest(X, actions, train, test, params):
+    from aeon.classification.distance_based import KNeighborsTimeSeriesClassifier
+
+    model = KNeighborsTimeSeriesClassifier(distance="dtw", distance_params=params)
+    model.fit(X[train], actions[train]).predict(X[test])
+
+
+def distance_table(recordings):
+    """Matrices of distances of clips of 50 frames, against dtaidistance's of half the pairs."""
+    peers = {}
+    if version_of("dtaidistance") is not None:
+        window = int(BAND * 50) + 1
+        peers = {"dtaidistance": None, f"dtaidistance, window={window}": window}
+    print_head("`synchronization_distances`, seconds (ours / theirs)", ["ours", *peers])
+    for view in (COSINES, BOTH):
+        X = on_clock(recordings, view, 50)
+        X = X[np.arange(PAIRS) % len(X)]
+        theirs = [partial(warped, X, window) for window in peers.values()]
+        for cost in ("velocity", "elastic", "posture"):
+            ours = partial(synchronization_distances, X, cost=cost)
+            print_times(f"{PAIRS} x {PAIRS}, {view}, {cost}", [ours, *theirs])
+
+
+def warped(X, window):
+    from dtaidistance import dtw_ndim
+
+    dtw_ndim.distance_matrix_fast(list(X), window=window, parallel=False)
+
+
+def print_times(name, functions):
+    """One thread each."""
+    with threadpool_limits(1):
+        seconds, ratios = in_turns(functions)
+    peers = [f"{s:.2f} ({r:.2f})" for s, r in zip(seconds[1:], ratios[1:], strict=True)]
+    print_row(name, [f"{seconds[0]:.2f}", *peers])
+
+
+# -- all of it --------------------------------------------------------------------------
+
+
+def print_tables(kinect, splits, optical):
+    """Of clips with splits of their actors, and of clips of few actors."""
+    left_out = partial(examine_fold, LEFT_OUT)
+    tasks = [(examine_split, splits), (left_out, actors_left_out(kinect.actors))]
+    recognition_table(kinect.name, examine_all(kinect, tasks), SPLIT_COLUMNS)
+    tasks = [
+        (left_out, actors_left_out(optical.actors)),
+        (partial(examine_fold, ALONE), actors_alone(optical.actors)),
+    ]
+    recognition_table(optical.name, examine_all(optical, tasks), FOLD_COLUMNS)
+    time_table(kinect, *splits[0])
+    distance_table(kinect)
+
+
+def main():
+    """Print the tables."""
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    folder = Path(sys.argv[1])
+    packages = ("sklearn_motionsync", "numpy", "scipy", "scikit-learn", "aeon", "dtaidistance")
+    versions = {package: version_of(package) for package in packages}
+    print(", ".join(f"{name} {version or 'not installed'}" for name, version in versions.items()))
+    for package in ("aeon", "dtaidistance"):
+        if versions[package] is None:
+            print(f"\nWithout {package} there are no rows and columns of it.")
+    kinect, optical = (
+        as_recordings(name, load_performances(folder / archive / f"{archive}_positions.npz"))
+        for archive, name in (("utkinect", "UTKinect"), ("hdm05", "HDM05"))
+    )
+    splits = published_splits(folder / "utkinect" / "utkinect_splits.json", kinect.actors)
+    print_tables(kinect, splits, optical)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,222 @@
+"""The benchmark of recognition: folds of people, probabilities, and the tables without peers."""
+
+import importlib
+import json
+from functools import partial
+from itertools import compress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from joblib import parallel_config
+from sklearn.pipeline import make_pipeline, make_union
+from sklearn_motionsync import ActionClassifier, DirectionCosines, JointPositions
+from sklearn_motionsync.datasets import make_bending
+from threadpoolctl import threadpool_limits
+
+BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _beside_each_other():
+    """The modules of the benchmarks import each other as they lie there."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(BENCHMARKS)
+        yield
+
+
+@pytest.fixture(scope="module")
+def recognition():
+    return importlib.import_module("recognition")
+
+
+@pytest.fixture(scope="module")
+def recognizers():
+    return importlib.import_module("recognizers")
+
+
+@pytest.fixture(scope="module")
+def bunch():
+    """Three people, who each bend twice, get up from either, and do that backwards."""
+    bunch = make_bending(6, n_actors=3, n_frames=24, random_state=0)
+    rising = [x[len(x) // 2 :] for x in bunch.data]
+    bunch.data = bunch.data + rising + [x[::-1] for x in rising]
+    bunch.target = np.repeat(["bending", "rising", "sinking"], 6)
+    bunch.actor = np.tile(["s01", "s02", "s03"], 6)
+    return bunch
+
+
+@pytest.fixture(scope="module")
+def recordings(recognizers, bunch):
+    return recognizers.as_recordings("few", bunch)
+
+
+class Nearest:
+    """Scores of one number a clip: minus the distance to the mean of a class."""
+
+    def __init__(self, values, actions):
+        self.values, self.actions, self.seen = values, actions, []
+
+    def __call__(self, train, test):
+        self.seen.append((set(train), set(test)))
+        classes = np.unique(self.actions[train])
+        means = [self.values[train][self.actions[train] == c].mean() for c in classes]
+        return classes, -np.abs(self.values[test][:, np.newaxis] - means)
+
+
+# -- folds ------------------------------------------------------------------------------
+
+
+def test_published_halves_share_nobody(recognition, tmp_path):
+    path = tmp_path / "splits.json"
+    path.write_text(json.dumps({"train_actors": [[2, 10]], "test_actors": [[1, 3]]}))
+    actors = np.array(["s01", "s02", "s10", "s03", "s01"])
+    ((train, test),) = recognition.published_splits(path, actors)
+    assert (train.tolist(), test.tolist()) == ([1, 2], [0, 3, 4])
+
+
+def test_published_halves_of_real_people(recognition, real_data):
+    archive = np.load(real_data / "utkinect" / "utkinect_positions.npz")
+    actors = archive["actor"]
+    path = real_data / "utkinect" / "utkinect_splits.json"
+    splits = recognition.published_splits(path, actors)
+    assert len(splits) == 10
+    for train, test in splits:
+        assert not set(actors[train]) & set(actors[test])
+        assert sorted([*train, *test]) == list(range(199))
+        assert len(set(actors[train])) == len(set(actors[test])) == 5
+
+
+def test_an_actor_is_left_out_or_alone(recognition):
+    actors = np.array(["b", "a", "b", "c"])
+    left_out = [
+        (train.tolist(), test.tolist()) for train, test in recognition.actors_left_out(actors)
+    ]
+    assert left_out == [([0, 2, 3], [1]), ([1, 3], [0, 2]), ([0, 1, 2], [3])]
+    alone = [(train.tolist(), test.tolist()) for train, test in recognition.actors_alone(actors)]
+    assert alone == [(test, train) for train, test in left_out]
+
+
+# -- figures ----------------------------------------------------------------------------
+
+
+def test_calibration_error_by_hand(recognition):
+    right = np.array([True, False, True, True, False])
+    confidence = np.array([0.95, 0.95, 0.65, 0.65, 0.3])
+    # Two bins of two are 0.45 and 0.35 off, one of one 0.3; 1 belongs to the last bin.
+    expected = (2 * 0.45 + 2 * 0.35 + 0.3) / 5
+    assert recognition.calibration_error(confidence, right) == pytest.approx(expected)
+    assert recognition.calibration_error(np.ones(4), np.ones(4, dtype=bool)) == 0
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1, 1e4])
+def test_the_temperature_makes_probabilities_of_shares(recognizers, unit):
+    # Two classes, scores that differ by 1, the larger right in 9 of 10: the odds are 9.
+    scores = unit * np.tile([0.0, 1.0], (10, 1))
+    slope = recognizers.slope_of(scores + 5 * unit, np.repeat([0, 1], [1, 9]))
+    assert slope * unit == pytest.approx(np.log(9), rel=1e-3)
+
+
+def test_people_are_left_out_together_for_the_temperature(recognizers, recordings):
+    decide = Nearest(np.arange(18.0), recordings.actions)
+    one = recognizers.Scored(recordings, decide)
+    train, test = np.flatnonzero(recordings.actors != "s02"), np.array([1, 4, 7, 10])
+    classes, probabilities = one.probabilities(train, test)
+    assert classes.tolist() == ["bending", "rising", "sinking"]
+    np.testing.assert_allclose(probabilities.sum(axis=1), 1)
+    assert decide.seen[0] == (set(train), set(test))
+    for known, held in decide.seen[1:]:
+        assert known | held == set(train)
+        assert not set(recordings.actors[[*known]]) & set(recordings.actors[[*held]])
+    assert len(decide.seen) == 3
+    predicted = one.predict(train, test)
+    np.testing.assert_array_equal(predicted, classes[probabilities.argmax(axis=1)])
+
+
+def test_what_only_the_one_left_out_does_is_thought_of_last(recognizers, recordings):
+    strange = recordings._replace(actions=np.where(np.arange(18) == 0, "alone", recordings.actions))
+    one = recognizers.Scored(strange, Nearest(np.arange(18.0), strange.actions))
+    classes, probabilities = one.probabilities(np.arange(18), np.arange(3))
+    assert classes.tolist() == ["alone", "bending", "rising", "sinking"]
+    assert np.isfinite(probabilities).all()
+
+
+def test_the_area_of_an_action_that_was_not_learnt(recognition, recognizers, recordings):
+    values = np.array([0.0, 0, 0, 0, 0, 0, 9, 9, 9, 9, 9, 9])
+    decide = Nearest(values, recordings.actions)
+    one, (train, test) = (
+        recognizers.Scored(recordings, decide),
+        (np.arange(0, 12, 2), np.arange(1, 12, 2)),
+    )
+    args = one, recordings.actions, "rising", train, test
+    assert recognition.unknown_area(*args) == 1
+    assert decide.seen == [({0, 2, 4}, set(test))]
+    assert np.isnan(recognition.unknown_area(one, recordings.actions, "rising", train, test[3:]))
+
+
+# -- recognizers ------------------------------------------------------------------------
+
+
+def test_amplitudes_of_waves(recognizers):
+    t = np.arange(40) / 40
+    X = (3 + 2 * np.cos(2 * np.pi * 4 * t))[np.newaxis, :, np.newaxis]
+    found = recognizers.fourier_pyramid(X, n_levels=2, n_frequencies=5)[0]
+    # Four waves in the whole are two in either half.
+    np.testing.assert_allclose(found, [3, 0, 0, 0, 1] + 2 * [3, 0, 1, 0, 0], atol=1e-12)
+
+
+def test_kernels_know_the_training_set_only(recognizers):
+    D = np.array([[0.0, 2, 4, 9], [2, 0, 6, 9], [4, 6, 0, 9], [9, 9, 9, 0]])
+    K = recognizers.mean_kernel([D, 2 * D], np.arange(3))
+    np.testing.assert_allclose(K, np.exp(-D / 4))
+
+
+def test_ours_is_the_pipeline_of_the_manual(recognizers, bunch, recordings):
+    train, test = np.flatnonzero(bunch.actor != "s03"), np.flatnonzero(bunch.actor == "s03")
+    views = make_union(DirectionCosines(bunch.skeleton), JointPositions(bunch.skeleton))
+    pipe = make_pipeline(views.set_output(transform="pandas"), ActionClassifier())
+    groups = bunch.actor[train]
+    pipe.fit([bunch.data[i] for i in train], bunch.target[train], actionclassifier__groups=groups)
+    expected = pipe.predict_proba([bunch.data[i] for i in test])
+    one = recognizers.Classifier(recordings, recognizers.BOTH)
+    np.testing.assert_allclose(one.probabilities(train, test)[1], expected, rtol=1e-6)
+    np.testing.assert_array_equal(one.predict(train, test), bunch.target[test])
+
+
+# -- tables -----------------------------------------------------------------------------
+
+
+def test_all_tables_of_a_tiny_set_without_other_packages(
+    recognition, recognizers, recordings, capsys, monkeypatch
+):
+    hasty = partial(ActionClassifier, ["posture"], n_frames=12)
+    short = [
+        (way, views[:1], (lengths[0] and 12,), package)
+        for way, views, lengths, package in recognizers.WAYS
+    ]
+    for module in (recognition, recognizers):
+        monkeypatch.setattr(module, "version_of", lambda package: None)
+        monkeypatch.setattr(module, "ActionClassifier", hasty)
+    for module, name, value in (
+        (recognizers, "WAYS", short),
+        (recognition, "ROUNDS", 1),
+        (recognition, "PAIRS", 6),
+    ):
+        monkeypatch.setattr(module, name, value)
+    splits = recognition.actors_left_out(recordings.actors)[:1]
+    two = recordings.actors != "s03"
+    few = recognizers.Recordings(
+        "two people",
+        {view: list(compress(some, two)) for view, some in recordings.views.items()},
+        recordings.actions[two],
+        recordings.actors[two],
+    )
+    with threadpool_limits(1), parallel_config(backend="sequential"):
+        recognition.print_tables(recordings, splits, few)
+    tables = capsys.readouterr().out.strip().split("\n\n")
+    rows = [[line.strip("| ").split(" | ") for line in table.splitlines()] for table in tables]
+    for head, _, *body in rows:
+        assert {len(row) for row in body} == {len(head)}
+    assert [len(body) - 2 for body in rows] == [4, 4, 2, 6]
+    ours = {row[0]: row[1:] for row in rows[0][2:]}["`ActionClassifier`, cosines"]
+    assert ours[:3] == ["100.0"] * 3
