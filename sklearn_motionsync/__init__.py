@@ -15,6 +15,7 @@
 from . import datasets, display, metrics
 from .aspace import ASpace
 from .body.direction_cosines import DirectionCosines
+from .body.joint_positions import JointPositions
 from .body.skeleton import Skeleton
 from .display import (
     ActionModelDisplay,
@@ -44,6 +45,7 @@ __all__ = [
     "ActionModelDisplay",
     "DenseSynchronizer",
     "DirectionCosines",
+    "JointPositions",
     "KeyframeSynchronizer",
     "LinearSynchronizer",
     "Match",

@@ -16,6 +16,7 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
+    JointPositions,
     KeyframeSynchronizer,
     LinearSynchronizer,
     Skeleton,
@@ -36,7 +37,8 @@ SYNCHRONIZERS = [
 ]
 DETECTOR = ActionDetector(make_pipeline(DenseSynchronizer(), ActionModel()))
 ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, ActionModel(), DETECTOR]
-ESTIMATORS = [DirectionCosines(Skeleton.paper()), *ROW_ESTIMATORS]
+BODY_ESTIMATORS = [DirectionCosines(Skeleton.paper()), JointPositions(Skeleton.paper())]
+ESTIMATORS = [*BODY_ESTIMATORS, *ROW_ESTIMATORS]
 TRANSFORMERS = [e for e in ESTIMATORS if hasattr(e, "transform")]
 
 EXTRA_CHECKS = [
@@ -234,7 +236,7 @@ def test_posture_level_gives_the_kind_back(estimator, performances):
         for estimator in ESTIMATORS
         for given in ("float32", "float64", "float16", "int32", "bool")
         # Coordinates that are 0 or 1 make limbs without length.
-        if not (given == "bool" and isinstance(estimator, DirectionCosines))
+        if not (given == "bool" and estimator in BODY_ESTIMATORS)
     ],
     ids=by_name,
 )
@@ -318,10 +320,9 @@ def test_pandas_output_keeps_the_labels(performances):
     assert list(out.loc["b"].index) == list(range(20))
 
 
-def test_pandas_through_a_pipeline(performances):
-    pipe = make_pipeline(
-        *(clone(e) for e in (*TRANSFORMERS[:2], DenseSynchronizer(), ActionModel()))
-    )
+@pytest.mark.parametrize("estimator", BODY_ESTIMATORS, ids=by_name)
+def test_pandas_through_a_pipeline(estimator, performances):
+    pipe = make_pipeline(clone(estimator), ASpace(), DenseSynchronizer(), ActionModel())
     plain = clone(pipe).fit(performances).score_samples(performances)
     with config_context(transform_output="pandas"):
         framed = clone(pipe).fit(performances).score_samples(performances)
@@ -449,20 +450,26 @@ def test_rows_are_univariate_sequences(estimator, performances):
     np.testing.assert_array_equal(clone(estimator).fit(rows).transform(rows), expected)
 
 
-# -- DirectionCosines, whose width its skeleton fixes: scikit-learn's demands, written out --
+# -- those whose width their skeleton fixes: scikit-learn's demands, written out ------------
 
 
 @pytest.mark.filterwarnings("ignore:X does not have valid feature names:UserWarning")
-@pytest.mark.parametrize("reference", ["heading", "parent", "world"])
-def test_direction_cosines_on_rows(reference, performances):
+@pytest.mark.parametrize(
+    ("kind", "reference", "width"),
+    [
+        *((DirectionCosines, reference, 37) for reference in ("heading", "parent", "world")),
+        *((JointPositions, reference, 42) for reference in ("heading", "world")),
+    ],
+)
+def test_bodies_on_rows(kind, reference, width, performances):
     X = performances[0]
-    estimator = DirectionCosines(Skeleton.paper(), reference)
+    estimator = kind(Skeleton.paper(), reference)
     params = estimator.get_params()
     assert estimator.fit(X) is estimator
     assert estimator.get_params() == params
     assert estimator.n_features_in_ == WIDTH
     out = estimator.transform(X)
-    assert out.shape == (30, 37)
+    assert out.shape == (30, width)
     np.testing.assert_array_equal(clone(estimator).fit_transform(X), out)
     np.testing.assert_array_equal(clone(estimator).fit(X, y=np.zeros(30)).transform(X), out)
     np.testing.assert_allclose(estimator.transform(X[::-1]), out[::-1], rtol=1e-12)
@@ -479,10 +486,16 @@ def test_direction_cosines_on_rows(reference, performances):
         estimator.transform(X[:, :-1])
 
 
+@pytest.mark.parametrize("estimator", BODY_ESTIMATORS, ids=by_name)
 @pytest.mark.parametrize(
     "params", [{"reference": "sideways"}, {"reference": None}, {"skeleton": "acclaim"}]
 )
-def test_direction_cosines_validates_its_parameters(params, performances):
-    estimator = DirectionCosines(Skeleton.paper()).set_params(**params)
+def test_parameters_of_bodies_are_validated(estimator, params, performances):
+    estimator = clone(estimator).set_params(**params)
     with pytest.raises(ValueError, match=f"The '{next(iter(params))}' parameter"):
         estimator.fit(performances)
+
+
+def test_positions_know_no_parent_limbs(performances):
+    with pytest.raises(ValueError, match=r"The 'reference' parameter"):
+        JointPositions(Skeleton.paper(), "parent").fit(performances)

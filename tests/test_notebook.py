@@ -15,6 +15,7 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
+    JointPositions,
     KeyframeSynchronizer,
     LinearSynchronizer,
     Skeleton,
@@ -27,6 +28,7 @@ ESTIMATORS = [
     ASpace(),
     DenseSynchronizer(),
     DirectionCosines(Skeleton.paper()),
+    JointPositions(Skeleton.paper()),
     KeyframeSynchronizer(),
     LinearSynchronizer(),
 ]

@@ -2,26 +2,17 @@
 
 import numpy as np
 import pandas as pd
-from sklearn.base import BaseEstimator, TransformerMixin, _fit_context
+from sklearn.base import _fit_context
 from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..fitting import at_once, of_one_state
 from ..gate import as_numbers
-from ..notebook import DocumentedMixin
-from ..performances import check_performances, check_transformed, restore
-from .axes import along_parents, heading, turned
-from .limbs import (
-    LIMB_NAMES,
-    LIMBS,
-    check_upright,
-    exponent_of,
-    landmarks_of,
-    leg_length,
-    limbs_of,
-    unit,
-)
-from .skeleton import LANDMARKS, Skeleton, check_columns
+from ..performances import check_transformed, restore
+from .axes import along_parents, turned
+from .base import PositionsTransformer, called
+from .limbs import LIMB_NAMES, LIMBS, exponent_of, leg_length, unit
+from .skeleton import LANDMARKS, Skeleton
 
 __all__ = ["DirectionCosines"]
 
@@ -31,7 +22,7 @@ __all__ = ["DirectionCosines"]
 _MOVED = 0.25
 
 
-class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
+class DirectionCosines(PositionsTransformer):
     """Postures of 37 parameters from joint positions (Eq. 1).
 
     A posture is the height of the pelvis and, for each of twelve limbs, the cosines of the
@@ -62,6 +53,7 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
     See Also
     --------
     ASpace : The reduced space of these postures.
+    JointPositions : Where the joints are: the other view of a body.
 
     Notes
     -----
@@ -124,33 +116,6 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
         self.limb_lengths_ = found
         return self
 
-    fit_transform = at_once(TransformerMixin.fit_transform)
-
-    @of_one_state
-    def transform(self, X):
-        """Postures of joint positions.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, 3 * n_joints), 3-D array, or 2-D array
-            Joint positions.
-
-        Returns
-        -------
-        The kind that was given, with 37 features
-
-        Raises
-        ------
-        ValueError
-            If the width is not that of the skeleton, a column of the skeleton stands in another
-            one's place, a limb has no length, or a body is upside down: in nine of ten frames its
-            pelvis is below the ankles, and its head is below the pelvis on average.
-        """
-        check_is_fitted(self)
-        performances = self._check(X, reset=False)
-        postures = [self._postures(performances, i) for i in range(len(performances))]
-        return restore(self, performances, postures)
-
     @of_one_state
     def inverse_transform(self, X, limb_lengths=None):
         """Joint positions of postures: the paper's fifteen joints, for drawing.
@@ -202,53 +167,12 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
         names = [f"{limb}_{axis}" for limb in LIMBS for axis in "xyz"]
         return np.asarray(["pelvis_height", *names], dtype=object)
 
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.input_tags.three_d_array = True
-        tags.transformer_tags.preserves_dtype = ["float64", "float32"]
-        return tags
-
-    def _check(self, X, *, reset):
-        performances = check_performances(self, X, reset=reset, level="posture")
-        width, expected = performances[0].shape[1], 3 * len(self.skeleton.joints)
-        if width != expected:
-            raise ValueError(
-                f"Performance 0 has {width} features a frame, but the skeleton's "
-                f"{len(self.skeleton.joints)} joints need {expected}: x, y, z of each."
-            )
-        # All tables of a list have the names of the first.
-        first = X[0] if isinstance(X, (list, tuple, np.ndarray)) else X
-        check_columns(first, self.skeleton, "Performance 0")
-        return performances
-
-    def _body(self, performances, i):
-        """Landmarks of a performance, limbs and their lengths in units of ``2**k``; k."""
-        points, k = landmarks_of(performances[i], self.skeleton)
-        limbs = limbs_of(points)
-        lengths = np.linalg.norm(limbs, axis=2)
-        # What is less is rounding of the coordinates.
-        largest = max(points.max(), -points.min())
-        without = lengths <= np.finfo(lengths.dtype).eps * largest
-        if without.any():
-            frame, limb = np.argwhere(without)[0]
-            name = LIMB_NAMES[limb]
-            raise ValueError(
-                f"{_called(performances, i)}, frame {frame}: the limb {name!r} has no length, its "
-                f"joints {[self.skeleton.landmarks[j] for j in LIMBS[name][:2]]} coincide. Repair "
-                "the frame, or choose other landmarks."
-            )
-        check_upright(points, lengths, self.skeleton, _called(performances, i))
-        return points, limbs, lengths, k
-
-    def _postures(self, performances, i):
-        points, limbs, lengths, _ = self._body(performances, i)
-        height = points[:, LANDMARKS.index("pelvis"), 1]
-        ankles = [LANDMARKS.index(f"{side}_ankle") for side in ("left", "right")]
-        floor = points[:, ankles, 1].min()
-        u = (height - floor) / leg_length(np.median(lengths, axis=0))
-        cosines = limbs / lengths[:, :, np.newaxis]
+    def _features(self, body):
+        floor = min(body.at(f"{side}_ankle")[:, 1].min() for side in ("left", "right"))
+        u = (body.at("pelvis")[:, 1] - floor) / body.leg
+        cosines = body.directions
         if self.reference != "world":
-            cosines = turned(cosines, heading(cosines[:, 0]))
+            cosines = turned(cosines, body.heading)
         if self.reference == "parent":
             cosines = along_parents(cosines)
         return np.column_stack([u, cosines.reshape(len(u), -1)])
@@ -261,7 +185,7 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
         if without.any():
             frame, limb = np.argwhere(without)[0]
             raise ValueError(
-                f"{_called(performances, i)}, frame {frame}: the limb {LIMB_NAMES[limb]!r} has no "
+                f"{called(performances, i)}, frame {frame}: the limb {LIMB_NAMES[limb]!r} has no "
                 "direction, its three cosines are 0. Drop the frame, or give it a direction."
             )
         # A mean or an approximation of cosines is shorter than 1, a limb is not.
@@ -275,16 +199,10 @@ class DirectionCosines(DocumentedMixin, TransformerMixin, BaseEstimator):
             sound = np.isfinite(positions.sum()) or np.isfinite(positions).all()
         if not sound or lengths.min() < np.finfo(positions.dtype).tiny:
             raise ValueError(
-                f"{_called(performances, i)}: the positions are beyond {positions.dtype} numbers. "
+                f"{called(performances, i)}: the positions are beyond {positions.dtype} numbers. "
                 "Give limb_lengths in another unit, or smaller heights of the pelvis."
             )
         return positions
-
-
-def _called(performances, i):
-    """What to call a performance in messages."""
-    label = performances.labels[i]
-    return f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
 
 
 def _checked_lengths(limb_lengths):

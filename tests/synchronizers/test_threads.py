@@ -14,6 +14,7 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
+    JointPositions,
     KeyframeSynchronizer,
     LinearSynchronizer,
     Skeleton,
@@ -30,6 +31,7 @@ ESTIMATORS = [
     ASpace(),
     ActionModel(),
     DirectionCosines(Skeleton.paper()),
+    JointPositions(Skeleton.paper()),
 ]
 
 

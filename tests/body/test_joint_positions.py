@@ -1,0 +1,256 @@
+"""Where joints are against closed forms and a slow computation, and side by side with cosines."""
+
+import math
+from statistics import median
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_bodies import moved, standing, turned
+from sklearn import clone, config_context
+from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
+from sklearn.pipeline import make_pipeline, make_union
+from sklearn_motionsync import (
+    ActionModel,
+    DenseSynchronizer,
+    DirectionCosines,
+    JointPositions,
+    Skeleton,
+    to_frame,
+    to_sequences,
+)
+from sklearn_motionsync.datasets import load_performances, make_bending
+
+PAPER = Skeleton.paper()
+LANDMARKS = list(PAPER.joints)[1:]
+
+
+def places(body, reference="heading"):
+    """Landmark: where it is, of a body of one posture."""
+    features = JointPositions(PAPER, reference).fit_transform([np.vstack([body, body])])[0][0]
+    return dict(zip(LANDMARKS, map(tuple, features.reshape(14, 3).round(9) + 0.0), strict=True))
+
+
+# -- what they are --------------------------------------------------------------------------
+
+
+def test_names():
+    names = JointPositions(PAPER).get_feature_names_out()
+    assert list(names) == [f"{landmark}_{axis}" for landmark in LANDMARKS for axis in "xyz"]
+    assert (len(names), names[0], names[-1]) == (42, "neck_x", "right_ankle_z")
+
+
+@pytest.mark.parametrize("size", [1, 2.5])
+@pytest.mark.parametrize("reference", ["heading", "world"])
+def test_a_body_made_by_hand(reference, size):
+    """Its legs are 1 long, and it looks along z."""
+    at = places(
+        size * standing(left_wrist=(0.2, 1.2, 0.3), right_ankle=(-0.1, 0.5, -0.5)), reference
+    )
+    assert at["neck"] == (0, 0.5, 0)
+    assert at["head"] == (0, 0.7, 0)
+    assert at["left_hip"] == (0.1, 0, 0)
+    assert at["left_ankle"] == (0.1, -1, 0)
+    assert at["left_wrist"] == (0.2, 0.2, 0.3)
+    assert at["right_ankle"] == (-0.1, -0.5, -0.5)
+
+
+def test_the_axes_turn_with_the_body_or_stay():
+    looks_along_x = turned(standing(left_wrist=(0.2, 1.2, 0.3)), 90)
+    assert places(looks_along_x)["left_wrist"] == (0.2, 0.2, 0.3)
+    assert places(looks_along_x, "world")["left_wrist"] == (0.3, 0.2, -0.2)
+
+
+def test_leaning_hips_leave_up_as_it_is():
+    """Only the heading of the hips is taken, not how they lean."""
+    at = places(standing(left_hip=(0.1, 1.05, 0), right_hip=(-0.1, 0.95, 0)))
+    assert at["head"][0] == at["neck"][0] == at["head"][2] == 0
+
+
+@pytest.mark.parametrize("dtype", [float, "f4"])
+def test_the_unit_is_the_usual_leg_of_the_performance(dtype):
+    """Of several postures, some of them with legs that are measured too long."""
+    long = standing(left_ankle=(0.1, -3, 0), right_ankle=(-0.1, -3, 0))
+    X = np.vstack([long, standing(), standing(), standing(), long]).astype(dtype)
+    features = JointPositions(PAPER).fit_transform([2 * X])[0]
+    assert features.dtype == dtype
+    np.testing.assert_allclose(features[:, 3 * LANDMARKS.index("neck") + 1], 0.5, rtol=1e-6)
+    np.testing.assert_allclose(features[0, -2], -4, rtol=1e-6)
+
+
+def test_nobody_who_walks_and_turns_at_every_frame_changes(bending):
+    rng = np.random.default_rng(0)
+    x = bending.data[0]
+    other = np.vstack(
+        [moved(turned(frame, rng.uniform(0, 360)), rng.normal(size=3)) for frame in x]
+    )
+    straight, astray = JointPositions(bending.skeleton).fit_transform([x, other])
+    np.testing.assert_allclose(astray, straight, atol=1e-9)
+
+
+def test_fit_learns_nothing_of_performances(bending):
+    fitted = JointPositions(bending.skeleton).fit(bending.data[:2])
+    assert {name for name in vars(fitted) if name.endswith("_")} == {"n_features_in_"}
+    other = clone(fitted).fit([3 * x for x in bending.data[2:]])
+    for x, y in zip(fitted.transform(bending.data), other.transform(bending.data), strict=True):
+        np.testing.assert_array_equal(x, y)
+
+
+def test_joints_that_are_no_landmarks_do_not_count(bends):
+    x = bends.data[0].reshape(-1, 31, 3).copy()
+    expected = JointPositions(bends.skeleton).fit_transform([x.reshape(len(x), -1)])[0]
+    others = [j for j, name in enumerate(bends.skeleton.joints)
+              if name not in bends.skeleton.landmarks.values()]  # fmt: skip
+    x[:, others] += 5
+    changed = JointPositions(bends.skeleton).fit_transform([x.reshape(len(x), -1)])[0]
+    np.testing.assert_array_equal(changed, expected)
+
+
+# -- real people ----------------------------------------------------------------------------
+
+
+def slowly(x, skeleton, reference):
+    """Frame by frame, joint by joint, the heading as an angle."""
+    frames = [
+        {name: frame.reshape(-1, 3)[skeleton.joints.index(joint)].tolist()
+         for name, joint in skeleton.landmarks.items()}
+        for frame in x
+    ]  # fmt: skip
+    segments = [(f"{side}_{a}", f"{side}_{b}") for side in ("left", "right")
+                for a, b in (("hip", "knee"), ("knee", "ankle"))]  # fmt: skip
+    leg = sum(median(math.dist(at[a], at[b]) for at in frames) for a, b in segments) / 2
+    rows = []
+    for at in frames:
+        (rx, _, rz), (lx, _, lz) = at["right_hip"], at["left_hip"]
+        angle = math.atan2(lz - rz, lx - rx) if reference == "heading" else 0
+        cos, sin = math.cos(angle) / leg, math.sin(angle) / leg
+        row = []
+        for name in LANDMARKS:
+            dx, dy, dz = (p - q for p, q in zip(at[name], at["pelvis"], strict=True))
+            row += [dx * cos + dz * sin, dy / leg, dz * cos - dx * sin]
+        rows.append(row)
+    return np.array(rows)
+
+
+@pytest.fixture(params=["hdm05/hdm05", "utkinect/utkinect"])
+def people(request, real_data):
+    """A skeleton, and a clip of each of several people and actions."""
+    bunch = load_performances(real_data / f"{request.param}_positions.npz")
+    return bunch.skeleton, [x.astype(float) for x in bunch.data[::17]]
+
+
+@pytest.mark.parametrize("reference", ["heading", "world"])
+def test_real_people_as_computed_slowly(people, reference):
+    skeleton, X = people
+    found = JointPositions(skeleton, reference).fit_transform(X)
+    for features, x in zip(found, X, strict=True):
+        np.testing.assert_allclose(features, slowly(x, skeleton, reference), atol=1e-12)
+
+
+@pytest.mark.parametrize("reference", ["heading", "world"])
+def test_the_limbs_between_them_point_as_the_cosines_say(people, reference):
+    skeleton, X = people
+    cosines = DirectionCosines(skeleton, reference).set_output(transform="pandas")
+    positions = JointPositions(skeleton, reference).set_output(transform="pandas")
+    said, at = cosines.fit_transform(X), positions.fit_transform(X)
+    ends = {
+        "left_thigh": ("left_hip", "left_knee"),
+        "shoulder": ("right_shoulder", "left_shoulder"),
+        "right_forearm": ("right_elbow", "right_wrist"),
+        "neck": ("neck", "head"),
+    }
+    for limb, joints in ends.items():
+        start, end = (at[[f"{joint}_{axis}" for axis in "xyz"]].to_numpy() for joint in joints)
+        direction = (end - start) / np.linalg.norm(end - start, axis=1, keepdims=True)
+        expected = said[[f"{limb}_{axis}" for axis in "xyz"]]
+        np.testing.assert_allclose(direction, expected, atol=1e-9)
+
+
+# -- side by side with the cosines ----------------------------------------------------------
+
+BUNCH = make_bending(8, n_frames=40, random_state=3)
+EQUAL = [x[:30] for x in BUNCH.data]
+NAMES = BUNCH.skeleton.column_names
+LABELS = [f"{actor} {take}" for actor, take in zip(BUNCH.actor, BUNCH.take, strict=True)]
+
+
+def views():
+    return make_union(DirectionCosines(BUNCH.skeleton), JointPositions(BUNCH.skeleton))
+
+
+def in_pandas():
+    return views().set_output(transform="pandas")
+
+
+def expected_of(X):
+    both = DirectionCosines(BUNCH.skeleton), JointPositions(BUNCH.skeleton)
+    return [np.hstack(pair) for pair in zip(*(e.fit_transform(X) for e in both), strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("X", "plain"),
+    [
+        (BUNCH.data, BUNCH.data),
+        (EQUAL, EQUAL),
+        (np.stack(EQUAL), EQUAL),
+        ([pd.DataFrame(x, columns=NAMES) for x in BUNCH.data], BUNCH.data),
+        (to_frame(BUNCH.data, performances=LABELS, columns=NAMES), BUNCH.data),
+        ([x.astype("f4") for x in BUNCH.data], [x.astype("f4") for x in BUNCH.data]),
+    ],
+    ids=["list", "equal lengths", "3-D", "frames", "MultiIndex", "float32"],
+)
+def test_both_views_of_every_kind_of_collection(X, plain):
+    fitted = in_pandas().fit(X)
+    with config_context(transform_output="pandas"):
+        everywhere = views().fit_transform(X)
+    for table in (fitted.transform(X), in_pandas().fit_transform(X), everywhere):
+        assert list(table.columns) == list(fitted.get_feature_names_out())
+        assert table.index.names == ["performance", "frame"]
+        if isinstance(X, pd.DataFrame):
+            assert table.index.equals(X.index)
+        for found, right in zip(to_sequences(table), expected_of(plain), strict=True):
+            assert found.shape[1] == 79
+            assert set(found.dtypes) == {plain[0].dtype}
+            np.testing.assert_array_equal(found, right)
+
+
+def test_names_of_both_views_tell_them_apart():
+    """Both have a neck, the limb and the joint."""
+    names = list(in_pandas().fit(BUNCH.data).get_feature_names_out())
+    assert len(set(names)) == 79
+    assert {"directioncosines__neck_x", "jointpositions__neck_x"} < set(names)
+
+
+def test_without_pandas_a_union_refuses_performances():
+    """It would join rows of a matrix, and knows nothing of performances."""
+    for X in (BUNCH.data, EQUAL, np.stack(EQUAL)):
+        with pytest.raises(ValueError, match=r"shape|dimension"):
+            views().fit_transform(X)
+    rows = views().fit_transform(BUNCH.data[0])
+    np.testing.assert_array_equal(rows, expected_of(BUNCH.data[:1])[0])
+
+
+def test_both_views_synchronised():
+    sync = DenseSynchronizer(30)
+    expected = clone(sync).fit(expected_of(BUNCH.data))
+    pipe = make_pipeline(in_pandas(), sync).fit(BUNCH.data)
+    np.testing.assert_array_equal(pipe[-1].pattern_, expected.pattern_)
+    aligned = expected.transform(expected_of(BUNCH.data))
+    np.testing.assert_array_equal(pipe.transform(BUNCH.data), aligned)
+    np.testing.assert_array_equal(clone(pipe).fit_transform(BUNCH.data), aligned)
+    np.testing.assert_array_equal(pipe.transform(BUNCH.data[:2]), aligned[:2])
+
+
+def test_both_views_in_cross_validation():
+    steps = DenseSynchronizer(20), ActionModel()
+    scores = cross_val_score(
+        make_pipeline(in_pandas(), *steps), BUNCH.data, groups=BUNCH.actor, cv=GroupKFold(2),
+        error_score="raise",
+    )  # fmt: skip
+    expected = cross_val_score(
+        make_pipeline(*steps), expected_of(BUNCH.data), groups=BUNCH.actor, cv=GroupKFold(2)
+    )
+    np.testing.assert_array_equal(scores, expected)
+    grid = {"featureunion__jointpositions__reference": ["heading", "world"]}
+    search = GridSearchCV(make_pipeline(in_pandas(), *steps), grid, cv=2, error_score="raise")
+    assert search.fit(BUNCH.data).predict(BUNCH.data).shape == (8,)
