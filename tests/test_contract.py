@@ -418,7 +418,7 @@ def test_a_bad_performance_is_named(estimator, fault, when, performances):
         ([np.zeros(3), np.zeros(4)], r"x\[:, np.newaxis\]"),
         (np.zeros(5), "[Ee]xpected 2D array"),
     ],
-    ids=str,
+    ids=lambda value: value if isinstance(value, str) else type(value).__name__,
 )
 def test_what_is_no_collection_is_refused(estimator, X, message):
     with pytest.raises(ValueError, match=message):

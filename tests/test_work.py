@@ -219,11 +219,13 @@ def test_an_interrupted_fit_leaves_no_half_fitted_estimator(walks, monkeypatch):
 @pytest.mark.parametrize("n_jobs", [1, 2])
 def test_ctrl_c_leaves_at_once(n_jobs):
     """Hours of work, interrupted after a moment."""
+    # Whoever runs the tests in the background may have it ignored.
     script = f"""
-        import time
+        import signal
         import numpy as np
         from sklearn.exceptions import NotFittedError
         from sklearn_motionsync import DenseSynchronizer
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         X = np.random.default_rng(0).standard_normal((3000, 200, 8))
         sync = DenseSynchronizer(search="exhaustive", n_jobs={n_jobs})
         try:

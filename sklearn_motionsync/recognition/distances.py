@@ -14,7 +14,7 @@ from ..matching.warps import normalise
 from ..performances import SequenceLevelMixin, check_performances
 from ..work import Common, Progress, run
 
-__all__ = ["SETTINGS", "distances_of", "synchronization_distances"]
+__all__ = ["SETTINGS", "distances_of", "on_clock", "synchronization_distances"]
 
 # What performances are compared with, and what is accepted.
 SETTINGS: dict = {
