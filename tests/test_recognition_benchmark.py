@@ -196,8 +196,8 @@ def test_all_tables_of_a_tiny_set_without_other_packages(
     ]
     for module in (recognition, recognizers):
         monkeypatch.setattr(module, "version_of", lambda package: None)
-        monkeypatch.setattr(module, "ActionClassifier", hasty)
     for module, name, value in (
+        (recognizers, "ActionClassifier", hasty),
         (recognizers, "WAYS", short),
         (recognition, "ROUNDS", 1),
         (recognition, "PAIRS", 6),
