@@ -11,6 +11,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.utils import estimator_checks
 from sklearn.utils.estimator_checks import parametrize_with_checks
 from sklearn_motionsync import (
+    ActionClassifier,
     ActionDetector,
     ActionModel,
     ASpace,
@@ -35,10 +36,23 @@ SYNCHRONIZERS = [
     DenseSynchronizer(),
     ShiftSynchronizer(),
 ]
+
+
+class InTurns(ActionClassifier):
+    """Two classes in turn, where the tests of collections give no labels."""
+
+    def fit(self, X, y=None):
+        if y is None:
+            n = X.index.levshape[0] if isinstance(X, pd.DataFrame) else len(list(X))
+            y = np.arange(n) % 2
+        return super().fit(X, y)
+
+
 DETECTOR = ActionDetector(make_pipeline(DenseSynchronizer(), ActionModel()))
+CLASSIFIER = InTurns(n_frames=8)
 ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, ActionModel(), DETECTOR]
 BODY_ESTIMATORS = [DirectionCosines(Skeleton.paper()), JointPositions(Skeleton.paper())]
-ESTIMATORS = [*BODY_ESTIMATORS, *ROW_ESTIMATORS]
+ESTIMATORS = [*BODY_ESTIMATORS, *ROW_ESTIMATORS, CLASSIFIER]
 TRANSFORMERS = [e for e in ESTIMATORS if hasattr(e, "transform")]
 
 EXTRA_CHECKS = [
@@ -58,7 +72,7 @@ def by_name(value):
     return type(value).__name__ if hasattr(value, "get_params") else None
 
 
-@parametrize_with_checks(ROW_ESTIMATORS)
+@parametrize_with_checks([*ROW_ESTIMATORS, ActionClassifier(n_frames=4)])
 def test_scikit_learn_checks(estimator, check):
     check(estimator)
 
@@ -70,7 +84,7 @@ def test_scikit_learn_checks(estimator, check):
     ("estimator", "name"),
     [
         (estimator, name)
-        for estimator in ROW_ESTIMATORS
+        for estimator in (*ROW_ESTIMATORS, ActionClassifier(n_frames=4))
         for name in EXTRA_CHECKS
         if hasattr(estimator, "transform") or "transform" not in name
     ],
@@ -133,7 +147,9 @@ def outputs(estimator, X):
     if hasattr(estimator, "score_samples"):
         answers += [estimator.score_samples(X), estimator.decision_function(X)]
         answers += [estimator.predict(X)]
-    if hasattr(estimator, "score"):
+    if hasattr(estimator, "predict_proba"):
+        answers += [estimator.predict_proba(X), estimator.novelty_scores(X), estimator.predict(X)]
+    elif hasattr(estimator, "score"):
         answers += [np.array(estimator.score(X))]
     return answers
 
@@ -430,7 +446,10 @@ def test_unfitted(estimator, performances):
         outputs(clone(estimator), performances)
 
 
-@pytest.mark.parametrize("estimator", [*SYNCHRONIZERS, ActionModel(), DETECTOR], ids=by_name)
+SEQUENCE_LEVEL = [*SYNCHRONIZERS, ActionModel(), DETECTOR, CLASSIFIER]
+
+
+@pytest.mark.parametrize("estimator", SEQUENCE_LEVEL, ids=by_name)
 def test_sequence_level_estimators_keep_to_the_kind_of_fit(estimator, performances):
     fitted = clone(estimator).fit(performances)
     with pytest.raises(ValueError, match=r"wrap one sequence as \[X\]"):

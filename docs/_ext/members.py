@@ -1,8 +1,11 @@
 """The methods of a class: those of the package, and those it has from scikit-learn."""
 
 import inspect
+import re
 
 PACKAGE = "sklearn_motionsync"
+# "accuracy <accuracy_score>": a label of scikit-learn's manual, which this one does not have.
+_LABELLED = re.compile(r":ref:`([^`<]*?)\s*<[^`>]*>`")
 
 
 def members(cls):
@@ -42,4 +45,5 @@ def _entry(cls, name):
     shown = [p.replace(annotation=inspect.Parameter.empty) for p in parameters]
     signature = str(inspect.Signature(shown))
     summary = inspect.getdoc(method).strip().split("\n\n")[0].replace("\n", " ")
+    summary = _LABELLED.sub(r"\1", summary)
     return {"name": name, "signature": signature, "summary": summary}

@@ -140,8 +140,9 @@ class PipelineFigures:
             (of_class,) = models
             given = of_class.estimator, of_class.performances, {}, caller
             view, cosines, columns = _in_limbs(*given)
-            i, by = 0, f" as {of_class.label!s}"
+            i, by = 0, " by the model of that class"
             called = _called(int(of_class.indices[0]), of_class.labels[0])
+            called = f"{called}, most like {str(of_class.label)!r},"
         limit = view.model.n_std if limit is None else as_limit(limit)
         names = list(cosines.get_feature_names_out())
         strip = strip_of(view.scores[i][:, columns], names, frames, limit)
@@ -157,8 +158,8 @@ class PipelineFigures:
             strip.titles,
             marked=strip.marked,
             behind=[[shadows[[frame]]] for frame in strip.frames],
-            heading=f"{called} is {verdict}{by}. Violet: limbs more than {limit:.3g} standard "
-            "deviations from what is expected of a new\nperson, at or around that frame; beyond "
+            heading=f"{called} is {verdict}{by}.\nViolet: limbs more than {limit:.3g} standard "
+            "deviations from what is expected of a new person, at or around\nthat frame; beyond "
             f"{view.model.simultaneous_factor():.2g} is rare. Pale: the mean performance.",
         )
         return display.plot(ax, at=at, azimuth=azimuth)

@@ -20,7 +20,7 @@ from .distances import SETTINGS
 from .kernel import MotionKernel
 from .labels import check_labels, label_of_unknown
 from .models import as_given, learn_model
-from .regression import KernelRegression, deal, decide, held_out, learn_temperature
+from .regression import deal, decide, learn, threshold
 
 __all__ = ["ActionClassifier"]
 
@@ -199,8 +199,8 @@ class ActionClassifier(
         with self._progress(fits=True) as progress:
             known = kernel.learn(performances, n_jobs=self.n_jobs, progress=progress)
         n_folds = _FOLDS if people is None else min(_FOLDS, people.max() + 1)
-        learn = partial(_learn, self.C, deal(codes, people, n_folds))
-        (learnt,) = run(learn, [(known, codes)])
+        learnt_of = partial(learn, self.C, deal(codes, people, n_folds))
+        (learnt,) = run(learnt_of, [(known, codes)])
         self._regression, self.temperature_, self.held_out_ = learnt
         # Copies: what the user does with the arrays must not change what was learnt.
         self._kernel = kernel
@@ -266,8 +266,8 @@ class ActionClassifier(
         return decisions if len(self.classes_) > 2 else decisions[:, 1] - decisions[:, 0]
 
     @of_one_state
-    def novelty_scores(self, X):
-        """How little performances are like any class: the largest decision value, negated.
+    def score_samples(self, X):
+        """How much performances are like any class: the largest decision value.
 
         Parameters
         ----------
@@ -276,8 +276,22 @@ class ActionClassifier(
         Returns
         -------
         ndarray, shape (n_sequences,)
-            The larger, the less it is one of the classes. ``reject_below`` rejects what is above
-            ``-reject_below``.
+            ``reject_below`` rejects what is below it. Pipelines that end here have it, too.
+        """
+        return self._decide(X).max(axis=1)
+
+    @of_one_state
+    def novelty_scores(self, X):
+        """How little performances are like any class: ``score_samples``, negated.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+
+        Returns
+        -------
+        ndarray, shape (n_sequences,)
+            The larger, the less it is one of the classes.
         """
         return -self._decide(X).max(axis=1)
 
@@ -303,14 +317,7 @@ class ActionClassifier(
         check_is_fitted(self)
         if not (isinstance(coverage, Real) and 0 < coverage < 1):
             raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
-        known = np.sort(self.held_out_[np.isfinite(self.held_out_)])
-        if not len(known):
-            raise ValueError(
-                "No threshold can be learnt, as nobody could be held out: give at least two "
-                "performances, and two groups, of two classes, or a number as reject_below."
-            )
-        rank = int((1 - coverage) * (len(known) + 1))
-        return float(known[max(rank - 1, 0)])
+        return threshold(self.held_out_, coverage)
 
     @of_one_state
     def model_of(self, label):
@@ -380,12 +387,3 @@ class ActionClassifier(
         with self._progress(fits=False) as progress:
             kernel = self._kernel(performances, n_jobs=self.n_jobs, progress=progress)
         return decide(kernel, *self._regression)
-
-
-def _learn(C, folds, kernel, codes):
-    """The regression, its temperature, and how sure it was of performances held out."""
-    regression = KernelRegression(kernel, C)
-    decisions = held_out(regression, kernel, codes, folds)
-    A, b = regression.fit(codes)
-    temperature = learn_temperature(decisions, codes)
-    return (np.ascontiguousarray(A.T).T, b), temperature, decisions.max(axis=1)

@@ -6,7 +6,15 @@ from scipy.optimize import minimize_scalar
 from scipy.special import log_softmax
 from sklearn.linear_model import LogisticRegression
 
-__all__ = ["KernelRegression", "deal", "decide", "held_out", "learn_temperature"]
+__all__ = [
+    "KernelRegression",
+    "deal",
+    "decide",
+    "held_out",
+    "learn",
+    "learn_temperature",
+    "threshold",
+]
 
 # Directions with less than this share of the largest eigenvalue are rounding.
 _ROUNDING = 1e-10
@@ -24,7 +32,7 @@ class KernelRegression:
     kernel : ndarray, shape (n, n)
         Of the training set, positive semidefinite but for rounding.
     C : float
-        Inverse strength of the penalty ``|f|^2 / 2``.
+        Inverse strength of the penalty ``|f|^2 / 2``, for all of them.
     """
 
     def __init__(self, kernel, C):
@@ -45,7 +53,9 @@ class KernelRegression:
             Classes that are none of theirs have minus infinity.
         """
         n_classes = codes.max() + 1
-        model = LogisticRegression(C=self.C, max_iter=_MOST_ITERATIONS, tol=_TOLERANCE)
+        # As strong a penalty, beside the mean loss, as if all were there.
+        C = self.C * len(codes) / len(codes[rows])
+        model = LogisticRegression(C=C, max_iter=_MOST_ITERATIONS, tol=_TOLERANCE)
         model.fit(self._z[rows], codes[rows])
         weights, intercepts = model.coef_, model.intercept_
         if len(weights) == 1:
@@ -121,3 +131,24 @@ def learn_temperature(decisions, codes):
 
     found = minimize_scalar(loss, bounds=(-5, 5), method="bounded", options={"xatol": 1e-6})
     return float(_USUAL * np.exp(found.x))
+
+
+def learn(C, folds, kernel, codes):
+    """The regression (A, b), its temperature, and how sure it is of performances held out (n,)."""
+    regression = KernelRegression(kernel, C)
+    decisions = held_out(regression, kernel, codes, folds)
+    A, b = regression.fit(codes)
+    temperature = learn_temperature(decisions, codes)
+    return (np.ascontiguousarray(A.T).T, b), temperature, decisions.max(axis=1)
+
+
+def threshold(held_out, coverage):
+    """The value that a share of new ones exceeds, by those held out; of few the smallest."""
+    known = np.sort(held_out[np.isfinite(held_out)])
+    if not len(known):
+        raise ValueError(
+            "No threshold can be learnt, as nobody could be held out: give at least two "
+            "performances, and two groups, of two classes, or a number as reject_below."
+        )
+    rank = int((1 - coverage) * (len(known) + 1))
+    return float(known[max(rank - 1, 0)])

@@ -120,6 +120,7 @@ def test_what_is_said_agrees(fitted, new):
     np.testing.assert_array_equal(fitted.predict(X), fitted.classes_[decisions.argmax(axis=1)])
     expected = softmax(fitted.temperature_ * decisions, axis=1)
     np.testing.assert_allclose(fitted.predict_proba(X), expected)
+    np.testing.assert_array_equal(fitted.score_samples(X), decisions.max(axis=1))
     np.testing.assert_array_equal(fitted.novelty_scores(X), -decisions.max(axis=1))
     assert fitted.score(X, y) == 1
 
@@ -465,7 +466,7 @@ def test_departures_are_those_from_the_class_that_is_given(bends, kind):
     if kind == "table":
         return
     display = SkeletonDisplay.from_departures(pipe, given, performance=2, limit=1)
-    assert display.heading.startswith("Performance 2 is accepted as half.")
+    assert display.heading.startswith("Performance 2, most like 'half', is accepted by the model")
     alone = SkeletonDisplay.from_departures(half, [new[2]], limit=1)
     assert display.titles == alone.titles
     np.testing.assert_allclose(np.array(display.scenes), np.array(alone.scenes))
