@@ -174,7 +174,7 @@ def recognition_table(name, found, columns):
     }
     others = {way: settings for way, settings in found.items() if way != CLASSIFIER}
     for way, settings in others.items():
-        best = max(settings, key=lambda s: np.mean(settings[s][columns[0][1]]))
+        best = max(settings, key=lambda s: shares(settings[s], columns))
         rows[f"{way}, {best}"] = numbers(settings[best], columns)
     every = [numbers(figures, columns) for of in others.values() for figures in of.values()]
     best = [
@@ -184,6 +184,11 @@ def recognition_table(name, found, columns):
     rows["*the best of others' settings, every number by itself*"] = best
     for row, values in rows.items():
         print_row(row, [show(v) for v, (*_, show, _) in zip(values, columns, strict=True)])
+
+
+def shares(figures, columns):
+    """What settings are chosen by: shares that are recognised, ties by the next column."""
+    return [summary(figures[figure]) for _, figure, summary, show, _ in columns if show is share]
 
 
 def numbers(figures, columns):
