@@ -134,7 +134,8 @@ def test_people_are_left_out_together_for_the_temperature(recognizers, recording
 
 
 def test_what_only_the_one_left_out_does_is_thought_of_last(recognizers, recordings):
-    strange = recordings._replace(actions=np.where(np.arange(18) == 0, "alone", recordings.actions))
+    actions = np.where(np.arange(18) == 0, "alone", recordings.actions)
+    strange = recognizers.Recordings("few", recordings.views, actions, recordings.actors)
     one = recognizers.Scored(strange, Nearest(np.arange(18.0), strange.actions))
     classes, probabilities = one.probabilities(np.arange(18), np.arange(3))
     assert classes.tolist() == ["alone", "bending", "rising", "sinking"]
@@ -196,8 +197,8 @@ def test_all_tables_of_a_tiny_set_without_other_packages(
     ]
     for module in (recognition, recognizers):
         monkeypatch.setattr(module, "version_of", lambda package: None)
-        monkeypatch.setattr(module, "ActionClassifier", hasty)
     for module, name, value in (
+        (recognizers, "ActionClassifier", hasty),
         (recognizers, "WAYS", short),
         (recognition, "ROUNDS", 1),
         (recognition, "PAIRS", 6),
