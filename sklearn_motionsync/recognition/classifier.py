@@ -43,7 +43,7 @@ class ActionClassifier(
 
     Parameters
     ----------
-    costs : list of {"velocity", "elastic", "posture"}, default=("velocity", "elastic", "posture")
+    costs : {"velocity", "elastic", "posture"} or list of them, default=all three
         The costs of the distances, each once; none, if ``summaries``, takes away all warps.
     C : float, default=10
         Inverse strength of the penalty of the regression.
@@ -128,7 +128,7 @@ class ActionClassifier(
     """
 
     _parameter_constraints: dict = {
-        "costs": ["array-like"],
+        "costs": ["array-like", StrOptions(set(COSTS))],
         "C": [Interval(Real, 0, None, closed="neither")],
         "gamma": [Interval(Real, 0, None, closed="neither")],
         "summaries": ["boolean"],

@@ -334,7 +334,7 @@ def test_a_constant_feature_does_not_count(known, fitted, new):
 
 def test_costs_one_by_one_and_none(known, new):
     X, y, _ = known
-    for costs in (["elastic"], ("posture", "velocity"), np.array(["velocity"]), []):
+    for costs in ("elastic", ("posture", "velocity"), np.array(["velocity"]), []):
         classifier = ActionClassifier(costs, n_frames=15).fit(X, y)
         assert classifier.score(new[0], new[1]) > 0.8
     bare = ActionClassifier(["elastic"], summaries=False, n_frames=15).fit(X, y)
