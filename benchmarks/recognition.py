@@ -179,9 +179,10 @@ def recognition_table(name, found, columns):
     every = [numbers(figures, columns) for of in others.values() for figures in of.values()]
     best = [
         better([n for n in column if not np.isnan(n)])
-        for column, (*_, better) in zip(zip(*every, strict=True), columns, strict=True)
+        for column, (*_, better) in zip(zip(*every, strict=True), columns, strict=bool(others))
     ]
-    rows["*the best of others' settings, every number by itself*"] = best
+    if others:
+        rows["*the best of others' settings, every number by itself*"] = best
     for row, values in rows.items():
         print_row(row, [show(v) for v, (*_, show, _) in zip(values, columns, strict=True)])
 
