@@ -26,6 +26,7 @@ import numpy as np
 from accuracy import print_head, print_row
 from joblib import Parallel, delayed
 from judges import version_of
+from negatives import SPOILT
 from recognizers import (
     BOTH,
     CLASSIFIER,
@@ -197,6 +198,47 @@ def numbers(figures, columns):
     return [summary(figures[figure]) for _, figure, summary, *_ in columns]
 
 
+# -- what is rejected -------------------------------------------------------------------
+
+KNOWN, UNKNOWN = "known actions", "an unknown action"
+
+
+def rejected_on_split(recordings, train, test):
+    """{kind: (novelties, border)} for ``reject_below="auto"``: known, spoilt, and unknown actions.
+
+    Spoilt are the performances of the known actions; unknown is each action left out in turn.
+    """
+    ours = Classifier(recordings, COSINES)
+    model, tried = ours.learnt(train), recordings.some(COSINES, test)
+    border = -model.threshold_at(0.95)
+    found = {kind: [spoil(x) for x in tried] for kind, spoil in {KNOWN: np.copy, **SPOILT}.items()}
+    found = {kind: [(model.novelty_scores(some), border)] for kind, some in found.items()}
+    actions = recordings.actions
+    for action in np.unique(actions[train]):
+        some = test[actions[test] == action]
+        if len(some):
+            model = ours.learnt(train[actions[train] != action])
+            novelties = model.novelty_scores(recordings.some(COSINES, some))
+            found.setdefault(UNKNOWN, []).append((novelties, -model.threshold_at(0.95)))
+    return found
+
+
+def rejection_table(recordings, splits):
+    """What the classifier rejects on cosines, and how well its novelty tells that."""
+    print_head('`ActionClassifier(reject_below="auto")`', ["rejected", "AUC to known actions"])
+    work = [delayed(rejected_on_split)(recordings, *split) for split in splits]
+    found = Parallel(n_jobs=-1)(work)
+    for kind in found[0]:
+        parts = [part for one in found for part in one[kind]]
+        rejected = np.mean([np.mean(novelties > border) for novelties, border in parts])
+        areas = []
+        for one in found if kind not in (KNOWN, UNKNOWN) else ():
+            both = [one[KNOWN][0][0], one[kind][0][0]]
+            strange = np.repeat([0, 1], list(map(len, both)))
+            areas.append(roc_auc_score(strange, np.concatenate(both)))
+        print_row(kind, [share(rejected), f"{np.mean(areas):.2f}" if areas else "-"])
+
+
 # -- time -------------------------------------------------------------------------------
 
 ROUNDS, PAIRS = 3, 300
@@ -280,6 +322,7 @@ def print_tables(kinect, splits, optical):
     left_out = partial(examine_fold, LEFT_OUT)
     tasks = [(examine_split, splits), (left_out, actors_left_out(kinect.actors))]
     recognition_table(kinect.name, examine_all(kinect, tasks), SPLIT_COLUMNS)
+    rejection_table(kinect, splits)
     tasks = [
         (left_out, actors_left_out(optical.actors)),
         (partial(examine_fold, ALONE), actors_alone(optical.actors)),

@@ -75,18 +75,19 @@ class Classifier:
 
     def predict(self, train, test):
         """Actions of performances (n_test,)."""
-        return self._learnt(train).predict(self._recordings.some(self._view, test))
+        return self.learnt(train).predict(self._recordings.some(self._view, test))
 
     def probabilities(self, train, test):
         """Classes, and their probabilities (n_test, n_classes)."""
-        model = self._learnt(train)
+        model = self.learnt(train)
         return model.classes_, model.predict_proba(self._recordings.some(self._view, test))
 
     def novelty(self, train, test):
         """The larger, the less like any class (n_test,)."""
-        return self._learnt(train).novelty_scores(self._recordings.some(self._view, test))
+        return self.learnt(train).novelty_scores(self._recordings.some(self._view, test))
 
-    def _learnt(self, train):
+    def learnt(self, train):
+        """The classifier of some of the recordings."""
         actions, actors = self._recordings.actions[train], self._recordings.actors[train]
         # Of one person alone it cannot learn how people differ.
         groups = actors if len(set(actors)) > 1 else None
