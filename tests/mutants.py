@@ -63,6 +63,10 @@ TESTS = {
     "model/variation": ["model/test_variation.py", "model/test_bands.py"],
     "model/views": ["model/test_bands.py", "display/test_departing.py", "display/test_displays.py"],
     "model": ["model/test_[abd]*.py"],
+    "model/classes": ["recognition/test_classifier.py"],
+    "recognition/distances": ["recognition/test_distances.py", "recognition/test_classifier.py"],
+    "recognition/regression": ["recognition/test_regression.py", "recognition/test_classifier.py"],
+    "recognition": ["recognition/test_classifier.py", "test_contract.py"],
     "gate": INPUT,
     "sequences": INPUT,
     "matching/comparison": ["recognition/test_distances.py", "recognition/test_classifier.py"],
@@ -103,6 +107,20 @@ EQUIVALENT = {
         "matching/consensus",
         "(np.arange(count) + 0.5) / max(count, 1) -> (np.arange(count) + 0.5) / max(count, 0)",
     ): "divides an empty array",
+    (
+        "matching/comparison",
+        "min(max_rate, n_frames - 1) -> min(max_rate, n_frames + 1)",
+    ): "no path takes a step longer than the clip",
+    (
+        "matching/comparison",
+        "np.ptp(scaled, axis=1, keepdims=True) <= _STILL * size -> "
+        "np.ptp(scaled, axis=1, keepdims=True) < _STILL * size",
+    ): "differs where all is 0 only",
+    (
+        "recognition/kernel",
+        "max(1.0, np.abs(self._centre).max() / self._unit) -> "
+        "max(2.0, np.abs(self._centre).max() / self._unit)",
+    ): "how much may be rounding",
     ("matching/filters", "_WIDE = 10"): "either filter gives the same but for rounding",
     ("matching/filters", "get_config()['working_memory'] * 2 ** 20"): SIZE,
     ("matching/filters", "get_config()['working_memory'] * 2 ** 20 / 6"): SIZE,

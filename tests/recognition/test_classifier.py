@@ -11,6 +11,7 @@ from scipy.special import softmax
 from sklearn import config_context
 from sklearn.calibration import CalibratedClassifierCV
 from sklearn.ensemble import StackingClassifier
+from sklearn.exceptions import NotFittedError
 from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import log_loss, roc_auc_score
 from sklearn.model_selection import (
@@ -33,7 +34,7 @@ from sklearn_motionsync import (
     to_frame,
 )
 from sklearn_motionsync.datasets import load_performances, make_bending
-from sklearn_motionsync.recognition.regression import KernelRegression, decide
+from sklearn_motionsync.recognition.regression import KernelRegression, deal, decide
 
 KINDS = ("wave", "rise", "turn")
 
@@ -149,6 +150,11 @@ def test_people_held_out_tell_how_sure_to_be(known, fitted):
     assert named.threshold_at(0.9) < unnamed.threshold_at(0.9)
     assert named.held_out_.mean() < 0.95 * unnamed.held_out_.mean()
     X, y, people = known
+    # Of many people several are held out at a time, one fold of five.
+    many = np.arange(30) % 7
+    dealt = deal(np.unique(y, return_inverse=True)[1], many, 5)
+    both = [ActionClassifier(n_frames=8).fit(X, y, groups=g) for g in (many, dealt)]
+    np.testing.assert_array_equal(both[0].held_out_, both[1].held_out_)
     # Labels of groups are labels.
     again = ActionClassifier(n_frames=30).fit(X, y, groups=np.array(list("edcba"))[people])
     assert again.temperature_ == pytest.approx(fitted.temperature_)
@@ -288,6 +294,12 @@ def test_one_performance_a_class(known, new):
         two.threshold_at(0.95)
 
 
+def test_unfitted():
+    for ask in (lambda c: c.model_of("wave"), lambda c: c.threshold_at(0.9)):
+        with pytest.raises(NotFittedError):
+            ask(ActionClassifier())
+
+
 def test_clips_of_three_frames_and_of_two(known, new):
     for n in (3, 2):
         X, tried = (
@@ -322,9 +334,10 @@ def test_all_alike(known):
     np.testing.assert_allclose(classifier.predict_proba(X), 0.5, atol=1e-3)
 
 
-def test_a_constant_feature_does_not_count(known, fitted, new):
+@pytest.mark.parametrize("constant", [0.1, -1e6 / 3])
+def test_a_constant_feature_does_not_count(known, fitted, new, constant):
     def wider(X):
-        return [np.column_stack([x, np.full(len(x), 0.1)]) for x in X]
+        return [np.column_stack([x, np.full(len(x), constant)]) for x in X]
 
     X, y, people = known
     classifier = ActionClassifier(n_frames=30).fit(wider(X), y, groups=people)

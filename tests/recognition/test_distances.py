@@ -73,7 +73,9 @@ def test_changes_of_pace_cost_what_smoothness_says():
     features = np.array([slow_features(x, "elastic", 20, 0.06, True) for x in X])
     unwarped = np.square(features[:, np.newaxis] - features).sum(axis=(2, 3))
     np.testing.assert_allclose(dear, unwarped, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(synchronization_distances(X, max_offset=0, n_frames=20), unwarped)
+    for none in ({"max_offset": 0}, {"max_rate": 1}):
+        straight = synchronization_distances(X, n_frames=20, **none)
+        np.testing.assert_allclose(straight, unwarped, rtol=1e-9, atol=1e-9)
 
 
 # -- nothing but the pair counts --------------------------------------------------------
