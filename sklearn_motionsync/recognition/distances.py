@@ -195,7 +195,8 @@ def _ordered(comparison, bases, moving, *, n_jobs, progress, name):
     blocks = list(itertools.product(rows, columns))
     portions = [(blocks[i : i + _PORTION_BLOCKS],) for i in range(0, len(blocks), _PORTION_BLOCKS)]
     stage = f"comparing {len(bases)} with {len(moving)} performances{name}"
-    jobs = {"n_jobs": n_jobs, "prefer": "threads", "step": progress.stage(stage, len(portions))}
+    # Blocks are too small for threads, which wait for each other between them.
+    jobs = {"n_jobs": n_jobs, "step": progress.stage(stage, len(portions))}
     out = np.empty((len(bases), len(moving)))
     common = (Common((comparison, bases, moving)),)
     for found in run(_blocks, portions, common=common, **jobs):
