@@ -26,6 +26,7 @@ __all__ = [
     "SequenceLevelMixin",
     "check_performances",
     "check_transformed",
+    "name_performance",
     "names_of_input",
     "read_collection",
     "restore",
@@ -69,6 +70,10 @@ class Performances(tuple):
             return self.take(range(len(self))[index])
         return super().__getitem__(index)
 
+    def called(self, i):
+        """What to call one of them in messages."""
+        return name_performance(i, self.labels[i])
+
     def take(self, indices):
         """Some of them: rows, or a list."""
         kind = "rows" if self.kind == "rows" else "list"
@@ -82,6 +87,11 @@ class Performances(tuple):
         is_rows = self.kind == "rows"
         fits = is_rows is on_rows and self.names is names and len(self) > 0
         return fits and self[0].shape[not is_rows] == n_features
+
+
+def name_performance(i, label):
+    """What to call a performance in messages and figures."""
+    return f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
 
 
 class SequenceLevelMixin:

@@ -13,7 +13,7 @@ from .axes import heading
 from .limbs import LIMB_NAMES, LIMBS, check_upright, landmarks_of, leg_length, limbs_of
 from .skeleton import LANDMARKS, check_columns
 
-__all__ = ["Body", "PositionsTransformer", "called"]
+__all__ = ["Body", "PositionsTransformer"]
 
 
 class Body(NamedTuple):
@@ -120,15 +120,9 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
             frame, limb = np.argwhere(without)[0]
             name = LIMB_NAMES[limb]
             raise ValueError(
-                f"{called(performances, i)}, frame {frame}: the limb {name!r} has no length, its "
+                f"{performances.called(i)}, frame {frame}: the limb {name!r} has no length, its "
                 f"joints {[self.skeleton.landmarks[j] for j in LIMBS[name][:2]]} coincide. Repair "
                 "the frame, or choose other landmarks."
             )
-        check_upright(points, lengths, self.skeleton, called(performances, i))
+        check_upright(points, lengths, self.skeleton, performances.called(i))
         return Body(points, limbs, lengths, exponent)
-
-
-def called(performances, i):
-    """What to call a performance in messages."""
-    label = performances.labels[i]
-    return f"Performance {i}" if label == i else f"Performance {i} ({label!r})"

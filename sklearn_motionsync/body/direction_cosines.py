@@ -10,7 +10,7 @@ from ..fitting import at_once, of_one_state
 from ..gate import as_numbers
 from ..performances import check_transformed, restore
 from .axes import along_parents, turned
-from .base import PositionsTransformer, called
+from .base import PositionsTransformer
 from .limbs import LIMB_NAMES, LIMBS, exponent_of, leg_length, unit
 from .skeleton import LANDMARKS, Skeleton
 
@@ -185,7 +185,7 @@ class DirectionCosines(PositionsTransformer):
         if without.any():
             frame, limb = np.argwhere(without)[0]
             raise ValueError(
-                f"{called(performances, i)}, frame {frame}: the limb {LIMB_NAMES[limb]!r} has no "
+                f"{performances.called(i)}, frame {frame}: the limb {LIMB_NAMES[limb]!r} has no "
                 "direction, its three cosines are 0. Drop the frame, or give it a direction."
             )
         # A mean or an approximation of cosines is shorter than 1, a limb is not.
@@ -199,7 +199,7 @@ class DirectionCosines(PositionsTransformer):
             sound = np.isfinite(positions.sum()) or np.isfinite(positions).all()
         if not sound or lengths.min() < np.finfo(positions.dtype).tiny:
             raise ValueError(
-                f"{called(performances, i)}: the positions are beyond {positions.dtype} numbers. "
+                f"{performances.called(i)}: the positions are beyond {positions.dtype} numbers. "
                 "Give limb_lengths in another unit, or smaller heights of the pelvis."
             )
         return positions

@@ -11,6 +11,7 @@ from ..body.skeleton import Skeleton
 from ..model.action_model import ActionModel
 from ..model.classes import models_of_classes
 from ..model.views import view_of
+from ..performances import name_performance
 from ..pipelines import (
     find_step,
     find_synchronizer,
@@ -135,13 +136,13 @@ class PipelineFigures:
         if models is None:
             view, cosines, columns = _in_limbs(estimator, X, params, caller)
             i = chosen(len(view.given))
-            called, by = _called(i, view.labels[i]), ""
+            called, by = name_performance(i, view.labels[i]), ""
         else:
             (of_class,) = models
             given = of_class.estimator, of_class.performances, {}, caller
             view, cosines, columns = _in_limbs(*given)
             i, by = 0, " by the model of that class"
-            called = _called(int(of_class.indices[0]), of_class.labels[0])
+            called = name_performance(int(of_class.indices[0]), of_class.labels[0])
             called = f"{called}, most like {str(of_class.label)!r},"
         limit = view.model.n_std if limit is None else as_limit(limit)
         names = list(cosines.get_feature_names_out())
@@ -206,10 +207,6 @@ class PipelineFigures:
             at=at,
             azimuth=azimuth,
         )
-
-
-def _called(i, label):
-    return f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
 
 
 def _in_limbs(estimator, X, params, caller):

@@ -7,7 +7,7 @@ products have one size, and blocks that are not full are filled up with zeros.
 
 import numpy as np
 
-from .costs import COSTS, cost_features, step_table
+from .costs import COSTS, cost_features
 from .rows import Bases, Bundle, right_factor
 from .trellis import Trellis
 from .units import exponent_of
@@ -59,12 +59,9 @@ class Comparison:
     ):
         self.cost, self.normalize, self.smoothing = cost, normalize, velocity_smoothing
         self.n_frames, self.exponent = n_frames, 0 if normalize else exponent
-        # Whole frames; 0.29 * 100 must not lose one to rounding.
-        reach = int(np.floor(max_offset * n_frames * (1 + 1e-12)))
-        # No step is longer than the clip.
-        table = step_table(cost, min(max_rate, n_frames - 1))
         mu = float(np.ldexp(float(smoothness), -self._degree))
-        self.trellis = Trellis(table, mu, min(reach, n_frames - 1))
+        reach = {"max_offset": max_offset, "max_rate": max_rate}
+        self.trellis = Trellis.on_clock(cost, n_frames, mu, **reach)
 
     @property
     def _degree(self):
@@ -102,11 +99,9 @@ class Comparison:
         ndarray, shape (n_bases, n_moving)
         """
         full = Bases(self.trellis, _filled(bases))
+        # Not by the tiles of the trellis: their sizes follow the number of features.
         bundle = Bundle(self.trellis, full, right_factor(_filled(moving)))
-        states = bundle.states(2)
-        for _ in bundle.advance(states):
-            pass
-        distances = bundle.cost(states)[: len(bases), : len(moving)]
+        distances = bundle.distances()[: len(bases), : len(moving)]
         both = energies(bases)[:, 0] + energies(moving)[:, 0, 0]
         distances = np.where(distances <= _EQUAL * both, 0, distances)
         with np.errstate(over="ignore", under="ignore"):

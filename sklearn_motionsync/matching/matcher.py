@@ -6,7 +6,7 @@ import numpy as np
 from sklearn import get_config
 
 from .consensus import choose_exemplars, smoothed, vote
-from .costs import COSTS, cost_features, step_table
+from .costs import COSTS, cost_features
 from .learning import learn_metric
 from .metric import Metric, energy_shares
 from .trellis import Trellis
@@ -118,11 +118,8 @@ class Matcher(NamedTuple):
         n_frames = (compared.shape[1] - 1) // subframes + 1
         energy = np.einsum("npk,npk->", compared, compared, dtype=np.float64)
         mu = float(smoothness * energy / np.prod(compared.shape[:2]))
-        # Whole frames; 0.29 * 100 must not lose one to rounding.
-        reach = int(np.floor(max_offset * n_frames * (1 + 1e-12)))
-        # No step is longer than the clip.
-        table = step_table(features.cost, min(max_rate, n_frames - 1), subframes)
-        return cls(features, Trellis(table, mu, min(reach, n_frames - 1)))
+        reach = {"max_offset": max_offset, "max_rate": max_rate, "subframes": subframes}
+        return cls(features, Trellis.on_clock(features.cost, n_frames, mu, **reach))
 
     def distances(self, features, bases, moving, tiles):
         """Synchronisation distances ``D_{n,m}`` of the tiles of the pairs of two index arrays."""

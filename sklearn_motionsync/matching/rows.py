@@ -104,8 +104,11 @@ class Bundle:
         """Rows of cells that no path has reached."""
         return np.full((n_rows, self.row_cells), np.inf, dtype=self.dtype)
 
-    def cost(self, states):
-        """Costs of the best paths, from the last row."""
+    def distances(self):
+        """Costs of the best paths: (n_bases, n_moving)."""
+        states = self.states(2)
+        for _ in self.advance(states):
+            pass
         at = self.centre * self.pairs
         best = states[(self.n_frames - 1) % len(states), at : at + self.pairs]
         return np.maximum(best, 0).reshape(-1, self.n_bases).T

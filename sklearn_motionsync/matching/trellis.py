@@ -23,6 +23,7 @@ Invariants the code relies on:
 import numpy as np
 
 from . import narrow
+from .costs import step_table
 from .rows import Bases, Bundle, group_steps, right_factor
 from .warps import even_slices
 
@@ -68,6 +69,15 @@ class Trellis:
         self.unit_group = group_of_step[self.slopes == 0][0]
         self._windows = {}
 
+    @classmethod
+    def on_clock(cls, cost, n_frames, mu, *, max_offset, max_rate, subframes=1):
+        """The trellis of a cost; the largest offset is a share of the clock."""
+        # Whole frames; 0.29 * 100 must not lose one to rounding.
+        reach = int(np.floor(max_offset * n_frames * (1 + 1e-12)))
+        # No step is longer than the clip.
+        table = step_table(cost, min(max_rate, n_frames - 1), subframes)
+        return cls(table, mu, min(reach, n_frames - 1))
+
     def distances(self, bases, moving):
         """Cost of the best path for every ordered pair.
 
@@ -82,10 +92,7 @@ class Trellis:
         """
         out = np.empty((len(bases), len(moving)), dtype=bases.dtype)
         for rows, columns, bundle in self.bundles(Bases(self, bases), moving):
-            states = bundle.states(2)
-            for _ in bundle.advance(states):
-                pass
-            out[rows, columns] = bundle.cost(states)
+            out[rows, columns] = bundle.distances()
         return out
 
     def paths(self, bases, moving, max_bytes=1 << 29):

@@ -293,7 +293,7 @@ class ActionClassifier(
         ndarray, shape (n_sequences,)
             The larger, the less it is one of the classes.
         """
-        return -self._decide(X).max(axis=1)
+        return -self.score_samples(X)
 
     @of_one_state
     def threshold_at(self, coverage):

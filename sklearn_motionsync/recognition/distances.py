@@ -5,7 +5,7 @@ from numbers import Integral, Real
 
 import numpy as np
 from sklearn.base import BaseEstimator
-from sklearn.utils._param_validation import Interval, StrOptions, validate_params
+from sklearn.utils._param_validation import Interval, Options, StrOptions
 
 from ..matching.comparison import BLOCK, Comparison
 from ..matching.costs import COSTS
@@ -30,17 +30,6 @@ SETTINGS: dict = {
 _PORTION_BLOCKS = 32
 
 
-@validate_params(
-    {
-        "X": "no_validation",
-        "Y": "no_validation",
-        "cost": [StrOptions(set(COSTS))],
-        "normalize": ["boolean"],
-        "symmetric": ["boolean"],
-        **SETTINGS,
-    },
-    prefer_skip_nested_validation=True,
-)
 def synchronization_distances(
     X,
     Y=None,
@@ -99,13 +88,14 @@ def synchronization_distances(
     -------
     ndarray, shape (n_X, n_Y)
         0 or more, in double precision: squares of the features, summed over the clock, and ``mu``
-        times the penalties of the path. With ``normalize`` strangers are about
-        ``2 * n_frames`` apart at most.
+        times the penalties of the path. With ``normalize`` performances with nothing in common
+        are ``2 * n_frames`` apart, and the opposite movement up to twice that.
 
     Raises
     ------
     ValueError
-        If the input breaks the contract, or the performances of Y have other features than X.
+        If the input breaks the contract, the performances of Y have other features than X, or a
+        parameter is none of those that are accepted.
 
     See Also
     --------
@@ -133,6 +123,15 @@ def synchronization_distances(
     >>> nearest.predict(synchronization_distances(new, known)).tolist()
     ['slow', 'fast', 'fast']
     """
+    settings = {
+        "n_frames": n_frames,
+        "velocity_smoothing": velocity_smoothing,
+        "max_offset": max_offset,
+        "smoothness": smoothness,
+        "max_rate": max_rate,
+    }
+    _check(cost=cost, normalize=normalize, symmetric=symmetric, **settings)
+    settings["n_frames"] = int(n_frames)
     reader = type("synchronization_distances", (SequenceLevelMixin, BaseEstimator), {})()
     both = [check_performances(reader, X, reset=True, level="sequence")]
     if Y is not None:
@@ -140,21 +139,25 @@ def synchronization_distances(
         given = {"reset": False, "level": "sequence", "on_rows": on_rows}
         both.append(check_performances(reader, Y, **given))
     exponent = max(exponent_of(x) for performances in both for x in performances)
-    comparison = Comparison(
-        cost,
-        normalize=normalize,
-        n_frames=int(n_frames),
-        velocity_smoothing=velocity_smoothing,
-        max_offset=max_offset,
-        smoothness=smoothness,
-        max_rate=max_rate,
-        exponent=exponent + exponent % 2,
-    )
+    exponent += exponent % 2
+    comparison = Comparison(cost, normalize=normalize, exponent=exponent, **settings)
     features = [comparison.features(on_clock(some, int(n_frames))) for some in both]
     progress = Progress(reader, verbose)
     return distances_of(
         comparison, *features, symmetric=symmetric, n_jobs=n_jobs, progress=progress
     )
+
+
+def _check(**given):
+    flag = Options(bool, {True, False})
+    accepted = {"cost": [StrOptions(set(COSTS))], "normalize": [flag], "symmetric": [flag]}
+    accepted |= SETTINGS
+    for name, value in given.items():
+        if not any(constraint.is_satisfied_by(value) for constraint in accepted[name]):
+            raise ValueError(
+                f"The {name!r} parameter of synchronization_distances must be "
+                f"{' or '.join(map(str, accepted[name]))}. Got {value!r} instead."
+            )
 
 
 def on_clock(performances, n_frames):

@@ -51,7 +51,6 @@ class MotionKernel:
         self._unit = np.sqrt(np.mean(spread)) or 1.0
         scaled = self._scaled(performances)
         self._known = self._features(scaled)
-        self._medians = []
         distances = [
             distances_of(c, known, name=f" by {c.cost}", **work)
             for c, known in zip(self.comparisons, self._known, strict=True)

@@ -5,6 +5,7 @@ from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 from scipy.special import log_softmax
 from sklearn.linear_model import LogisticRegression
+from sklearn.model_selection import GroupKFold
 
 __all__ = [
     "KernelRegression",
@@ -84,14 +85,10 @@ def deal(codes, groups, n_folds):
         folds = np.empty(len(codes), dtype=np.intp)
         folds[order] = (np.arange(len(codes)) - starts) % n_folds
         return folds
-    sizes = np.bincount(groups)
-    fold_of = np.empty(len(sizes), dtype=np.intp)
-    room = np.zeros(n_folds)
-    # The largest groups first, each into the fold that holds the fewest performances.
-    for group in np.argsort(-sizes, kind="stable"):
-        fold_of[group] = room.argmin()
-        room[fold_of[group]] += sizes[group]
-    return fold_of[groups]
+    folds = np.empty(len(codes), dtype=np.intp)
+    for fold, (_, out) in enumerate(GroupKFold(n_folds).split(codes, groups=groups)):
+        folds[out] = fold
+    return folds
 
 
 def held_out(regression, kernel, codes, folds):
