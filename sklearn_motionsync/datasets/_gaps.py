@@ -156,6 +156,24 @@ def warn_of_gaps(df, name):
     )
 
 
+def warn_of_missing(df, name):
+    """The same of a table that holds no positions."""
+    missing = df.isna().sum()
+    missing = missing[missing > 0].sort_values(ascending=False, kind="stable")
+    if missing.empty:
+        return
+    names = ", ".join(str(column)[:40] for column in missing.index[:4])
+    names += ", ..." if len(missing) > 4 else ""
+    warnings.warn(
+        f"{name}: {100 * missing.sum() / df.size:.2g} % of the values are missing (NaN), of "
+        f"{len(missing)} of {df.shape[1]} {df.attrs.get('kind', 'columns')} ({names}). Interpolate "
+        "short gaps with df.interpolate(limit=<frames>, limit_area='inside'), or drop those "
+        "columns.",
+        UserWarning,
+        stacklevel=3,
+    )
+
+
 def _read(df):
     """Names of the joints, and a copy of the positions (n_frames, 3 * n_joints)."""
     if not isinstance(df, pd.DataFrame):
