@@ -6,12 +6,14 @@ from ._cmu import fetch_cmu
 from ._events import cut_at_events
 from ._gaps import fill_gaps, find_gaps
 from ._motion import read_motion
+from ._poses import from_poses
 
 __all__ = [
     "cut_at_events",
     "fetch_cmu",
     "fill_gaps",
     "find_gaps",
+    "from_poses",
     "load_performances",
     "make_bending",
     "read_motion",

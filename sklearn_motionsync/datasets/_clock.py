@@ -69,12 +69,12 @@ def set_clock(name, motion, frame_rate):
         )
 
 
-def tell_uneven(name, times, stacklevel):
+def tell_uneven(name, times, stacklevel, unit="s"):
     """Warn that frames are not evenly spaced, and say what to do."""
     steps = np.diff(times)
     warnings.warn(
-        f"{name}: its times are uneven, in steps of {steps.min():.4g} to {steps.max():.4g} s, but "
-        "frames count as evenly spaced. df.attrs['times'] holds them; "
+        f"{name}: its times are uneven, in steps of {steps.min():.4g} to {steps.max():.4g} "
+        f"{unit}, but frames count as evenly spaced. df.attrs['times'] holds them; "
         "to_sequences(df.assign(time=df.attrs['times']), time='time') makes them even. Where they "
         "are even in truth, give frame_rate=.",
         UserWarning,
