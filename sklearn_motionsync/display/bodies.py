@@ -3,8 +3,9 @@
 import numpy as np
 
 from ..body.axes import heading
-from ..body.limbs import unit, y_up
+from ..body.limbs import unit
 from ..body.skeleton import check_columns
+from ..body.upright import y_up
 from ..gate import as_numbers
 from .given import mean_of_seen
 
