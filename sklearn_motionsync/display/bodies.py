@@ -129,27 +129,34 @@ def on_screen(x, azimuth):
 
 
 def with_landmarks(x, skeleton):
-    """The joints, and after them the landmarks, if nothing but these is joined by bones."""
-    if skeleton is None or skeleton.bones:
+    """The joints, and after them the landmarks, if limbs are drawn between these."""
+    if skeleton is None or not _has_limbs_of_its_own(skeleton):
         return x
     landmarks = [place_of(x, skeleton, name) for name in skeleton.body().joints]
     return np.concatenate([x, np.stack(landmarks, axis=1)], axis=1)
 
 
+def _has_limbs_of_its_own(skeleton):
+    """Whether bones do not show the limbs: there are none, or a landmark is a mean of joints."""
+    means = any(len(skeleton.indices_of(name)) > 1 for name in skeleton.landmarks)
+    return means or not skeleton.bones
+
+
 def bones_by_side(skeleton):
     """Bones by the side of the body they hang on: below a hip or shoulder, or in the middle.
 
-    Of a skeleton that joins nothing they are the limbs, between the landmarks after its joints.
+    Limbs of their own are between the landmarks after the joints, in place of bones between these.
     """
     bones = {"left": [], "middle": [], "right": []}
     if skeleton is None:
         return bones
-    if not skeleton.bones:
+    own = skeleton.bones
+    if _has_limbs_of_its_own(skeleton):
         body, count = skeleton.body(), len(skeleton.joints)
-        return {
-            side: [(a + count, b + count) for a, b in of_side]
-            for side, of_side in (bones_by_side(body) if body.bones else bones).items()
-        }
+        for side, of_side in bones_by_side(body).items() if body.bones else ():
+            bones[side] += [(a + count, b + count) for a, b in of_side]
+        joints = {j for name in skeleton.landmarks for j in skeleton.indices_of(name)}
+        own = [bone for bone in own if not set(bone) <= joints]
     side_of = {}
     # Knees and elbows, for whoever has no hips and shoulders.
     for part in ("hip", "shoulder", "knee", "elbow", "ankle", "wrist"):
@@ -157,7 +164,7 @@ def bones_by_side(skeleton):
             if f"{side}_{part}" in skeleton.landmarks:
                 for joint in skeleton.indices_of(f"{side}_{part}"):
                     side_of.setdefault(joint, side)
-    for parent, joint in skeleton.bones:
+    for parent, joint in own:
         sides = [_side_above(j, skeleton, side_of) for j in (parent, joint)]
         # What goes from one side to the other is on none.
         crosses = None not in sides and sides[0] != sides[1]

@@ -50,9 +50,9 @@ class SkeletonDisplay(PipelineFigures):
     to face the same way at first. Their lowest joint ever is on the floor; the pictures of a strip,
     and those of people who walk away, go with the pelvis.
 
-    A skeleton may lack landmarks; one that joins nothing is drawn as its joints, with limbs between
-    its landmarks. Key-points of a picture are drawn as the camera saw them, from where it stood:
-    ``azimuth`` has no meaning for them.
+    A skeleton may lack landmarks. Where a landmark is the mean of joints, limbs are drawn between
+    the landmarks; a skeleton that joins nothing is drawn as its joints, too. Key-points of a picture
+    are drawn as the camera saw them, from where it stood: ``azimuth`` has no meaning for them.
 
     Parameters
     ----------
