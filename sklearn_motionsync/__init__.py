@@ -16,6 +16,7 @@ from . import datasets, display, metrics
 from .aspace import ASpace
 from .body.direction_cosines import DirectionCosines
 from .body.joint_positions import JointPositions
+from .body.mirror import mirror
 from .body.skeleton import Skeleton
 from .display import (
     ActionModelDisplay,
@@ -59,6 +60,7 @@ __all__ = [
     "display",
     "find_departures",
     "metrics",
+    "mirror",
     "synchronization_distances",
     "to_frame",
     "to_sequences",

@@ -2,13 +2,16 @@
 
 import numpy as np
 
-from .limbs import LEFT, LIMBS, UP
+from .limbs import LEFT, LIMBS, UP, ancestor_of
 
 __all__ = ["along_parents", "heading", "turned"]
 
 
 def heading(hip):
-    """Frames (n_frames, 3, 3), rows x to the left along the hips, y up, z forward."""
+    """Frames (n_frames, 3, 3), rows x to the left along the hips, y up, z forward.
+
+    The direction (n_frames, 3) of the shoulders will do where there are no hips.
+    """
     x = hip * np.array([1, 0, 1], dtype=hip.dtype)
     length = np.linalg.norm(x, axis=1, keepdims=True)
     # Hips one above the other show no heading: keep the recording's axes.
@@ -37,18 +40,37 @@ def _swing(rest, direction):
     return rotation.transpose(0, 2, 1)
 
 
-def along_parents(cosines, *, inverse=False):
-    """From cosines along the body's axes to those along the parent limbs' axes, or back."""
-    frames, out = {}, np.empty_like(cosines)
+def along_parents(cosines, limbs, *, inverse=False):
+    """From cosines along the body's axes to those along the parent limbs' axes, or back.
+
+    Parameters
+    ----------
+    cosines : ndarray, shape (n_frames, 12, n_dims)
+        Of limbs in the plane of a picture, the rotations are about its normal.
+    limbs : list of str
+        Those that are there. Who lacks a parent hangs on the nearest limb above it, or on the body.
+    inverse : bool, default=False
+
+    Returns
+    -------
+    ndarray of the same shape
+        0 for limbs that are not there.
+    """
+    n_dims = cosines.shape[2]
+    if n_dims == 2:
+        cosines = np.concatenate([cosines, np.zeros_like(cosines[..., :1])], axis=2)
+    frames, out = {}, np.zeros_like(cosines)
     for i, (name, limb) in enumerate(LIMBS.items()):
-        given = cosines[:, i : i + 1]
-        if limb.parent is None:
+        if name not in limbs:
+            continue
+        given, above = cosines[:, i : i + 1], ancestor_of(name, limbs)
+        if above is None:
             local = whole = given
             parent = np.broadcast_to(np.eye(3, dtype=cosines.dtype), (len(cosines), 3, 3))
         else:
-            parent = frames[limb.parent]
+            parent = frames[above]
             local = given if inverse else turned(given, parent)
             whole = given @ parent if inverse else given
         out[:, i : i + 1] = whole if inverse else local
         frames[name] = _swing(limb.rest, local[:, 0]) @ parent
-    return out
+    return out[..., :n_dims]

@@ -10,10 +10,16 @@ from ..fitting import at_once, of_one_state
 from ..notebook import DocumentedMixin
 from ..performances import check_performances, restore
 from .axes import heading
-from .limbs import LIMB_NAMES, LIMBS, check_upright, landmarks_of, leg_length, limbs_of
-from .skeleton import LANDMARKS, check_columns
+from .columns import AXES, check_columns
+from .formats import LANDMARKS
+from .limbs import LIMB_NAMES, LIMBS, landmarks_of, leg_length, limbs_of, size_of
+from .skeleton import Skeleton
+from .upright import check_upright, y_up
 
-__all__ = ["Body", "PositionsTransformer"]
+__all__ = ["ACROSS", "Body", "PositionsTransformer"]
+
+# Limbs that point at the camera when a body is seen from the side.
+ACROSS = ("hip", "shoulder")
 
 
 class Body(NamedTuple):
@@ -21,38 +27,55 @@ class Body(NamedTuple):
 
     Attributes
     ----------
-    points : ndarray, shape (n_frames, 15, 3)
-        Of the landmarks.
-    limbs : ndarray, shape (n_frames, 12, 3)
+    points : ndarray, shape (n_frames, 15, n_dims)
+        Of the landmarks; 0 for those that lack.
+    limbs : ndarray, shape (n_frames, 12, n_dims)
+        Those of `skeleton`; whatever the others.
     lengths : ndarray, shape (n_frames, 12)
-        Of the limbs, above 0.
+        Of the limbs, above 0; of hips and shoulders that a picture shows end-on, 0.
     exponent : int
+    skeleton : Skeleton
     """
 
     points: np.ndarray
     limbs: np.ndarray
     lengths: np.ndarray
     exponent: int
+    skeleton: Skeleton
 
     def at(self, landmark):
-        """Where a landmark is: (n_frames, 3)."""
+        """Where a landmark is: (n_frames, n_dims)."""
         return self.points[:, LANDMARKS.index(landmark)]
 
     @property
     def leg(self):
         """Length of the stretched leg: of the performance's median limbs."""
-        return leg_length(np.median(self.lengths, axis=0))
+        return leg_length(np.median(self.lengths, axis=0), self.skeleton.limbs)
+
+    @property
+    def size(self):
+        """The same, or of a body without a whole leg the length of all its limbs."""
+        return size_of(np.median(self.lengths, axis=0), self.skeleton.limbs)
 
     @property
     def directions(self):
-        """Limbs of length 1."""
-        return self.limbs / self.lengths[:, :, np.newaxis]
+        """Limbs of length 1; of those that lack or have no length, 0."""
+        lengths = self.lengths
+        if not lengths.all():
+            lengths = np.where(lengths > 0, lengths, 1)
+        return self.limbs / lengths[:, :, np.newaxis]
 
     @property
     def heading(self):
-        """Axes that turn with the body: (n_frames, 3, 3), rows x to the left, y up, z forward."""
-        hip = LIMB_NAMES.index("hip")
-        return heading(self.limbs[:, hip] / self.lengths[:, hip, np.newaxis])
+        """Axes that turn with the body: (n_frames, 3, 3), rows x to the left, y up, z forward.
+
+        None where nothing tells them: in the plane, and without hips and shoulders.
+        """
+        across = next((name for name in ACROSS if name in self.skeleton.limbs), None)
+        if across is None or self.skeleton.n_dims == 2:
+            return None
+        i = LIMB_NAMES.index(across)
+        return heading(self.limbs[:, i] / self.lengths[:, i, np.newaxis])
 
 
 class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
@@ -70,8 +93,8 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : list of arrays (n_frames_i, 3 * n_joints), 3-D array, or 2-D array
-            Joint positions, joint by joint x, y, z.
+        X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, or 2-D array
+            Joint positions, joint by joint x, y, z; or x, y.
 
         Returns
         -------
@@ -82,7 +105,8 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
         ValueError
             If the width is not that of the skeleton, a column of the skeleton stands in another
             one's place, a limb has no length, or a body is upside down: in nine of ten frames its
-            pelvis is below the ankles, and its head is below the pelvis on average.
+            pelvis is below the ankles, and its head is below the pelvis on average. Of a body of
+            which only one of the two is there, that one decides.
         """
         check_is_fitted(self)
         performances = self._check(X, reset=False)
@@ -97,32 +121,41 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
 
     def _check(self, X, *, reset):
         performances = check_performances(self, X, reset=reset, level="posture")
-        width, expected = performances[0].shape[1], 3 * len(self.skeleton.joints)
+        skeleton = self.skeleton
+        width, expected = performances[0].shape[1], skeleton.n_dims * len(skeleton.joints)
         if width != expected:
             raise ValueError(
                 f"Performance 0 has {width} features a frame, but the skeleton's "
-                f"{len(self.skeleton.joints)} joints need {expected}: x, y, z of each."
+                f"{len(skeleton.joints)} joints need {expected}: "
+                f"{', '.join(AXES[skeleton.n_dims])} of each."
             )
         # All tables of a list have the names of the first.
         first = X[0] if isinstance(X, (list, tuple, np.ndarray)) else X
-        check_columns(first, self.skeleton, "Performance 0")
+        check_columns(first, skeleton, "Performance 0")
         return performances
 
     def _body(self, performances, i):
         """The body of a performance, or a refusal."""
-        points, exponent = landmarks_of(performances[i], self.skeleton)
+        skeleton = self.skeleton
+        points, exponent = landmarks_of(performances[i], skeleton)
+        points = y_up(points, skeleton)
         limbs = limbs_of(points)
         lengths = np.linalg.norm(limbs, axis=2)
         # What is less is rounding of the coordinates.
         largest = max(points.max(), -points.min())
         without = lengths <= np.finfo(lengths.dtype).eps * largest
+        there = skeleton.limbs
+        for k, name in enumerate(LIMB_NAMES):
+            lacks = name not in there
+            if lacks or (skeleton.n_dims == 2 and name in ACROSS and without[:, k].all()):
+                limbs[:, k], lengths[:, k], without[:, k] = 0, 0, False
         if without.any():
             frame, limb = np.argwhere(without)[0]
             name = LIMB_NAMES[limb]
             raise ValueError(
                 f"{performances.called(i)}, frame {frame}: the limb {name!r} has no length, its "
-                f"joints {[self.skeleton.landmarks[j] for j in LIMBS[name][:2]]} coincide. Repair "
+                f"joints {[skeleton.landmarks[j] for j in LIMBS[name][:2]]} coincide. Repair "
                 "the frame, or choose other landmarks."
             )
-        check_upright(points, lengths, self.skeleton, performances.called(i))
-        return Body(points, limbs, lengths, exponent)
+        check_upright(points, lengths, skeleton, performances.called(i))
+        return Body(points, limbs, lengths, exponent, skeleton)

@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Mapping, Set
 from numbers import Integral, Real
 
-from .landmarks import LANDMARKS
+from .formats import LANDMARKS
 
-__all__ = ["as_joints", "as_landmarks", "as_parents", "circle_of", "is_whole"]
+__all__ = ["as_joints", "as_landmarks", "as_parents", "circle_of", "is_whole", "kept_parents"]
 
 
 def as_joints(joints):
@@ -51,7 +51,7 @@ def is_whole(value):
 
 
 def as_landmarks(landmarks):
-    """Landmarks that are known by name, as a dict."""
+    """Landmarks that are known by name, as a dict: a joint's name, several as a tuple, or None."""
     if not isinstance(landmarks, Mapping):
         raise ValueError(
             "landmarks must be a mapping, the joint at each landmark such as "
@@ -59,7 +59,21 @@ def as_landmarks(landmarks):
         )
     if unknown := sorted(str(name) for name in landmarks if name not in LANDMARKS):
         raise ValueError(f"landmarks must be among {LANDMARKS}, got {unknown}.")
-    return dict(landmarks)
+    return {name: _as_place(name, at) for name, at in landmarks.items()}
+
+
+def _as_place(landmark, at):
+    """The joint of a landmark, or the tuple of those whose mean it is."""
+    if at is None:
+        return None
+    joints = (at,) if isinstance(at, str) else _listed(at)
+    sound = joints and all(isinstance(joint, str) for joint in joints)
+    if not sound or len(set(joints)) < len(joints):
+        raise ValueError(
+            f"The landmark {landmark!r} must be a joint's name, a tuple of different names for "
+            f"their mean, or None where it lacks; got {at!r}."
+        )
+    return str(joints[0]) if len(joints) == 1 else tuple(map(str, joints))
 
 
 def circle_of(parents):
@@ -74,3 +88,23 @@ def circle_of(parents):
             joint = parents[joint]
         sound.update(chain)
     return []
+
+
+def kept_parents(joints, names, parents):
+    """Index of the nearest ancestor that is among the joints, or -1, for each joint."""
+    if len(names) != len(parents) or any(not -1 <= p < len(names) for p in parents):
+        raise ValueError(
+            "df.attrs must have one parent, an index or -1, for each of its joints; got "
+            f"{len(names)} joints and the parents {parents}."
+        )
+    above = {name: names[p] for name, p in zip(names, parents, strict=True) if p >= 0}
+    index = {joint: j for j, joint in enumerate(joints)}
+    result = []
+    for joint in joints:
+        ancestor = above.get(joint)
+        for _ in names:  # no more steps than joints, should parents run in a circle
+            if ancestor is None or ancestor in index:
+                break
+            ancestor = above.get(ancestor)
+        result.append(index.get(ancestor, -1))
+    return result

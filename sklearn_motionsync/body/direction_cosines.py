@@ -10,16 +10,17 @@ from ..fitting import at_once, of_one_state
 from ..gate import as_numbers
 from ..performances import check_transformed, restore
 from .axes import along_parents, turned
-from .base import PositionsTransformer
-from .limbs import LIMB_NAMES, LIMBS, exponent_of, leg_length, unit
-from .skeleton import LANDMARKS, Skeleton
+from .base import ACROSS, PositionsTransformer
+from .built import built
+from .columns import AXES
+from .formats import SIDES
+from .limbs import LIMB_NAMES, exponent_of, unit
+from .skeleton import Skeleton
 
 __all__ = ["DirectionCosines"]
 
-# How far the hips of a body may be moved from where its pelvis is, in leg lengths, so that it
-# stands on the floor. Of 144 performances of optical motion capture, and of their approximations in
-# an aSpace, none needs more than 0.21.
-_MOVED = 0.25
+_HEIGHT = "pelvis_height"
+_NUMBER = {2: "two", 3: "three"}
 
 
 class DirectionCosines(PositionsTransformer):
@@ -30,23 +31,30 @@ class DirectionCosines(PositionsTransformer):
     or when all its limbs are longer by the same factor; with the default frame of
     reference, nor when it faces another way.
 
+    A skeleton that lacks landmarks has fewer parameters: the cosines of the limbs that are
+    there, and the height if there is a pelvis and a whole leg. Key-points in a picture
+    (``Skeleton(..., n_dims=2)``) have two cosines a limb.
+
     Parameters
     ----------
     skeleton : Skeleton
-        Which columns are which joints: ``Skeleton.paper()``, ``Skeleton.acclaim()``,
-        ``Skeleton.kinect()`` or your own.
+        Which columns are which joints: a ready one such as ``Skeleton.acclaim()``, that of a
+        table, ``Skeleton.from_frame(df)``, or your own.
     reference : {"heading", "parent", "world"}, default="heading"
-        The axes of the cosines. ``"heading"``: x to the left along the hips, y up, z forward.
-        ``"parent"``: those of the parent limb, which turn with it (without twist);
-        the hip's are those of ``"heading"``. ``"world"``: those of the recording.
+        The axes of the cosines. ``"heading"``: x to the left along the hips, y up, z forward; of
+        a body without hips along the shoulders, and without those the axes of the recording.
+        ``"parent"``: those of the parent limb, which turn with it (without twist), or of the
+        nearest limb above it that is there; the hip's are those of ``"heading"``. ``"world"``:
+        those of the recording, of which y is made the vertical one. A picture shows no heading:
+        in the plane ``"heading"`` is ``"world"``, x across the picture and y up.
 
     Attributes
     ----------
-    limb_lengths_ : ndarray, shape (12,)
-        Median length of each limb over the postures seen in ``fit``, in the unit of the
-        positions; what ``inverse_transform`` builds a body of.
+    limb_lengths_ : ndarray, shape (n_limbs,)
+        Median length of each of ``skeleton.limbs`` over the postures seen in ``fit``, in the unit
+        of the positions; what ``inverse_transform`` builds a body of.
     n_features_in_ : int
-        Three times the number of joints.
+        The number of joints times that of their axes.
     feature_names_in_ : ndarray of str
         Names of the columns; only if the input had names.
 
@@ -62,6 +70,10 @@ class DirectionCosines(PositionsTransformer):
     1 for standing, less for sitting, more in the air. The floor is a property of a
     performance; a 2-D input is taken as one performance.
 
+    In a picture, hips and shoulders that coincide in a whole performance point at the camera: both
+    of their cosines are 0, as the two of three would be. A joint that was not found, and that the
+    program put at (0, 0), is to be repaired or left out: no position tells it from others.
+
     Examples
     --------
     >>> from sklearn_motionsync import DirectionCosines
@@ -71,6 +83,18 @@ class DirectionCosines(PositionsTransformer):
     >>> postures = cosines.transform(bunch.data)
     >>> postures[0].shape[1], list(cosines.get_feature_names_out()[:4])
     (37, ['pelvis_height', 'hip_x', 'hip_y', 'hip_z'])
+
+    Legs seen by a camera:
+
+    >>> import pandas as pd
+    >>> from sklearn_motionsync import Skeleton
+    >>> df = pd.DataFrame(bunch.data[0], columns=bunch.skeleton.column_names)
+    >>> legs = df[[c for c in df if c[:-2].endswith(("hip", "knee", "ankle")) and c[-1] in "xy"]]
+    >>> cosines = DirectionCosines(Skeleton.from_frame(legs)).fit(legs)
+    >>> cosines.get_feature_names_out()[:5].tolist()
+    ['pelvis_height', 'hip_x', 'hip_y', 'left_thigh_x', 'left_thigh_y']
+    >>> cosines.inverse_transform(cosines.transform(legs)).shape[1], cosines.skeleton.body()
+    (14, Skeleton(<7 joints, 7 of 15 landmarks>, up='y', n_dims=2))
     """
 
     _parameter_constraints: dict = {
@@ -89,8 +113,8 @@ class DirectionCosines(PositionsTransformer):
 
         Parameters
         ----------
-        X : list of arrays (n_frames_i, 3 * n_joints), 3-D array, or 2-D array
-            Joint positions, joint by joint x, y, z.
+        X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, or 2-D array
+            Joint positions, joint by joint x, y, z; or x, y.
         y : ignored
 
         Returns
@@ -103,12 +127,15 @@ class DirectionCosines(PositionsTransformer):
             As from ``transform``.
         """
         performances = self._check(X, reset=True)
-        bodies = [self._body(performances, i)[2:] for i in range(len(performances))]
+        limbs = self.skeleton.limbs
+        bodies = [self._body(performances, i)[2:4] for i in range(len(performances))]
         unit_of_all = max(k for _, k in bodies)
         lengths = [x if k == unit_of_all else np.ldexp(x, k - unit_of_all) for x, k in bodies]
         with np.errstate(over="ignore"):
             found = np.ldexp(np.median(np.concatenate(lengths), axis=0), unit_of_all)
-        if not (found > 0).all() or not np.isfinite(found).all():
+        found = found[_places_of(limbs)]
+        has_length = (found > 0) | self._may_lack_length
+        if not has_length.all() or not np.isfinite(found).all():
             raise ValueError(
                 f"The lengths of the limbs are beyond {found.dtype} numbers: give the positions in "
                 "another unit, such as metres."
@@ -120,6 +147,8 @@ class DirectionCosines(PositionsTransformer):
     def inverse_transform(self, X, limb_lengths=None):
         """Joint positions of postures: the paper's fifteen joints, for drawing.
 
+        Of a body that lacks landmarks it is those that limbs hold together, ``skeleton.body()``.
+
         The lowest ankle of a performance stands on the floor y = 0, its pelvis above the
         origin; unless ``reference="world"`` it faces along z. Its hips lie evenly on both sides
         of the pelvis and its shoulders of the neck, so a body built that way comes back exactly.
@@ -129,29 +158,34 @@ class DirectionCosines(PositionsTransformer):
         ``transform`` gives the same height of the pelvis, and the same cosines. They
         are moved by a quarter of a leg at most. A body that is farther from the floor, such as a
         single posture in the air, stays there, and its height comes back as near as that allows.
+        A posture without a height has its pelvis at height 0; so has a part of the body that no
+        limb joins to the pelvis its uppermost joint.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, 37), 3-D array, or 2-D array
-            Postures; the three cosines of a limb only give its direction.
-        limb_lengths : array-like of shape (12,), default=None
+            Postures; the cosines of a limb only give its direction.
+        limb_lengths : array-like of shape (n_limbs,), default=None
             Length of each limb, above 0; by default ``limb_lengths_``.
 
         Returns
         -------
-        The kind that was given, with 45 features: the positions of ``Skeleton.paper()``
+        The kind that was given, with 45 features: the positions of ``Skeleton.paper()``, or those
+        of ``skeleton.body()``
 
         Raises
         ------
         ValueError
-            If the three cosines of a limb are all 0, columns are not those of
-            ``get_feature_names_out``, or ``limb_lengths`` are not 12 numbers above 0.
+            If the cosines of a limb are all 0, columns are not those of
+            ``get_feature_names_out``, or ``limb_lengths`` are not numbers above 0, one a limb.
         """
         check_is_fitted(self)
-        lengths = self.limb_lengths_ if limb_lengths is None else _checked_lengths(limb_lengths)
+        lengths = self.limb_lengths_
+        if limb_lengths is not None:
+            lengths = _checked_lengths(limb_lengths, self.skeleton.limbs)
         performances = check_transformed(self, X, self.get_feature_names_out())
         arrays = [self._positions(performances, i, lengths) for i in range(len(performances))]
-        return restore(self, performances, arrays, columns=Skeleton.paper().column_names)
+        return restore(self, performances, arrays, columns=self.skeleton.body().column_names)
 
     def get_feature_names_out(self, input_features=None):
         """Names of the 37 parameters: ``pelvis_height``, ``hip_x``, ..., ``right_forearm_z``.
@@ -164,40 +198,57 @@ class DirectionCosines(PositionsTransformer):
         -------
         ndarray of str
         """
-        names = [f"{limb}_{axis}" for limb in LIMBS for axis in "xyz"]
-        return np.asarray(["pelvis_height", *names], dtype=object)
+        axes = AXES[self.skeleton.n_dims]
+        names = [f"{limb}_{axis}" for limb in self.skeleton.limbs for axis in axes]
+        return np.asarray([_HEIGHT] * self.skeleton.has_height + names, dtype=object)
 
     def _features(self, body):
-        floor = min(body.at(f"{side}_ankle")[:, 1].min() for side in ("left", "right"))
-        u = (body.at("pelvis")[:, 1] - floor) / body.leg
-        cosines = body.directions
-        if self.reference != "world":
-            cosines = turned(cosines, body.heading)
+        limbs, cosines = self.skeleton.limbs, body.directions
+        heading = body.heading if self.reference != "world" else None
+        if heading is not None:
+            cosines = turned(cosines, heading)
         if self.reference == "parent":
-            cosines = along_parents(cosines)
-        return np.column_stack([u, cosines.reshape(len(u), -1)])
+            cosines = along_parents(cosines, limbs)
+        cosines = cosines[:, _places_of(limbs)].reshape(len(cosines), -1)
+        if not self.skeleton.has_height:
+            return cosines
+        ankles = [f"{side}_ankle" for side in SIDES if f"{side}_ankle" in self.skeleton.landmarks]
+        floor = min(body.at(ankle)[:, 1].min() for ankle in ankles)
+        return np.column_stack([(body.at("pelvis")[:, 1] - floor) / body.leg, cosines])
+
+    @property
+    def _may_lack_length(self):
+        """Which limbs a picture may show end-on."""
+        in_plane = self.skeleton.n_dims == 2
+        return np.array([in_plane and name in ACROSS for name in self.skeleton.limbs])
 
     def _positions(self, performances, i, lengths):
-        postures = performances[i]
-        cosines = postures[:, 1:].reshape(len(postures), -1, 3)
+        postures, limbs = performances[i], self.skeleton.limbs
+        first, n_dims = int(self.skeleton.has_height), self.skeleton.n_dims
+        given = postures[:, first:].reshape(len(postures), -1, n_dims)
         # All of them being there is told sooner than one of each limb.
-        without = np.zeros(()) if cosines.all() else ~cosines.any(axis=2)
+        without = np.zeros(()) if given.all() else ~given.any(axis=2) & ~self._may_lack_length
         if without.any():
             frame, limb = np.argwhere(without)[0]
             raise ValueError(
-                f"{performances.called(i)}, frame {frame}: the limb {LIMB_NAMES[limb]!r} has no "
-                "direction, its three cosines are 0. Drop the frame, or give it a direction."
+                f"{performances.called(i)}, frame {frame}: the limb {limbs[limb]!r} has no "
+                f"direction, its {_NUMBER[n_dims]} cosines are 0. Drop the frame, or give it a "
+                "direction."
             )
         # A mean or an approximation of cosines is shorter than 1, a limb is not.
-        cosines = unit(cosines)
+        cosines = np.zeros((len(given), len(LIMB_NAMES), n_dims), dtype=given.dtype)
+        cosines[:, _places_of(limbs)] = unit(given)
         if self.reference == "parent":
-            cosines = along_parents(cosines, inverse=True)
+            cosines = along_parents(cosines, limbs, inverse=True)
         k = exponent_of(lengths.max(), postures.dtype)
+        whole = np.zeros(len(LIMB_NAMES), dtype=postures.dtype)
+        heights = postures[:, 0] if first else None
         with np.errstate(over="ignore", invalid="ignore"):
-            body = _built(postures[:, 0], cosines, np.ldexp(lengths, -k).astype(postures.dtype))
+            whole[_places_of(limbs)] = np.ldexp(lengths, -k)
+            body = built(heights, cosines, whole, self.skeleton)
             positions = np.ldexp(body, k) if k else body
             sound = np.isfinite(positions.sum()) or np.isfinite(positions).all()
-        if not sound or lengths.min() < np.finfo(positions.dtype).tiny:
+        if not sound or lengths[lengths > 0].min(initial=1) < np.finfo(positions.dtype).tiny:
             raise ValueError(
                 f"{performances.called(i)}: the positions are beyond {positions.dtype} numbers. "
                 "Give limb_lengths in another unit, or smaller heights of the pelvis."
@@ -205,41 +256,27 @@ class DirectionCosines(PositionsTransformer):
         return positions
 
 
-def _checked_lengths(limb_lengths):
+def _places_of(limbs):
+    """Where limbs are among all twelve: a slice, if they are all."""
+    if len(limbs) == len(LIMB_NAMES):
+        return slice(None)
+    return [LIMB_NAMES.index(name) for name in limbs]
+
+
+def _checked_lengths(limb_lengths, limbs):
     """One length above 0 for each limb."""
-    names = list(limb_lengths.index) if isinstance(limb_lengths, pd.Series) else LIMB_NAMES
-    if names not in (LIMB_NAMES, list(range(len(LIMB_NAMES)))):
-        raise ValueError(f"limb_lengths is indexed by {names}; select {LIMB_NAMES}, in that order.")
+    names = list(limb_lengths.index) if isinstance(limb_lengths, pd.Series) else limbs
+    if names not in (limbs, list(range(len(limbs)))):
+        raise ValueError(f"limb_lengths is indexed by {names}; select {limbs}, in that order.")
     lengths = as_numbers(limb_lengths, "limb_lengths", dtype=np.float64)
-    if lengths.shape != (len(LIMBS),):
+    if lengths.shape != (len(limbs),):
         raise ValueError(
-            f"limb_lengths needs one length for each of {LIMB_NAMES}, got shape {lengths.shape}."
+            f"limb_lengths needs one length for each of {limbs}, got shape {lengths.shape}."
         )
     wrong = ~((lengths > 0) & np.isfinite(lengths))
     if wrong.any():
         limb = int(wrong.argmax())
         raise ValueError(
-            f"limb_lengths must be numbers above 0, got {lengths[limb]:g} for {LIMB_NAMES[limb]!r}."
+            f"limb_lengths must be numbers above 0, got {lengths[limb]:g} for {limbs[limb]!r}."
         )
     return lengths
-
-
-def _built(heights, cosines, lengths):
-    """(n_frames, 45) positions of bodies with given heights, directions and lengths of limbs."""
-    limb = dict(zip(LIMBS, np.moveaxis(cosines * lengths[:, np.newaxis], 1, 0), strict=True))
-    legs = leg_length(lengths)
-    at = {"pelvis": np.zeros_like(limb["hip"])}
-    at["pelvis"][:, 1] = heights * legs
-    at["neck"] = at["pelvis"] + limb["torso"]
-    at["head"] = at["neck"] + limb["neck"]
-    for side, sign in (("left", 0.5), ("right", -0.5)):
-        at[f"{side}_hip"] = at["pelvis"] + sign * limb["hip"]
-        at[f"{side}_shoulder"] = at["neck"] + sign * limb["shoulder"]
-        for part in ("thigh", "leg", "arm", "forearm"):
-            start, end, _, _ = LIMBS[f"{side}_{part}"]
-            at[end] = at[start] + limb[f"{side}_{part}"]
-    above = min(at[f"{side}_ankle"][:, 1].min() for side in ("left", "right"))
-    for side in ("left", "right"):
-        for joint in ("hip", "knee", "ankle"):
-            at[f"{side}_{joint}"][:, 1] -= np.clip(above, -_MOVED * legs, _MOVED * legs)
-    return np.concatenate([at[name] for name in LANDMARKS], axis=1)

@@ -7,7 +7,9 @@ from sklearn.utils._param_validation import StrOptions
 from ..fitting import at_once
 from .axes import turned
 from .base import PositionsTransformer
-from .skeleton import LANDMARKS, Skeleton
+from .columns import AXES
+from .formats import LANDMARKS, SIDES
+from .skeleton import Skeleton
 
 __all__ = ["JointPositions"]
 
@@ -19,20 +21,23 @@ class JointPositions(PositionsTransformer):
     in leg lengths. It does not change when the body is moved, or is larger as a whole; with the
     default frame of reference, nor when it faces another way.
 
+    A skeleton that lacks landmarks has the places of those that are there; key-points in a picture
+    have two coordinates each.
+
     Parameters
     ----------
     skeleton : Skeleton
-        Which columns are which joints: ``Skeleton.paper()``, ``Skeleton.acclaim()``,
-        ``Skeleton.kinect()`` or your own.
+        Which columns are which joints: a ready one such as ``Skeleton.acclaim()``, that of a
+        table, ``Skeleton.from_frame(df)``, or your own.
     reference : {"heading", "world"}, default="heading"
         The axes. ``"heading"``: those of the body at each frame, x to the left along the hips,
         y up, z forward, as in `DirectionCosines`. ``"world"``: those of the recording, of which
-        y is made the vertical one.
+        y is made the vertical one. In the plane both are the picture's, x across and y up.
 
     Attributes
     ----------
     n_features_in_ : int
-        Three times the number of joints.
+        The number of joints times that of their axes.
     feature_names_in_ : ndarray of str
         Names of the columns; only if the input had names.
 
@@ -43,7 +48,10 @@ class JointPositions(PositionsTransformer):
     Notes
     -----
     The unit is that of the pelvis' height in `DirectionCosines`: the length of the stretched leg,
-    the median over the performance. A 2-D input is taken as one performance.
+    the median over the performance; of a body without a whole leg, the length of all its limbs.
+    Without a pelvis, places are relative to the middle of the hips, the neck, the middle of the
+    shoulders, or the first landmark, whichever is there first. A 2-D input is taken as one
+    performance.
 
     To directions all limbs are alike; to positions those matter most that reach far.
     scikit-learn's ``make_union`` puts both side by side, frame by frame. It needs pandas output
@@ -91,8 +99,8 @@ class JointPositions(PositionsTransformer):
 
         Parameters
         ----------
-        X : list of arrays (n_frames_i, 3 * n_joints), 3-D array, or 2-D array
-            Joint positions, joint by joint x, y, z.
+        X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, or 2-D array
+            Joint positions, joint by joint x, y, z; or x, y.
         y : ignored
 
         Returns
@@ -120,12 +128,30 @@ class JointPositions(PositionsTransformer):
         -------
         ndarray of str
         """
-        names = [f"{landmark}_{axis}" for landmark in LANDMARKS[1:] for axis in "xyz"]
+        axes = AXES[self.skeleton.n_dims]
+        names = [f"{landmark}_{axis}" for landmark in self._landmarks for axis in axes]
         return np.asarray(names, dtype=object)
 
+    @property
+    def _landmarks(self):
+        """Those whose places are features: all but the one that is the origin."""
+        origin = _origin_of(self.skeleton)
+        return [name for name in self.skeleton.landmarks if [name] != origin]
+
     def _features(self, body):
-        # The pelvis is the first landmark.
-        places = (body.points[:, 1:] - body.points[:, :1]) / body.leg
-        if self.reference == "heading":
-            places = turned(places, body.heading)
+        origin = [body.at(name) for name in _origin_of(self.skeleton)]
+        # The pelvis is the first landmark; no other is the origin if it is there.
+        places = (body.points[:, 1:] - (sum(origin) / len(origin))[:, np.newaxis]) / body.size
+        heading = body.heading if self.reference == "heading" else None
+        if heading is not None:
+            places = turned(places, heading)
+        if len(self._landmarks) < places.shape[1]:
+            places = places[:, [LANDMARKS.index(name) - 1 for name in self._landmarks]]
         return places.reshape(len(places), -1)
+
+
+def _origin_of(skeleton):
+    """The landmarks whose mean is the origin."""
+    choices = [["pelvis"], [f"{side}_hip" for side in SIDES], ["neck"]]
+    choices += [[f"{side}_shoulder" for side in SIDES], [next(iter(skeleton.landmarks))]]
+    return next(names for names in choices if set(names) <= set(skeleton.landmarks))

@@ -1,125 +1,109 @@
-"""Skeletons known by heart, and landmarks told from the names of joints."""
+"""Landmarks told from the names of joints: those of a known format, or the likeliest ones."""
 
 import os
 import re
 
-__all__ = [
-    "ACCLAIM",
-    "ACCLAIM_LANDMARKS",
-    "KINECT",
-    "KINECT_LANDMARKS",
-    "LANDMARKS",
-    "PAPER",
-    "guess_landmarks",
-]
+from .formats import FORMATS, LANDMARKS, SIDES
 
-# The fifteen joints of the body model and the parent of each.
-PAPER = {
-    "pelvis": None,
-    "neck": "pelvis",
-    "head": "neck",
-    **{
-        f"{side}_{joint}": parent if parent in ("neck", "pelvis") else f"{side}_{parent}"
-        for side in ("left", "right")
-        for joint, parent in (
-            ("shoulder", "neck"),
-            ("elbow", "shoulder"),
-            ("wrist", "elbow"),
-            ("hip", "pelvis"),
-            ("knee", "hip"),
-            ("ankle", "knee"),
-        )
-    },
-}
-LANDMARKS = list(PAPER)
-
-ACCLAIM = {
-    "root": None,
-    **{"lhipjoint": "root", "rhipjoint": "root", "lowerback": "root"},
-    **{"lfemur": "lhipjoint", "ltibia": "lfemur", "lfoot": "ltibia", "ltoes": "lfoot"},
-    **{"rfemur": "rhipjoint", "rtibia": "rfemur", "rfoot": "rtibia", "rtoes": "rfoot"},
-    **{"upperback": "lowerback", "thorax": "upperback", "lowerneck": "thorax"},
-    **{"lclavicle": "thorax", "rclavicle": "thorax"},
-    **{"upperneck": "lowerneck", "head": "upperneck"},
-    **{"lhumerus": "lclavicle", "lradius": "lhumerus", "lwrist": "lradius"},
-    **{"lhand": "lwrist", "lthumb": "lwrist", "lfingers": "lhand"},
-    **{"rhumerus": "rclavicle", "rradius": "rhumerus", "rwrist": "rradius"},
-    **{"rhand": "rwrist", "rthumb": "rwrist", "rfingers": "rhand"},
-}
-# An Acclaim joint is the far end of the bone of that name.
-ACCLAIM_LANDMARKS = {
-    "pelvis": "root",
-    "neck": "thorax",
-    "head": "head",
-    **{
-        f"{side}_{landmark}": side[0] + bone
-        for side in ("left", "right")
-        for landmark, bone in (
-            ("shoulder", "clavicle"),
-            ("elbow", "humerus"),
-            ("wrist", "radius"),
-            ("hip", "hipjoint"),
-            ("knee", "femur"),
-            ("ankle", "tibia"),
-        )
-    },
-}
-
-KINECT = {
-    "HipCenter": None,
-    "Spine": "HipCenter",
-    "ShoulderCenter": "Spine",
-    "Head": "ShoulderCenter",
-    **{"ShoulderLeft": "ShoulderCenter", "ElbowLeft": "ShoulderLeft"},
-    **{"WristLeft": "ElbowLeft", "HandLeft": "WristLeft"},
-    **{"ShoulderRight": "ShoulderCenter", "ElbowRight": "ShoulderRight"},
-    **{"WristRight": "ElbowRight", "HandRight": "WristRight"},
-    **{"HipLeft": "HipCenter", "KneeLeft": "HipLeft"},
-    **{"AnkleLeft": "KneeLeft", "FootLeft": "AnkleLeft"},
-    **{"HipRight": "HipCenter", "KneeRight": "HipRight"},
-    **{"AnkleRight": "KneeRight", "FootRight": "AnkleRight"},
-}
-KINECT_LANDMARKS = {
-    "pelvis": "HipCenter",
-    "neck": "ShoulderCenter",
-    "head": "Head",
-    **{
-        f"{side}_{landmark}": landmark.capitalize() + side.capitalize()
-        for side in ("left", "right")
-        for landmark in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-    },
-}
+__all__ = ["LANDMARKS", "as_tuple", "completed", "likely_landmarks", "one_sided", "plain_names"]
 
 # Names of the joint at each landmark in files whose joints are the near ends of the
-# bones, the likeliest first.
+# bones, the likeliest first. The last of many are what Plug-in Gait calls its bones.
 _SYNONYMS = {
-    "pelvis": ("pelvis", "hips", "hip", "hipcenter", "midhip", "root"),
-    "neck": ("neck", "neck1", "necktwist01", "shouldercenter", "spineshoulder", "thorax"),
-    "head": ("head",),
-    "shoulder": ("upperarm", "uparm", "arm", "shoulder"),
-    "elbow": ("elbow", "forearm", "lowerarm", "lowarm"),
-    "wrist": ("wrist", "hand"),
-    "hip": ("thigh", "upleg", "upperleg", "hip", "hipjoint"),
-    "knee": ("knee", "calf", "leg", "lowerleg", "lowleg", "shin"),
-    "ankle": ("ankle", "foot"),
-}
+    "pelvis": ("pelvis", "hips", "hip", "hipcenter", "midhip", "spinebase", "root", "pelo"),
+    "neck": ("neck", "neck1", "neck01", "necktwist01", "shouldercenter", "spineshoulder", "thorax",
+             "trxo"),
+    "head": ("head", "nose", "headtop", "headtopend", "hedo"),
+    "shoulder": ("upperarm", "uparm", "uarm", "arm", "shoulder", "sjc", "clo"),
+    "elbow": ("elbow", "forearm", "lowerarm", "lowarm", "farm", "ejc", "huo"),
+    "wrist": ("wrist", "hand", "wjc", "rao"),
+    "hip": ("thigh", "upleg", "upperleg", "hip", "hipjoint", "hjc", "fep"),
+    "knee": ("knee", "calf", "leg", "lowerleg", "lowleg", "shin", "kjc", "feo"),
+    "ankle": ("ankle", "foot", "ajc", "tio"),
+}  # fmt: skip
+_EARS = "ear"
+# Formats that the guess could read otherwise; it finds what others lack in files that have more.
+_KNOWN = [
+    known.landmarks
+    for known in FORMATS.values()
+    if len(known.landmarks) == len(LANDMARKS)
+    and all(isinstance(at, str) for at in known.landmarks.values())
+]
+# What stands in the middle of a pair, where no joint does.
+_MIDDLES = {"pelvis": "hip", "neck": "shoulder"}
 
 
-def guess_landmarks(joints):
-    """The joint of each landmark that can be told from the names."""
+def likely_landmarks(joints, names=()):
+    """The landmarks of a known format if the names are its, otherwise guessed ones.
+
+    `names` may tell more joints than are there; their landmarks are left out.
+    """
+    there = {*joints, *names}
+    plain = plain_names([*joints, *(name for name in names if name not in set(joints))])
+    for landmarks in _KNOWN:
+        if not set(landmarks.values()) <= there:
+            landmarks = {name: plain.get(_plain(joint)) for name, joint in landmarks.items()}
+        if None not in landmarks.values():
+            return {name: joint for name, joint in landmarks.items() if joint in set(joints)}
+    return _guessed(plain_names(joints))
+
+
+def completed(landmarks):
+    """Landmarks with a pelvis and a neck in the middle of the hips and the shoulders."""
+    for name, part in _MIDDLES.items():
+        pair = [landmarks.get(f"{side}_{part}") for side in SIDES]
+        if name not in landmarks and None not in pair:
+            landmarks = landmarks | {name: tuple(j for at in pair for j in as_tuple(at))}
+    return landmarks
+
+
+def one_sided(landmarks, given):
+    """Landmarks that lack though their counterpart was told from the names; but those given."""
+    lacking = []
+    for name in LANDMARKS:
+        side, _, part = name.rpartition("_")
+        other = f"{SIDES[side == SIDES[0]]}_{part}"
+        if side and name not in {*landmarks, *given} and other in landmarks and other not in given:
+            lacking.append(name)
+    return lacking
+
+
+def as_tuple(at):
+    """The joints of a landmark, of which there is one or several."""
+    return (at,) if isinstance(at, str) else tuple(at)
+
+
+def plain_names(joints):
+    """Joints by their names in small letters and digits; of equal names the first."""
     # A prefix that a program gave to every joint but perhaps the root is no part of a name.
     prefix = re.match(r"(.*[^A-Za-z0-9])?", os.path.commonprefix(joints[1:])).group()  # noqa: RUF071
-    plain = {re.sub(r"[^a-z0-9]", "", j.removeprefix(prefix).lower()): j for j in reversed(joints)}
+    return {_plain(j.removeprefix(prefix)): j for j in reversed(joints)}
+
+
+def _plain(name):
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _guessed(plain):
+    """The joint of each landmark that can be told from the names."""
     found = {}
     for landmark in LANDMARKS:
         side, _, part = landmark.rpartition("_")
-        forms = ("{side}{part}", "{part}{side}", "{side[0]}{part}", "{part}{side[0]}")
-        names = [
-            form.format(side=side, part=synonym)
-            for synonym in _SYNONYMS[part]
-            for form in (forms if side else ("{part}",))
-        ]
-        joint = next((plain[name] for name in names if name in plain), None)
+        joint = _find(plain, side, _SYNONYMS[part])
         if joint is not None:
             found[landmark] = joint
+    ears = [_find(plain, side, (_EARS,)) for side in SIDES]
+    if "head" not in found and None not in ears:
+        found["head"] = tuple(ears)
     return found
+
+
+def _find(plain, side, synonyms):
+    """The joint that is called by one of these names, of this side."""
+    forms = ("{side}{part}", "{part}{side}", "{side[0]}{part}", "{part}{side[0]}")
+    names = [
+        form.format(side=side, part=synonym)
+        for synonym in synonyms
+        for form in (forms if side else ("{part}",))
+    ]
+    return next((plain[name] for name in names if name in plain), None)

@@ -1,32 +1,26 @@
-"""The limbs of the body model, and which way up a body is."""
+"""The limbs of the body model: between which landmarks they are, and how long."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from .skeleton import LANDMARKS
+from .formats import LANDMARKS, SIDES
 
 __all__ = [
     "LEFT",
     "LIMBS",
     "LIMB_NAMES",
     "UP",
-    "check_upright",
+    "ancestor_of",
     "exponent_of",
     "landmarks_of",
     "leg_length",
+    "limbs_between",
     "limbs_of",
+    "size_of",
+    "stretched_legs",
     "unit",
-    "y_up",
 ]
-
-# A body is upside down if it is in so many of its frames, by more than so many leg lengths. Of 363
-# real performances that bend, hop, crouch and sit down, the one that comes closest has its pelvis
-# 0.26 legs above the ankles and its head, on average, 0.15 above the pelvis.
-_NEARLY_ALWAYS, _CLEARLY = 0.9, 0.1
-# Whose left and right limbs differ by more is no body, so it has no upside; of those people the
-# limbs differ by 1.38 at most.
-_ALIKE = 1.5
 
 
 class Limb(NamedTuple):
@@ -62,15 +56,45 @@ LIMBS = {
 LIMB_NAMES = list(LIMBS)
 
 
-def landmarks_of(positions, skeleton):
-    """(n_frames, 15, 3) places of the landmarks, the second axis vertical, in units of ``2**k``; k.
+def limbs_between(landmarks):
+    """Names of the limbs both of whose joints are among the landmarks."""
+    return [name for name, limb in LIMBS.items() if {limb.start, limb.end} <= set(landmarks)]
 
-    In that unit no square leaves the range of the numbers, and no digit is lost.
+
+def ancestor_of(name, limbs):
+    """The nearest of the limbs that a limb hangs on; None if none of them is above it."""
+    above = LIMBS[name].parent
+    while above is not None and above not in limbs:
+        above = LIMBS[above].parent
+    return above
+
+
+def stretched_legs(limbs):
+    """The sides whose thigh and leg are both there."""
+    return [side for side in SIDES if {f"{side}_thigh", f"{side}_leg"} <= set(limbs)]
+
+
+def landmarks_of(positions, skeleton):
+    """(n_frames, 15, n_dims) places of the landmarks along the recording's axes, and ``k``.
+
+    They are in units of ``2**k``, in which no square leaves the range of the numbers, and no
+    digit is lost. A landmark that the skeleton lacks is at 0.
     """
-    columns = [skeleton.index_of(name) for name in LANDMARKS]
-    points = positions.reshape(len(positions), -1, 3)[:, columns]
-    k = exponent_of(max(points.max(), -points.min()), points.dtype)
-    return y_up(np.ldexp(points, -k) if k else points, skeleton), k
+    joints = positions.reshape(len(positions), -1, skeleton.n_dims)
+    columns = {LANDMARKS.index(name): skeleton.indices_of(name) for name in skeleton.landmarks}
+    used = joints[:, sorted({j for of_one in columns.values() for j in of_one})]
+    k = exponent_of(max(used.max(), -used.min()), used.dtype)
+    if k:
+        joints = np.ldexp(joints, -k)
+    if len(columns) == len(LANDMARKS):
+        points = joints[:, [of_one[0] for of_one in columns.values()]]
+    else:
+        points = np.zeros((len(joints), len(LANDMARKS), skeleton.n_dims), dtype=joints.dtype)
+        points[:, list(columns)] = joints[:, [of_one[0] for of_one in columns.values()]]
+    for place, of_one in columns.items():
+        if len(of_one) > 1:
+            points[:, place] = sum(joints[:, j] for j in of_one) / len(of_one)
+    return points, k
 
 
 def exponent_of(largest, dtype):
@@ -81,29 +105,28 @@ def exponent_of(largest, dtype):
     return k
 
 
-def y_up(points, skeleton):
-    """Points (..., 3) of a skeleton in axes of which the second is vertical."""
-    if skeleton.up == "y":
-        return points
-    return np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1)
-
-
 def limbs_of(points):
-    """(n_frames, 12, 3) limb vectors of (n_frames, 15, 3) landmarks."""
+    """(n_frames, 12, n_dims) limb vectors of (n_frames, 15, n_dims) landmarks."""
     start, end = ([LANDMARKS.index(limb[k]) for limb in LIMBS.values()] for k in (0, 1))
     return points[:, end] - points[:, start]
 
 
-def leg_length(lengths):
-    """Length of the stretched leg, the mean of both sides."""
-    parts = [
-        lengths[LIMB_NAMES.index(f"{s}_{p}")] for s in ("left", "right") for p in ("thigh", "leg")
-    ]
-    return sum(parts) / 2
+def leg_length(lengths, limbs=LIMB_NAMES):
+    """Length of the stretched leg, the mean of the sides that have one."""
+    sides = stretched_legs(limbs)
+    parts = [lengths[LIMB_NAMES.index(f"{s}_{p}")] for s in sides for p in ("thigh", "leg")]
+    return sum(parts) / len(sides)
+
+
+def size_of(lengths, limbs):
+    """What tells the size of a body: the stretched leg, or without one all of its limbs."""
+    if stretched_legs(limbs):
+        return leg_length(lengths, limbs)
+    return sum(lengths[LIMB_NAMES.index(name)] for name in limbs)
 
 
 def unit(vectors):
-    """Directions of vectors (..., 3) of any length; what has none stays 0."""
+    """Directions of vectors (..., n_dims) of any length; what has none stays 0."""
     norm = np.linalg.norm(vectors, axis=-1, keepdims=True)
     small = np.finfo(vectors.dtype).tiny ** 0.25
     if not (norm.min() > small and norm.max() < 1 / small):
@@ -111,46 +134,3 @@ def unit(vectors):
         vectors = vectors / np.where(largest > 0, largest, 1)
         norm = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(norm > 0, norm, 1)
-
-
-def _is_even(lengths):
-    """Whether limbs of the left and the right are about as long as each other."""
-    left, right = (
-        np.array([lengths[i] for i, name in enumerate(LIMB_NAMES) if name.startswith(side)])
-        for side in ("left", "right")
-    )
-    return bool(np.all((left < _ALIKE * right) & (right < _ALIKE * left)))
-
-
-def check_upright(points, lengths, skeleton, what):
-    """Refuse a body that stands on its head from the first to the last frame.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n_frames, 15, 3)
-        Landmarks, the second axis vertical.
-    lengths : ndarray, shape (n_frames, 12)
-        Of the limbs.
-    skeleton : Skeleton
-    what : str
-        What to call it in messages, with a capital letter.
-    """
-    left, right = (points[:, LANDMARKS.index(f"{side}_ankle")] for side in ("left", "right"))
-    feet = left / 2 + right / 2
-    pelvis, head = (points[:, LANDMARKS.index(name)] for name in ("pelvis", "head"))
-    if np.count_nonzero(pelvis[:, 1] < feet[:, 1]) < _NEARLY_ALWAYS * (len(points) - 1):
-        return
-    typical = np.median(lengths, axis=0)
-    legs = leg_length(typical)
-    below = np.quantile(pelvis[:, 1] - feet[:, 1], _NEARLY_ALWAYS) < -_CLEARLY * legs
-    if not below or (head - pelvis)[:, 1].mean() > -_CLEARLY * legs or not _is_even(typical):
-        return
-    axes = (("x", 1), ("y", 1), ("z", 1)) if skeleton.up == "y" else (("x", 1), ("z", 1), ("y", -1))
-    rise = (head - feet).mean(axis=0)
-    name, sign = axes[np.abs(rise).argmax()]
-    seems = f"{'+' if sign * rise[np.abs(rise).argmax()] > 0 else '-'}{name}"
-    raise ValueError(
-        f"{what} is upside down: the pelvis is below the ankles and the head below the pelvis. "
-        f"The skeleton says that +{skeleton.up} is up, but {seems} seems to be. Turn the positions "
-        "(x, -y, -z instead of x, y, z), or give Skeleton(..., up=...) if another axis is vertical."
-    )

@@ -3,17 +3,16 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..gate import names_of
-from .checks import as_joints, as_landmarks, as_parents, circle_of
-from .landmarks import (
-    ACCLAIM,
-    ACCLAIM_LANDMARKS,
-    KINECT,
-    KINECT_LANDMARKS,
-    LANDMARKS,
-    PAPER,
-    guess_landmarks,
-)
+import numpy as np
+
+from ..gate import as_numbers
+from .checks import as_joints, as_landmarks, as_parents, circle_of, is_whole, kept_parents
+from .columns import AXES, check_columns, joints_of, joints_with_axes
+from .formats import FORMATS, LANDMARKS
+from .landmarks import as_tuple, completed, likely_landmarks, one_sided
+from .limbs import LIMBS, limbs_between, stretched_legs
+from .ready import ReadySkeletons
+from .upright import UPS, seems_up
 
 __all__ = ["LANDMARKS", "Skeleton", "check_columns", "joints_of"]
 
@@ -35,28 +34,34 @@ class _ReadOnly(dict):
 
 
 @dataclass(frozen=True)
-class Skeleton:
+class Skeleton(ReadySkeletons):
     """Which joints the positions hold, how they hang together, and which are the body's.
 
     Parameters
     ----------
     joints : sequence of str
         Names of the joints, in the order of the columns: joint j has the columns
-        ``3 j``, ``3 j + 1``, ``3 j + 2`` (x, y, z).
+        ``3 j``, ``3 j + 1``, ``3 j + 2`` (x, y, z), or with two axes ``2 j``, ``2 j + 1`` (x, y).
     parents : sequence of int
         Index of each joint's parent, -1 for a root. Used to draw bones.
-    landmarks : mapping of str to str, default=None
+    landmarks : mapping of str to str or tuple of str, default=None
         The joint at each of the fifteen landmarks of the paper's body model:
         ``pelvis``, ``neck``, ``head`` and ``left_``/``right_`` ``shoulder``, ``elbow``,
-        ``wrist``, ``hip``, ``knee``, ``ankle``. By default it is guessed from the names.
-    up : {"y", "z"}, default="y"
-        The vertical axis of the positions.
+        ``wrist``, ``hip``, ``knee``, ``ankle``. Several joints stand for their mean, such as two
+        markers for the middle of a knee. Landmarks may lack, or be None; two of them that belong to
+        one limb must be there. By default it is guessed from the names: a pelvis or a neck without a joint
+        is the mean of the hips or the shoulders.
+    up : {"y", "x", "z", "-y", "-x", "-z"}, default="y"
+        The vertical axis of the positions; "-y" where y points downwards, as in pictures.
+    n_dims : {3, 2}, default=3
+        Axes of a position: 2 for key-points in a picture.
 
     Raises
     ------
     ValueError
         If lengths disagree, a name is no text or comes twice, a parent is no index of another
-        joint, parents run in a circle, or a landmark is missing, unknown or names no joint.
+        joint, parents run in a circle, a landmark is unknown or names no joint, the landmarks leave
+        no limb, or a guess finds a landmark on one side only.
 
     Notes
     -----
@@ -69,12 +74,21 @@ class Skeleton:
     >>> skeleton = Skeleton.acclaim()
     >>> len(skeleton.joints), skeleton.landmarks["left_knee"]
     (31, 'lfemur')
+    >>> Skeleton.coco(n_dims=2).landmarks["pelvis"]
+    ('left_hip', 'right_hip')
+
+    Markers of one leg:
+
+    >>> leg = {"left_hip": "LGTR", "left_knee": ("LKNE", "LKNM"), "left_ankle": "LANK"}
+    >>> Skeleton(["LGTR", "LKNE", "LKNM", "LANK"], [-1] * 4, leg, up="z").limbs
+    ['left_thigh', 'left_leg']
     """
 
     joints: tuple
     parents: tuple
     landmarks: Mapping | None = None
     up: str = "y"
+    n_dims: int = 3
 
     def __post_init__(self):
         joints, parents = as_joints(self.joints), as_parents(self.parents)
@@ -90,22 +104,26 @@ class Skeleton:
                 f"parents run in a circle: {' > '.join(joints[j] for j in circle)}. The chain of "
                 "every joint must end at a root, whose parent is -1."
             )
-        if not (isinstance(self.up, str) and self.up in ("y", "z")):
-            raise ValueError(f"up must be 'y' or 'z', got {self.up!r}.")
+        if not is_whole(self.n_dims) or self.n_dims not in UPS:
+            raise ValueError(
+                f"n_dims must be 3, or 2 for positions in the plane, got {self.n_dims!r}."
+            )
+        ups = UPS[self.n_dims]
+        if not (isinstance(self.up, str) and self.up in ups):
+            raise ValueError(
+                f"up must be {', '.join(map(repr, list(ups)[:-1]))} or {list(ups)[-1]!r}, got "
+                f"{self.up!r}."
+            )
         object.__setattr__(self, "joints", joints)
         object.__setattr__(self, "parents", parents)
+        object.__setattr__(self, "n_dims", int(self.n_dims))
         object.__setattr__(self, "landmarks", self._checked_landmarks())
 
     def _checked_landmarks(self):
-        guessed = self.landmarks is None
-        landmarks = guess_landmarks(self.joints) if guessed else as_landmarks(self.landmarks)
-        missing = [name for name in LANDMARKS if landmarks.get(name) not in self.joints]
-        if missing:
-            raise ValueError(
-                f"No joint stands for the landmarks {missing}; give landmarks={{...}} with one of "
-                f"the joints {list(self.joints)} for each."
-            )
-        return _ReadOnly({name: str(landmarks[name]) for name in LANDMARKS})
+        if self.landmarks is None:
+            return _sound(completed(likely_landmarks(self.joints)), (), self.joints)
+        landmarks = as_landmarks(self.landmarks)
+        return _sound(landmarks, landmarks, self.joints)
 
     # Files hold the landmarks as a plain dict, which every kind of file can fill again.
 
@@ -113,33 +131,25 @@ class Skeleton:
         return vars(self) | {"landmarks": dict(self.landmarks)}
 
     def __setstate__(self, state):
-        vars(self).update(state, landmarks=_ReadOnly(state["landmarks"]))
+        landmarks = {
+            name: at if isinstance(at, str) else tuple(at)
+            for name, at in state["landmarks"].items()
+        }
+        vars(self).update(state, landmarks=_ReadOnly(landmarks))
 
     def __repr__(self):
-        for name in ("acclaim", "kinect", "paper"):
-            if self == getattr(type(self), name)():
-                return f"Skeleton.{name}()"
-        return f"Skeleton(<{len(self.joints)} joints>, up={self.up!r})"
+        for name in FORMATS:
+            if self == getattr(type(self), name)(n_dims=self.n_dims):
+                return f"Skeleton.{name}({'n_dims=2' if self.n_dims == 2 else ''})"
+        some = len(self.landmarks)
+        of = "" if some == len(LANDMARKS) else f", {some} of {len(LANDMARKS)} landmarks"
+        plane = ", n_dims=2" if self.n_dims == 2 else ""
+        return f"Skeleton(<{len(self.joints)} joints{of}>, up={self.up!r}{plane})"
 
     @classmethod
-    def paper(cls):
-        """The paper's fifteen joints."""
-        return cls._of(PAPER, {name: name for name in LANDMARKS})
-
-    @classmethod
-    def acclaim(cls):
-        """The 31 joints of HDM05 and of CMU's ASF/AMC files."""
-        return cls._of(ACCLAIM, ACCLAIM_LANDMARKS)
-
-    @classmethod
-    def kinect(cls):
-        """The 20 joints of the first Kinect."""
-        return cls._of(KINECT, KINECT_LANDMARKS)
-
-    @classmethod
-    def from_names(cls, joints, parents, up="y"):
+    def from_names(cls, joints, parents, up="y", n_dims=3):
         """A ready skeleton if the names are one's, otherwise landmarks guessed from names."""
-        return cls(joints, parents, cls._likely_landmarks(joints), up)
+        return cls(joints, parents, None, up, n_dims)
 
     @classmethod
     def from_frame(cls, df, *, landmarks=None, up=None):
@@ -147,14 +157,17 @@ class Skeleton:
 
         Parameters
         ----------
-        df : DataFrame (n_frames, 3 * n_joints)
-            Columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint by joint. Where its
+        df : DataFrame (n_frames, 3 * n_joints), or (n_frames, 2 * n_joints)
+            Columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint by joint, or ``<joint>_x``,
+            ``<joint>_y`` of key-points in a picture. Where its
             ``attrs`` name ``joints`` and ``parents``, the parent of a joint is its nearest
             ancestor that has columns; otherwise nothing is joined.
-        landmarks : mapping of str to str, default=None
-            The joints of some or all landmarks; the others are told from the names.
-        up : {"y", "z"}, default=None
-            The vertical axis; by default ``df.attrs["up"]``, or "y".
+        landmarks : mapping of str to str or tuple of str, default=None
+            The joints of some or all landmarks, several for their mean; the others are told from
+            the names. None as a joint leaves a landmark out.
+        up : {"y", "x", "z", "-y", "-x", "-z"}, default=None
+            The vertical axis; by default ``df.attrs["up"]``, or the one along which the head is
+            above the feet on average. Where the positions do not tell, it is "y".
 
         Returns
         -------
@@ -163,8 +176,9 @@ class Skeleton:
         Raises
         ------
         ValueError
-            If the columns are not such triples, or a landmark has no joint. Without columns, as
-            an array: make the skeleton by ``Skeleton(joints, parents)``.
+            If the columns are not such triples or pairs, no limb is told from the names, or a
+            landmark on one side only. Without columns, as an array: make the skeleton by
+            ``Skeleton(joints, parents)``.
 
         Examples
         --------
@@ -173,8 +187,11 @@ class Skeleton:
         >>> df = pd.DataFrame(0.0, index=range(2), columns=Skeleton.paper().column_names)
         >>> Skeleton.from_frame(df).landmarks["left_knee"]
         'left_knee'
+        >>> legs = df[[c for c in df if c.startswith(("left_", "right_"))]]
+        >>> Skeleton.from_frame(legs, landmarks={"pelvis": ("left_hip", "right_hip")}, up="z")
+        Skeleton(<12 joints, 14 of 15 landmarks>, up='z')
         """
-        joints = joints_of(df)
+        joints, n_dims = joints_with_axes(df)
         if twice := sorted({joint for joint in joints if joints.count(joint) > 1}):
             raise ValueError(
                 f"The columns of the joints {twice} come more than once; use "
@@ -182,34 +199,64 @@ class Skeleton:
             )
         given = {} if landmarks is None else as_landmarks(landmarks)
         attrs = getattr(df, "attrs", {})
-        up = attrs.get("up") or "y" if up is None else up
         names = as_joints(attrs.get("joints", ()))
         # Columns that were renamed are none of the joints that the file had.
-        likely = cls._likely_landmarks(joints, names if set(joints) <= set(names) else ())
-        parents = _kept_parents(joints, names, as_parents(attrs.get("parents", ())))
-        return cls(joints, parents, likely | given, up)
-
-    @classmethod
-    def _likely_landmarks(cls, joints, names=()):
-        """The landmarks of a ready skeleton if the names are one's, otherwise guessed ones.
-
-        `names` may tell more joints than are there; their landmarks are left out.
-        """
-        for known in (cls.acclaim(), cls.kinect(), cls.paper()):
-            if set(known.landmarks.values()) <= {*joints, *names}:
-                return {name: j for name, j in known.landmarks.items() if j in joints}
-        return guess_landmarks(as_joints(joints))
-
-    @classmethod
-    def _of(cls, parents, landmarks):
-        joints = list(parents)
-        return cls(joints, [joints.index(p) if p else -1 for p in parents.values()], landmarks)
+        likely = likely_landmarks(joints, names if set(joints) <= set(names) else ())
+        landmarks = _sound(completed(likely | given), given, joints)
+        parents = kept_parents(joints, names, as_parents(attrs.get("parents", ())))
+        up = attrs.get("up") if up is None else up
+        skeleton = cls(joints, parents, landmarks, "y" if up is None else up, n_dims)
+        seems = _seems_up(df, skeleton) if up is None else None
+        return skeleton if seems is None else cls(joints, parents, landmarks, seems, n_dims)
 
     def index_of(self, landmark):
         """Index of the joint that stands for a landmark."""
-        if landmark not in self.landmarks:
+        indices = self.indices_of(landmark)
+        if len(indices) > 1:
+            raise ValueError(
+                f"The landmark {landmark!r} is the mean of the joints {self.landmarks[landmark]}; "
+                "indices_of gives all of them."
+            )
+        return indices[0]
+
+    def indices_of(self, landmark):
+        """Indices of the joints whose mean a landmark is: a tuple, mostly of one."""
+        if landmark not in LANDMARKS:
             raise ValueError(f"landmark must be among {LANDMARKS}, got {landmark!r}.")
-        return self.joints.index(self.landmarks[landmark])
+        if landmark not in self.landmarks:
+            raise ValueError(
+                f"The skeleton lacks the landmark {landmark!r}; it has {list(self.landmarks)}."
+            )
+        return tuple(self.joints.index(joint) for joint in as_tuple(self.landmarks[landmark]))
+
+    def body(self):
+        """The skeleton of the landmarks that limbs hold together, with "y" up.
+
+        It is that of the positions which `DirectionCosines.inverse_transform` gives; of a whole
+        body, ``Skeleton.paper()``.
+
+        Returns
+        -------
+        Skeleton
+        """
+        held = {joint for name in self.limbs for joint in LIMBS[name][:2]}
+        # The pelvis is between the hips, the neck between the shoulders.
+        held |= {"pelvis"} if "hip" in self.limbs or self.has_height else set()
+        held |= {"neck"} if "shoulder" in self.limbs else set()
+        joints = [name for name in LANDMARKS if name in held and name in self.landmarks]
+        paper = type(self).paper()
+        parents = kept_parents(joints, paper.joints, paper.parents)
+        return type(self)(joints, parents, {name: name for name in joints}, "y", self.n_dims)
+
+    @property
+    def limbs(self):
+        """Names of the limbs, both of whose joints are landmarks: of the whole body twelve."""
+        return limbs_between(self.landmarks)
+
+    @property
+    def has_height(self):
+        """Whether the height of the pelvis is told: there is one, and a leg down to the ankle."""
+        return "pelvis" in self.landmarks and bool(stretched_legs(self.limbs))
 
     @property
     def bones(self):
@@ -219,66 +266,34 @@ class Skeleton:
     @property
     def column_names(self):
         """Names of the position columns, ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, ..."""
-        return [f"{joint}_{axis}" for joint in self.joints for axis in "xyz"]
+        return [f"{joint}_{axis}" for joint in self.joints for axis in AXES[self.n_dims]]
 
 
-def joints_of(df):
-    """Names of the joints of a DataFrame whose columns are ``<joint>_x``, ``_y``, ``_z``, ..."""
-    columns = getattr(df, "columns", None)
-    if columns is None or callable(columns):
-        raise ValueError(
-            "Joints are told from the columns of a DataFrame, got "
-            f"{type(df).__name__}. Use pd.DataFrame(positions, columns=skeleton.column_names)."
-        )
-    columns = [str(column) for column in columns]
-    joints = [column[:-2] for column in columns[::3]]
-    if not joints or columns != [f"{joint}_{axis}" for joint in joints for axis in "xyz"]:
-        raise ValueError(
-            "The columns must be <joint>_x, <joint>_y, <joint>_z for one joint after the other, "
-            f"got {columns[:4]}{' ...' if len(columns) > 4 else ''}; select them with "
-            "df[skeleton.column_names] or drop the others."
-        )
-    return joints
+def _sound(landmarks, given, joints):
+    """The landmarks that are there, in their order; a refusal if they make no body.
 
-
-def check_columns(x, skeleton, what):
-    """Refuse a table in which a column of the skeleton stands in another one's place.
-
-    Names that the skeleton does not have are fine.
-
-    Parameters
-    ----------
-    x : table, or anything without names
-    skeleton : Skeleton
-    what : str
-        What to call it in messages, with a capital letter.
+    Those that are given are meant as they are, those that are guessed come in pairs.
     """
-    expected = skeleton.column_names
-    place_of = {name: place for place, name in enumerate(expected)}
-    for place, name in enumerate(names_of(x) or ()):
-        if place_of.get(name, place) != place:
-            raise ValueError(
-                f"{what}: column {place} is {name!r}, where the skeleton has "
-                f"{(*expected, 'none')[min(place, len(expected))]!r}. Bring the columns into the "
-                "order of the skeleton's joints by df[skeleton.column_names]."
-            )
-
-
-def _kept_parents(joints, names, parents):
-    """Index of the nearest ancestor that is among the joints, or -1, for each joint."""
-    if len(names) != len(parents) or any(not -1 <= p < len(names) for p in parents):
+    there = {name: landmarks[name] for name in LANDMARKS if landmarks.get(name) is not None}
+    absent = [name for name, at in there.items() if not set(as_tuple(at)) <= set(joints)]
+    missing = absent or one_sided(there, given)
+    if not missing and not limbs_between(there):
+        missing = [name for name in LANDMARKS if name not in there]
+    if missing:
+        got = f" (got { ({name: there[name] for name in absent}) })" if absent else ""
         raise ValueError(
-            "df.attrs must have one parent, an index or -1, for each of its joints; got "
-            f"{len(names)} joints and the parents {parents}."
+            f"No joint stands for the landmarks {missing}{got}; give landmarks={{...}} with one of "
+            f"the joints {list(joints)} for each, or several of them for their mean, such as "
+            "{'pelvis': ('LASI', 'RASI')}. A landmark that the body lacks is None; both ends of "
+            "one limb must be there."
         )
-    above = {name: names[p] for name, p in zip(names, parents, strict=True) if p >= 0}
-    index = {joint: j for j, joint in enumerate(joints)}
-    result = []
-    for joint in joints:
-        ancestor = above.get(joint)
-        for _ in names:  # no more steps than joints, should parents run in a circle
-            if ancestor is None or ancestor in index:
-                break
-            ancestor = above.get(ancestor)
-        result.append(index.get(ancestor, -1))
-    return result
+    return _ReadOnly(there)
+
+
+def _seems_up(df, skeleton):
+    """The vertical axis that a table of positions seems to have, or None."""
+    try:
+        positions = as_numbers(df, "df", dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    return seems_up(positions, skeleton)

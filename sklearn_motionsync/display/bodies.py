@@ -3,9 +3,10 @@
 import numpy as np
 
 from ..body.axes import heading
-from ..body.limbs import unit, y_up
-from ..body.skeleton import check_columns
-from ..gate import as_numbers
+from ..body.columns import check_columns
+from ..body.limbs import unit
+from ..body.upright import y_up
+from ..gate import as_numbers, names_of
 from .given import mean_of_seen
 
 __all__ = [
@@ -14,8 +15,10 @@ __all__ = [
     "bones_by_side",
     "limits",
     "on_screen",
+    "place_of",
     "placed",
     "upright",
+    "with_landmarks",
 ]
 
 # How far people may walk, in their heights, before the picture follows them.
@@ -27,21 +30,26 @@ _LARGEST = 1e150
 
 
 def upright(x, skeleton, i):
-    """(n_frames, n_joints, 3) of (n_frames, 3 n_joints), with the second axis vertical.
+    """(n_frames, n_joints, n_dims) of (n_frames, n_dims * n_joints), the second axis vertical.
 
-    Without a skeleton the second axis is taken for vertical.
+    Without a skeleton the second axis is taken for vertical, and three axes are unless the names of
+    the columns or their number say two.
     """
     what = f"Performance {i}"
     if skeleton is not None:
         check_columns(x, skeleton, what)
+        n_dims, n_joints = skeleton.n_dims, len(skeleton.joints)
+    names = names_of(x) or ()
     x = as_numbers(x, what, dtype=np.float64)
-    n_joints = x.shape[-1] // 3 if skeleton is None and x.ndim > 0 else 0
-    if skeleton is not None:
-        n_joints = len(skeleton.joints)
-    if x.ndim != 2 or x.shape[1] != 3 * n_joints or x.size == 0:
+    if skeleton is None:
+        width = x.shape[-1] if x.ndim > 0 else 0
+        named = [str(name)[-2:] for name in names] == ["_x", "_y"] * (len(names) // 2)
+        n_dims = 2 if width % 2 == 0 and (width % 3 or (names and named)) else 3
+        n_joints = width // n_dims
+    if x.ndim != 2 or x.shape[1] != n_dims * n_joints or x.size == 0:
         whose, width = "joints", "3 * n_joints"
         if skeleton is not None:
-            whose, width = f"the skeleton's {n_joints} joints", 3 * n_joints
+            whose, width = f"the skeleton's {n_joints} joints", n_dims * n_joints
         raise ValueError(
             f"{what} has shape {x.shape}, but the positions of {whose} are (n_frames, {width})."
         )
@@ -52,7 +60,7 @@ def upright(x, skeleton, i):
         raise ValueError(
             f"{what}, frame {frame}, column {column} is {size}; make it NaN to leave a gap."
         )
-    points = x.reshape(len(x), -1, 3)
+    points = x.reshape(len(x), -1, n_dims)
     return points if skeleton is None else y_up(points, skeleton)
 
 
@@ -60,19 +68,41 @@ def placed(x, skeleton, *, follow=False):
     """A performance turned to face forward at first, above the origin, its lowest joint at 0.
 
     With ``follow``, or if it leads far away, the pelvis stays above the origin all the time.
-    Without a skeleton nothing is turned, and the middle of the joints stands for the pelvis.
+    Without a skeleton nothing is turned, and the middle of the joints stands for the pelvis. Who
+    has no hips faces as the shoulders do; nobody is turned in a picture.
     """
-    if skeleton is None:
-        turn, way = np.eye(3), _known(mean_of_seen(x, axis=1), "joints")
+    n_dims = x.shape[2]
+    turn = np.eye(n_dims)
+    across = None if skeleton is None or n_dims == 2 else _side_by_side(skeleton)
+    if across is not None:
+        left, right = (place_of(x, skeleton, f"{side}_{across}") for side in ("left", "right"))
+        turn = heading(unit(_known(left - right, f"{across}s")[:1]))[0]
+    if skeleton is not None and "pelvis" in skeleton.landmarks:
+        way = _known(place_of(x, skeleton, "pelvis"), "pelvis")
     else:
-        left, right, pelvis = map(skeleton.index_of, ("left_hip", "right_hip", "pelvis"))
-        turn = heading(unit(_known(x[:, left] - x[:, right], "hips")[:1]))[0]
-        way = _known(x[:, pelvis], "pelvis")
+        way = _known(mean_of_seen(x, axis=1), "joints")
     floor, top = np.nanmin(x[..., 1]), np.nanmax(x[..., 1])
-    follow = follow or np.ptp(way[:, [0, 2]], axis=0).max() > _FAR * (top - floor)
+    # Over the ground, or across the picture.
+    walked = np.ptp(np.delete(way, 1, axis=1), axis=0).max()
+    follow = follow or walked > _FAR * (top - floor)
     origin = way if follow else np.repeat(way[:1], len(x), axis=0)
     origin[:, 1] = floor
     return (x - origin[:, np.newaxis]) @ turn.T
+
+
+def place_of(x, skeleton, landmark):
+    """Where a landmark is: (n_frames, n_dims)."""
+    return x[:, list(skeleton.indices_of(landmark))].mean(axis=1)
+
+
+def _side_by_side(skeleton):
+    """The landmarks of both sides that tell how a body faces; None if there are none."""
+    pairs = [
+        part
+        for part in ("hip", "shoulder")
+        if {f"left_{part}", f"right_{part}"} <= set(skeleton.landmarks)
+    ]
+    return pairs[0] if pairs else None
 
 
 def _known(track, what):
@@ -87,32 +117,72 @@ def _known(track, what):
 
 
 def on_screen(x, azimuth):
-    """(n_frames, n_joints, 2) places across and up, as seen from far away at eye level."""
+    """(n_frames, n_joints, 2) places across and up, as seen from far away at eye level.
+
+    A picture is seen as it is.
+    """
+    if x.shape[-1] == 2:
+        return x
     a = np.deg2rad(azimuth)
     across = x @ np.array([np.cos(a), 0, -np.sin(a)])
     return np.stack([across, x[..., 1]], axis=-1)
 
 
+def with_landmarks(x, skeleton):
+    """The joints, and after them the landmarks, if limbs are drawn between these."""
+    if skeleton is None or not _has_limbs_of_its_own(skeleton):
+        return x
+    landmarks = [place_of(x, skeleton, name) for name in skeleton.body().joints]
+    return np.concatenate([x, np.stack(landmarks, axis=1)], axis=1)
+
+
+def _has_limbs_of_its_own(skeleton):
+    """Whether bones do not show the limbs: there are none, or a landmark is a mean of joints."""
+    means = any(len(skeleton.indices_of(name)) > 1 for name in skeleton.landmarks)
+    return means or not skeleton.bones
+
+
 def bones_by_side(skeleton):
-    """Bones by the side of the body they hang on: below a hip or shoulder, or in the middle."""
-    if skeleton is None:
-        return {"left": [], "middle": [], "right": []}
-    side_of = {}
-    for side in ("left", "right"):
-        for landmark in ("hip", "shoulder"):
-            side_of[skeleton.index_of(f"{side}_{landmark}")] = side
+    """Bones by the side of the body they hang on: below a hip or shoulder, or in the middle.
+
+    Limbs of their own are between the landmarks after the joints, in place of bones between these.
+    """
     bones = {"left": [], "middle": [], "right": []}
-    for parent, joint in skeleton.bones:
-        above, seen = joint, set()
-        while above >= 0 and above not in side_of and above not in seen:
-            seen.add(above)
-            above = skeleton.parents[above]
-        bones[side_of.get(above, "middle")].append((parent, joint))
+    if skeleton is None:
+        return bones
+    own = skeleton.bones
+    if _has_limbs_of_its_own(skeleton):
+        body, count = skeleton.body(), len(skeleton.joints)
+        for side, of_side in bones_by_side(body).items() if body.bones else ():
+            bones[side] += [(a + count, b + count) for a, b in of_side]
+        joints = {j for name in skeleton.landmarks for j in skeleton.indices_of(name)}
+        own = [bone for bone in own if not set(bone) <= joints]
+    side_of = {}
+    # Knees and elbows, for whoever has no hips and shoulders.
+    for part in ("hip", "shoulder", "knee", "elbow", "ankle", "wrist"):
+        for side in ("left", "right"):
+            if f"{side}_{part}" in skeleton.landmarks:
+                for joint in skeleton.indices_of(f"{side}_{part}"):
+                    side_of.setdefault(joint, side)
+    for parent, joint in own:
+        sides = [_side_above(j, skeleton, side_of) for j in (parent, joint)]
+        # What goes from one side to the other is on none.
+        crosses = None not in sides and sides[0] != sides[1]
+        bones["middle" if crosses or sides[1] is None else sides[1]].append((parent, joint))
     return bones
 
 
-def bodies_of(space, mean):
-    """A function from points of a space to bodies (n, 15, 3) on the floor of the mean performance.
+def _side_above(joint, skeleton, side_of):
+    """The side of a joint, or of the nearest above it that has one."""
+    while joint >= 0:
+        if joint in side_of:
+            return side_of[joint]
+        joint = skeleton.parents[joint]
+    return None
+
+
+def bodies_of(space, mean, n_dims):
+    """A function from points of a space to bodies (n, n_landmarks, n_dims) on the mean's floor.
 
     A performance of its own would be put on a floor of its own.
     """
@@ -125,7 +195,7 @@ def bodies_of(space, mean):
 
     def bodies(points):
         together = np.asarray(space.inverse_transform(np.concatenate([mean, points])))
-        return together[len(mean) :].reshape(len(points), -1, 3)
+        return together[len(mean) :].reshape(len(points), -1, n_dims)
 
     return bodies
 

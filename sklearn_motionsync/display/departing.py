@@ -26,7 +26,7 @@ class Strip(NamedTuple):
         One a panel.
     titles : list of str
     marked : list of list of (int, int)
-        The bones of the paper's skeleton that depart around these frames.
+        The bones of the skeleton that depart around these frames.
     """
 
     frames: list
@@ -34,7 +34,7 @@ class Strip(NamedTuple):
     marked: list
 
 
-def strip_of(scores, names, frames, limit):
+def strip_of(scores, names, frames, limit, skeleton=None):
     """The frames of a strip, and the limbs that depart around them.
 
     Parameters
@@ -50,11 +50,14 @@ def strip_of(scores, names, frames, limit):
         clock away.
     limit : float
         Beyond how many standard deviations a feature departs.
+    skeleton : Skeleton, default=None
+        Whose joints are landmarks; by default the paper's.
 
     Returns
     -------
     Strip
     """
+    skeleton = Skeleton.paper() if skeleton is None else skeleton
     parts = list(dict.fromkeys(map(_part_of, names)))
     columns = [[k for k, name in enumerate(names) if _part_of(name) == part] for part in parts]
     # The score of a limb is that of the cosine that is farthest off.
@@ -67,7 +70,7 @@ def strip_of(scores, names, frames, limit):
         worst = parts[int(peaks.argmax())]
         said = f"{worst} {_rounded(peaks.max())} std" if departing else "no limb departs"
         titles.append(f"frame {frame}\n{said}")
-        bones = [bone for part in departing for bone in _bones_of(part)]
+        bones = [bone for part in departing for bone in _bones_of(part, skeleton)]
         marked.append(list(dict.fromkeys(bones)))
     return Strip(shown, titles, marked)
 
@@ -100,10 +103,9 @@ def _rounded(score):
     return f"{score:.0f}" if score >= 10 else f"{score:.1f}"
 
 
-def _bones_of(part):
-    """The bones of the paper's skeleton that a limb is drawn as."""
-    skeleton = Skeleton.paper()
+def _bones_of(part, skeleton):
+    """The bones of a skeleton that a limb is drawn as."""
     limb = LIMBS[_PELVIS if part == _HEIGHT else part]
-    ends = skeleton.index_of(limb.start), skeleton.index_of(limb.end)
+    ends = tuple(skeleton.joints.index(name) for name in limb[:2] if name in skeleton.joints)
     # The hips and the shoulders are each drawn as two bones, from their middle.
     return [ends] if ends in skeleton.bones else [b for b in skeleton.bones if b[1] in ends]

@@ -171,7 +171,7 @@ def as_skeleton(skeleton):
 
 
 def as_scenes(scenes, skeleton):
-    """For each panel a list of performances (n_frames_i, n_joints, 3)."""
+    """For each panel a list of performances (n_frames_i, n_joints, n_dims)."""
     checked = _as_performances_of_panels(scenes, skeleton, "scenes", "Panel")
     if not any(np.isfinite(x).any() for scene in checked for x in scene):
         raise ValueError("scenes must hold positions to draw; they are empty, or all NaN.")
@@ -196,11 +196,20 @@ def _as_performances_of_panels(scenes, skeleton, name, panel):
             f"{name} must be a list with, for each panel, a list of its performances (n_frames, "
             f"n_joints, 3); got {type(scenes).__name__}."
         )
-    shape = ("n_frames", "n_joints" if skeleton is None else len(skeleton.joints), 3)
     return [
-        [as_drawn(x, f"{panel} {k}, performance {i}", shape) for i, x in enumerate(scene)]
+        [
+            as_drawn(x, f"{panel} {k}, performance {i}", _shape_of(x, skeleton))
+            for i, x in enumerate(scene)
+        ]
         for k, scene in enumerate(listed)
     ]
+
+
+def _shape_of(x, skeleton):
+    """What a performance must be like: of points without a skeleton, in the plane or in space."""
+    if skeleton is not None:
+        return "n_frames", len(skeleton.joints), skeleton.n_dims
+    return "n_frames", "n_joints", 2 if np.shape(x)[2:] == (2,) else 3
 
 
 def as_marked(marked, n_panels, skeleton):

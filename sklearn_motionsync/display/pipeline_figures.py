@@ -7,7 +7,6 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
-from ..body.skeleton import Skeleton
 from ..model.action_model import ActionModel
 from ..model.classes import models_of_classes
 from ..model.views import view_of
@@ -56,11 +55,13 @@ class PipelineFigures:
         SkeletonDisplay
         """
         _, model = find_step(estimator, ActionModel)
-        space, _ = _before_synchronizer(estimator)
+        space, views = _before_synchronizer(estimator)
         check_is_fitted(model)
-        bodies = bodies_of(space, model.mean_)
+        skeleton = views[0].skeleton.body()
+        bodies = bodies_of(space, model.mean_, skeleton.n_dims)
         # The floor is the lowest that the mean performance ever reaches.
-        floor = [0, bodies(model.mean_)[..., 1].min(), 0]
+        floor = np.zeros(skeleton.n_dims)
+        floor[1] = bodies(model.mean_)[..., 1].min()
         scenes, titles = [], []
         for frame in as_moments(frames, model.n_frames_):
             samples = model.sample(n_samples, frame=frame, random_state=random_state)
@@ -68,7 +69,7 @@ class PipelineFigures:
             for points in (model.mean_[[frame]], samples[accepted]):
                 scenes.append([x[np.newaxis] - floor for x in bodies(points)])
             titles += [f"frame {frame}\nmean posture", f"frame {frame}\n{sum(accepted)} samples"]
-        return cls(scenes, Skeleton.paper(), titles).plot(ax, **view)
+        return cls(scenes, skeleton, titles).plot(ax, **view)
 
     @classmethod
     def from_departures(
@@ -98,7 +99,7 @@ class PipelineFigures:
             Fitted, from `DirectionCosines` to an `ActionModel`, with an `ASpace` or without; or to
             an `ActionClassifier`, and the model is that of the class the performance is given. The
             cosines may be one part of a union, whose other features decide but are not drawn.
-        X : list of arrays (n_frames_i, 3 * n_joints)
+        X : list of arrays (n_frames_i, n_dims * n_joints)
             Joint positions.
         performance : int, default=0
             Which of them is drawn.
@@ -146,16 +147,17 @@ class PipelineFigures:
             called = f"{called}, most like {str(of_class.label)!r},"
         limit = view.model.n_std if limit is None else as_limit(limit)
         names = list(cosines.get_feature_names_out())
-        strip = strip_of(view.scores[i][:, columns], names, frames, limit)
+        skeleton = cosines.skeleton.body()
+        strip = strip_of(view.scores[i][:, columns], names, frames, limit, skeleton)
         # Each on a floor of its own, as heights of the pelvis are.
         bodies, shadows = (
-            np.asarray(cosines.inverse_transform(x)).reshape(len(x), -1, 3)
+            np.asarray(cosines.inverse_transform(x)).reshape(len(x), -1, skeleton.n_dims)
             for x in (view.whole[i][:, columns], view.model.mean_[:, columns])
         )
         verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
         display = cls(
             [[bodies[[frame]]] for frame in strip.frames],
-            Skeleton.paper(),
+            skeleton,
             strip.titles,
             marked=strip.marked,
             behind=[[shadows[[frame]]] for frame in strip.frames],
@@ -175,7 +177,7 @@ class PipelineFigures:
         ----------
         estimator : Pipeline
             Fitted, from `DirectionCosines`, `JointPositions` or both to a synchronizer or further.
-        X : list of arrays (n_frames_i, 3 * n_joints)
+        X : list of arrays (n_frames_i, n_dims * n_joints)
             Joint positions.
         performances : list of int, default=None
             Which of them to draw; by default the pattern, if it is one of them, and others up to

@@ -2,10 +2,18 @@
 
 import numpy as np
 
-from ..body.skeleton import Skeleton
 from ..synchronizers.match import as_match
 from .animation import playable
-from .bodies import bodies_of_postures, bones_by_side, limits, on_screen, placed, upright
+from .bodies import (
+    bodies_of_postures,
+    bones_by_side,
+    limits,
+    on_screen,
+    place_of,
+    placed,
+    upright,
+    with_landmarks,
+)
 from .drawing import COLORS, panels, stage, sticks
 from .given import (
     as_behind,
@@ -42,9 +50,13 @@ class SkeletonDisplay(PipelineFigures):
     to face the same way at first. Their lowest joint ever is on the floor; the pictures of a strip,
     and those of people who walk away, go with the pelvis.
 
+    A skeleton may lack landmarks. Where a landmark is the mean of joints, limbs are drawn between
+    the landmarks; a skeleton that joins nothing is drawn as its joints, too. Key-points of a picture
+    are drawn as the camera saw them, from where it stood: ``azimuth`` has no meaning for them.
+
     Parameters
     ----------
-    scenes : list of list of ndarray (n_frames_i, n_joints, 3)
+    scenes : list of list of ndarray (n_frames_i, n_joints, n_dims)
         For each panel its performances: joint positions in axes of which the second is vertical.
     skeleton : Skeleton or None
         Joints and bones; None draws all joints as points, without bones.
@@ -59,7 +71,7 @@ class SkeletonDisplay(PipelineFigures):
     marked : list of list of (int, int), default=None
         For each panel the bones to be seen at once, such as those of limbs that depart from the
         action: pairs of ``skeleton.bones``. They are violet, all others grey.
-    behind : list of list of ndarray (n_frames_i, n_joints, 3), default=None
+    behind : list of list of ndarray (n_frames_i, n_joints, n_dims), default=None
         For each panel performances that stand behind as pale shadows, such as the mean.
     heading : str, default=None
         What stands above all panels, if the figure is the display's own.
@@ -72,7 +84,7 @@ class SkeletonDisplay(PipelineFigures):
         For each panel the LineCollections of the ``"left"``, ``"middle"`` and ``"right"`` bones,
         and of the ``"departing"`` ones if bones are marked.
     heads_ : list of Line2D
-        Without a skeleton, all joints.
+        Without a skeleton, or without bones, all joints.
     behind_ : list of LineCollection
         One a panel, if something stands behind.
     heading_ : Text or None
@@ -118,10 +130,11 @@ class SkeletonDisplay(PipelineFigures):
 
         Parameters
         ----------
-        X : array-like, shape (n_frames, 3 * n_joints), or (n_sequences, n_frames, 3 * n_joints)
+        X : array-like, shape (n_frames, n_dims * n_joints), or (n_sequences, n_frames, ...)
             Joint positions.
         skeleton : Skeleton or None
-            None draws the joints as points without bones, turned as they are, y up.
+            None draws the joints as points without bones, turned as they are, y up. They have
+            three axes, or two if columns are called so (``_x``, ``_y``) or are no triples.
         frames : int or list of int, default=6
             How many, evenly spaced from the first to the last, or which ones.
         ax : Axes or array-like of Axes, default=None
@@ -148,7 +161,7 @@ class SkeletonDisplay(PipelineFigures):
 
         Parameters
         ----------
-        X : array-like, shape (n_frames, 37), or (n_sequences, n_frames, 37)
+        X : array-like, shape (n_frames, n_features), or (n_sequences, n_frames, n_features)
             Postures.
         cosines : DirectionCosines
             Fitted; knows how long the limbs are.
@@ -159,7 +172,7 @@ class SkeletonDisplay(PipelineFigures):
         SkeletonDisplay
         """
         positions = bodies_of_postures(as_performances(X), cosines)
-        return cls.from_positions(positions, Skeleton.paper(), frames=frames, ax=ax, **view)
+        return cls.from_positions(positions, cosines.skeleton.body(), frames=frames, ax=ax, **view)
 
     @classmethod
     def from_predictions(cls, X, times, skeleton, *, names=None, ax=None, **view):
@@ -167,7 +180,7 @@ class SkeletonDisplay(PipelineFigures):
 
         Parameters
         ----------
-        X : list of arrays (n_frames_i, 3 * n_joints)
+        X : list of arrays (n_frames_i, n_dims * n_joints)
             Joint positions.
         times : array-like, shape (n_sequences, P)
             tau(p) from 0 to P - 1, such as ``synchronizer.match(points).times``.
@@ -188,7 +201,7 @@ class SkeletonDisplay(PipelineFigures):
         labels = as_names(labels, len(X), "names", "performances")
         flat = [x.reshape(len(x), -1) for x in raw]
         warped = match.warp(flat)
-        warped = warped.reshape(*warped.shape[:2], -1, 3)
+        warped = warped.reshape(*warped.shape[:2], *raw[0].shape[1:])
         lengths = [len(x) - 1 for x in raw]
         return cls(
             [raw, list(warped)],
@@ -220,7 +233,10 @@ class SkeletonDisplay(PipelineFigures):
         n_panels = len(self.scenes)
         behind = [[] for _ in range(n_panels)] if self.behind is None else self.behind
         drawn, behind = (
-            [[on_screen(x, azimuth) for x in scene] for scene in scenes]
+            [
+                [on_screen(with_landmarks(x, self.skeleton), azimuth) for x in scene]
+                for scene in scenes
+            ]
             for scenes in (self.scenes, behind)
         )
         places = None
@@ -312,7 +328,8 @@ class SkeletonDisplay(PipelineFigures):
         self.bones_.append(drawn)
         if self.behind is not None:
             self.behind_.append(sticks(axis, COLORS["shadow"], 3 * width, zorder=1))
-        size = 3 * width if self.skeleton is not None else 1.5 * width
+        joined = self.skeleton is not None and self.skeleton.bones
+        size = 3 * width if joined else 1.5 * width
         style = {"color": colors["middle"], "alpha": alpha, "markersize": size}
         self.heads_ += axis.plot([], [], "o", **style)
         stage(axis, title, low, high)
@@ -323,7 +340,6 @@ class SkeletonDisplay(PipelineFigures):
         if durations is None:
             durations = [[len(x) - 1 for x in scene] for scene in self._drawn]
         longest = max(max(of_scene, default=0) for of_scene in durations)
-        heads = slice(None) if self.skeleton is None else [self.skeleton.index_of("head")]
         artists = []
         for i, (scene, taking) in enumerate(zip(self._drawn, durations, strict=True)):
             shares = [min(1.0, at * longest / d) if d > 0 else 0.0 for d in taking]
@@ -333,14 +349,24 @@ class SkeletonDisplay(PipelineFigures):
             for side, lines in self.bones_[i].items():
                 lines.set_segments(_segments(bodies, self._bones[i][side]))
                 artists.append(lines)
-            dots = [body[heads] for body in bodies]
+            dots = [self._dots_of(body) for body in bodies]
             self.heads_[i].set_data(np.concatenate(dots).T if dots else ([], []))
             artists.append(self.heads_[i])
         for lines, scene in zip(self.behind_, self._behind, strict=bool(self.behind_)):
             bodies = [x[round(at * (len(x) - 1))] for x in scene]
-            lines.set_segments(_segments(bodies, self.skeleton.bones))
+            everywhere = [b for bones in bones_by_side(self.skeleton).values() for b in bones]
+            lines.set_segments(_segments(bodies, everywhere))
             artists.append(lines)
         return artists
+
+    def _dots_of(self, body):
+        """Where dots are: at the head, or at all joints if nothing joins them."""
+        skeleton = self.skeleton
+        if skeleton is None or not skeleton.bones:
+            return body if skeleton is None else body[: len(skeleton.joints)]
+        if "head" not in skeleton.landmarks:
+            return body[:0]
+        return place_of(body[np.newaxis], skeleton, "head")
 
 
 def _segments(bodies, bones):

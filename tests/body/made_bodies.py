@@ -1,6 +1,7 @@
 """Bodies made by hand, and bodies that are elsewhere."""
 
 import numpy as np
+import pandas as pd
 from sklearn_motionsync import Skeleton
 
 
@@ -38,3 +39,8 @@ def standing(**moves):
 
 def turned_over(positions, axes=(1, -1, -1)):
     return (positions.reshape(-1, 3) * axes).reshape(positions.shape)
+
+
+def columns_of(x, skeleton=None):
+    """A table of positions."""
+    return pd.DataFrame(x, columns=(skeleton or Skeleton.paper()).column_names)

@@ -55,8 +55,7 @@ def test_skeleton_of_some_columns():
 def test_skeleton_with_some_landmarks():
     known = Skeleton.paper()
     df = positions_of(known).rename(columns=lambda c: c.replace("pelvis", "bottom"))
-    with pytest.raises(ValueError, match=r"landmarks \['pelvis'\]; give landmarks="):
-        Skeleton.from_frame(df)
+    assert Skeleton.from_frame(df).landmarks["pelvis"] == ("left_hip", "right_hip")
     skeleton = Skeleton.from_frame(df, landmarks={"pelvis": "bottom", "left_hip": "right_hip"})
     assert skeleton.landmarks == known.landmarks | {"pelvis": "bottom", "left_hip": "right_hip"}
     with pytest.raises(ValueError, match=r"landmarks must be among .* got \['nose'\]"):
@@ -105,8 +104,21 @@ def with_parents(**parents):
         ((["a", "b"], [-1]), "one parent each"),
         ((["a", "b"], [-1, 5]), "parents must be"),
         ((["a", "b"], [-1, 0]), "No joint stands for the landmarks"),
-        ((PAPER.joints, PAPER.parents, None, "x"), "up must be"),
-        ((PAPER.joints, PAPER.parents, None, ["y"]), "up must be"),
+        *(
+            ((PAPER.joints, PAPER.parents, None, up), "up must be .* or '-x', got")
+            for up in ("w", "+y", "-", "", ["y"], None)
+        ),
+        ((PAPER.joints, PAPER.parents, None, "z", 2), "up must be 'y', '-y', 'x' or '-x', got 'z'"),
+        *(
+            ((PAPER.joints, PAPER.parents, None, "y", n_dims), "n_dims must be 3, or 2 for")
+            for n_dims in (1, 4, True, "3", None, [3], 2.5)
+        ),
+        *(
+            ((PAPER.joints, PAPER.parents, {"pelvis": at}), "landmark 'pelvis' must be a joint's")
+            for at in (3, ("neck", "neck"), (), ["neck", 1], {"neck"})
+        ),
+        ((PAPER.joints, PAPER.parents, {"pelvis": ("neck", "tail")}), r"landmarks \['pelvis'\] \("),
+        ((PAPER.joints, PAPER.parents, {"pelvis": "pelvis"}), "both ends of one limb"),
         ((PAPER.joints, PAPER.parents, {"pelvis": "tail"}), "'neck'"),
         ((PAPER.joints, PAPER.parents, ["pelvis"]), "landmarks must be a mapping"),
         ((PAPER.joints, PAPER.parents, UNKNOWN), r"landmarks must be among .* got \['nose'\]"),
@@ -148,8 +160,8 @@ def test_what_has_no_joints_in_its_columns():
         Skeleton.from_frame(pd.concat([df, df[["neck_x", "neck_y", "neck_z"]]], axis=1))
     with pytest.raises(ValueError, match="landmarks must be a mapping"):
         Skeleton.from_frame(df, landmarks="pelvis")
-    for up in ("x", "", np.array(["y", "z"])):
-        with pytest.raises(ValueError, match="up must be 'y' or 'z'"):
+    for up in ("w", "", np.array(["y", "z"])):
+        with pytest.raises(ValueError, match="up must be 'y', 'z', 'x'"):
             Skeleton.from_frame(df, up=up)
 
 

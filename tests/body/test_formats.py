@@ -1,0 +1,143 @@
+"""Skeletons known by heart: their joints, how they are recognised, and that they show a body."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_bodies import columns_of
+from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
+from sklearn_motionsync.datasets import make_bending
+
+PAPER = Skeleton.paper()
+# How many joints, some of them by their place, what is up in space, and landmarks that tell.
+FORMATS = {
+    "paper": (15, {0: "pelvis"}, "y", {}),
+    "acclaim": (31, {0: "root"}, "y", {"left_knee": "lfemur"}),
+    "kinect": (20, {3: "Head", 19: "FootRight"}, "y", {"neck": "ShoulderCenter"}),
+    "kinect_v2": (
+        25,
+        {0: "SpineBase", 4: "ShoulderLeft", 16: "HipRight", 20: "SpineShoulder", 24: "ThumbRight"},
+        "y",
+        {"pelvis": "SpineBase", "neck": "SpineShoulder", "right_ankle": "AnkleRight"},
+    ),
+    "openpose": (
+        25,
+        {0: "Nose", 4: "RWrist", 8: "MidHip", 14: "LAnkle", 18: "LEar", 19: "LBigToe", 24: "RHeel"},
+        "y",
+        {"pelvis": "MidHip", "neck": "Neck", "head": "Nose", "left_hip": "LHip"},
+    ),
+    "coco": (
+        17,
+        {0: "nose", 5: "left_shoulder", 16: "right_ankle"},
+        "y",
+        {"pelvis": ("left_hip", "right_hip"), "neck": ("left_shoulder", "right_shoulder")},
+    ),
+    "mediapipe": (
+        33,
+        {0: "nose", 8: "right_ear", 11: "left_shoulder", 23: "left_hip", 32: "right_foot_index"},
+        "-y",
+        {"pelvis": ("left_hip", "right_hip"), "head": "nose", "left_wrist": "left_wrist"},
+    ),
+    "opencap": (20, {0: "Neck", 7: "midHip"}, "y", {"pelvis": "midHip", "right_knee": "RKnee"}),
+    "plug_in_gait": (15, {0: "PELO", 1: "LHJC"}, "z", {"left_elbow": "LEJC", "neck": "TRXO"}),
+    "optitrack": (21, {0: "Hip", 6: "LUArm"}, "y", {"left_elbow": "LFArm", "left_knee": "LShin"}),
+    "unreal": (22, {0: "pelvis"}, "z", {"neck": "neck_01", "right_elbow": "lowerarm_r"}),
+}  # fmt: skip
+
+
+def ready(name, **settings):
+    return getattr(Skeleton, name)(**settings)
+
+
+def embedded(name, n_dims=3):
+    """A made person as a format shows it: what is no landmark lies at the neck."""
+    (x,) = make_bending(1, random_state=1).data
+    skeleton = ready(name, n_dims=n_dims, up="y")
+    points = dict(zip(PAPER.joints, np.moveaxis(x.reshape(-1, 15, 3), 1, 0), strict=True))
+    at = {j: points[n] for n, j in skeleton.landmarks.items() if isinstance(j, str)}
+    joints = [at.get(j, points["neck"])[:, :n_dims] for j in skeleton.joints]
+    return columns_of(np.concatenate(joints, axis=1), skeleton)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_joints_and_landmarks(name):
+    count, places, up, landmarks = FORMATS[name]
+    skeleton = ready(name)
+    assert (len(skeleton.joints), skeleton.up, skeleton.n_dims) == (count, up, 3)
+    assert {j: skeleton.joints[j] for j in places} == places
+    assert skeleton.landmarks == {**skeleton.landmarks, **landmarks}
+    assert len(skeleton.limbs) == (11 if name == "opencap" else 12)
+    assert skeleton.parents.count(-1) <= 3
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_what_they_are_called(name):
+    for settings, called in (({}, ""), ({"n_dims": 2}, "n_dims=2")):
+        skeleton = ready(name, **settings)
+        assert repr(skeleton) == f"Skeleton.{name}({called})"
+        assert eval(repr(skeleton), {"Skeleton": Skeleton}) == skeleton
+    other = ready(name, up="-x")
+    assert other.up == "-x"
+    assert repr(other).startswith("Skeleton(<")
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_pictures_have_y_downwards(name):
+    skeleton = ready(name, n_dims=2)
+    assert skeleton.up == ("y" if name in ("paper", "acclaim") else "-y")
+    assert skeleton.column_names[:2] == [f"{skeleton.joints[0]}_x", f"{skeleton.joints[0]}_y"]
+    assert len(skeleton.column_names) == 2 * len(skeleton.joints)
+
+
+@pytest.mark.parametrize("n_dims", [3, 2])
+@pytest.mark.parametrize("spelling", [str, str.lower, str.upper, "subject 1:{}".format])
+@pytest.mark.parametrize("name", FORMATS)
+def test_they_are_told_from_their_names(name, spelling, n_dims):
+    """However they are written, and with joints besides."""
+    known = ready(name, n_dims=n_dims)
+    df = embedded(name, n_dims)
+    names = [spelling(joint) for joint in known.joints]
+    as_written = dict(zip(known.joints, names, strict=True))
+    axes = "xyz"[:n_dims]
+    df.columns = [f"{joint}_{axis}" for joint in names for axis in axes]
+    df[[f"{spelling('Extra')}_{axis}" for axis in axes]] = 0.0
+    expected = {
+        landmark: as_written[at] if isinstance(at, str) else tuple(as_written[j] for j in at)
+        for landmark, at in known.landmarks.items()
+    }
+    skeleton = Skeleton.from_frame(df)
+    assert skeleton.landmarks == expected
+    assert (skeleton.up, skeleton.n_dims) == ("y", n_dims)
+    assert Skeleton.from_names(skeleton.joints, skeleton.parents).landmarks == expected
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_body_is_the_same_in_any_format(name):
+    (x,) = make_bending(1, random_state=1).data
+    for kind in (DirectionCosines, JointPositions):
+        some = kind(ready(name, up="y")).set_output(transform="pandas")
+        expected = kind(PAPER).set_output(transform="pandas").fit_transform(x)
+        found = some.fit_transform(embedded(name))
+        # The made people have their pelvis and neck in the middle, but for noise.
+        atol = 0.06 if name in ("coco", "mediapipe") else 1e-12
+        np.testing.assert_allclose(found, expected[found.columns], atol=atol)
+
+
+@pytest.mark.parametrize(
+    ("joints", "landmarks"),
+    [
+        # Joint centres alone, as of a lower body.
+        ("LHJC RHJC LKJC RKJC LAJC RAJC", {"pelvis": ("LHJC", "RHJC"), "left_knee": "LKJC"}),
+        ("PELO LFEP RFEP LFEO RFEO LTIO RTIO", {"left_hip": "LFEP", "left_ankle": "LTIO"}),
+        ("Hip LThigh RThigh LShin RShin LFoot RFoot", {"pelvis": "Hip", "right_hip": "RThigh"}),
+        # A key-point format with a neck and a head of its own.
+        ("left_shoulder right_shoulder left_elbow right_elbow nose head neck",
+         {"neck": "neck", "head": "head"}),
+        ("LShoulder RShoulder LElbow RElbow LEar REar", {"head": ("LEar", "REar")}),
+        ("LShoulder RShoulder LElbow RElbow HeadTop", {"head": "HeadTop"}),
+    ],
+)  # fmt: skip
+def test_names_that_are_no_format(joints, landmarks):
+    joints = joints.split()
+    df = pd.DataFrame(0.0, index=[0], columns=[f"{j}_{a}" for j in joints for a in "xyz"])
+    found = Skeleton.from_frame(df).landmarks
+    assert found == {**found, **landmarks}

@@ -1,0 +1,216 @@
+"""The mirror: left and right exchanged, of every kind of input, by landmarks and by names."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_bodies import columns_of
+from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton, mirror, to_frame
+from sklearn_motionsync.datasets import load_performances, make_bending
+
+PAPER = Skeleton.paper()
+BUNCH = make_bending(3, random_state=1)
+FORMATS = ["paper", "acclaim", "kinect", "kinect_v2", "openpose", "coco", "mediapipe", "opencap",
+           "plug_in_gait", "optitrack", "unreal"]  # fmt: skip
+
+
+def other_side(name):
+    side, _, part = name.partition("_")
+    return {"left": f"right_{part}", "right": f"left_{part}"}.get(side, name)
+
+
+def test_joints_take_each_others_place_and_the_lateral_axis_is_turned_around():
+    (x,) = mirror(BUNCH.data[:1], PAPER)
+    given, found = (y.reshape(len(y), 15, 3) for y in (BUNCH.data[0], x))
+    for j, name in enumerate(PAPER.joints):
+        expected = given[:, PAPER.joints.index(other_side(name))] * [-1, 1, 1]
+        np.testing.assert_array_equal(found[:, j], expected)
+
+
+@pytest.mark.parametrize("reference", ["heading", "parent", "world"])
+def test_cosines_are_those_of_the_mirrored_limbs(reference):
+    for landmarks in (PAPER.joints, [j for j in PAPER.joints if j.endswith(("hip", "knee"))]):
+        skeleton = Skeleton(PAPER.joints, PAPER.parents, {j: j for j in landmarks})
+        cosines = DirectionCosines(skeleton, reference).set_output(transform="pandas")
+        plain, mirrored = cosines.fit_transform(BUNCH.data), cosines.fit_transform(
+            mirror(BUNCH.data, skeleton)
+        )  # fmt: skip
+        for name in plain:
+            limb, axis = name[:-2], name[-1]
+            # Hips and shoulders go from right to left: so does what is seen in the mirror.
+            flips = axis == "x" if limb not in ("hip", "shoulder") else axis in "yz"
+            if name == "pelvis_height":
+                flips = False
+            np.testing.assert_allclose(
+                mirrored[name], (-1 if flips else 1) * plain[other_side(name)], atol=1e-9
+            )
+
+
+def test_places_are_those_of_the_mirrored_joints():
+    positions = JointPositions(PAPER).set_output(transform="pandas")
+    plain, mirrored = positions.fit_transform(BUNCH.data), positions.transform(
+        mirror(BUNCH.data, PAPER)
+    )  # fmt: skip
+    for name in plain:
+        sign = -1 if name.endswith("_x") else 1
+        np.testing.assert_allclose(mirrored[name], sign * plain[other_side(name)], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
+def test_real_people(real_data, name):
+    """Twice they are themselves, and their limbs are as long as those of the other side."""
+    bunch = load_performances(real_data / f"{name}_positions.npz")
+    X = bunch.data[::11]
+    mirrored = mirror(X, bunch.skeleton)
+    for x, again in zip(X, mirror(mirrored, bunch.skeleton), strict=True):
+        assert again.dtype == x.dtype
+        np.testing.assert_array_equal(again, x)
+    plain, other = (DirectionCosines(bunch.skeleton).fit(y) for y in (X, mirrored))
+    lengths = dict(zip(bunch.skeleton.limbs, plain.limb_lengths_, strict=True))
+    expected = [lengths[other_side(limb)] for limb in bunch.skeleton.limbs]
+    np.testing.assert_allclose(other.limb_lengths_, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_partners_of_all_formats(name):
+    skeleton = getattr(Skeleton, name)()
+    joints = list(skeleton.joints)
+    x = np.random.default_rng(0).normal(size=(4, 3 * len(joints)))
+    x.reshape(4, -1, 3)[..., 0] *= [_side_of(j) != "" for j in joints]
+    found = mirror(x, skeleton).reshape(4, -1, 3) * [-1, 1, 1]
+    for j, joint in enumerate(joints):
+        same = [k for k in range(len(joints))
+                if np.array_equal(found[:, j], x.reshape(4, -1, 3)[:, k])]  # fmt: skip
+        assert len(same) == 1
+        assert _without_side(joints[same[0]]) == _without_side(joint)
+        assert (same[0] == j) is (_side_of(joint) == "")
+
+
+def _split(joint):
+    """A name without its side, and its side, as formats write them."""
+    for word, side in (("left", "l"), ("right", "r")):
+        if word in joint.lower():
+            return joint.lower().replace(word, ""), side
+    if joint.endswith(("_l", "_r")):
+        return joint[:-2], joint[-1]
+    initial, rest = joint[0].lower(), joint[1:]
+    middle = ("root", "lowerback", "lowerneck")
+    if initial in "lr" and joint not in middle:
+        return rest, initial
+    return joint, ""
+
+
+def _without_side(joint):
+    return _split(joint)[0]
+
+
+def _side_of(joint):
+    return _split(joint)[1]
+
+
+# -- kinds of input -----------------------------------------------------------------------------
+
+
+def test_every_kind_is_kept():
+    X = BUNCH.data
+    expected = mirror(X, PAPER)
+    names = PAPER.column_names
+    for x, right in zip(X, expected, strict=True):
+        np.testing.assert_array_equal(mirror(x, PAPER), right)
+        np.testing.assert_array_equal(mirror(x.tolist(), PAPER), right)
+        assert mirror(x.astype("f4"), PAPER).dtype == np.float32
+    stack = np.stack([x[:40] for x in X])
+    np.testing.assert_array_equal(mirror(stack, PAPER), [x[:40] for x in expected])
+    table = to_frame(X, performances=["a", "b", "c"], columns=names)
+    table.attrs["up"] = "y"
+    found = mirror(table, PAPER)
+    pd.testing.assert_frame_equal(
+        found, to_frame(expected, performances=["a", "b", "c"], columns=names)
+    )
+    assert found.attrs == {"up": "y"}
+    frames = [columns_of(x).rename_axis("time") for x in X]
+    for df, right in zip(mirror(frames, PAPER), expected, strict=True):
+        assert (list(df.columns), df.index.name) == (names, "time")
+        np.testing.assert_array_equal(df, right)
+    kept = X[0].copy()
+    mirror(X, PAPER)
+    np.testing.assert_array_equal(X[0], kept)
+    gap = X[0].copy()
+    gap[4, 6:9] = np.nan
+    assert np.isnan(mirror(gap, PAPER)).sum() == 3
+
+
+@pytest.mark.parametrize(("up", "axis"), [("y", 0), ("z", 0), ("-y", 0), ("-z", 0), ("x", 1)])
+def test_the_axis_is_horizontal(up, axis):
+    skeleton = Skeleton(PAPER.joints, PAPER.parents, up=up)
+    x = BUNCH.data[0]
+    changed = mirror(x, skeleton).reshape(-1, 15, 3)[:, 0] != x.reshape(-1, 15, 3)[:, 0]
+    assert changed.any(axis=0).tolist() == [k == axis for k in range(3)]
+
+
+def test_pictures():
+    skeleton = Skeleton.coco(n_dims=2)
+    x = np.random.default_rng(0).normal(size=(5, 34))
+    found = mirror(x, skeleton).reshape(5, 17, 2)
+    left, right = (skeleton.index_of(f"{side}_ankle") for side in ("left", "right"))
+    np.testing.assert_array_equal(found[:, left], x.reshape(5, 17, 2)[:, right] * [-1, 1])
+    np.testing.assert_array_equal(found[:, 0], x.reshape(5, 17, 2)[:, 0] * [-1, 1])
+
+
+# -- markers ------------------------------------------------------------------------------------
+
+
+def with_markers(names, middle=()):
+    """A made person with markers beside the hips or in the middle; parents unknown."""
+    df = columns_of(BUNCH.data[0])
+    for name in names:
+        at = "pelvis" if name in middle else "left_wrist"
+        for axis in "xyz":
+            df[f"{name}_{axis}"] = df[f"{at}_{axis}"]
+    return df
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [("LASI", "RASI"), ("l.ASIS_study", "R.ASIS_study"), ("Sub:L_toe", "Sub:R_toe"),
+     ("ToeL", "ToeR"), ("mouthLeft", "mouthRight"), ("S:LTOE", "S:RTOE")],
+)  # fmt: skip
+def test_partners_by_name(one, other):
+    df = with_markers([one, other])
+    df[[f"{other}_{a}" for a in "xyz"]] += 1
+    found = mirror(df, Skeleton.from_frame(df))
+    np.testing.assert_array_equal(found[f"{one}_y"], df[f"{other}_y"])
+
+
+def test_means_are_paired_in_their_order():
+    df = with_markers(["m1", "m2", "m3", "m4"])
+    df[[f"m{i}_{a}" for i in (3, 4) for a in "xyz"]] += 1
+    given = {"left_ankle": ("m1", "m2"), "right_ankle": ("m3", "m4")}
+    found = mirror(df, Skeleton.from_frame(df, landmarks=given))
+    np.testing.assert_array_equal(found["m2_y"], df["m4_y"])
+
+
+def test_who_has_no_partner():
+    df = with_markers(["RBAK", "C7"], middle=["C7"])
+    message = "'RBAK' is on one side in every frame, and none takes its place"
+    with pytest.raises(ValueError, match=message):
+        mirror(df, Skeleton.from_frame(df))
+    df = with_markers(["C7"], middle=["C7"])
+    np.testing.assert_array_equal(mirror(df, Skeleton.from_frame(df))["C7_x"], -df["C7_x"])
+    df = with_markers(["left_toe"])
+    with pytest.raises(ValueError, match=r"'left_toe' is on one side, .* Leave its columns out"):
+        mirror(df, Skeleton.from_frame(df))
+    leg = ["left_hip", "left_knee", "left_ankle"]
+    with pytest.raises(ValueError, match="'left_hip' is on one side, and none"):
+        mirror(np.zeros((2, 9)), Skeleton(leg, [-1, 0, 1], {j: j for j in leg}))
+
+
+def test_what_cannot_be_mirrored():
+    with pytest.raises(ValueError, match=r"15 joints are \(n_frames, 45\)"):
+        mirror(np.zeros((4, 30)), PAPER)
+    table = columns_of(BUNCH.data[0])
+    with pytest.raises(ValueError, match="Performance 1: column 0 is 'neck_x'"):
+        mirror([table, table[[*table.columns[3:], *table.columns[:3]]]], PAPER)
+    with pytest.raises(ValueError, match="needs the Skeleton of the positions"):
+        mirror(BUNCH.data, None)
+    with pytest.raises(ValueError, match="Found 0 performances"):
+        mirror([], PAPER)

@@ -1,0 +1,308 @@
+"""Bodies that lack landmarks, and landmarks that are means: what is there is as of the whole."""
+
+import copy
+import pickle
+
+import joblib
+import numpy as np
+import pandas as pd
+import pytest
+from made_bodies import columns_of, moved, standing, turned
+from sklearn import clone
+from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
+from sklearn_motionsync.datasets import load_performances, make_bending, read_motion
+
+PAPER = Skeleton.paper()
+LEGS = ["pelvis", *(f"{s}_{j}" for s in ("left", "right") for j in ("hip", "knee", "ankle"))]
+ARMS = ["neck", *(f"{s}_{j}" for s in ("left", "right") for j in ("shoulder", "elbow", "wrist"))]
+LEFT = ["left_hip", "left_knee", "left_ankle"]
+PARTS = {
+    "legs": LEGS,
+    "no head": [j for j in PAPER.joints if j != "head"],
+    "no arms": [*LEGS, "neck", "head"],
+    "no wrists": [j for j in PAPER.joints if "wrist" not in j],
+    "upper body": ["pelvis", *ARMS, "head"],
+    "arms": ARMS,
+    "left half": ["pelvis", "neck", "head", *(j for j in PAPER.joints if j.startswith("left"))],
+    "left leg": LEFT,
+    "forearm and leg": ["left_elbow", "left_wrist", "right_knee", "right_ankle"],
+}
+
+
+def only(joints, of=PAPER):
+    """The skeleton of a whole body that knows these landmarks only."""
+    return Skeleton(of.joints, of.parents, {j: of.landmarks[j] for j in joints}, of.up)
+
+
+@pytest.fixture(params=["made", "hdm05/hdm05", "utkinect/utkinect"], scope="module")
+def people(request):
+    if request.param == "made":
+        bunch = make_bending(3, random_state=0)
+        return bunch.skeleton, bunch.data
+    folder = request.getfixturevalue("real_data")
+    bunch = load_performances(folder / f"{request.param}_positions.npz")
+    return bunch.skeleton, bunch.data[::25]
+
+
+# -- cosines of the limbs that are there ------------------------------------------------------
+
+
+@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("reference", ["heading", "parent", "world"])
+def test_cosines_are_those_of_the_whole_body_to_the_last_bit(people, part, reference):
+    skeleton, X = people
+    whole = DirectionCosines(skeleton, reference).fit(X)
+    some = DirectionCosines(only(PARTS[part], skeleton), reference).fit(X)
+    names, all_names = (list(e.get_feature_names_out()) for e in (some, whole))
+    assert set(names) < set(all_names)
+    assert ("pelvis_height" in names) is ({"pelvis", *LEFT} <= set(PARTS[part]))
+    limbs = some.skeleton.limbs
+    assert names[-3 * len(limbs) :] == [f"{limb}_{axis}" for limb in limbs for axis in "xyz"]
+    lengths = dict(zip(whole.skeleton.limbs, whole.limb_lengths_, strict=True))
+    np.testing.assert_array_equal(some.limb_lengths_, [lengths[limb] for limb in limbs])
+    if reference == "world":
+        same = names
+    else:
+        # Who lacks hips turns with the shoulders, and whose parent is not there with another.
+        same = [n for n in names if n == "pelvis_height"] if "hip" not in limbs else names
+    if reference == "parent" and "hip" in limbs:
+        same = [n for n in names if "shoulder" not in n or "torso" in limbs]
+    if part == "left half":
+        same = [n for n in same if n != "pelvis_height"]  # of one leg, not the mean of both
+    columns, own = ([list(of).index(n) for n in same] for of in (all_names, names))
+    for a, b in zip(whole.transform(X), some.transform(X), strict=True):
+        np.testing.assert_array_equal(b[:, own], a[:, columns])
+
+
+def test_a_part_without_hips_turns_with_the_shoulders():
+    faces_x = turned(standing(left_wrist=(0.2, 1.2, 0.3)), 90)
+    features = DirectionCosines(only(ARMS)).fit_transform(faces_x)[0]
+    at = dict(zip(DirectionCosines(only(ARMS)).get_feature_names_out(), features, strict=True))
+    np.testing.assert_allclose([at[f"shoulder_{a}"] for a in "xyz"], [1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose([at[f"left_forearm_{a}"] for a in "xyz"], [0, 0, 1], atol=1e-12)
+    leg = DirectionCosines(only(LEFT)).fit_transform(turned(standing(), 90))
+    np.testing.assert_allclose(leg, [[0, -1, 0, 0, -1, 0]], atol=1e-12)
+
+
+@pytest.mark.parametrize("part", ["legs", "no head", "no arms", "no wrists", "upper body", "arms"])
+@pytest.mark.parametrize("kind", [DirectionCosines, JointPositions])
+def test_moving_growing_and_turning_change_nothing(kind, part):
+    (x,) = make_bending(1, random_state=1).data
+    estimator = kind(only(PARTS[part]))
+    expected = estimator.fit_transform([x])[0]
+    for changed in (moved(x, [3.0, -7.0, 2.0]), 1.3 * x, turned(x, 77)):
+        np.testing.assert_allclose(estimator.fit_transform([changed])[0], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("reference", ["heading", "parent", "world"])
+def test_postures_of_the_built_body_are_the_same(people, part, reference):
+    skeleton, X = people
+    some = DirectionCosines(only(PARTS[part], skeleton), reference).set_output(transform="pandas")
+    postures = some.fit_transform(X)
+    back = some.inverse_transform(postures)
+    body = some.skeleton.body()
+    assert list(back.columns) == body.column_names
+    assert set(body.joints) == set(body.landmarks) <= set(PARTS[part])
+    assert body.limbs == some.skeleton.limbs
+    again = DirectionCosines(body, reference).set_output(transform="pandas").fit_transform(back)
+    assert list(again.columns) == list(postures.columns)
+    # Of people whose limbs change their length, heights come back as near as hips may move.
+    cosines = [c for c in postures if c != "pelvis_height"]
+    np.testing.assert_allclose(again[cosines], postures[cosines], atol=1e-5)
+    if "pelvis_height" in postures and part != "left half" and "HipLeft" not in skeleton.joints:
+        np.testing.assert_allclose(again["pelvis_height"], postures["pelvis_height"], atol=1e-5)
+
+
+def test_the_body_of_a_whole_skeleton_is_the_papers():
+    for skeleton in (PAPER, Skeleton.acclaim(), Skeleton.kinect(), Skeleton.mediapipe()):
+        assert skeleton.body() == PAPER
+    assert Skeleton.coco(n_dims=2).body() == Skeleton.paper(n_dims=2)
+    legs = only(LEGS).body()
+    assert legs.joints == tuple(j for j in PAPER.joints if j in LEGS)
+    parent = {j: legs.joints[p] for j, p in zip(legs.joints, legs.parents, strict=True) if p >= 0}
+    assert parent["left_hip"] == "pelvis"
+    assert parent["left_knee"] == "left_hip"
+    assert repr(legs) == "Skeleton(<7 joints, 7 of 15 landmarks>, up='y')"
+
+
+def test_limb_lengths_of_some_limbs():
+    (x,) = make_bending(1, random_state=1).data
+    cosines = DirectionCosines(only(LEFT)).fit(x)
+    back = cosines.inverse_transform(cosines.transform(x), [2.0, 3.0])
+    np.testing.assert_allclose(DirectionCosines(only(LEFT).body()).fit(back).limb_lengths_, [2, 3])
+    with pytest.raises(
+        ValueError, match=r"each of \['left_thigh', 'left_leg'\], got shape \(12,\)"
+    ):
+        cosines.inverse_transform(cosines.transform(x), np.ones(12))
+
+
+# -- places of the landmarks that are there ---------------------------------------------------
+
+
+@pytest.mark.parametrize("part", ["legs", "no head", "no arms", "no wrists", "left half"])
+def test_places_are_those_of_the_whole_body(people, part):
+    skeleton, X = people
+    whole = JointPositions(skeleton, "world").fit(X)
+    some = JointPositions(only(PARTS[part], skeleton), "world").fit(X)
+    assert [n[:-2] for n in some.get_feature_names_out()[::3]] == [
+        j for j in PAPER.joints if j in PARTS[part] and j != "pelvis"
+    ]
+    columns = [list(whole.get_feature_names_out()).index(n) for n in some.get_feature_names_out()]
+    for a, b in zip(whole.transform(X), some.transform(X), strict=True):
+        if part == "left half":  # whose unit is one leg
+            a, b = (y / np.linalg.norm(y) for y in (a[:, columns], b))
+            np.testing.assert_allclose(b, a, atol=1e-6)
+        else:
+            np.testing.assert_array_equal(b, a[:, columns])
+
+
+def test_places_without_a_pelvis_or_a_leg():
+    x = np.vstack([standing()] * 2)
+    hips = JointPositions(only(LEGS[1:]))
+    at = dict(zip(hips.get_feature_names_out(), hips.fit_transform(x)[0], strict=True))
+    assert (at["left_hip_x"], at["left_hip_y"], at["left_ankle_y"]) == (0.1, 0, -1)
+    # From the neck, in lengths of all limbs: 0.4 of shoulders, and 0.6 of each arm.
+    arms = JointPositions(only(ARMS))
+    assert "neck_x" not in arms.get_feature_names_out()
+    at = dict(zip(arms.get_feature_names_out(), arms.fit_transform(x)[0], strict=True))
+    np.testing.assert_allclose([at["left_wrist_x"], at["left_wrist_y"]], [0.125, -0.375])
+    leg = JointPositions(only(LEFT))
+    assert list(leg.get_feature_names_out()[::3]) == ["left_knee_x", "left_ankle_x"]
+    np.testing.assert_allclose(leg.fit_transform(x)[0], [0, -0.5, 0, 0, -1, 0])
+
+
+# -- landmarks that are means -----------------------------------------------------------------
+
+
+def with_markers(x, spread=0.05):
+    """A table in which each knee is two markers, one to each side, and its middle."""
+    df = columns_of(x)
+    for side in ("left", "right"):
+        for name, shift in (("in", -spread), ("out", spread)):
+            for axis in "xyz":
+                df[f"{side}_{name}_{axis}"] = df[f"{side}_knee_{axis}"] + shift * (axis == "z")
+    return df
+
+
+def test_a_mean_of_joints_is_where_the_middle_is():
+    x = make_bending(1, random_state=1).data[0]
+    df = with_markers(x)
+    knees = {f"{side}_knee": (f"{side}_in", f"{side}_out") for side in ("left", "right")}
+    skeleton = Skeleton.from_frame(df, landmarks=knees)
+    assert skeleton.landmarks == {**PAPER.landmarks, **knees}
+    for kind in (DirectionCosines, JointPositions):
+        np.testing.assert_allclose(
+            kind(skeleton).fit_transform(df), kind(PAPER).fit_transform(x), atol=1e-12
+        )
+        far = kind(skeleton).fit_transform(1e300 * df)
+        np.testing.assert_allclose(far, kind(PAPER).fit_transform(x), atol=1e-9)
+    with pytest.raises(ValueError, match=r"'left_knee' is the mean of .* indices_of gives all"):
+        skeleton.index_of("left_knee")
+    assert skeleton.indices_of("left_knee") == (15, 16)
+    with pytest.raises(ValueError, match=r"lacks the landmark 'head'; it has \['left_hip'"):
+        only(LEFT).index_of("head")
+
+
+def test_where_no_joint_is_the_pelvis_the_middle_of_the_hips_is():
+    x = make_bending(1, random_state=1).data[0]
+    df = columns_of(x).drop(columns=[f"{j}_{a}" for j in ("pelvis", "neck") for a in "xyz"])
+    skeleton = Skeleton.from_frame(df)
+    assert skeleton.landmarks["pelvis"] == ("left_hip", "right_hip")
+    assert skeleton.landmarks["neck"] == ("left_shoulder", "right_shoulder")
+    # The made people have their pelvis and neck in the middle.
+    expected = DirectionCosines(PAPER).fit_transform(x)
+    np.testing.assert_allclose(DirectionCosines(skeleton).fit_transform(df), expected, atol=0.05)
+    told = Skeleton.from_frame(df, landmarks={"left_hip": ("left_hip", "left_knee")})
+    assert told.landmarks["pelvis"] == ("left_hip", "left_knee", "right_hip")
+    assert "pelvis" not in Skeleton.from_frame(df, landmarks={"pelvis": None}).landmarks
+
+
+def test_one_joint_in_a_tuple_is_that_joint():
+    assert Skeleton(PAPER.joints, PAPER.parents, {**PAPER.landmarks, "head": ["head"]}) == PAPER
+
+
+@pytest.mark.parametrize(
+    "skeleton", [Skeleton.mediapipe(), Skeleton.coco(n_dims=2), only(LEGS), only(LEFT).body()]
+)
+def test_copies_are_equal(skeleton):
+    copies = [copy.copy(skeleton), copy.deepcopy(skeleton), pickle.loads(pickle.dumps(skeleton))]
+    copies += [clone(DirectionCosines(skeleton)).skeleton]
+    for other in copies:
+        assert other == skeleton
+        assert hash(other) == hash(skeleton)
+        assert joblib.hash(other) == joblib.hash(skeleton)
+        assert repr(other) == repr(skeleton)
+    old = Skeleton.__new__(Skeleton)
+    lists = {k: v if isinstance(v, str) else list(v) for k, v in skeleton.landmarks.items()}
+    old.__setstate__(vars(skeleton) | {"landmarks": lists})
+    assert old == skeleton
+
+
+# -- what is told from names --------------------------------------------------------------------
+
+
+def without(*joints):
+    x = make_bending(1, random_state=1).data[0]
+    return columns_of(x).drop(columns=[f"{j}_{a}" for j in joints for a in "xyz"])
+
+
+def test_a_whole_part_may_lack():
+    for gone in (["head"], ["left_wrist", "right_wrist"], [j for j in PAPER.joints if j in ARMS]):
+        skeleton = Skeleton.from_frame(without(*gone))
+        assert set(skeleton.landmarks) == set(PAPER.joints) - set(gone)
+        assert len(DirectionCosines(skeleton).fit_transform(without(*gone)))
+
+
+def test_one_side_alone_is_rather_a_name_that_was_not_understood():
+    message = r"landmarks \['right_knee'\]; give landmarks=.*several of them for their mean"
+    with pytest.raises(ValueError, match=message):
+        Skeleton.from_frame(without("right_knee"))
+    given = {"left_hip": "left_hip", "left_knee": "left_knee", "left_ankle": "left_ankle"}
+    right = [j for j in PAPER.joints if j.startswith("right")]
+    with pytest.raises(ValueError, match="right_shoulder"):
+        Skeleton.from_frame(without(*right), landmarks=given)
+    others = without(*right, *(j for j in PAPER.joints if j in ARMS))
+    assert Skeleton.from_frame(others, landmarks=given).limbs == ["left_thigh", "left_leg"]
+    # Or it is said that it lacks.
+    skeleton = Skeleton.from_frame(without("right_knee"), landmarks={"right_knee": None})
+    assert "right_thigh" not in skeleton.limbs
+    assert "left_thigh" in skeleton.limbs
+
+
+def test_names_that_tell_no_limb_are_refused_with_what_to_give():
+    df = pd.DataFrame(0.0, index=[0], columns=[f"M{i}_{a}" for i in range(3) for a in "xyz"])
+    message = r"\['pelvis', 'neck', .*joints \['M0', 'M1', 'M2'\].*\{'pelvis': \('LASI', 'RASI'\)\}"
+    with pytest.raises(ValueError, match=message):
+        Skeleton.from_frame(df)
+
+
+# -- real markers -------------------------------------------------------------------------------
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_legs_of_markers_in_a_file(real_data):
+    """Clusters on the segments of the legs: their middles are joined to limbs."""
+    df = read_motion(real_data / "original_files" / "c3d" / "Eb015pr.c3d", max_gap=20)
+    df = df.dropna()
+    with pytest.raises(ValueError, match=r"No joint stands for .*'LASI', 'RASI'"):
+        Skeleton.from_frame(df)
+    clusters = {"hip": ("TH1", "TH2"), "knee": ("SK1", "SK2"), "ankle": ("FT1", "FT2")}
+    landmarks = {
+        f"{side}_{joint}": tuple(side[0].upper() + name for name in names)
+        for side in ("left", "right") for joint, names in clusters.items()
+    }  # fmt: skip
+    skeleton = Skeleton.from_frame(df, landmarks=landmarks)
+    assert skeleton.up == df.attrs["up"] == "z"
+    assert skeleton.landmarks["pelvis"] == ("LTH1", "LTH2", "RTH1", "RTH2")
+    cosines = DirectionCosines(skeleton).set_output(transform="pandas")
+    table = cosines.fit_transform(df)
+    assert list(table.columns[:2]) == ["pelvis_height", "hip_x"]
+    middle = {
+        name: sum(df[[f"{j}_{a}" for a in "xyz"]].to_numpy() for j in joints) / 2
+        for name, joints in landmarks.items()
+    }
+    shin = middle["left_ankle"] - middle["left_knee"]
+    # Up is z, and the cosine with it is the same whichever way the person faces.
+    expected = shin[:, 2] / np.linalg.norm(shin, axis=1)
+    np.testing.assert_allclose(table["left_leg_y"], expected, atol=1e-12)

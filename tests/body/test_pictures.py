@@ -1,0 +1,149 @@
+"""Key-points in a picture: two cosines a limb, against those of bodies that move in a plane."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_bodies import columns_of, standing, turned
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    JointPositions,
+    Skeleton,
+)
+from sklearn_motionsync.datasets import make_bending
+
+PAPER = Skeleton.paper()
+PLANE = Skeleton.paper(n_dims=2)
+REFERENCES = ["heading", "parent", "world"]
+
+
+def picture_of(x, across=0):
+    """Positions along two axes: one across the picture, and y."""
+    return x.reshape(len(x), -1, 3)[..., [across, 1]].reshape(len(x), -1)
+
+
+def flat(x):
+    """Moved into the plane that faces the camera."""
+    return (x.reshape(-1, 3) * [1, 1, 0]).reshape(x.shape)
+
+
+@pytest.fixture(scope="module")
+def people():
+    """Seen from before them, at half a right angle, so that left is across all the time."""
+    people = []
+    for x in make_bending(4, random_state=1).data:
+        left, right = (x[0, 3 * PAPER.index_of(f"{side}_hip") :][:3] for side in ("left", "right"))
+        faces = np.rad2deg(np.arctan2(*(left - right)[[2, 0]]))
+        people.append(flat(turned(x, faces + 45)))
+    return people
+
+
+def in_plane(names):
+    return [not name.endswith("_z") for name in names]
+
+
+@pytest.mark.parametrize("reference", REFERENCES)
+def test_two_cosines_are_those_of_a_body_that_moves_in_a_plane(people, reference):
+    space = DirectionCosines(PAPER, reference).fit(people)
+    plane = DirectionCosines(PLANE, reference).fit([picture_of(x) for x in people])
+    names = space.get_feature_names_out()
+    columns = in_plane(names)
+    assert list(plane.get_feature_names_out()) == [n for n in names if not n.endswith("_z")]
+    np.testing.assert_allclose(plane.limb_lengths_, space.limb_lengths_, rtol=1e-12)
+    for x in people:
+        (found,) = plane.transform([picture_of(x)])
+        np.testing.assert_allclose(found, space.transform([x])[0][:, columns], atol=1e-9)
+        np.testing.assert_allclose(
+            plane.inverse_transform([found])[0],
+            picture_of(space.inverse_transform(space.transform([x]))[0]),
+            atol=1e-9,
+        )
+
+
+@pytest.mark.parametrize("reference", ["heading", "world"])
+def test_places_are_those_of_a_body_that_moves_in_a_plane(people, reference):
+    space, plane = JointPositions(PAPER, reference), JointPositions(PLANE, reference)
+    names = space.fit(people).get_feature_names_out()
+    assert list(plane.get_feature_names_out()) == [n for n in names if not n.endswith("_z")]
+    for x in people:
+        found = plane.fit_transform([picture_of(x)])[0]
+        np.testing.assert_allclose(found, space.transform([x])[0][:, in_plane(names)], atol=1e-12)
+
+
+@pytest.mark.parametrize("reference", REFERENCES)
+def test_from_the_side_hips_and_shoulders_point_at_the_camera(reference):
+    """Their two cosines are 0, as they are of three: z is towards the camera."""
+    bent = standing(neck=(0, 1.4, 0.3), head=(0, 1.5, 0.5), left_knee=(0.1, 0.5, 0.2))
+    bent = np.vstack([bent, standing()])
+    bent.reshape(-1, 15, 3)[:, PAPER.joints.index("right_shoulder")] += [0, 0, 1e-30]
+    side = picture_of(bent, across=2)
+    cosines = DirectionCosines(PLANE, reference).fit(side)
+    at = dict(zip(cosines.get_feature_names_out(), cosines.transform(side)[0], strict=True))
+    assert (at["hip_x"], at["hip_y"], at["shoulder_x"], at["shoulder_y"]) == (0, 0, 0, 0)
+    np.testing.assert_allclose(at["torso_x"], 0.6, atol=1e-12)
+    back = cosines.inverse_transform(cosines.transform(side))
+    np.testing.assert_allclose(cosines.transform(back), cosines.transform(side), atol=1e-12)
+    for kind in (DirectionCosines, JointPositions):
+        leg = PAPER.joints.index("left_knee")
+        faulty = side.copy()
+        faulty[:, 2 * leg : 2 * leg + 2] = side[:, 2 * (leg - 1) : 2 * leg]
+        with pytest.raises(ValueError, match="the limb 'left_thigh' has no length"):
+            kind(PLANE).fit(faulty)
+    # A moment of coincidence is rather a key-point that was not found.
+    (x,) = make_bending(1, random_state=1).data
+    lost = picture_of(x)
+    for side in ("left", "right"):
+        lost[5, 2 * PAPER.index_of(f"{side}_hip") :][:2] = 0
+    with pytest.raises(ValueError, match=r"frame 5: the limb 'hip' has no length"):
+        DirectionCosines(PLANE).fit(lost)
+
+
+@pytest.mark.parametrize(
+    ("up", "pixels"),
+    [
+        ("-y", lambda x, y: (x, -y)),
+        # A picture that lies on its side, y downwards: the head to its right, or to its left.
+        ("x", lambda x, y: (y, x)),
+        ("-x", lambda x, y: (-y, -x)),
+    ],
+)
+def test_pictures_as_the_camera_saw_them(people, up, pixels):
+    seen = [picture_of(x) for x in people]
+    skeleton = Skeleton(PLANE.joints, PLANE.parents, up=up, n_dims=2)
+    given = [np.stack(pixels(x[:, ::2], x[:, 1::2]), axis=2).reshape(x.shape) for x in seen]
+    for kind in (DirectionCosines, JointPositions):
+        found = kind(skeleton).fit_transform([x + 500 for x in given])
+        for a, b in zip(found, kind(PLANE).fit_transform(seen), strict=True):
+            np.testing.assert_allclose(a, b, atol=1e-9)
+    told = Skeleton.from_frame(columns_of(given[0], skeleton))
+    assert (told.up, told.n_dims, told.landmarks) == (up, 2, PAPER.landmarks)
+    other = {"-y": "y", "x": "-x", "-x": "x"}[up]
+    with pytest.raises(ValueError, match=f"seems to be.*up='{up}'"):
+        DirectionCosines(Skeleton(PLANE.joints, PLANE.parents, up=other, n_dims=2)).fit(given)
+
+
+def test_columns_of_two_axes():
+    df = pd.DataFrame(0.0, index=[0], columns=PLANE.column_names)
+    assert Skeleton.from_frame(df).n_dims == 2
+    for wrong in (df[df.columns[1:]], df.add_suffix("_x"), df[["neck_y", "neck_x"]]):
+        with pytest.raises(ValueError, match=r"<joint>_z or, in the plane, <joint>_x, <joint>_y"):
+            Skeleton.from_frame(wrong)
+    with pytest.raises(ValueError, match="15 joints need 30: x, y of each"):
+        DirectionCosines(PLANE).fit([np.zeros((4, 45))])
+    (x,) = make_bending(1, random_state=1).data
+    table = columns_of(picture_of(x), PLANE)
+    with pytest.raises(ValueError, match="column 0 is 'pelvis_y', where the skeleton has"):
+        DirectionCosines(PLANE).fit(table[[*table.columns[1::-1], *table.columns[2:]]])
+
+
+def test_a_pipeline_of_key_points(people):
+    """From pictures to a model and back."""
+    seen = [picture_of(x) for x in people]
+    steps = DirectionCosines(PLANE), ASpace(4), DenseSynchronizer(40), ActionModel()
+    pipe = make_pipeline(*steps).fit(seen)
+    assert pipe[-1].mean_.shape == (40, 4)
+    assert pipe[:2].inverse_transform(pipe[-1].mean_).shape == (40, 30)
+    assert pipe.predict(seen).shape == (4,)

@@ -1,0 +1,155 @@
+"""The vertical axis: any of six, given, told from the positions, and checked."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_bodies import columns_of, standing, turned_over
+from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
+from sklearn_motionsync.datasets import load_performances, make_bending
+
+PAPER = Skeleton.paper()
+UPS = ["x", "y", "z", "-x", "-y", "-z"]
+LEGS = ["pelvis", *(f"{s}_{j}" for s in ("left", "right") for j in ("hip", "knee", "ankle"))]
+TRUNK = ["pelvis", "neck", "head", "left_shoulder", "right_shoulder"]
+KINDS = [
+    *((DirectionCosines, reference) for reference in ("heading", "parent", "world")),
+    *((JointPositions, reference) for reference in ("heading", "world")),
+]
+
+
+def with_up(up, skeleton=PAPER, landmarks=None):
+    landmarks = skeleton.landmarks if landmarks is None else {j: j for j in landmarks}
+    return Skeleton(skeleton.joints, skeleton.parents, landmarks, up, skeleton.n_dims)
+
+
+def raised(x, up, seed=0):
+    """Positions whose y axis becomes another one, by a rotation that is anyhow about it."""
+    rng = np.random.default_rng(seed)
+    y = np.eye(3)["xyz".index(up[-1])] * (-1 if up[0] == "-" else 1)
+    side = rng.normal(size=3)
+    side -= (side @ y) * y
+    side /= np.linalg.norm(side)
+    turn = np.stack([side, y, np.cross(side, y)])
+    assert np.linalg.det(turn) > 0
+    return (x.reshape(-1, 3) @ turn).reshape(x.shape)
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return make_bending(1, random_state=1).data[0]
+
+
+@pytest.mark.parametrize("up", UPS)
+@pytest.mark.parametrize(("kind", "reference"), KINDS)
+def test_any_axis_may_be_vertical(kind, reference, up, recording):
+    made = kind(with_up(up), reference)
+    expected = kind(PAPER, reference).fit_transform(recording)
+    if reference != "world":
+        found = made.fit_transform(raised(recording, up))
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+    # Of the recording's axes one is turned into another: a body is not mirrored.
+    at = made.fit_transform([raised(recording, up, seed) for seed in (0, 1)])[0]
+    hips = at[:, [list(made.get_feature_names_out()).index(n) for n in _triad(kind)]]
+    whole = expected[:, [list(made.get_feature_names_out()).index(n) for n in _triad(kind)]]
+    chirality = [np.linalg.det(x.reshape(-1, 3, 3)) for x in (hips, whole)]
+    np.testing.assert_allclose(chirality[0], chirality[1], atol=1e-9)
+
+
+def _triad(kind):
+    parts = ("hip", "torso", "left_thigh")
+    if kind is JointPositions:
+        parts = ("left_hip", "neck", "left_knee")
+    return [f"{part}_{axis}" for part in parts for axis in "xyz"]
+
+
+@pytest.mark.parametrize(
+    ("up", "recorded"),
+    [
+        ("z", lambda x, y, z: (x, -z, y)),
+        ("-y", lambda x, y, z: (x, -y, -z)),
+        ("-z", lambda x, y, z: (x, z, -y)),
+    ],
+)
+def test_the_recordings_axes_are_turned_about_x(up, recorded, recording):
+    given = np.stack(recorded(*np.moveaxis(recording.reshape(-1, 15, 3), 2, 0)), axis=2)
+    for kind in (DirectionCosines, JointPositions):
+        found = kind(with_up(up), "world").fit_transform(given.reshape(recording.shape))
+        np.testing.assert_array_equal(found, kind(PAPER, "world").fit_transform(recording))
+
+
+# -- told from the positions ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("up", UPS)
+@pytest.mark.parametrize("joints", [None, LEGS, TRUNK])
+def test_the_head_is_above_the_feet(up, joints, recording):
+    df = columns_of(raised(recording, up))
+    if joints:
+        df = df[[f"{j}_{a}" for j in joints for a in "xyz"]]
+    assert Skeleton.from_frame(df).up == up
+    # What is given, or what the file says, goes first.
+    assert Skeleton.from_frame(df, up="x").up == "x"
+    df.attrs["up"] = "-z"
+    assert Skeleton.from_frame(df).up == "-z"
+    df.attrs["up"] = None
+    df.iloc[3:9] = np.nan
+    assert Skeleton.from_frame(df).up == up
+
+
+@pytest.mark.parametrize("up", UPS)
+@pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
+def test_real_people_tell_what_is_up(real_data, name, up):
+    """All that they do: bend, sit down, hop, crouch, bring the elbows to the knees."""
+    bunch = load_performances(real_data / f"{name}_positions.npz")
+    for x in bunch.data:
+        df = columns_of(raised(x.astype(float), up), bunch.skeleton)
+        assert Skeleton.from_frame(df).up == up
+
+
+def test_what_does_not_tell_is_taken_for_y():
+    for values in (0.0, np.nan, "a", 1e300):
+        df = pd.DataFrame(values, index=range(3), columns=PAPER.column_names)
+        assert Skeleton.from_frame(df).up == "y"
+    aslant = columns_of(standing() @ np.kron(np.eye(15), np.full((3, 3), 3**-0.5)))
+    assert (
+        Skeleton.from_frame(aslant[[c for c in aslant if "elbow" in c or "wrist" in c]]).up == "y"
+    )
+
+
+# -- checked --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("up", UPS)
+@pytest.mark.parametrize("landmarks", [None, LEGS, TRUNK])
+def test_bodies_upside_down_are_refused(up, landmarks, recording):
+    other = up[1:] if up.startswith("-") else f"-{up}"
+    signed = [u if u.startswith("-") else rf"\+{u}" for u in (up, other)]
+    message = rf"says that {signed[0]} is up, but {signed[1]} seems to be\. .*up='{other}'"
+    for kind in (DirectionCosines, JointPositions):
+        with pytest.raises(ValueError, match=f"Performance 1 is upside down: .*{message}"):
+            kind(with_up(up, landmarks=landmarks)).fit(
+                [raised(recording, up), raised(recording, other)]
+            )
+        kind(with_up(other, landmarks=landmarks)).fit([raised(recording, other)])
+
+
+def test_what_is_said_of_a_part_that_is_upside_down(recording):
+    down = turned_over(recording)
+    for landmarks, said in ((LEGS, "pelvis is below the ankles"), (TRUNK, "head is below the pel")):
+        with pytest.raises(ValueError, match=rf"upside down: the {said}\w*\. The skeleton says"):
+            DirectionCosines(with_up("y", landmarks=landmarks)).fit([down])
+    # Arms alone may be anywhere.
+    arms = [f"{side}_{j}" for side in ("left", "right") for j in ("shoulder", "elbow", "wrist")]
+    DirectionCosines(with_up("y", landmarks=arms)).fit([down])
+
+
+@pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
+def test_parts_of_real_people_are_upright(real_data, name):
+    bunch = load_performances(real_data / f"{name}_positions.npz")
+    for landmarks, all_tell in ((LEGS, True), ([*TRUNK, "left_elbow"], False)):
+        known = {j: bunch.skeleton.landmarks[j] for j in landmarks}
+        some = Skeleton(bunch.joints, bunch.skeleton.parents, known)
+        fitted = DirectionCosines(some).fit(bunch.data)
+        for x in bunch.data if all_tell else bunch.data[:1]:
+            with pytest.raises(ValueError, match="upside down"):
+                fitted.transform([turned_over(x)])
