@@ -58,14 +58,17 @@ class PipelineFigures:
         _, model = find_step(estimator, ActionModel)
         space, _ = _before_synchronizer(estimator)
         check_is_fitted(model)
-        bodies = bodies_of(space, model.mean_)
+        # What a synchronizer puts beside them is no posture.
+        width = find_synchronizer(estimator)[1].pattern_.shape[1]
+        mean = model.mean_[:, :width]
+        bodies = bodies_of(space, mean)
         # The floor is the lowest that the mean performance ever reaches.
-        floor = [0, bodies(model.mean_)[..., 1].min(), 0]
+        floor = [0, bodies(mean)[..., 1].min(), 0]
         scenes, titles = [], []
         for frame in as_moments(frames, model.n_frames_):
             samples = model.sample(n_samples, frame=frame, random_state=random_state)
             accepted = model.accepts(samples, frame)
-            for points in (model.mean_[[frame]], samples[accepted]):
+            for points in (mean[[frame]], samples[accepted, :width]):
                 scenes.append([x[np.newaxis] - floor for x in bodies(points)])
             titles += [f"frame {frame}\nmean posture", f"frame {frame}\n{sum(accepted)} samples"]
         return cls(scenes, Skeleton.paper(), titles).plot(ax, **view)

@@ -10,7 +10,7 @@ from ..pipelines import reach_synchronizer
 from ..sequences import as_collection, to_frame
 from .clock import as_frame_rate, as_unit
 
-__all__ = ["Match", "as_match"]
+__all__ = ["Match", "as_match", "check_answer"]
 
 # Rounding may take times back by this share of the clock.
 _ROUNDING = 1e-9
@@ -371,6 +371,16 @@ def as_match(times, n_sequences):
             f"performances; got {np.shape(times)}."
         )
     return Match(times)
+
+
+def check_answer(match, n_sequences, n_frames, name):
+    """Refuse what a synchronizer of this name answers with, unless it matches all performances."""
+    shape = np.shape(getattr(match, "times", None))
+    if shape != (n_sequences, n_frames):
+        raise ValueError(
+            f"{name}.match must return a Match with times of shape (n_sequences, P), here "
+            f"{(n_sequences, n_frames)}; got {type(match).__name__} with {shape}."
+        )
 
 
 def _with_attributes(X):
