@@ -1,5 +1,7 @@
 """One way to draw: the panels, colours and curves that all displays share."""
 
+from textwrap import fill
+
 import numpy as np
 
 from .given import as_names
@@ -155,6 +157,9 @@ def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
         box = legend.get_window_extent()
         if box.width <= room:
             break
+    if title is not None and box.width > room:
+        legend.set_title(fill(title, max(int(len(title) * room / box.width), 12)))
+        box = legend.get_window_extent()
     if any(a.get_title() for a in top):
         # The titles keep the room.
         legend.set_in_layout(False)

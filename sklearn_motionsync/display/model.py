@@ -18,9 +18,9 @@ _HOLDS = {
 }
 # The same of groups.
 _HOLD = {
-    "points": "bands hold single postures of a group, not performances",
-    "performances": "bands hold {share:.3g} % of new people's performances of a group",
-    "mean": "bands hold the mean of all people of a group, {share:.3g} % sure",
+    "points": "bands hold single postures, not performances",
+    "performances": "bands hold {share:.3g} % of new people's performances",
+    "mean": "bands hold the mean of all people, {share:.3g} % sure",
 }
 
 
