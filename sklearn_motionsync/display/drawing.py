@@ -134,7 +134,8 @@ def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
     Parameters
     ----------
     top : list of Axes
-        A row of panels, whose titles move up. They must be there already.
+        Panels, the first of them on the left. Titles of those beside it, which must be there
+        already, move up.
     handles : list of Artist
     labels : list of str
     title : str, default=None
@@ -150,6 +151,7 @@ def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
     axis, labels = top[0], [_plain(label) for label in labels]
     extents = [a.get_window_extent() for a in (below or top)]
     room = max(e.x1 for e in extents) - extents[0].x0
+    beside = [a for a in top if abs(a.get_window_extent().y1 - extents[0].y1) < 1]
     style = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
     style |= {"fontsize": "small", "title_fontsize": "small", "alignment": "left"}
     for count in range(min(len(labels), n_cols), 0, -1):
@@ -160,14 +162,14 @@ def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
     if title is not None and box.width > room:
         legend.set_title(fill(title, max(int(len(title) * room / box.width), 12)))
         box = legend.get_window_extent()
-    if any(a.get_title() for a in top):
+    if any(a.get_title() for a in beside):
         # The titles keep the room.
         legend.set_in_layout(False)
-        pad = box.height * 72 / axis.get_figure(root=True).dpi + _GAP
-        for a in top:
+        pad = box.height * 72 / axis.figure.dpi + _GAP
+        for a in beside:
             a.set_title(a.get_title(), fontsize=a.title.get_fontsize(), pad=pad)
     if axis.figure.get_layout_engine() is None:
-        for a in top:
+        for a in beside:
             _lower(a, box.height)
     return legend
 

@@ -310,7 +310,7 @@ class ActionModelDisplay:
             labels.append("mean performance")
         what = _HOLDS[self.band] if self.groups is None else _HOLD[self.band]
         title = what.format(share=100 * (self.coverage or 0))
-        legend_above(self.axes_[:1], handles, labels, title, n_cols=1)
+        legend_above(self.axes_, handles, labels, title, below=self.axes_[:1], n_cols=1)
 
 
 def _as_band(band):

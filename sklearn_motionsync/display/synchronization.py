@@ -273,8 +273,8 @@ class SynchronizationDisplay:
         self.warps_ = self._draw_warps(self.axes_[-1], clock, style) if warps else None
         _small_titles(self.axes_)
         if color_of:
-            top = [*self.axes_[:2], *self.axes_[2 * n_rows :]]
-            legend_above(top, self.group_means_[0], list(color_of), below=top[:2])
+            handles, labels = self.group_means_[0], list(color_of)
+            legend_above(self.axes_, handles, labels, below=self.axes_[:2])
         return self
 
     def _describe_pattern(self):

@@ -385,7 +385,7 @@ def check_answer(match, n_sequences, n_frames, name):
 
 def _with_attributes(X):
     """The sequences of a collection that may know what they are called; none of anything else."""
-    if X is None or all(np.ndim(n) == 0 for n in X):
+    if X is None or (not hasattr(X, "columns") and all(np.ndim(n) == 0 for n in X)):
         return []
     return [x for x in as_collection(X) or [] if hasattr(x, "attrs")]
 
