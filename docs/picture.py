@@ -63,6 +63,7 @@ def main():
     below[0].set_ylabel("second dimension\nof the aSpace")
     below[2].sharey(below[1])
     below[2].get_legend().set_title(None)
+    below[2].get_legend().set_bbox_to_anchor(None)
     below[2].get_legend().set_loc("lower right")
     figure.savefig(Path(__file__).parent / "_static" / "bends.png", dpi=110)
 

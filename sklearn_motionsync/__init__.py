@@ -35,6 +35,7 @@ from .synchronizers.dense import DenseSynchronizer
 from .synchronizers.keyframes import KeyframeSynchronizer
 from .synchronizers.linear import LinearSynchronizer
 from .synchronizers.match import Match
+from .synchronizers.timing import TimingChannel
 
 __version__ = "0.1.0.dev0"
 
@@ -55,6 +56,7 @@ __all__ = [
     "SkeletonDisplay",
     "SynchronizationDisplay",
     "Synchronizer",
+    "TimingChannel",
     "TrellisDisplay",
     "datasets",
     "display",

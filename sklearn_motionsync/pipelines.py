@@ -187,6 +187,8 @@ def taken_by(method, params):
         # It takes anything by its signature, and hands on what its transformers take.
         parts = [taken_by(part.transform, given) for part in parts_of(owner)]
         return {name: value for part in parts for name, value in part.items()}
+    # Who only adds to what a synchronizer gives hands on what that takes.
+    method = getattr(_inside(owner), method.__name__, method)
     accepted = list(inspect.signature(method).parameters.values())
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
         return given
@@ -271,6 +273,11 @@ def _what_was_fitted(estimator):
     return estimator
 
 
+def _inside(step):
+    """The synchronizer within a step that adds to what it gives, fitted if that is; or the step."""
+    return getattr(step, "synchronizer_", getattr(step, "synchronizer", step))
+
+
 def _first(estimator, fits, name):
     found = _search(estimator, fits)
     if found is None:
@@ -287,7 +294,8 @@ def _search(estimator, fits):
     """The steps before the first one that fits, and that one; None if there is none."""
     estimator = _what_was_fitted(estimator)
     if not isinstance(estimator, Pipeline):
-        return (None, estimator) if fits(estimator) else None
+        inner = _inside(estimator)
+        return (None, inner) if fits(inner) else None
     for i, (name, step) in enumerate(estimator.steps):
         found = _search(step, fits)
         if found is not None:

@@ -15,6 +15,7 @@ from sklearn_motionsync import (
     KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
+    TimingChannel,
     to_frame,
     to_sequences,
 )
@@ -27,7 +28,7 @@ SYNCHRONIZERS = [
     DenseSynchronizer(),
     ShiftSynchronizer(),
 ]
-SEQUENCES = [*SYNCHRONIZERS, ActionModel()]
+SEQUENCES = [*SYNCHRONIZERS, TimingChannel(LinearSynchronizer()), ActionModel()]
 ALL = [ASpace(), *SEQUENCES]
 
 NAMES = ["hip", "knee", "ankle"]

@@ -21,6 +21,7 @@ from sklearn_motionsync import (
     KeyframeSynchronizer,
     LinearSynchronizer,
     Skeleton,
+    TimingChannel,
     to_frame,
     to_sequences,
 )
@@ -50,7 +51,8 @@ class InTurns(ActionClassifier):
 
 DETECTOR = ActionDetector(make_pipeline(DenseSynchronizer(), ActionModel()))
 CLASSIFIER = InTurns(n_frames=8)
-ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, ActionModel(), DETECTOR]
+CHANNELS = [TimingChannel(LinearSynchronizer()), TimingChannel(DenseSynchronizer(), "log_rate")]
+ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR]
 BODY_ESTIMATORS = [DirectionCosines(Skeleton.paper()), JointPositions(Skeleton.paper())]
 ESTIMATORS = [*BODY_ESTIMATORS, *ROW_ESTIMATORS, CLASSIFIER]
 TRANSFORMERS = [e for e in ESTIMATORS if hasattr(e, "transform")]
@@ -237,8 +239,8 @@ def test_posture_level_gives_the_kind_back(estimator, performances):
     assert isinstance(out, np.ndarray)
     assert out.ndim == 3
     out = fitted.transform(performances)
-    if hasattr(estimator, "n_frames"):
-        assert out.shape == (6, fitted.n_frames_, WIDTH)
+    if hasattr(fitted, "n_frames_"):
+        assert out.shape == (6, fitted.n_frames_, len(fitted.get_feature_names_out()))
     else:
         assert isinstance(out, list)
         one = fitted.transform(performances[0])
@@ -446,7 +448,7 @@ def test_unfitted(estimator, performances):
         outputs(clone(estimator), performances)
 
 
-SEQUENCE_LEVEL = [*SYNCHRONIZERS, ActionModel(), DETECTOR, CLASSIFIER]
+SEQUENCE_LEVEL = [*SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR, CLASSIFIER]
 
 
 @pytest.mark.parametrize("estimator", SEQUENCE_LEVEL, ids=by_name)

@@ -1,5 +1,7 @@
 """One way to draw: the panels, colours and curves that all displays share."""
 
+from textwrap import fill
+
 import numpy as np
 
 from .given import as_names
@@ -7,7 +9,9 @@ from .given import as_names
 __all__ = [
     "COLORS",
     "curves",
+    "front_line",
     "group_colors",
+    "legend_above",
     "panels",
     "parts_outside",
     "pyplot",
@@ -30,7 +34,10 @@ COLORS = {
     "quiet": "#808080",
     "shadow": "#D9D9D9",
 }
-_GROUPS = ["#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9", "#000000"]
+# Black is the pattern.
+_GROUPS = ["#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"]
+# Points between a legend and a title above it.
+_GAP = 6
 
 
 def pyplot():
@@ -107,6 +114,78 @@ def curves(axis, xs, ys, **style):
     axis.add_collection(lines)
     axis.autoscale_view()
     return lines
+
+
+def front_line(axis, xs, ys, **style):
+    """A curve in front of others, with a white rim so that it is seen among them."""
+    from matplotlib.patheffects import Normal, Stroke
+
+    style = {"linewidth": 1.8, "zorder": 4} | style
+    rim = [Stroke(linewidth=style["linewidth"] + 1.4, foreground="white"), Normal()]
+    (line,) = axis.plot(xs, ys, path_effects=rim, **style)
+    return line
+
+
+def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
+    """A legend between panels and their titles, where it hides no curve.
+
+    Panels of a figure without a layout engine become lower by as much.
+
+    Parameters
+    ----------
+    top : list of Axes
+        Panels, the first of them on the left. Titles of those beside it, which must be there
+        already, move up.
+    handles : list of Artist
+    labels : list of str
+    title : str, default=None
+    below : list of Axes, default=None
+        Those that it may reach over, of which it begins above the first; by default all.
+    n_cols : int, default=6
+        Columns at most.
+
+    Returns
+    -------
+    Legend
+    """
+    axis, labels = top[0], [_plain(label) for label in labels]
+    extents = [a.get_window_extent() for a in (below or top)]
+    room = max(e.x1 for e in extents) - extents[0].x0
+    beside = [a for a in top if abs(a.get_window_extent().y1 - extents[0].y1) < 1]
+    style = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
+    style |= {"fontsize": "small", "title_fontsize": "small", "alignment": "left"}
+    for count in range(min(len(labels), n_cols), 0, -1):
+        legend = axis.legend(handles, labels, title=title, ncols=count, frameon=False, **style)
+        box = legend.get_window_extent()
+        if box.width <= room:
+            break
+    if title is not None and box.width > room:
+        legend.set_title(fill(title, max(int(len(title) * room / box.width), 12)))
+        box = legend.get_window_extent()
+    if any(a.get_title() for a in beside):
+        # The titles keep the room.
+        legend.set_in_layout(False)
+        pad = box.height * 72 / axis.figure.dpi + _GAP
+        for a in beside:
+            a.set_title(a.get_title(), fontsize=a.title.get_fontsize(), pad=pad)
+    if axis.figure.get_layout_engine() is None:
+        for a in beside:
+            _lower(a, box.height)
+    return legend
+
+
+def _lower(axis, height):
+    """Take so many pixels off the top of axes, of half of them at most."""
+    spec, figure = axis.get_subplotspec(), axis.figure
+    place = axis.get_position() if spec is None else spec.get_position(figure)
+    height = min(height / figure.bbox.height, place.height / 2)
+    axis.set_position([place.x0, place.y0, place.width, place.height - height])
+
+
+def _plain(label):
+    """Text that matplotlib neither takes for mathematics nor leaves out of a legend."""
+    label = label.replace("$", r"\$")
+    return f" {label}" if label.startswith("_") else label
 
 
 def sticks(axis, color, width, alpha=1.0, zorder=2):

@@ -1,11 +1,12 @@
 """ActionModelDisplay: the mean of a learnt action, a band about it, who leaves it (Fig. 3d)."""
 
-import numpy as np
-
 from ..features import choose_features
 from ..model.views import view_of
-from .drawing import COLORS, curves, panels, parts_outside
+from .by_group import Groups, bands_of_groups
+from .drawing import legend_above, panels
 from .given import as_drawn, as_names, is_number
+from .layers import count_outside, layers_of
+from .time_axis import TimeAxis, lengths_of
 
 __all__ = ["ActionModelDisplay"]
 
@@ -15,8 +16,12 @@ _HOLDS = {
     "performances": "band holds {share:.3g} % of new people's performances",
     "mean": "band holds the mean of all people, {share:.3g} % sure",
 }
-# Of the largest bound, how much beyond it is rounding, in units of the last place.
-_ROUNDING = 64
+# The same of groups.
+_HOLD = {
+    "points": "bands hold single postures, not performances",
+    "performances": "bands hold {share:.3g} % of new people's performances",
+    "mean": "bands hold the mean of all people, {share:.3g} % sure",
+}
 
 
 class ActionModelDisplay:
@@ -27,9 +32,12 @@ class ActionModelDisplay:
     Parameters
     ----------
     mean, lower, upper : ndarray, shape (P, n_shown)
+        With groups (n_groups, P, n_shown), in the order in which they come; bounds are NaN where a
+        group has no band.
     feature_names : list of str
     n_std : float, default=None
-        Half-width of the band, in standard deviations; None only of the band of the mean.
+        Half-width of the band, in standard deviations; None only of the band of the mean, and of
+        groups.
     performances : ndarray, shape (n_sequences, P, n_shown), default=None
         Synchronised performances, drawn behind.
     band : {"points", "performances", "mean"}, default="points"
@@ -39,6 +47,14 @@ class ActionModelDisplay:
     departures : bool, default=True
         Whether parts of performances outside the band are violet. They never are when the band is
         that of the mean, which nobody needs to keep to.
+    groups : sequence of length n_sequences, default=None
+        The group of every performance.
+    people : sequence of length n_sequences, default=None
+        Who gave it, for the legend.
+    unit : {"frames", "percent", "seconds"}, default="frames"
+        Of the axis of time.
+    frame_rate : float, default=None
+        Frames of the clock a second, for seconds.
 
     Attributes
     ----------
@@ -46,9 +62,11 @@ class ActionModelDisplay:
     axes_ : list of Axes
         One a feature.
     mean_ : list of Line2D
+        One a feature; with groups one a group, feature by feature.
     envelope_ : list of FillBetweenPolyCollection
+        The same, without groups that have no band.
     performances_ : list of LineCollection
-        Empty without performances.
+        As ``mean_``; empty without performances.
     departures_ : list of LineCollection
         What of them is outside the band; empty where that is not drawn.
 
@@ -78,14 +96,25 @@ class ActionModelDisplay:
         band="points",
         coverage=None,
         departures=True,
+        groups=None,
+        people=None,
+        unit="frames",
+        frame_rate=None,
     ):
-        self.mean = as_drawn(mean, "The mean", ("P", "n_shown"))
+        self.groups, of_each = None, ()
+        if groups is not None:
+            if performances is None:
+                raise ValueError("groups are those of performances: give these, too.")
+            self.groups = Groups(groups, people, len(performances))
+            of_each = (len(self.groups.names),)
+        self.mean = as_drawn(mean, "The mean", (*of_each, "P", "n_shown"))
         self.lower = as_drawn(lower, "The lower bound", self.mean.shape)
         self.upper = as_drawn(upper, "The upper bound", self.mean.shape)
-        n_shown = self.mean.shape[1]
+        n_frames, n_shown = self.mean.shape[-2:]
         self.feature_names = as_names(feature_names, n_shown, "feature_names", "features")
         self.band = _as_band(band)
-        if not (is_number(n_std, 0) or (n_std is None and band == "mean")):
+        optional = band == "mean" or groups is not None
+        if not (is_number(n_std, 0) or (n_std is None and optional)):
             raise ValueError(f"n_std must be a number of at least 0, got {n_std!r}.")
         if not (is_number(coverage, 0, 1) or (coverage is None and band == "points")):
             raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
@@ -93,15 +122,29 @@ class ActionModelDisplay:
         self.departures = bool(departures)
         self.performances = None
         if performances is not None:
-            shape = ("n_sequences", *self.mean.shape)
+            shape = ("n_sequences", *self.mean.shape[-2:])
             self.performances = as_drawn(performances, "What is drawn behind", shape)
+        self.unit, self.frame_rate = unit, frame_rate
+        self._axis = TimeAxis(unit, n_frames, None, frame_rate)
 
     def __repr__(self):
         return f"ActionModelDisplay({self.feature_names})"
 
     @classmethod
     def from_estimator(
-        cls, estimator, X=None, *, features=None, band="points", departures=True, ax=None, **params
+        cls,
+        estimator,
+        X=None,
+        *,
+        features=None,
+        band=None,
+        departures=True,
+        groups=None,
+        people=None,
+        unit="frames",
+        frame_rate=None,
+        ax=None,
+        **params,
     ):
         """Draw a fitted model, or a pipeline that ends in one.
 
@@ -116,8 +159,9 @@ class ActionModelDisplay:
             be features of the postures, such as ``"pelvis_height"`` or ``"left_leg_y"``: the
             model is then taken back out of the aSpace, fitted anew on the postures of the
             performances that it keeps. By default the first four of the model.
-        band : {"points", "performances", "mean"}, default="points"
-            Which band is drawn about the mean, and named in the legend:
+        band : {"points", "performances", "mean"}, default=None
+            Which band is drawn about the mean, and named in the legend; by default that of points,
+            with groups that of performances:
 
             - ``"points"``: ``model.envelope()``, ``n_std`` standard deviations at every frame by
               itself. It holds most postures of new people, but few of their performances from
@@ -131,6 +175,20 @@ class ActionModelDisplay:
         departures : bool, default=True
             Whether the parts of performances that leave the band are drawn violet; they are not
             when the band is that of the mean.
+        groups : sequence of length n_sequences, default=None
+            The group of every performance of X. Mean and band are then drawn for each group, of a
+            model of its own that is fitted now on the performances of the group, all on the clock
+            of the one pattern. A single performance has no band, nor have those of a single person,
+            unless the band is that of points.
+        people : sequence of length n_sequences, default=None
+            Who gave each performance of X, as ``ActionModel.fit(groups=...)`` takes it: bands of
+            performances and means of groups are then learnt from how people differ. By default
+            each is of another person; give it whenever people come more than once.
+        unit : {"frames", "percent", "seconds"}, default="frames"
+            Of the axis of time: frames or per cent of the pattern, or seconds, in which the clock
+            takes as long as the median performance of X.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            Frames a second of X as recorded, for seconds; without X those of the clock.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
@@ -144,27 +202,43 @@ class ActionModelDisplay:
         --------
         SkeletonDisplay.from_departures : Which limbs depart, on stick figures.
         """
-        _as_band(band)
-        if X is None and params:
-            raise TypeError(
-                f"{cls.__name__}.from_estimator takes {', '.join(params)} along with performances "
-                "X only."
-            )
+        by_default = "points" if groups is None else "performances"
+        band = _as_band(by_default if band is None else band)
         caller = f"{cls.__name__}.from_estimator"
+        if X is None and (params or groups is not None or people is not None):
+            given = [*params, *(["groups"] if groups is not None else [])] or ["people"]
+            raise TypeError(f"{caller} takes {', '.join(given)} along with performances X only.")
+        if people is not None and groups is None:
+            raise TypeError(
+                f"{caller} takes people along with groups only: a model that is fitted already "
+                "knows its people, by fit(X, groups=people)."
+            )
         view = view_of(estimator, X, params, caller, features=features)
         chosen = choose_features(features, view.names)
-        lower, upper, n_std = _bounds(view, band)
         shown = view.whole if band == "performances" else view.synchronised
+        n_std = None
+        if groups is None:
+            mean, (lower, upper, n_std) = view.model.mean_, _bounds(view, band)
+        else:
+            of_groups = Groups(groups, people, len(shown))
+            mean, lower, upper = bands_of_groups(view.model, shown, of_groups, band)
+        if unit == "seconds" and X is not None:
+            clock = TimeAxis(unit, mean.shape[-2], lengths_of(X), frame_rate).clock
+            frame_rate = (len(clock) - 1) / clock[-1]
         display = cls(
-            view.model.mean_[:, chosen],
-            lower[:, chosen],
-            upper[:, chosen],
+            mean[..., chosen],
+            lower[..., chosen],
+            upper[..., chosen],
             feature_names=[view.names[i] for i in chosen],
             n_std=n_std,
             performances=None if shown is None else shown[:, :, chosen],
             band=band,
             coverage=None if band == "points" else view.model.coverage,
             departures=departures,
+            groups=groups,
+            people=people,
+            unit=unit,
+            frame_rate=frame_rate,
         )
         return display.plot(ax)
 
@@ -185,49 +259,28 @@ class ActionModelDisplay:
         n_cols = 1 if count == 1 else 2
         n_rows = -(-count // n_cols)
         spots = [divmod(i, n_cols) for i in range(count)]
-        size = (5 * n_cols, max(3, 2.2 * n_rows + 0.6))
-        self.figure_, self.axes_ = panels(ax, spots, n_rows, n_cols, size)
-        clock = np.arange(len(self.mean))
+        layers = layers_of(self.mean, self.lower, self.upper, self.performances, self.groups)
+        height = max(3, 2.2 * n_rows + 0.6) + 0.2 * max(len(layers) - 3, 0)
+        self.figure_, self.axes_ = panels(ax, spots, n_rows, n_cols, (5 * n_cols, height))
         self.mean_, self.envelope_, self.performances_, self.departures_ = [], [], [], []
         for i, (axis, name) in enumerate(zip(self.axes_, self.feature_names, strict=True)):
-            bounds = self.lower[:, i], self.upper[:, i]
-            style = {"color": COLORS["envelope"], "alpha": 0.35, "linewidth": 0}
-            self.envelope_.append(axis.fill_between(clock, *bounds, label=self._label(), **style))
-            for bound in bounds:
-                axis.plot(clock, bound, color=COLORS["pattern"], linewidth=0.9)
-            if self.performances is not None:
-                self._draw_performances(axis, clock, i)
-            style = {"color": COLORS["mean"], "linewidth": 2, "label": "mean performance"}
-            self.mean_ += axis.plot(clock, self.mean[:, i], **style)
+            self._draw(axis, layers, i)
             axis.set_ylabel(name)
             if i + n_cols >= count:
-                axis.set_xlabel("frame of the pattern")
-        self._explain(self.axes_[0], above=ax is None)
+                axis.set_xlabel(self._axis.label)
+        self._explain(layers)
         return self
 
-    def _draw_performances(self, axis, clock, i):
-        behind = self.performances[:, :, i]
-        style = {"linewidths": 0.7, "linestyles": "dashed", "alpha": 0.55}
-        style |= {"colors": COLORS["performance"], "label": f"{len(behind)} performances"}
-        self.performances_.append(curves(axis, [clock] * len(behind), behind, **style))
-        if self.departures and self.band != "mean":
-            outside = parts_outside(behind, *(bound[:, i] for bound in self._just_outside()))
-            style = {"colors": COLORS["departure"], "linewidths": 1.4, "zorder": 3}
-            style["label"] = f"outside the band: {self._count_outside()} of them"
-            self.departures_.append(curves(axis, *outside, **style))
-
-    def _count_outside(self):
-        """How many performances leave the band in a feature that is shown."""
-        lower, upper = self._just_outside()
-        outside = (self.performances < lower) | (self.performances > upper)
-        return int(outside.any(axis=(1, 2)).sum())
-
-    def _just_outside(self):
-        """The bounds, so much farther out that rounding does not count."""
-        largest = [np.nanmax(np.abs(b), axis=0, initial=0) for b in (self.lower, self.upper)]
-        eps = np.finfo(np.result_type(self.mean, np.float32)).eps
-        margin = _ROUNDING * eps * np.maximum(*largest)
-        return self.lower - margin, self.upper + margin
+    def _draw(self, axis, layers, i):
+        """One feature: bands, performances in front of them, what departs, and the means."""
+        clock = self._axis.clock
+        banded = [layer for layer in layers if layer.has_band]
+        self.envelope_ += [layer.draw_band(axis, clock, i) for layer in banded]
+        if self.performances is not None:
+            self.performances_ += [layer.draw_performances(axis, clock, i) for layer in layers]
+            if self.departures and self.band != "mean":
+                self.departures_ += [layer.draw_departures(axis, self._axis, i) for layer in banded]
+        self.mean_ += [layer.draw_mean(axis, clock, i) for layer in layers]
 
     def _label(self):
         if self.n_std is None:
@@ -235,13 +288,29 @@ class ActionModelDisplay:
         predicted = "predicted " if self.band == "performances" else ""
         return f"mean ± {self.n_std:.3g} {predicted}standard deviations"
 
-    def _explain(self, axis, above):
-        """A legend, with what the band holds as its title; above the panel it hides nothing."""
-        title = _HOLDS[self.band].format(share=100 * (self.coverage or 0))
-        style = {"fontsize": "small", "title_fontsize": "small", "alignment": "left"}
-        if above:
-            style |= {"loc": "lower left", "bbox_to_anchor": (0, 1)}
-        axis.legend(frameon=not above, title=title, **style)
+    def _explain(self, layers):
+        """A legend, with what the band holds as its title; above the panels it hides nothing."""
+        if self.groups is None:
+            handles, labels = [self.envelope_[0]], [self._label()]
+            if self.performances is not None:
+                handles.append(self.performances_[0])
+                labels.append(f"{len(self.performances)} performances")
+        else:
+            handles, labels = [], []
+            bands = iter(self.envelope_)
+            for layer, line in zip(layers, self.mean_, strict=False):
+                handles.append((next(bands), line) if layer.has_band else line)
+                labels.append(self.groups.describe(layer.group, layer.has_band))
+        if self.departures_:
+            handles.append(self.departures_[0])
+            of_group = "" if self.groups is None else " of its group"
+            labels.append(f"outside the band{of_group}: {count_outside(layers)} of them")
+        if self.groups is None:
+            handles.append(self.mean_[0])
+            labels.append("mean performance")
+        what = _HOLDS[self.band] if self.groups is None else _HOLD[self.band]
+        title = what.format(share=100 * (self.coverage or 0))
+        legend_above(self.axes_, handles, labels, title, below=self.axes_[:1], n_cols=1)
 
 
 def _as_band(band):

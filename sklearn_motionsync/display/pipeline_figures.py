@@ -58,15 +58,18 @@ class PipelineFigures:
         space, views = _before_synchronizer(estimator)
         check_is_fitted(model)
         skeleton = views[0].skeleton.body()
-        bodies = bodies_of(space, model.mean_, skeleton.n_dims)
+        # What a synchronizer puts beside them is no posture.
+        width = find_synchronizer(estimator)[1].pattern_.shape[1]
+        mean = model.mean_[:, :width]
+        bodies = bodies_of(space, mean, skeleton.n_dims)
         # The floor is the lowest that the mean performance ever reaches.
         floor = np.zeros(skeleton.n_dims)
-        floor[1] = bodies(model.mean_)[..., 1].min()
+        floor[1] = bodies(mean)[..., 1].min()
         scenes, titles = [], []
         for frame in as_moments(frames, model.n_frames_):
             samples = model.sample(n_samples, frame=frame, random_state=random_state)
             accepted = model.accepts(samples, frame)
-            for points in (model.mean_[[frame]], samples[accepted]):
+            for points in (mean[[frame]], samples[accepted, :width]):
                 scenes.append([x[np.newaxis] - floor for x in bodies(points)])
             titles += [f"frame {frame}\nmean posture", f"frame {frame}\n{sum(accepted)} samples"]
         return cls(scenes, skeleton, titles).plot(ax, **view)

@@ -7,10 +7,18 @@ from ..gate import check_names
 from ..performances import read_collection
 from ..pipelines import index_of_pattern, reach_synchronizer
 from ..synchronizers.match import as_match
-from .drawing import COLORS, curves, group_colors, panels
+from .drawing import COLORS, curves, front_line, group_colors, legend_above, panels
 from .given import as_drawn, as_names, mean_of_seen
+from .time_axis import TimeAxis
 
 __all__ = ["SynchronizationDisplay"]
+
+_GROUPS = "groups", "performances"
+_WARPED = {
+    "frames": "frame tau(p) of the performance,\nevenly stretched to the clock",
+    "percent": "% of the performance",
+    "seconds": "time of the performance (s),\nevenly stretched to the clock",
+}
 
 
 class SynchronizationDisplay:
@@ -33,6 +41,10 @@ class SynchronizationDisplay:
         Which of the performances is the pattern.
     groups : sequence of str, default=None
         The group of every performance, by which it is coloured: actors, sessions, ...
+    unit : {"frames", "percent", "seconds"}, default="frames"
+        Of the axes of time.
+    frame_rate : float, or array-like of shape (n_sequences,), default=None
+        Frames a second of the performances, for seconds.
 
     Attributes
     ----------
@@ -42,6 +54,8 @@ class SynchronizationDisplay:
     before_, after_ : list of LineCollection
         The performances of each feature.
     pattern_ : list of Line2D
+    group_means_ : list of list of Line2D
+        For each feature the mean of every group; empty without groups.
     warps_ : LineCollection or None
 
     Examples
@@ -59,7 +73,17 @@ class SynchronizationDisplay:
     """
 
     def __init__(
-        self, before, after, times, *, feature_names, pattern=None, pattern_index=None, groups=None
+        self,
+        before,
+        after,
+        times,
+        *,
+        feature_names,
+        pattern=None,
+        pattern_index=None,
+        groups=None,
+        unit="frames",
+        frame_rate=None,
     ):
         before, _ = read_collection(before)
         self.times = as_match(times, len(before)).times
@@ -74,14 +98,27 @@ class SynchronizationDisplay:
         if pattern is not None:
             self.pattern = as_drawn(pattern, "The pattern", (n_frames, n_shown))
         self.pattern_index = pattern_index
-        self.groups = groups
+        self.groups = None if groups is None else as_names(groups, n_sequences, *_GROUPS)
+        self.unit, self.frame_rate = unit, frame_rate
+        lengths = [len(x) for x in self.before]
+        self._axis = TimeAxis(unit, n_frames, lengths, frame_rate)
 
     def __repr__(self):
         return f"SynchronizationDisplay({len(self.before)} performances, {self.feature_names})"
 
     @classmethod
     def from_estimator(
-        cls, estimator, X, *, features=None, groups=None, warps=True, ax=None, **params
+        cls,
+        estimator,
+        X,
+        *,
+        features=None,
+        groups=None,
+        unit="frames",
+        frame_rate=None,
+        warps=True,
+        ax=None,
+        **params,
     ):
         """Draw what a fitted synchronizer, or a pipeline with one, does to performances.
 
@@ -94,7 +131,13 @@ class SynchronizationDisplay:
             Which features to draw, by index or name: those that reach the synchronizer, which
             may be dimensions of the aSpace. By default the first four.
         groups : sequence of length n_sequences, default=None
-            Colours performances by group, such as ``bunch.actor``.
+            Colours performances by group, such as ``bunch.actor``, and draws the mean of each
+            group; all of them are on the clock of the one pattern.
+        unit : {"frames", "percent", "seconds"}, default="frames"
+            Of the axes of time: frames; per cent of a performance, and of the pattern; or seconds
+            of the performances as recorded, on the clock those of the median performance.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            Frames a second of X, for seconds.
         warps : bool, default=True
             Whether to draw tau(p) against the diagonal.
         ax : Axes or array-like of Axes, default=None
@@ -119,6 +162,8 @@ class SynchronizationDisplay:
             pattern=synchronizer.pattern_[:, chosen],
             pattern_index=index_of_pattern(synchronizer, performances),
             groups=groups,
+            unit=unit,
+            frame_rate=frame_rate,
         )
         return display.plot(ax, warps=warps)
 
@@ -132,6 +177,8 @@ class SynchronizationDisplay:
         features=None,
         feature_names=None,
         groups=None,
+        unit="frames",
+        frame_rate=None,
         warps=True,
         ax=None,
     ):
@@ -148,7 +195,7 @@ class SynchronizationDisplay:
         features : int, str or list of them, default=None
         feature_names : sequence of str, default=None
             By default the names of the columns, or x0, x1, ...
-        groups, warps, ax : as for `from_estimator`
+        groups, unit, frame_rate, warps, ax : as for `from_estimator`
 
         Returns
         -------
@@ -177,6 +224,8 @@ class SynchronizationDisplay:
             feature_names=[feature_names[i] for i in chosen],
             pattern=None if pattern is None else pattern[:, chosen],
             groups=groups,
+            unit=unit,
+            frame_rate=frame_rate,
         )
         return display.plot(ax, warps=warps)
 
@@ -198,31 +247,34 @@ class SynchronizationDisplay:
         n_rows, n_cols = len(self.feature_names), 2 + bool(warps)
         spots = [(row, column) for row in range(n_rows) for column in (0, 1)]
         spots += [(slice(None), 2)] * bool(warps)
-        size = (3.2 * n_cols, max(2.6, 1.6 * n_rows + 0.8))
-        self.figure_, self.axes_ = panels(ax, spots, n_rows, n_cols, size)
         colors, color_of = group_colors(self.groups, len(self.before))
-        style = {"colors": colors, "linewidths": 0.9, "alpha": 0.55}
-        clock = np.arange(self.times.shape[1])
-        self.before_, self.after_, self.pattern_ = [], [], []
+        n_lines = -(-len(color_of) // 3)
+        size = (3.2 * n_cols, max(2.6, 1.6 * n_rows + 0.8) + 0.2 * n_lines)
+        self.figure_, self.axes_ = panels(ax, spots, n_rows, n_cols, size)
+        style = {"colors": colors, "linewidths": 0.9, "alpha": 0.35 if color_of else 0.55}
+        clock, own = self._axis.clock, self._axis.own()
+        self.before_, self.after_, self.pattern_, self.group_means_ = [], [], [], []
         for row, name in enumerate(self.feature_names):
             left, right = self.axes_[2 * row : 2 * row + 2]
-            own = [np.arange(len(x)) for x in self.before]
             self.before_.append(curves(left, own, [x[:, row] for x in self.before], **style))
             after = self.after[:, :, row]
             self.after_.append(curves(right, [clock] * len(after), after, **style))
+            self.group_means_.append(self._draw_means(right, clock, row, color_of))
             self.pattern_.append(self._draw_pattern(right, clock, row))
             left.set_ylabel(name)
             right.sharey(left)
             right.autoscale_view()
             if row == 0:
                 left.set_title(f"as recorded\n{len(self.before)} performances")
-                right.set_title(f"synchronised\n{self._describe_pattern()}")
-        left.set_xlabel("frame of the performance")
-        right.set_xlabel("frame of the pattern")
+                means = ", thick: means of groups" if color_of else ""
+                right.set_title(f"synchronised{means}\n{self._describe_pattern()}")
+        left.set_xlabel(self._axis.label_of_performances)
+        right.set_xlabel(self._axis.label)
         self.warps_ = self._draw_warps(self.axes_[-1], clock, style) if warps else None
-        if color_of:
-            _legend_of_groups(self.axes_[0], color_of)
         _small_titles(self.axes_)
+        if color_of:
+            handles, labels = self.group_means_[0], list(color_of)
+            legend_above(self.axes_, handles, labels, below=self.axes_[:2])
         return self
 
     def _describe_pattern(self):
@@ -231,28 +283,34 @@ class SynchronizationDisplay:
         which = "" if self.pattern_index is None else f", performance {self.pattern_index}"
         return f"black: the pattern{which}"
 
+    def _draw_means(self, axis, clock, row, color_of):
+        """The mean of every group, in front of its performances."""
+        means = []
+        for name, color in color_of.items():
+            members = np.array(self.groups) == name
+            curve = mean_of_seen(self.after[members, :, row], axis=0)
+            means.append(front_line(axis, clock, curve, color=color))
+        return means
+
     def _draw_pattern(self, axis, clock, row):
         curve = mean_of_seen(self.after[:, :, row], axis=0)
         if self.pattern is not None:
             curve = self.pattern[:, row]
-        (line,) = axis.plot(clock, curve, color=COLORS["pattern"], linewidth=1.6)
+        style = {"linestyle": "--", "linewidth": 1.2} if self.groups else {"linewidth": 1.6}
+        (line,) = axis.plot(clock, curve, color=COLORS["pattern"], zorder=5, **style)
         return line
 
     def _draw_warps(self, axis, clock, style):
-        lines = curves(axis, [clock] * len(self.times), self.times, **style)
+        times = self._axis.of_clock(self.times)
+        lines = curves(axis, [clock] * len(times), times, **style)
         axis.plot(clock, clock, "--", color=COLORS["pattern"], linewidth=1)
         axis.set_title("warps\ndashed: an even pace")
-        axis.set_xlabel("frame p of the pattern")
-        axis.set_ylabel("frame tau(p) of the performance,\nevenly stretched to the clock")
+        axis.set_xlabel(self._axis.label)
+        axis.set_ylabel(_WARPED[self.unit])
         place = {"transform": axis.transAxes, "fontsize": "small", "color": "0.3"}
         axis.text(0.04, 0.96, "later than\nthe pattern", va="top", **place)
         axis.text(0.96, 0.04, "earlier than\nthe pattern", ha="right", **place)
         return lines
-
-
-def _legend_of_groups(axis, color_of):
-    handles = [axis.plot([], [], color=color, label=name)[0] for name, color in color_of.items()]
-    axis.legend(handles=handles, loc="best", fontsize="small", frameon=True)
 
 
 def _small_titles(axes):

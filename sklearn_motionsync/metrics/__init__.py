@@ -8,12 +8,15 @@ from .measures import (
     roughness,
     timing_error,
 )
+from .phase import AmplitudePhase, amplitude_phase_variance
 from .scorers import FeatureHoldoutScorer, SpreadScorer
 from .spread import least_squares, pairwise_correlation, sobolev_least_squares
 
 __all__ = [
+    "AmplitudePhase",
     "FeatureHoldoutScorer",
     "SpreadScorer",
+    "amplitude_phase_variance",
     "group_timing_error",
     "inverse_consistency",
     "keyframe_error",

@@ -11,6 +11,7 @@ from ..aspace import ASpace
 from ..features import as_features, names_of
 from ..performances import check_performances
 from ..pipelines import asking, find_step, flat_steps, how_to_give, taken_by, transform_through
+from ..sequences import as_collection
 from .action_model import ActionModel
 
 __all__ = ["View", "view_of"]
@@ -111,9 +112,10 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
     if way is None:
         nothing = np.zeros(len(names))
         return View(model, names, points, points, labels, model, given, nothing)
-    names = names_of(way.before, way.aspace, way.aspace.n_features_in_)
+    beside = names[len(way.aspace.components_) :]
+    names = [*names_of(way.before, way.aspace, way.aspace.n_features_in_), *beside]
     seen = None if points is None else way.back(points)
-    left_out = _NEWCOMER * way.aspace.left_out_variance_
+    left_out = np.append(_NEWCOMER * way.aspace.left_out_variance_, np.zeros(len(beside)))
     return View(_seen(model, way.back), names, seen, whole, labels, model, given, left_out)
 
 
@@ -125,7 +127,10 @@ def _seen(model, through):
 
 
 class _Way(NamedTuple):
-    """The aSpace of a pipeline, the steps before it, and the synchronizers after it."""
+    """The aSpace of a pipeline, the steps before it, and the synchronizers after it.
+
+    What these put beside the points of the aSpace, such as a `TimingChannel`, stays there.
+    """
 
     before: Pipeline | None
     aspace: ASpace
@@ -133,7 +138,9 @@ class _Way(NamedTuple):
 
     def back(self, points):
         """Postures of points of the aSpace."""
-        return points @ self.aspace.components_ + self.aspace.mean_
+        components, mean = self.aspace.components_, self.aspace.mean_
+        points, beside = np.split(points, [len(components)], axis=2)
+        return np.concatenate([points @ components + mean, beside], axis=2)
 
     def follow(self, X, params, caller):
         """What reaches the model, and the postures of it, whole, on the same clock."""
@@ -145,7 +152,8 @@ class _Way(NamedTuple):
             for step in self.after:
                 whole = step.match(points, **taken_by(step.match, params)).warp(whole)
                 points = step.transform(points, **taken_by(step.transform, params))
-        return points, np.stack(whole)
+        beside = np.stack(as_collection(points))[:, :, len(self.aspace.components_) :]
+        return points, np.concatenate([np.stack(whole), beside], axis=2)
 
 
 def _way_back(before, names, must):

@@ -15,6 +15,7 @@ from ..matching.units import Unit
 from ..matching.warps import normalise
 from ..notebook import DocumentedMixin
 from ..performances import Performances, SequenceLevelMixin, names_of_input, restore
+from .match import check_answer
 
 __all__ = ["Synchronizer", "TrainingSet"]
 
@@ -243,13 +244,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
     def _warp(self, X, **params):
         performances = self.check_performances(X)
         match = self.match(performances, **params)
-        shape = np.shape(getattr(match, "times", None))
-        if shape != (len(performances), self.n_frames_):
-            raise ValueError(
-                f"{type(self).__name__}.match must return a Match with times of shape "
-                f"(n_sequences, P), here {(len(performances), self.n_frames_)}; got "
-                f"{type(match).__name__} with {shape}."
-            )
+        check_answer(match, len(performances), self.n_frames_, type(self).__name__)
         out = match.warp(performances)
         if performances.kind == "rows":
             return out[:, :, 0]

@@ -1,16 +1,21 @@
 """Match: how performances meet the pattern, which every synchronizer answers with."""
 
 import numpy as np
+import pandas as pd
 
 from ..gate import as_numbers
 from ..matching.warps import sample
 from ..performances import read_collection
 from ..pipelines import reach_synchronizer
+from ..sequences import as_collection, to_frame
+from .clock import as_frame_rate, as_unit
 
-__all__ = ["Match", "as_match"]
+__all__ = ["Match", "as_match", "check_answer"]
 
 # Rounding may take times back by this share of the clock.
 _ROUNDING = 1e-9
+# Slower is standing still: a hundredth of the pace of the pattern.
+_SLOWEST = 0.01
 
 
 class Match:
@@ -60,6 +65,14 @@ class Match:
     >>> forces = [np.arange(41.0)[:, None], np.arange(81.0)[:, None]]  # ten times the rate
     >>> match.warp(forces)[1].ravel().tolist()
     [0.0, 20.0, 40.0, 60.0, 80.0]
+
+    Timing is a result, too: this one is late at first, by a quarter of the clock at most.
+
+    >>> late = Match([[0, 2, 3, 3.5, 4]])
+    >>> late.offsets_in("percent").tolist()
+    [[0.0, 25.0, 25.0, 12.5, 0.0]]
+    >>> late.rates.tolist()
+    [[2.0, 1.5, 0.75, 0.5, 0.5]]
     """
 
     __slots__ = ("distances", "times")
@@ -99,8 +112,104 @@ class Match:
 
     @property
     def offsets(self):
-        """``Delta(p) = tau(p) - p``, in frames of the pattern: (n_sequences, P)."""
+        """``Delta(p) = tau(p) - p``, in frames of the pattern: (n_sequences, P).
+
+        Positive where a performance is later than the pattern, negative where it is earlier.
+        """
         return self.times - np.arange(self.times.shape[1])
+
+    @property
+    def rates(self):
+        """``d tau / dp``, how fast performances run where the pattern runs at 1: (n_sequences, P).
+
+        Central differences of ``times``, one-sided at both ends. Where tau stands still the rate is
+        0.01 and not less, so that its log, ``np.log(match.rates)``, is finite: 0 at the pace of the
+        pattern, positive where a performance is faster.
+        """
+        return np.maximum(np.gradient(self.times, axis=1), _SLOWEST)
+
+    def offsets_in(self, unit, X=None, frame_rate=None):
+        """How much later than the pattern performances are at every frame of it, in a unit of time.
+
+        The lengths of performances do not count: all begin and end with the pattern. Who
+        is slower evenly is not late.
+
+        Parameters
+        ----------
+        unit : {"frames", "percent", "seconds"}
+            Frames of the pattern, as ``offsets``; per cent of the clock, ``100 Delta / (P - 1)``;
+            or seconds of each performance as it was recorded, by which it is later than it would
+            be had it gone evenly with the pattern.
+        X : as for ``frames``, default=None
+            For seconds: the performances, or how many frames each has.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            For seconds: frames a second of what X is.
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P)
+            Positive where a performance is later than the pattern.
+
+        Raises
+        ------
+        ValueError
+            If there is no such unit, or X or the frame rate is missing for seconds; as from
+            ``seconds``.
+        """
+        return self._in_unit(unit, X, frame_rate)[1]
+
+    def to_frame(self, unit="frames", X=None, frame_rate=None, labels=None):
+        """The timing of all performances as a table, such as for a CSV file.
+
+        Parameters
+        ----------
+        unit : {"frames", "percent", "seconds"}, default="frames"
+            Of ``time`` and ``offset``, as in ``offsets_in``.
+        X : as for ``frames``, default=None
+            For seconds; and where it has labels, they are those of the table.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            For seconds: frames a second of what X is.
+        labels : sequence of length n_sequences, default=None
+            What performances are called; by default as in X, or 0, 1, ...
+
+        Returns
+        -------
+        DataFrame
+            Indexed by performance and frame of the pattern, with the columns ``time``, tau(p) in
+            the unit, from the beginning of each performance; ``offset``, how much later than the
+            pattern that is; and ``rate``.
+
+        Raises
+        ------
+        ValueError
+            As from ``offsets_in``; or if there is not one label a performance.
+
+        Examples
+        --------
+        >>> from sklearn_motionsync import Match
+        >>> match = Match([[0, 2, 3, 3.5, 4]])
+        >>> match.to_frame("percent", labels=["ann"]).loc["ann"].round(1)
+                time  offset  rate
+        frame
+        0        0.0     0.0   2.0
+        1       50.0    25.0   1.5
+        2       75.0    25.0   0.8
+        3       87.5    12.5   0.5
+        4      100.0     0.0   0.5
+        >>> csv = match.to_frame("percent", labels=["ann"]).to_csv()
+        """
+        times, offsets = self._in_unit(unit, X, frame_rate)
+        if isinstance(X, pd.DataFrame) and labels is None:
+            labels = list(X.index.droplevel(-1).unique())
+        tables = [
+            pd.DataFrame(np.column_stack(columns), columns=["time", "offset", "rate"])
+            for columns in zip(times, offsets, self.rates, strict=True)
+        ]
+        if labels is not None:
+            self._check_count(labels, "labels")
+        for table, x in zip(tables, _with_attributes(X), strict=False):
+            table.attrs.update(x.attrs)
+        return to_frame(tables, performances=labels)
 
     @classmethod
     def from_estimator(cls, estimator, X, **params):
@@ -183,16 +292,7 @@ class Match:
         ValueError
             If there is not one a performance, or one has fewer than two frames.
         """
-        lengths = _lengths(X)
-        self._check_count(lengths, "lengths")
-        sound = (lengths >= 2) & (lengths == np.floor(lengths))
-        if not sound.all():
-            i = int(np.argmin(sound))
-            raise ValueError(
-                f"Performance {i} has {lengths[i]:g} frames; give the performances, or how many "
-                "frames each has, whole numbers of at least 2."
-            )
-        return self.times * (lengths[:, np.newaxis] - 1) / (self.times.shape[1] - 1)
+        return self._stretched(self.times, X)
 
     def seconds(self, X, frame_rate):
         """When in each performance, from its beginning, each frame of the pattern is met.
@@ -212,17 +312,41 @@ class Match:
         ValueError
             As from ``frames``; or if a rate is not above 0, or there is not one a performance.
         """
-        rate = as_numbers(frame_rate, "frame_rate")
-        sound = (rate > 0) & np.isfinite(rate)
-        if rate.ndim > 1 or not sound.all():
-            which = f" for performance {int(np.argmin(sound))}" if rate.ndim == 1 else ""
+        return self._in_seconds(self.times, X, frame_rate)
+
+    def _in_unit(self, unit, X, frame_rate):
+        """tau(p) in a unit of time, and how much of it is offset."""
+        unit, last = as_unit(unit), self.times.shape[1] - 1
+        if unit != "seconds":
+            scale = 100 / last if unit == "percent" else 1
+            if X is not None:
+                self._check_count(_lengths(X), "lengths")
+            return self.times * scale, self.offsets * scale
+        if X is None or frame_rate is None:
             raise ValueError(
-                f"frame_rate must be one number above 0, or one a performance, got {frame_rate!r}"
-                f"{which}."
+                "unit='seconds' needs X, the performances or how many frames each has, and "
+                "frame_rate: how long each of them takes."
             )
+        return tuple(self._in_seconds(t, X, frame_rate) for t in (self.times, self.offsets))
+
+    def _stretched(self, times, X):
+        """Frames of the pattern as frames of each performance, which has as many as it has."""
+        lengths = _lengths(X)
+        self._check_count(lengths, "lengths")
+        sound = (lengths >= 2) & (lengths == np.floor(lengths))
+        if not sound.all():
+            i = int(np.argmin(sound))
+            raise ValueError(
+                f"Performance {i} has {lengths[i]:g} frames; give the performances, or how many "
+                "frames each has, whole numbers of at least 2."
+            )
+        return times * (lengths[:, np.newaxis] - 1) / (self.times.shape[1] - 1)
+
+    def _in_seconds(self, times, X, frame_rate):
+        rate = as_frame_rate(frame_rate)
         if rate.ndim == 1:
             self._check_count(rate, "frame rates")
-        return self.frames(X) / rate[..., np.newaxis]
+        return self._stretched(times, X) / rate[..., np.newaxis]
 
     def __iter__(self):
         return iter((self.offsets, self.times, self.distances))
@@ -247,6 +371,23 @@ def as_match(times, n_sequences):
             f"performances; got {np.shape(times)}."
         )
     return Match(times)
+
+
+def check_answer(match, n_sequences, n_frames, name):
+    """Refuse what a synchronizer of this name answers with, unless it matches all performances."""
+    shape = np.shape(getattr(match, "times", None))
+    if shape != (n_sequences, n_frames):
+        raise ValueError(
+            f"{name}.match must return a Match with times of shape (n_sequences, P), here "
+            f"{(n_sequences, n_frames)}; got {type(match).__name__} with {shape}."
+        )
+
+
+def _with_attributes(X):
+    """The sequences of a collection that may know what they are called; none of anything else."""
+    if X is None or (not hasattr(X, "columns") and all(np.ndim(n) == 0 for n in X)):
+        return []
+    return [x for x in as_collection(X) or [] if hasattr(x, "attrs")]
 
 
 def _lengths(X):

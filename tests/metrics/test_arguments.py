@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from sklearn_motionsync import to_frame
 from sklearn_motionsync.metrics import (
+    amplitude_phase_variance,
     group_timing_error,
     inverse_consistency,
     keyframe_error,
@@ -185,7 +186,7 @@ def with_gap(value):
     return x
 
 
-@pytest.mark.parametrize("measure", SPREADS)
+@pytest.mark.parametrize("measure", [*SPREADS, amplitude_phase_variance])
 @pytest.mark.parametrize(
     ("bad", "message"),
     [

@@ -207,3 +207,91 @@ def test_gaps_stay_where_they_are(gap, frame):
     if 0 < frame < 9:
         skips = np.where(np.arange(10) < frame, frame - 1.0, frame + 1.0)
         assert np.isfinite(Match([skips]).warp([x])).all()
+
+
+# -- timing as a result ------------------------------------------------------------------
+
+
+@pytest.fixture
+def late():
+    """The peak of the pattern, at frame 5 of 11, comes at frame 7 of one and at 4 of another."""
+    return Match([np.interp(np.arange(11), [0, 5, 10], [0, peak, 10]) for peak in (7, 4)])
+
+
+def test_offsets_are_positive_where_a_performance_is_later(late):
+    peak = np.exp(-np.square(np.arange(11.0) - 5))[:, np.newaxis]
+    slow = np.interp(np.arange(11), late.times[0], np.arange(11))
+    X = [peak, np.interp(slow, np.arange(11), peak[:, 0])[:, np.newaxis]]
+    assert X[1].argmax() == 7
+    found = DenseSynchronizer(pattern=0, consensus=0, cost="posture").fit(X).match(X)
+    assert found.offsets[1, 5] > 1
+    assert late.offsets[:, 5].tolist() == [2, -1]
+
+
+def test_offsets_in_units(late):
+    np.testing.assert_array_equal(late.offsets_in("frames"), late.offsets)
+    assert late.offsets_in("percent")[:, 5].tolist() == [20, -10]
+    X = [np.zeros((21, 1)), np.zeros((41, 1))]
+    # Two seconds and one, of which 20 per cent and 10.
+    for given in (X, [21, 41]):
+        seconds = late.offsets_in("seconds", given, frame_rate=[10, 40])
+        np.testing.assert_allclose(seconds[:, 5], [0.4, -0.1])
+    even = np.linspace(0, 1, 11) * np.array([[2], [1]])
+    np.testing.assert_allclose(seconds, late.seconds(X, [10, 40]) - even, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda m: m.offsets_in("ms"), r"unit must be one of \['frames', .*got 'ms'"),
+        (lambda m: m.offsets_in(None), "got None"),
+        (lambda m: m.offsets_in("seconds"), "needs X, .* and frame_rate"),
+        (lambda m: m.offsets_in("seconds", [5, 5]), "needs X, .* and frame_rate"),
+        (lambda m: m.offsets_in("seconds", frame_rate=5), "needs X, .* and frame_rate"),
+        (lambda m: m.offsets_in("seconds", [5], 5), "2 matched performances, but 1 lengths"),
+        (lambda m: m.offsets_in("percent", [5]), "2 matched performances, but 1 lengths"),
+        (lambda m: m.to_frame(labels=["a"]), "2 matched performances, but 1 labels"),
+        (lambda m: m.to_frame(labels=["a", "a"]), "2 different labels"),
+        (lambda m: m.to_frame("hours"), "unit must be one of"),
+    ],
+)
+def test_units_that_are_none(late, call, message):
+    with pytest.raises(ValueError, match=message):
+        call(late)
+
+
+def test_rates_are_the_slope_of_the_warp(late):
+    rates = late.rates
+    np.testing.assert_allclose(
+        rates[:, [0, 3, 7, 10]], [[1.4] * 2 + [0.6] * 2, [0.8] * 2 + [1.2] * 2]
+    )
+    np.testing.assert_allclose(rates[:, 5], [1, 1])
+    assert (Match([np.arange(9)]).rates == 1).all()
+    still = Match([[0, 0, 0, 3, 3]]).rates
+    assert np.isfinite(np.log(still)).all()
+    assert still[0, 0] == still.min() == 0.01
+
+
+def test_a_table_of_the_timing(late):
+    X = to_frame([np.zeros((21, 1)), np.zeros((41, 1))], performances=["ann", "bob"])
+    table = late.to_frame("seconds", X, frame_rate=[10, 40])
+    assert table.index.names == ["performance", "frame"]
+    assert list(table.index.unique(0)) == ["ann", "bob"]
+    assert list(table.columns) == ["time", "offset", "rate"]
+    np.testing.assert_allclose(table.loc[("bob", 5)], [0.4, -0.1, 1])
+    table = late.to_frame()
+    np.testing.assert_array_equal(table["offset"].unstack(), late.offsets)
+    np.testing.assert_array_equal(table["time"].unstack(), late.times)
+    np.testing.assert_array_equal(table["rate"].unstack(), late.rates)
+    assert list(late.to_frame("percent", labels=pd.Series(["x", "y"])).index.unique(0)) == [
+        "x",
+        "y",
+    ]
+    assert list(late.to_frame(X=X, labels=["x", "y"]).index.unique(0)) == ["x", "y"]
+    assert list(late.to_frame(X=[21, 41]).index.unique(0)) == [0, 1]
+
+
+def test_a_match_of_two_frames():
+    match = Match([[0, 1], [0, 0.5]])
+    assert match.offsets_in("percent").tolist() == [[0, 0], [0, -50]]
+    assert match.rates.tolist() == [[1, 1], [0.5, 0.5]]

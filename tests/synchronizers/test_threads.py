@@ -18,6 +18,7 @@ from sklearn_motionsync import (
     KeyframeSynchronizer,
     LinearSynchronizer,
     Skeleton,
+    TimingChannel,
 )
 
 from shift_synchronizer import ShiftSynchronizer
@@ -28,6 +29,7 @@ ESTIMATORS = [
     KeyframeSynchronizer(),
     LinearSynchronizer(),
     ShiftSynchronizer(),
+    TimingChannel(LinearSynchronizer()),
     ASpace(),
     ActionModel(),
     DirectionCosines(Skeleton.paper()),
@@ -59,6 +61,8 @@ def state(estimator):
 
 
 def as_bytes(value):
+    if hasattr(value, "get_params"):
+        return state(value)
     return repr(value) if isinstance(value, dict) else np.asarray(value).tobytes()
 
 

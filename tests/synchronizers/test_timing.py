@@ -1,0 +1,200 @@
+"""TimingChannel: curves and their timing side by side, through all that pipelines do."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn import config_context
+from sklearn.decomposition import PCA
+from sklearn.exceptions import NotFittedError
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionDetector,
+    ActionModel,
+    ActionModelDisplay,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    KeyframeSynchronizer,
+    LinearSynchronizer,
+    Match,
+    SkeletonDisplay,
+    SynchronizationDisplay,
+    TimingChannel,
+    TrellisDisplay,
+    find_departures,
+    to_frame,
+)
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
+
+
+@pytest.fixture(scope="module")
+def bunch():
+    return make_bending(7, n_frames=40, random_state=3)
+
+
+@pytest.fixture(scope="module")
+def points(bunch):
+    return ASpace(3).fit_transform(DirectionCosines(bunch.skeleton).fit_transform(bunch.data))
+
+
+def steps(bunch, *last):
+    return make_pipeline(DirectionCosines(bunch.skeleton), ASpace(3), *last)
+
+
+@pytest.mark.parametrize(
+    ("params", "expected"),
+    [
+        ({}, lambda match, _: match.offsets_in("percent")),
+        ({"unit": "frames"}, lambda match, _: match.offsets),
+        (
+            {"unit": "seconds", "frame_rate": 50},
+            lambda match, X: match.offsets_in("seconds", X, 50),
+        ),
+        ({"channel": "log_rate"}, lambda match, _: np.log(match.rates)),
+    ],
+)
+def test_the_channel_is_the_last_feature(points, params, expected):
+    synchronizer = DenseSynchronizer(30).fit(points)
+    channel = TimingChannel(DenseSynchronizer(30), **params).fit(points)
+    out, match = channel.transform(points), synchronizer.match(points)
+    np.testing.assert_array_equal(out[:, :, :3], synchronizer.transform(points))
+    np.testing.assert_array_equal(out[:, :, 3], expected(match, points))
+    assert channel.get_feature_names_out()[-1] == params.get("channel", "offset")
+    single = TimingChannel(DenseSynchronizer(30), **params)
+    assert single.fit_transform([x.astype(np.float32) for x in points]).dtype == np.float32
+
+
+def test_what_is_asked_of_synchronizers(points):
+    channel = TimingChannel(DenseSynchronizer(30, pattern=2)).fit(points)
+    inner = channel.synchronizer_
+    for name in ("pattern_", "pattern_index_", "n_frames_", "n_features_in_"):
+        np.testing.assert_array_equal(getattr(channel, name), getattr(inner, name))
+    np.testing.assert_array_equal(channel.match(points).times, inner.match(points).times)
+    np.testing.assert_array_equal(channel.normalize(points), inner.normalize(points))
+    assert not hasattr(channel, "feature_names_in_")
+    assert channel.synchronizer is not inner
+    for method in ("match", "normalize", "check_performances", "transform"):
+        with pytest.raises(NotFittedError):
+            getattr(TimingChannel(DenseSynchronizer()), method)(points)
+
+
+def test_rows_are_curves_and_then_their_channel(points):
+    rows = np.sin(np.linspace(0, 6, 25) + np.linspace(0, 1, 5)[:, np.newaxis])
+    channel = TimingChannel(DenseSynchronizer(20)).set_output(transform="pandas").fit(rows)
+    out, inner = channel.transform(rows), channel.synchronizer_
+    assert out.shape == (5, 40)
+    assert list(out.columns[[0, 19, 20, 39]]) == [
+        "densesynchronizer0",
+        "densesynchronizer19",
+        "offset0",
+        "offset19",
+    ]
+    np.testing.assert_array_equal(out.iloc[:, :20], inner.transform(rows))
+    np.testing.assert_array_equal(out.iloc[:, 20:], inner.match(rows).offsets_in("percent"))
+    assert make_pipeline(channel, PCA(2)).fit_transform(rows).shape == (5, 2)
+
+
+def test_tables_keep_their_labels(points):
+    X = to_frame(points, performances=list("abcdefg"), columns=["p", "q", "r"])
+    out = TimingChannel(LinearSynchronizer(9)).set_output(transform="pandas").fit_transform(X)
+    assert list(out.columns) == ["p", "q", "r", "offset"]
+    assert list(out.index.unique(0)) == list("abcdefg")
+    assert (out["offset"] == 0).all()
+
+
+def test_key_frames_by_name_and_by_routing(bunch):
+    X, given = bunch.data, {"keyframes": bunch.keyframes}
+    expected = KeyframeSynchronizer(30).fit(X, **given).match(X, **given)
+    channel = TimingChannel(KeyframeSynchronizer(30)).fit(X, **given)
+    out = channel.transform(X, **given)
+    np.testing.assert_array_equal(out[:, :, -1], expected.offsets_in("percent"))
+    np.testing.assert_array_equal(channel.fit_transform(X, **given), out)
+    with pytest.raises(ValueError, match="fitted with key-frames"):
+        channel.transform(X)
+    with pytest.raises(TypeError, match="keyframes"):
+        TimingChannel(LinearSynchronizer()).fit(X, **given)
+    np.testing.assert_array_equal(Match.from_estimator(channel, X, **given).times, expected.times)
+    with pytest.raises(TypeError, match="got 'moments', which is no argument"):
+        Match.from_estimator(channel, X, moments=[1])
+    assert SpreadScorer()(channel, X, **given) == SpreadScorer()(channel.synchronizer_, X, **given)
+    with config_context(enable_metadata_routing=True):
+        asking = KeyframeSynchronizer(30).set_fit_request(keyframes=True)
+        asking.set_transform_request(keyframes=True)
+        pipe = make_pipeline(TimingChannel(asking), ActionModel())
+        pipe.fit(X, **given)
+        np.testing.assert_array_equal(pipe[:1].transform(X, **given), out)
+        np.testing.assert_array_equal(TimingChannel(asking).fit_transform(X, **given), out)
+        fits_only = KeyframeSynchronizer(30).set_fit_request(keyframes=True)
+        fits_only.set_transform_request(keyframes=False)
+        with pytest.raises(ValueError, match="fitted with key-frames"):
+            TimingChannel(fits_only).fit_transform(X, **given)
+        with pytest.raises(TypeError, match="moments"):
+            TimingChannel(asking).fit_transform(X, moments=[1])
+
+
+def test_tools_of_pipelines_find_the_synchronizer(bunch):
+    pipe = steps(bunch, TimingChannel(DenseSynchronizer(30)), ActionModel()).fit(bunch.data)
+    plain = steps(bunch, DenseSynchronizer(30), ActionModel()).fit(bunch.data)
+    X = bunch.data
+    np.testing.assert_array_equal(
+        Match.from_estimator(pipe, X).times, Match.from_estimator(plain, X).times
+    )
+    for scorer in (SpreadScorer(), FeatureHoldoutScorer()):
+        assert scorer(pipe, X) == scorer(plain, X)
+    one, other = (SynchronizationDisplay.from_estimator(p, X) for p in (pipe, plain))
+    np.testing.assert_array_equal(one.after, other.after)
+    one, other = (TrellisDisplay.from_estimator(p, X, performance=1) for p in (pipe, plain))
+    np.testing.assert_array_equal(one.costs, other.costs)
+    assert len(SkeletonDisplay.from_model(pipe, frames=[5]).axes_) == 2
+    assert len(SkeletonDisplay.from_departures(pipe, X, performance=1, frames=2).axes_) == 2
+    detector = ActionDetector(pipe).fit(X)
+    assert (detector.predict(X) == 1).all()
+    search = GridSearchCV(
+        pipe, {"timingchannel__synchronizer__max_offset": [0.0, 0.25]}, cv=2, scoring=SpreadScorer()
+    )
+    assert search.fit(X).best_params_ == {"timingchannel__synchronizer__max_offset": 0.25}
+
+
+def test_models_of_postures_keep_the_channel(bunch):
+    """The model is taken back out of the aSpace, and the timing stays beside the postures."""
+    pipe = steps(bunch, TimingChannel(DenseSynchronizer(30)), ActionModel()).fit(bunch.data)
+    display = ActionModelDisplay.from_estimator(pipe, bunch.data)
+    assert display.feature_names == ["aspace0", "aspace1", "aspace2", "offset"]
+    features = ["offset", "pelvis_height"]
+    plain = steps(bunch, DenseSynchronizer(30), ActionModel()).fit(bunch.data)
+    for band in ("points", "performances"):
+        display = ActionModelDisplay.from_estimator(pipe, bunch.data, features=features, band=band)
+        offsets = Match.from_estimator(pipe, bunch.data).offsets_in("percent")
+        np.testing.assert_allclose(display.performances[:, :, 0], offsets)
+        np.testing.assert_allclose(display.mean[:, 0], offsets.mean(axis=0))
+        expected = ActionModelDisplay.from_estimator(
+            plain, bunch.data, features="pelvis_height", band=band
+        )
+        np.testing.assert_allclose(display.performances[:, :, 1:], expected.performances)
+    strange = [*bunch.data[:2], bunch.data[2][::-1]]
+    assert "offset" in set(find_departures(pipe, strange, limit=0.5)["feature"])
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({"channel": "phase"}, "The 'channel' parameter"),
+        ({"unit": "ms"}, "The 'unit' parameter"),
+        ({"unit": "seconds"}, "unit='seconds' needs frame_rate"),
+        ({"frame_rate": 0}, "The 'frame_rate' parameter"),
+        ({"synchronizer": ASpace()}, "The 'synchronizer' parameter .* 'sklearn_motionsync"),
+        ({"synchronizer": TimingChannel(DenseSynchronizer())}, "The 'synchronizer' parameter"),
+    ],
+)
+def test_parameters_are_validated(points, params, message):
+    with pytest.raises(ValueError, match=message):
+        TimingChannel(DenseSynchronizer()).set_params(**params).fit(points)
+
+
+def test_frames_with_names(points):
+    frames = [pd.DataFrame(x, columns=["p", "q", "r"]) for x in points]
+    channel = TimingChannel(LinearSynchronizer()).fit(frames)
+    assert list(channel.feature_names_in_) == ["p", "q", "r"]
+    assert list(channel.get_feature_names_out()) == ["p", "q", "r", "offset"]
