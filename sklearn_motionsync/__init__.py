@@ -24,11 +24,12 @@ from .display import (
     SynchronizationDisplay,
     TrellisDisplay,
 )
+from .long_tables import to_sequences
 from .model.action_model import ActionModel
 from .model.departures import find_departures
 from .model.detector import ActionDetector
 from .recognition import ActionClassifier, synchronization_distances
-from .sequences import to_frame, to_sequences
+from .sequences import to_frame
 from .synchronizers.base import Synchronizer
 from .synchronizers.dense import DenseSynchronizer
 from .synchronizers.keyframes import KeyframeSynchronizer
