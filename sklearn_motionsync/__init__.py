@@ -24,6 +24,7 @@ from .display import (
     SynchronizationDisplay,
     TrellisDisplay,
 )
+from .framewise import FrameWise
 from .long_tables import to_sequences
 from .model.action_model import ActionModel
 from .model.departures import find_departures
@@ -46,6 +47,7 @@ __all__ = [
     "ActionModelDisplay",
     "DenseSynchronizer",
     "DirectionCosines",
+    "FrameWise",
     "JointPositions",
     "KeyframeSynchronizer",
     "LinearSynchronizer",

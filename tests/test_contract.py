@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn import clone, config_context
+from sklearn.decomposition import PCA
 from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
 from sklearn.utils import estimator_checks
@@ -17,6 +18,7 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
+    FrameWise,
     JointPositions,
     KeyframeSynchronizer,
     LinearSynchronizer,
@@ -52,7 +54,9 @@ DETECTOR = ActionDetector(make_pipeline(DenseSynchronizer(), ActionModel()))
 CLASSIFIER = InTurns(n_frames=8)
 ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, ActionModel(), DETECTOR]
 BODY_ESTIMATORS = [DirectionCosines(Skeleton.paper()), JointPositions(Skeleton.paper())]
-ESTIMATORS = [*BODY_ESTIMATORS, *ROW_ESTIMATORS, CLASSIFIER]
+# Those of other transformers are in tests/test_framewise.py.
+FRAMEWISE = FrameWise(PCA(2))
+ESTIMATORS = [*BODY_ESTIMATORS, *ROW_ESTIMATORS, FRAMEWISE, CLASSIFIER]
 TRANSFORMERS = [e for e in ESTIMATORS if hasattr(e, "transform")]
 
 EXTRA_CHECKS = [

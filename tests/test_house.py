@@ -29,6 +29,7 @@ FLOORS = [
     "pipelines",
     "features",
     "aspace",
+    "framewise",
     "body",
     "matching",
     "synchronizers",
