@@ -25,11 +25,13 @@ from .display import (
     SynchronizationDisplay,
     TrellisDisplay,
 )
+from .framewise import FrameWise
+from .long_tables import to_sequences
 from .model.action_model import ActionModel
 from .model.departures import find_departures
 from .model.detector import ActionDetector
 from .recognition import ActionClassifier, synchronization_distances
-from .sequences import to_frame, to_sequences
+from .sequences import to_frame
 from .synchronizers.base import Synchronizer
 from .synchronizers.dense import DenseSynchronizer
 from .synchronizers.keyframes import KeyframeSynchronizer
@@ -47,6 +49,7 @@ __all__ = [
     "ActionModelDisplay",
     "DenseSynchronizer",
     "DirectionCosines",
+    "FrameWise",
     "JointPositions",
     "KeyframeSynchronizer",
     "LinearSynchronizer",

@@ -171,7 +171,7 @@ def _not_numeric(values, what, reason):
     return f"{what} is not a numeric array: got {type(values).__name__}, {reason}."
 
 
-def check_finite(array, where, names=None, frames=None):
+def check_finite(array, where, names=None, frames=None, *, allow_nan=False):
     """Refuse NaN and infinity in (n_frames, n_features), naming the first one.
 
     Parameters
@@ -181,12 +181,17 @@ def check_finite(array, where, names=None, frames=None):
         Up to the number of the frame, such as "Performance 3, frame".
     names, frames : list, default=None
         Names of the features, and labels of the frames.
+    allow_nan : bool, default=False
+        Refuse infinity only.
     """
     # A sum is not finite if a term is not; no mask is made of a sound array.
     with np.errstate(over="ignore", invalid="ignore"):
         if np.isfinite(array.sum()) or np.isfinite(array).all():
             return
-    frame, feature = np.argwhere(~np.isfinite(array))[0]
+    bad = np.isinf(array) if allow_nan else ~np.isfinite(array)
+    if not bad.any():
+        return
+    frame, feature = np.argwhere(bad)[0]
     kind = "NaN" if np.isnan(array[frame, feature]) else "infinity"
     label = "" if frames is None or frames[frame] == frame else f" ({frames[frame]})"
     name = "" if names is None else f" ({names[feature]!r})"

@@ -10,14 +10,13 @@ from sklearn.utils._set_output import _get_output_config
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from .gate import check_finite, check_names, names_of, refuse
-from .sequences import (
-    ACCEPTED,
+from .sequences import ACCEPTED, NOT_ONE, as_collection, check_members
+from .tables import (
     INDEX_NAMES,
-    NOT_ONE,
-    as_collection,
-    check_members,
+    as_pandas,
     frame_labels,
-    frame_name,
+    labels_of,
+    name_performance,
     stack_frame,
 )
 
@@ -26,6 +25,7 @@ __all__ = [
     "SequenceLevelMixin",
     "check_performances",
     "check_transformed",
+    "labels_as_given",
     "name_performance",
     "names_of_input",
     "read_collection",
@@ -50,13 +50,13 @@ class Performances(tuple):
     kind : {"rows", "array", "list", "frame"}
         2-D, 3-D, list, MultiIndex frame.
     labels : list
-        Of the performances.
+        Of the performances; tuples where several levels name them.
     frames : list
         Labels of the frames of each performance; empty for univariate rows.
     names : ndarray of str or None
         ``feature_names_in_`` of the estimator that checked them.
     levels : tuple of str
-        What performances and frames are called.
+        Names of the levels of an index; the last is that of the frames.
     """
 
     def __new__(cls, arrays, kind, labels, frames, names=None, levels=INDEX_NAMES):
@@ -87,11 +87,6 @@ class Performances(tuple):
         is_rows = self.kind == "rows"
         fits = is_rows is on_rows and self.names is names and len(self) > 0
         return fits and self[0].shape[not is_rows] == n_features
-
-
-def name_performance(i, label):
-    """What to call a performance in messages and figures."""
-    return f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
 
 
 class SequenceLevelMixin:
@@ -134,7 +129,7 @@ class SequenceLevelMixin:
         return performances
 
 
-def check_performances(estimator, X, *, reset, level, on_rows=None):
+def check_performances(estimator, X, *, reset, level, on_rows=None, finite=True):
     """Check the input of an estimator against the contract.
 
     Parameters
@@ -148,6 +143,8 @@ def check_performances(estimator, X, *, reset, level, on_rows=None):
         How a 2-D input is read.
     on_rows : bool, default=None
         Whether the estimator was fitted on 2-D input and takes nothing else; None: it takes both.
+    finite : {True, "allow-nan"}, default=True
+        Whether NaN is refused, too.
 
     Returns
     -------
@@ -155,7 +152,8 @@ def check_performances(estimator, X, *, reset, level, on_rows=None):
     """
     sequences = as_collection(X)
     if sequences is None:
-        return _check_rows(estimator, X, reset=reset, level=level, on_rows=on_rows)
+        how = {"reset": reset, "level": level, "on_rows": on_rows, "finite": finite}
+        return _check_rows(estimator, X, **how)
     name = type(estimator).__name__
     if on_rows:
         raise ValueError(
@@ -163,9 +161,7 @@ def check_performances(estimator, X, *, reset, level, on_rows=None):
             f"{estimator.n_features_in_}) and got a collection of performances. Give it 2-D "
             "input, or fit it on a collection."
         )
-    is_frame = isinstance(X, pd.DataFrame)
-    labels = list(X.index.unique(level=0)) if is_frame else list(range(len(sequences)))
-    arrays, names = check_members(sequences, labels=labels if is_frame else None)
+    arrays, names = check_members(sequences, finite=finite)
     if not reset and arrays[0].shape[1] != estimator.n_features_in_:
         raise ValueError(
             f"Performance 0 has {arrays[0].shape[1]} features a frame, but {name} is "
@@ -175,10 +171,10 @@ def check_performances(estimator, X, *, reset, level, on_rows=None):
     told = names is not None and isinstance(names[0], str)
     first = pd.DataFrame(arrays[0], columns=names) if told else arrays[0]
     validate_data(estimator, first, reset=reset, skip_check_array=True)
-    kind = "frame" if is_frame else "array" if getattr(X, "ndim", 1) == 3 else "list"
+    is_array = getattr(X, "ndim", 1) == 3
+    kind = "frame" if isinstance(X, pd.DataFrame) else "array" if is_array else "list"
     names = getattr(estimator, "feature_names_in_", None)
-    given = X.index.names if is_frame else [None, frame_name(sequences)]
-    levels = tuple(given or usual for given, usual in zip(given, INDEX_NAMES, strict=True))
+    labels, levels = labels_of(sequences)
     return Performances(arrays, kind, labels, frame_labels(sequences), names, levels)
 
 
@@ -195,7 +191,7 @@ def _check_names(estimator, x, reset):
         check_names(x, names_of_input(estimator), "The input")
 
 
-def check_transformed(estimator, X, names):
+def check_transformed(estimator, X, names, *, finite=True):
     """Check the input of ``inverse_transform``: postures of features of these names."""
     space = type(type(estimator).__name__, (BaseEstimator,), {})()
     space.n_features_in_ = len(names)
@@ -204,7 +200,7 @@ def check_transformed(estimator, X, names):
     named = names_of(some)
     if named is not None and isinstance(named[0], str):
         space.feature_names_in_ = np.asarray(names, dtype=object)
-    return check_performances(space, X, reset=False, level="posture")
+    return check_performances(space, X, reset=False, level="posture", finite=finite)
 
 
 def restore(estimator, performances, arrays, *, frames=None, columns=None):
@@ -217,9 +213,11 @@ def restore(estimator, performances, arrays, *, frames=None, columns=None):
         return arrays[0]
     container = _get_output_config("transform", estimator)["dense"]
     if container == "pandas":
-        labels = performances.frames if frames is None else [frames] * len(arrays)
+        own, levels = performances.frames, performances.levels
+        if frames is not None:
+            own, levels = [frames] * len(arrays), (*levels[:-1], INDEX_NAMES[1])
         columns = estimator.get_feature_names_out() if columns is None else columns
-        return stack_frame(arrays, performances.labels, labels, columns, performances.levels)
+        return stack_frame(arrays, performances.labels, own, columns, levels)
     if container != "default":
         raise ValueError(
             f"{type(estimator).__name__} has no {container!r} output for a collection of "
@@ -228,6 +226,23 @@ def restore(estimator, performances, arrays, *, frames=None, columns=None):
     if performances.kind == "array" or isinstance(arrays, np.ndarray):
         return np.stack(arrays) if isinstance(arrays, list) else arrays
     return arrays
+
+
+def labels_as_given(X, reached):
+    """Labels and level names of performances as a user gave them.
+
+    Parameters
+    ----------
+    X : performances, as the first step of a pipeline takes them
+    reached : Performances
+        What reaches a later step, maybe without labels.
+    """
+    sequences = None if isinstance(X, Performances) else as_collection(X)
+    if sequences is not None:
+        labels, levels = labels_of(sequences)
+        if labels != list(range(len(labels))) and len(labels) == len(reached):
+            return labels, levels
+    return reached.labels, reached.levels
 
 
 def read_collection(X):
@@ -243,15 +258,15 @@ def read_collection(X):
     return check_members(sequences, finite=False)
 
 
-def _check_rows(estimator, X, *, reset, level, on_rows):
+def _check_rows(estimator, X, *, reset, level, on_rows, finite):
     """A 2-D input: rows are postures, or univariate sequences."""
     if on_rows is False:
         raise ValueError(
             f"{type(estimator).__name__} was fitted on a collection of performances and got 2-D or "
             f"other input: wrap one sequence as [X]. {ACCEPTED}."
         )
-    if reset and level == "sequence" and isinstance(X, pd.DataFrame):
-        _refuse_long_table(type(estimator).__name__, X)
+    if reset and level == "sequence" and isinstance(as_pandas(X), pd.DataFrame):
+        _refuse_long_table(type(estimator).__name__, as_pandas(X))
     refuse(X, "The input")
     index = X.index if isinstance(X, pd.DataFrame) else None
     source, X = (
@@ -267,7 +282,7 @@ def _check_rows(estimator, X, *, reset, level, on_rows):
     )
     _check_names(estimator, source, reset)
     names = getattr(estimator, "feature_names_in_", None)
-    check_finite(X, "Row", names, index)
+    check_finite(X, "Row", names, index, allow_nan=finite == "allow-nan")
     if level == "posture":
         levels = INDEX_NAMES[0], getattr(index, "name", None) or INDEX_NAMES[1]
         return Performances([X], "rows", [0], [range(len(X))], levels=levels)

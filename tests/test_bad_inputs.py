@@ -111,7 +111,11 @@ PERFORMANCES = [
     (LONG.drop(columns="trial"), SEQUENCES, ["to_sequences(df, by=[...], time=...)", "'time'"]),
     (FRAMES[0], SEQUENCES, ["'hip'", "to_sequences", "to_numpy()"]),
     (LONG, ALL, ["'trial'", "'ann'"]),
-    (LABELLED.assign(k=1).set_index("k", append=True), SEQUENCES, ["3 levels", "to_sequences"]),
+    (
+        LABELLED.assign(k=1).set_index("k", append=True),
+        SEQUENCES,
+        ["3 levels", "(df, by="],
+    ),
 ]
 
 
@@ -236,13 +240,13 @@ CALLS = [
     (lambda: MATCH.seconds(X, "fast"), ["frame_rate", "'fast'"]),
     (lambda: MATCH.frames(["a"] * 5), ["lengths", "'a'"]),
     (lambda: to_sequences(LONG), ["by=", "time="]),
-    (lambda: to_sequences(LONG, time="time"), ["goes with by="]),
+    (lambda: to_sequences(LONG, time="time"), ["'trial'", "text", "by=['trial'], time='time')"]),
     (lambda: to_sequences(LONG, by="subject"), ["['subject']", "'trial'"]),
     (lambda: to_sequences(LONG, by="trial", time="trial"), ["different"]),
-    (lambda: to_sequences(LONG, by="trial", time="knee"), ["'ann'", "do not increase"]),
+    (lambda: to_sequences(LONG, by="trial", time="knee"), ["'ann'", "gaps", "max_gap=1.73)"]),
     (lambda: to_sequences(LONG.drop(index=3), by="trial", time="time"), ["'ann'", "gap", "2 to 4"]),
     (lambda: to_sequences(BACKWARDS.drop(index=3), by=["day", "trial"], time="time"), ["9, 'ann'"]),
-    (lambda: to_sequences(LONG.assign(time=DATES[0]), by="trial", time="time"), ["durations"]),
+    (lambda: to_sequences(LONG.assign(time=DATES[0]), by="trial", time="time"), ["twice: 0 and"]),
     (lambda: to_sequences(X), ["DataFrame", "got list"]),
     (lambda: to_frame(X[0]), ["single 2-D input", "[X]"]),
     (lambda: to_frame(X, columns=["a"]), ["3 features", "got 1"]),

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn import clone, config_context
+from sklearn.decomposition import PCA
 from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
 from sklearn.utils import estimator_checks
@@ -17,6 +18,7 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
+    FrameWise,
     JointPositions,
     KeyframeSynchronizer,
     LinearSynchronizer,
@@ -54,7 +56,9 @@ CLASSIFIER = InTurns(n_frames=8)
 CHANNELS = [TimingChannel(LinearSynchronizer()), TimingChannel(DenseSynchronizer(), "log_rate")]
 ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR]
 BODY_ESTIMATORS = [DirectionCosines(Skeleton.paper()), JointPositions(Skeleton.paper())]
-ESTIMATORS = [*BODY_ESTIMATORS, *ROW_ESTIMATORS, CLASSIFIER]
+# Those of other transformers are in tests/test_framewise.py.
+FRAMEWISE = FrameWise(PCA(2))
+ESTIMATORS = [*BODY_ESTIMATORS, *ROW_ESTIMATORS, FRAMEWISE, CLASSIFIER]
 TRANSFORMERS = [e for e in ESTIMATORS if hasattr(e, "transform")]
 
 EXTRA_CHECKS = [
@@ -313,8 +317,10 @@ def test_pandas_output_keeps_what_levels_are_called(performances):
     frames = [df.rename_axis("sample") for df in to_sequences(X)]
     for estimator in (ASpace(2), LinearSynchronizer(20)):
         pandas = clone(estimator).set_output(transform="pandas")
-        assert pandas.fit_transform(X).index.names == ["trial", "sample"]
-        assert pandas.fit_transform(frames).index.names == ["performance", "sample"]
+        # Frames of a clock are no samples of a trial.
+        last = "frame" if hasattr(estimator, "n_frames") else "sample"
+        assert pandas.fit_transform(X).index.names == ["trial", last]
+        assert pandas.fit_transform(frames).index.names == ["trial", last]
 
 
 def test_the_way_back_takes_its_own_output(performances):

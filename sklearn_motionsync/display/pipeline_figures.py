@@ -1,10 +1,13 @@
 """Stick figures of what a fitted pipeline knows: its model (Fig. 4), people on its clock."""
 
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
+from sklearn.pipeline import FeatureUnion
 from sklearn.utils.validation import check_is_fitted
 
+from ..aspace import ASpace
 from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
 from ..model.action_model import ActionModel
@@ -138,24 +141,25 @@ class PipelineFigures:
         chosen = partial(as_performance, performance)
         models = models_of_classes(estimator, X, params, caller, chosen)
         if models is None:
-            view, cosines, columns = _in_limbs(estimator, X, params, caller)
+            view, limbs = _in_limbs(estimator, X, params, caller)
             i = chosen(len(view.given))
             called, by = name_performance(i, view.labels[i]), ""
         else:
             (of_class,) = models
             given = of_class.estimator, of_class.performances, {}, caller
-            view, cosines, columns = _in_limbs(*given)
+            view, limbs = _in_limbs(*given)
             i, by = 0, " by the model of that class"
             called = name_performance(int(of_class.indices[0]), of_class.labels[0])
             called = f"{called}, most like {str(of_class.label)!r},"
         limit = view.model.n_std if limit is None else as_limit(limit)
-        names = list(cosines.get_feature_names_out())
-        skeleton = cosines.skeleton.body()
-        strip = strip_of(view.scores[i][:, columns], names, frames, limit, skeleton)
+        names = list(limbs.cosines.get_feature_names_out())
+        skeleton = limbs.cosines.skeleton.body()
+        strip = strip_of(view.scores[i][:, limbs.columns], names, frames, limit, skeleton)
         # Each on a floor of its own, as heights of the pelvis are.
+        positions = limbs.cosines.inverse_transform
         bodies, shadows = (
-            np.asarray(cosines.inverse_transform(x)).reshape(len(x), -1, skeleton.n_dims)
-            for x in (view.whole[i][:, columns], view.model.mean_[:, columns])
+            np.asarray(positions(limbs.back(x))).reshape(len(x), -1, skeleton.n_dims)
+            for x in (view.whole[i], view.model.mean_)
         )
         verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
         display = cls(
@@ -214,22 +218,57 @@ class PipelineFigures:
         )
 
 
+class _Limbs(NamedTuple):
+    """Where the direction cosines are among the features of a view, and the way back to them.
+
+    Attributes
+    ----------
+    cosines : DirectionCosines
+    columns : slice
+    steps : list of transformer
+        Between the cosines and those features, such as scalers.
+    """
+
+    cosines: DirectionCosines
+    columns: slice
+    steps: list
+
+    def back(self, features):
+        """Cosines of features of the view, (n, 37)."""
+        for step in reversed(self.steps):
+            features = np.asarray(step.inverse_transform(features))
+        return features[:, self.columns]
+
+
 def _in_limbs(estimator, X, params, caller):
-    """A view of the model and performances, its DirectionCosines, and which columns are theirs."""
-    _, views = _before_synchronizer(estimator)
+    """A view of the model and performances, and where its limbs are."""
+    before, views = _before_synchronizer(estimator)
     if X is None:
         raise ValueError(f"{caller} needs performances X, whose departures are drawn; got None.")
     view = view_of(estimator, X, params, caller, postures=True)
     cosines = [part for part in views if isinstance(part, DirectionCosines)]
     # Of several there is no telling whose columns they are.
     columns = _columns_of(cosines[0], view.names) if len(cosines) == 1 else None
-    if columns is None:
+    steps = flat_steps(before)
+    found = [k for k, step in enumerate(steps) if cosines and _gives(step, cosines[0])]
+    after = [step for step in steps[sum(found[:1]) + 1 :] if not isinstance(step, ASpace)]
+    back = found and all(hasattr(step, "inverse_transform") for step in after)
+    if columns is None or not back:
         raise ValueError(
             "Limbs that depart need a pipeline of DirectionCosines, an ASpace if you like, "
             "synchronizers and an ActionModel, whose features lead back to limbs; those found "
-            f"are {', '.join(view.names[:4])}, ..."
+            f"are {', '.join(view.names[:4])}, ..., by way of "
+            f"{[type(step).__name__ for step in steps]}."
         )
-    return view, cosines[0], columns
+    return view, _Limbs(cosines[0], columns, after)
+
+
+def _gives(step, cosines):
+    """Whether the features of cosines leave a step, or a union with them, as they are."""
+    if not isinstance(step, FeatureUnion):
+        return step is cosines
+    views = [flat_steps(view) for _, view in step.transformer_list if not isinstance(view, str)]
+    return any(_gives(inner[-1], cosines) for inner in views if inner)
 
 
 def _columns_of(cosines, names):

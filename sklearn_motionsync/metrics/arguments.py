@@ -7,7 +7,7 @@ import pandas as pd
 
 from ..gate import as_numbers, check_finite
 from ..matching.units import exponent_of
-from ..sequences import to_sequences
+from ..sequences import as_collection
 
 __all__ = [
     "Movements",
@@ -232,8 +232,8 @@ def _in_order(frames, last, whose, unit):
 
 def _on_clock(values, what):
     """An array of whatever holds performances on one clock."""
-    if isinstance(values, pd.DataFrame) and values.index.nlevels == 2:
-        values = to_sequences(values)
+    if isinstance(values, pd.DataFrame) and values.index.nlevels >= 2:
+        values = as_collection(values)
     if isinstance(values, np.ndarray) and values.dtype == object and values.ndim == 1:
         values = list(values)
     if isinstance(values, (list, tuple)):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from sklearn.pipeline import Pipeline
 
+from ..performances import labels_as_given
 from ..pipelines import find_classifier, transform_through
 from ..sequences import as_collection
 
@@ -64,13 +65,13 @@ def models_of_classes(estimator, X, params, caller, only=None):
         chosen = chosen[[only(len(performances))]]
     collection = as_collection(X)
     columns = classifier.predict_proba(performances.take(chosen)).argmax(axis=1)
-    models = []
+    models, called = [], labels_as_given(X, performances)[0]
     for column in dict.fromkeys(columns.tolist()):
         indices, label = chosen[columns == column], classifier.classes_[column]
         steps = [] if before is None else before.steps
         some = _rows(X, indices) if collection is None else [collection[i] for i in indices]
         whole = Pipeline([*steps, *classifier.model_of(label).steps])
-        labels = [performances.labels[i] for i in indices]
+        labels = [called[i] for i in indices]
         models.append(ClassModel(label, whole, some, indices, labels))
     return models
 

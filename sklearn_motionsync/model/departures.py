@@ -39,8 +39,9 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
     -------
     DataFrame
         One row a run of frames, by performance and then the worst first: ``performance``, its
-        number or label; with a classifier ``class``, the one it is given; ``feature``; ``first``
-        and ``last``, frames of the model, counted from 0; ``peak``, the worst of them;
+        number or label, a tuple if several levels of an index name it; with a classifier
+        ``class``, the one it is given; ``feature``; ``first`` and ``last``, frames of the model,
+        counted from 0; ``peak``, the worst of them;
         ``deviation``, standard deviations there, negative below the mean; ``rare``, whether a
         share of ``coverage`` of the performances of new people goes so far at no frame and in no
         feature (`ActionModel.simultaneous_factor`).
@@ -94,7 +95,8 @@ def _departures(estimator, X, params, caller, features, limit, part=None):
         names, scores = [names[i] for i in chosen], scores[:, :, chosen]
     found = runs(scores, view.model.n_std if limit is None else limit)
     labels = view.labels if part is None else part.labels
-    columns = {"performance": np.array(labels, dtype=object)[found.performance]}
+    # A label may be a tuple, of which no array is made.
+    columns = {"performance": pd.Series([labels[i] for i in found.performance], dtype=object)}
     if part is not None:
         columns["class"] = np.full(len(found.first), part.label, dtype=object)
         columns["index"] = found.performance

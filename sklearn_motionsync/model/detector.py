@@ -12,6 +12,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..fitting import at_once, of_one_state
 from ..notebook import DocumentedMixin
+from ..performances import labels_as_given
 from ..pipelines import (
     MissingMetadata,
     find_step,
@@ -21,6 +22,7 @@ from ..pipelines import (
     steps_to_fit,
     taken_by,
 )
+from ..tables import index_of
 from .action_model import ActionModel
 from .likeness import as_codes
 from .manner import Course, Usual, energies
@@ -224,8 +226,8 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
             such as "too long, too weak"; it is empty if it is accepted.
         """
         table, performances = self._ask(X, params, "report")
-        index = pd.Index(performances.labels, name=performances.levels[0], tupleize_cols=False)
-        table = pd.DataFrame(table, index=index)
+        labels, levels = labels_as_given(X, performances)
+        table = pd.DataFrame(table, index=index_of(labels, levels[:-1]))
         table["reason"] = [_reason(row) for row in table.to_dict("records")]
         return table
 

@@ -9,7 +9,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..aspace import ASpace
 from ..features import as_features, names_of
-from ..performances import check_performances
+from ..performances import check_performances, labels_as_given
 from ..pipelines import asking, find_step, flat_steps, how_to_give, taken_by, transform_through
 from ..sequences import as_collection
 from .action_model import ActionModel
@@ -108,7 +108,7 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
         else:
             synchronised, whole = way.follow(X, params, caller)
             given = model.check_performances(synchronised)
-        points, labels = np.stack(given), given.labels
+        points, labels = np.stack(given), labels_as_given(X, given)[0]
     if way is None:
         nothing = np.zeros(len(names))
         return View(model, names, points, points, labels, model, given, nothing)

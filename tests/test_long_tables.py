@@ -1,0 +1,417 @@
+"""Long tables to performances that know what they are called, in order of an even time."""
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.model_selection import GridSearchCV, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionDetector,
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    LinearSynchronizer,
+    find_departures,
+    to_frame,
+    to_sequences,
+)
+from sklearn_motionsync.metrics import least_squares
+
+KEYS = ["subject", "trial"]
+
+
+def walk(time, trial=0):
+    return {"knee": np.sin(4 * time + 0.1 * trial), "hip": np.cos(3 * time)}
+
+
+def trial_of(who, k, time):
+    return pd.DataFrame({"subject": who, "trial": k, "time": time, **walk(time, k)})
+
+
+@pytest.fixture
+def table():
+    """Three subjects, two trials each, all rows mixed."""
+    rng = np.random.default_rng(0)
+    parts = [
+        trial_of(who, k, np.arange(rng.integers(30, 40)) / 50)
+        for who in ("cem", "ann", "bob")
+        for k in (2, 1)
+    ]
+    return pd.concat(parts, ignore_index=True).sample(frac=1, random_state=0, ignore_index=True)
+
+
+@pytest.fixture
+def walks(table):
+    return to_sequences(table, by=KEYS, time="time")
+
+
+def labels_of(table, levels=(0, 1)):
+    return list(table.index.droplevel(-1).unique())
+
+
+# -- keys, labels, levels --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("levels", [[], ["subject"], ["trial", "time"], [*KEYS, "time"]])
+def test_the_time_puts_frames_in_order_and_keys_name_performances(table, levels):
+    df = table.set_index(levels) if levels else table
+    found = to_sequences(df, by=KEYS, time="time")
+    keys = list(table[KEYS].drop_duplicates().itertuples(index=False, name=None))
+    assert [x.attrs["performance"] for x in found] == keys
+    for x, (who, k) in zip(found, keys, strict=True):
+        rows = table[(table["subject"] == who) & (table["trial"] == k)].sort_values("time")
+        pd.testing.assert_frame_equal(x, rows.set_index("time")[["knee", "hip"]])
+        assert x.attrs["levels"] == ("subject", "trial", "time")
+        assert not x.attrs["resampled"]
+
+
+def test_labels_are_plain(walks):
+    assert repr(walks[0].attrs["performance"][1]) in ("1", "2")
+    (numbered,) = to_sequences(pd.DataFrame({"k": [3, 3], "x": [0.0, 1]}), by="k")
+    assert repr(numbered.attrs["performance"]) == "3"
+
+
+def test_the_way_back(table, walks):
+    expected = table.set_index([*KEYS, "time"]).sort_index()
+    back = to_frame(walks)
+    assert labels_of(back) == [x.attrs["performance"] for x in walks]
+    pd.testing.assert_frame_equal(back.sort_index(), expected)
+    for again, x in zip(to_sequences(back), walks, strict=True):
+        pd.testing.assert_frame_equal(again, x)
+        assert again.attrs["performance"] == x.attrs["performance"]
+
+
+def test_labels_given_to_a_frame_name_their_levels(walks):
+    some = walks[:2]
+    assert to_frame(some, performances=["a", "b"]).index.names == ["performance", "time"]
+    tuples = [("x", 1), ("x", 2)]
+    assert to_frame(some, performances=tuples).index.nlevels == 2
+    index = pd.MultiIndex.from_tuples(tuples, names=["who", "take"])
+    assert to_frame(some, performances=index).index.names == ["who", "take", "time"]
+    assert to_frame(some, performances=pd.Index([4, 5], name="take")).index.names[0] == "take"
+    bare = to_frame([x.to_numpy() for x in some], performances=some)
+    assert bare.index.names == [*KEYS, "frame"]
+
+
+@pytest.mark.parametrize("as_table", [False, True])
+def test_pandas_outputs_have_the_levels_of_the_table(walks, as_table):
+    X = to_frame(walks) if as_table else walks
+    labels = [x.attrs["performance"] for x in walks]
+    before = ASpace(2).set_output(transform="pandas").fit_transform(X)
+    pd.testing.assert_index_equal(before.index, to_frame(walks).index)
+    for estimator in (LinearSynchronizer(20), make_pipeline(ASpace(2), DenseSynchronizer(20))):
+        out = estimator.set_output(transform="pandas").fit_transform(X)
+        assert out.index.names == ["subject", "trial", "frame"]
+        assert labels_of(out) == labels
+        assert out.loc["ann"].loc[1].index.tolist() == list(range(20))
+
+
+@pytest.mark.parametrize("names", [["who", "day", "trial", "t"], [None] * 4])
+def test_any_number_of_levels_named_or_not(names):
+    index = pd.MultiIndex.from_product([["a", "b"], [1], ["x", "y"], range(5)], names=names)
+    df = pd.DataFrame({"knee": np.sin(np.arange(20.0))}, index=index)
+    out = LinearSynchronizer(4).set_output(transform="pandas").fit_transform(df)
+    assert labels_of(out) == [("a", 1, "x"), ("a", 1, "y"), ("b", 1, "x"), ("b", 1, "y")]
+    unnamed = ["level_0", "level_1", "level_2", "frame"]
+    assert out.index.names == (unnamed if names[0] is None else [*names[:3], "frame"])
+
+
+class Called(TransformerMixin, BaseEstimator):
+    """Writes down what the performances are called that it is given."""
+
+    seen = []
+
+    def fit(self, X, y=None):
+        return self
+
+    def transform(self, X):
+        Called.seen.append(labels_of(ASpace(1).set_output(transform="pandas").fit_transform(X)))
+        return X
+
+
+def test_lists_keep_labels_through_cross_validation(walks):
+    labels = [x.attrs["performance"] for x in walks]
+    pipe = make_pipeline(Called(), LinearSynchronizer(10))
+
+    def score(estimator, X, y=None):
+        estimator.transform(X)
+        return 0.0
+
+    for search in (
+        lambda: cross_val_score(pipe, walks, cv=3, scoring=score),
+        lambda: GridSearchCV(
+            pipe, {"linearsynchronizer__n_frames": [5, 9]}, scoring=score, cv=3
+        ).fit(walks),
+    ):
+        Called.seen = []
+        search()
+        assert [labels[0], labels[1]] in Called.seen
+        assert labels[2:] in Called.seen
+
+
+def test_copies_of_a_performance_are_numbered(walks):
+    """Labels that come twice, or not throughout, name nothing."""
+    for X in ([walks[0], walks[0]], [walks[0], walks[1].to_numpy()], [walks[0] * 1, walks[0]]):
+        X = [x.iloc[:20] if hasattr(x, "iloc") else x[:20] for x in X]
+        X = X if all(hasattr(x, "columns") for x in X) else [np.asarray(x) for x in X]
+        out = ASpace(2).set_output(transform="pandas").fit_transform(X)
+        assert list(out.index.unique(0)) == [0, 1]
+
+
+@pytest.mark.parametrize("attrs", [{"performance": ["a"]}, {"performance": "a", "levels": 3}])
+def test_attributes_of_others_are_no_labels(attrs):
+    x = pd.DataFrame({"knee": [0.0, 1.0]})
+    x.attrs = attrs
+    assert to_frame([x]).index.unique(0).tolist() == [0]
+
+
+def test_messages_name_the_label(walks):
+    bad = [x.copy() for x in walks]
+    who = bad[3].attrs["performance"]
+    bad[3].iloc[4, 1] = np.nan
+    for X in (bad, to_frame(bad)):
+        with pytest.raises(ValueError, match="is NaN") as caught:
+            ASpace().fit(X)
+        where = f"Performance 3 {who!r}, frame 4 (0.08), feature 1 ('hip')"
+        assert str(caught.value).startswith(where)
+
+
+def test_what_departs_is_called_by_its_label(walks):
+    """Also behind steps that give arrays."""
+    moved = [x.copy() for x in walks]
+    moved[1].iloc[10:15] += 5
+    label = moved[1].attrs["performance"]
+    for X in (walks, to_frame(walks)):
+        model = make_pipeline(ASpace(2), LinearSynchronizer(30), ActionModel()).fit(X)
+        given = moved if X is walks else to_frame(moved)
+        assert set(find_departures(model, given)["performance"]) == {label}
+    detector = ActionDetector(make_pipeline(ASpace(2), DenseSynchronizer(30), ActionModel()))
+    report = detector.fit(walks).report(moved)
+    assert report.index.names == KEYS
+    assert report.index.tolist() == [x.attrs["performance"] for x in walks]
+
+
+def test_measures_take_tables_of_several_levels(walks):
+    linear = LinearSynchronizer(20).set_output(transform="pandas").fit(walks)
+    dense = DenseSynchronizer(20).set_output(transform="pandas").fit(walks)
+    tables = linear.transform(walks), dense.transform(walks)
+    arrays = [np.stack(to_sequences(df)) for df in tables]
+    assert least_squares(*tables) == least_squares(*arrays)
+
+
+# -- times ----------------------------------------------------------------------------------
+
+
+def test_uneven_times_are_resampled_on_straight_lines():
+    """A known curve: between two recorded frames nothing is invented."""
+    rng = np.random.default_rng(0)
+    time = np.arange(60) / 50 + rng.uniform(-0.009, 0.009, 60)
+    (x,) = to_sequences(trial_of("a", 1, time), by=KEYS, time="time")
+    assert x.attrs["resampled"]
+    assert (x.index[0], x.index[-1]) == (time[0], time[-1])
+    steps = np.diff(x.index)
+    np.testing.assert_allclose(steps, steps[0], rtol=1e-9)
+    np.testing.assert_allclose(steps[0], np.median(np.diff(time)), rtol=0.02)
+    for name, curve in walk(time, 1).items():
+        np.testing.assert_allclose(x[name], np.interp(x.index, time, curve), rtol=1e-12)
+        np.testing.assert_allclose(x[name], walk(x.index.to_numpy(), 1)[name], atol=2e-3)
+
+
+@pytest.mark.parametrize("jitter", [0.02, 0.2, 0.45])
+def test_jitter_is_resampled_too(jitter):
+    time = np.arange(9.0)
+    time[4] += jitter
+    (x,) = to_sequences(pd.DataFrame({"t": time, "x": 3 * time}), time="t")
+    np.testing.assert_allclose(x.index, np.linspace(0, 8, len(x)))
+    np.testing.assert_allclose(x["x"], 3 * x.index)
+
+
+@pytest.mark.parametrize("rate", [50, 60, 90, 100, 120])
+@pytest.mark.parametrize("unit", [1, 1000])
+def test_rounded_times_are_even(rate, unit):
+    """Of a recording whose times are written to the millisecond every number is kept."""
+    time = unit * np.round(np.arange(400) / rate, 3)
+    (x,) = to_sequences(pd.DataFrame({"t": time, "x": np.sin(time)}), time="t")
+    np.testing.assert_array_equal(x["x"], np.sin(time))
+    assert not x.attrs["resampled"]
+    (x,) = to_sequences(x.reset_index(), time="t", frame_rate=rate / unit)
+    assert not x.attrs["resampled"]
+
+
+@pytest.mark.parametrize(("rate", "n_frames"), [(25, 26), (100, 101), (30, 31)])
+def test_a_frame_rate_is_given(rate, n_frames):
+    time = np.arange(51) / 50
+    (x,) = to_sequences(pd.DataFrame({"t": time, "x": time**2}), time="t", frame_rate=rate)
+    np.testing.assert_allclose(x.index, np.arange(n_frames) / rate, atol=1e-12)
+    np.testing.assert_allclose(x["x"], np.interp(x.index, time, time**2))
+
+
+def test_gaps_are_bridged_up_to_a_size():
+    time = np.delete(np.arange(20.0), [4, 10, 11])
+    df = pd.DataFrame({"t": time, "x": time, "k": "a"})
+    with pytest.raises(ValueError, match=r"'a' has gaps from 3 to 5, from 9 to 12") as caught:
+        to_sequences(df, by="k", time="t")
+    assert "to_sequences(df, by='k', time='t', max_gap=3.0)" in str(caught.value)
+    with pytest.raises(ValueError, match=r"a gap from 9 to 12"):
+        to_sequences(df, by="k", time="t", max_gap=2)
+    (x,) = to_sequences(df, by="k", time="t", max_gap=3)
+    assert x["x"].tolist() == x.index.tolist() == list(range(20))
+
+
+def test_the_call_that_a_gap_asks_for_is_enough():
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        time = np.cumsum(rng.exponential(size=30)) * 10.0 ** rng.integers(-6, 6)
+        df = pd.DataFrame({"t": time, "x": time})
+        with pytest.raises(ValueError, match="max_gap") as caught:
+            to_sequences(df, time="t")
+        max_gap = float(str(caught.value).split("max_gap=")[1].split(")")[0])
+        assert to_sequences(df, time="t", max_gap=max_gap)
+
+
+def test_dates_and_durations_become_seconds():
+    seconds = np.arange(10) / 4
+    start = pd.Timestamp("2020-03-29 01:59:59", tz="Europe/Vienna")  # clocks go forward then
+    stamps = start + pd.to_timedelta(seconds, unit="s")
+    for time in (
+        stamps,
+        stamps.tz_convert(None),
+        stamps.tz_convert(None).to_pydatetime(),
+        pd.to_timedelta(seconds, unit="s"),
+        pd.to_timedelta(seconds, unit="s").to_pytimedelta(),
+    ):
+        df = pd.DataFrame({"t": time, "x": seconds}).iloc[::-1]
+        (x,) = to_sequences(df, time="t")
+        assert x.index.tolist() == x["x"].tolist() == seconds.tolist()
+
+
+def test_gaps_in_features_stay_gaps():
+    time = np.r_[0:5, 5.3, 6:10]
+    df = pd.DataFrame({"t": time, "x": time, "y": 2 * time}).astype({"y": np.float32})
+    df.loc[2, "x"] = np.nan
+    (x,) = to_sequences(df, time="t")
+    assert x["x"].isna().any()
+    assert not x["y"].isna().any()
+    assert (x["x"].dtype, x["y"].dtype) == (np.float64, np.float32)
+    with pytest.raises(ValueError, match=r"'x'.* is NaN"):
+        ASpace().fit([x])
+
+
+def test_one_performance_by_its_time_alone():
+    time = np.arange(9) / 10
+    (x,) = to_sequences(pd.DataFrame({"t": time[::-1], "x": range(9)}), time="t")
+    assert x["x"].tolist() == list(range(8, -1, -1))
+    assert x.attrs["performance"] == 0
+    assert to_frame([x]).index.names == ["performance", "t"]
+
+
+def test_a_time_among_the_levels_goes_with_the_others(table, walks):
+    indexed = table.set_index([*KEYS, "time"])
+    for df in (indexed, indexed.reset_index("time").set_index("hip", append=True)):
+        expected = [x[["knee"]] for x in walks]
+        found = to_sequences(df, time="time")
+        for x, y in zip(found, expected, strict=True):
+            pd.testing.assert_frame_equal(x[["knee"]], y)
+    one = table[table["subject"] == "ann"].set_index("trial").drop(columns="subject")
+    assert [x.attrs["performance"] for x in to_sequences(one, time="time")] == [1, 2]
+
+
+def test_attributes_of_the_table_stay(table):
+    table.attrs["frame_rate"] = 50
+    assert all(x.attrs["frame_rate"] == 50 for x in to_sequences(table, by=KEYS, time="time"))
+
+
+# -- what is refused ---------------------------------------------------------------------------
+
+BY = {"by": KEYS, "time": "time"}
+
+
+def put(column, value, row=3):
+    def change(df):
+        df = df.astype({column: object})
+        df.loc[row, column] = value
+        return df
+
+    return change
+
+
+REFUSED = [
+    # change of the table, arguments, words
+    (put("subject", None), BY, ["'subject'", "row 3", "df.dropna(subset=['subject'])"]),
+    (put("trial", np.nan), BY, ["'trial'", "1 of", "row 3"]),
+    (put("time", np.nan), BY, ["time of performance", "row 3", "df.dropna(subset=['time'])"]),
+    (put("time", np.inf), BY, ["infinite", "row 3"]),
+    (lambda df: pd.concat([df, df[:1]]), BY, ["twice", "drop_duplicates(['subject', 'trial', 'ti"]),
+    (lambda df: df, {"by": "subject", "time": "time"}, ["twice", "by=['subject', '...']"]),
+    (lambda df: df.drop(columns=KEYS), {"time": "time"}, ["twice", "by=['...'], time='time')"]),
+    (lambda df: df.assign(group="young"), BY, ["'group'", "'young'", "by=['subject', 'trial', 'g"]),
+    (lambda df: df.assign(day=pd.Timestamp(0)), BY, ["'day'", "dates", "df.drop(columns=['day'])"]),
+    (lambda df: df.astype({"time": str}), BY, ["text", "df['time'] = pd.to_datetime(df['time'])"]),
+    (lambda df: df, {"by": ["subject", "take"]}, ["['take']", "'trial'", "by=[...], time=...)"]),
+    (lambda df: df, {"by": []}, ["no column", "by=[...]"]),
+    (lambda df: df, {"by": ["trial", "trial"]}, ["different"]),
+    (lambda df: df, {**BY, "max_gap": -1}, ["max_gap", "above 0", "-1"]),
+    (lambda df: df, {**BY, "frame_rate": "fast"}, ["frame_rate", "'fast'"]),
+    (lambda df: df, {**BY, "frame_rate": 1e9}, ["frame_rate=1e+09", "frames from 0 to", "units"]),
+    (lambda df: df, {**BY, "frame_rate": 0.1}, ["frame_rate=0.1", "units"]),
+    (lambda df: df, {"by": KEYS, "max_gap": 2}, ["max_gap=2", "time="]),
+    (lambda df: df, {}, ["index of 1 level(s)", "by=['subject', 'trial'], time='time')"]),
+    (lambda df: df.set_index([*KEYS, "time"]), {}, ["do not increase", "time='time')"]),
+    (lambda df: pl.DataFrame(df.to_dict("list")).lazy(), BY, ["LazyFrame", "df.collect()"]),
+]
+
+
+@pytest.mark.parametrize(("change", "given", "words"), REFUSED, ids=range(len(REFUSED)))
+def test_tables_that_cannot_be_cut(table, change, given, words):
+    with pytest.raises(ValueError) as caught:  # noqa: PT011 - the words are below
+        to_sequences(change(table), **given)
+    assert [word for word in words if word not in str(caught.value)] == [], str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+def test_a_key_that_is_missing_in_an_index(table):
+    df = put("subject", None)(table).set_index([*KEYS, "time"]).sort_index()
+    for take in (to_sequences, ASpace().fit):
+        with pytest.raises(ValueError, match="'subject' is missing"):
+            take(df)
+
+
+# -- polars ---------------------------------------------------------------------------------
+
+
+def test_polars_goes_the_same_way(table, walks):
+    found = to_sequences(pl.DataFrame(table.to_dict("list")), **BY)
+    for x, y in zip(found, walks, strict=True):
+        pd.testing.assert_frame_equal(x, y)
+        assert x.attrs == y.attrs
+
+
+def test_polars_dates_and_missing_values(table):
+    seconds = np.arange(5)
+    df = pl.DataFrame(
+        {"who": ["a"] * 5, "t": (seconds * 1000).astype("M8[ms]"), "x": [1, 2, None, 4, 5]},
+        schema_overrides={"who": pl.Categorical},
+    )
+    (x,) = to_sequences(df, by="who", time="t")
+    assert x.index.tolist() == seconds.tolist()
+    assert x["x"].isna().tolist() == [False, False, True, False, False]
+
+
+def test_lists_of_polars_frames_are_performances(walks):
+    X = [pl.DataFrame(x.to_dict("list")) for x in walks]
+    sync = DenseSynchronizer(20).fit(X)
+    assert sync.feature_names_in_.tolist() == ["knee", "hip"]
+    np.testing.assert_array_equal(sync.transform(X), DenseSynchronizer(20).fit_transform(walks))
+    assert list(to_frame(X).columns) == ["knee", "hip"]
+    with pytest.raises(ValueError, match="should match"):
+        sync.transform([x[["hip", "knee"]] for x in X])
+    with pytest.raises(ValueError, match=r"df\.collect\(\)"):
+        DenseSynchronizer().fit([x.lazy() for x in X])
+
+
+def test_a_long_polars_table_is_not_read_row_by_row(table):
+    df = pl.DataFrame(table.drop(columns=KEYS).to_dict("list"))
+    with pytest.raises(ValueError, match=r"to_sequences\(df, by=\[...\], time=...\)"):
+        DenseSynchronizer().fit(df)
