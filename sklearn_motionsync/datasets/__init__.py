@@ -3,6 +3,7 @@
 from ._archive import load_performances
 from ._bending import make_bending
 from ._cmu import fetch_cmu
+from ._gait import make_gait
 from ._gaps import fill_gaps, find_gaps
 from ._motion import read_motion
 
@@ -12,5 +13,6 @@ __all__ = [
     "find_gaps",
     "load_performances",
     "make_bending",
+    "make_gait",
     "read_motion",
 ]
