@@ -34,6 +34,12 @@ CURVES = {
         0.54: 0.76, 0.58: 0.30, TOE_OFF: 0, 0.75: 0, 0.90: 0,
     },
 }  # fmt: skip
+# How people differ: degrees by which an angle is larger throughout, and by which it is larger here
+# and smaller there; the share of the latter between cycles of somebody; and shares by which the
+# range of a curve is larger, and by which the force is larger here and there, for each degree.
+_MOVED = {"hip_flexion": 4.0, "knee_flexion": 3.0, "ankle_dorsiflexion": 2.5}
+_BENT, _BENT_AGAIN = 1.5, 0.3
+_LARGER, _FORCE_A_DEGREE = 0.06, 0.02
 # At how many moments a pace is drawn.
 _N_PACE = 501
 
@@ -97,13 +103,13 @@ def _vary(random_state, style, name, at, values, n):
         weights = size * random_state.standard_normal((count, 3)) / waves[:, 0]
         return weights @ np.sin(2 * np.pi * (waves * at + random_state.uniform(size=(3, 1))))
 
-    wave = style * (draw(1, 1.0) + draw(n, 0.3))
-    larger = np.exp(style * (0.05 * random_state.standard_normal()))
-    moved = style * 2.0 * random_state.standard_normal()
+    wave = draw(1, _BENT) + draw(n, _BENT * _BENT_AGAIN)
+    larger = np.exp(style * _LARGER * random_state.standard_normal())
+    moved = random_state.standard_normal()
     if name == "vertical_force":
         # What is 0 stays 0.
-        return values * larger * np.exp(0.02 * wave)
-    return values * larger + moved + wave
+        return values * larger * np.exp(style * _FORCE_A_DEGREE * wave)
+    return values * larger + style * (_MOVED[name] * moved + wave)
 
 
 def _draw_shares(random_state, n, strength, even):
@@ -111,7 +117,7 @@ def _draw_shares(random_state, n, strength, even):
     waves = np.arange(1, 4)[:, np.newaxis]
     shape = np.sin(np.pi * waves * even + random_state.uniform(0, 2 * np.pi, (3, 1)))
     weights = random_state.standard_normal((1, 3)) + 0.35 * random_state.standard_normal((n, 3))
-    rates = 2 ** (0.5 * strength * np.tanh(0.23 * (weights / waves[:, 0]) @ shape))
+    rates = 2 ** (0.5 * strength * np.tanh(0.15 * (weights / waves[:, 0]) @ shape))
     shares = np.cumsum((rates[:, 1:] + rates[:, :-1]) / 2, axis=1)
     return np.hstack([np.zeros((n, 1)), shares / shares[:, -1:]])
 
