@@ -13,9 +13,10 @@ def find_gaps(df):
 
     Parameters
     ----------
-    df : DataFrame (n_frames, 3 * n_joints)
-        Columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, as `read_motion` gives them. A
-        joint is missing in a frame where any of the three is NaN.
+    df : DataFrame (n_frames, 3 * n_joints) or (n_frames, 2 * n_joints)
+        Columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, as `read_motion` gives them, or
+        ``<joint>_x``, ``<joint>_y`` of key-points in the plane. A joint is missing in a frame
+        where any of them is NaN.
 
     Returns
     -------
@@ -27,8 +28,8 @@ def find_gaps(df):
     Raises
     ------
     ValueError
-        If it is no DataFrame, the columns are not such triples, values are infinite or no
-        numbers, or it holds several performances.
+        If it is no DataFrame, the columns are not such triples or pairs, values are infinite or
+        no numbers, or it holds several performances.
 
     Examples
     --------
@@ -40,8 +41,8 @@ def find_gaps(df):
       joint  first  last  n_frames  inside
     0  knee      1     2         2    True
     """
-    joints, values = _read(df)
-    joint, first, last = _find(_missing(values))
+    joints, n_dims, values = _read(df)
+    joint, first, last = _find(_missing(values, n_dims))
     return pd.DataFrame(
         {
             "joint": np.array(joints, dtype=object)[joint],
@@ -58,7 +59,7 @@ def fill_gaps(df, max_gap):
 
     Parameters
     ----------
-    df : DataFrame (n_frames, 3 * n_joints)
+    df : DataFrame (n_frames, 3 * n_joints) or (n_frames, 2 * n_joints)
         As for `find_gaps`. It is not changed.
     max_gap : int
         The longest gap to fill, in frames. Longer ones stay NaN, as do those that touch an end
@@ -108,8 +109,8 @@ def fill_gaps(df, max_gap):
     np.int64(2)
     """
     check_max_gap(max_gap)
-    _, values = _read(df)
-    missing = _missing(values)
+    _, n_dims, values = _read(df)
+    missing = _missing(values, n_dims)
     joint, first, last = _find(missing)
     short = (first > 0) & (last < len(df) - 1) & (last - first < max_gap)
     # By the joint's place: names may come twice.
@@ -119,7 +120,7 @@ def fill_gaps(df, max_gap):
         np.add.at(here, first[rows], 1)
         np.add.at(here, last[rows] + 1, -1)
         frames = np.flatnonzero(np.cumsum(here[:-1]))
-        part = values[:, 3 * j : 3 * j + 3]
+        part = values[:, n_dims * j : n_dims * (j + 1)]
         filled = _interpolate(np.flatnonzero(~missing[:, j]), part, frames)
         part[frames] = np.where(np.isnan(part[frames]), filled, part[frames])
     result = pd.DataFrame(values, index=df.index, columns=df.columns)
@@ -156,14 +157,32 @@ def warn_of_gaps(df, name):
     )
 
 
+def warn_of_missing(df, name):
+    """The same of a table that holds no positions."""
+    missing = df.isna().sum()
+    missing = missing[missing > 0].sort_values(ascending=False, kind="stable")
+    if missing.empty:
+        return
+    names = ", ".join(str(column)[:40] for column in missing.index[:4])
+    names += ", ..." if len(missing) > 4 else ""
+    warnings.warn(
+        f"{name}: {100 * missing.sum() / df.size:.2g} % of the values are missing (NaN), of "
+        f"{len(missing)} of {df.shape[1]} {df.attrs.get('kind', 'columns')} ({names}). Interpolate "
+        "short gaps with df.interpolate(limit=<frames>, limit_area='inside'), or drop those "
+        "columns.",
+        UserWarning,
+        stacklevel=3,
+    )
+
+
 def _read(df):
-    """Names of the joints, and a copy of the positions (n_frames, 3 * n_joints)."""
+    """Names of the joints, their dimensions, and a copy of the positions."""
     if not isinstance(df, pd.DataFrame):
         raise ValueError(
             f"A recording must be a DataFrame, as read_motion gives, got {type(df).__name__}; name "
             "the columns of an array with pd.DataFrame(x, columns=skeleton.column_names)."
         )
-    joints = joints_of(df)
+    joints, n_dims = _joints_with_dims(df)
     levels = df.index.droplevel(-1) if df.index.nlevels > 1 else df.index[:0]
     if levels.nunique() > 1:
         raise ValueError(
@@ -185,7 +204,16 @@ def _read(df):
             "or NaN where a marker was not seen. Replace it, as in "
             "df.replace([np.inf, -np.inf], np.nan)."
         )
-    return joints, values
+    return joints, n_dims, values
+
+
+def _joints_with_dims(df):
+    """Names of the joints, in the plane or in space, and which of these it is."""
+    columns = [str(column) for column in df.columns]
+    joints = [column[:-2] for column in columns[::2]]
+    if joints and columns == [f"{joint}_{axis}" for joint in joints for axis in "xy"]:
+        return joints, 2
+    return joints_of(df), 3
 
 
 def _is_numeric(column):
@@ -203,8 +231,8 @@ def _no_numbers(df, column, dtype):
     )
 
 
-def _missing(values):
-    return np.isnan(values).reshape(len(values), -1, 3).any(axis=2)
+def _missing(values, n_dims):
+    return np.isnan(values).reshape(len(values), -1, n_dims).any(axis=2)
 
 
 def _find(missing):

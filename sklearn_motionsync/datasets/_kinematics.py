@@ -19,10 +19,12 @@ class MotionText:
     """
 
     def __init__(self, path):
-        data = path.read_bytes().replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        data = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         self.path = path
         self.size = len(data)
         self.line_number = 0
+        self.is_whole = True  # the line read last has an end
         self._lines = io.BytesIO(data)
         self._words = []  # those left of this line, the last first
 
@@ -31,16 +33,19 @@ class MotionText:
         """Bytes after the line read last."""
         return self.size - self._lines.tell()
 
+    def row(self):
+        """The next line that has words, as it is; empty at the end."""
+        while line := self._lines.readline():
+            self.line_number += 1
+            if line.strip():
+                self.is_whole = line.endswith(b"\n")
+                return line.removesuffix(b"\n")
+        return b""
+
     def line(self):
         """The words of the next line that has any, or what is left of this one; [] at the end."""
         words, self._words = self._words[::-1], []
-        while not words:
-            line = self._lines.readline()
-            if not line:
-                return []
-            self.line_number += 1
-            words = line.split()
-        return words
+        return words or self.row().split()
 
     def lines(self):
         """All lines that are left."""

@@ -290,3 +290,49 @@ def everything(machine=84):
         "others": {"EVENT": events, "ANALOG": analog},
         "header": {"first": 101, "last": 140, "events": [("RHS", 0.5), ("RTO", 0.1)]},
     }
+
+
+def trc(positions, names, rate=50, times=None, units="mm", blank="", digits=3, **header):
+    """A TRC file of positions (n_frames, n_markers, 3); NaN is `blank`."""
+    n_frames, n_markers = positions.shape[:2]
+    times = np.arange(n_frames) / rate if times is None else times
+    header = {
+        "DataRate": f"{rate:.2f}",
+        "CameraRate": f"{rate:.2f}",
+        "NumFrames": n_frames,
+        "NumMarkers": n_markers,
+        "Units": units,
+        "OrigDataRate": f"{rate:.2f}",
+        "OrigDataStartFrame": 1,
+        "OrigNumFrames": n_frames,
+    } | header
+    lines = ["PathFileType\t4\t(X/Y/Z)\ttrial.trc", "\t".join(header)]
+    lines += ["\t".join(map(str, header.values()))]
+    lines += ["Frame#\tTime\t" + "\t\t\t".join(names) + "\t\t"]
+    lines += ["\t\t" + "\t".join(f"{axis}{i + 1}" for i in range(n_markers) for axis in "XYZ"), ""]
+    for number, (time, frame) in enumerate(zip(times, positions, strict=True), 1):
+        numbers = [blank if np.isnan(x) else str(x) for x in frame.ravel()]
+        lines.append("\t".join([str(number), f"{time:.{digits}f}", *numbers]))
+    return "\n".join(lines) + "\n"
+
+
+def storage(values, labels, rate=100, times=None, header="version=1\nnRows={n}\nnColumns={m}\n"):
+    """A MOT or STO file of values (n_frames, n_columns)."""
+    times = np.arange(len(values)) / rate if times is None else times
+    text = "Coordinates\n" + header.format(n=len(values), m=1 + len(labels)) + "endheader\n"
+    text += "\t".join(["time", *labels]) + "\n"
+    for time, row in zip(times, values, strict=True):
+        text += "\t".join([f"{time:.8f}", *(str(value) for value in row)]) + "\n"
+    return text
+
+
+def opensim():
+    """Small TRC, MOT and STO files, by name, one a call of `read_motion`."""
+    values = np.random.default_rng(0).normal(size=(20, 2)).round(4)
+    vectors = [["1,2,3", "~[4,5,6]"]] * 20
+    texts = {
+        "a.trc": trc(tracks(gap=(3, 9)), ["LASI", "R Knee", "V_Sacral"]),
+        "a.mot": storage(values, ["knee", "ground_force_vx"]),
+        "a.sto": storage(vectors, ["pelvis", "torso"], header="DataType=Vec3\nDataRate=100\n"),
+    }
+    return [{name: text.encode()} for name, text in texts.items()]

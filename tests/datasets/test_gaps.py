@@ -51,9 +51,18 @@ def test_gaps_between_two_frames_and_of_nothing():
 
 
 def test_columns_that_are_no_joints():
-    for columns in (["a_x", "a_y"], ["a_x", "a_z", "a_y"], ["time", "a_x", "a_y"], []):
+    for columns in (["a_x"], ["a_y", "a_x"], ["a_x", "b_y"], ["a_x", "a_z", "a_y"], []):
         with pytest.raises(ValueError, match="columns must be <joint>_x, <joint>_y, <joint>_z"):
             find_gaps(pd.DataFrame(0.0, index=range(2), columns=columns))
+
+
+def test_keypoints_in_the_plane():
+    plane = with_gaps().drop(columns=["a_z", "b_z", "c_z"])
+    gaps = find_gaps(plane)
+    assert gaps["joint"].tolist() == ["a", "a", "c"]
+    assert gaps["first"].tolist() == [10, 30, 50]
+    in_space = fill_gaps(with_gaps(), 9)
+    np.testing.assert_array_equal(fill_gaps(plane, 9)[["a_x", "a_y"]], in_space[["a_x", "a_y"]])
 
 
 def test_a_joint_that_comes_twice():

@@ -6,10 +6,10 @@ from sklearn_motionsync import DirectionCosines, Skeleton
 from sklearn_motionsync.datasets import read_motion
 
 import fuzz_readers
-from motion_files import AMC, ASF, body, c3d, everything, put, tracks
+from motion_files import AMC, ASF, body, c3d, everything, opensim, put, tracks
 
 
-@pytest.mark.parametrize("name", ["a.bvh", "a.amc", "a.c3d"])
+@pytest.mark.parametrize("name", ["a.bvh", "a.amc", "a.c3d", "a.trc", "a.mot", "a.sto"])
 def test_no_file(tmp_path, name):
     with pytest.raises(FileNotFoundError, match=rf"no motion file at .*{name}"):
         read_motion(tmp_path / name)
@@ -22,7 +22,7 @@ def test_wrong_calls(tmp_path):
     path = put(tmp_path, body())
     with pytest.raises(ValueError, match=r"a skeleton without motion; give the \.amc file"):
         read_motion(put(tmp_path, ASF, "a.asf"))
-    with pytest.raises(ValueError, match=r"must end with \.bvh, \.amc or \.c3d, got '\.txt'"):
+    with pytest.raises(ValueError, match=r"end with \.bvh, .*, \.mot or \.sto, got '\.txt'"):
         read_motion(put(tmp_path, "", "a.txt"))
     with pytest.raises(ValueError, match=r"asf= goes with \.amc files only"):
         read_motion(path, asf=tmp_path / "a.asf")
@@ -43,10 +43,11 @@ def test_damaged_files(tmp_path):
         {"a.amc": AMC.encode(), "a.asf": ASF.encode("latin-1")},
         *({"a.c3d": c3d(tracks(gap=(3, 9)), machine)} for machine in (84, 85, 86)),
         *({"a.c3d": c3d(**everything(machine))} for machine in (84, 85, 86)),
+        *opensim(),
     ]
     outcomes = [
         fuzz_readers.run_case(fuzz_readers.damaged(originals, 0, number), tmp_path)
-        for number in range(500)
+        for number in range(800)
     ]
     assert set(outcomes) == {"read", "ValueError"}
 

@@ -1,0 +1,78 @@
+"""The archive of HDM05 that is made from the downloaded files, against the one that tests read."""
+
+import importlib
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sklearn_motionsync.datasets import load_performances
+
+BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
+
+
+@pytest.fixture(scope="module")
+def hdm05():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(BENCHMARKS)
+        yield importlib.import_module("hdm05")
+
+
+def make(hdm05, monkeypatch, *args):
+    monkeypatch.setattr(sys, "argv", ["hdm05.py", *map(str, args)])
+    hdm05.main()
+
+
+def test_clips_are_those_of_the_archive(hdm05, real_data, tmp_path, monkeypatch, capsys):
+    output = tmp_path / "new" / "hdm05_positions.npz"
+    make(hdm05, monkeypatch, real_data / "original_files", output)
+    assert "3 clips, " in capsys.readouterr().out
+    with np.load(real_data / "hdm05" / "hdm05_positions.npz") as file:
+        archive = dict(file)
+    with np.load(output) as file:
+        made = dict(file)
+    assert set(made) == set(archive)
+    clips = [archive["source"].tolist().index(name) for name in made["source"]]
+    assert sorted(clips) == clips
+    for i, clip in enumerate(clips):
+        ours, theirs = (
+            part["positions"][slice(*part["offsets"][k : k + 2])]
+            for part, k in ((made, i), (archive, clip))
+        )
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=2e-6)  # metres
+    for name in ("label", "actor", "take", "fps"):
+        assert made[name].tolist() == archive[name][clips].tolist()
+    for name in ("joints", "parents"):
+        assert made[name].tolist() == archive[name].tolist()
+    for name, array in made.items():
+        assert array.dtype.kind == archive[name].dtype.kind
+    assert made["positions"].dtype == np.float32
+    assert len(load_performances(output).data) == 3
+
+
+def test_every_clip_of_the_archive_would_be_taken(hdm05, real_data, tmp_path):
+    """And in its order."""
+    with np.load(real_data / "hdm05" / "hdm05_positions.npz") as file:
+        sources = file["source"].tolist()
+    for number, name in enumerate(sources):
+        folder = tmp_path / str(number % 7)
+        folder.mkdir(exist_ok=True)
+        (folder / name).touch()
+        (folder / name.replace("_tr_", "_mm_")).touch()
+    shutil.copytree(tmp_path / "0", tmp_path / "again")
+    (tmp_path / "HDM_bd_depositFloorR_001_120.c3d").touch()
+    assert [path.name for path, _ in hdm05.find_clips(tmp_path)] == sources
+
+
+def test_what_is_not_there(hdm05, tmp_path, monkeypatch):
+    with pytest.raises(
+        SystemExit, match=re.escape(f"below {tmp_path}; download them as docs/bench")
+    ):
+        make(hdm05, monkeypatch, tmp_path, tmp_path / "a.npz")
+    (tmp_path / "HDM_bd_grabHighR_001_120.amc").touch()
+    with pytest.raises(SystemExit, match=r"\['HDM_bd\.asf'\] are not in"):
+        make(hdm05, monkeypatch, tmp_path, tmp_path / "a.npz")
+    with pytest.raises(SystemExit, match=r"There are no clips .* of the actions .*jump"):
+        make(hdm05, monkeypatch, tmp_path, tmp_path / "a.npz", "--actions", "jump")
