@@ -4,6 +4,7 @@ from ._archive import load_performances
 from ._bending import make_bending
 from ._cmu import fetch_cmu
 from ._events import cut_at_events
+from ._gait import make_gait
 from ._gaps import fill_gaps, find_gaps
 from ._motion import read_motion
 from ._poses import from_poses
@@ -16,5 +17,6 @@ __all__ = [
     "from_poses",
     "load_performances",
     "make_bending",
+    "make_gait",
     "read_motion",
 ]

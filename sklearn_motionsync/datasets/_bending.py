@@ -7,9 +7,7 @@ from scipy.interpolate import PchipInterpolator
 from sklearn.utils import Bunch, check_random_state
 
 from ..body.skeleton import Skeleton
-
-# What is made at once at most, in bytes.
-_LARGEST = 16e9
+from ._limits import check_parameters, check_size
 
 # When the five moments come, in shares of the action.
 _KEYFRAMES = {
@@ -118,29 +116,21 @@ def make_bending(
     >>> [x.shape[1] for x in bunch.data], bunch.keyframes.shape
     ([45, 45, 45], (3, 5))
     """
-    for name, value, kind, least, most in (
-        ("n_performances", n_performances, Integral, 1, 10**6),
-        ("n_frames", n_frames, Integral, 10, 10**6),
-        ("n_actors", n_actors, Integral, 1, 10**6),
-        ("style", style, Real, 0, 100),
-        ("warp", warp, Real, 0, 10),
-        ("noise", noise, Real, 0, 1000),
-        ("frame_rate", frame_rate, Real, 0.001, 10**9),
-    ):
-        number = isinstance(value, kind) and not isinstance(value, bool)
-        if not number or not least <= value <= most:
-            what = "a whole number" if kind is Integral else "a number"
-            raise ValueError(
-                f"The '{name}' parameter of make_bending must be {what} from {least} to "
-                f"{most}, got {value!r}."
-            )
-    n_bytes = n_performances * n_frames * 45 * 8
-    if n_bytes > _LARGEST:
-        raise ValueError(
-            f"{n_performances} performances of about {n_frames} frames would take "
-            f"{n_bytes / 1e9:.0f} GB; make_bending makes up to {_LARGEST / 1e9:.0f} GB. Give a "
-            "smaller n_performances or n_frames."
-        )
+    check_parameters(
+        "make_bending",
+        [
+            ("n_performances", n_performances, Integral, 1, 10**6),
+            ("n_frames", n_frames, Integral, 10, 10**6),
+            ("n_actors", n_actors, Integral, 1, 10**6),
+            ("style", style, Real, 0, 100),
+            ("warp", warp, Real, 0, 10),
+            ("noise", noise, Real, 0, 1000),
+            ("frame_rate", frame_rate, Real, 0.001, 10**9),
+        ],
+    )
+    what = f"{n_performances} performances of about {n_frames} frames"
+    smaller = "n_performances or n_frames"
+    check_size("make_bending", what, n_performances * n_frames * 45, smaller)
     random_state = check_random_state(random_state)
     actors = [_draw_actor(random_state, style) for _ in range(n_actors)]
     moments = np.array(list(_KEYFRAMES.values()))

@@ -1,0 +1,263 @@
+"""make_gait: people of two groups who walk, and what is promised of them."""
+
+import numpy as np
+import pytest
+from sklearn_motionsync import KeyframeSynchronizer
+from sklearn_motionsync.datasets import make_gait
+
+HIP, KNEE, ANKLE, FORCE = range(4)
+PEAK, VALLEY, SECOND, TOE_OFF, SWING = range(5)
+
+
+@pytest.fixture(scope="module")
+def gait():
+    return make_gait(n_people=7, n_cycles=4, random_state=0)
+
+
+@pytest.fixture(scope="module")
+def takes():
+    return make_gait(n_people=7, n_cycles=4, takes=True, random_state=0)
+
+
+def shares(bunch):
+    """Per cent of each cycle at which its key-frames come."""
+    lengths = np.array([len(x) for x in bunch.data])
+    return 100 * bunch.keyframes / (lengths[:, np.newaxis] - 1)
+
+
+def on_clock(bunch, frames=101):
+    """Every cycle at the true moments: (n, frames, 4)."""
+    moments = np.linspace(0, 1, frames)
+    found = []
+    for x, times in zip(bunch.data, bunch.times, strict=True):
+        found.append(np.stack([np.interp(moments, times, f) for f in x.T], axis=1))
+    return np.stack(found)
+
+
+def test_it_is_what_it_says(gait):
+    assert len(gait.data) == len(gait.times) == 28
+    assert gait.keyframes.shape == (28, len(gait.keyframe_names))
+    assert gait.person.tolist() == [f"person{i}" for i in range(7) for _ in range(4)]
+    assert "".join(gait.group) == 3 * "AAAABBBB" + "AAAA"
+    assert gait.cycle.tolist() == 7 * [1, 2, 3, 4]
+    assert gait.feature_names[KNEE] == "knee_flexion"
+    assert gait.units == 3 * ["degrees"] + ["body weights"]
+    for i, (x, times) in enumerate(zip(gait.data, gait.times, strict=True)):
+        assert x.shape == (len(times), 4)
+        assert 80 <= len(x) <= 120
+        assert (times[0], times[-1]) == (0, 1)
+        assert (np.diff(times) > 0).all()
+        at = np.interp(gait.keyframes[i], np.arange(len(times)), times)
+        # The pace between two frames is nearly even.
+        np.testing.assert_allclose(at, gait.keyframe_times, atol=1e-4)
+    assert len({len(x) for x in gait.data}) > 10
+
+
+def test_somebody_walks(gait):
+    for x, keyframes in zip(gait.data, gait.keyframes, strict=True):
+        hip, knee, ankle, force = x.T
+        peak, valley, second, toe_off, swing = keyframes
+        assert abs(np.argmax(knee) - swing) < 4
+        assert 45 < knee.max() < 80
+        assert hip[0] > 15 > 0 > hip.min() > -25
+        assert abs(np.argmin(ankle) - toe_off) < 6
+        middle = round(valley)
+        assert abs(np.argmax(force[:middle]) - peak) < 4
+        assert abs(middle + np.argmax(force[middle:]) - second) < 4
+        assert force[:middle].max() > 1 > force[middle] > 0.5
+        frames = np.arange(len(x))
+        assert (force[frames >= toe_off] == 0)[:-1].all()
+        assert (force >= 0).all()
+        assert (force[1 : int(toe_off) - 2] > 0).all()
+
+
+def test_a_cycle_ends_where_the_next_one_begins():
+    gait = make_gait(2, 3, noise=0, random_state=0)
+    for i in (0, 1, 3, 4):
+        np.testing.assert_allclose(gait.data[i][-1], gait.data[i + 1][0], atol=1e-9)
+
+
+def test_the_keyframes_are_used_as_they_are(gait):
+    sync = KeyframeSynchronizer(101).fit(gait.data, keyframes=gait.keyframes)
+    synchronised = sync.transform(gait.data, keyframes=gait.keyframes)
+    toe_off = int(np.ceil(sync.keyframes_[TOE_OFF])) + 2
+    assert synchronised[:, toe_off:-2, FORCE].max() == 0
+
+
+# -- what differs between the groups ---------------------------------------------------------
+
+
+def test_groups_differ_by_nothing_unless_asked():
+    gait = make_gait(4, random_state=0)
+    assert gait.group_names == ["A", "B"]
+    np.testing.assert_array_equal(*gait.group_curves)
+    np.testing.assert_array_equal(*gait.group_times)
+
+
+def test_timing_is_what_toe_off_comes_later_by():
+    same, later = (make_gait(4, timing=t, style=0, warp=0, random_state=0) for t in (0, 5))
+    in_b = same.group == "B"
+    difference = shares(later) - shares(same)
+    assert (difference[~in_b] == 0).all()
+    np.testing.assert_allclose(difference[in_b][:, TOE_OFF], 5, atol=1e-3)
+    # What is around it is shifted with it, the heel strikes and loading hardly.
+    assert (difference[in_b][:, PEAK] < 0.2).all()
+    assert (difference[in_b][:, [SECOND, SWING]] > 2.5).all()
+    # The same people, as long as before: only the timing of group B has changed.
+    for i in np.flatnonzero(~in_b):
+        np.testing.assert_array_equal(same.data[i], later.data[i])
+    assert [len(x) for x in same.data] == [len(x) for x in later.data]
+
+
+def test_timing_changes_no_posture_and_amplitude_no_time():
+    plain, later, larger = (
+        make_gait(4, noise=0, random_state=0, **params)
+        for params in ({}, {"timing": 6}, {"amplitude": 15})
+    )
+    assert np.abs(on_clock(later) - on_clock(plain)).max() < 0.3
+    in_b = plain.group == "B"
+    np.testing.assert_array_equal(larger.keyframes, plain.keyframes)
+    change = on_clock(larger) - on_clock(plain)
+    assert np.abs(change[~in_b]).max() == 0
+    assert np.abs(change[..., [HIP, ANKLE, FORCE]]).max() == 0
+    knee = change[in_b][:, :, KNEE]
+    assert np.abs(knee.max(axis=1) / 15 - 1).max() < 0.2  # people have a scale of their own
+    assert np.abs(knee[:, :50]).max() < 0.2
+
+
+@pytest.mark.parametrize(("timing", "amplitude"), [(4, 0), (-12, -40), (12, 40)])
+def test_the_truth_that_is_returned_is_what_groups_do(timing, amplitude):
+    gait = make_gait(
+        2, 1, timing=timing, amplitude=amplitude, style=0, warp=0, noise=0, random_state=0
+    )
+    moments = np.linspace(0, 1, 101)
+    for i in range(2):
+        share = np.interp(moments, gait.times[i], np.linspace(0, 1, len(gait.times[i])))
+        np.testing.assert_allclose(gait.group_times[i], share, atol=2e-3)
+        assert np.abs(on_clock(gait)[i] - gait.group_curves[i]).max() < 1
+        assert (np.diff(gait.group_times[i]) > 0).all()
+    later = 100 * (gait.group_times[1] - gait.group_times[0])
+    assert later[62] == pytest.approx(timing)
+    higher = gait.group_curves[1] - gait.group_curves[0]
+    assert higher[73, KNEE] == pytest.approx(amplitude)
+    assert np.abs(higher[:40]).max() == 0
+
+
+def test_groups_of_many_people_differ_by_it_in_the_mean():
+    gait = make_gait(200, 1, timing=3, amplitude=10, random_state=0)
+    in_b = gait.group == "B"
+    difference = shares(gait)[in_b].mean(axis=0) - shares(gait)[~in_b].mean(axis=0)
+    assert difference[TOE_OFF] == pytest.approx(3, abs=0.7)
+    knee = on_clock(gait)[:, 73, KNEE]
+    assert knee[in_b].mean() - knee[~in_b].mean() == pytest.approx(10, abs=1.5)
+
+
+def test_people_differ_more_than_their_cycles():
+    at = shares(make_gait(80, 4, random_state=0))[:, TOE_OFF].reshape(80, 4)
+    assert at.mean(axis=1).std() == pytest.approx(1.25, abs=0.25)
+    assert np.sqrt(at.var(axis=1, ddof=1).mean()) == pytest.approx(0.42, abs=0.1)
+
+
+# -- takes -----------------------------------------------------------------------------------
+
+
+def test_takes_are_whole_walks_with_their_events(takes):
+    assert len(takes.data) == 7
+    assert "".join(takes.group) == "ABABABA"
+    assert "cycle" not in takes
+    for x, times, events in zip(takes.data, takes.times, takes.events, strict=True):
+        assert x.shape == (len(times), 4)
+        assert (np.diff(times) > 0).all()
+        assert -0.5 < times[0] < 0
+        assert 4 < times[-1] < 4.5
+        assert [event["label"] for event in events] == 4 * ["Foot Strike", "Foot Off"] + [
+            "Foot Strike"
+        ]
+        assert set(events[0]) == {"label", "context", "time", "frame"}
+        at = [event["frame"] for event in events]
+        assert [event["time"] * 100 for event in events] == pytest.approx(at)
+        moments = np.interp(at, np.arange(len(x)), times)
+        expected = np.array([0, 0.62, 1, 1.62, 2, 2.62, 3, 3.62, 4])
+        np.testing.assert_allclose(moments, expected, atol=1e-3)
+        # No jump where a cycle meets the next.
+        assert np.abs(np.diff(x[:, :3], axis=0)).max() < 9
+
+
+def test_keyframes_of_takes_have_names_and_times(takes):
+    assert takes.keyframes.shape == (7, 25)
+    assert takes.keyframe_names[:2] + takes.keyframe_names[-1:] == [
+        "heel strike 1", "first force peak 1", "heel strike 5",
+    ]  # fmt: skip
+    for i, times in enumerate(takes.times):
+        at = np.interp(takes.keyframes[i], np.arange(len(times)), times)
+        np.testing.assert_allclose(at, takes.keyframe_times, atol=2e-3)
+        strikes = [e["frame"] for e in takes.events[i] if e["label"] == "Foot Strike"]
+        np.testing.assert_allclose(takes.keyframes[i][::6], strikes)
+
+
+def test_the_same_people_are_in_takes_and_in_cycles(gait, takes):
+    for i in range(7):
+        lasting = np.diff(takes.keyframes[i][::6])
+        cycles = [len(gait.data[4 * i + c]) for c in range(4)]
+        np.testing.assert_allclose(lasting, cycles, atol=0.51)
+        foot_off = takes.keyframes[i][4::6] - takes.keyframes[i][:-1:6]
+        expected = shares(gait)[4 * i : 4 * i + 4, TOE_OFF]
+        np.testing.assert_allclose(100 * foot_off / lasting, expected, atol=1e-6)
+
+
+# -- parameters ------------------------------------------------------------------------------
+
+
+def test_random_state_decides():
+    a, b, c = (make_gait(2, random_state=seed) for seed in (0, 0, 1))
+    np.testing.assert_array_equal(a.data[1], b.data[1])
+    assert a.data[1].shape != c.data[1].shape or not np.allclose(a.data[1], c.data[1])
+    assert make_gait(2, random_state=np.random.RandomState(0)).data[1].tolist() == (
+        a.data[1].tolist()
+    )
+
+
+@pytest.mark.parametrize("takes", [False, True])
+def test_the_smallest_and_the_largest_parameters(takes):
+    for params in (
+        {"n_people": 1, "n_cycles": 1, "n_frames": 20},
+        {"warp": 10, "timing": 12},
+        {"noise": 1000},
+        {"style": 100, "amplitude": -40},
+    ):
+        gait = make_gait(**{"n_people": 3, "takes": takes, "random_state": 0} | params)
+        for x, times, keyframes in zip(gait.data, gait.times, gait.keyframes, strict=True):
+            assert np.isfinite(x).all()
+            assert (x[:, FORCE] >= 0).all()
+            assert (x[times % 1 > 0.6201, FORCE] == 0).all()
+            assert (np.diff(times) > 0).all()
+            assert (np.diff(keyframes) > 0).all()
+            assert keyframes[0] > 0
+            assert keyframes[-1] < len(x) - 1
+
+
+@pytest.mark.parametrize(
+    "params",
+    [
+        *({"n_people": value} for value in (0, True, 10**9, 2.0)),
+        *({"n_cycles": value} for value in (0, 10**5, 1.5)),
+        *({"amplitude": value} for value in (41, -41, np.nan, "more")),
+        *({"timing": value} for value in (12.5, -13, np.nan, None)),
+        *({"takes": value} for value in (1, None, "yes")),
+        *({"n_frames": value} for value in (19, 10**9, np.nan)),
+        *({"style": value} for value in (np.nan, -1, 1e308)),
+        *({"warp": value} for value in (11, -1, np.inf)),
+        *({"noise": value} for value in (1e308, -1, np.nan)),
+        *({"frame_rate": value} for value in (0, -1, np.inf)),
+    ],
+    ids=str,
+)
+def test_nonsense_parameters(params):
+    with pytest.raises(ValueError, match=f"'{next(iter(params))}' parameter of make_gait"):
+        make_gait(**params)
+
+
+def test_what_it_would_take_is_said_before():
+    said = r"1000 people with 10000 cycles of about 100 frames would take 32 GB.*n_people, n_cycles"
+    with pytest.raises(ValueError, match=said):
+        make_gait(1000, 10**4)
