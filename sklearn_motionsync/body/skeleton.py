@@ -49,8 +49,8 @@ class Skeleton(ReadySkeletons):
         ``pelvis``, ``neck``, ``head`` and ``left_``/``right_`` ``shoulder``, ``elbow``,
         ``wrist``, ``hip``, ``knee``, ``ankle``. Several joints stand for their mean, such as two
         markers for the middle of a knee. Landmarks may lack, or be None; two of them that belong to
-        one limb must be there. By default it is guessed from the names: a pelvis or a neck without a joint
-        is the mean of the hips or the shoulders.
+        one limb must be there. By default it is guessed from the names: a pelvis or a neck without
+        a joint is the mean of the hips or the shoulders.
     up : {"y", "x", "z", "-y", "-x", "-z"}, default="y"
         The vertical axis of the positions; "-y" where y points downwards, as in pictures.
     n_dims : {3, 2}, default=3
