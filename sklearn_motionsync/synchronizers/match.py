@@ -175,9 +175,9 @@ class Match:
         Returns
         -------
         DataFrame
-            Indexed by performance, called as in X, and frame of the pattern, with the columns ``time``, tau(p) in
-            the unit, from the beginning of each performance; ``offset``, how much later than the
-            pattern that is; and ``rate``.
+            Indexed by performance, called as in X, and frame of the pattern. Columns: ``time``,
+            tau(p) in the unit, from the beginning of each performance; ``offset``, how much later
+            than the pattern that is; ``rate``.
 
         Raises
         ------
