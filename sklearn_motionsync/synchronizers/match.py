@@ -175,9 +175,9 @@ class Match:
         Returns
         -------
         DataFrame
-            Indexed by performance and frame of the pattern, with the columns ``time``, tau(p) in
-            the unit, from the beginning of each performance; ``offset``, how much later than the
-            pattern that is; and ``rate``.
+            Indexed by performance, called as in X, and frame of the pattern. Columns: ``time``,
+            tau(p) in the unit, from the beginning of each performance; ``offset``, how much later
+            than the pattern that is; ``rate``.
 
         Raises
         ------
@@ -209,7 +209,11 @@ class Match:
             self._check_count(labels, "labels")
         for table, x in zip(tables, _with_attributes(X), strict=False):
             table.attrs.update(x.attrs)
-        return to_frame(tables, performances=labels)
+        table = to_frame(tables, performances=labels)
+        if isinstance(X, pd.DataFrame) and X.index.nlevels == table.index.nlevels:
+            known = zip(X.index.names[:-1], table.index.names, strict=False)
+            table.index.names = [*(name or usual for name, usual in known), table.index.names[-1]]
+        return table
 
     @classmethod
     def from_estimator(cls, estimator, X, **params):

@@ -279,6 +279,8 @@ def test_a_table_of_the_timing(late):
     assert list(table.index.unique(0)) == ["ann", "bob"]
     assert list(table.columns) == ["time", "offset", "rate"]
     np.testing.assert_allclose(table.loc[("bob", 5)], [0.4, -0.1, 1])
+    named = late.to_frame(X=X.rename_axis(["trial", "sample"]))
+    assert named.index.names == ["trial", "frame"]
     table = late.to_frame()
     np.testing.assert_array_equal(table["offset"].unstack(), late.offsets)
     np.testing.assert_array_equal(table["time"].unstack(), late.times)
