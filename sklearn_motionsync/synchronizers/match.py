@@ -1,14 +1,13 @@
 """Match: how performances meet the pattern, which every synchronizer answers with."""
 
 import numpy as np
-import pandas as pd
 
 from ..gate import as_numbers
 from ..matching.warps import sample
 from ..performances import read_collection
 from ..pipelines import reach_synchronizer
-from ..sequences import as_collection, to_frame
 from .clock import as_frame_rate, as_unit
+from .table import table_of_timing
 
 __all__ = ["Match", "as_match", "check_answer"]
 
@@ -199,21 +198,10 @@ class Match:
         >>> csv = match.to_frame("percent", labels=["ann"]).to_csv()
         """
         times, offsets = self._in_unit(unit, X, frame_rate)
-        if isinstance(X, pd.DataFrame) and labels is None:
-            labels = list(X.index.droplevel(-1).unique())
-        tables = [
-            pd.DataFrame(np.column_stack(columns), columns=["time", "offset", "rate"])
-            for columns in zip(times, offsets, self.rates, strict=True)
-        ]
         if labels is not None:
             self._check_count(labels, "labels")
-        for table, x in zip(tables, _with_attributes(X), strict=False):
-            table.attrs.update(x.attrs)
-        table = to_frame(tables, performances=labels)
-        if isinstance(X, pd.DataFrame) and X.index.nlevels == table.index.nlevels:
-            known = zip(X.index.names[:-1], table.index.names, strict=False)
-            table.index.names = [*(name or usual for name, usual in known), table.index.names[-1]]
-        return table
+        columns = {"time": times, "offset": offsets, "rate": self.rates}
+        return table_of_timing(columns, X, labels)
 
     @classmethod
     def from_estimator(cls, estimator, X, **params):
@@ -385,13 +373,6 @@ def check_answer(match, n_sequences, n_frames, name):
             f"{name}.match must return a Match with times of shape (n_sequences, P), here "
             f"{(n_sequences, n_frames)}; got {type(match).__name__} with {shape}."
         )
-
-
-def _with_attributes(X):
-    """The sequences of a collection that may know what they are called; none of anything else."""
-    if X is None or (not hasattr(X, "columns") and all(np.ndim(n) == 0 for n in X)):
-        return []
-    return [x for x in as_collection(X) or [] if hasattr(x, "attrs")]
 
 
 def _lengths(X):
