@@ -168,8 +168,9 @@ class Match:
             For seconds; and where it has labels, they are those of the table.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             For seconds: frames a second of what X is.
-        labels : sequence of length n_sequences, default=None
-            What performances are called; by default as in X, or 0, 1, ...
+        labels : sequence of length n_sequences, or Index, default=None
+            What performances are called; by default as in X, or 0, 1, ... A MultiIndex makes
+            several levels.
 
         Returns
         -------

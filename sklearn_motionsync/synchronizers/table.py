@@ -16,31 +16,24 @@ def table_of_timing(columns, X, labels):
     columns : dict of ndarray, shape (n_sequences, P)
         By name.
     X : performances, how many frames each has, or None
-        Who knows what performances are called, and what their level of the index is.
-    labels : sequence of length n_sequences, or None
+        Who may know what performances are called.
+    labels : sequence of length n_sequences, Index, or None
 
     Returns
     -------
     DataFrame
     """
-    is_frame = isinstance(X, pd.DataFrame)
-    if is_frame and labels is None:
-        labels = list(X.index.droplevel(-1).unique())
     tables = [
         pd.DataFrame(np.column_stack(of_one), columns=list(columns))
         for of_one in zip(*columns.values(), strict=True)
     ]
-    for table, x in zip(tables, _with_attributes(X), strict=False):
-        table.attrs.update(x.attrs)
-    table = to_frame(tables, performances=labels)
-    if is_frame and X.index.nlevels == table.index.nlevels:
-        known = zip(X.index.names[:-1], table.index.names, strict=False)
-        table.index.names = [*(name or usual for name, usual in known), table.index.names[-1]]
-    return table
+    return to_frame(tables, performances=_tables_of(X) if labels is None else labels)
 
 
-def _with_attributes(X):
-    """The sequences of a collection that may know what they are called; none of anything else."""
+def _tables_of(X):
+    """The sequences of a collection, if they are tables, which may know what they are called."""
     if X is None or (not hasattr(X, "columns") and all(np.ndim(n) == 0 for n in X)):
-        return []
-    return [x for x in as_collection(X) or [] if hasattr(x, "attrs")]
+        return None
+    sequences = as_collection(X)
+    are_tables = sequences and all(isinstance(x, pd.DataFrame) for x in sequences)
+    return sequences if are_tables else None
