@@ -1,4 +1,4 @@
-"""What all tests and documented examples share: figures are closed after each of them."""
+"""What all tests and documented examples share: figures are closed, files go to a folder."""
 
 import os
 import sys
@@ -6,6 +6,13 @@ import sys
 import pytest
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(request, tmp_path, monkeypatch):
+    """Documented examples may write files."""
+    if isinstance(request.node, pytest.DoctestItem):
+        monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture(autouse=True)

@@ -298,7 +298,8 @@ def _check_rows(estimator, X, *, reset, level, on_rows, finite):
 def _refuse_long_table(name, df):
     """Named columns are features, and rows frames, unless the names only number the frames."""
     texts = [c for c in df.columns if isinstance(c, str)]
-    if df.index.nlevels == 1 and (not texts or _are_numbered(list(df.columns))):
+    counts = not texts or _are_numbered(list(df.columns))
+    if df.index.nlevels == 1 and counts and not _tells_time(df.index):
         return
     shown = ", ".join(map(repr, df.columns[:4])) + (", ..." if df.shape[1] > 4 else "")
     levels = "index does" if df.index.nlevels == 1 else f"index of {df.index.nlevels} levels does"
@@ -306,8 +307,16 @@ def _refuse_long_table(name, df):
         f"{name} got a table of {len(df)} rows with the columns {shown}, whose {levels} not tell "
         "performances apart. If its rows are frames, say which columns name the performance and "
         "the time: to_sequences(df, by=[...], time=...), or index it by (performance, frame). If "
-        "every row is one univariate performance, give df.to_numpy()."
+        "every row is one univariate performance, give df.to_numpy(); if every column is one, "
+        "df.T.to_numpy()."
     )
+
+
+def _tells_time(index):
+    """Whether an index increases in fractions, dates or durations, as the time of frames does."""
+    if not index.is_monotonic_increasing or not index.is_unique:
+        return False
+    return index.dtype.kind in "mM" or (index.dtype.kind == "f" and bool((index % 1 != 0).any()))
 
 
 def _are_numbered(names):

@@ -275,3 +275,12 @@ def test_what_does_not_tick_in_every_performance_is_no_clock(other):
     ramps = [np.column_stack([0.02 * np.arange(len(x)), x]) for x in X]
     LinearSynchronizer().fit([*ramps, np.column_stack([other, X[0]])])
     LinearSynchronizer().fit([ramp[:, :1] for ramp in ramps])
+
+
+@pytest.mark.parametrize("columns", [["walk1", "walk2", "walk3"], [4, 5, 6]])
+def test_a_wide_table_by_its_time_is_not_read_row_by_row(columns):
+    """Columns that number the trials look like columns that number the frames."""
+    for index in (np.arange(20) / 50, DATES):
+        wide = pd.DataFrame(X[0], columns=columns, index=index)
+        refuses(lambda wide=wide: DenseSynchronizer().fit(wide), ["every column is one, df.T"])
+        assert DenseSynchronizer(8).fit_transform(wide.T.to_numpy()).shape == (3, 8)

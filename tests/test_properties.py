@@ -11,6 +11,9 @@ from hypothesis import strategies as st
 from sklearn.base import clone
 from sklearn_motionsync import DenseSynchronizer, KeyframeSynchronizer, LinearSynchronizer
 
+# Waves of random sizes: that one is much larger than all others happens, and is told.
+pytestmark = pytest.mark.filterwarnings("ignore:Feature .* of the energy:UserWarning")
+
 PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0}
 SYNCHRONIZERS = [
     LinearSynchronizer(),

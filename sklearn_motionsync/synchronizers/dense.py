@@ -16,7 +16,9 @@ from ..matching.median import Median, estimate_distances, rounding_of, search_me
 from ..matching.refinement import choose_smoothing
 from ..matching.warper import RefinedWarper, Warper
 from ..matching.warps import normalise
+from ..performances import names_of_input
 from ..work import LongWorkMixin, run
+from .balance import warn_of_one_feature
 from .base import Synchronizer
 from .match import Match
 from .portions import compare_in_portions, in_portions, shared_training_set
@@ -144,7 +146,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     metric_ : Bunch or None
         What was learnt: ``share``, the part of every feature in what is compared, about 0 for
         noise; ``energy``, its part in the plain velocities, which would be compared without a
-        metric; ``performances``, the indices of those it was learnt from. None if none was learnt.
+        metric, above 0.95 of one of several a warning; ``performances``, the indices of those it
+        was learnt from. None if none was learnt.
     mu_ : float
         The absolute weight of the changes of pace.
     exemplars_ : ndarray of int
@@ -310,6 +313,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             if learns:
                 features, self.metric_ = learn_metric(self, features, positions)
             matcher, features = Matcher.learn(features, positions, **self._settings())
+            warn_of_one_feature(performances, features, self.metric_, names_of_input(self))
             self.mu_ = float(matcher.features.back(matcher.trellis.mu))
             shared = shared_training_set(matcher, positions, features)
             median = self._choose_median(shared, features, progress)

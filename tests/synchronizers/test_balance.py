@@ -1,0 +1,78 @@
+"""One of several features that drowns the others is told, and no other."""
+
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, FrameWise
+from sklearn_motionsync.datasets import load_performances
+
+SETTINGS = [
+    {},
+    {"metric": None},
+    {"cost": "elastic"},
+    {"cost": "posture", "max_rate": 2, "consensus": 0},
+]
+
+
+def walks(units=(60, 900), n=5, n_frames=40):
+    rng = np.random.default_rng(0)
+    times = [np.linspace(0, 1, n_frames) ** rng.uniform(0.8, 1.25) for _ in range(n)]
+    curves = [np.column_stack([np.sin(5 * t), 5 + np.cos(4 * t)]) for t in times]
+    return [pd.DataFrame(x * units, columns=["knee", "force"]) for x in curves]
+
+
+def is_quiet(X, **params):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        DenseSynchronizer(n_frames=30, **params).fit(X)
+    return True
+
+
+@pytest.mark.parametrize("params", SETTINGS)
+def test_features_of_other_units_are_told(params):
+    sync = DenseSynchronizer(n_frames=30, **params)
+    with pytest.warns(UserWarning, match=r"Feature 'force' holds 9\d.* % of the energy") as told:
+        sync.fit(walks())
+    assert "make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer())" in str(told[0].message)
+    with pytest.warns(UserWarning, match=r"Feature 0 holds"):
+        sync.fit([x.to_numpy() * [100, 1 / 900] for x in walks()])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        make_pipeline(FrameWise(StandardScaler()), sync).fit(walks())
+
+
+@pytest.mark.parametrize("params", SETTINGS)
+def test_nothing_is_told_of_what_is_balanced_or_alone(params):
+    one_unit = walks((1, 1))
+    assert is_quiet(one_unit, **params)
+    assert is_quiet([x[["force"]] for x in walks()], **params)
+    still = [x.assign(knee=0.1) for x in walks()]
+    assert is_quiet(still, **params)
+    assert is_quiet([x * 0 for x in walks()], **params)
+
+
+@pytest.mark.parametrize("dtype", ["f4", "f8"])
+def test_principal_components_have_one_unit(dtype):
+    """The first holds most by construction."""
+    X = [x.to_numpy().astype(dtype) for x in walks()]
+    points = ASpace(2).fit_transform(X)
+    variance = np.concatenate(points).var(axis=0)
+    assert variance[0] > 0.95 * variance.sum()
+    assert is_quiet(points)
+
+
+@pytest.mark.parametrize("name", ["hdm05", "utkinect"])
+def test_people_are_balanced(name, real_data):
+    from sklearn_motionsync import Skeleton
+
+    bunch = load_performances(real_data / name / f"{name}_positions.npz")
+    skeleton = Skeleton.acclaim() if name == "hdm05" else Skeleton.kinect()
+    label = bunch.target[0]
+    X = [x for x, target in zip(bunch.data, bunch.target, strict=True) if target == label][:12]
+    cosines = DirectionCosines(skeleton).fit_transform(X)
+    for features in (X, cosines, ASpace().fit_transform(cosines), ASpace(2).fit_transform(X)):
+        assert is_quiet(features)
