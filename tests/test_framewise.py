@@ -217,7 +217,7 @@ def test_parameters_are_nested(X):
         (OneHotEncoder(handle_unknown="ignore"), ["sparse"]),
         ("scale", ["'transformer'", "'scale'"]),
     ],
-    ids=str,
+    ids=lambda given: type(given).__name__,
 )
 def test_transformers_that_do_not_fit(transformer, words, X):
     framewise = FrameWise(transformer)
