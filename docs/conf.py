@@ -19,6 +19,7 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
     "mathml",
@@ -102,6 +103,13 @@ plot_rcparams = {
     "legend.frameon": False,
 }
 plot_apply_rcparams = True
+
+# Code is copied as it is typed: without prompts, and without what it prints.
+copybutton_selector = ", ".join(
+    f"div.highlight-{language} pre" for language in ("default", "pycon", "Python", "python", "sh")
+)
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
 
 # -- pages --------------------------------------------------------------------------------
 
