@@ -130,5 +130,7 @@ html_theme_options = {
     "secondary_sidebar_items": ["page-toc"],
     "pygments_light_style": "friendly",
 }
-html_sidebars = {page: [] for page in ("index", "tutorial", "method")}
+html_sidebars = {
+    page: [] for page in ("index", "tutorial", "method", "field", "glossary", "changelog")
+}
 html_context = {"default_mode": "light"}
