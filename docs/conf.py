@@ -19,6 +19,7 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
     "mathml",
@@ -103,6 +104,13 @@ plot_rcparams = {
 }
 plot_apply_rcparams = True
 
+# Code is copied as it is typed: without prompts, and without what it prints.
+copybutton_selector = ", ".join(
+    f"div.highlight-{language} pre" for language in ("default", "pycon", "Python", "python", "sh")
+)
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
+
 # -- pages --------------------------------------------------------------------------------
 
 html_theme = "pydata_sphinx_theme"
@@ -122,5 +130,7 @@ html_theme_options = {
     "secondary_sidebar_items": ["page-toc"],
     "pygments_light_style": "friendly",
 }
-html_sidebars = {page: [] for page in ("index", "tutorial", "method")}
+html_sidebars = {
+    page: [] for page in ("index", "tutorial", "method", "field", "glossary", "changelog")
+}
 html_context = {"default_mode": "light"}

@@ -1,11 +1,8 @@
-"""Small repairs to what Sphinx and its extensions make of doctests, tables and players."""
+"""Small repairs to what Sphinx and its extensions make of doctests and tables."""
 
 import re
 
 _NUMBERS = re.compile(r"[-+]?\d[\d.,e+%/() -]*( to [\d.]+\))?")
-
-# Matplotlib's player of animations fetches its icons; the theme has them here.
-_ICONS = re.compile(r"<link[^>]*font-awesome[^>]*>")
 
 
 def strip_blocks(app, doctree):
@@ -28,15 +25,6 @@ def mark_numbers(app, doctree):
             entry["classes"].append("number")
 
 
-def keep_local(app, doctree):
-    """Pages fetch nothing from other sites."""
-    from docutils import nodes
-
-    for raw in doctree.findall(nodes.raw):
-        if raw["format"] == "html" and _ICONS.search(raw.astext()):
-            raw[:] = [nodes.Text(_ICONS.sub("", raw.astext()))]
-
-
 def setup(app):
     from numpydoc.xref import DEFAULT_LINKS
     from sphinx.ext import autosummary
@@ -46,5 +34,4 @@ def setup(app):
     autosummary.WELL_KNOWN_ABBREVIATIONS += ("Eq.", "Eqs.", "Fig.", "Figs.")
     app.connect("doctree-read", strip_blocks)
     app.connect("doctree-read", mark_numbers)
-    app.connect("doctree-read", keep_local)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,6 +1,7 @@
 """Animations that a notebook plays without further ado."""
 
 from .drawing import pyplot
+from .player import with_own_buttons
 
 __all__ = ["playable"]
 
@@ -30,7 +31,7 @@ def playable(figure, show, count, fps, *, closes):
     from matplotlib.animation import FuncAnimation
 
     class Playable(FuncAnimation):
-        """Its places stay, its pictures are small."""
+        """Its places stay, its pictures are small, and it fetches nothing."""
 
         def to_jshtml(self, *args, **kwargs):
             # To find the places of the panels costs more than to draw.
@@ -39,7 +40,7 @@ def playable(figure, show, count, fps, *, closes):
             figure.set_layout_engine("none")
             try:
                 with pyplot().rc_context({"savefig.dpi": _DPI}):
-                    return super().to_jshtml(*args, **kwargs)
+                    return with_own_buttons(super().to_jshtml(*args, **kwargs))
             finally:
                 figure.set_layout_engine(layout)
 

@@ -1,0 +1,41 @@
+"""The oldest versions that pyproject.toml allows, as constraints for pip.
+
+    python .ci/floors.py > floors.txt
+    pip install '.[test]' -c floors.txt
+
+A floor such as ``numpy>=2.0`` becomes ``numpy==2.0.*``: its newest repairs, but nothing younger.
+Only what the package and its tests need is pinned; the manual is built with what is newest.
+"""
+
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+EXTRAS = ("plot", "test")
+# What the oldest versions need in their turn, before it warned of the ways in which they use it.
+COMPANIONS = ["pyparsing==3.1.*"]
+_REQUIREMENT = re.compile(r"(?P<name>[\w.-]+)(\[[^]]*\])?\s*(?P<versions>[^;]*)(;\s*(?P<when>.*))?")
+_FLOOR = re.compile(r">=\s*([\d.]*\d)")
+
+
+def pin(requirement):
+    """The constraint that keeps a requirement at its floor."""
+    parts = _REQUIREMENT.fullmatch(requirement)
+    floor = parts and _FLOOR.search(parts["versions"])
+    if not floor:
+        raise ValueError(f"The requirement {requirement!r} has no floor; say NAME>=VERSION.")
+    when = f" ; {parts['when']}" if parts["when"] else ""
+    return f"{parts['name']}=={floor[1]}.*{when}"
+
+
+def constraints(path):
+    """What a pyproject.toml needs for the package, its figures and its tests, at the floors."""
+    project = tomllib.loads(Path(path).read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    asked = project["dependencies"] + [each for extra in EXTRAS for each in extras[extra]]
+    return sorted({*COMPANIONS, *(pin(requirement) for requirement in asked)})
+
+
+if __name__ == "__main__":
+    sys.stdout.write("\n".join(constraints(Path(__file__).parents[1] / "pyproject.toml")) + "\n")

@@ -1,0 +1,25 @@
+"""The player of animations: its buttons are there, with and without a network."""
+
+import re
+
+import pytest
+from sklearn_motionsync import SkeletonDisplay
+
+
+@pytest.fixture(scope="module")
+def player(bending):
+    display = SkeletonDisplay.from_positions(bending.data[0], bending.skeleton)
+    return display.animate(seconds=0.2, fps=10).to_jshtml()
+
+
+def test_a_player_fetches_nothing(player):
+    assert not re.search(r"<link|@import|url\(|(src|href)=.https?:", player)
+
+
+def test_every_button_has_a_picture_and_a_name(player):
+    buttons = re.findall(r"<button ([^>]*)>(.*?)</button>", player, re.DOTALL)
+    assert len(buttons) == 9
+    assert all(re.search('title="[^"]+"', attributes) for attributes, _ in buttons)
+    pictures = [picture.strip() for _, picture in buttons]
+    assert all(re.fullmatch(r"<svg .*<path .*</svg>", p) for p in pictures), pictures
+    assert len(set(pictures)) == 9
