@@ -16,7 +16,6 @@ from ..matching.median import Median, estimate_distances, rounding_of, search_me
 from ..matching.refinement import choose_smoothing
 from ..matching.warper import RefinedWarper, Warper
 from ..matching.warps import normalise
-from ..performances import names_of_input
 from ..work import LongWorkMixin, run
 from .balance import warn_of_one_feature
 from .base import Synchronizer
@@ -313,7 +312,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             if learns:
                 features, self.metric_ = learn_metric(self, features, positions)
             matcher, features = Matcher.learn(features, positions, **self._settings())
-            warn_of_one_feature(performances, features, self.metric_, names_of_input(self))
+            warn_of_one_feature(self, performances, features)
             self.mu_ = float(matcher.features.back(matcher.trellis.mu))
             shared = shared_training_set(matcher, positions, features)
             median = self._choose_median(shared, features, progress)
