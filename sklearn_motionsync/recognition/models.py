@@ -1,5 +1,7 @@
 """What performances of a class have in common, for those who ask why."""
 
+import warnings
+
 import numpy as np
 import pandas as pd
 from sklearn.pipeline import Pipeline
@@ -31,7 +33,11 @@ def learn_model(performances, groups, n_frames, n_jobs):
     if groups is not None and len(np.unique(groups)) < 2:
         groups = None
     synchronizer, model = DenseSynchronizer(n_frames, n_jobs=n_jobs), ActionModel()
-    model.fit(synchronizer.fit_transform(performances), groups=groups)
+    with warnings.catch_warnings():
+        # One class may move one feature only; units are a matter of all classes.
+        warnings.filterwarnings("ignore", ".* of the energy that is compared", UserWarning)
+        synchronized = synchronizer.fit_transform(performances)
+    model.fit(synchronized, groups=groups)
     return Pipeline([("densesynchronizer", synchronizer), ("actionmodel", model)])
 
 

@@ -37,8 +37,8 @@ def warn_of_one_feature(synchronizer, performances, compared):
     k = int(shares.argmax())
     name = k if names is None else repr(names[k])
     warnings.warn(
-        f"Feature {name} holds {100 * shares[k]:.4g} % of the energy that is compared, the other "
-        f"{len(shares) - 1} hardly count. If units differ, scale them: "
+        f"Feature {name} holds {100 * shares[k]:.4g} % of the energy that is compared: of "
+        f"{len(shares)} features the others hardly count. If units differ, scale them: "
         "make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer()). If it alone shall tell "
         "the moments, leave the others out, and warp them by Match.warp.",
         UserWarning,
