@@ -41,7 +41,7 @@ DIFFERENCES = {
     "timing, 3 %": {"timing": 3},
     "shape, 8 degrees": {"amplitude": 8},
     "both, 3 % and 8 degrees": {"timing": 3, "amplitude": 8},
-    "timing, 3 %, people vary 1.5 times as much in pace": {"timing": 3, "warp": 1.5},
+    "timing, 3 %, pace varies more": {"timing": 3, "warp": 1.5},
 }
 CHANNELS = ("hip_flexion", "knee_flexion", "vertical_force")
 LINEAR, CURVE, OFFSET, JOINT = (
