@@ -13,7 +13,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import spm1d
-from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn_motionsync import DenseSynchronizer, FrameWise, LinearSynchronizer, Match
 from sklearn_motionsync.datasets import make_gait
 
 COLORS = {"A": "#0072B2", "B": "#D55E00"}
@@ -57,10 +59,9 @@ linear = LinearSynchronizer(101).fit_transform(gait.data)
 
 
 def synchronise(bunch):
-    spread = np.concatenate(bunch.data).std(axis=0)
-    scaled = [x / spread for x in bunch.data]
-    match = DenseSynchronizer(101).fit(scaled).match(scaled)
-    return match.warp(bunch.data), 100 * match.offsets / (match.offsets.shape[1] - 1)
+    pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(101)).fit(bunch.data)
+    match = Match.from_estimator(pipe, bunch.data)
+    return match.warp(bunch.data), match.offsets_in("percent")
 
 
 curves, offsets = synchronise(gait)
