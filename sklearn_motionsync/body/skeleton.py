@@ -7,14 +7,14 @@ import numpy as np
 
 from ..gate import as_numbers
 from .checks import as_joints, as_landmarks, as_parents, circle_of, is_whole, kept_parents
-from .columns import AXES, check_columns, joints_of, joints_with_axes
+from .columns import AXES, check_columns, joints_with_axes
 from .formats import FORMATS, LANDMARKS
 from .landmarks import as_tuple, completed, likely_landmarks, one_sided
 from .limbs import LIMBS, limbs_between, stretched_legs
 from .ready import ReadySkeletons
 from .upright import UPS, seems_up
 
-__all__ = ["LANDMARKS", "Skeleton", "check_columns", "joints_of"]
+__all__ = ["LANDMARKS", "Skeleton", "check_columns"]
 
 
 class _ReadOnly(dict):
@@ -49,8 +49,8 @@ class Skeleton(ReadySkeletons):
         ``pelvis``, ``neck``, ``head`` and ``left_``/``right_`` ``shoulder``, ``elbow``,
         ``wrist``, ``hip``, ``knee``, ``ankle``. Several joints stand for their mean, such as two
         markers for the middle of a knee. Landmarks may lack, or be None; two of them that belong to
-        one limb must be there. By default it is guessed from the names: a pelvis or a neck without a joint
-        is the mean of the hips or the shoulders.
+        one limb must be there. By default it is guessed from the names: a pelvis or a neck without
+        a joint is the mean of the hips or the shoulders.
     up : {"y", "x", "z", "-y", "-x", "-z"}, default="y"
         The vertical axis of the positions; "-y" where y points downwards, as in pictures.
     n_dims : {3, 2}, default=3
