@@ -21,6 +21,7 @@ __all__ = [
     "labels_given",
     "labels_of",
     "name_performance",
+    "own_label",
     "parts_of",
     "stack_frame",
 ]
@@ -98,7 +99,7 @@ def labels_of(sequences):
     Those that a list carries, if it does so throughout and they differ; otherwise 0, 1, ...
     """
     frame = frame_name(sequences) or INDEX_NAMES[1]
-    found = [_own_label(x) for x in sequences]
+    found = [own_label(x) for x in sequences]
     labels = [label for label, _ in found]
     names = {levels for _, levels in found}
     if len(names) == 1 and None not in names and len(set(labels)) == len(labels):
@@ -106,7 +107,7 @@ def labels_of(sequences):
     return list(range(len(sequences))), (INDEX_NAMES[0], frame)
 
 
-def _own_label(x):
+def own_label(x):
     """The label that a DataFrame carries, and its level names without the last; None if none."""
     attrs = x.attrs if isinstance(x, pd.DataFrame) else {}
     label, levels = attrs.get(_LABEL), attrs.get(_LEVELS, INDEX_NAMES)

@@ -323,6 +323,74 @@ def test_attributes_of_the_table_stay(table):
     assert all(x.attrs["frame_rate"] == 50 for x in to_sequences(table, by=KEYS, time="time"))
 
 
+def test_levels_of_a_wide_file_are_keys(tmp_path):
+    """pandas keeps every column that it reads apart, and warns when one more is inserted."""
+    pd.DataFrame(np.random.default_rng(0).random((9, 120))).to_csv(tmp_path / "a.csv")
+    read = {name: pd.read_csv(tmp_path / "a.csv", index_col=0) for name in "ab"}
+    found = to_sequences(pd.concat(read, names=["trial", "t"]), time="t")
+    assert [(x.attrs["performance"], x.shape) for x in found] == [("a", (9, 120)), ("b", (9, 120))]
+
+
+# -- what a recording says of its clock ---------------------------------------------------------
+
+CLOCK = {"frame_rate": None, "first_time": 2.0, "units": "deg"}
+
+
+def recording(seconds, **facts):
+    df = pd.DataFrame({"knee": seconds})
+    df.attrs = CLOCK | facts
+    return df
+
+
+def events_at(*frames):
+    return [{"label": "Foot Strike", "frame": frame} for frame in frames]
+
+
+def test_uneven_times_that_were_made_even_are_a_frame_rate():
+    seconds = 2 + np.delete(np.arange(101) / 100, [3, 50])
+    df = recording(seconds, times=seconds.tolist(), events=events_at(2.0, 48.5, None, -3.0))
+    for time in (seconds, seconds - 2, 1000 * seconds, pd.to_timedelta(seconds, unit="s")):
+        (x,) = to_sequences(df.assign(time=time), time="time", max_gap=1e5)
+        assert x.attrs["frame_rate"] == 100
+        assert x.attrs["first_time"] == 2
+        assert "times" not in x.attrs
+        # Where they were: the third frame that is missing came before, the other is bridged.
+        assert [e["frame"] for e in x.attrs["events"]] == pytest.approx([2, 50, None, -3], abs=0.1)
+    assert df.attrs["times"] == seconds.tolist()
+    assert [e["frame"] for e in df.attrs["events"]] == [2, 48.5, None, -3]
+
+
+def test_another_frame_rate_is_that_of_the_recording():
+    df = recording(np.arange(101) / 100, frame_rate=100.0, events=events_at(30.0))
+    df = df.assign(ms=np.arange(101) * 10.0)
+    (x,) = to_sequences(df, time="ms", frame_rate=0.05)
+    assert x.attrs["frame_rate"] == 50
+    assert x.attrs["events"] == events_at(15.0)
+    (x,) = to_sequences(df, time="ms")
+    assert x.attrs["frame_rate"] == 100
+    assert x.attrs["events"] == events_at(30.0)
+
+
+@pytest.mark.parametrize("time", [None, "frame"])
+def test_parts_of_a_recording_have_their_own_times(time):
+    seconds = 2 + np.cumsum([0, 1, 3, 1, 1, 2, 1, 1, 1, 4]) / 10
+    df = recording(seconds, times=seconds.tolist(), events=events_at(1.5, 6.0), first_frame=7)
+    df = df.assign(cycle=[0] * 4 + [1] * 6, frame=range(10))
+    first, second = to_sequences(df, by="cycle", time=time)
+    assert first.attrs["times"] == seconds[:4].tolist()
+    assert second.attrs["times"] == seconds[4:].tolist()
+    assert [x.attrs["first_time"] for x in (first, second)] == [2, seconds[4]]
+    assert [x.attrs["events"] for x in (first, second)] == [events_at(1.5), events_at(2.0)]
+    assert first.attrs["first_frame"] == 7
+    assert "first_frame" not in second.attrs
+
+
+def test_a_recording_keeps_its_name():
+    df = recording(np.arange(9.0), performance="walk1", levels=["recording", "frame"])
+    (x,) = to_sequences(df.assign(t=np.arange(9)), time="t")
+    assert (x.attrs["performance"], x.attrs["levels"]) == ("walk1", ("recording", "t"))
+
+
 # -- what is refused ---------------------------------------------------------------------------
 
 BY = {"by": KEYS, "time": "time"}
