@@ -15,7 +15,16 @@ from .even_times import (
     round_up,
 )
 from .gate import as_numbers
-from .tables import INDEX_NAMES, as_pandas, called, cut, full_names, own_label, parts_of
+from .tables import (
+    INDEX_NAMES,
+    as_pandas,
+    called,
+    cut,
+    full_names,
+    own_label,
+    parts_of,
+)
+from .wide_tables import call_to_unfold
 
 __all__ = ["to_sequences"]
 
@@ -100,8 +109,10 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap=None):
     df = as_pandas(df)
     if not isinstance(df, pd.DataFrame):
         raise ValueError(
-            f"to_sequences needs a DataFrame of pandas or polars, got {type(df).__name__}. Give "
-            "pd.DataFrame(x, columns=[...]); arrays that are performances already need no table."
+            f"to_sequences needs a DataFrame of pandas or polars, got {type(df).__name__}. Several "
+            f"tables make one: pd.concat({{'ann': ann, 'bob': bob}}, names={list(INDEX_NAMES)}). "
+            "An array makes one by pd.DataFrame(x, columns=[...]); arrays that are performances "
+            "already need no table."
         )
     check_settings(frame_rate, max_gap, time)
     if by is None and time is None:
@@ -148,6 +159,8 @@ def _cut_by_columns(df, request):
     else:
         index = pd.Index(flat[keys[0]] if keys else np.zeros(len(flat), dtype=int))
     labels, parts = parts_of(index, names)
+    if keys and len(flat) == len(labels):
+        _refuse_wide(df, keys)
     if not keys and own_label(df)[0] is not None:
         label, names = own_label(df)
         labels = [label]
@@ -199,6 +212,20 @@ def _flat(df, keys, request):
             f"which comes once; there are {columns[:20]}."
         )
     return flat
+
+
+def _refuse_wide(df, keys):
+    """Say what to do with performances of one row each."""
+    call = call_to_unfold(df.columns, [key for key in keys if key not in df.columns])
+    how = (
+        f"is the table wide, frames side by side in columns? Then {call}."
+        if call
+        else ("name fewer columns, that tell performances apart and not frames; the time is time=.")
+    )
+    raise ValueError(
+        f"{keys} tell {len(df)} performances of one row each apart, and a performance has 2 "
+        f"frames or more: {how}"
+    )
 
 
 def _check_features(features, keys, request):

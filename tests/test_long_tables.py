@@ -1,5 +1,7 @@
 """Long tables to performances that know what they are called, in order of an even time."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import polars as pl
@@ -483,3 +485,80 @@ def test_a_long_polars_table_is_not_read_row_by_row(table):
     df = pl.DataFrame(table.drop(columns=KEYS).to_dict("list"))
     with pytest.raises(ValueError, match=r"to_sequences\(df, by=\[...\], time=...\)"):
         DenseSynchronizer().fit(df)
+
+
+# -- wide tables: told, and how to make them long ----------------------------------------------
+
+
+def wide(names=("hip", "knee"), sep="_", keys=KEYS, n_frames=12):
+    """One row a trial, frames side by side; the second trial is two frames shorter."""
+    numbers = np.arange(1, n_frames + 1)
+    columns = {f"{name}{sep}{p}": [p + k, 2.0 * p] for k, name in enumerate(names) for p in numbers}
+    df = pd.DataFrame(columns).astype(float)
+    df.loc[1, [f"{name}{sep}{p}" for name in names for p in numbers[-2:]]] = np.nan
+    return df.assign(**{key: ["ann", "bob"] for key in keys})
+
+
+def call_in(message):
+    return re.search(r"to_sequences\((?:pd\.wide|\S*melt).*?time='frame'\)", message).group()
+
+
+@pytest.mark.parametrize("names", [("hip", "knee"), ("knee",), ("",)])
+@pytest.mark.parametrize("sep", ["_", "", " ", "."])
+@pytest.mark.parametrize("keys", [KEYS, ["subject"]])
+def test_the_call_that_makes_a_wide_table_long(names, sep, keys):
+    df = wide(names, sep if names != ("",) else "", keys)
+    messages = []
+    for table, params in ((df, {"by": keys}), (df.set_index(keys), {"by": keys})):
+        with pytest.raises(
+            ValueError, match=r"tell 2 performances of one row each apart"
+        ) as caught:
+            to_sequences(table, **params)
+        messages.append((table, str(caught.value)))
+    with pytest.raises(ValueError, match="If columns are frames, make it long: ") as caught:
+        DenseSynchronizer().fit(df)
+    messages.append((df, str(caught.value)))
+    for table, message in messages:
+        long = eval(call_in(message), {"pd": pd, "df": table, "to_sequences": to_sequences})
+        assert [x.shape for x in long] == [(12, len(names)), (10, len(names))]
+        assert long[0].iloc[:, 0].tolist() == list(range(1, 13))
+        label = ("bob", "bob") if len(keys) == 2 else "bob"
+        assert long[1].attrs["performance"] == label
+
+
+def test_trials_that_an_index_takes_for_frames():
+    """Two people, two trials each: no performances of two frames and 100 features."""
+    df = pd.concat([wide(n_frames=50)] * 2).assign(trial=[1, 1, 2, 2]).set_index(KEYS)
+    with pytest.warns(UserWarning, match=r"4 rows is read as 2 performances of 2 frames") as caught:
+        to_sequences(df)
+    long = eval(call_in(str(caught[0].message)), {"pd": pd, "df": df, "to_sequences": to_sequences})
+    assert [x.attrs["performance"] for x in long] == [
+        ("ann", 1),
+        ("bob", 1),
+        ("ann", 2),
+        ("bob", 2),
+    ]
+    with pytest.warns(UserWarning, match="if they are the frames"):
+        DenseSynchronizer().fit(df.dropna())
+
+
+def test_many_numbered_features_are_no_wide_table():
+    X = [np.random.default_rng(k).random((12, 40)) for k in range(3)]
+    table = to_frame(X, columns=[f"aspace{k}" for k in range(40)])
+    assert len(to_sequences(table)) == 3
+
+
+def test_keys_that_number_the_frames_too(table):
+    with pytest.raises(ValueError, match=r"of one row each apart.*name fewer columns"):
+        to_sequences(table, by=[*KEYS, "time"])
+
+
+def test_several_tables_are_put_into_one(table):
+    parts = {name: part.drop(columns=KEYS) for name, part in table.groupby("subject")}
+    for several in (parts, list(parts.values())):
+        with pytest.raises(ValueError, match=r"Several tables make one: pd\.concat\(\{'ann'"):
+            to_sequences(several, time="time")
+    with pytest.raises(
+        ValueError, match=r"got dict\. Use list\(X\.values\(\)\); or, of tables, pd"
+    ):
+        DenseSynchronizer().fit(parts)
