@@ -7,7 +7,15 @@ import pandas as pd
 
 from .gate import as_numbers
 
-__all__ = ["as_times", "check_settings", "even_grid", "gaps_of", "interpolated", "round_up"]
+__all__ = [
+    "as_times",
+    "check_settings",
+    "even_grid",
+    "facts_at",
+    "gaps_of",
+    "interpolated",
+    "round_up",
+]
 
 # Steps of time this much longer than the usual one are gaps.
 _GAP = 1.9
@@ -119,6 +127,81 @@ def interpolated(column, times, grid):
     """A feature at other times, on straight lines; what is next to NaN is NaN."""
     dtype = column.dtype if column.dtype.kind == "f" else np.float64
     return np.interp(grid, times, column).astype(dtype, copy=False)
+
+
+def facts_at(attrs, rows, n_rows, times=None, grid=None):
+    """What a recording says of its clock, of the frames that a performance has now.
+
+    Parameters
+    ----------
+    attrs : dict
+        Of the table, as `datasets.read_motion` gives it.
+    rows : ndarray of int
+        Which of the ``n_rows`` of the table are in the performance, in its order.
+    times : ndarray, default=None
+        Of these rows, in any unit.
+    grid : ndarray, default=None
+        The even times that were put in their place.
+
+    Returns
+    -------
+    dict
+        Without what is not known any more.
+    """
+    facts = dict(attrs)
+    seconds, rate = facts.pop("times", None), facts.get("frame_rate")
+    events = facts.pop("events", None)
+    if rows[0]:
+        facts.pop("first_frame", None)
+        if rate and "first_time" in facts:
+            facts["first_time"] += rows[0] / rate
+    if seconds is not None and len(seconds) == n_rows:
+        seconds = np.asarray(seconds, dtype=np.float64)[rows]
+        facts |= _clock_of(seconds if grid is None else np.interp(grid, times, seconds))
+    elif rate and grid is not None:
+        facts["frame_rate"] = _digits(rate * np.median(np.diff(times)) / (grid[1] - grid[0]))
+    if isinstance(events, (list, tuple)) and (np.diff(rows) > 0).all():
+        n_frames = len(rows if grid is None else grid)
+        moved = [_moved(event, rows, times, grid) for event in events]
+        whole = len(rows) == n_rows
+        facts["events"] = [
+            event
+            for event in moved
+            if whole or event.get("frame") is None or 0 <= event["frame"] <= n_frames - 1
+        ]
+    return facts
+
+
+def _clock_of(seconds):
+    """Even times are a frame rate."""
+    clock = {"first_time": float(seconds[0])}
+    if len(seconds) > 1 and _is_even(seconds, _slack(seconds)):
+        rate = (len(seconds) - 1) / (seconds[-1] - seconds[0])
+        return clock | {"frame_rate": _digits(rate)}
+    return clock | {"times": seconds.tolist()}
+
+
+def _digits(rate):
+    return float(f"{rate:.9g}")
+
+
+def _moved(event, rows, times, grid):
+    """An event at its place in other frames."""
+    if not isinstance(event, dict) or event.get("frame") is None:
+        return event
+    own = np.arange(len(rows))
+    place = _on_line(event["frame"], rows, own)
+    if grid is not None:
+        place = _on_line(_on_line(place, own, times), grid, np.arange(len(grid)))
+    return event | {"frame": round(float(place), 5)}
+
+
+def _on_line(x, xs, ys):
+    """Between points that increase on straight lines, beyond them at the mean pace."""
+    if xs[0] <= x <= xs[-1]:
+        return np.interp(x, xs, ys)
+    end = 0 if x < xs[0] else -1
+    return ys[end] + (x - xs[end]) * (ys[-1] - ys[0]) / max(xs[-1] - xs[0], 1e-300)
 
 
 def _slack(times):

@@ -5,9 +5,26 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from .even_times import as_times, check_settings, even_grid, gaps_of, interpolated, round_up
+from .even_times import (
+    as_times,
+    check_settings,
+    even_grid,
+    facts_at,
+    gaps_of,
+    interpolated,
+    round_up,
+)
 from .gate import as_numbers
-from .tables import INDEX_NAMES, as_pandas, called, cut, full_names, parts_of
+from .tables import (
+    INDEX_NAMES,
+    as_pandas,
+    called,
+    cut,
+    full_names,
+    own_label,
+    parts_of,
+)
+from .wide_tables import call_to_unfold
 
 __all__ = ["to_sequences"]
 
@@ -46,7 +63,9 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap=None):
         by the frame level, the time, or 0, 1, ... What ``by`` and ``time`` name are no features.
         ``attrs["performance"]`` is the label, a tuple if several levels name the performance,
         ``attrs["levels"]`` the names of the levels, and ``attrs["resampled"]``, with a ``time``,
-        whether frames were interpolated.
+        whether frames were interpolated. A table without ``by`` keeps the label that it has. Other
+        ``attrs`` stay; what `datasets.read_motion` puts there of times, frame rate and events is
+        that of the frames returned.
 
     Raises
     ------
@@ -90,8 +109,10 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap=None):
     df = as_pandas(df)
     if not isinstance(df, pd.DataFrame):
         raise ValueError(
-            f"to_sequences needs a DataFrame of pandas or polars, got {type(df).__name__}. Give "
-            "pd.DataFrame(x, columns=[...]); arrays that are performances already need no table."
+            f"to_sequences needs a DataFrame of pandas or polars, got {type(df).__name__}. Several "
+            f"tables make one: pd.concat({{'ann': ann, 'bob': bob}}, names={list(INDEX_NAMES)}). "
+            "An array makes one by pd.DataFrame(x, columns=[...]); arrays that are performances "
+            "already need no table."
         )
     check_settings(frame_rate, max_gap, time)
     if by is None and time is None:
@@ -138,10 +159,18 @@ def _cut_by_columns(df, request):
     else:
         index = pd.Index(flat[keys[0]] if keys else np.zeros(len(flat), dtype=int))
     labels, parts = parts_of(index, names)
+    if keys and len(flat) == len(labels):
+        _refuse_wide(df, keys)
+    if not keys and own_label(df)[0] is not None:
+        label, names = own_label(df)
+        labels = [label]
     if time is None:
         numbered = [features.iloc[rows].reset_index(drop=True) for rows in parts]
         levels = (*names, INDEX_NAMES[1])
-        return [called(x, k, levels, df.attrs) for x, k in zip(numbered, labels, strict=True)]
+        return [
+            called(x, label, levels, facts_at(df.attrs, rows, len(df)))
+            for x, rows, label in zip(numbered, parts, labels, strict=True)
+        ]
     timed = [
         _in_order(flat[time], rows, label, keys, request)
         for rows, label in zip(parts, labels, strict=True)
@@ -154,8 +183,8 @@ def _cut_by_columns(df, request):
         if grid is not None:
             x = _resampled(x, times, grid, label)
         x = x.set_axis(pd.Index(times if grid is None else grid, name=time))
-        levels = (*names, time)
-        sequences.append(called(x, label, levels, df.attrs, resampled=grid is not None))
+        facts = facts_at(df.attrs, rows, len(df), times, grid)
+        sequences.append(called(x, label, (*names, time), facts, resampled=grid is not None))
     return sequences
 
 
@@ -163,7 +192,11 @@ def _flat(df, keys, request):
     """The table with the levels that are asked for as columns."""
     named = [*keys, *([] if request.time is None else [request.time])]
     levels = [name for name in df.index.names if name in named and name not in df.columns]
-    flat = df.reset_index(levels) if levels else df
+    flat = df
+    if levels:
+        # All at once: inserting into a table of many columns makes pandas warn.
+        own = pd.DataFrame({name: df.index.get_level_values(name) for name in levels})
+        flat = pd.concat([own, df.reset_index(drop=True)], axis=1)
     columns = list(flat.columns)
     missing = [key for key in named if key not in columns]
     if missing or (request.by is not None and not keys):
@@ -179,6 +212,20 @@ def _flat(df, keys, request):
             f"which comes once; there are {columns[:20]}."
         )
     return flat
+
+
+def _refuse_wide(df, keys):
+    """Say what to do with performances of one row each."""
+    call = call_to_unfold(df.columns, [key for key in keys if key not in df.columns])
+    how = (
+        f"is the table wide, frames side by side in columns? Then {call}."
+        if call
+        else ("name fewer columns, that tell performances apart and not frames; the time is time=.")
+    )
+    raise ValueError(
+        f"{keys} tell {len(df)} performances of one row each apart, and a performance has 2 "
+        f"frames or more: {how}"
+    )
 
 
 def _check_features(features, keys, request):

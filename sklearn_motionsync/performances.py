@@ -19,6 +19,7 @@ from .tables import (
     name_performance,
     stack_frame,
 )
+from .wide_tables import call_to_unfold
 
 __all__ = [
     "Performances",
@@ -303,12 +304,14 @@ def _refuse_long_table(name, df):
         return
     shown = ", ".join(map(repr, df.columns[:4])) + (", ..." if df.shape[1] > 4 else "")
     levels = "index does" if df.index.nlevels == 1 else f"index of {df.index.nlevels} levels does"
+    unfold = call_to_unfold(df.columns, list(df.index.names) if df.index.nlevels > 1 else [])
+    wide = "" if unfold is None else f"If columns are frames, make it long: {unfold}. "
     raise ValueError(
         f"{name} got a table of {len(df)} rows with the columns {shown}, whose {levels} not tell "
         "performances apart. If its rows are frames, say which columns name the performance and "
-        "the time: to_sequences(df, by=[...], time=...), or index it by (performance, frame). If "
-        "every row is one univariate performance, give df.to_numpy(); if every column is one, "
-        "df.T.to_numpy()."
+        "the time: to_sequences(df, by=[...], time=...), or index it by (performance, frame). "
+        f"{wide}If every row is one univariate performance, give df.to_numpy(); if every column is "
+        "one, df.T.to_numpy()."
     )
 
 

@@ -13,6 +13,7 @@ from scipy.sparse import issparse
 
 from .gate import as_numbers, check_finite, names_of
 from .tables import (
+    INDEX_NAMES,
     as_pandas,
     cut,
     frame_labels,
@@ -105,7 +106,12 @@ def as_collection(X):
         return cut(X) if X.index.nlevels >= 2 else None
     if issparse(X):
         return None
-    if isinstance(X, (dict, set, frozenset, str, bytes)) or hasattr(X, "__next__"):
+    if isinstance(X, dict):
+        raise ValueError(
+            f"{ACCEPTED}, got dict. Use list(X.values()); or, of tables, pd.concat(X, "
+            f"names={list(INDEX_NAMES)}), which keeps what they are called."
+        )
+    if isinstance(X, (set, frozenset, str, bytes)) or hasattr(X, "__next__"):
         raise ValueError(f"{ACCEPTED}, got {type(X).__name__}. Use list(...) of the arrays.")
     if isinstance(X, np.ndarray):
         if X.ndim == 3:

@@ -5,9 +5,13 @@ the performance. Every performance that is cut out carries its label and the nam
 ``attrs``, so that lists keep them, however they are sliced.
 """
 
+import warnings
+
 import numpy as np
 import pandas as pd
 from pandas.api.types import is_hashable
+
+from .wide_tables import call_to_unfold, numbered_columns
 
 __all__ = [
     "INDEX_NAMES",
@@ -21,6 +25,7 @@ __all__ = [
     "labels_given",
     "labels_of",
     "name_performance",
+    "own_label",
     "parts_of",
     "stack_frame",
 ]
@@ -28,6 +33,8 @@ __all__ = [
 INDEX_NAMES = ("performance", "frame")
 # Where a DataFrame keeps what it is called.
 _LABEL, _LEVELS = "performance", "levels"
+# So many times as many numbered columns as frames are rather frames themselves.
+_MANY = 5
 
 
 def cut(df):
@@ -43,6 +50,7 @@ def cut(df):
     keys, frames = df.index.droplevel(-1), df.index.get_level_values(-1)
     levels = full_names(df.index.names)
     labels, parts = parts_of(keys, list(levels[:-1]), "df.reset_index()")
+    _check_wide(df, levels, parts)
     if len(df) == len(labels) > 1 and len(levels) > 2:
         raise ValueError(
             f"An index of {len(levels)} levels names the performance by {list(levels[:-1])} and "
@@ -62,6 +70,25 @@ def cut(df):
             )
         sequences.append(called(df.iloc[rows].set_axis(own), label, levels, df.attrs))
     return sequences
+
+
+def _check_wide(df, levels, parts):
+    """Tell a table of trials in rows, whose last key would be taken for the frame."""
+    longest = max(map(len, parts), default=0)
+    numbers, _ = numbered_columns(df.columns) if longest < df.shape[1] else ({}, [])
+    n_frames = min(numbers.values(), default=0)
+    if n_frames < _MANY * max(longest, 2):
+        return
+    call = call_to_unfold(df.columns, list(levels))
+    if call is None:
+        return
+    warnings.warn(
+        f"A table of {len(df)} rows is read as {len(parts)} performances of {longest} frames or "
+        f"less, by its index {list(levels)}, the last of which is the frame. But its columns are "
+        f"numbered, up to {n_frames} of a kind: if they are the frames, make it long, {call}.",
+        UserWarning,
+        stacklevel=2,
+    )
 
 
 def as_pandas(table):
@@ -98,7 +125,7 @@ def labels_of(sequences):
     Those that a list carries, if it does so throughout and they differ; otherwise 0, 1, ...
     """
     frame = frame_name(sequences) or INDEX_NAMES[1]
-    found = [_own_label(x) for x in sequences]
+    found = [own_label(x) for x in sequences]
     labels = [label for label, _ in found]
     names = {levels for _, levels in found}
     if len(names) == 1 and None not in names and len(set(labels)) == len(labels):
@@ -106,7 +133,7 @@ def labels_of(sequences):
     return list(range(len(sequences))), (INDEX_NAMES[0], frame)
 
 
-def _own_label(x):
+def own_label(x):
     """The label that a DataFrame carries, and its level names without the last; None if none."""
     attrs = x.attrs if isinstance(x, pd.DataFrame) else {}
     label, levels = attrs.get(_LABEL), attrs.get(_LEVELS, INDEX_NAMES)

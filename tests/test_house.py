@@ -21,6 +21,7 @@ FLOORS = [
     "cluster",
     "work",
     "gate",
+    "wide_tables",
     "tables",
     "even_times",
     "long_tables",

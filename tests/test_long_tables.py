@@ -1,5 +1,7 @@
 """Long tables to performances that know what they are called, in order of an even time."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import polars as pl
@@ -323,6 +325,74 @@ def test_attributes_of_the_table_stay(table):
     assert all(x.attrs["frame_rate"] == 50 for x in to_sequences(table, by=KEYS, time="time"))
 
 
+def test_levels_of_a_wide_file_are_keys(tmp_path):
+    """pandas keeps every column that it reads apart, and warns when one more is inserted."""
+    pd.DataFrame(np.random.default_rng(0).random((9, 120))).to_csv(tmp_path / "a.csv")
+    read = {name: pd.read_csv(tmp_path / "a.csv", index_col=0) for name in "ab"}
+    found = to_sequences(pd.concat(read, names=["trial", "t"]), time="t")
+    assert [(x.attrs["performance"], x.shape) for x in found] == [("a", (9, 120)), ("b", (9, 120))]
+
+
+# -- what a recording says of its clock ---------------------------------------------------------
+
+CLOCK = {"frame_rate": None, "first_time": 2.0, "units": "deg"}
+
+
+def recording(seconds, **facts):
+    df = pd.DataFrame({"knee": seconds})
+    df.attrs = CLOCK | facts
+    return df
+
+
+def events_at(*frames):
+    return [{"label": "Foot Strike", "frame": frame} for frame in frames]
+
+
+def test_uneven_times_that_were_made_even_are_a_frame_rate():
+    seconds = 2 + np.delete(np.arange(101) / 100, [3, 50])
+    df = recording(seconds, times=seconds.tolist(), events=events_at(2.0, 48.5, None, -3.0))
+    for time in (seconds, seconds - 2, 1000 * seconds, pd.to_timedelta(seconds, unit="s")):
+        (x,) = to_sequences(df.assign(time=time), time="time", max_gap=1e5)
+        assert x.attrs["frame_rate"] == 100
+        assert x.attrs["first_time"] == 2
+        assert "times" not in x.attrs
+        # Where they were: the third frame that is missing came before, the other is bridged.
+        assert [e["frame"] for e in x.attrs["events"]] == pytest.approx([2, 50, None, -3], abs=0.1)
+    assert df.attrs["times"] == seconds.tolist()
+    assert [e["frame"] for e in df.attrs["events"]] == [2, 48.5, None, -3]
+
+
+def test_another_frame_rate_is_that_of_the_recording():
+    df = recording(np.arange(101) / 100, frame_rate=100.0, events=events_at(30.0))
+    df = df.assign(ms=np.arange(101) * 10.0)
+    (x,) = to_sequences(df, time="ms", frame_rate=0.05)
+    assert x.attrs["frame_rate"] == 50
+    assert x.attrs["events"] == events_at(15.0)
+    (x,) = to_sequences(df, time="ms")
+    assert x.attrs["frame_rate"] == 100
+    assert x.attrs["events"] == events_at(30.0)
+
+
+@pytest.mark.parametrize("time", [None, "frame"])
+def test_parts_of_a_recording_have_their_own_times(time):
+    seconds = 2 + np.cumsum([0, 1, 3, 1, 1, 2, 1, 1, 1, 4]) / 10
+    df = recording(seconds, times=seconds.tolist(), events=events_at(1.5, 6.0), first_frame=7)
+    df = df.assign(cycle=[0] * 4 + [1] * 6, frame=range(10))
+    first, second = to_sequences(df, by="cycle", time=time)
+    assert first.attrs["times"] == seconds[:4].tolist()
+    assert second.attrs["times"] == seconds[4:].tolist()
+    assert [x.attrs["first_time"] for x in (first, second)] == [2, seconds[4]]
+    assert [x.attrs["events"] for x in (first, second)] == [events_at(1.5), events_at(2.0)]
+    assert first.attrs["first_frame"] == 7
+    assert "first_frame" not in second.attrs
+
+
+def test_a_recording_keeps_its_name():
+    df = recording(np.arange(9.0), performance="walk1", levels=["recording", "frame"])
+    (x,) = to_sequences(df.assign(t=np.arange(9)), time="t")
+    assert (x.attrs["performance"], x.attrs["levels"]) == ("walk1", ("recording", "t"))
+
+
 # -- what is refused ---------------------------------------------------------------------------
 
 BY = {"by": KEYS, "time": "time"}
@@ -415,3 +485,80 @@ def test_a_long_polars_table_is_not_read_row_by_row(table):
     df = pl.DataFrame(table.drop(columns=KEYS).to_dict("list"))
     with pytest.raises(ValueError, match=r"to_sequences\(df, by=\[...\], time=...\)"):
         DenseSynchronizer().fit(df)
+
+
+# -- wide tables: told, and how to make them long ----------------------------------------------
+
+
+def wide(names=("hip", "knee"), sep="_", keys=KEYS, n_frames=12):
+    """One row a trial, frames side by side; the second trial is two frames shorter."""
+    numbers = np.arange(1, n_frames + 1)
+    columns = {f"{name}{sep}{p}": [p + k, 2.0 * p] for k, name in enumerate(names) for p in numbers}
+    df = pd.DataFrame(columns).astype(float)
+    df.loc[1, [f"{name}{sep}{p}" for name in names for p in numbers[-2:]]] = np.nan
+    return df.assign(**{key: ["ann", "bob"] for key in keys})
+
+
+def call_in(message):
+    return re.search(r"to_sequences\((?:pd\.wide|\S*melt).*?time='frame'\)", message).group()
+
+
+@pytest.mark.parametrize("names", [("hip", "knee"), ("knee",), ("",)])
+@pytest.mark.parametrize("sep", ["_", "", " ", "."])
+@pytest.mark.parametrize("keys", [KEYS, ["subject"]])
+def test_the_call_that_makes_a_wide_table_long(names, sep, keys):
+    df = wide(names, sep if names != ("",) else "", keys)
+    messages = []
+    for table, params in ((df, {"by": keys}), (df.set_index(keys), {"by": keys})):
+        with pytest.raises(
+            ValueError, match=r"tell 2 performances of one row each apart"
+        ) as caught:
+            to_sequences(table, **params)
+        messages.append((table, str(caught.value)))
+    with pytest.raises(ValueError, match="If columns are frames, make it long: ") as caught:
+        DenseSynchronizer().fit(df)
+    messages.append((df, str(caught.value)))
+    for table, message in messages:
+        long = eval(call_in(message), {"pd": pd, "df": table, "to_sequences": to_sequences})
+        assert [x.shape for x in long] == [(12, len(names)), (10, len(names))]
+        assert long[0].iloc[:, 0].tolist() == list(range(1, 13))
+        label = ("bob", "bob") if len(keys) == 2 else "bob"
+        assert long[1].attrs["performance"] == label
+
+
+def test_trials_that_an_index_takes_for_frames():
+    """Two people, two trials each: no performances of two frames and 100 features."""
+    df = pd.concat([wide(n_frames=50)] * 2).assign(trial=[1, 1, 2, 2]).set_index(KEYS)
+    with pytest.warns(UserWarning, match=r"4 rows is read as 2 performances of 2 frames") as caught:
+        to_sequences(df)
+    long = eval(call_in(str(caught[0].message)), {"pd": pd, "df": df, "to_sequences": to_sequences})
+    assert [x.attrs["performance"] for x in long] == [
+        ("ann", 1),
+        ("bob", 1),
+        ("ann", 2),
+        ("bob", 2),
+    ]
+    with pytest.warns(UserWarning, match="if they are the frames"):
+        DenseSynchronizer().fit(df.dropna())
+
+
+def test_many_numbered_features_are_no_wide_table():
+    X = [np.random.default_rng(k).random((12, 40)) for k in range(3)]
+    table = to_frame(X, columns=[f"aspace{k}" for k in range(40)])
+    assert len(to_sequences(table)) == 3
+
+
+def test_keys_that_number_the_frames_too(table):
+    with pytest.raises(ValueError, match=r"of one row each apart.*name fewer columns"):
+        to_sequences(table, by=[*KEYS, "time"])
+
+
+def test_several_tables_are_put_into_one(table):
+    parts = {name: part.drop(columns=KEYS) for name, part in table.groupby("subject")}
+    for several in (parts, list(parts.values())):
+        with pytest.raises(ValueError, match=r"Several tables make one: pd\.concat\(\{'ann'"):
+            to_sequences(several, time="time")
+    with pytest.raises(
+        ValueError, match=r"got dict\. Use list\(X\.values\(\)\); or, of tables, pd"
+    ):
+        DenseSynchronizer().fit(parts)

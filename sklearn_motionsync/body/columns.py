@@ -2,23 +2,17 @@
 
 from ..gate import names_of
 
-__all__ = ["AXES", "check_columns", "joints_of", "joints_with_axes"]
+__all__ = ["AXES", "check_columns", "joints_with_axes"]
 
 # Of the positions in the plane, and in space.
 AXES = {2: "xy", 3: "xyz"}
 
 
-def joints_of(df):
-    """Names of the joints of a DataFrame whose columns are ``<joint>_x``, ``_y``, ``_z``, ..."""
-    return _told(df, (3,))[0]
-
-
 def joints_with_axes(df):
-    """The same, also of columns ``<joint>_x``, ``<joint>_y``, ...; and how many axes they have."""
-    return _told(df, (3, 2))
+    """Names of the joints of a DataFrame of their positions, and how many axes each has.
 
-
-def _told(df, allowed):
+    Its columns are ``<joint>_x``, ``_y``, ``_z``, ..., or ``<joint>_x``, ``_y``, ... in the plane.
+    """
     columns = getattr(df, "columns", None)
     if columns is None or callable(columns):
         raise ValueError(
@@ -26,15 +20,15 @@ def _told(df, allowed):
             f"{type(df).__name__}. Use pd.DataFrame(positions, columns=skeleton.column_names)."
         )
     columns = [str(column) for column in columns]
-    for n_dims in allowed:
+    for n_dims, axes in sorted(AXES.items(), reverse=True):
         joints = [column[:-2] for column in columns[::n_dims]]
-        if joints and columns == [f"{joint}_{axis}" for joint in joints for axis in AXES[n_dims]]:
+        if joints and columns == [f"{joint}_{axis}" for joint in joints for axis in axes]:
             return joints, n_dims
-    in_plane = " or, in the plane, <joint>_x, <joint>_y" if 2 in allowed else ""
     raise ValueError(
-        f"The columns must be <joint>_x, <joint>_y, <joint>_z{in_plane} for one joint after the "
-        f"other, got {columns[:4]}{' ...' if len(columns) > 4 else ''}; select them with "
-        "df[skeleton.column_names] or drop the others."
+        "The columns must be <joint>_x, <joint>_y, <joint>_z or, in the plane, <joint>_x, "
+        f"<joint>_y for one joint after the other, got {columns[:4]}"
+        f"{' ...' if len(columns) > 4 else ''}; select them with df[skeleton.column_names], with "
+        "df.filter(regex='_[xyz]$'), or drop the others."
     )
 
 

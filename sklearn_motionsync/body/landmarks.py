@@ -8,20 +8,23 @@ from .formats import FORMATS, LANDMARKS, SIDES
 __all__ = ["LANDMARKS", "as_tuple", "completed", "likely_landmarks", "one_sided", "plain_names"]
 
 # Names of the joint at each landmark in files whose joints are the near ends of the
-# bones, the likeliest first. The last of many are what Plug-in Gait calls its bones.
+# bones, the likeliest first. The last are what Plug-in Gait calls its bones, and its markers on
+# the skin, which stand for the joints where no centres were computed.
 _SYNONYMS = {
     "pelvis": ("pelvis", "hips", "hip", "hipcenter", "midhip", "spinebase", "root", "pelo"),
     "neck": ("neck", "neck1", "neck01", "necktwist01", "shouldercenter", "spineshoulder", "thorax",
              "trxo"),
     "head": ("head", "nose", "headtop", "headtopend", "hedo"),
-    "shoulder": ("upperarm", "uparm", "uarm", "arm", "shoulder", "sjc", "clo"),
-    "elbow": ("elbow", "forearm", "lowerarm", "lowarm", "farm", "ejc", "huo"),
+    "shoulder": ("upperarm", "uparm", "uarm", "arm", "shoulder", "sjc", "clo", "sho"),
+    "elbow": ("elbow", "forearm", "lowerarm", "lowarm", "farm", "ejc", "huo", "elb"),
     "wrist": ("wrist", "hand", "wjc", "rao"),
-    "hip": ("thigh", "upleg", "upperleg", "hip", "hipjoint", "hjc", "fep"),
-    "knee": ("knee", "calf", "leg", "lowerleg", "lowleg", "shin", "kjc", "feo"),
-    "ankle": ("ankle", "foot", "ajc", "tio"),
+    "hip": ("thigh", "upleg", "upperleg", "hip", "hipjoint", "hjc", "fep", "asi"),
+    "knee": ("knee", "calf", "leg", "lowerleg", "lowleg", "shin", "kjc", "feo", "kne"),
+    "ankle": ("ankle", "foot", "ajc", "tio", "ank"),
 }  # fmt: skip
-_EARS = "ear"
+# Joints or markers of which a landmark is the mean where none of those names is there: one of each
+# side, or several of one.
+_AROUND = {"head": ("ear", "fhd"), "wrist": ("wra", "wrb")}
 # Formats that the guess could read otherwise; it finds what others lack in files that have more.
 _KNOWN = [
     known.landmarks
@@ -92,9 +95,14 @@ def _guessed(plain):
         joint = _find(plain, side, _SYNONYMS[part])
         if joint is not None:
             found[landmark] = joint
-    ears = [_find(plain, side, (_EARS,)) for side in SIDES]
-    if "head" not in found and None not in ears:
-        found["head"] = tuple(ears)
+    for name in _AROUND["head"]:
+        pair = [_find(plain, side, (name,)) for side in SIDES]
+        if "head" not in found and None not in pair:
+            found["head"] = tuple(pair)
+    for side in SIDES:
+        pair = [_find(plain, side, (name,)) for name in _AROUND["wrist"]]
+        if f"{side}_wrist" not in found and None not in pair:
+            found[f"{side}_wrist"] = tuple(pair)
     return found
 
 

@@ -7,14 +7,14 @@ import numpy as np
 
 from ..gate import as_numbers
 from .checks import as_joints, as_landmarks, as_parents, circle_of, is_whole, kept_parents
-from .columns import AXES, check_columns, joints_of, joints_with_axes
+from .columns import AXES, check_columns, joints_with_axes
 from .formats import FORMATS, LANDMARKS
 from .landmarks import as_tuple, completed, likely_landmarks, one_sided
 from .limbs import LIMBS, limbs_between, stretched_legs
 from .ready import ReadySkeletons
 from .upright import UPS, seems_up
 
-__all__ = ["LANDMARKS", "Skeleton", "check_columns", "joints_of"]
+__all__ = ["LANDMARKS", "Skeleton", "check_columns"]
 
 
 class _ReadOnly(dict):

@@ -5,6 +5,8 @@ from numbers import Real
 
 import pandas as pd
 
+from ._labels import FRAME, label_of_part
+
 _HELP = (
     "attrs['events'] must be a list of dicts with label, context and frame, as read_motion gives "
     "for C3D files"
@@ -191,15 +193,7 @@ def _name(parts, attrs, performance):
     """The parts, with their labels."""
     whole = attrs.get("performance") if performance is None else performance
     for i, part in enumerate(parts):
-        part.attrs["performance"], part.attrs["levels"] = i, ("performance", "frame")
-    if whole is None:
-        return parts
-    before = whole if isinstance(whole, tuple) else (whole,)
-    names = tuple(attrs.get("levels", ()))[:-1]
-    if len(names) != len(before):
-        several = len(before) > 1
-        names = tuple(f"recording_{k}" if several else "recording" for k in range(len(before)))
-    last = "part" if "part" not in names else f"part_{len(names) + 1}"
-    for i, part in enumerate(parts):
-        part.attrs["performance"], part.attrs["levels"] = (*before, i), (*names, last, "frame")
+        part.attrs["performance"], part.attrs["levels"] = i, ("performance", FRAME)
+        if whole is not None:
+            part.attrs |= label_of_part(whole, i, "part", attrs.get("levels", ()))
     return parts

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pandas as pd
 
-from ..body.skeleton import joints_of
+from ..body.columns import joints_with_axes
 
 
 def find_gaps(df):
@@ -139,7 +139,7 @@ def warn_of_gaps(df, name):
     gaps = find_gaps(df)
     if gaps.empty:
         return
-    joints = joints_of(df)
+    joints, _ = joints_with_axes(df)
     worst = gaps.groupby("joint")["n_frames"].sum().sort_values(ascending=False, kind="stable")
     n_missing = int(worst.sum())
     names = ", ".join(str(joint)[:20] for joint in worst.index[:4])
@@ -182,7 +182,7 @@ def _read(df):
             f"A recording must be a DataFrame, as read_motion gives, got {type(df).__name__}; name "
             "the columns of an array with pd.DataFrame(x, columns=skeleton.column_names)."
         )
-    joints, n_dims = _joints_with_dims(df)
+    joints, n_dims = joints_with_axes(df)
     levels = df.index.droplevel(-1) if df.index.nlevels > 1 else df.index[:0]
     if levels.nunique() > 1:
         raise ValueError(
@@ -205,15 +205,6 @@ def _read(df):
             "df.replace([np.inf, -np.inf], np.nan)."
         )
     return joints, n_dims, values
-
-
-def _joints_with_dims(df):
-    """Names of the joints, in the plane or in space, and which of these it is."""
-    columns = [str(column) for column in df.columns]
-    joints = [column[:-2] for column in columns[::2]]
-    if joints and columns == [f"{joint}_{axis}" for joint in joints for axis in "xy"]:
-        return joints, 2
-    return joints_of(df), 3
 
 
 def _is_numeric(column):

@@ -12,6 +12,7 @@ from ._bvh import read_bvh
 from ._c3d import read_c3d
 from ._clock import set_clock
 from ._gaps import check_max_gap, fill_gaps, warn_of_gaps, warn_of_missing
+from ._labels import FRAME
 from ._storage import read_storage
 from ._trc import read_trc
 
@@ -71,6 +72,9 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0, group=None):
             Their names; for the group "analog", MOT and STO ``channels`` instead.
         parents : list of int
             Index of each joint's parent, -1 for a root and for markers.
+        performance, levels : str, list of str
+            What the recording is called in tables, the name of its file without the ending; and
+            the names of the levels of an index of such, "recording" and "frame".
 
         for C3D and TRC files also
 
@@ -165,7 +169,7 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0, group=None):
     motion = _read(path, kind, asf, group)
     if "times" in motion:
         set_clock(path.name, motion, frame_rate)
-    df = _to_frame(motion, kind.removeprefix("."), frame_rate)
+    df = _to_frame(motion, path, frame_rate)
     if group == "analog":
         return df
     if kind in (".mot", ".sto"):
@@ -202,7 +206,7 @@ def _existing(path, what):
     return path
 
 
-def _to_frame(motion, name, frame_rate):
+def _to_frame(motion, path, frame_rate):
     if "values" in motion:
         values, columns = motion.pop("values"), list(motion["channels"])
     else:
@@ -213,5 +217,6 @@ def _to_frame(motion, name, frame_rate):
     df = pd.DataFrame(values, columns=columns, index=index)
     if frame_rate is not None:
         motion["frame_rate"] = float(frame_rate)
-    df.attrs = {"format": name} | motion
+    df.attrs = {"format": path.suffix.lower().removeprefix(".")} | motion
+    df.attrs |= {"performance": path.stem, "levels": ["recording", FRAME]}
     return df

@@ -9,6 +9,7 @@ import pandas as pd
 from ._clock import find_rate, tell_uneven
 from ._gaps import check_max_gap, fill_gaps
 from ._kinematics import unique
+from ._labels import FRAME, label_of_part
 
 # What the dimensions are called, the older names last.
 _NAMES = {
@@ -19,7 +20,7 @@ _NAMES = {
 }
 
 
-def from_poses(poses, *, min_confidence=None, frame_rate=None, max_gap=0):
+def from_poses(poses, *, min_confidence=None, frame_rate=None, max_gap=0, performance=None):
     """Turn an xarray Dataset of poses, as `movement` has them, into recordings.
 
     xarray is not needed for it, beyond what made the Dataset.
@@ -37,6 +38,9 @@ def from_poses(poses, *, min_confidence=None, frame_rate=None, max_gap=0):
         Frames a second. By default as the times say, or ``fps`` where they are numbers of frames.
     max_gap : int, default=0
         Gaps of up to that many frames are interpolated, see `fill_gaps`.
+    performance : hashable, default=None
+        What the recording is called, such as the name of its file; it stands before the name of
+        the individual. A tuple has a level for each of its parts.
 
     Returns
     -------
@@ -47,7 +51,8 @@ def from_poses(poses, *, min_confidence=None, frame_rate=None, max_gap=0):
         nobody says, or times are uneven), ``units`` (None), ``up`` ("-y" in the plane, as pictures
         count from above; None in space), ``kind`` ("keypoints"), ``joints``, ``parents`` (-1 for
         all), ``first_time`` where times are seconds, ``times`` where they are uneven;
-        ``performance``, the name of the individual, and ``levels``.
+        ``performance``, the name of the individual, or ``(performance, individual)``, and
+        ``levels``.
 
     Raises
     ------
@@ -95,7 +100,9 @@ def from_poses(poses, *, min_confidence=None, frame_rate=None, max_gap=0):
         df = pd.DataFrame(values[:, i].reshape(len(values), -1), columns=columns, index=index)
         df.attrs = {"format": "poses", "units": None, "up": "-y" if len(axes) == 2 else None}
         df.attrs |= {"kind": "keypoints", "joints": joints, "parents": [-1] * len(joints)} | facts
-        df.attrs |= {"performance": individual, "levels": ("individual", "frame")}
+        df.attrs |= {"performance": individual, "levels": ("individual", FRAME)}
+        if performance is not None:
+            df.attrs |= label_of_part(performance, individual, "individual")
         recordings.append(fill_gaps(df, max_gap) if max_gap else df)
     return recordings
 

@@ -134,6 +134,14 @@ def test_a_body_is_the_same_in_any_format(name):
          {"neck": "neck", "head": "head"}),
         ("LShoulder RShoulder LElbow RElbow LEar REar", {"head": ("LEar", "REar")}),
         ("LShoulder RShoulder LElbow RElbow HeadTop", {"head": "HeadTop"}),
+        # Plug-in Gait's markers; joint centres are better.
+        ("LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE",
+         {"pelvis": ("LASI", "RASI"), "left_hip": "LASI", "right_knee": "RKNE",
+          "left_ankle": "LANK"}),
+        ("LFHD RFHD LBHD RBHD C7 CLAV LSHO LELB LWRA LWRB LFIN RSHO RELB RWRA RWRB RFIN",
+         {"neck": ("LSHO", "RSHO"), "head": ("LFHD", "RFHD"), "left_elbow": "LELB",
+          "right_wrist": ("RWRA", "RWRB")}),
+        ("LASI RASI LKNE RKNE LANK RANK LHJC RHJC", {"left_hip": "LHJC", "left_knee": "LKNE"}),
     ],
 )  # fmt: skip
 def test_names_that_are_no_format(joints, landmarks):

@@ -26,6 +26,8 @@ def test_acclaim_by_hand(tmp_path):
         "kind": "joints",
         "joints": ["root", "thigh", "shin"],
         "parents": [-1, 0, 1],
+        "performance": "a_01",
+        "levels": ["recording", "frame"],
     }
     expected = np.array([[1, 2, 3], [1, -2, 3], [1, -5, 3]]) * INCH
     np.testing.assert_allclose(df.iloc[0].to_numpy().reshape(3, 3), expected)

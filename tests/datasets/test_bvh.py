@@ -43,7 +43,8 @@ def test_what_a_frame_says_of_itself(tmp_path):
     assert df.index.name == "frame"
     facts = {k: v for k, v in df.attrs.items() if k not in ("joints", "parents")}
     kind = {"format": "bvh", "units": None, "up": "y", "kind": "joints"}
-    assert facts == kind | {"frame_rate": 50.0}
+    name = {"performance": "a", "levels": ["recording", "frame"]}
+    assert facts == kind | {"frame_rate": 50.0} | name
     assert json.loads(json.dumps(df.attrs)) == df.attrs
     assert read_motion(tmp_path / "a.bvh", frame_rate=25).attrs["frame_rate"] == 25.0
 

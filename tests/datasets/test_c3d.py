@@ -30,6 +30,8 @@ def test_c3d_of_every_machine(tmp_path, machine, real):
         "events": [],
         "groups": {"markers": {"n": 3, "units": "mm", "frame_rate": 50.0}},
         "left_out": "",
+        "performance": "a",
+        "levels": ["recording", "frame"],
     }
 
 
@@ -183,9 +185,9 @@ def test_real_c3d(real_data):
     assert (first.attrs["units"], first.attrs["up"]) == ("mm", "z")
     with pytest.raises(ValueError, match=r"No joint stands for the landmarks \['pelvis'"):
         Skeleton.from_frame(first)
-    for df in frames.values():
+    for name, df in frames.items():
         np.testing.assert_allclose(df, first, atol=1e-3)
-        assert df.attrs == first.attrs
+        assert df.attrs == first.attrs | {"performance": name}
     events = [(event["label"], event["time"], event["frame"]) for event in first.attrs["events"]]
     assert events == [("RIC", 2.72, 136), ("RHS", 5.4, 270), ("RTO", 7.32, 366)]
     assert first.attrs["left_out"] == "16 analog channels at 200 Hz, the geometry of 2 force plates"

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sklearn_motionsync import DirectionCosines, Skeleton
+from sklearn_motionsync import DirectionCosines, Skeleton, to_frame
 from sklearn_motionsync.datasets import read_motion
 
 import fuzz_readers
@@ -34,6 +34,15 @@ def test_wrong_calls(tmp_path):
     for gap in (-1, 1.5, "5", True, None):
         with pytest.raises(ValueError, match="max_gap must be a whole number of frames, 0 or mor"):
             read_motion(path, max_gap=gap)
+
+
+def test_recordings_are_called_like_their_files(tmp_path):
+    """So that tables of several say which is which; of folders with the same names nothing is."""
+    recordings = [read_motion(put(tmp_path, body(), f"walk {k}.bvh")) for k in "ba"]
+    table = to_frame(recordings)
+    assert table.index.names == ["recording", "frame"]
+    assert list(table.index.unique("recording")) == ["walk b", "walk a"]
+    assert list(to_frame(recordings[:1] * 2).index.unique(0)) == [0, 1]
 
 
 def test_damaged_files(tmp_path):

@@ -41,6 +41,9 @@ def test_what_is_made():
     assert ann.attrs == facts | {"performance": "ann", "levels": ("individual", "frame")}
     assert bob.attrs["performance"] == "bob"
     json.dumps(ann.attrs)
+    _, bob = from_poses(poses(), performance="trial1")
+    assert bob.attrs["performance"] == ("trial1", "bob")
+    assert bob.attrs["levels"] == ("recording", "individual", "frame")
     assert LinearSynchronizer(n_frames=9).fit_transform([ann, bob]).shape == (2, 9, 6)
     assert len(to_frame([ann, bob])) == 80
 

@@ -29,7 +29,8 @@ def test_what_is_read(tmp_path, name):
     assert df.index.equals(pd.RangeIndex(50))
     assert df.index.name == "frame"
     facts = {"format": name[-3:].lower(), "kind": "coordinates", "units": None, "up": None}
-    assert df.attrs == facts | {"frame_rate": 100.0, "channels": LABELS, "first_time": 0.0}
+    facts |= {"frame_rate": 100.0, "channels": LABELS, "first_time": 0.0}
+    assert df.attrs == facts | {"performance": "a", "levels": ["recording", "frame"]}
     assert json.loads(json.dumps(df.attrs)) == df.attrs
     assert LinearSynchronizer(n_frames=9).fit_transform([df, df]).shape == (2, 9, 3)
 

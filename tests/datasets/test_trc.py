@@ -24,6 +24,7 @@ def test_what_is_read(tmp_path):
     assert df.index.name == "frame"
     facts = {"format": "trc", "kind": "markers", "units": "mm", "up": None, "frame_rate": 50.0}
     facts |= {"joints": NAMES, "parents": [-1] * 3, "first_frame": 1, "first_time": 0.0}
+    facts |= {"performance": "a", "levels": ["recording", "frame"]}
     assert df.attrs == facts
     assert json.loads(json.dumps(df.attrs)) == df.attrs
     assert read(tmp_path, trc(tracks(), NAMES, units="m")).attrs["units"] == "m"
