@@ -2,9 +2,9 @@
 Ground forces of walking people
 ===============================
 
-Sixty steps of one person at three speeds. Fast steps push harder, their first peak comes earlier, and
-their valley and second peak later, so that after time normalisation the valley of one lies beside
-that of another, and the mean curve is flatter than any step. The forces are real: ten people
+Sixty steps of one person at three speeds. Fast steps push harder, their first peak comes earlier,
+and their valley and second peak later, so that after time normalisation the valley of one lies
+beside that of another, and the mean curve is flatter than any step. The forces are real: ten people
 measured by Pataky et al. (2008), which come with `spm1d <https://spm1d.org>`_.
 """
 
