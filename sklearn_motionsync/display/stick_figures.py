@@ -341,6 +341,8 @@ class SkeletonDisplay(PipelineFigures):
             durations = [[len(x) - 1 for x in scene] for scene in self._drawn]
         longest = max(max(of_scene, default=0) for of_scene in durations)
         artists = []
+        for axis, title in zip(self.axes_, self.titles, strict=True) if longest > 0 else ():
+            axis.set_title(f"{title}, at {100 * at:.0f} % of the time", fontsize="medium")
         for i, (scene, taking) in enumerate(zip(self._drawn, durations, strict=True)):
             shares = [min(1.0, at * longest / d) if d > 0 else 0.0 for d in taking]
             bodies = [

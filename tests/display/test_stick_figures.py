@@ -338,3 +338,13 @@ def test_real_people_fall_into_step(bends):
     ]
     raw, synchronised = (np.ptp(moments) for moments in lowest)
     assert synchronised < 0.3 * raw
+
+
+def test_figures_say_which_instant_they_show(pipe, bunch):
+    display = SkeletonDisplay.from_estimator(pipe, bunch.data, at=0.25)
+    assert all(a.get_title().endswith(", at 25 % of the time") for a in display.axes_)
+    animation = display.animate(seconds=1, fps=3)
+    animation.to_jshtml()
+    assert all(a.get_title().endswith(", at 100 % of the time") for a in display.axes_)
+    still = SkeletonDisplay.from_positions(bunch.data[0], bunch.skeleton, frames=[0, 5])
+    assert [axis.get_title() for axis in still.axes_] == ["frame 0", "frame 5"]
