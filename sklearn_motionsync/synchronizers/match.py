@@ -119,11 +119,12 @@ class Match:
 
     @property
     def rates(self):
-        """``d tau / dp``, how fast performances run where the pattern runs at 1: (n_sequences, P).
+        """``d tau / dp``, how long performances take for what takes the pattern 1: (n_sequences, P).
 
         Central differences of ``times``, one-sided at both ends. Where tau stands still the rate is
         0.01 and not less, so that its log, ``np.log(match.rates)``, is finite: 0 at the pace of the
-        pattern, positive where a performance is faster.
+        pattern, positive where a performance is slower and its offset grows, negative where it is
+        faster.
         """
         return np.maximum(np.gradient(self.times, axis=1), _SLOWEST)
 

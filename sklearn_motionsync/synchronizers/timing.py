@@ -37,8 +37,8 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         Such as ``DenseSynchronizer()``; a clone of it is fitted.
     channel : {"offset", "log_rate"}, default="offset"
         What is appended: how much later than the pattern a performance is
-        (``Match.offsets_in(unit)``), or the log of how fast it runs there
-        (``np.log(Match.rates)``), which has no unit.
+        (``Match.offsets_in(unit)``), or the log rate (``np.log(Match.rates)``), which has no unit
+        and is positive where a performance is slower.
     unit : {"percent", "frames", "seconds"}, default="percent"
         Of the offset: per cent of the clock, frames of the pattern, or seconds of each
         performance.
