@@ -162,6 +162,8 @@ def test_many_groups_are_told_apart(bunch, pipe):
     assert [text.strip().replace("\\", "") for text in texts(display.axes_[0])] == [
         f"{name}: 1 performance, no band" for name in names
     ]
+    before = SynchronizationDisplay.from_estimator(pipe, bunch.data, groups=names, features=[0])
+    assert len({line.get_linestyle() for line in before.group_means_[0]}) == 4
     # Black is the pattern.
     for count in (6, 7, 20):
         _, color_of = group_colors(range(count), count)
