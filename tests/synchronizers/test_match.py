@@ -292,6 +292,11 @@ def test_a_table_of_the_timing(late):
     ]
     assert list(late.to_frame(X=X, labels=["x", "y"]).index.unique(0)) == ["x", "y"]
     assert list(late.to_frame(X=[21, 41]).index.unique(0)) == [0, 1]
+    lengths = pd.Series({("ann", 1): 21, ("ann", 2): 41}).rename_axis(["subject", "trial"])
+    assert late.to_frame("seconds", lengths, 10).index.names == ["subject", "trial", "frame"]
+    for index in ([0, 1], [3, 3]):
+        unnamed = pd.Series([21, 41], index=index)
+        assert list(late.to_frame("seconds", unnamed, 10).index.unique(0)) == [0, 1]
 
 
 def test_a_match_of_two_frames():
