@@ -11,6 +11,7 @@ __all__ = [
     "curves",
     "front_line",
     "group_colors",
+    "group_lines",
     "legend_above",
     "panels",
     "parts_outside",
@@ -36,6 +37,8 @@ COLORS = {
 }
 # Black is the pattern.
 _GROUPS = ["#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"]
+# Of more groups the colours are alike, and their means are told apart by lines.
+_LINES = ["-", "--", ":", "-."]
 # Points between a legend and a title above it.
 _GAP = 6
 
@@ -236,3 +239,9 @@ def group_colors(groups, n_sequences):
         palette = pyplot().colormaps["viridis"](np.linspace(0, 0.95, len(names)))
     color_of = dict(zip(names, palette, strict=False))
     return [color_of[group] for group in groups], color_of
+
+
+def group_lines(n_groups):
+    """The line of the mean of every group, of so many."""
+    lines = _LINES if n_groups > len(_GROUPS) else _LINES[:1]
+    return [lines[k % len(lines)] for k in range(n_groups)]

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Set
 from numbers import Real
 
 import numpy as np
+import pandas as pd
 
 from ..body.checks import is_whole
 from ..body.skeleton import Skeleton
@@ -51,6 +52,12 @@ def as_names(names, count, what, each):
         raise ValueError(
             f"{what} must be a list of text, one for each of the {count} {each}, got {got}."
         )
+    for i, name in enumerate(listed):
+        if pd.isna(name):
+            raise ValueError(
+                f"{what} must be text for each of the {count} {each}, but {name!r} at {i} says "
+                "that it is missing: name it, such as 'unknown', or leave it out of what is drawn."
+            )
     return [str(name) for name in listed]
 
 

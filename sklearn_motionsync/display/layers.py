@@ -4,14 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .drawing import COLORS, curves, front_line, group_colors, parts_outside
+from .drawing import COLORS, curves, front_line, group_colors, group_lines, parts_outside
 
 __all__ = ["Layer", "count_outside", "layers_of"]
 
 # Of the largest bound, how much beyond it is rounding, in units of the last place.
 _ROUNDING = 64
-# Of more groups the colours are alike, and their means are told apart by lines.
-_FEW, _LINES = 6, ("-", "--", ":", "-.")
 
 
 class Layer(NamedTuple):
@@ -95,7 +93,7 @@ def layers_of(mean, lower, upper, performances, groups):
     if groups is None:
         return [Layer(mean, lower, upper, performances)]
     _, color_of = group_colors(groups.labels, len(groups.labels))
-    lines = _LINES if len(color_of) > _FEW else _LINES[:1]
+    lines = group_lines(len(color_of))
     return [
         Layer(
             mean[k],
@@ -104,7 +102,7 @@ def layers_of(mean, lower, upper, performances, groups):
             performances[groups.members(name)],
             name,
             color_of[name],
-            lines[k % len(lines)],
+            lines[k],
         )
         for k, name in enumerate(groups.names)
     ]

@@ -7,7 +7,15 @@ from ..gate import check_names
 from ..performances import read_collection
 from ..pipelines import index_of_pattern, reach_synchronizer
 from ..synchronizers.match import as_match
-from .drawing import COLORS, curves, front_line, group_colors, legend_above, panels
+from .drawing import (
+    COLORS,
+    curves,
+    front_line,
+    group_colors,
+    group_lines,
+    legend_above,
+    panels,
+)
 from .given import as_drawn, as_names, mean_of_seen
 from .time_axis import TimeAxis
 
@@ -285,11 +293,11 @@ class SynchronizationDisplay:
 
     def _draw_means(self, axis, clock, row, color_of):
         """The mean of every group, in front of its performances."""
-        means = []
-        for name, color in color_of.items():
+        means, lines = [], group_lines(len(color_of))
+        for (name, color), line in zip(color_of.items(), lines, strict=True):
             members = np.array(self.groups) == name
             curve = mean_of_seen(self.after[members, :, row], axis=0)
-            means.append(front_line(axis, clock, curve, color=color))
+            means.append(front_line(axis, clock, curve, color=color, linestyle=line))
         return means
 
     def _draw_pattern(self, axis, clock, row):

@@ -1,6 +1,7 @@
 """How unlike a performance is to those that were learnt, and how unlike people may be."""
 
 import numpy as np
+import pandas as pd
 from scipy.stats import t as student
 
 from ..matching.filters import smooth
@@ -194,7 +195,7 @@ def as_codes(groups, n_performances):
     Raises
     ------
     ValueError
-        If there is not one for each performance, or only one in all.
+        If there is not one for each performance, or one is missing, or only one in all.
     """
     if groups is None:
         return np.arange(n_performances)
@@ -207,6 +208,12 @@ def as_codes(groups, n_performances):
         raise ValueError(
             f"groups has {len(groups)} labels, and there are {n_performances} performances: give "
             "one for each."
+        )
+    missing = [bool(np.ndim(label) == 0 and pd.isna(label)) for label in groups]
+    if any(missing):
+        raise ValueError(
+            f"groups does not say who gave performance {missing.index(True)}: it is missing. Give "
+            "everybody a label, or leave such performances out."
         )
     labels = list(dict.fromkeys(groups))
     if len(labels) < 2:

@@ -1,5 +1,7 @@
 """Match: how performances meet the pattern, which every synchronizer answers with."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..gate import as_numbers
@@ -119,11 +121,12 @@ class Match:
 
     @property
     def rates(self):
-        """``d tau / dp``, how fast performances run where the pattern runs at 1: (n_sequences, P).
+        """``d tau / dp``, how long performances take where the pattern takes 1: (n_sequences, P).
 
         Central differences of ``times``, one-sided at both ends. Where tau stands still the rate is
         0.01 and not less, so that its log, ``np.log(match.rates)``, is finite: 0 at the pace of the
-        pattern, positive where a performance is faster.
+        pattern, positive where a performance is slower and its offset grows, negative where it is
+        faster.
         """
         return np.maximum(np.gradient(self.times, axis=1), _SLOWEST)
 
@@ -378,6 +381,12 @@ def check_answer(match, n_sequences, n_frames, name):
 
 def _lengths(X):
     """How many frames the sequences have, of sequences or of such numbers."""
-    if hasattr(X, "__len__") and not hasattr(X, "columns") and all(np.ndim(n) == 0 for n in X):
+    if getattr(X, "ndim", 0) == 2 and not hasattr(X, "columns"):
+        raise ValueError(
+            "X is a single 2-D input. Wrap one performance as [X]; of univariate ones in rows give "
+            "how many frames each has, [X.shape[1]] * len(X)."
+        )
+    is_plain = hasattr(X, "__len__") and not isinstance(X, Mapping) and not hasattr(X, "columns")
+    if is_plain and all(np.ndim(n) == 0 for n in X):
         return as_numbers(X, "The lengths", dtype=np.float64)
     return np.array([len(x) for x in read_collection(X)[0]], dtype=np.float64)

@@ -27,11 +27,14 @@ def table_of_timing(columns, X, labels):
         pd.DataFrame(np.column_stack(of_one), columns=list(columns))
         for of_one in zip(*columns.values(), strict=True)
     ]
-    return to_frame(tables, performances=_tables_of(X) if labels is None else labels)
+    return to_frame(tables, performances=_labels_of(X) if labels is None else labels)
 
 
-def _tables_of(X):
-    """The sequences of a collection, if they are tables, which may know what they are called."""
+def _labels_of(X):
+    """What performances are called, or tables which may know it; None if nobody does."""
+    if isinstance(X, pd.Series):
+        is_numbered = isinstance(X.index, pd.RangeIndex) or not X.index.is_unique
+        return None if is_numbered else X.index
     if X is None or (not hasattr(X, "columns") and all(np.ndim(n) == 0 for n in X)):
         return None
     sequences = as_collection(X)

@@ -37,8 +37,8 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         Such as ``DenseSynchronizer()``; a clone of it is fitted.
     channel : {"offset", "log_rate"}, default="offset"
         What is appended: how much later than the pattern a performance is
-        (``Match.offsets_in(unit)``), or the log of how fast it runs there
-        (``np.log(Match.rates)``), which has no unit.
+        (``Match.offsets_in(unit)``), or the log rate (``np.log(Match.rates)``), which has no unit
+        and is positive where a performance is slower.
     unit : {"percent", "frames", "seconds"}, default="percent"
         Of the offset: per cent of the clock, frames of the pattern, or seconds of each
         performance.
@@ -120,12 +120,18 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         Raises
         ------
         ValueError
-            If the frame rate for seconds is missing, and as from the ``fit`` of the synchronizer.
+            If the frame rate for seconds is missing, or a feature is called as the channel would
+            be; and as from the ``fit`` of the synchronizer.
         """
         if self.channel == "offset" and self.unit == "seconds" and self.frame_rate is None:
             raise ValueError("unit='seconds' needs frame_rate, frames a second of X.")
         given = self._for_synchronizer("fit", params)
         self.synchronizer_ = clone(self.synchronizer).fit(X, y, **given)
+        if self.channel in getattr(self, "feature_names_in_", ()):
+            raise ValueError(
+                f"A feature of X is called {self.channel!r}, as the channel would be: rename it, "
+                "or leave it out."
+            )
         self._fitted_on_rows = self.synchronizer_.check_performances(X).kind == "rows"
         return self
 

@@ -134,6 +134,8 @@ def test_who_leaves_the_band_of_the_own_group(bunch, pipe):
     [
         ({"groups": ["a"]}, ValueError, "groups must be .* each of the 9 performances, got 1"),
         ({"groups": GROUPS, "people": [1]}, ValueError, "people must be .* each of the 9"),
+        ({"groups": [*GROUPS[:8], None]}, ValueError, "groups .* None at 8 .* missing"),
+        ({"groups": GROUPS, "people": [np.nan, *PEOPLE[1:]]}, ValueError, "people .* nan at 0"),
         ({"people": PEOPLE}, TypeError, "takes people along with groups only"),
         ({"groups": GROUPS, "X": None}, TypeError, "takes groups along with performances X"),
         ({"people": PEOPLE, "X": None}, TypeError, "takes people along with performances X"),
@@ -160,6 +162,8 @@ def test_many_groups_are_told_apart(bunch, pipe):
     assert [text.strip().replace("\\", "") for text in texts(display.axes_[0])] == [
         f"{name}: 1 performance, no band" for name in names
     ]
+    before = SynchronizationDisplay.from_estimator(pipe, bunch.data, groups=names, features=[0])
+    assert len({line.get_linestyle() for line in before.group_means_[0]}) == 4
     # Black is the pattern.
     for count in (6, 7, 20):
         _, color_of = group_colors(range(count), count)

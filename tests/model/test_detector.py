@@ -434,3 +434,6 @@ def test_groups_are_checked():
         make().fit(X, groups=[1, 2, 3])
     with pytest.raises(ValueError, match="All performances are of the group 'ann'"):
         make().fit(X, groups=["ann"] * 20)
+    for groups in (np.array([1.0, np.nan] * 10), ["ann", None] * 10):
+        with pytest.raises(ValueError, match="who gave performance 1: it is missing"):
+            make().fit(X, groups=groups)

@@ -106,7 +106,8 @@ def test_frames_and_seconds(matched):
         ([40] * 5, 1, "6 matched performances, but 5 lengths"),
         ([40, 40, 1, 40, 40, 40], 1, "Performance 2 has 1 frames; give the performances"),
         ([40, 40, 40, 40, 40.5, 40], 1, "Performance 4 has 40.5 frames"),
-        (np.zeros((6, 9)), 1, "Wrap one performance"),
+        (np.zeros((6, 9)), 1, r"Wrap one performance .* \[X.shape\[1\]\] \* len\(X\)"),
+        ({"a": np.zeros((6, 9))}, 1, "got dict"),
         (map(len, ["ab"] * 6), 1, "got map"),
         (5, 1, "single 2-D input"),
         ([40] * 6, 0, "frame_rate must be one number above 0"),
@@ -291,6 +292,11 @@ def test_a_table_of_the_timing(late):
     ]
     assert list(late.to_frame(X=X, labels=["x", "y"]).index.unique(0)) == ["x", "y"]
     assert list(late.to_frame(X=[21, 41]).index.unique(0)) == [0, 1]
+    lengths = pd.Series({("ann", 1): 21, ("ann", 2): 41}).rename_axis(["subject", "trial"])
+    assert late.to_frame("seconds", lengths, 10).index.names == ["subject", "trial", "frame"]
+    for index in ([0, 1], [3, 3]):
+        unnamed = pd.Series([21, 41], index=index)
+        assert list(late.to_frame("seconds", unnamed, 10).index.unique(0)) == [0, 1]
 
 
 def test_a_match_of_two_frames():

@@ -193,6 +193,14 @@ def test_parameters_are_validated(points, params, message):
         TimingChannel(DenseSynchronizer()).set_params(**params).fit(points)
 
 
+def test_the_name_of_the_channel_is_free(points):
+    frames = [pd.DataFrame(x, columns=["p", "offset", "r"]) for x in points]
+    with pytest.raises(ValueError, match="called 'offset', as the channel would be: rename it"):
+        TimingChannel(LinearSynchronizer()).fit(frames)
+    channel = TimingChannel(LinearSynchronizer(), channel="log_rate").fit(frames)
+    assert list(channel.get_feature_names_out()) == ["p", "offset", "r", "log_rate"]
+
+
 def test_frames_with_names(points):
     frames = [pd.DataFrame(x, columns=["p", "q", "r"]) for x in points]
     channel = TimingChannel(LinearSynchronizer()).fit(frames)
