@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .limbs import LEFT, LIMBS, UP, ancestor_of
+from .limbs import LEFT, LIMBS, UP, ancestor_of, unit
 
 __all__ = ["along_parents", "heading", "turned"]
 
@@ -27,17 +27,25 @@ def turned(vectors, frames):
 
 
 def _swing(rest, direction):
-    """Rows: the axes after the smallest rotation that takes ``rest`` to each direction."""
+    """Rows: the axes after the smallest rotation that takes ``rest`` to each direction.
+
+    It is made of two half-turns, about ``rest`` and about the middle of both, so that it is a
+    rotation up to the rounding of numbers, also where the direction nearly is the opposite.
+    """
     rest = np.asarray(rest, dtype=direction.dtype)
-    axis = np.cross(rest, direction)
     cosine = direction @ rest
-    # At the opposite of rest every axis serves; the limit keeps the rotation finite.
-    scale = 1 / np.maximum(1 + cosine, np.finfo(direction.dtype).eps)
-    cross = np.zeros((len(axis), 3, 3), dtype=direction.dtype)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        cross[:, i, j], cross[:, j, i] = -axis[:, k], axis[:, k]
-    rotation = np.eye(3, dtype=direction.dtype) + cross + scale[:, None, None] * (cross @ cross)
-    return rotation.transpose(0, 2, 1)
+    sideways = direction * (rest == 0)
+    # 1 + cosine, but for the digits that it loses there.
+    along = np.where(cosine > 0, 1 + cosine, (sideways**2).sum(axis=1) / (1 + np.abs(cosine)))
+    along[~direction.any(axis=1)] = 1
+    middle = unit(along[:, np.newaxis] * rest + sideways)
+    # At the opposite of rest every middle across serves in space, and in the plane only this one.
+    across = (rest[0] == 0, rest[0] != 0, 0)
+    middle = np.where(middle.any(axis=1, keepdims=True), middle, across).astype(direction.dtype)
+    about_middle = 2 * middle[:, :, np.newaxis] * middle[:, np.newaxis] - np.eye(
+        3, dtype=rest.dtype
+    )
+    return (2 * rest * rest - 1)[:, np.newaxis] * about_middle
 
 
 def along_parents(cosines, limbs, *, inverse=False):

@@ -16,10 +16,10 @@ _SYNONYMS = {
              "trxo"),
     "head": ("head", "nose", "headtop", "headtopend", "hedo"),
     "shoulder": ("upperarm", "uparm", "uarm", "arm", "shoulder", "sjc", "clo", "sho"),
-    "elbow": ("elbow", "forearm", "lowerarm", "lowarm", "farm", "ejc", "huo", "elb"),
+    "elbow": ("elbow", "forearm", "lowerarm", "lowarm", "farm", "larm", "ejc", "huo", "elb"),
     "wrist": ("wrist", "hand", "wjc", "rao"),
     "hip": ("thigh", "upleg", "upperleg", "hip", "hipjoint", "hjc", "fep", "asi"),
-    "knee": ("knee", "calf", "leg", "lowerleg", "lowleg", "shin", "kjc", "feo", "kne"),
+    "knee": ("knee", "calf", "leg", "lowerleg", "lowleg", "shin", "shank", "kjc", "feo", "kne"),
     "ankle": ("ankle", "foot", "ajc", "tio", "ank"),
 }  # fmt: skip
 # Joints or markers of which a landmark is the mean where none of those names is there: one of each
@@ -80,6 +80,8 @@ def plain_names(joints):
     """Joints by their names in small letters and digits; of equal names the first."""
     # A prefix that a program gave to every joint but perhaps the root is no part of a name.
     prefix = re.match(r"(.*[^A-Za-z0-9])?", os.path.commonprefix(joints[1:])).group()  # noqa: RUF071
+    # Of a body of which one side was recorded, every name has the side.
+    prefix = re.sub(r"(?i)(?<![a-z0-9])(left|right|l|r)[^a-z0-9]+$", "", prefix)
     return {_plain(j.removeprefix(prefix)): j for j in reversed(joints)}
 
 

@@ -167,7 +167,10 @@ class Skeleton(ReadySkeletons):
             the names. None as a joint leaves a landmark out.
         up : {"y", "x", "z", "-y", "-x", "-z"}, default=None
             The vertical axis; by default ``df.attrs["up"]``, or the one along which the head is
-            above the feet on average. Where the positions do not tell, it is "y".
+            above the feet on average; without feet, the head above the pelvis and the shoulders
+            above the hands. Where the positions do not tell clearly, it is "y". Give it for those
+            who lie or stand on their hands, and for trunks that bend and have no arms or legs:
+            their positions tell another one.
 
         Returns
         -------

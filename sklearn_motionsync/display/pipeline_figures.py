@@ -161,6 +161,11 @@ class PipelineFigures:
             np.asarray(positions(limbs.back(x))).reshape(len(x), -1, skeleton.n_dims)
             for x in (view.whole[i], view.model.mean_)
         )
+        if not skeleton.has_height:
+            # What has no height is above the lowest that either ever reaches.
+            floor = min(bodies[..., 1].min(), shadows[..., 1].min())
+            bodies[..., 1] -= floor
+            shadows[..., 1] -= floor
         verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
         display = cls(
             [[bodies[[frame]]] for frame in strip.frames],

@@ -53,6 +53,31 @@ def test_parent_cosines_turn_with_the_parent():
     assert limbs["left_thigh"] == (0, -0.6, 0.8)
 
 
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("n_dims", [2, 3])
+def test_parent_cosines_of_limbs_that_point_the_other_way(n_dims, dtype):
+    """Hips of people seen from behind, level to any digit or exactly, and an arm across."""
+    x = standing().reshape(-1, 3)[:, :n_dims].reshape(1, -1)
+    skeleton = Skeleton.paper(n_dims=n_dims)
+    x = np.repeat(x, 5, axis=0).astype(dtype)
+    tilts = np.array([0, 1e-9, 1e-7, 1e-4, 1e-2])
+    world = DirectionCosines(skeleton, "world").fit(x)
+    for limb in ("hip", "left_arm"):
+        postures = world.transform(x)
+        place = list(world.get_feature_names_out()).index(f"{limb}_x")
+        postures[:, place], postures[:, place + 1] = -np.cos(tilts), np.sin(tilts)
+        positions = world.inverse_transform(postures)
+        parent = DirectionCosines(skeleton, "parent").fit(positions)
+        cosines = parent.transform(positions)
+        lengths = np.linalg.norm(cosines[:, 1:].reshape(5, 12, n_dims), axis=2)
+        eps = 10 * np.finfo(dtype).eps
+        np.testing.assert_allclose(lengths, 1, atol=eps)
+        again = parent.transform(parent.inverse_transform(cosines))
+        np.testing.assert_allclose(again, cosines, atol=10 * eps)
+        if n_dims == 2:
+            np.testing.assert_allclose(cosines, cosines[[0] * 5], atol=0.011)
+
+
 @pytest.mark.parametrize("reference", REFERENCES)
 def test_joint_positions_come_back(reference, recording):
     """Exactly, but for place and heading: the embedded body is built like the inverse's."""
@@ -265,6 +290,15 @@ def test_landmarks_of_common_names():
     assert skeleton.landmarks["left_shoulder"] == "LeftArm"
     assert skeleton.landmarks["right_knee"] == "RightLeg"
     assert skeleton.landmarks["left_wrist"] == "LeftHand"
+
+
+def test_shanks_and_lower_arms_are_knees_and_elbows():
+    segments = ("thigh", "shank", "foot", "uarm", "larm", "hand")
+    joints = ["pelvis", "torso", "head", *(f"{side}_{name}" for side in "lr" for name in segments)]
+    skeleton = Skeleton(joints, [-1] * len(joints))
+    assert skeleton.landmarks["left_knee"] == "l_shank"
+    assert skeleton.landmarks["right_elbow"] == "r_larm"
+    assert len(skeleton.limbs) == 12
 
 
 def test_bones_and_columns():

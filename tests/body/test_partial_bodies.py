@@ -270,6 +270,17 @@ def test_one_side_alone_is_rather_a_name_that_was_not_understood():
     assert "left_thigh" in skeleton.limbs
 
 
+@pytest.mark.parametrize("spelling", ["left_{}", "L_{}", "Anna:Left_{}"])
+def test_the_side_that_all_names_have_is_a_part_of_them(spelling):
+    """One leg has no pelvis, which its hip would be without the side."""
+    joints = [spelling.format(part) for part in ("hip", "knee", "ankle", "toe")]
+    df = pd.DataFrame(0.0, index=[0], columns=[f"{j}_{a}" for j in joints for a in "xyz"])
+    given = dict(zip(("left_hip", "left_knee", "left_ankle"), joints, strict=False))
+    assert Skeleton.from_frame(df, landmarks=given).landmarks == given
+    with pytest.raises(ValueError, match=r"landmarks \['right_hip', 'right_knee', 'right_ankle'\]"):
+        Skeleton.from_frame(df)
+
+
 def test_names_that_tell_no_limb_are_refused_with_what_to_give():
     df = pd.DataFrame(0.0, index=[0], columns=[f"M{i}_{a}" for i in range(3) for a in "xyz"])
     message = r"\['pelvis', 'neck', .*joints \['M0', 'M1', 'M2'\].*\{'pelvis': \('LASI', 'RASI'\)\}"

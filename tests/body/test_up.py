@@ -106,6 +106,21 @@ def test_real_people_tell_what_is_up(real_data, name, up):
         assert Skeleton.from_frame(df).up == up
 
 
+@pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
+def test_upper_bodies_of_real_people_tell_no_other_axis(real_data, name):
+    """Nor those who bend down, whose trunk lies: the arms hang, or it is not told."""
+    bunch = load_performances(real_data / f"{name}_positions.npz")
+    arms = [f"{side}_{part}" for side in ("left", "right") for part in ("shoulder", "wrist")]
+    given = dict.fromkeys(PAPER.joints)
+    given |= {at: bunch.skeleton.landmarks[at] for at in ("pelvis", "neck", "head", *arms)}
+    told = 0
+    for x in bunch.data:
+        assert Skeleton.from_frame(columns_of(x, bunch.skeleton), landmarks=given).up == "y"
+        df = columns_of(raised(x, "-z"), bunch.skeleton)
+        told += Skeleton.from_frame(df, landmarks=given).up == "-z"
+    assert told > 0.85 * len(bunch.data)
+
+
 def test_what_does_not_tell_is_taken_for_y():
     for values in (0.0, np.nan, "a", 1e300):
         df = pd.DataFrame(values, index=range(3), columns=PAPER.column_names)

@@ -110,6 +110,13 @@ def test_models_and_departures_of_any_part(joints, axes):
     assert sum(len(lines(display, k)) for k in range(3)) == 3 * len(skeleton.bones)
 
 
+@pytest.mark.parametrize("axes", ["xyz", "xy"])
+def test_departures_of_an_upper_body_are_above_the_floor(axes):
+    X, skeleton = part_of([j for j in PAPER.joints if j not in LEGS or j == "pelvis"], axes)
+    display = SkeletonDisplay.from_departures(pipeline(skeleton).fit(X), X, frames=3)
+    assert min(x[..., 1].min() for scene in display.scenes + display.behind for x in scene) >= 0
+
+
 def test_a_picture_is_drawn_as_the_camera_saw_it():
     """Whatever the azimuth; the lowest joint of all on the floor, the pelvis above the origin."""
     skeleton = Skeleton.paper(n_dims=2, up="-y")
