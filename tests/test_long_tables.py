@@ -452,6 +452,17 @@ REFUSED = [
 ]
 
 
+@pytest.mark.parametrize("time", ["time", "frame"])
+def test_an_index_the_wrong_way_round(time):
+    """Its frames would be performances, and the trials their frames."""
+    wide = pd.DataFrame({time: np.arange(30), "knee_1": np.ones(30), "knee_2": np.zeros(30)})
+    long = pd.wide_to_long(wide, ["knee"], i=time, j="trial", sep="_")
+    for take in (to_sequences, ASpace().fit, DenseSynchronizer().fit):
+        with pytest.raises(ValueError, match=rf"to_sequences\(df, by=\['trial'\], time='{time}'\)"):
+            take(long)
+    assert [len(x) for x in to_sequences(long, by=["trial"], time=time)] == [30, 30]
+
+
 @pytest.mark.parametrize(("change", "given", "words"), REFUSED, ids=range(len(REFUSED)))
 def test_tables_that_cannot_be_cut(table, change, given, words):
     with pytest.raises(ValueError) as caught:  # noqa: PT011 - the words are below
