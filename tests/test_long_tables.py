@@ -452,6 +452,11 @@ REFUSED = [
 ]
 
 
+def test_groups_of_a_table_with_their_keys(table):
+    with pytest.raises(ValueError, match=r"0, column 'subject', .* to_sequences\(df, by=\['subj"):
+        DenseSynchronizer().fit([x for _, x in table.groupby("subject")])
+
+
 @pytest.mark.parametrize("time", ["time", "frame"])
 def test_an_index_the_wrong_way_round(time):
     """Its frames would be performances, and the trials their frames."""
