@@ -1,5 +1,7 @@
 """The times of frames: as numbers, in order, without gaps, and evenly spaced or made so."""
 
+import datetime
+import re
 from numbers import Real
 
 import numpy as np
@@ -8,15 +10,19 @@ import pandas as pd
 from .gate import as_numbers
 
 __all__ = [
+    "COMMA",
     "as_times",
     "check_settings",
     "even_grid",
     "facts_at",
     "gaps_of",
+    "has_comma",
     "interpolated",
     "round_up",
 ]
 
+# What to do with numbers that are text for their comma.
+COMMA = "has decimal commas, such as {!r}, and is text so: pd.read_csv(path, sep=';', decimal=',')."
 # Steps of time this much longer than the usual one are gaps.
 _GAP = 1.9
 # Times this share of a step from even ones are even.
@@ -46,14 +52,26 @@ def as_times(values, what, column):
     if series.dtype.kind == "m":
         return series.dt.total_seconds().to_numpy(dtype=np.float64)
     texts = [v for v in series if isinstance(v, str)] if series.dtype.kind in "OSUT" else []
+    name = f"df[{column!r}]"
+    if series.dtype.kind == "O" and any(isinstance(v, datetime.time) for v in series):
+        raise ValueError(
+            f"{what} is of the clock (datetime.time). Convert it: {name} = "
+            f"pd.to_timedelta({name}.astype(str))."
+        )
     if texts:
-        name = f"df[{column!r}]"
+        if has_comma(texts[0]):
+            raise ValueError(f"{what} {COMMA.format(texts[0])}")
         raise ValueError(
             f"{what} is text, such as {texts[0][:40]!r}. Convert it: {name} = "
             f"pd.to_datetime({name}) for dates, pd.to_timedelta for durations, pd.to_numeric for "
             "numbers."
         )
     return as_numbers(series, what, dtype=np.float64)
+
+
+def has_comma(text):
+    """Whether text is a number with a decimal comma."""
+    return re.fullmatch(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*", text) is not None
 
 
 def check_settings(frame_rate, max_gap, time):
@@ -208,11 +226,15 @@ def _slack(times):
     """How far rounding may have moved times: in memory, or to the digits they are written with."""
     step = (times[-1] - times[0]) / (len(times) - 1)
     slack = max(_EVEN * step, 8 * np.spacing(np.abs(times).max()))
+    single = times.astype(np.float32)
+    if (single == times).all():
+        slack = max(slack, 2 * float(np.spacing(np.abs(single).max())))
     for digits in range(-9, 10):
         quantum = 10.0**-digits
         ticks = (times - times[0]) / quantum
         written = np.abs(ticks - np.round(ticks)).max() < 1e-3
-        if quantum <= step / 4 and written:
+        # A third: 30 frames a second with two digits.
+        if quantum <= step / 3 and written:
             return max(slack, quantum)
     return slack
 

@@ -2,15 +2,17 @@
 
 import numpy as np
 import pandas as pd
+from scipy.sparse import issparse
 from sklearn.base import BaseEstimator, TransformerMixin, _fit_context, clone
-from sklearn.pipeline import Pipeline
+from sklearn.compose import ColumnTransformer
+from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 from sklearn.utils._param_validation import HasMethods
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import check_is_fitted
 
 from .fitting import at_once, of_one_state
-from .gate import as_numbers
+from .gate import as_numbers, names_of
 from .notebook import DocumentedMixin
 from .performances import check_performances, check_transformed, restore
 
@@ -51,7 +53,8 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
     Notes
     -----
     A gap (NaN) is let through if the transformer takes it, as imputers and scalers do; infinity is
-    not. A pipeline takes what its first step takes.
+    not. A pipeline takes what its first step takes, a union what all its parts take; a
+    ``ColumnTransformer`` and a ``FunctionTransformer`` take any.
 
     Examples
     --------
@@ -112,7 +115,10 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
                     "[x[['knee', 'hip']] for x in X]."
                 ) from error
             raise
-        rows = self._transformed(performances, 0)
+        rows = self.transformer_.transform(self._named(performances[0]))
+        # FunctionTransformer names columns by the table that it gives only.
+        self._names_out = names_of(rows)
+        rows = self._as_rows(rows, performances, 0)
         self._n_features_out, self._inverts = rows.shape[1], _inverts(self.transformer_, rows[:1])
         return self
 
@@ -171,13 +177,16 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         ndarray of str
-            Those that the transformer gives; framewise0, framewise1, ... if it gives none.
+            Those that the transformer gives, or the table it makes; framewise0, framewise1, ... if
+            there are none.
         """
         check_is_fitted(self)
         if hasattr(self.transformer_, "get_feature_names_out"):
             if input_features is None:
                 input_features = getattr(self, "feature_names_in_", None)
             names = self.transformer_.get_feature_names_out(input_features)
+        elif self._names_out is not None and isinstance(self._names_out[0], str):
+            names = self._names_out
         else:
             names = [f"framewise{k}" for k in range(self._n_features_out)]
         return np.asarray(names, dtype=object)
@@ -203,12 +212,7 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
 
     def _finite(self):
         """What the contract asks of the input: NaN goes to whoever takes it."""
-        first = self.transformer
-        while isinstance(first, Pipeline):
-            steps = [step for _, step in first.steps if step not in (None, "passthrough")]
-            first = steps[0] if steps else None
-        takes_gaps = hasattr(first, "__sklearn_tags__") and get_tags(first).input_tags.allow_nan
-        return "allow-nan" if takes_gaps else True
+        return "allow-nan" if _takes_gaps(self.transformer) else True
 
     def _named(self, frames):
         """Frames of its own for the transformer, which may write to them, with their names."""
@@ -224,6 +228,11 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
     def _as_rows(self, rows, performances, i):
         """What the transformer gave for a performance, if it is a row of numbers a frame."""
         what, n_frames = performances.called(i), len(performances[i])
+        if issparse(rows):
+            raise TypeError(
+                f"{self._name} gives a sparse matrix, and frames are arrays: let it give arrays, "
+                "as by sparse_output=False, or sparse_threshold=0 of a ColumnTransformer."
+            )
         rows = as_numbers(rows, f"{what}, transformed by {self._name},")
         if rows.ndim != 2 or len(rows) != n_frames:
             raise ValueError(
@@ -232,6 +241,21 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
                 "frames is applied before, [change(x) for x in X]."
             )
         return np.ascontiguousarray(rows)
+
+
+def _takes_gaps(transformer):
+    """Whether a transformer takes NaN, as do those that hand columns or frames on unseen."""
+    if isinstance(transformer, Pipeline):
+        steps = [step for _, step in transformer.steps if step not in (None, "passthrough")]
+        return bool(steps) and _takes_gaps(steps[0])
+    if isinstance(transformer, FeatureUnion):
+        parts = [part for _, part in transformer.transformer_list if part != "drop"]
+        return all(part == "passthrough" or _takes_gaps(part) for part in parts)
+    if not hasattr(transformer, "__sklearn_tags__"):
+        return False
+    tags = get_tags(transformer)
+    looks_away = tags.no_validation or isinstance(transformer, ColumnTransformer)
+    return tags.input_tags.allow_nan or looks_away
 
 
 def _inverts(transformer, rows):

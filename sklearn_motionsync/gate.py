@@ -11,6 +11,11 @@ __all__ = ["as_numbers", "check_finite", "check_names", "check_squares", "names_
 
 _TIMES = (np.datetime64, np.timedelta64, datetime.date, datetime.time, datetime.timedelta)
 _FILES = {"amc", "bvh", "c3d", "csv", "json", "npy", "npz", "parquet", "txt", "xlsx"}
+_HELP = "; give numbers"
+_HELP_FOR_TABLES = (
+    "; give numbers. If it tells performances apart, to_sequences(df, by={0}, time=...) cuts the "
+    "whole table; otherwise leave it out, x.drop(columns={0})"
+)
 _SECONDS = "Give seconds as numbers, (t - t[0]) / np.timedelta64(1, 's')"
 
 
@@ -76,10 +81,11 @@ def _refuse_columns(table, what):
         if column.dtype.kind in "Mm" or isinstance(column.dtype, pd.PeriodDtype):
             raise ValueError(f"{which} holds dates or durations. {_SECONDS}.")
         if column.dtype.kind in "OSUT":
-            _refuse_items(column.to_numpy(dtype=object), which)
+            help_ = _HELP if isinstance(table, pd.Series) else _HELP_FOR_TABLES
+            _refuse_items(column.to_numpy(dtype=object), which, help_.format([column.name]))
 
 
-def _refuse_items(values, what):
+def _refuse_items(values, what, help_=_HELP):
     """The same for arrays, and for lists in lists."""
     if isinstance(values, np.ndarray):
         kind = values.dtype.kind
@@ -92,17 +98,16 @@ def _refuse_items(values, what):
         values = [values]
     for value in values:
         if isinstance(value, (str, bytes, os.PathLike)):
-            raise ValueError(_not_numeric(value, what, _advice(value)))
+            raise ValueError(_not_numeric(value, what, _advice(value, help_)))
         if isinstance(value, _TIMES):
             kind = type(value).__name__
             raise ValueError(f"{what} holds dates or durations ({kind}). {_SECONDS}.")
         if isinstance(value, (list, tuple, np.ndarray)):
-            _refuse_items(value, what)
+            _refuse_items(value, what, help_)
 
 
-def _advice(text):
+def _advice(text, advice):
     ending = str(text).rpartition(".")[2].lower()
-    advice = "; give numbers"
     if isinstance(text, os.PathLike) or ending in _FILES:
         advice = "; read the files first, by read_motion(path), pandas.read_csv(path) or the like"
     return f"{str(text)[:60]!r}{advice}"

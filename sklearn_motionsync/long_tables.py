@@ -6,11 +6,13 @@ import numpy as np
 import pandas as pd
 
 from .even_times import (
+    COMMA,
     as_times,
     check_settings,
     even_grid,
     facts_at,
     gaps_of,
+    has_comma,
     interpolated,
     round_up,
 )
@@ -151,6 +153,8 @@ class _Request(NamedTuple):
 def _cut_by_columns(df, request):
     keys, time = request.keys(df), request.time
     flat = _flat(df, keys, request)
+    if not len(flat):
+        raise ValueError("The table has no rows, so there are no performances in it.")
     features = flat.drop(columns=[*keys, *([] if time is None else [time])])
     _check_features(features, keys, request)
     names = keys or [INDEX_NAMES[0]]
@@ -238,6 +242,18 @@ def _check_features(features, keys, request):
                 f"Say {request.call(time=name)}, or drop it: {drop}."
             )
         texts = [v for v in column if isinstance(v, str)] if column.dtype.kind in "OSUT" else []
+        if texts and has_comma(texts[0]):
+            raise ValueError(f"Column {name!r} {COMMA.format(texts[0])}")
+        told = pd.Series(texts, dtype=object)
+        odd = told[pd.to_numeric(told, errors="coerce").isna()].tolist()
+        if 0 < len(odd) < column.notna().sum():
+            raise ValueError(
+                f"Column {name!r} holds text among its numbers, such as {odd[0][:40]!r}. If that "
+                f"stands for gaps, df[{name!r}] = pd.to_numeric(df[{name!r}], errors='coerce') "
+                "makes them NaN; if it is a row of units, pd.read_csv(path, skiprows=[1]) leaves "
+                f"it out; if the column tells performances apart, say "
+                f"{request.call(by=[*keys, name])}; otherwise drop it: {drop}."
+            )
         if texts:
             raise ValueError(
                 f"Column {name!r} holds text, such as {texts[0][:40]!r}, which is no feature. If "

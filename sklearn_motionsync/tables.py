@@ -33,6 +33,8 @@ __all__ = [
 INDEX_NAMES = ("performance", "frame")
 # Where a DataFrame keeps what it is called.
 _LABEL, _LEVELS = "performance", "levels"
+# What no performance is called by.
+_TIMES = ("frame", "time")
 # So many times as many numbered columns as frames are rather frames themselves.
 _MANY = 5
 
@@ -50,6 +52,7 @@ def cut(df):
     keys, frames = df.index.droplevel(-1), df.index.get_level_values(-1)
     levels = full_names(df.index.names)
     labels, parts = parts_of(keys, list(levels[:-1]), "df.reset_index()")
+    _check_order(levels)
     _check_wide(df, levels, parts)
     if len(df) == len(labels) > 1 and len(levels) > 2:
         raise ValueError(
@@ -70,6 +73,16 @@ def cut(df):
             )
         sequences.append(called(df.iloc[rows].set_axis(own), label, levels, df.attrs))
     return sequences
+
+
+def _check_order(levels):
+    """Refuse an index whose first level tells frames, as ``pd.wide_to_long`` may make one."""
+    if levels[0] in _TIMES and levels[-1] not in _TIMES:
+        raise ValueError(
+            f"An index of the levels {list(levels)} names the performance by {levels[0]!r} and the "
+            f"frame by {levels[-1]!r}, and it is rather the other way round. Say which is which: "
+            f"to_sequences(df, by={list(levels[1:])!r}, time={levels[0]!r})."
+        )
 
 
 def _check_wide(df, levels, parts):

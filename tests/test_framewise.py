@@ -107,7 +107,9 @@ def test_names_are_those_of_the_transformer(frames):
         (StandardScaler(), NAMES),
         (VarianceThreshold(1e-9), NAMES[:2]),
         (PCA(2), ["pca0", "pca1"]),
-        (FunctionTransformer(np.tanh), ["framewise0", "framewise1", "framewise2"]),
+        (FunctionTransformer(np.tanh), NAMES),
+        (FunctionTransformer(lambda table: table[["force"]]), ["force"]),
+        (FunctionTransformer(np.array), ["framewise0", "framewise1", "framewise2"]),
         (FunctionTransformer(np.tanh, feature_names_out="one-to-one"), NAMES),
         (make_column_transformer((PCA(1), ["force", "knee"])), ["pca__pca0"]),
     ):
@@ -176,9 +178,19 @@ def test_gaps_go_to_those_who_take_them(X):
         given = (gaps, np.stack(gaps), to_frame(gaps), gaps[2])
         for some in given:
             assert np.isfinite(np.stack(FrameWise(imputer).fit_transform(some))).all()
+    columns = make_column_transformer((SimpleImputer(), [1]), remainder="passthrough")
+    for transformer in (columns, FunctionTransformer(np.nan_to_num), make_union(SimpleImputer())):
+        for some in given[:2]:
+            assert np.isfinite(np.stack(FrameWise(transformer).fit_transform(some))).all()
     scaled = FrameWise(StandardScaler()).fit_transform(gaps)
     assert np.isnan(scaled[2]).sum() == 1
-    for estimator in (FrameWise(PCA(2)), make_pipeline(FrameWise(StandardScaler()), ASpace())):
+    halves = FrameWise(make_union(StandardScaler(), PCA(2)))
+    for estimator in (
+        FrameWise(PCA(2)),
+        halves,
+        make_pipeline(FrameWise(StandardScaler()), ASpace()),
+        make_pipeline(FrameWise(FunctionTransformer(np.tanh)), ASpace()),
+    ):
         with pytest.raises(ValueError, match="Performance 2, frame 5, feature 1 is NaN"):
             estimator.fit(gaps)
     gaps[2][5, 1] = np.inf
@@ -214,7 +226,7 @@ def test_parameters_are_nested(X):
         ),
         (FunctionTransformer(lambda x: x[:, 0]), ["Performance 0", "(30,)"]),
         (FunctionTransformer(lambda x: x.astype(str)), ["Performance 0", "FunctionTransformer"]),
-        (OneHotEncoder(handle_unknown="ignore"), ["sparse"]),
+        (OneHotEncoder(handle_unknown="ignore"), ["OneHotEncoder", "sparse_output=False"]),
         ("scale", ["'transformer'", "'scale'"]),
     ],
     ids=lambda given: type(given).__name__,

@@ -1,5 +1,6 @@
 """Long tables to performances that know what they are called, in order of an even time."""
 
+import datetime as dt
 import re
 
 import numpy as np
@@ -242,6 +243,18 @@ def test_rounded_times_are_even(rate, unit):
     assert not x.attrs["resampled"]
 
 
+@pytest.mark.parametrize(
+    "time",
+    [np.round(np.arange(400) / 30, 2), (np.arange(6000) / 60).astype("f4")],
+    ids=["two digits", "single precision"],
+)
+def test_coarse_times_are_even(time):
+    df = pd.DataFrame({"t": time, "x": np.sin(time.astype(float))})
+    (x,) = to_sequences(df, time="t")
+    np.testing.assert_array_equal(x["x"], df["x"])
+    assert not x.attrs["resampled"]
+
+
 @pytest.mark.parametrize(("rate", "n_frames"), [(25, 26), (100, 101), (30, 31)])
 def test_a_frame_rate_is_given(rate, n_frames):
     time = np.arange(51) / 50
@@ -419,6 +432,12 @@ REFUSED = [
     (lambda df: df.assign(group="young"), BY, ["'group'", "'young'", "by=['subject', 'trial', 'g"]),
     (lambda df: df.assign(day=pd.Timestamp(0)), BY, ["'day'", "dates", "df.drop(columns=['day'])"]),
     (lambda df: df.astype({"time": str}), BY, ["text", "df['time'] = pd.to_datetime(df['time'])"]),
+    (lambda df: df.assign(knee="0,5"), BY, ["'knee' has decimal commas", "'0,5'", "decimal=','"]),
+    (lambda df: df.assign(time="0,5"), BY, ["time of performance", "decimal=','"]),
+    (put("knee", "-"), BY, ["'-'", "pd.to_numeric(df['knee'], errors='coerce')"]),
+    (lambda df: put("knee", "-")(df).astype({"knee": str}), BY, ["'-'", "errors='coerce')"]),
+    (lambda df: df.assign(time=dt.time(0, 1)), BY, ["pd.to_timedelta(df['time'].astype(str))"]),
+    (lambda df: df[:0], BY, ["no rows"]),
     (lambda df: df, {"by": ["subject", "take"]}, ["['take']", "'trial'", "by=[...], time=...)"]),
     (lambda df: df, {"by": []}, ["no column", "by=[...]"]),
     (lambda df: df, {"by": ["trial", "trial"]}, ["different"]),
@@ -431,6 +450,22 @@ REFUSED = [
     (lambda df: df.set_index([*KEYS, "time"]), {}, ["do not increase", "time='time')"]),
     (lambda df: pl.DataFrame(df.to_dict("list")).lazy(), BY, ["LazyFrame", "df.collect()"]),
 ]
+
+
+def test_groups_of_a_table_with_their_keys(table):
+    with pytest.raises(ValueError, match=r"0, column 'subject', .* to_sequences\(df, by=\['subj"):
+        DenseSynchronizer().fit([x for _, x in table.groupby("subject")])
+
+
+@pytest.mark.parametrize("time", ["time", "frame"])
+def test_an_index_the_wrong_way_round(time):
+    """Its frames would be performances, and the trials their frames."""
+    wide = pd.DataFrame({time: np.arange(30), "knee_1": np.ones(30), "knee_2": np.zeros(30)})
+    long = pd.wide_to_long(wide, ["knee"], i=time, j="trial", sep="_")
+    for take in (to_sequences, ASpace().fit, DenseSynchronizer().fit):
+        with pytest.raises(ValueError, match=rf"to_sequences\(df, by=\['trial'\], time='{time}'\)"):
+            take(long)
+    assert [len(x) for x in to_sequences(long, by=["trial"], time=time)] == [30, 30]
 
 
 @pytest.mark.parametrize(("change", "given", "words"), REFUSED, ids=range(len(REFUSED)))

@@ -34,9 +34,11 @@ def find_rate(times, decimals=17, stated=None):
         return stated, len(times) < 2 or stated is not None
     # Times have few digits: 0.033, 0.067, 0.1.
     rate = float(f"{1 / step:.6g}")
-    agree = stated is not None and abs(stated * step - 1) < _SAME
-    off = times - step * np.arange(len(times))
     rounding = 10.0**-decimals
+    # Of a few frames the digits do not tell the rate that well.
+    blur = rounding / (len(times) - 1)
+    agree = stated is not None and abs(step - 1 / stated) < max(_SAME / stated, min(blur, step / 4))
+    off = times - step * np.arange(len(times))
     even = np.ptp(off) / 2 <= min(_JITTER * step + rounding / 2, _MOST * step)
     if agree and (even or np.diff(times).max() < _GAP * max(step, rounding)):
         return stated, True

@@ -240,7 +240,14 @@ def _as_seconds(times, unit, fps):
         raise ValueError("The times of poses must increase; sort them by ds.sortby('time').")
     if unit is None:
         unit = "frames" if (times == np.round(times)).all() else "seconds"
-    in_frames = str(unit).startswith("frame")
+    word = str(unit).lower()
+    in_frames = word.startswith("frame")
+    if not in_frames and word not in ("s", "sec", "second", "seconds"):
+        raise ValueError(
+            f"The times of poses must be seconds or frames, but attrs['time_unit'] is {unit!r}. "
+            "Change them, as in ds.assign_coords(time=ds.time / 1000).assign_attrs("
+            "time_unit='seconds')."
+        )
     if in_frames and fps is not None:
         return times / fps, True
     return times, not in_frames

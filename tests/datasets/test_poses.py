@@ -183,6 +183,7 @@ def test_without_xarray():
         (poses().isel(time=slice(0)), {}, r"position of poses is empty: {'time': 0"),
         (poses().isel(time=slice(None, None, -1)), {}, r"must increase; sort them by ds\.sortby"),
         (poses(times=np.array(list("ab" * 20))), {}, "times of poses must be numbers, got <U1"),
+        (poses(unit="ms"), {}, "must be seconds or frames, but .* is 'ms'"),
         (poses().astype(str), {}, "The position of poses must be numbers, got <U"),
         (
             poses().drop_vars("confidence"),

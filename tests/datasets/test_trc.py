@@ -134,6 +134,12 @@ def test_times_with_few_digits(tmp_path, rate, digits):
     assert read(tmp_path, unsaid).attrs["frame_rate"] == pytest.approx(rate, rel=0.002)
 
 
+@pytest.mark.parametrize("n_frames", [3, 5, 12])
+def test_the_stated_rate_counts_where_few_digits_tell_less(tmp_path, n_frames):
+    df = read(tmp_path, trc(tracks()[:n_frames], NAMES, 30, digits=2))
+    assert df.attrs["frame_rate"] == 30
+
+
 def test_the_data_rate_counts_not_that_of_the_cameras(tmp_path):
     df = read(tmp_path, trc(tracks(), NAMES, CameraRate="200.00", OrigDataRate="200.00"))
     assert df.attrs["frame_rate"] == 50
