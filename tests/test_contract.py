@@ -79,10 +79,10 @@ def by_name(value):
 
 
 # One cost: what is checked is the interface, and all three take three times as long.
-CLASSIFIER = ActionClassifier(costs=["posture"], n_frames=4)
+WITH_ONE_COST = ActionClassifier(costs=["posture"], n_frames=4)
 
 
-@parametrize_with_checks([*ROW_ESTIMATORS, CLASSIFIER])
+@parametrize_with_checks([*ROW_ESTIMATORS, WITH_ONE_COST])
 def test_scikit_learn_checks(estimator, check):
     check(estimator)
 
@@ -94,7 +94,7 @@ def test_scikit_learn_checks(estimator, check):
     ("estimator", "name"),
     [
         (estimator, name)
-        for estimator in (*ROW_ESTIMATORS, CLASSIFIER)
+        for estimator in (*ROW_ESTIMATORS, WITH_ONE_COST)
         for name in EXTRA_CHECKS
         if hasattr(estimator, "transform") or "transform" not in name
     ],
