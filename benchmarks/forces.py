@@ -20,7 +20,7 @@ from sklearn_motionsync import DenseSynchronizer
 
 # Whoever has several settings is also judged on the last five people by what is best on the first.
 CHOSEN_ON = 5
-SHARP = {"cost": "elastic", "subframes": 4, "velocity_smoothing": 0.01, "smoothness": 0.0}
+SHARP = {"cost": "elastic", "subframes": 4, "velocity_smoothing": 0.01, "smoothness": 0}
 
 
 def read_forces():
@@ -96,14 +96,19 @@ def elastic(method, smoothing):
     return times
 
 
+def _as_written(params):
+    return ", ".join(f"{name}={value!r}".replace("'", '"') for name, value in params.items())
+
+
 METHODS = {
     "linear time normalisation": {"": linear},
     "the paper's method": {"": dense(cost="posture", metric=None, consensus=0, max_rate=2)},
     "`DenseSynchronizer()`": {"": dense()},
     "`DenseSynchronizer`, for single curves": {
-        "subframes=4": dense(subframes=4),
-        "sharp": dense(**SHARP),
-        "sharp, consensus=0": dense(**SHARP, consensus=0),
+        '`cost="elastic"`': dense(cost="elastic"),
+        "`subframes=4`": dense(subframes=4),
+        f"`{_as_written(SHARP)}`": dense(**SHARP),
+        "the same, and `consensus=0`": dense(**SHARP, consensus=0),
     },
     "`fdatools.register`": {
         "defaults": continuous("eigen", 4, 0.0),
