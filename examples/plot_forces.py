@@ -30,7 +30,7 @@ print(steps.shape, pd.Series(speeds).value_counts().to_dict())
 
 synchronizer = DenseSynchronizer(n_frames=101).fit(steps)
 display = SynchronizationDisplay.from_estimator(synchronizer, steps, groups=speeds, unit="percent")
-display.axes_[0].set_ylabel("vertical force")
+_ = display.axes_[0].set_ylabel("vertical force")
 
 # %%
 # The warps are a result: those of slow steps leave the diagonal about the valley, which comes early

@@ -52,7 +52,7 @@ for axis, name, unit in zip(axes, take.columns[[1, 3]], ("degrees", "body weight
         axis.axvline(event["time"], color=color, linestyle=line, linewidth=1)
     axis.set_ylabel(f"{name.replace('_', ' ')}\n({unit})")
 axes[1].set_xlabel("seconds")
-figure.legend(
+_ = figure.legend(
     [axes[0].lines[1], axes[0].lines[2]],
     ["heel strike", "toe-off"],
     loc="outside upper center",
