@@ -35,8 +35,10 @@ from .sequences import to_frame
 from .synchronizers.base import Synchronizer
 from .synchronizers.dense import DenseSynchronizer
 from .synchronizers.keyframes import KeyframeSynchronizer
+from .synchronizers.lags import Lags
 from .synchronizers.linear import LinearSynchronizer
 from .synchronizers.match import Match
+from .synchronizers.parts import PartSynchronizer
 from .synchronizers.timing import TimingChannel
 
 __version__ = "0.1.0.dev0"
@@ -52,9 +54,11 @@ __all__ = [
     "FrameWise",
     "JointPositions",
     "KeyframeSynchronizer",
+    "Lags",
     "LinearSynchronizer",
     "Match",
     "MetricDisplay",
+    "PartSynchronizer",
     "Skeleton",
     "SkeletonDisplay",
     "SynchronizationDisplay",
