@@ -20,6 +20,7 @@ from .body.mirror import mirror
 from .body.skeleton import Skeleton
 from .display import (
     ActionModelDisplay,
+    LagDisplay,
     MetricDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
@@ -54,6 +55,7 @@ __all__ = [
     "FrameWise",
     "JointPositions",
     "KeyframeSynchronizer",
+    "LagDisplay",
     "Lags",
     "LinearSynchronizer",
     "Match",
