@@ -11,6 +11,9 @@ from .warps import follow
 
 __all__ = ["PartWarper"]
 
+# So strong a coupling leaves a part nothing; a stronger one is beyond numbers.
+_RIGID = 1e6
+
 
 @dataclass(frozen=True, eq=False)
 class PartWarper(Warper):
@@ -58,7 +61,7 @@ class PartWarper(Warper):
         matcher, compared = Matcher.learn(features, positions, **settings)
         n_frames = len(body.pattern)
         energy = np.square(compared).sum(axis=2, dtype=np.float64).mean()
-        weight = float(coupling * energy * (100 / (n_frames - 1)) ** 2)
+        weight = float(min(coupling, _RIGID) * energy * (100 / (n_frames - 1)) ** 2)
         frames = np.arange(n_frames)
         own = features.unit(chosen[:, :, columns])
         return cls.to_pattern(

@@ -213,6 +213,8 @@ def test_parts_of_the_body_are_known(fitted, postures):
     assert [*by_skeleton] == [*by_name] == [*fitted.parts_] == PARTS
     for name in PARTS:
         assert by_skeleton[name] == by_name[name].tolist() == fitted.parts_[name].tolist()
+    resampled = [np.float32(x[:-1] + x[1:]) / 2 for x in postures]
+    assert [*PartSynchronizer(n_frames=40).fit(resampled).parts_] == PARTS
     limbs = {names[k].rsplit("_", 1)[0] for k in by_skeleton["left leg"]}
     assert limbs == {"left_thigh", "left_leg"}
     assert sorted(k for part in by_skeleton.values() for k in part) == list(range(1, 37))
