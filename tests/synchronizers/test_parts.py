@@ -18,6 +18,7 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import load_performances, make_bending
 
 PARTS = ["left arm", "right arm", "left leg", "right leg", "trunk"]
+ARMS = {name: Skeleton.paper().parts()[name] for name in ("right arm", "left arm")}
 P = 100
 
 
@@ -68,23 +69,23 @@ def grabs(real_data):
 def test_a_lag_of_an_arm_comes_back_against_the_pattern_of_other_people(grabs):
     """Also of the arm that grabs, with which the warp of the whole body goes."""
     X, actor = grabs
-    sync = PartSynchronizer(n_frames=P, coupling=0).fit([X[i] for i in np.where(actor != "bd")[0]])
+    sync = PartSynchronizer(ARMS, 0, n_frames=P).fit([X[i] for i in np.where(actor != "bd")[0]])
     new = [X[i] for i in np.where(actor == "bd")[0]]
-    cases = [(part, size) for part in ("right arm", "left arm") for size in (3, 6, 10)]
+    cases = [(part, size) for part in ARMS for size in (3, 6, 10)]
     late = [delayed(x, sync.parts_[part], size) for part, size in cases for x in new]
-    lags = sync.lags(new + late).values
+    lags = sync.lags(new + late)
     times = sync.match_parts(new)
-    without, *within = lags.reshape(-1, len(new), *lags.shape[1:])
+    without, *within = lags.values.reshape(-1, len(new), len(ARMS), P)
     for (part, size), found in zip(cases, within, strict=True):
         put_in = lag_to_find(times[part].times, size)
-        errors = (found - without)[:, PARTS.index(part)] - put_in
+        errors = (found - without)[:, lags.parts.index(part)] - put_in
         assert np.median(np.abs(errors)) < 1, (part, size)
 
 
 def test_a_lag_of_an_arm_comes_back_against_the_same_clip(grabs):
     X, _ = grabs
-    sync = PartSynchronizer(n_frames=P, pattern=0, coupling=0).fit(X[:6])
-    for part in ("right arm", "left arm"):
+    sync = PartSynchronizer(ARMS, 0, n_frames=P, pattern=0).fit(X[:6])
+    for part in ARMS:
         late = [delayed(X[0], sync.parts_[part], size) for size in (3, 6, 10)]
         put_in = [lag_to_find(np.arange(P), size) for size in (3, 6, 10)]
         errors = sync.match_parts(late)[part].offsets - put_in
@@ -94,9 +95,9 @@ def test_a_lag_of_an_arm_comes_back_against_the_same_clip(grabs):
 def test_coupling_takes_lags_away(grabs):
     X, apart = grabs[0][::4], []
     for coupling in (0, 1e-4, 1e-3, 1e-2, 1e-1, 1):
-        sync = PartSynchronizer(n_frames=50, coupling=coupling).fit(X)
+        sync = PartSynchronizer(ARMS, coupling, n_frames=50).fit(X)
         body, parts = sync.match(X).times, sync.match_parts(X)
-        apart.append([np.abs(parts[name].times - body).mean() for name in PARTS])
+        apart.append([np.abs(parts[name].times - body).mean() for name in ARMS])
     assert (np.diff(apart, axis=0) < 0).all()
     assert np.max(apart[-1]) < 0.05
 
