@@ -38,6 +38,7 @@ from .synchronizers.keyframes import KeyframeSynchronizer
 from .synchronizers.linear import LinearSynchronizer
 from .synchronizers.match import Match
 from .synchronizers.timing import TimingChannel
+from .takes.self_correlation import self_correlation
 
 __version__ = "0.1.0.dev0"
 
@@ -66,6 +67,7 @@ __all__ = [
     "find_departures",
     "metrics",
     "mirror",
+    "self_correlation",
     "synchronization_distances",
     "to_frame",
     "to_sequences",
