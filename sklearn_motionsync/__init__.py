@@ -38,6 +38,7 @@ from .synchronizers.keyframes import KeyframeSynchronizer
 from .synchronizers.linear import LinearSynchronizer
 from .synchronizers.match import Match
 from .synchronizers.timing import TimingChannel
+from .takes.cycles import CycleSegmenter
 from .takes.self_correlation import self_correlation
 
 __version__ = "0.1.0.dev0"
@@ -48,6 +49,7 @@ __all__ = [
     "ActionDetector",
     "ActionModel",
     "ActionModelDisplay",
+    "CycleSegmenter",
     "DenseSynchronizer",
     "DirectionCosines",
     "FrameWise",
