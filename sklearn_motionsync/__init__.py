@@ -20,6 +20,7 @@ from .body.mirror import mirror
 from .body.skeleton import Skeleton
 from .display import (
     ActionModelDisplay,
+    CycleDisplay,
     MetricDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
@@ -49,6 +50,7 @@ __all__ = [
     "ActionDetector",
     "ActionModel",
     "ActionModelDisplay",
+    "CycleDisplay",
     "CycleSegmenter",
     "DenseSynchronizer",
     "DirectionCosines",

@@ -5,6 +5,7 @@ again, and the artists stay on the display as attributes that end in an undersco
 matplotlib, in the extra ``plot``, is imported only when something is drawn.
 """
 
+from .cycles import CycleDisplay
 from .metric import MetricDisplay
 from .model import ActionModelDisplay
 from .stick_figures import SkeletonDisplay
@@ -13,6 +14,7 @@ from .trellis import TrellisDisplay
 
 __all__ = [
     "ActionModelDisplay",
+    "CycleDisplay",
     "MetricDisplay",
     "SkeletonDisplay",
     "SynchronizationDisplay",

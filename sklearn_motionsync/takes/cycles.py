@@ -18,7 +18,7 @@ from .compared import compared, names_of_compared, start_curves
 from .origin import cut_takes
 from .self_correlation import LEAST_CYCLES, correlate
 
-__all__ = ["CycleSegmenter"]
+__all__ = ["CycleSegmenter", "examined", "taken"]
 
 # How often the takes are matched to the template in a fit, which is estimated again each time.
 _ROUNDS = 2
@@ -146,8 +146,8 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
             If the input breaks the contract, a take is not cyclic or too short and
             ``not_cyclic="raise"``, or none is left; or there is no such `start`.
         """
-        given, takes = _taken(self, X, reset=True)
-        features, found = _examined(given, takes, self.skeleton)
+        given, takes = taken(self, X, reset=True)
+        features, found = examined(given, takes, self.skeleton)
         kept = self._kept(takes, found)
         if not kept:
             raise ValueError(
@@ -189,7 +189,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
             As from ``fit``; but the lists are empty if no take is left.
         """
         check_is_fitted(self)
-        given, takes = _taken(self, X, reset=False)
+        given, takes = taken(self, X, reset=False)
         rows = []
         for i, take, phases in self._phases(given, takes):
             rows += [(i, *row) for row in cycles_of(take, phases, self.template_, self.incomplete)]
@@ -227,7 +227,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
             takes that are skipped.
         """
         check_is_fitted(self)
-        given, takes = _taken(self, X, reset=False)
+        given, takes = taken(self, X, reset=False)
         out = [np.full(len(take), np.nan) for take in takes]
         for i, take, phases in self._phases(given, takes):
             out[i] = take.at_frames(phases)
@@ -248,8 +248,8 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
             whether it can be segmented; and the ``reason`` why not.
         """
         self._validate_params()
-        given, takes = _taken(clone(self), X, reset=True)
-        _, found = _examined(given, takes, self.skeleton)
+        given, takes = taken(clone(self), X, reset=True)
+        _, found = examined(given, takes, self.skeleton)
         reasons = [_reason(f, self.threshold) for f in found]
         return pd.DataFrame(
             {
@@ -311,7 +311,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
 
     def _phases(self, given, takes):
         """Yield the index of every take with cycles, its samples, and their phases."""
-        features, found = _examined(given, takes, self.skeleton)
+        features, found = examined(given, takes, self.skeleton)
         step = follow if self.refine else keep_pace
         for i in self._kept(takes, found):
             take = Sampled(features[i], found[i].period)
@@ -350,14 +350,14 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         return name, top_of(cycles[name]) / PHASES
 
 
-def _taken(segmenter, X, *, reset):
+def taken(segmenter, X, *, reset):
     """Takes as they were given, a single one as a list, and checked."""
     given = X if as_collection(X) is not None else [X]
     takes = check_performances(segmenter, given, reset=reset, level="sequence")
     return as_collection(given), takes
 
 
-def _examined(given, takes, skeleton):
+def examined(given, takes, skeleton):
     """What is compared of takes, and their self-correlations."""
     features = compared(given, takes, skeleton)
     return features, [correlate(x) for x in features]
