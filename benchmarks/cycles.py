@@ -12,6 +12,8 @@ other actors or, where there is one actor, from the other takes.
 """
 
 import argparse
+import copy
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -39,13 +41,18 @@ SMOOTHING, APART = 0.02, 0.3
 
 def read(folder, archive, label):
     """The takes of an action: positions, actors, frames a second, skeleton."""
-    bunch = load_performances(Path(folder) / archive / f"{archive}_positions.npz")
+    bunch = copy.copy(_load(Path(folder) / archive / f"{archive}_positions.npz"))
     # Of fewer than 8 frames nothing can be said.
     chosen = [i for i in np.flatnonzero(bunch.target == label) if len(bunch.data[i]) >= 8]
     bunch.data = [bunch.data[i] for i in chosen]
     bunch.actor, bunch.take = bunch.actor[chosen], bunch.take[chosen]
     bunch.frame_rate = bunch.frame_rate[chosen]
     return bunch
+
+
+@functools.cache
+def _load(path):
+    return load_performances(path)
 
 
 def foot_strikes(positions, skeleton, frame_rate):

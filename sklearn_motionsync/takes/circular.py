@@ -21,8 +21,10 @@ PHASES, _SUBFRAMES = 32, 4
 _SMOOTHNESS = 0.3
 # Standard deviation, in samples, of the Gaussian under which velocities are derived.
 _WIDTH = 1
-# How far, in cycles, a take comes off its mean pace: for the phase it begins at, and by the cycle.
-_BEGIN, _DRIFT = 0.55, 0.1
+# How far, in cycles, a part comes off the mean pace: for the phase it begins at, and by the cycle.
+_BEGIN, _DRIFT = 0.55, 0.3
+# Cycles of the parts in which long takes are matched, and by how many they overlap.
+_PART, _OVERLAP = 16, 2
 _FASTEST = 2
 
 
@@ -99,17 +101,32 @@ def keep_pace(template, take):
 
 
 def follow(template, take):
-    """Phases of the best path of a take along the repeated template (Eqs. 12-17)."""
-    n_samples = len(take.values)
+    """Phases of the best path of a take along the repeated template (Eqs. 12-17).
+
+    Takes of many cycles are matched in parts that overlap, so that time grows with the take as
+    memory does. In the middle of an overlap the phases of the next part go on.
+    """
+    values, cycle = take.values, _between(template)
+    whole, overlap = _PART * PHASES, _OVERLAP * PHASES
+    phases = _follow(cycle, values[: whole + overlap])
+    for start in range(whole, len(values) - overlap, whole):
+        part = _follow(cycle, values[start : start + whole + overlap])
+        middle = overlap // 2
+        part += np.round(phases[start + middle] - part[middle])
+        phases = np.concatenate([phases[: start + middle], part[middle:]])
+    return np.maximum.accumulate(phases)
+
+
+def _follow(cycle, values):
     steps, moving, inner, _, _ = step_table("posture", _FASTEST, _SUBFRAMES)
     table = StepTable(steps, moving, inner, np.square(steps / _SUBFRAMES - 1), _SUBFRAMES)
-    reach = int(np.ceil(PHASES * (_BEGIN + _DRIFT * take.pace[-1])))
+    reach = int(np.ceil(PHASES * _BEGIN + _DRIFT * len(values)))
     trellis = Trellis(table, _SMOOTHNESS, reach, free=True)
-    cycle = _between(template)
-    positions = np.arange(-trellis.width, (n_samples - 1) * _SUBFRAMES + 1 + trellis.width)
-    moving = cycle[positions % len(cycle)]
-    (path,) = trellis.paths(take.values[np.newaxis], moving[np.newaxis])[0]
-    return (np.arange(n_samples) * _SUBFRAMES + path) / len(cycle)
+    last = (len(values) - 1) * _SUBFRAMES
+    positions = np.arange(-trellis.width, last + 1 + trellis.width)
+    repeated = cycle[positions % len(cycle)]
+    (path,) = trellis.paths(values[np.newaxis], repeated[np.newaxis])[0]
+    return (np.arange(0, last + 1, _SUBFRAMES) + path) / len(cycle)
 
 
 def _between(template):
