@@ -10,9 +10,11 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..body.skeleton import Skeleton
 from ..fitting import at_once, of_one_state
+from ..gate import as_numbers
 from ..notebook import DocumentedMixin
 from ..performances import check_performances
 from ..sequences import as_collection
+from ..tables import as_pandas
 from .circular import PHASES, Sampled, average, cycles_of, follow, keep_pace, top_of
 from .compared import compared, names_of_compared, start_curves
 from .origin import cut_takes
@@ -352,9 +354,23 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
 
 def taken(segmenter, X, *, reset):
     """Takes as they were given, a single one as a list, and checked."""
-    given = X if as_collection(X) is not None else [X]
-    takes = check_performances(segmenter, given, reset=reset, level="sequence")
-    return as_collection(given), takes
+    X = X if as_collection(X) is not None else [_single(as_pandas(X))]
+    takes = check_performances(segmenter, X, reset=reset, level="sequence")
+    return as_collection(X), takes
+
+
+def _single(X):
+    """One take (n_frames, n_features)."""
+    if isinstance(X, pd.DataFrame):
+        return X
+    take = as_numbers(X, "The take")
+    if take.ndim != 2:
+        raise ValueError(
+            f"Expected 2D array, one take (n_frames, n_features), or a list of takes; got an array "
+            f"of shape {take.shape}. Reshape your data: a single feature is a column, "
+            "x[:, np.newaxis]."
+        )
+    return take
 
 
 def examined(given, takes, skeleton):

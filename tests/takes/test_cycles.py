@@ -10,6 +10,7 @@ from sklearn.exceptions import NotFittedError
 from sklearn.model_selection import GroupKFold, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
+from sklearn.utils import estimator_checks
 from sklearn_motionsync import (
     ActionModel,
     ASpace,
@@ -215,6 +216,9 @@ def test_bad_takes_are_named(change, message, gait, fitted):
 def test_other_refusals(gait, fitted):
     with pytest.raises(ValueError, match="0 performances"):
         CycleSegmenter().fit([])
+    for X in (gait.data[0][:, 0], 3.0):
+        with pytest.raises(ValueError, match=r"one take \(n_frames, n_features\), or a list"):
+            fitted.segment(X)
     with pytest.raises(ValueError, match="3 features a frame, but CycleSegmenter is expecting 4"):
         fitted.segment([x[:, :3] for x in gait.data])
     with pytest.raises(NotFittedError):
@@ -226,6 +230,30 @@ def test_other_refusals(gait, fitted):
 
 
 # -- the contract -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "check_complex_data",
+        "check_do_not_raise_errors_in_init_or_set_params",
+        "check_estimator_cloneable",
+        "check_estimator_repr",
+        "check_estimator_sparse_array",
+        "check_estimators_nan_inf",
+        "check_estimators_unfitted",
+        "check_fit1d",
+        "check_get_params_invariance",
+        "check_no_attributes_set_in_init",
+        "check_param_validation",
+        "check_parameters_default_constructible",
+        "check_set_params",
+        "check_valid_tag_types",
+    ],
+)
+def test_scikit_learn_checks_whose_data_may_be_refused(name):
+    """The others fit noise, in which nothing repeats."""
+    getattr(estimator_checks, name)("CycleSegmenter", CycleSegmenter())
 
 
 def same(answer, expected):
