@@ -110,7 +110,9 @@ def phases_of_others(bunch, **params):
     groups = bunch.actor if len(set(bunch.actor)) > 1 else bunch.take
     out = [None] * len(bunch.data)
     for train, test in LeaveOneGroupOut().split(bunch.data, groups=groups):
-        segmenter = CycleSegmenter(bunch.skeleton, **params).fit([bunch.data[i] for i in train])
+        # Which foot is farther ahead depends on who is left out.
+        segmenter = CycleSegmenter(bunch.skeleton, start="right", **params)
+        segmenter.fit([bunch.data[i] for i in train])
         for i, phases in zip(test, segmenter.phases([bunch.data[i] for i in test]), strict=True):
             out[i] = phases
     return out

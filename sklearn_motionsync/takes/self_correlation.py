@@ -21,7 +21,7 @@ _NEAR = 0.9
 # Before a peak the correlation falls below this share of it; what does not is a ripple of noise.
 _FALL = 0.5
 # Width of the smoothing, as a share of the time in which the movement changes.
-_SMOOTHING = 1 / 6
+_SMOOTHING = 1 / 4
 # Variances below this share of the whole are rounding.
 _NOTHING = 1e-12
 
@@ -91,9 +91,9 @@ def self_correlation(take, skeleton=None):
 
     Notes
     -----
-    Postures are smoothed by a Gaussian, a sixth as wide as the root of their variance by that of
-    their change in a frame: of a sine, a fortieth of its period. Time and memory grow with the take
-    as a Fourier transform of it does.
+    Postures are smoothed by a Gaussian, a fourth as wide as the root of their variance by that of
+    their change in a frame: of a sine, a twenty-fifth of its period. Time and memory grow with the
+    take as a Fourier transform of it does.
 
     References
     ----------

@@ -240,7 +240,6 @@ def test_other_refusals(gait, fitted):
         "check_estimator_cloneable",
         "check_estimator_repr",
         "check_estimator_sparse_array",
-        "check_estimators_nan_inf",
         "check_estimators_unfitted",
         "check_fit1d",
         "check_get_params_invariance",
