@@ -21,7 +21,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import make_bending, make_gait
 
-gait = make_gait(6, n_cycles=6, takes=True, warp=2, random_state=0)
+gait = make_gait(6, n_cycles=4, takes=True, warp=2, random_state=0)
 takes = FrameWise(StandardScaler()).fit_transform(gait.data)  # degrees and body weights
 
 # %%
