@@ -20,6 +20,7 @@ from .body.mirror import mirror
 from .body.skeleton import Skeleton
 from .display import (
     ActionModelDisplay,
+    CycleDisplay,
     LagDisplay,
     MetricDisplay,
     SkeletonDisplay,
@@ -41,6 +42,8 @@ from .synchronizers.linear import LinearSynchronizer
 from .synchronizers.match import Match
 from .synchronizers.parts import PartSynchronizer
 from .synchronizers.timing import TimingChannel
+from .takes.cycles import CycleSegmenter
+from .takes.self_correlation import self_correlation
 
 __version__ = "0.1.0.dev0"
 
@@ -50,6 +53,8 @@ __all__ = [
     "ActionDetector",
     "ActionModel",
     "ActionModelDisplay",
+    "CycleDisplay",
+    "CycleSegmenter",
     "DenseSynchronizer",
     "DirectionCosines",
     "FrameWise",
@@ -72,6 +77,7 @@ __all__ = [
     "find_departures",
     "metrics",
     "mirror",
+    "self_correlation",
     "synchronization_distances",
     "to_frame",
     "to_sequences",
