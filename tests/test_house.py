@@ -34,6 +34,7 @@ FLOORS = [
     "body",
     "matching",
     "synchronizers",
+    "blending",
     "model",
     "recognition",
     "datasets",
