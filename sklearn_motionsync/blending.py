@@ -13,7 +13,7 @@ from .body.joint_positions import JointPositions
 from .body.limbs import exponent_of
 from .body.skeleton import Skeleton
 from .gate import as_numbers
-from .pipelines import flat_steps, parts_of
+from .pipelines import flat_steps, parts_of, reach_synchronizer
 from .sequences import NOT_ONE, as_collection, check_members
 from .synchronizers.match import Match
 from .tables import labels_of
@@ -128,7 +128,7 @@ def blend_performances(
     _check(sequences, arrays, skeleton)
     match = estimator
     if not isinstance(estimator, Match):
-        match = Match.from_estimator(estimator, X, **params)
+        match = reach_synchronizer(estimator, X, params, "blend_performances").match()
     elif params:
         raise TypeError(f"A Match is matched already, and takes no {sorted(params)}.")
     met = match.frames(list(map(len, arrays)))

@@ -8,6 +8,7 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
+    KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
     Skeleton,
@@ -378,6 +379,16 @@ def test_gaps_are_refused_by_their_frame(bending, pipe):
         blend_performances(match, X[:1], [1], keyframes=[])
     with pytest.raises(ValueError, match="lengths_of is for joint positions"):
         blend_performances(match, bending.data[:2], [1, 0], lengths_of=0)
+
+
+def test_key_frames_are_handed_on(bending):
+    X, keyframes = bending.data[:4], bending.keyframes[:4]
+    pipe = make_pipeline(DirectionCosines(bending.skeleton), KeyframeSynchronizer())
+    pipe.fit(X, keyframesynchronizer__keyframes=keyframes)
+    found = blend_performances(pipe, X, [0, 1, 0, 0], keyframes=keyframes)
+    np.testing.assert_allclose(found, X[1], atol=1e-12)
+    with pytest.raises(ValueError, match=r"blend_performances\(estimator, X, keyframes="):
+        blend_performances(pipe, X, [0, 1, 0, 0])
 
 
 def test_takes_of_the_kinect(real_data):
