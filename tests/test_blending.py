@@ -273,9 +273,10 @@ def test_beyond_a_performance_it_goes_on_but_never_back():
     assert 0 < found.argmax() <= 15 + 1
 
 
-def test_a_transition_takes_the_pace_of_each():
+@pytest.mark.parametrize("weights", [[[1, 0], [0, 1]], [[1, 0], [1, 0], [0, 1], [0, 1]]])
+def test_a_transition_takes_the_pace_of_each(weights):
     X = [np.linspace(0, 1, 51)[:, np.newaxis], np.linspace(0, 1, 201)[:, np.newaxis]]
-    found = blend_performances(late(0.5, 0.5), X, [[1, 0], [0, 1]])
+    found = blend_performances(late(0.5, 0.5), X, weights)
     assert len(found) == 126
     speed = np.diff(found[:, 0])
     assert speed[0] == pytest.approx(1 / 50, rel=0.05)

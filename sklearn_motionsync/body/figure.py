@@ -81,10 +81,10 @@ class Plan:
         for name, at in skeleton.landmarks.items():
             joints = skeleton.indices_of(name)
             # What is the mean of several joints is a point of its own.
-            self._points[name] = joints[0] if isinstance(at, str) else self._new_point()
+            self._points[name] = joints[0] if isinstance(at, str) else self._count()
         for part in _MIDDLES:
             if part in skeleton.limbs:
-                self._points[part] = self._new_point()
+                self._points[part] = self._count()
         self.origin = self._points[self._first()]
         self.links, self.lasting = self._linked()
 
@@ -93,7 +93,7 @@ class Plan:
         skeleton = self.skeleton
         joints = y_up(positions.reshape(len(positions), -1, skeleton.n_dims), skeleton)
         points = np.concatenate(
-            [joints, np.zeros((len(joints), self._n_points() - joints.shape[1], joints.shape[2]))],
+            [joints, np.zeros((len(joints), self._count() - joints.shape[1], joints.shape[2]))],
             axis=1,
         )
         for name, at in skeleton.landmarks.items():
@@ -129,7 +129,7 @@ class Plan:
         It is moved up or down as a whole, so that its lower ankle is, half of the time, no lower
         than it should be (n_frames,), and half of the time no higher.
         """
-        points = np.empty((len(links), self._n_points(), links.shape[2]))
+        points = np.empty((len(links), self._count(), links.shape[2]))
         points[:, self.origin] = place
         links = along_angle(links, angle)
         for k, (near, far) in enumerate(self.links):
@@ -145,11 +145,9 @@ class Plan:
 
     # -- which point hangs on which ----------------------------------------------------------
 
-    def _new_point(self):
-        return max(len(self.skeleton.joints) - 1, *self._points.values(), 0) + 1
-
-    def _n_points(self):
-        return max(len(self.skeleton.joints), 1 + max(self._points.values()))
+    def _count(self):
+        """How many points there are: the joints, and those of their own."""
+        return 1 + max([len(self.skeleton.joints) - 1, *self._points.values()])
 
     def _first(self):
         choices = ("pelvis", "hip", "neck", "shoulder", *LANDMARKS)
