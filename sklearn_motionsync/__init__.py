@@ -14,6 +14,7 @@
 
 from . import datasets, display, metrics
 from .aspace import ASpace
+from .blending import blend_performances
 from .body.direction_cosines import DirectionCosines
 from .body.joint_positions import JointPositions
 from .body.mirror import mirror
@@ -72,6 +73,7 @@ __all__ = [
     "Synchronizer",
     "TimingChannel",
     "TrellisDisplay",
+    "blend_performances",
     "datasets",
     "display",
     "find_departures",
