@@ -14,6 +14,7 @@ from pandas.api.types import is_hashable
 from .wide_tables import call_to_unfold, numbered_columns
 
 __all__ = [
+    "FRAME",
     "INDEX_NAMES",
     "as_pandas",
     "called",
@@ -22,6 +23,7 @@ __all__ = [
     "frame_name",
     "full_names",
     "index_of",
+    "label_of_part",
     "labels_given",
     "labels_of",
     "name_performance",
@@ -31,6 +33,8 @@ __all__ = [
 ]
 
 INDEX_NAMES = ("performance", "frame")
+# The innermost level of an index.
+FRAME = INDEX_NAMES[1]
 # Where a DataFrame keeps what it is called.
 _LABEL, _LEVELS = "performance", "levels"
 # What no performance is called by.
@@ -155,6 +159,28 @@ def own_label(x):
     levels = tuple(levels)[:-1]
     fits = len(levels) == 1 or (isinstance(label, tuple) and len(levels) == len(label))
     return (label, levels) if fits and is_hashable((label, levels)) else (None, None)
+
+
+def label_of_part(whole, part, level, levels=()):
+    """The label of a part of a recording, behind that of the recording, as ``attrs``.
+
+    Parameters
+    ----------
+    whole : hashable
+        What the recording is called; a tuple has several levels.
+    part : hashable
+    level : str
+        What the level of parts is called, unless the recording has one of that name.
+    levels : sequence of str, default=()
+        Names of the levels of the recording, with that of the frames, if it has any.
+    """
+    before = whole if isinstance(whole, tuple) else (whole,)
+    names = tuple(levels)[:-1]
+    if len(names) != len(before):
+        several = len(before) > 1
+        names = tuple(f"recording_{k}" if several else "recording" for k in range(len(before)))
+    last = level if level not in names else f"{level}_{len(names) + 1}"
+    return {_LABEL: (*before, part), _LEVELS: (*names, last, FRAME)}
 
 
 def labels_given(performances):

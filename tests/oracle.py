@@ -16,6 +16,15 @@ def path_cost(x, y, path, costs, mu, subframes):
     return total
 
 
+def all_free_paths(n_frames, steps, subframes, max_disparity):
+    """Every path that stays in the band, wherever it begins and ends."""
+    reach = max_disparity * subframes
+    for start, *taken in itertools.product(range(-reach, reach + 1), *[steps] * (n_frames - 1)):
+        path = reach + start + np.concatenate([[0], np.cumsum(taken)]).astype(int)
+        if np.abs(path - reach - subframes * np.arange(n_frames)).max() <= reach:
+            yield path
+
+
 def all_paths(n_frames, steps, subframes, max_disparity):
     """Every path with pinned ends that stays in the band."""
     last = (n_frames - 1) * subframes

@@ -5,7 +5,7 @@ from numbers import Real
 
 import pandas as pd
 
-from ._labels import FRAME, label_of_part
+from ..tables import FRAME, label_of_part
 
 _HELP = (
     "attrs['events'] must be a list of dicts with label, context and frame, as read_motion gives "

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pandas as pd
 
+from ..tables import FRAME
 from ._acclaim import read_acclaim
 from ._asf import find_asf
 from ._bvh import read_bvh
 from ._c3d import read_c3d
 from ._clock import set_clock
 from ._gaps import check_max_gap, fill_gaps, warn_of_gaps, warn_of_missing
-from ._labels import FRAME
 from ._storage import read_storage
 from ._trc import read_trc
 

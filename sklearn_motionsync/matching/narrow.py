@@ -26,7 +26,7 @@ def suits(bundle):
     consecutive = n_steps == trellis.table.steps.max() + 1
     cells = bundle.n_frames * (2 * trellis.width + 1) * bundle.pairs
     few = cells <= NARROW_CELLS * len(trellis.groups) and cells * n_steps <= _NARROW_WAYS
-    return consecutive and few
+    return consecutive and few and not trellis.free
 
 
 def narrow_paths(bundle):
@@ -67,6 +67,9 @@ def _ways(bundle):
     ways = ways.reshape(bundle.n_frames, len(table.steps), -1)
     # The first sample is reached by no step, so it pays no penalty.
     ways[0] -= trellis.of_step[0, trellis.entry_of_step, np.newaxis]
+    if bundle.coupling is not None:
+        for p, way in enumerate(ways):
+            way += bundle.coupled(p, -width, width)
     return ways
 
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["PRODUCT_ROWS", "Bases", "Bundle", "group_steps", "right_factor"]
+__all__ = ["PRODUCT_ROWS", "Bases", "Bundle", "Coupling", "group_steps", "right_factor"]
 
 # Samples of a single base that share one product.
 PRODUCT_ROWS = 16
@@ -68,6 +68,25 @@ class Bases:
         return _left_factor(self.sequences, moving, inner, penalty)
 
 
+class Coupling(NamedTuple):
+    """What draws paths towards others: ``weight * (d - d_other)^2`` is added to the local cost.
+
+    Attributes
+    ----------
+    weight : float
+        In squared features of a frame, by the square of a frame.
+    offsets : ndarray, shape (n_bases, n_moving, P)
+        ``d_other`` of every pair, in frames.
+    """
+
+    weight: float
+    offsets: np.ndarray
+
+    def part(self, rows, columns):
+        """That of some pairs, by slices."""
+        return self._replace(offsets=self.offsets[rows, columns])
+
+
 class Bundle:
     """The pairs of one tile, whose rows are computed together.
 
@@ -75,8 +94,9 @@ class Bundle:
     n_bases), with ``pad`` cells at both sides for the steps that leave the band.
     """
 
-    def __init__(self, trellis, bases, right):
+    def __init__(self, trellis, bases, right, coupling=None):
         self.trellis, self.bases, self.right = trellis, bases, right
+        self.coupling = coupling
         self.n_bases, self.n_frames = bases.sequences.shape[:2]
         self.dtype = bases.sequences.dtype
         self.pairs = right.shape[1] * self.n_bases
@@ -100,18 +120,50 @@ class Bundle:
         rank = np.arange(len(self.trellis.slopes), dtype=self.dtype)[:, np.newaxis]
         return _TIE[self.dtype] * rank * energy.ravel()
 
+    @functools.cached_property
+    def drawn_to(self):
+        """The offsets that the coupling draws to, sample by sample: (P, pairs)."""
+        return self.coupling.offsets.transpose(2, 1, 0).reshape(self.n_frames, -1)
+
+    def coupled(self, p, low, high):
+        """What the coupling adds to the cells of a row, the disparities from low to high, flat."""
+        offsets = np.arange(low, high + 1)[:, np.newaxis] / self.trellis.table.subframes
+        added = self.coupling.weight * np.square(offsets - self.drawn_to[p])
+        return added.astype(self.dtype).ravel()
+
     def states(self, n_rows):
         """Rows of cells that no path has reached."""
         return np.full((n_rows, self.row_cells), np.inf, dtype=self.dtype)
 
     def distances(self):
         """Costs of the best paths: (n_bases, n_moving)."""
+        return self.ends().min(axis=2)
+
+    def ends(self):
+        """Costs of the best paths to every end: (n_bases, n_moving, n_ends).
+
+        The ends are disparities, rising: 0 alone if they are pinned.
+        """
         states = self.states(2)
         for _ in self.advance(states):
             pass
-        at = self.centre * self.pairs
-        best = states[(self.n_frames - 1) % len(states), at : at + self.pairs]
-        return np.maximum(best, 0).reshape(-1, self.n_bases).T
+        best = np.maximum(self._last_row(states), 0)
+        return best.reshape(len(best), -1, self.n_bases).transpose(2, 1, 0)
+
+    def _last_row(self, states):
+        """``S(P - 1, d)`` of the disparities at which a path may end: (n_ends, pairs)."""
+        ends = self.trellis.ends_at + self.centre
+        cells = states[(self.n_frames - 1) % len(states)].reshape(-1, self.pairs)
+        return cells[ends[0] : ends[-1] + 1]
+
+    def _best_ends(self, states):
+        """Where the best paths end, (pairs,); of equal ends the nearest to the middle."""
+        ends = self.trellis.ends_at
+        nearest = np.argsort(np.abs(ends), kind="stable")
+        costs = self._last_row(states)[nearest]
+        if len(nearest) > 1:
+            costs += self.handicaps[1] * np.arange(len(nearest))[:, np.newaxis]
+        return ends[nearest[costs.argmin(axis=0)]]
 
     # -- forward: the recurrence, Eq. 16 --------------------------------------
 
@@ -143,6 +195,8 @@ class Bundle:
                     trial = room[: stop - start]
                     best = _best_step(old, start, stop, levels, trial, level)
                     np.minimum(new, np.add(best, local[i], out=trial), out=new)
+            if self.coupling is not None and (p == 0 or p > first):
+                new += self.coupled(p, lows[p], highs[p])
             yield p
 
     def costs_of_samples(self, first, last, lows, highs):
@@ -152,7 +206,8 @@ class Bundle:
         widest = (2 * self.trellis.width + 1) * self.pairs
         room = np.empty(n_groups * widest, dtype=self.dtype)
         for p in range(first, last):
-            window = self.right[p * sub + lows[p] : p * sub + highs[p] + 1]
+            at = self.trellis.lead + p * sub
+            window = self.right[at + lows[p] : at + highs[p] + 1]
             factor = window.reshape(-1, n_factors)
             costs = room[: n_groups * len(factor) * self.n_bases].reshape(n_groups, -1)
             products = costs.reshape(n_groups, -1, self.n_bases)
@@ -169,7 +224,8 @@ class Bundle:
             # The ends of the windows never move back.
             lowest = start * sub + lows[start]
             highest = (stop - 1) * sub + highs[stop - 1]
-            factor = self.right[lowest : highest + 1].reshape(-1, n_factors)
+            lead = self.trellis.lead
+            factor = self.right[lead + lowest : lead + highest + 1].reshape(-1, n_factors)
             left = self.left[start:stop].reshape(-1, n_factors)
             costs = np.matmul(left, factor.T).reshape(stop - start, n_groups, -1)
             for p, rows in zip(range(start, min(stop, last)), costs, strict=False):
@@ -179,8 +235,10 @@ class Bundle:
 
     # -- backward: the path, Eq. 17 -------------------------------------------
 
-    def paths(self, max_bytes):
+    def paths(self, max_bytes, ends=None):
         """Disparities of the best paths: (n_bases, n_moving, P).
+
+        Given ``ends``, those of the best paths to each of them: (n_bases, n_moving, n_ends, P).
 
         If not all rows may be kept, every ``length``-th is, and the rows between two of them
         are computed again, from the last to the first.
@@ -193,8 +251,10 @@ class Bundle:
         for p in self.advance(states):
             if length < n_frames and p % length == 0:
                 kept[p] = states[p % 2].copy()
-        at = np.empty((n_frames, self.pairs), dtype=np.intp)
-        at[-1] = self.centre * self.pairs + np.arange(self.pairs)
+        there = self._best_ends(states) if ends is None else np.asarray(ends)[:, np.newaxis]
+        here = (there + self.centre) * self.pairs + np.arange(self.pairs)
+        at = np.empty((n_frames, here.size), dtype=np.intp)
+        at[-1] = here.ravel()
         for first in range(0, n_frames, length)[::-1]:
             last = min(first + length, n_frames)
             if kept:
@@ -203,7 +263,10 @@ class Bundle:
                 for _ in self.advance(states, first, last):
                     pass
             self._retrace(states, at, first, last)
-        return self.disparities(at // self.pairs - self.centre)
+        found = self.disparities(at // self.pairs - self.centre)
+        if ends is None:
+            return found
+        return found.reshape(self.n_bases, len(ends), -1, n_frames).swapaxes(1, 2)
 
     def _retrace(self, states, at, first, last):
         """Follow the paths back from row ``last`` to ``first``: the step that won each time."""
@@ -212,7 +275,7 @@ class Bundle:
         shift = trellis.slopes * pairs
         back = shift[:, np.newaxis]
         penalties, weight, inner = trellis.of_step.astype(states.dtype)[:, :, np.newaxis]
-        charges = penalties + self.handicaps
+        charges = np.tile(penalties + self.handicaps, at.shape[1] // pairs)
         n_moving, n_factors = self.right.shape[1:]
         positions = self.right.reshape(-1, n_factors)
         start = min(last, self.n_frames - 1)
@@ -221,10 +284,10 @@ class Bundle:
             value = states[(p - 1) % len(states)].take(here - back)
             value += charges
             if several:
-                q = p * trellis.table.subframes - self.centre
+                q = trellis.lead + p * trellis.table.subframes - self.centre
                 y = positions.take(here // self.n_bases + q * n_moving, axis=0)
                 value += weight * y[:, -2]
-                y = y.reshape(n_moving, self.n_bases, n_factors)[..., :-2]
+                y = y.reshape(-1, self.n_bases, n_factors)[..., :-2]
                 products = np.einsum("mnk,nk->mn", y, self.bases.sequences[:, p])
                 value -= inner * products.ravel()
             here = here - shift.take(value.argmin(axis=0))

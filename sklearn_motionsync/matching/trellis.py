@@ -14,6 +14,9 @@ Invariants the code relies on:
 - Both ends are pinned (Eq. 9) and no step is negative. A path that leaves
   ``0 <= q < Q`` can therefore never come back, so Eq. 14's infinite cost outside
   needs no test: whatever finite number stands there is never on a winning path.
+- With free ends a path begins and ends at any disparity. The moving sequence then goes on for
+  ``width`` positions at both ends, so that every cell of the band is inside: Q is
+  ``(P - 1) * subframes + 1 + 2 * width``, and p meets ``q = width + p * subframes + d``.
 - A step looks only at the row before it. A row has no dependency inside
   itself and is computed for all bases, disparities and moving sequences at once.
 - The sequence index is stored last, so that every window of ``q`` is one
@@ -50,12 +53,18 @@ class Trellis:
         Weight of the rate penalty.
     max_disparity : int
         ``D``, the largest offset, in frames.
+    free : bool, default=False
+        Whether both ends are free. Neither then costs anything: what a path pays for is the
+        samples of the base and the steps between them.
     """
 
-    def __init__(self, table, mu, max_disparity):
-        self.table, self.mu = table, mu
+    def __init__(self, table, mu, max_disparity, free=False):
+        self.table, self.mu, self.free = table, mu, free
         self.reach = max_disparity
         self.width = max_disparity * table.subframes
+        # Where sample 0 of the base meets the moving sequence, and where paths may end.
+        self.lead = self.width if free else 0
+        self.ends_at = np.arange(-self.lead, self.lead + 1)
         self.groups, group_of_step = group_steps(table, mu)
         # Of every step: its penalty, and the weights of |x_m|^2 and of the inner product.
         self.of_step = np.stack([mu * table.penalty, table.moving, table.inner])
@@ -70,13 +79,13 @@ class Trellis:
         self._windows = {}
 
     @classmethod
-    def on_clock(cls, cost, n_frames, mu, *, max_offset, max_rate, subframes=1):
+    def on_clock(cls, cost, n_frames, mu, *, max_offset, max_rate, subframes=1, free=False):
         """The trellis of a cost; the largest offset is a share of the clock."""
         # Whole frames; 0.29 * 100 must not lose one to rounding.
         reach = int(np.floor(max_offset * n_frames * (1 + 1e-12)))
         # No step is longer than the clip.
         table = step_table(cost, min(max_rate, n_frames - 1), subframes)
-        return cls(table, mu, min(reach, n_frames - 1))
+        return cls(table, mu, min(reach, n_frames - 1), free)
 
     def distances(self, bases, moving):
         """Cost of the best path for every ordered pair.
@@ -95,7 +104,7 @@ class Trellis:
             out[rows, columns] = bundle.distances()
         return out
 
-    def paths(self, bases, moving, max_bytes=1 << 29):
+    def paths(self, bases, moving, max_bytes=1 << 29, coupling=None):
         """Best path for every ordered pair.
 
         Parameters
@@ -104,22 +113,57 @@ class Trellis:
         moving : ndarray, shape (n_moving, Q, n_features)
         max_bytes : int, default=2 ** 29
             Above this the rows of the trellis are not all kept but computed twice.
+        coupling : Coupling, default=None
+            What draws the paths towards others.
 
         Returns
         -------
         ndarray of int32, shape (n_bases, n_moving, P)
-            ``d(p)`` in sub-positions; ``d(0) = d(P-1) = 0``. It depends on the pair alone: what
-            other pairs are given changes rounding, and in double precision rounding decides
-            nothing.
+            ``d(p)`` in sub-positions; pinned ends make ``d(0) = d(P-1) = 0``. It depends on the
+            pair alone: what other pairs are given changes rounding, and in double precision
+            rounding decides nothing.
         """
         if not isinstance(bases, Bases):
             bases = Bases(self, bases)
         shape = len(bases), len(moving), bases.sequences.shape[1]
         disparities = np.empty(shape, dtype=np.int32)
-        for rows, columns, bundle in self.bundles(bases, moving):
+        for rows, columns, bundle in self.bundles(bases, moving, coupling):
             few = narrow.suits(bundle)
             found = narrow.narrow_paths(bundle) if few else bundle.paths(max_bytes)
             disparities[rows, columns] = found
+        return disparities
+
+    def ends(self, bases, moving):
+        """Cost of the best path to every end, for every ordered pair.
+
+        Returns
+        -------
+        ndarray, shape (n_bases, n_moving, n_ends)
+            The disparities ``ends_at``.
+        """
+        out = np.empty((len(bases), len(moving), len(self.ends_at)), dtype=bases.dtype)
+        for rows, columns, bundle in self.bundles(Bases(self, bases), moving):
+            out[rows, columns] = bundle.ends()
+        return out
+
+    def paths_to(self, ends, bases, moving, max_bytes=1 << 29):
+        """Best path to each of some ends, for every ordered pair.
+
+        Parameters
+        ----------
+        ends : array-like of int, shape (n_ends,)
+            Disparities among ``ends_at``.
+        bases, moving, max_bytes
+            As in `paths`.
+
+        Returns
+        -------
+        ndarray of int32, shape (n_bases, n_moving, n_ends, P)
+        """
+        shape = len(bases), len(moving), len(ends), bases.shape[1]
+        disparities = np.empty(shape, dtype=np.int32)
+        for rows, columns, bundle in self.bundles(Bases(self, bases), moving):
+            disparities[rows, columns] = bundle.paths(max_bytes, ends)
         return disparities
 
     def costs(self, base, moving, disparities):
@@ -142,7 +186,7 @@ class Trellis:
 
     def _costs(self, base, moving, disparities):
         n_moving, n_positions, n_features = moving.shape
-        q = disparities + self.table.subframes * np.arange(len(base))
+        q = disparities + (self.lead + self.table.subframes * np.arange(len(base)))
         steps = np.full_like(q, self.table.subframes)
         np.subtract(q[:, 1:], q[:, :-1], out=steps[:, 1:])
         q += n_positions * np.arange(n_moving)[:, np.newaxis]
@@ -173,14 +217,17 @@ class Trellis:
         """Cells of the trellis of one pair."""
         return (moving.shape[1] // self.table.subframes) * (2 * self.width + 1)
 
-    def bundles(self, bases, moving):
+    def bundles(self, bases, moving, coupling=None):
         """Yield the slices of every tile of pairs, and the bundle of its rows."""
         for rows, columns in self.tiles(len(bases), *moving.shape[::2]):
             right = right_factor(moving[columns])
-            yield rows, columns, Bundle(self, bases.part(rows), right)
+            drawn = None if coupling is None else coupling.part(rows, columns)
+            yield rows, columns, Bundle(self, bases.part(rows), right, drawn)
 
     def windows(self, n_frames):
-        """Lowest and highest disparity, at every sample, of a pinned path in the band."""
+        """Lowest and highest disparity, at every sample, of a path in the band."""
+        if self.free:
+            return [-self.width] * n_frames, [self.width] * n_frames
         known = self._windows.get(n_frames)
         if known is not None:
             return known

@@ -7,9 +7,10 @@ import pytest
 from sklearn_motionsync.matching import narrow, rows
 from sklearn_motionsync.matching import trellis as tiling
 from sklearn_motionsync.matching.costs import StepTable, step_table
+from sklearn_motionsync.matching.rows import Coupling
 from sklearn_motionsync.matching.trellis import Trellis
 
-from oracle import brute_force, path_cost, plain_loops
+from oracle import all_free_paths, all_paths, brute_force, path_cost, plain_loops
 
 
 def posture_costs(max_rate, subframes):
@@ -82,6 +83,66 @@ def test_equals_every_admissible_path(case, make_costs, whole, dtype, narrow_cel
             else:
                 cost = path_cost(x, y, path, costs, mu, subframes)
                 np.testing.assert_allclose(cost, best, **close)
+
+
+@pytest.mark.parametrize("make_costs", [posture_costs, rate_weighted_costs])
+@pytest.mark.parametrize("case", [(5, 2, 1, 2, 0.3), (4, 2, 2, 1, 0.4), (2, 3, 1, 4, 0.0)])
+@pytest.mark.parametrize("n_bases", [1, 2])
+def test_free_ends_equal_every_path(case, make_costs, n_bases):
+    n_frames, max_rate, subframes, reach, mu = case
+    costs, rng = make_costs(max_rate, subframes), np.random.default_rng(0)
+    bases = rng.standard_normal((n_bases, n_frames, 2))
+    moving = rng.standard_normal((3, (n_frames - 1) * subframes + 1 + 2 * reach * subframes, 2))
+    trellis = Trellis(table_of(costs, subframes), mu, reach, free=True)
+    to_all = trellis.ends(bases, moving)
+    disparities = trellis.paths_to(trellis.ends_at, bases, moving)
+    best = trellis.paths(bases, moving)
+    again = trellis.paths(bases, moving, max_bytes=0)
+    np.testing.assert_array_equal(again, best)
+    np.testing.assert_allclose(trellis.distances(bases, moving), to_all.min(axis=2))
+    paths = list(all_free_paths(n_frames, sorted(costs), subframes, reach))
+    for n, base in enumerate(bases):
+        for m, sequence in enumerate(moving):
+            totals = [path_cost(base, sequence, path, costs, mu, subframes) for path in paths]
+            for i, end in enumerate(trellis.ends_at):
+                last = trellis.lead + (n_frames - 1) * subframes + end
+                known = {tuple(q): t for q, t in zip(paths, totals, strict=True) if q[-1] == last}
+                np.testing.assert_allclose(to_all[n, m, i], min(known.values()), atol=1e-12)
+                d = disparities[n, m, i]
+                path = tuple(trellis.lead + d + subframes * np.arange(n_frames))
+                np.testing.assert_allclose(known[path], min(known.values()), atol=1e-12)
+                added_up = trellis.costs(base, sequence[np.newaxis], d[np.newaxis])
+                np.testing.assert_allclose(added_up, known[path], atol=1e-12)
+            np.testing.assert_array_equal(best[n, m], disparities[n, m, to_all[n, m].argmin()])
+
+
+def test_equal_free_ends_are_in_the_middle():
+    trellis = Trellis(step_table(), 1.0, 4, free=True)
+    assert not trellis.paths(np.zeros((1, 6, 2)), np.zeros((1, 14, 2))).any()
+
+
+@pytest.mark.parametrize("make_costs", [posture_costs, rate_weighted_costs])
+@pytest.mark.parametrize("n_bases", [1, 2])
+@pytest.mark.parametrize("narrow_cells", [0, 30_000], ids=["wide", "narrow"])
+def test_coupled_paths_equal_every_path(make_costs, n_bases, narrow_cells, monkeypatch):
+    monkeypatch.setattr(narrow, "NARROW_CELLS", narrow_cells)
+    costs, rng = make_costs(2, 2), np.random.default_rng(0)
+    bases, moving = rng.standard_normal((n_bases, 5, 2)), rng.standard_normal((3, 9, 2))
+    coupling = Coupling(0.7, rng.uniform(-1, 1, (n_bases, 3, 5)))
+    trellis = Trellis(table_of(costs, 2), 0.2, 2)
+    disparities = trellis.paths(bases, moving, coupling=coupling)
+    np.testing.assert_array_equal(
+        trellis.paths(bases, moving, max_bytes=0, coupling=coupling), disparities
+    )
+    diagonal = 2 * np.arange(5)
+    for n, base in enumerate(bases):
+        for m, sequence in enumerate(moving):
+            totals = {}
+            for path in all_paths(5, sorted(costs), 2, 2):
+                drawn = 0.7 * np.square((path - diagonal) / 2 - coupling.offsets[n, m]).sum()
+                totals[tuple(path)] = path_cost(base, sequence, path, costs, 0.2, 2) + drawn
+            found = totals[tuple(diagonal + disparities[n, m])]
+            np.testing.assert_allclose(found, min(totals.values()), atol=1e-12)
 
 
 @pytest.mark.parametrize("make_costs", [posture_costs, rate_weighted_costs])

@@ -1,0 +1,1 @@
+"""From long takes to performances: cycles, and where an action happens."""
