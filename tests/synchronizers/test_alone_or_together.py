@@ -31,7 +31,6 @@ def piecewise(X):
 
 TIES = {
     "held": held,
-    "rounded": lambda X: [x.round(1) for x in X],
     "held and rounded": lambda X: held([x.round(1) for x in X]),
     "piecewise constant": piecewise,
     "whole numbers": lambda X: [x.round() for x in X],
