@@ -305,8 +305,8 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
                 f"{reasons[bad]} of about {found[bad].period:.0f} frames, and {LEAST_CYCLES} are "
                 "needed to see that it repeats. Give a longer take"
                 if short
-                else f"is not cyclic: its self-correlation has the strength {strength:.2f}, below "
-                f"threshold={self.threshold:g}. Leave it out"
+                else f"is not cyclic, or has less than {LEAST_CYCLES} cycles: its self-correlation "
+                f"has the strength {strength:.2f}, below threshold={self.threshold:g}. Leave it out"
             )
             raise ValueError(f'{what} {why}, or set not_cyclic="skip"; report(X) tells of all.')
         return [i for i, reason in enumerate(reasons) if not reason]
