@@ -38,6 +38,7 @@ from .synchronizers.keyframes import KeyframeSynchronizer
 from .synchronizers.linear import LinearSynchronizer
 from .synchronizers.match import Match
 from .synchronizers.timing import TimingChannel
+from .takes.search import find_performances
 
 __version__ = "0.1.0.dev0"
 
@@ -64,6 +65,7 @@ __all__ = [
     "datasets",
     "display",
     "find_departures",
+    "find_performances",
     "metrics",
     "mirror",
     "synchronization_distances",
