@@ -1,4 +1,4 @@
-"""How unlike windows of a take are to the performances that were learnt, and how unlike they may be.
+"""How unlike windows of a take are to performances that were learnt, and how unlike they may be.
 
 Windows are compared as they are, linearly normalised to the clock: warping them to a pattern makes
 what is another movement look like it, and windows that begin too early or late look right.
@@ -20,12 +20,12 @@ _SAY_OF_MEAN = 0.1
 # Say of length and energy: of the sum of their squared standard deviations.
 _SAY_OF_MANNER = 0.05
 # They make nothing more unlike than e to this.
-_MOST = 20.0
+_MOST = 3.0
 # The variance of both logarithms that is usual of people; it counts like so many values.
 _USUAL_VARIANCE, _USUAL_COUNT = 0.07, 3
 # Who stands still is as unlike as 1. What is not clearly more alike is not the action, however
-# unlike people are; and as windows begin and end at whole frames, not all can be asked for.
-_MOST_BORDER, _LEAST_BORDER = 0.75, 0.05
+# unlike people are; and takes are noisier than clips, and windows begin at whole frames.
+_MOST_BORDER, _LEAST_BORDER = 0.7, 0.15
 # The border where a single performance tells nothing of how people differ.
 _BORDER_OF_ONE = 0.5
 # Windows that are compared at a time: bounds the memory, whatever the length of the take.
@@ -48,6 +48,8 @@ class Unlikeness:
     synchronizer : fitted Synchronizer
     groups : array-like (n_kept,), default=None
         Of the training performances that it keeps; by default each is its own.
+    length : bool, default=True
+        Whether the length counts.
 
     Attributes
     ----------
@@ -55,10 +57,10 @@ class Unlikeness:
         That of the training performances, each compared with those of other groups.
     """
 
-    def __init__(self, synchronizer, groups=None):
+    def __init__(self, synchronizer, groups=None, length=True):
         training = synchronizer.training_
         self._features, self._n_frames = training.features, synchronizer.n_frames_
-        self._length = _Usual(training.durations)
+        self._length = _Usual(training.durations) if length else np.zeros_like
         count = len(training.kept)
         positions = self._positions(training.on_clock)
         self._center = positions.mean(axis=(0, 1))

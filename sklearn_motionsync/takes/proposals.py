@@ -19,7 +19,7 @@ __all__ = ["Proposer", "at_times", "scales"]
 _CLOCK = 50
 # How far both ends are free, as a share of the clock; portions follow each other as far apart.
 _SHARE = 0.2
-# From one time scale to the next: ends that are free by a fifth on both sides cover what is between.
+# From one time scale to the next: ends that are free by a fifth cover what is between.
 _RATIO = 1.6
 _SMOOTHNESS, _MAX_RATE = 0.003, 3
 # Portions matched at a time: bounds the memory, whatever the length of the take.

@@ -29,10 +29,13 @@ _MARGIN, _MARGIN_OF_ONE = 1.1, 1.5
 _FEWEST = 3
 # Ends of a hit are moved by this share of its length at first, then by ever less.
 _FIRST_MOVE = 1 / 8
+_MOVES = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
+# Twice as unlike as the threshold allows: no move of the ends makes that up.
+_HOPELESS = 2
 
 
 def find_performances(
-    pattern, X, *, threshold="learned", coverage=0.7, max_hits=None, durations=None, groups=None
+    pattern, X, *, threshold="learned", coverage=0.6, max_hits=None, durations=None, groups=None
 ):
     """Where in long takes an action happens: performances cut out of them.
 
@@ -42,8 +45,8 @@ def find_performances(
        it is to the two most similar ones in posture and in what the synchronizer compares, in
        length and in energy. The score is ``exp(-unlikeness)``: 1 is equal, 0.37 as unlike as
        standing still.
-    3. The best window is kept, after its ends were moved to where they are best, then the best of
-       those that do not overlap it, and so on, down to the threshold.
+    3. The ends of the best window are moved to where its score is best; then those of the best
+       that does not overlap it, and so on. What reaches the threshold is a hit.
 
     Time grows with the length of a take, memory does not.
 
@@ -58,15 +61,16 @@ def find_performances(
         feature may be one-dimensional.
     threshold : "learned", float or None, default="learned"
         The lowest score of a hit. ``"learned"``: from the training performances, each compared
-        with those of other groups; at least 0.47 and at most 0.95; 0.61 for an array, half as
-        unlike as standing still. None: whatever is better than what it overlaps.
-    coverage : float, default=0.7
+        with those of other groups; at least 0.50 and at most 0.86; 0.61 for an array, half as
+        unlike as standing still. None: whatever is better than what it overlaps, as with 0.
+    coverage : float, default=0.6
         Share of performances of people not seen, cut out by hand, that a learnt threshold lets in.
     max_hits : int, default=None
         How many are kept of each take, the best ones; by default all.
     durations : (int, int), default=None
         Numbers of frames of the shortest and the longest performance looked for. By default a
-        tenth beyond those of the training set; for an array from 2/3 to 3/2 of its length.
+        tenth beyond those of the training set, and what is unusually short or long counts as
+        unlike; for an array from 2/3 to 3/2 of its length.
     groups : array-like, default=None
         Who performed each training performance, or what else makes them resemble each other. By
         default those that an `ActionModel` in the pipeline was fitted with.
@@ -116,19 +120,19 @@ def find_performances(
     reader = type("find_performances", (SequenceLevelMixin, BaseEstimator), {})()
     given = check_performances(reader, X, reset=True, level="sequence")
     synchronizer, takes, groups = _reach(pattern, X, groups)
+    _check_lengths(given, takes)
     shortest, longest = _durations(synchronizer, durations)
     propose = Proposer.of(synchronizer, shortest, longest)
-    unlikeness = Unlikeness(synchronizer, groups)
-    border = _border(unlikeness, threshold, coverage)
+    unlikeness = Unlikeness(synchronizer, groups, length=durations is None)
+    lowest = _lowest(unlikeness, threshold, coverage)
     rows = []
     for i, take in enumerate(takes):
         take = take.astype(np.float64, copy=False)
         search = _Search(take, unlikeness, shortest, longest)
-        hits = search.hits(propose(take), border, max_hits)
-        rows += [(i, start, stop, np.exp(-unlike)) for start, stop, unlike in sorted(hits)]
+        rows += [(i, *hit) for hit in search.hits(propose(take), lowest, max_hits)]
     rows = pd.DataFrame(rows, columns=["take", "start", "stop", "score"])
     rows = rows.astype({"take": int, "start": int, "stop": int, "score": float})
-    return cut_takes(X, given, rows.assign(threshold=np.exp(-border)))
+    return cut_takes(X, given, rows.assign(threshold=lowest))
 
 
 class _Search:
@@ -138,18 +142,22 @@ class _Search:
         self._take, self._unlikeness = take, unlikeness
         self._shortest, self._longest = shortest, min(longest, len(take))
 
-    def hits(self, windows, border, most):
-        """Start, stop and unlikeness of the best of windows (n, 2), the best first."""
-        most = len(windows) if most is None else most
-        unlike = self._unlikeness(self._take, windows)
-        kept = []
-        for k in np.argsort(unlike, kind="stable"):
-            if len(kept) == most or not (unlike[k] <= border):
+    def hits(self, windows, threshold, most):
+        """Start, stop and score of the best of windows (n, 2), in the order of time.
+
+        Windows are tried the best first, and each takes its place whether it is accepted or not:
+        so a threshold chooses among hits, and changes none.
+        """
+        scores = np.exp(-self._unlikeness(self._take, windows))
+        tried = []
+        for k in np.argsort(-scores, kind="stable"):
+            if scores[k] < threshold**_HOPELESS:
                 break
-            room = self._room(windows[k], kept)
+            room = self._room(windows[k], tried)
             if room is not None:
-                kept.append(self._moved(windows[k], unlike[k], *room))
-        return kept
+                tried.append(self._moved(windows[k], scores[k], *room))
+        found = sorted((hit for hit in tried if hit[2] >= threshold), key=lambda hit: -hit[2])
+        return sorted(found[:most])
 
     def _room(self, window, kept):
         """From where to where a window may reach; None if it overlaps what is kept."""
@@ -159,21 +167,20 @@ class _Search:
         before = max((other for _, other, _ in kept if other <= start), default=0)
         return before, min((this for this, _, _ in kept if this >= stop), default=len(self._take))
 
-    def _moved(self, window, unlike, first, last):
-        """The window with its ends moved, by ever less, to where it is most alike."""
+    def _moved(self, window, score, first, last):
+        """The window with its ends moved, by ever less, to where its score is best."""
         window, move = np.asarray(window), max(1, int(_FIRST_MOVE * (window[1] - window[0])))
-        moves = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
         while move:
-            some = window + move * moves
+            some = window + move * _MOVES
             sizes = some[:, 1] - some[:, 0]
             inside = (some[:, 0] >= first) & (some[:, 1] <= last)
             some = some[inside & (sizes >= self._shortest) & (sizes <= self._longest)]
-            found = self._unlikeness(self._take, some)
-            if len(found) and found.min() < unlike:
-                window, unlike = some[found.argmin()], found.min()
+            scores = np.exp(-self._unlikeness(self._take, some))
+            if scores.max(initial=0) > score:
+                window, score = some[scores.argmax()], scores.max()
             else:
                 move //= 2
-        return int(window[0]), int(window[1]), float(unlike)
+        return int(window[0]), int(window[1]), float(score)
 
 
 def _as_takes(X):
@@ -205,8 +212,17 @@ def _reach(pattern, X, groups):
         return synchronizer, synchronizer.check_performances(X), None
     check_is_fitted(find_synchronizer(pattern)[1])
     reached = reach_synchronizer(pattern, X, {}, "find_performances")
-    lengths = [len(x) for x in reached.performances]
     return reached.synchronizer, reached.performances, _groups(pattern, reached, groups)
+
+
+def _check_lengths(given, takes):
+    for i, (before, after) in enumerate(zip(given, takes, strict=True)):
+        if len(before) != len(after):
+            raise ValueError(
+                f"{given.called(i)} has {len(before)} frames, and {len(after)} after the steps "
+                "before the synchronizer: where a hit is could not be told. Resample the takes "
+                "before you give them."
+            )
 
 
 def _groups(pattern, reached, groups):
@@ -234,13 +250,11 @@ def _durations(synchronizer, durations):
     return max(_FEWEST, int(known.min() / margin)), int(np.ceil(known.max() * margin))
 
 
-def _border(unlikeness, threshold, coverage):
-    """Up to how unlike hits may be."""
-    if threshold is None:
-        return np.finfo(np.float64).max
+def _lowest(unlikeness, threshold, coverage):
+    """The lowest score of a hit."""
     if isinstance(threshold, str):
-        return unlikeness.border(coverage)
-    return -np.log(threshold) if threshold > 0 else np.finfo(np.float64).max
+        return float(np.exp(-unlikeness.border(coverage)))
+    return 0.0 if threshold is None else float(threshold)
 
 
 def _check(*, threshold, coverage, max_hits, durations):
