@@ -21,6 +21,7 @@ from .body.skeleton import Skeleton
 from .display import (
     ActionModelDisplay,
     MetricDisplay,
+    SearchDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
     TrellisDisplay,
@@ -56,6 +57,7 @@ __all__ = [
     "LinearSynchronizer",
     "Match",
     "MetricDisplay",
+    "SearchDisplay",
     "Skeleton",
     "SkeletonDisplay",
     "SynchronizationDisplay",

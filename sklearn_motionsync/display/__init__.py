@@ -7,6 +7,7 @@ matplotlib, in the extra ``plot``, is imported only when something is drawn.
 
 from .metric import MetricDisplay
 from .model import ActionModelDisplay
+from .search import SearchDisplay
 from .stick_figures import SkeletonDisplay
 from .synchronization import SynchronizationDisplay
 from .trellis import TrellisDisplay
@@ -14,6 +15,7 @@ from .trellis import TrellisDisplay
 __all__ = [
     "ActionModelDisplay",
     "MetricDisplay",
+    "SearchDisplay",
     "SkeletonDisplay",
     "SynchronizationDisplay",
     "TrellisDisplay",

@@ -62,7 +62,8 @@ def find_performances(
     threshold : "learned", float or None, default="learned"
         The lowest score of a hit. ``"learned"``: from the training performances, each compared
         with those of other groups; at least 0.50 and at most 0.86; 0.61 for an array, half as
-        unlike as standing still. None: whatever is better than what it overlaps, as with 0.
+        unlike as standing still. None: whatever is better than what it overlaps, to be compared
+        with the learnt one.
     coverage : float, default=0.6
         Share of performances of people not seen, cut out by hand, that a learnt threshold lets in.
     max_hits : int, default=None
@@ -82,7 +83,7 @@ def find_performances(
         are called by the label of their take and their number in it.
     origin : DataFrame
         One row each: ``take``, its index or label; ``start`` and ``stop``, frames of the take, the
-        last excluded; ``score``; ``threshold``, with which it was compared.
+        last excluded; ``score``; ``threshold``, the one that was given or learnt.
 
     Raises
     ------
@@ -124,7 +125,8 @@ def find_performances(
     shortest, longest = _durations(synchronizer, durations)
     propose = Proposer.of(synchronizer, shortest, longest)
     unlikeness = Unlikeness(synchronizer, groups, length=durations is None)
-    lowest = _lowest(unlikeness, threshold, coverage)
+    level = _level(unlikeness, threshold, coverage)
+    lowest = 0.0 if threshold is None else level
     rows = []
     for i, take in enumerate(takes):
         take = take.astype(np.float64, copy=False)
@@ -132,7 +134,7 @@ def find_performances(
         rows += [(i, *hit) for hit in search.hits(propose(take), lowest, max_hits)]
     rows = pd.DataFrame(rows, columns=["take", "start", "stop", "score"])
     rows = rows.astype({"take": int, "start": int, "stop": int, "score": float})
-    return cut_takes(X, given, rows.assign(threshold=lowest))
+    return cut_takes(X, given, rows.assign(threshold=level))
 
 
 class _Search:
@@ -250,11 +252,11 @@ def _durations(synchronizer, durations):
     return max(_FEWEST, int(known.min() / margin)), int(np.ceil(known.max() * margin))
 
 
-def _lowest(unlikeness, threshold, coverage):
-    """The lowest score of a hit."""
-    if isinstance(threshold, str):
+def _level(unlikeness, threshold, coverage):
+    """The score that is given, or learnt."""
+    if threshold is None or isinstance(threshold, str):
         return float(np.exp(-unlikeness.border(coverage)))
-    return 0.0 if threshold is None else float(threshold)
+    return float(threshold)
 
 
 def _check(*, threshold, coverage, max_hits, durations):
