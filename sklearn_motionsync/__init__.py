@@ -24,6 +24,7 @@ from .display import (
     CycleDisplay,
     LagDisplay,
     MetricDisplay,
+    SearchDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
     TrellisDisplay,
@@ -45,6 +46,7 @@ from .synchronizers.parts import PartSynchronizer
 from .synchronizers.timing import TimingChannel
 from .takes.cycles import CycleSegmenter
 from .takes.self_correlation import self_correlation
+from .takes.search import find_performances
 
 __version__ = "0.1.0.dev0"
 
@@ -67,6 +69,7 @@ __all__ = [
     "Match",
     "MetricDisplay",
     "PartSynchronizer",
+    "SearchDisplay",
     "Skeleton",
     "SkeletonDisplay",
     "SynchronizationDisplay",
@@ -77,6 +80,7 @@ __all__ = [
     "datasets",
     "display",
     "find_departures",
+    "find_performances",
     "metrics",
     "mirror",
     "self_correlation",

@@ -9,6 +9,7 @@ from .cycles import CycleDisplay
 from .lags import LagDisplay
 from .metric import MetricDisplay
 from .model import ActionModelDisplay
+from .search import SearchDisplay
 from .stick_figures import SkeletonDisplay
 from .synchronization import SynchronizationDisplay
 from .trellis import TrellisDisplay
@@ -18,6 +19,7 @@ __all__ = [
     "CycleDisplay",
     "LagDisplay",
     "MetricDisplay",
+    "SearchDisplay",
     "SkeletonDisplay",
     "SynchronizationDisplay",
     "TrellisDisplay",
