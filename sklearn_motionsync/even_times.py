@@ -231,10 +231,11 @@ def _slack(times):
         slack = max(slack, 2 * float(np.spacing(np.abs(single).max())))
     for digits in range(-9, 10):
         quantum = 10.0**-digits
-        ticks = (times - times[0]) / quantum
-        written = np.abs(ticks - np.round(ticks)).max() < 1e-3
         # A third: 30 frames a second with two digits.
-        if quantum <= step / 3 and written:
+        if quantum > step / 3:
+            continue
+        ticks = (times - times[0]) / quantum
+        if np.abs(ticks - np.round(ticks)).max() < 1e-3:
             return max(slack, quantum)
     return slack
 

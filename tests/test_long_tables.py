@@ -597,3 +597,13 @@ def test_several_tables_are_put_into_one(table):
         ValueError, match=r"got dict\. Use list\(X\.values\(\)\); or, of tables, pd"
     ):
         DenseSynchronizer().fit(parts)
+
+
+def test_a_level_named_frame_may_tell_performances_apart():
+    """Rows are then numbered under another name, and the way there and back keeps both."""
+    df = pd.DataFrame({"frame": [1, 1, 2, 2, 2], "knee": np.arange(5.0)})
+    found = to_sequences(df, by="frame")
+    out = to_frame(found)
+    assert out.index.names == ["frame", "row"]
+    assert out.index.tolist() == [(1, 0), (1, 1), (2, 0), (2, 1), (2, 2)]
+    assert to_frame(to_sequences(out)).equals(out)
