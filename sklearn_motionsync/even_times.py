@@ -2,6 +2,7 @@
 
 import datetime
 import re
+import warnings
 from numbers import Real
 
 import numpy as np
@@ -19,6 +20,7 @@ __all__ = [
     "has_comma",
     "interpolated",
     "round_up",
+    "warn_of_uneven",
 ]
 
 # What to do with numbers that are text for their comma.
@@ -139,6 +141,36 @@ def even_grid(times, frame_rate, what):
     if frame_rate is None:
         return np.linspace(times[0], times[-1], n_steps + 1)
     return np.minimum(times[0] + np.arange(n_steps + 1) / frame_rate, times[-1])
+
+
+def warn_of_uneven(sequences):
+    """Tell of performances cut out by an index whose last level is a time that is not even.
+
+    Whole numbers are frames, whichever of them there are.
+
+    Parameters
+    ----------
+    sequences : list of DataFrame
+        As `tables.cut` gives them.
+    """
+    for x in sequences:
+        if x.index.dtype.kind not in "fmM" or len(x) < 2:
+            continue
+        label, name = x.attrs["performance"], x.index.name
+        times = as_times(x.index, f"The time of performance {label!r}", name)
+        if not np.isfinite(times).all() or _is_even(times, _slack(times)):
+            continue
+        steps = np.diff(times)
+        worst, what = steps.argmax(), "frame" if name is None else name
+        warnings.warn(
+            f"The times of performance {label!r}, level {what!r} of the index, are not even: from "
+            f"{times[worst]:.10g} to {times[worst + 1]:.10g} it is {steps[worst]:.4g}, mostly "
+            f"{np.median(steps):.4g}. Frames count as evenly spaced: to_sequences(df, "
+            f"time={what!r}) makes them so.",
+            UserWarning,
+            stacklevel=3,
+        )
+        return
 
 
 def interpolated(column, times, grid):

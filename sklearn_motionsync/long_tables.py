@@ -15,6 +15,7 @@ from .even_times import (
     has_comma,
     interpolated,
     round_up,
+    warn_of_uneven,
 )
 from .gate import as_numbers
 from .tables import (
@@ -45,6 +46,7 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap=None):
     df : DataFrame of pandas or polars
         One row a frame. Without ``by`` and ``time`` its index has two levels or more: the last is
         the frame, increasing within each performance, and those before it name the performance.
+        Times there that are not even are warned of.
     by : str or list of str, default=None
         Columns or index levels that together tell performances apart; rows of one performance
         need not be neighbours. By default the levels of the index before the last; a table
@@ -119,7 +121,9 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap=None):
         )
     check_settings(frame_rate, max_gap, time)
     if by is None and time is None:
-        return cut(df)
+        sequences = cut(df)
+        warn_of_uneven(sequences)
+        return sequences
     if df.index.nlevels > 1:
         df = df.rename_axis(index=full_names(df.index.names))
     return _cut_by_columns(df, _Request(by, time, frame_rate, max_gap))
