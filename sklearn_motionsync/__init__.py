@@ -45,8 +45,8 @@ from .synchronizers.match import Match
 from .synchronizers.parts import PartSynchronizer
 from .synchronizers.timing import TimingChannel
 from .takes.cycles import CycleSegmenter
-from .takes.self_correlation import self_correlation
 from .takes.search import find_performances
+from .takes.self_correlation import self_correlation
 
 __version__ = "0.1.0.dev0"
 
