@@ -5,11 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 from sklearn.base import BaseEstimator, TransformerMixin, _fit_context
+from sklearn.utils import Bunch
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..fitting import at_once, of_one_state
 from ..gate import as_numbers, check_finite, check_names
+from ..matching.filters import SMOOTHING
+from ..matching.matcher import Features
 from ..matching.median import Median, median_of
 from ..matching.units import Unit
 from ..matching.warps import normalise
@@ -23,6 +26,8 @@ __all__ = ["Synchronizer", "TrainingSet"]
 _FAR = 1e30
 # What one copy of a training set on the clock may take; a fit holds several.
 _MOST_BYTES = 4 * 2**30
+# Of a training set so many performances are kept.
+_MOST_KEPT = 64
 
 
 class TrainingSet(NamedTuple):
@@ -77,6 +82,10 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
     global_distances_ : ndarray, shape (n_sequences,)
         Sum of the squared distances of each performance to all others; NaN if the pattern was
         given.
+    training_ : Bunch
+        What `find_performances` goes by: ``durations`` (n_sequences,), frames of the
+        performances; ``kept``, the indices of at most 64 of them, evenly spaced; those
+        linearly normalised, ``on_clock`` (n_kept, P, n_features); ``features``, what is compared.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -264,6 +273,11 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         self._check_size(performances)
         on_clock = normalise(performances, self.n_frames_)
         self._unit = unit = Unit.of(on_clock)
+        kept = np.unique(np.linspace(0, len(on_clock) - 1, _MOST_KEPT).round().astype(np.intp))
+        durations = np.array([len(x) for x in performances])
+        features = Features("velocity", 1, SMOOTHING, unit)
+        known = {"durations": durations, "kept": kept, "on_clock": on_clock[kept]}
+        self.training_ = Bunch(**known, features=features)
         return TrainingSet(performances, on_clock, unit, unit(on_clock), given)
 
     def _check_unit(self, sequences, exponent=0, what=None):

@@ -161,6 +161,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         the misfit after matching by all features. NaN where nothing can tell.
     refines_ : bool
         Whether warps are refined.
+    training_ : Bunch
+        What `find_performances` goes by, as of `Synchronizer`.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -312,6 +314,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             if learns:
                 features, self.metric_ = learn_metric(self, features, positions)
             matcher, features = Matcher.learn(features, positions, **self._settings())
+            self.training_.features = matcher.features
             warn_of_one_feature(self, performances, features)
             self.mu_ = float(matcher.features.back(matcher.trellis.mu))
             shared = shared_training_set(matcher, positions, features)

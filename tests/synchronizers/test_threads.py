@@ -17,6 +17,7 @@ from sklearn_motionsync import (
     JointPositions,
     KeyframeSynchronizer,
     LinearSynchronizer,
+    PartSynchronizer,
     Skeleton,
     TimingChannel,
 )
@@ -26,6 +27,7 @@ from shift_synchronizer import ShiftSynchronizer
 ESTIMATORS = [
     DenseSynchronizer(),
     DenseSynchronizer(n_jobs=2, consensus=2),
+    PartSynchronizer({"first": [0]}, n_frames=12, metric=None, consensus=1, refine=False),
     KeyframeSynchronizer(),
     LinearSynchronizer(),
     ShiftSynchronizer(),

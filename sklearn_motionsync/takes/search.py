@@ -1,0 +1,287 @@
+"""find_performances: where in long takes an action happens."""
+
+from numbers import Integral, Real
+
+import numpy as np
+import pandas as pd
+from sklearn.base import BaseEstimator
+from sklearn.utils.validation import check_is_fitted
+
+from ..gate import as_numbers
+from ..model.action_model import ActionModel
+from ..performances import SequenceLevelMixin, check_performances
+from ..pipelines import find_synchronizer, flat_steps, reach_synchronizer
+from ..sequences import as_collection
+from ..synchronizers.dense import DenseSynchronizer
+from ..tables import as_pandas
+from .likely import Unlikeness
+from .origin import cut_takes
+from .proposals import Proposer
+
+__all__ = ["find_performances"]
+
+# A pattern that is given as an array is compared on at most so many frames.
+_CLOCK = 100
+# How much shorter and longer than those that were learnt performances may be: of many, and where
+# there is only a pattern.
+_MARGIN, _MARGIN_OF_ONE = 1.1, 1.5
+# No window is shorter.
+_FEWEST = 3
+# Ends of a hit are moved by this share of its length at first, then by ever less.
+_FIRST_MOVE = 1 / 8
+_MOVES = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
+# Twice as unlike as the threshold allows: no move of the ends makes that up.
+_HOPELESS = 2
+
+
+def find_performances(
+    pattern, X, *, threshold="learned", coverage=0.6, max_hits=None, durations=None, groups=None
+):
+    """Where in long takes an action happens: performances cut out of them.
+
+    1. The pattern is looked for in portions of a take that overlap, at several time scales: the
+       trellis with free ends finds where in each it begins and ends best.
+    2. Each of these windows is compared with the training performances, as they are: how unlike
+       it is to the two most similar ones in posture and in what the synchronizer compares, in
+       length and in energy. The score is ``exp(-unlikeness)``: 1 is equal, 0.37 as unlike as
+       standing still.
+    3. The ends of the best window are moved to where its score is best; then those of the best
+       that does not overlap it, and so on. What reaches the threshold is a hit.
+
+    Time grows with the length of a take, memory does not.
+
+    Parameters
+    ----------
+    pattern : fitted synchronizer, Pipeline, ActionDetector, or array (n_frames, n_features)
+        What to look for. A pipeline ends in a synchronizer or in what follows one; its first step
+        takes the takes. An array (one performance) has nobody beside it: it says what
+        to look for, not how people differ.
+    X : array (n_frames, n_features), list of such arrays, or other collection
+        One take, or several, at the frame rate of the training performances. A single
+        feature may be one-dimensional.
+    threshold : "learned", float or None, default="learned"
+        The lowest score of a hit. ``"learned"``: from the training performances, each compared
+        with those of other groups; at least 0.50 and at most 0.86; 0.61 for an array, half as
+        unlike as standing still. None: whatever is better than what it overlaps, to be compared
+        with the learnt one.
+    coverage : float, default=0.6
+        Share of performances of people not seen, cut out by hand, that a learnt threshold lets in.
+    max_hits : int, default=None
+        How many are kept of each take, the best ones; by default all.
+    durations : (int, int), default=None
+        Numbers of frames of the shortest and the longest performance looked for. By default a
+        tenth beyond those of the training set, and what is unusually short or long counts as
+        unlike; for an array from 2/3 to 3/2 of its length.
+    groups : array-like, default=None
+        Who performed each training performance, or what else makes them resemble each other. By
+        default those that an `ActionModel` in the pipeline was fitted with.
+
+    Returns
+    -------
+    performances : list of array, or of DataFrame, (n_frames_i, n_features)
+        Cut out of the takes, in the order of their time, take by take. DataFrames keep columns, and
+        are called by the label of their take and their number in it.
+    origin : DataFrame
+        One row each: ``take``, its index or label; ``start`` and ``stop``, frames of the take, the
+        last excluded; ``score``; ``threshold``, the one that was given or learnt.
+
+    Raises
+    ------
+    ValueError
+        If the takes break the input contract or have other features than the training set, or a
+        parameter is none of those that are accepted.
+
+    See Also
+    --------
+    ActionDetector : Whether what was cut out already is the action.
+    SearchDisplay : Draws hits along the takes.
+
+    Notes
+    -----
+    A learnt threshold takes for known how people differ. How much else in a take looks like the
+    action nobody knows before: give more ``coverage`` to miss less, a higher threshold for fewer
+    false hits, and see docs/method.md for figures. What people do in entirely different ways
+    is hardly found.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn_motionsync import find_performances
+    >>> t = np.linspace(0, 1, 40)
+    >>> wave = np.column_stack([np.sin(6 * t), np.sin(9 * t)])
+    >>> take = np.zeros((300, 2))
+    >>> take[50:90], take[200:250] = wave, np.column_stack(
+    ...     [np.interp(np.linspace(0, 1, 50), t, x) for x in wave.T])
+    >>> performances, origin = find_performances(wave, take)
+    >>> origin[["take", "start", "stop"]].to_numpy().tolist()
+    [[0, 50, 90], [0, 200, 250]]
+    """
+    _check(threshold=threshold, coverage=coverage, max_hits=max_hits, durations=durations)
+    X = _as_takes(X)
+    reader = type("find_performances", (SequenceLevelMixin, BaseEstimator), {})()
+    given = check_performances(reader, X, reset=True, level="sequence")
+    synchronizer, takes, groups = _reach(pattern, X, groups)
+    _check_lengths(given, takes)
+    shortest, longest = _durations(synchronizer, durations)
+    propose = Proposer.of(synchronizer, shortest, longest)
+    unlikeness = Unlikeness(synchronizer, groups, length=durations is None)
+    level = _level(unlikeness, threshold, coverage)
+    lowest = 0.0 if threshold is None else level
+    rows = []
+    for i, take in enumerate(takes):
+        take = take.astype(np.float64, copy=False)
+        search = _Search(take, unlikeness, shortest, longest)
+        rows += [(i, *hit) for hit in search.hits(propose(take), lowest, max_hits)]
+    rows = pd.DataFrame(rows, columns=["take", "start", "stop", "score"])
+    rows = rows.astype({"take": int, "start": int, "stop": int, "score": float})
+    return cut_takes(X, given, rows.assign(threshold=level))
+
+
+class _Search:
+    """The best windows of a take that do not overlap."""
+
+    def __init__(self, take, unlikeness, shortest, longest):
+        self._take, self._unlikeness = take, unlikeness
+        self._shortest, self._longest = shortest, min(longest, len(take))
+
+    def hits(self, windows, threshold, most):
+        """Start, stop and score of the best of windows (n, 2), in the order of time.
+
+        Windows are tried the best first, and each takes its place whether it is accepted or not:
+        so a threshold chooses among hits, and changes none.
+        """
+        scores = np.exp(-self._unlikeness(self._take, windows))
+        tried = []
+        for k in np.argsort(-scores, kind="stable"):
+            if scores[k] < threshold**_HOPELESS:
+                break
+            room = self._room(windows[k], tried)
+            if room is not None:
+                tried.append(self._moved(windows[k], scores[k], *room))
+        found = sorted((hit for hit in tried if hit[2] >= threshold), key=lambda hit: -hit[2])
+        return sorted(found[:most])
+
+    def _room(self, window, kept):
+        """From where to where a window may reach; None if it overlaps what is kept."""
+        start, stop = window
+        if any(start < other and this < stop for this, other, _ in kept):
+            return None
+        before = max((other for _, other, _ in kept if other <= start), default=0)
+        return before, min((this for this, _, _ in kept if this >= stop), default=len(self._take))
+
+    def _moved(self, window, score, first, last):
+        """The window with its ends moved, by ever less, to where its score is best."""
+        window, move = np.asarray(window), max(1, int(_FIRST_MOVE * (window[1] - window[0])))
+        while move:
+            some = window + move * _MOVES
+            sizes = some[:, 1] - some[:, 0]
+            inside = (some[:, 0] >= first) & (some[:, 1] <= last)
+            some = some[inside & (sizes >= self._shortest) & (sizes <= self._longest)]
+            scores = np.exp(-self._unlikeness(self._take, some))
+            if scores.max(initial=0) > score:
+                window, score = some[scores.argmax()], scores.max()
+            else:
+                move //= 2
+        return int(window[0]), int(window[1]), float(score)
+
+
+def _as_takes(X):
+    """A collection of takes, one being wrapped."""
+    X = as_pandas(X)
+    if as_collection(X) is not None:
+        return X
+    if isinstance(X, pd.DataFrame):
+        return [X]
+    array = as_numbers(X, "The take")
+    return [array[:, np.newaxis] if array.ndim == 1 else array]
+
+
+def _reach(pattern, X, groups):
+    """The synchronizer, the takes as they reach it, and the groups of what it keeps."""
+    if not hasattr(pattern, "fit"):
+        if groups is not None:
+            raise ValueError("groups tell training performances apart; an array is only one.")
+        pattern = as_pandas(pattern)
+        if not isinstance(pattern, pd.DataFrame):
+            pattern = as_numbers(pattern, "The pattern")
+            pattern = pattern[:, np.newaxis] if pattern.ndim == 1 else pattern
+        if pattern.ndim != 2 or len(pattern) < _FEWEST:
+            raise ValueError(
+                f"The pattern has shape {pattern.shape}: give one performance, (n_frames, "
+                f"n_features), of at least {_FEWEST} frames, or a fitted synchronizer."
+            )
+        synchronizer = DenseSynchronizer(min(len(pattern), _CLOCK), pattern=0).fit([pattern])
+        return synchronizer, synchronizer.check_performances(X), None
+    check_is_fitted(find_synchronizer(pattern)[1])
+    reached = reach_synchronizer(pattern, X, {}, "find_performances")
+    return reached.synchronizer, reached.performances, _groups(pattern, reached, groups)
+
+
+def _check_lengths(given, takes):
+    for i, (before, after) in enumerate(zip(given, takes, strict=True)):
+        if len(before) != len(after):
+            raise ValueError(
+                f"{given.called(i)} has {len(before)} frames, and {len(after)} after the steps "
+                "before the synchronizer: where a hit is could not be told. Resample the takes "
+                "before you give them."
+            )
+
+
+def _groups(pattern, reached, groups):
+    training = reached.synchronizer.training_
+    if groups is not None:
+        if len(groups) != len(training.durations):
+            raise ValueError(
+                f"groups has {len(groups)} labels, and the synchronizer was fitted on "
+                f"{len(training.durations)} performances: give one for each."
+            )
+        return [groups[i] for i in training.kept]
+    models = [step for step in flat_steps(pattern) if isinstance(step, ActionModel)]
+    known = [model.groups_ for model in models if hasattr(model, "groups_")]
+    # Of more than a model keeps nobody knows who gave which.
+    complete = len(training.kept) == len(training.durations)
+    return known[0] if known and complete and len(known[0]) == len(training.kept) else None
+
+
+def _durations(synchronizer, durations):
+    """The shortest and the longest window."""
+    known = synchronizer.training_.durations
+    if durations is not None:
+        return max(int(durations[0]), 2), int(durations[1])
+    margin = _MARGIN if len(known) > 1 else _MARGIN_OF_ONE
+    return max(_FEWEST, int(known.min() / margin)), int(np.ceil(known.max() * margin))
+
+
+def _level(unlikeness, threshold, coverage):
+    """The score that is given, or learnt."""
+    if threshold is None or isinstance(threshold, str):
+        return float(np.exp(-unlikeness.border(coverage)))
+    return float(threshold)
+
+
+def _check(*, threshold, coverage, max_hits, durations):
+    def is_number(x, kind=Real):
+        return isinstance(x, kind) and not isinstance(x, bool)
+
+    if not (
+        threshold is None
+        or (isinstance(threshold, str) and threshold == "learned")
+        or (is_number(threshold) and 0 <= threshold <= 1)
+    ):
+        raise ValueError(
+            f"threshold must be 'learned', a score from 0 to 1, or None; got {threshold!r}."
+        )
+    if not (is_number(coverage) and 0 < coverage < 1):
+        raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
+    if not (max_hits is None or (is_number(max_hits, Integral) and max_hits >= 1)):
+        raise ValueError(f"max_hits must be a whole number from 1 on, or None; got {max_hits!r}.")
+    if durations is None:
+        return
+    pair = tuple(durations) if isinstance(durations, (tuple, list, np.ndarray)) else ()
+    if not (
+        len(pair) == 2 and all(is_number(n, Integral) for n in pair) and 2 <= pair[0] <= pair[1]
+    ):
+        raise ValueError(
+            "durations must be two whole numbers of frames, the shortest from 2 on and the longest "
+            f"performance; got {durations!r}."
+        )

@@ -1,0 +1,49 @@
+"""Hits along takes: what is drawn, and what is refused."""
+
+import matplotlib
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn_motionsync import SearchDisplay, find_performances, to_sequences
+
+matplotlib.use("Agg")
+
+WAVE = np.column_stack([np.sin(np.linspace(0, 6, 40)), np.sin(np.linspace(0, 9, 40))])
+TAKE = np.concatenate([np.zeros((30, 2)), WAVE, np.zeros((50, 2)), 0.2 * WAVE, np.zeros((40, 2))])
+
+
+def test_hits_stand_where_they_are_and_others_are_grey():
+    display = SearchDisplay.from_estimator(WAVE, TAKE, segments=[(0, 30, 70)])
+    assert repr(display) == "SearchDisplay(1 hit in 1 take)"
+    boxes = [path.get_extents() for path in display.hits_[0].get_paths()]
+    spans = [[box.x0, box.x1] for box in boxes]
+    assert spans == display.origin[["start", "stop"]].to_numpy().tolist()
+    good = display.origin["score"].to_numpy() >= display.origin["threshold"].to_numpy()
+    assert spans[int(good.argmax())] == [30, 70]
+    colors = {tuple(color) for color in display.hits_[0].get_facecolor()[~good]}
+    assert len(colors) == 1
+    assert tuple(display.hits_[0].get_facecolor()[good.argmax()]) not in colors
+
+
+def test_several_takes_have_a_panel_each():
+    table = pd.concat([pd.DataFrame(TAKE), pd.DataFrame(TAKE[:80])], keys=["ann", "bob"])
+    takes = to_sequences(table.rename_axis(["take", "frame"]))
+    _, origin = find_performances(pd.DataFrame(WAVE), takes)
+    display = SearchDisplay.from_predictions(origin, takes)
+    assert [axis.get_title(loc="left") for axis in display.axes_] == ["take ann", "take bob"]
+    assert [axis.get_xlim()[1] for axis in display.axes_] == [len(TAKE), 80]
+
+
+def test_nothing_found_is_drawn_too():
+    still = np.zeros((100, 2))
+    display = SearchDisplay.from_predictions(find_performances(WAVE, still)[1], still)
+    assert repr(display) == "SearchDisplay(0 hits in 1 take)"
+
+
+def test_what_is_refused():
+    with pytest.raises(ValueError, match="none of those that are drawn"):
+        SearchDisplay.from_estimator(WAVE, TAKE, segments=[(3, 0, 9)])
+    with pytest.raises(ValueError, match="are missing"):
+        SearchDisplay(pd.DataFrame({"take": [0]}), {0: 9})
+    with pytest.raises(ValueError, match="from_predictions"):
+        SearchDisplay.from_estimator(WAVE, TAKE, threshold=0.5)
