@@ -169,7 +169,8 @@ class PipelineFigures:
             shadows[..., 1] -= floor
         verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
         if verdict == "accepted" and _is_unseen(view, i, limbs.columns):
-            by += ": the model sees what the aSpace keeps,\nwhich leaves out how far some limbs depart"
+            by += ": the model sees what the aSpace keeps,\n"
+            by += "which leaves out how far some limbs depart"
         display = cls(
             [[bodies[[frame]]] for frame in strip.frames],
             skeleton,
