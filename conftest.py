@@ -9,10 +9,11 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 
 
 @pytest.fixture(autouse=True)
-def _in_a_folder_of_its_own(request, tmp_path, monkeypatch):
+def _in_a_folder_of_its_own(request):
     """Documented examples may write files."""
+    # Asked for here, so that no folder is made for each of thousands of tests.
     if isinstance(request.node, pytest.DoctestItem):
-        monkeypatch.chdir(tmp_path)
+        request.getfixturevalue("monkeypatch").chdir(request.getfixturevalue("tmp_path"))
 
 
 @pytest.fixture(autouse=True)

@@ -3,6 +3,10 @@
     python .ci/floors.py > floors.txt
     pip install '.[test]' -c floors.txt
 
+With the name of an extra, what that needs besides the package, as pyproject.toml has it:
+
+    python .ci/floors.py docs > needed.txt
+
 A floor such as ``numpy>=2.0`` becomes ``numpy==2.0.*``: its newest repairs, but nothing younger.
 Only what the package and its tests need is pinned; the manual is built with what is newest.
 """
@@ -29,13 +33,19 @@ def pin(requirement):
     return f"{parts['name']}=={floor[1]}.*{when}"
 
 
+def needed(path, *extras):
+    """What a pyproject.toml asks for, for the package and some extras."""
+    project = tomllib.loads(Path(path).read_text(encoding="utf-8"))["project"]
+    optional = project["optional-dependencies"]
+    return project["dependencies"] + [each for extra in extras for each in optional[extra]]
+
+
 def constraints(path):
     """What a pyproject.toml needs for the package, its figures and its tests, at the floors."""
-    project = tomllib.loads(Path(path).read_text(encoding="utf-8"))["project"]
-    extras = project["optional-dependencies"]
-    asked = project["dependencies"] + [each for extra in EXTRAS for each in extras[extra]]
-    return sorted({*COMPANIONS, *(pin(requirement) for requirement in asked)})
+    return sorted({*COMPANIONS, *(pin(requirement) for requirement in needed(path, *EXTRAS))})
 
 
 if __name__ == "__main__":
-    sys.stdout.write("\n".join(constraints(Path(__file__).parents[1] / "pyproject.toml")) + "\n")
+    path = Path(__file__).parents[1] / "pyproject.toml"
+    lines = needed(path, *sys.argv[1:]) if sys.argv[1:] else constraints(path)
+    sys.stdout.write("\n".join(lines) + "\n")

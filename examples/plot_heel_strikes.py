@@ -10,10 +10,12 @@ model of healthy gait is shown cycles that it should not accept.
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import (
     ActionModel,
     ActionModelDisplay,
     DenseSynchronizer,
+    FrameWise,
     KeyframeSynchronizer,
     LinearSynchronizer,
     find_departures,
@@ -75,10 +77,11 @@ print("toe-off at frame", np.round(np.ravel(toe_off[:6]), 1), "...")
 # %%
 # One clock
 # ---------
-# Degrees and body weights cannot be compared, so every feature is divided by its spread.
+# Degrees and body weights cannot be compared, so every feature is scaled, by one number for all
+# cycles.
 
-spread = pd.concat(cycles).std()
-scaled = [(cycle / spread).to_numpy() for cycle in cycles]
+scaler = FrameWise(StandardScaler())
+scaled = scaler.fit_transform(cycles)
 dense = DenseSynchronizer(101).fit(scaled)
 toe_off_only = KeyframeSynchronizer(101).fit(scaled, keyframes=toe_off)
 matches = {
@@ -118,7 +121,7 @@ pd.DataFrame(spreads, index=names).round(2)
 
 def on_clock(cycles):
     """Curves of the pattern's clock, with their names."""
-    match = dense.match([(cycle / spread).to_numpy() for cycle in cycles])
+    match = dense.match(scaler.transform(cycles))
     return [pd.DataFrame(x, columns=gait.feature_names) for x in match.warp(cycles)]
 
 

@@ -14,12 +14,15 @@
 
 from . import datasets, display, metrics
 from .aspace import ASpace
+from .blending import blend_performances
 from .body.direction_cosines import DirectionCosines
 from .body.joint_positions import JointPositions
 from .body.mirror import mirror
 from .body.skeleton import Skeleton
 from .display import (
     ActionModelDisplay,
+    CycleDisplay,
+    LagDisplay,
     MetricDisplay,
     SearchDisplay,
     SkeletonDisplay,
@@ -36,10 +39,14 @@ from .sequences import to_frame
 from .synchronizers.base import Synchronizer
 from .synchronizers.dense import DenseSynchronizer
 from .synchronizers.keyframes import KeyframeSynchronizer
+from .synchronizers.lags import Lags
 from .synchronizers.linear import LinearSynchronizer
 from .synchronizers.match import Match
+from .synchronizers.parts import PartSynchronizer
 from .synchronizers.timing import TimingChannel
+from .takes.cycles import CycleSegmenter
 from .takes.search import find_performances
+from .takes.self_correlation import self_correlation
 
 __version__ = "0.1.0.dev0"
 
@@ -49,14 +56,19 @@ __all__ = [
     "ActionDetector",
     "ActionModel",
     "ActionModelDisplay",
+    "CycleDisplay",
+    "CycleSegmenter",
     "DenseSynchronizer",
     "DirectionCosines",
     "FrameWise",
     "JointPositions",
     "KeyframeSynchronizer",
+    "LagDisplay",
+    "Lags",
     "LinearSynchronizer",
     "Match",
     "MetricDisplay",
+    "PartSynchronizer",
     "SearchDisplay",
     "Skeleton",
     "SkeletonDisplay",
@@ -64,12 +76,14 @@ __all__ = [
     "Synchronizer",
     "TimingChannel",
     "TrellisDisplay",
+    "blend_performances",
     "datasets",
     "display",
     "find_departures",
     "find_performances",
     "metrics",
     "mirror",
+    "self_correlation",
     "synchronization_distances",
     "to_frame",
     "to_sequences",

@@ -2,6 +2,7 @@
 
 import datetime
 import re
+import warnings
 from numbers import Real
 
 import numpy as np
@@ -19,6 +20,7 @@ __all__ = [
     "has_comma",
     "interpolated",
     "round_up",
+    "warn_of_uneven",
 ]
 
 # What to do with numbers that are text for their comma.
@@ -141,6 +143,36 @@ def even_grid(times, frame_rate, what):
     return np.minimum(times[0] + np.arange(n_steps + 1) / frame_rate, times[-1])
 
 
+def warn_of_uneven(sequences):
+    """Tell of performances cut out by an index whose last level is a time that is not even.
+
+    Whole numbers are frames, whichever of them there are.
+
+    Parameters
+    ----------
+    sequences : list of DataFrame
+        As `tables.cut` gives them.
+    """
+    for x in sequences:
+        if x.index.dtype.kind not in "fmM" or len(x) < 2:
+            continue
+        label, name = x.attrs["performance"], x.index.name
+        times = as_times(x.index, f"The time of performance {label!r}", name)
+        if not np.isfinite(times).all() or _is_even(times, _slack(times)):
+            continue
+        steps = np.diff(times)
+        worst, what = steps.argmax(), "frame" if name is None else name
+        warnings.warn(
+            f"The times of performance {label!r}, level {what!r} of the index, are not even: from "
+            f"{times[worst]:.10g} to {times[worst + 1]:.10g} it is {steps[worst]:.4g}, mostly "
+            f"{np.median(steps):.4g}. Frames count as evenly spaced: to_sequences(df, "
+            f"time={what!r}) makes them so.",
+            UserWarning,
+            stacklevel=3,
+        )
+        return
+
+
 def interpolated(column, times, grid):
     """A feature at other times, on straight lines; what is next to NaN is NaN."""
     dtype = column.dtype if column.dtype.kind == "f" else np.float64
@@ -231,10 +263,11 @@ def _slack(times):
         slack = max(slack, 2 * float(np.spacing(np.abs(single).max())))
     for digits in range(-9, 10):
         quantum = 10.0**-digits
-        ticks = (times - times[0]) / quantum
-        written = np.abs(ticks - np.round(ticks)).max() < 1e-3
         # A third: 30 frames a second with two digits.
-        if quantum <= step / 3 and written:
+        if quantum > step / 3:
+            continue
+        ticks = (times - times[0]) / quantum
+        if np.abs(ticks - np.round(ticks)).max() < 1e-3:
             return max(slack, quantum)
     return slack
 

@@ -15,10 +15,12 @@ from .even_times import (
     has_comma,
     interpolated,
     round_up,
+    warn_of_uneven,
 )
 from .gate import as_numbers
 from .tables import (
     INDEX_NAMES,
+    ROW,
     as_pandas,
     called,
     cut,
@@ -44,6 +46,7 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap=None):
     df : DataFrame of pandas or polars
         One row a frame. Without ``by`` and ``time`` its index has two levels or more: the last is
         the frame, increasing within each performance, and those before it name the performance.
+        Times there that are not even are warned of.
     by : str or list of str, default=None
         Columns or index levels that together tell performances apart; rows of one performance
         need not be neighbours. By default the levels of the index before the last; a table
@@ -118,7 +121,9 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap=None):
         )
     check_settings(frame_rate, max_gap, time)
     if by is None and time is None:
-        return cut(df)
+        sequences = cut(df)
+        warn_of_uneven(sequences)
+        return sequences
     if df.index.nlevels > 1:
         df = df.rename_axis(index=full_names(df.index.names))
     return _cut_by_columns(df, _Request(by, time, frame_rate, max_gap))
@@ -169,27 +174,40 @@ def _cut_by_columns(df, request):
         label, names = own_label(df)
         labels = [label]
     if time is None:
-        numbered = [features.iloc[rows].reset_index(drop=True) for rows in parts]
-        levels = (*names, INDEX_NAMES[1])
+        name = ROW if INDEX_NAMES[1] in names else None
+        numbered = [_indexed(features, rows, pd.RangeIndex(len(rows), name=name)) for rows in parts]
+        levels = (*names, name or INDEX_NAMES[1])
         return [
             called(x, label, levels, facts_at(df.attrs, rows, len(df)))
             for x, rows, label in zip(numbered, parts, labels, strict=True)
         ]
+    clock = flat[time]
+    if isinstance(clock.dtype, np.dtype) and clock.dtype.kind in "fiu":
+        clock = clock.to_numpy(dtype=np.float64)
     timed = [
-        _in_order(flat[time], rows, label, keys, request)
+        _in_order(clock, rows, label, keys, request)
         for rows, label in zip(parts, labels, strict=True)
     ]
     _check_gaps([times for times, _ in timed], labels, request)
     sequences = []
     for (times, rows), label in zip(timed, labels, strict=True):
         grid = even_grid(times, request.frame_rate, f"Performance {label!r}")
-        x = features.iloc[rows]
+        index = pd.Index(times if grid is None else grid, name=time)
+        x = _indexed(features, rows, index if grid is None else None)
         if grid is not None:
-            x = _resampled(x, times, grid, label)
-        x = x.set_axis(pd.Index(times if grid is None else grid, name=time))
+            x = _resampled(x, times, grid, label).set_axis(index)
         facts = facts_at(df.attrs, rows, len(df), times, grid)
         sequences.append(called(x, label, (*names, time), facts, resampled=grid is not None))
     return sequences
+
+
+def _indexed(features, rows, index=None):
+    """Rows of a table, a copy, under an index of their own."""
+    x = features.iloc[rows]
+    if index is not None:
+        # In place: set_axis would copy everything once more.
+        x.index = index
+    return x
 
 
 def _flat(df, keys, request):
@@ -265,7 +283,10 @@ def _check_features(features, keys, request):
 def _in_order(column, rows, label, keys, request):
     """Times of a performance, increasing, and its rows in this order."""
     what = f"The time of performance {label!r}"
-    times = as_times(column.iloc[rows], what, request.time)
+    if isinstance(column, np.ndarray):
+        times = column[rows]
+    else:
+        times = as_times(column.iloc[rows], what, request.time)
     if not np.isfinite(times).all():
         row = rows[np.argmin(np.isfinite(times))]
         raise ValueError(

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
+from .even_times import warn_of_uneven
 from .gate import as_numbers, check_finite, names_of
 from .tables import (
     INDEX_NAMES,
@@ -103,7 +104,11 @@ def as_collection(X):
     """The performances of a collection as a list; None for what scikit-learn calls 2-D."""
     X = as_pandas(X)
     if isinstance(X, pd.DataFrame):
-        return cut(X) if X.index.nlevels >= 2 else None
+        if X.index.nlevels < 2:
+            return None
+        sequences = cut(X)
+        warn_of_uneven(sequences)
+        return sequences
     if issparse(X):
         return None
     if isinstance(X, dict):

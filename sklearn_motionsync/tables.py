@@ -16,6 +16,7 @@ from .wide_tables import call_to_unfold, numbered_columns
 __all__ = [
     "FRAME",
     "INDEX_NAMES",
+    "ROW",
     "as_pandas",
     "called",
     "cut",
@@ -33,6 +34,8 @@ __all__ = [
 ]
 
 INDEX_NAMES = ("performance", "frame")
+# What numbers the rows where "frame" tells performances apart.
+ROW = "row"
 # The innermost level of an index.
 FRAME = INDEX_NAMES[1]
 # Where a DataFrame keeps what it is called.
@@ -81,7 +84,7 @@ def cut(df):
 
 def _check_order(levels):
     """Refuse an index whose first level tells frames, as ``pd.wide_to_long`` may make one."""
-    if levels[0] in _TIMES and levels[-1] not in _TIMES:
+    if levels[0] in _TIMES and levels[-1] not in (*_TIMES, ROW):
         raise ValueError(
             f"An index of the levels {list(levels)} names the performance by {levels[0]!r} and the "
             f"frame by {levels[-1]!r}, and it is rather the other way round. Say which is which: "

@@ -44,6 +44,7 @@ LIMIT_SECONDS = 400
 # What is broken, and the tests that concern it, the fastest and most telling first; the doctests
 # of a module come before them. Modules that are not named have the tests of their folder.
 BROKEN = ["model/*", "recognition/*", "gate", "sequences", "matching/*", "metrics/*"]
+BROKEN += ["blending", "body/blends", "body/figure", "body/sphere"]
 DENSE = ["synchronizers/test_dense.py", "synchronizers/test_accuracy.py"]
 METRIC = ["synchronizers/test_metric.py"]
 ALONE = ["synchronizers/test_alone_or_together.py"]
@@ -55,7 +56,13 @@ INPUT = ["test_bad_inputs.py", "test_sequences.py", "test_contract.py"]
 INPUT += ["synchronizers/test_match.py"]
 ANY = ["test_properties.py"]
 TRELLIS = ["matching/test_trellis.py", *DENSE, *ALONE]
+BLENDS = ["body/test_sphere.py", "test_blending.py"]
 TESTS = {
+    "blending": BLENDS,
+    "body/blends": BLENDS,
+    "body/figure": BLENDS,
+    "body/sphere": BLENDS,
+    "model/charts": ["model/test_sampling.py"],
     "model/action_model": ["model/test_likeness.py", "model/test_[abd]*.py", "test_contract.py"],
     "model/likeness": ["model/test_likeness.py", "model/test_detector.py"],
     "model/manner": ["model/test_detector.py"],

@@ -1,5 +1,6 @@
 """Slow and obvious versions of the matching. They share no code with the package."""
 
+import functools
 import itertools
 
 import numpy as np
@@ -35,9 +36,15 @@ def all_paths(n_frames, steps, subframes, max_disparity):
             yield path
 
 
+# Finding the paths takes longer than adding up their costs.
+@functools.cache
+def known_paths(n_frames, steps, subframes, max_disparity):
+    return list(all_paths(n_frames, steps, subframes, max_disparity))
+
+
 def brute_force(x, y, costs, mu, subframes, max_disparity):
     """Smallest cost, and every path that has it but for rounding."""
-    paths = list(all_paths(len(x), sorted(costs), subframes, max_disparity))
+    paths = known_paths(len(x), tuple(sorted(costs)), subframes, max_disparity)
     totals = np.array([path_cost(x, y, path, costs, mu, subframes) for path in paths])
     best = totals.min()
     near = totals <= best + 1e-9 * max(1.0, abs(best))

@@ -73,10 +73,10 @@ def bits(sync, X):
 # shared out, with few exemplars and with so many that sending them is not worth it.
 LONG = {"refine": "auto", "search": "exhaustive"}
 FITS = {
-    "all pairs": ((120, 60, 32), {"search": "exhaustive"}),
+    "all pairs": ((90, 40, 48), {"search": "exhaustive"}),
     "search": ((300, 40, 16), {}),
-    "long takes": ((60, 150, 16), {**LONG, "consensus": 20}),
-    "many exemplars": ((60, 150, 16), {**LONG, "consensus": 50}),
+    "long takes": ((60, 80, 30), {**LONG, "consensus": 20}),
+    "many exemplars": ((60, 80, 30), {**LONG, "consensus": 50}),
 }
 
 
@@ -85,7 +85,7 @@ def test_a_fit_sends_the_performances_to_every_worker_once(client, name, monkeyp
     """Data: the arrays that are given, which are on the clock already."""
     shape, settings = FITS[name]
     if "consensus" in settings:
-        monkeypatch.setattr(portions, "PORTION_CELLS", 1_000_000)
+        monkeypatch.setattr(portions, "PORTION_CELLS", 300_000)
     X = walks(*shape)
     expected = bits(DenseSynchronizer(**settings).fit(X), X)
     with distributed.get_task_stream(client), joblib.parallel_config(backend="dask"):

@@ -597,3 +597,34 @@ def test_several_tables_are_put_into_one(table):
         ValueError, match=r"got dict\. Use list\(X\.values\(\)\); or, of tables, pd"
     ):
         DenseSynchronizer().fit(parts)
+
+
+def test_a_level_named_frame_may_tell_performances_apart():
+    """Rows are then numbered under another name, and the way there and back keeps both."""
+    df = pd.DataFrame({"frame": [1, 1, 2, 2, 2], "knee": np.arange(5.0)})
+    found = to_sequences(df, by="frame")
+    out = to_frame(found)
+    assert out.index.names == ["frame", "row"]
+    assert out.index.tolist() == [(1, 0), (1, 1), (2, 0), (2, 1), (2, 2)]
+    assert to_frame(to_sequences(out)).equals(out)
+
+
+def test_an_index_of_uneven_times_is_warned_of():
+    times = np.delete(np.arange(20) / 50, [7, 8, 9])
+    x = pd.DataFrame({"knee": np.sin(9 * times)}, index=pd.Index(times, name="time"))
+    even = x.set_axis(pd.Index(np.arange(17) / 30, name="time").to_series().round(3))
+    df = pd.concat({"ann": even, "bob": x}, names=["who"])
+    words = r"'bob', level 'time' .*: from 0.12 to 0.2 it is 0.08, mostly 0.02.*time='time'\) makes"
+    for take in (to_sequences, LinearSynchronizer(9).fit):
+        with pytest.warns(UserWarning, match=words):
+            take(df)
+    # Nothing is told of even times, nor of frames that are missing; nor of what was made even.
+    assert len(to_sequences(df.loc[["ann"]])) == 1
+    frames = df.loc[["bob"]].set_axis(
+        pd.MultiIndex.from_product([["bob"], np.delete(range(20), [7, 8, 9])])
+    )
+    assert len(to_sequences(frames)) == 1
+    assert len(to_sequences(to_frame(to_sequences(df, time="time", max_gap=0.1)))) == 2
+    dates = df.rename(lambda t: pd.Timestamp("2024-05-01") + pd.Timedelta(seconds=t), level="time")
+    with pytest.warns(UserWarning, match="'bob', level 'time'"):
+        to_sequences(dates)

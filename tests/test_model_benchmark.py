@@ -145,6 +145,10 @@ def test_all_tables_of_a_tiny_set(model, judges, clips, capsys, monkeypatch):
     monkeypatch.setattr(judges, "TREES", 3)
     for name, value in (("FEW", (5,)), ("DRAWS", 1), ("REPETITIONS", 2)):
         monkeypatch.setattr(model, name, value)
+    # Of three people one is held out, with both actions.
+    folds = [fold for fold in clips.folds() if fold[1] == clips.actors[0]]
+    assert len(folds) == 2
+    monkeypatch.setattr(type(clips), "folds", lambda self: folds)
     with threadpool_limits(1), parallel_config(backend="sequential"):
         model.print_tables([clips])
     tables = capsys.readouterr().out.strip().split("\n\n")

@@ -18,6 +18,7 @@ from sklearn_motionsync import (
     JointPositions,
     KeyframeSynchronizer,
     LinearSynchronizer,
+    PartSynchronizer,
     Skeleton,
 )
 from sklearn_motionsync.datasets import make_bending
@@ -31,6 +32,7 @@ ESTIMATORS = [
     JointPositions(Skeleton.paper()),
     KeyframeSynchronizer(),
     LinearSynchronizer(),
+    PartSynchronizer(),
 ]
 
 

@@ -25,7 +25,7 @@ SYNCHRONIZERS = [
 ]
 every_synchronizer = pytest.mark.parametrize("estimator", SYNCHRONIZERS, ids=str)
 # The same examples everywhere.
-few = settings(max_examples=12, deadline=None, derandomize=True, database=None)
+few = settings(max_examples=8, deadline=None, derandomize=True, database=None)
 ROUNDING = 1e-6
 
 

@@ -22,7 +22,7 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.metrics import SpreadScorer
 
-BUNCH = make_bending(10, n_frames=40, random_state=2)
+BUNCH = make_bending(7, n_frames=40, random_state=2)
 K = list(BUNCH.keyframes)
 COSINES = DirectionCosines(BUNCH.skeleton)
 POSITIONS = JointPositions(BUNCH.skeleton)

@@ -7,6 +7,7 @@ import pandas as pd
 
 from ..gate import as_numbers
 from ..sequences import as_collection
+from ..tables import as_pandas
 from .axes import heading
 from .columns import check_columns
 from .formats import LANDMARKS, SIDES
@@ -71,8 +72,8 @@ def mirror(X, skeleton):
     partners, alone = partners_of(skeleton)
     # Frame by frame it does not matter which of them are one performance.
     whole = isinstance(X, pd.DataFrame) or getattr(X, "ndim", 1) == 3
-    given = None if whole else as_collection(X)
-    parts = [X] if given is None else given
+    one = whole or as_collection(X) is None
+    parts = [X] if one else list(X)
     if not parts:
         raise ValueError("Found 0 performances (n_samples=0); there is nothing to mirror.")
     arrays = [_checked(x, skeleton, i) for i, x in enumerate(parts)]
@@ -81,12 +82,13 @@ def mirror(X, skeleton):
         _like(x, _exchanged(array, skeleton, partners))
         for x, array in zip(parts, arrays, strict=True)
     ]
-    return mirrored[0] if given is None else mirrored
+    return mirrored[0] if one else mirrored
 
 
 def _checked(x, skeleton, i):
     """Numbers (..., n_joints, n_dims) of one performance, or of several in one array."""
     what = f"Performance {i}"
+    x = as_pandas(x)
     check_columns(x, skeleton, what)
     array = as_numbers(x, what)
     width = skeleton.n_dims * len(skeleton.joints)
@@ -107,6 +109,9 @@ def _exchanged(array, skeleton, partners):
 
 def _like(x, array):
     """An array as the kind of what was given."""
+    if x is not as_pandas(x):
+        # Polars, which need not be installed.
+        return type(x)(dict(zip(x.columns, array.T, strict=True)))
     if not isinstance(x, pd.DataFrame):
         return array
     df = pd.DataFrame(array, index=x.index, columns=x.columns)

@@ -11,6 +11,7 @@ from .columns import AXES, check_columns, joints_with_axes
 from .formats import FORMATS, LANDMARKS
 from .landmarks import as_tuple, completed, likely_landmarks, one_sided
 from .limbs import LIMBS, limbs_between, stretched_legs
+from .parts import parts_of_limbs
 from .ready import ReadySkeletons
 from .upright import UPS, seems_up
 
@@ -250,6 +251,25 @@ class Skeleton(ReadySkeletons):
         paper = type(self).paper()
         parents = kept_parents(joints, paper.joints, paper.parents)
         return type(self)(joints, parents, {name: name for name in joints}, "y", self.n_dims)
+
+    def parts(self):
+        """Which features of `DirectionCosines` are the arms', the legs' and the trunk's.
+
+        For `PartSynchronizer`. The trunk is hip line, torso, shoulder line and neck; the height of
+        the pelvis is no part's, and a part without limbs is left out.
+
+        Returns
+        -------
+        dict of str to list of int
+            ``"left arm"``, ``"right arm"``, ``"left leg"``, ``"right leg"``, ``"trunk"``.
+
+        Examples
+        --------
+        >>> from sklearn_motionsync import Skeleton
+        >>> Skeleton.paper().parts()["left leg"]
+        [13, 14, 15, 19, 20, 21]
+        """
+        return parts_of_limbs(self.limbs, self.n_dims, int(self.has_height))
 
     @property
     def limbs(self):

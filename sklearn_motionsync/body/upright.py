@@ -5,7 +5,7 @@ import numpy as np
 from .formats import LANDMARKS, SIDES
 from .limbs import LIMB_NAMES, landmarks_of, size_of, unit
 
-__all__ = ["UPS", "check_upright", "seems_up", "y_up"]
+__all__ = ["UPS", "as_recorded", "check_upright", "seems_up", "y_up"]
 
 # A body is upside down if it is in so many of its frames, by more than so many leg lengths. Of 363
 # real performances that bend, hop, crouch and sit down, the one that comes closest has its pelvis
@@ -49,6 +49,14 @@ def y_up(points, skeleton):
         return points
     axes = UPS[skeleton.n_dims][skeleton.up]
     return np.stack([s * points[..., a] if s < 0 else points[..., a] for a, s in axes], axis=-1)
+
+
+def as_recorded(points, skeleton):
+    """The way back: points whose second axis is vertical in the axes of the recording."""
+    back = np.empty_like(points)
+    for axis, (source, sign) in enumerate(UPS[skeleton.n_dims][skeleton.up]):
+        back[..., source] = sign * points[..., axis]
+    return back
 
 
 def seems_up(positions, skeleton):
@@ -149,10 +157,7 @@ def check_upright(points, lengths, skeleton, what):
     if upper is not None and (upper - middle)[:, 1].mean() > -_CLEARLY * size:
         return
     rise = ((middle if upper is None else upper) - bottom).mean(axis=0)
-    # Back to the axes of the recording.
-    told = np.zeros_like(rise)
-    for (axis, sign), value in zip(UPS[skeleton.n_dims][skeleton.up], rise, strict=True):
-        told[axis] = sign * value
+    told = as_recorded(rise, skeleton)
     parts = [
         "the pelvis is below the ankles" if lower is not None else "",
         "the head is below the pelvis" if upper is not None else "",

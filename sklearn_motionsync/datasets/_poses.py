@@ -209,7 +209,7 @@ def _drop_uncertain(values, confidence, least):
 
 def _clock(position, attrs, frame_rate):
     """What is known of the time."""
-    fps = attrs.get("fps")
+    fps = _as_number(attrs.get("fps"))
     good = isinstance(fps, Real) and not isinstance(fps, bool) and 0 < fps < math.inf
     fps = float(fps) if good else None
     times = _coordinate(position, "time")
@@ -227,6 +227,14 @@ def _clock(position, attrs, frame_rate):
     elif not even:
         tell_uneven("The poses", times, stacklevel=4, unit="s" if in_seconds else "frames")
     return facts
+
+
+def _as_number(value):
+    """Numbers that are written as text, as files keep them who know text only."""
+    try:
+        return float(value) if isinstance(value, str) else value
+    except ValueError:
+        return None
 
 
 def _as_seconds(times, unit, fps):

@@ -5,6 +5,8 @@ again, and the artists stay on the display as attributes that end in an undersco
 matplotlib, in the extra ``plot``, is imported only when something is drawn.
 """
 
+from .cycles import CycleDisplay
+from .lags import LagDisplay
 from .metric import MetricDisplay
 from .model import ActionModelDisplay
 from .search import SearchDisplay
@@ -14,6 +16,8 @@ from .trellis import TrellisDisplay
 
 __all__ = [
     "ActionModelDisplay",
+    "CycleDisplay",
+    "LagDisplay",
     "MetricDisplay",
     "SearchDisplay",
     "SkeletonDisplay",

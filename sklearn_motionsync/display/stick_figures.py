@@ -44,11 +44,11 @@ class SkeletonDisplay(PipelineFigures):
     """Stick figures of joint positions: strips of postures, or performances in motion.
 
     Make one with `from_positions`, `from_postures` (strips), `from_model` (Fig. 4),
-    `from_departures` (what is wrong with a performance), `from_estimator` or `from_predictions`
-    (performances before and after synchronisation, to `animate`). Left limbs are blue, right ones
-    orange; limbs that depart from an action are violet, and then all others grey. People are turned
-    to face the same way at first. Their lowest joint ever is on the floor; the pictures of a strip,
-    and those of people who walk away, go with the pelvis.
+    `from_departures` (what is wrong with a performance), `from_performances`, `from_estimator` or
+    `from_predictions` (performances, also before and after synchronisation, to `animate`). Left
+    limbs are blue, right ones orange; limbs that depart from an action are violet, and then all
+    others grey. People are turned to face the same way at first. Their lowest joint ever is on the
+    floor; the pictures of a strip, and those of people who walk away, go with the pelvis.
 
     A skeleton may lack landmarks. Where a landmark is the mean of joints, limbs are drawn between
     the landmarks; a skeleton that joins nothing is drawn as its joints, too. Key-points of a
@@ -194,11 +194,8 @@ class SkeletonDisplay(PipelineFigures):
         -------
         SkeletonDisplay
         """
-        X, skeleton = as_performances(X), as_skeleton(skeleton)
-        raw = [placed(upright(x, skeleton, i), skeleton) for i, x in enumerate(X)]
-        match = as_match(times, len(X))
-        labels = list(range(len(X))) if names is None else names
-        labels = as_names(labels, len(X), "names", "performances")
+        raw, labels = _beside_each_other(X, skeleton, names)
+        match = as_match(times, len(raw))
         flat = [x.reshape(len(x), -1) for x in raw]
         warped = match.warp(flat)
         warped = warped.reshape(*warped.shape[:2], *raw[0].shape[1:])
@@ -210,6 +207,22 @@ class SkeletonDisplay(PipelineFigures):
             durations=[lengths, [float(np.median(lengths))] * len(raw)],
             labels=labels,
         ).plot(ax, **view)
+
+    @classmethod
+    def from_performances(cls, X, skeleton, *, names=None, ax=None, **view):
+        """Performances beside each other, each at its own pace: two people and their blend.
+
+        Parameters
+        ----------
+        X, skeleton, names, ax, **view : as for `from_predictions`
+
+        Returns
+        -------
+        SkeletonDisplay
+            At the beginning; see `animate`.
+        """
+        raw, labels = _beside_each_other(X, skeleton, names)
+        return cls([raw], skeleton, ["each at its own pace"], labels=labels).plot(ax, **view)
 
     def plot(self, ax=None, *, at=0.0, azimuth=-60):
         """Draw.
@@ -369,6 +382,14 @@ class SkeletonDisplay(PipelineFigures):
         if "head" not in skeleton.landmarks:
             return body[:0]
         return place_of(body[np.newaxis], skeleton, "head")
+
+
+def _beside_each_other(X, skeleton, names):
+    """Performances that are put on the floor, facing forward, and what they are called."""
+    X, skeleton = as_performances(X), as_skeleton(skeleton)
+    raw = [placed(upright(x, skeleton, i), skeleton) for i, x in enumerate(X)]
+    labels = list(range(len(X))) if names is None else names
+    return raw, as_names(labels, len(X), "names", "performances")
 
 
 def _segments(bodies, bones):

@@ -83,7 +83,7 @@ def _weighted_median(values, weights):
     return np.take_along_axis(values, at, axis=-1).mean(axis=-1)
 
 
-def smoothed(times, reach, width):
+def smoothed(times, reach, width, about=0.0):
     """Warps (n_sequences, P) whose offsets are smoothed and in the band, pinned, non-decreasing.
 
     Parameters
@@ -93,12 +93,14 @@ def smoothed(times, reach, width):
         Largest offset.
     width : float
         Standard deviation of the Gaussian, as a share of the clip.
+    about : ndarray, shape (n_sequences, P), default=0.0
+        Offsets that are smooth as they are: what differs from them is smoothed.
     """
     n_frames = times.shape[1]
     frames, sigma = np.arange(n_frames), width * (n_frames - 1)
-    offsets = times - frames
+    offsets = times - frames - about
     if sigma > 1 / 3:
         offsets = smooth(offsets[:, :, np.newaxis], sigma)[:, :, 0]
         offsets[:, [0, -1]] = 0
-    times = frames + np.clip(offsets, -reach, reach)
+    times = frames + np.clip(offsets + about, -reach, reach)
     return np.maximum.accumulate(np.clip(times, 0, n_frames - 1), axis=1)

@@ -84,6 +84,27 @@ class Features(NamedTuple):
         shares = metric.shares(velocity, positions), energy_shares(velocity)
         return self._replace(metric=metric), *shares
 
+    def part(self, columns, on_clock):
+        """What is compared of some features alone; None if they do not move.
+
+        Features that the metric takes for noise are left out; if it takes all of them for that,
+        they are compared without it.
+
+        Parameters
+        ----------
+        columns : ndarray of int
+        on_clock : ndarray, shape (n_sequences, Q, n_features)
+            The training set at all positions, whole and not in the unit.
+        """
+        plain = self._replace(unit=self.unit.part(columns), metric=None)
+        positions = plain.unit(on_clock[:, :, columns])
+        compared = plain(positions)
+        if not np.ptp(compared, axis=1).any():
+            return None
+        if self.metric is None:
+            return plain
+        return Features(*plain[:-1], self.metric.part(self.unit.holders[columns], compared))
+
     def positions(self, arrays, n_frames):
         """Performances at every position of the clock (Eq. 7), in the unit."""
         return self.unit(normalise(arrays, n_frames, self.subframes))
@@ -132,10 +153,10 @@ class Matcher(NamedTuple):
         bases = features[bases, :: self.trellis.table.subframes]
         return self.trellis.distances(bases, features[moving])
 
-    def paths(self, bases, moving):
+    def paths(self, bases, moving, coupling=None):
         """Disparities of the best paths: (n_bases, n_moving, P)."""
         max_bytes = get_config()["working_memory"] * 2**20 // 2
-        return self.trellis.paths(bases, moving, max_bytes)
+        return self.trellis.paths(bases, moving, max_bytes, coupling)
 
     def all_voted(self, sequences, consensus, warp_smoothing):
         """Times of all ordered pairs of sequences, at the pace of the frames, after the vote."""

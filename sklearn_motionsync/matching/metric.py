@@ -57,6 +57,24 @@ class Metric(NamedTuple):
             shares[self.features] += (with_all * weights).sum(axis=1)
         return shares / shares.sum()
 
+    def part(self, columns, velocity):
+        """That of some features alone, by their indices; None if it does not hear them move.
+
+        A part has a mean squared speed of its own, and is compressed by that.
+
+        Parameters
+        ----------
+        columns : ndarray of int, shape (n_columns,)
+        velocity : ndarray, shape (n_sequences, Q, n_columns)
+            Theirs, of the training set.
+        """
+        place = {int(feature): row for row, feature in enumerate(self.features)}
+        heard = np.array([i for i, k in enumerate(columns) if int(k) in place], dtype=np.intp)
+        rows = [place[int(k)] for k in columns[heard]]
+        speed = np.square(velocity[:, :, heard]).sum(axis=2, dtype=np.float64)
+        energy = float(speed.mean())
+        return Metric(heard, energy, self.velocity[rows], self.posture[rows]) if energy else None
+
     def _parts(self, velocity, positions):
         fast = compressed(velocity[:, :, self.features], self.energy)
         return fast, without_mean(positions[:, :, self.features])

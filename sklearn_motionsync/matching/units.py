@@ -68,6 +68,22 @@ class Unit(NamedTuple):
             out[..., others] = 0
         return out
 
+    def part(self, columns):
+        """That of some features alone, by their indices."""
+        place = {int(column): i for i, column in enumerate(columns)}
+        copies = [[place[k] for k in group.tolist() if k in place] for group in self.copies]
+        copies = [np.array(group) for group in copies if len(group) > 1]
+        centre, rounding = self.centre[columns], self.rounding[columns]
+        return Unit(centre, self.exponent, rounding, copies)
+
+    @property
+    def holders(self):
+        """For every feature, the one that holds what it does: itself, unless it is a copy."""
+        holders = np.arange(len(self.centre))
+        for first, *others in self.copies:
+            holders[others] = first
+        return holders
+
     def back(self, values, degree=2):
         """What grows as the unit to some degree, such as squares, in the unit of the data.
 

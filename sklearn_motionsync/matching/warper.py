@@ -52,15 +52,18 @@ class Warper:
     warp_smoothing: float
 
     @classmethod
-    def to_pattern(cls, matcher, pattern, chosen, votes, warp_smoothing):
-        """The warper to a pattern: its postures, and it and its exemplars at all positions."""
+    def to_pattern(cls, matcher, pattern, chosen, votes, warp_smoothing, coupling=None, **own):
+        """The warper to a pattern: its postures, and it and its exemplars at all positions.
+
+        What draws its paths to the exemplars, and what a kind of warpers has of its own.
+        """
         features = matcher.features(chosen)
         # A copy: the whole of the features is not to be kept alive.
         bases = Bases(matcher.trellis, features[:, :: matcher.features.subframes].copy())
-        disparities = matcher.paths(bases.part(slice(1)), features[1:])[0]
+        disparities = matcher.paths(bases.part(slice(1)), features[1:], coupling)[0]
         lengths = matcher.trellis.costs(bases.sequences[0], features[1:], disparities)
-        times = matcher.times(disparities)
-        return cls(matcher, pattern, bases, times, lengths, votes, warp_smoothing)
+        times = _times(matcher, bases, disparities[np.newaxis], coupling)[0]
+        return cls(matcher, pattern, bases, times, lengths, votes, warp_smoothing, **own)
 
     def positions(self, arrays):
         """Performances in the unit at every sub-position of the clock (Eq. 7), in double precision.
@@ -95,14 +98,17 @@ class Warper:
         path = self.matcher.paths(self.bases.part(slice(1)), moving)[0, 0] / sub
         return frames, disparities / sub, costs, path
 
-    def voted(self, positions):
-        """Distances of the direct paths, and smoothed times after the vote of the exemplars."""
+    def voted(self, positions, coupling=None):
+        """Distances of the direct paths, and smoothed times after the vote of the exemplars.
+
+        A coupling draws the paths, and is no part of their distances.
+        """
         moving, trellis = self.matcher.features(positions), self.matcher.trellis
         bases = self.bases
         if moving.dtype != bases.sequences.dtype:
             bases = Bases(trellis, bases.sequences.astype(moving.dtype))
-        base, disparities = bases.sequences[0], self.matcher.paths(bases, moving)
-        routes = self.matcher.times(disparities)
+        base, disparities = bases.sequences[0], self.matcher.paths(bases, moving, coupling)
+        routes = _times(self.matcher, bases, disparities, coupling)
         if not self.votes:
             return trellis.costs(base, moving, disparities[0]), routes[0]
         pairs = zip(bases.sequences, disparities, strict=True)
@@ -111,10 +117,26 @@ class Warper:
         if len(self.to_exemplars):
             lengths[1:] += self.to_lengths[:, np.newaxis].astype(lengths.dtype)
             times = vote(times, self.to_exemplars, routes[1:], lengths)
-        times = smoothed(times, trellis.reach, self.warp_smoothing)
+        about = 0.0 if coupling is None else coupling.offsets[0]
+        times = smoothed(times, trellis.reach, self.warp_smoothing, about)
         # A path without any distance is right: the pattern keeps its own pace.
         rounding = 64 * np.finfo(positions.dtype).eps * np.square(base).sum()
         return distances, np.where((distances <= rounding)[:, np.newaxis], routes[0], times)
+
+
+def _times(matcher, bases, disparities, coupling):
+    """``tau`` of paths: (n_bases, n_moving, P).
+
+    A path stands at whole steps. Within one the features of a base, of mean squared slope c, and a
+    coupling of the weight w share it: it is moved by w / (w + c) of the way that is left.
+    """
+    times = matcher.times(disparities)
+    if coupling is None:
+        return times
+    slope = np.square(np.diff(bases.sequences, axis=1)).sum(axis=2).mean()
+    half = 0.5 / matcher.trellis.table.subframes
+    way = coupling.offsets + np.arange(times.shape[-1]) - times
+    return times + coupling.weight / (coupling.weight + slope) * np.clip(way, -half, half)
 
 
 @dataclass(frozen=True, eq=False)

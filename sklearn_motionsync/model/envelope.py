@@ -141,7 +141,10 @@ class EnvelopeMixin:
         Both are drawn about those of training performances chosen at random, with mean, variance
         and covariance of all: what belongs together stays together, and styles stay apart.
         Postures are cut off at the envelope. Performances are inside for ``predict``; one that
-        would fall outside is drawn in to its training performance.
+        would fall outside is drawn in to its training performance. Features of theirs that are
+        directions, such as those of `DirectionCosines`, are mixed on the sphere and keep the
+        length 1. Dimensions of an `ASpace` are no directions: limbs drawn there get their length
+        from ``inverse_transform`` of the cosines.
 
         Parameters
         ----------
@@ -155,6 +158,10 @@ class EnvelopeMixin:
         -------
         ndarray, shape (n, n_features) or (n, P, n_features)
             (n, P) for whole performances of a model fitted on 2-D input.
+
+        See Also
+        --------
+        blend_performances : Mixtures of one's own, in timing too.
         """
         check_is_fitted(self)
         if not isinstance(n, Integral) or n < 1:

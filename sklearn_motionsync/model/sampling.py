@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from .charts import Chart
+
 __all__ = ["PERFORMANCE", "POSTURE", "sample_performances", "sample_postures"]
 
 # Shares of the variance that a drawn posture owes to one training performance, to a mixture of
@@ -63,6 +65,8 @@ def sample_performances(
     Each is a random mixture of the training performances' deviations, most of it one of them
     that is inside itself, with the variance of all. One that comes out outside is drawn in to that
     training performance, at last as far as it: the mean is no way out, it need not be inside.
+    Features that are directions are mixed on the sphere, as tangents at their mean, and keep the
+    length 1 (`directions_in`).
 
     Parameters
     ----------
@@ -85,14 +89,16 @@ def sample_performances(
     ndarray, shape (n, P, n_features), of the mean's dtype
         If no training performance is inside, some may be as unlike as the most typical one.
     """
-    unlike = dissimilarity((mean + deviations).astype(mean.dtype))
+    chart = Chart(mean, deviations)
+    known = chart.coordinates
+    unlike = dissimilarity(chart.performances(known))
     inside = np.flatnonzero(unlike <= threshold)
     homes = inside if len(inside) else np.array([np.argmin(unlike)])
     own = homes[random_state.randint(len(homes), size=n)]
-    weights = _mixtures(own, len(deviations), *shares, random_state)
-    drawn = np.tensordot(weights, deviations - deviations.mean(axis=0), axes=1)
+    weights = _mixtures(own, len(known), *shares, random_state)
+    drawn = np.tensordot(weights, known - known.mean(axis=0), axes=1)
     drawn *= _scale(variance, deviations)
-    samples = (mean + drawn).astype(mean.dtype)
+    samples = chart.performances(drawn)
     outside = np.arange(n)
     for step in range(1, _STEPS + 1):
         # What is no number is not inside.
@@ -100,8 +106,8 @@ def sample_performances(
         if not len(outside):
             break
         nearer = step / _STEPS
-        deviation = (1 - nearer) * drawn[outside] + nearer * deviations[own[outside]]
-        samples[outside] = (mean + deviation).astype(mean.dtype)
+        at = (1 - nearer) * drawn[outside] + nearer * known[own[outside]]
+        samples[outside] = chart.performances(at)
     return samples
 
 

@@ -78,7 +78,7 @@ def _distances(training, bases, moving, tiles):
     return training.matcher.distances(training.features, bases, moving, tiles)
 
 
-def in_portions(warper, method, positions, *, n_jobs, progress, name, found=None):
+def in_portions(warper, method, positions, *along, n_jobs, progress, name, found=None):
     """Results of a method of a warper, for portions of all performances at all positions.
 
     Parameters
@@ -87,6 +87,8 @@ def in_portions(warper, method, positions, *, n_jobs, progress, name, found=None
     method : str
         Of its methods one that takes positions and rows.
     positions : ndarray, shape (n_sequences, Q, n_features)
+    *along : ndarray, shape (n_sequences, ...)
+        What the method takes besides.
     n_jobs : int or None
     progress : Progress
     name : str
@@ -104,7 +106,7 @@ def in_portions(warper, method, positions, *, n_jobs, progress, name, found=None
             jobs["n_jobs"] = 1
         portions = [(method, rows[some]) for some in slices]
         return list(run(_of_training, portions, common=(Common(warper), training), **jobs))
-    portions = [(method, positions[some]) for some in slices]
+    portions = [(method, positions[some], *(x[some] for x in along)) for some in slices]
     return list(run(_of_own, portions, common=(Common(warper),), **jobs))
 
 
@@ -112,5 +114,5 @@ def _of_training(warper, training, method, rows):
     return getattr(warper, method)(training.positions, rows)
 
 
-def _of_own(warper, method, positions):
-    return getattr(warper, method)(positions, np.s_[:])
+def _of_own(warper, method, positions, *along):
+    return getattr(warper, method)(positions, np.s_[:], *along)

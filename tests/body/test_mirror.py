@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import polars as pl
 import pytest
 from made_bodies import columns_of
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton, mirror, to_frame
@@ -131,6 +132,13 @@ def test_every_kind_is_kept():
     for df, right in zip(mirror(frames, PAPER), expected, strict=True):
         assert (list(df.columns), df.index.name) == (names, "time")
         np.testing.assert_array_equal(df, right)
+    # Of polars as well, one and several, in single precision too.
+    tables = [pl.DataFrame(dict(zip(names, x.T, strict=True))) for x in (X[0], X[1].astype("f4"))]
+    given, found = [tables[0], *tables], [mirror(tables[0], PAPER), *mirror(tables, PAPER)]
+    for df, table in zip(found, given, strict=True):
+        assert isinstance(df, pl.DataFrame)
+        assert df.schema == table.schema
+    np.testing.assert_array_equal(mirror(tables[0], PAPER).to_numpy(), expected[0])
     kept = X[0].copy()
     mirror(X, PAPER)
     np.testing.assert_array_equal(X[0], kept)

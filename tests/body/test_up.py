@@ -101,7 +101,8 @@ def test_the_head_is_above_the_feet(up, joints, recording):
 def test_real_people_tell_what_is_up(real_data, name, up):
     """All that they do: bend, sit down, hop, crouch, bring the elbows to the knees."""
     bunch = load_performances(real_data / f"{name}_positions.npz")
-    for x in bunch.data:
+    # Each of them with three of the axes.
+    for x in bunch.data[list(UPS).index(up) % 2 :: 2]:
         df = columns_of(raised(x.astype(float), up), bunch.skeleton)
         assert Skeleton.from_frame(df).up == up
 

@@ -348,3 +348,19 @@ def test_figures_say_which_instant_they_show(pipe, bunch):
     assert all(a.get_title().endswith(", at 100 % of the time") for a in display.axes_)
     still = SkeletonDisplay.from_positions(bunch.data[0], bunch.skeleton, frames=[0, 5])
     assert [axis.get_title() for axis in still.axes_] == ["frame 0", "frame 5"]
+
+
+def test_performances_beside_each_other_keep_their_pace(bunch):
+    X = [bunch.data[0], bunch.data[1][::2], bunch.data[2]]
+    display = SkeletonDisplay.from_performances(X, bunch.skeleton, names=["a", "b", "c"])
+    (scene,) = display.scenes
+    assert [len(x) for x in scene] == [len(x) for x in X]
+    assert [tick.get_text() for tick in display.axes_[0].get_xticklabels()] == ["a", "b", "c"]
+    # The short one has ended while the others are half way.
+    middle = SkeletonDisplay.from_performances(X, bunch.skeleton, at=0.6)
+    ended = SkeletonDisplay.from_performances([X[1]], bunch.skeleton, at=1.0)
+    alone = np.sort(np.ptp(bones_drawn(ended, 0)[..., 1], axis=1))
+    heights = np.ptp(bones_drawn(middle, 0)[..., 1], axis=1)
+    assert np.isclose(heights[:, np.newaxis], alone).any(axis=0).all()
+    with pytest.raises(ValueError, match="one for each of the 3 performances"):
+        SkeletonDisplay.from_performances(X, bunch.skeleton, names=["a"])

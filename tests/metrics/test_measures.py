@@ -182,17 +182,17 @@ def test_scorers_prefer_matching(scorer, spread, bending):
     def pipe(synchronizer):
         return make_pipeline(DirectionCosines(bending.skeleton), ASpace(6), synchronizer)
 
-    scoring = scorer(spread)
+    scoring, X = scorer(spread), bending.data[:16]
     linear, dense = (
-        cross_val_score(pipe(s), bending.data, cv=2, scoring=scoring, error_score="raise").mean()
-        for s in (LinearSynchronizer(50), DenseSynchronizer(50))
+        cross_val_score(pipe(s), X, cv=2, scoring=scoring, error_score="raise").mean()
+        for s in (LinearSynchronizer(40), DenseSynchronizer(40))
     )
     assert dense > linear
     grid = {"densesynchronizer__max_offset": [0.0, 0.25]}
     search = GridSearchCV(
-        pipe(DenseSynchronizer(50)), grid, scoring=scoring, cv=2, error_score="raise"
+        pipe(DenseSynchronizer(40)), grid, scoring=scoring, cv=2, error_score="raise"
     )
-    assert search.fit(bending.data).best_params_ == {"densesynchronizer__max_offset": 0.25}
+    assert search.fit(X).best_params_ == {"densesynchronizer__max_offset": 0.25}
 
 
 def test_spread_scorer_is_the_ratio(bending_aspace):

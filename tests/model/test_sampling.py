@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from scipy.stats import truncnorm
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, Skeleton
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    Skeleton,
+)
+from sklearn_motionsync.model.charts import directions_in
 from sklearn_motionsync.model.sampling import sample_performances, sample_postures
 
 
@@ -217,6 +224,59 @@ def test_samples_repeat_with_their_random_state():
         assert not np.array_equal(draw(X, 4, seed=3), draw(X, 4, seed=4))
 
 
+# -- directions -------------------------------------------------------------------------
+
+
+def turning(n=24, seed=0):
+    """A height, two directions in space that turn with people, and a number: (n, 15, 8)."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 1, 15)
+    (a, b), (c, d) = rng.normal(scale=0.4, size=(2, 2, n, 1))
+    cones = [
+        np.stack([np.cos(x), np.sin(x) * np.cos(y), np.sin(x) * np.sin(y)], axis=2)
+        for x, y in ((1 + a + t, 2 * t + b), (0.8 + b - t, t + d))
+    ]
+    number, height = (c + t)[..., np.newaxis], (1 + 0.1 * d * t)[..., np.newaxis]
+    return np.concatenate([height, *cones, number], axis=2)
+
+
+def norms(X, columns=((1, 4), (4, 7))):
+    return np.stack([np.linalg.norm(X[..., slice(*c)], axis=-1) for c in columns])
+
+
+def test_directions_keep_their_length_and_vary_as_those_of_people():
+    X = turning(200)
+    drawn = performances_of(X, 4000)
+    np.testing.assert_allclose(norms(drawn), 1, atol=1e-12)
+    # Numbers between them have the variance of all, and so have angles from any direction.
+    np.testing.assert_allclose(drawn[..., 7].var(axis=0), X[..., 7].var(axis=0), rtol=0.1)
+    angles = [np.arccos(np.clip(Y[..., 1], -1, 1)) for Y in (drawn, X)]
+    np.testing.assert_allclose(*(a.std(axis=0) for a in angles), rtol=0.15)
+    # As numbers they would shrink.
+    assert norms(X.mean(axis=0)).min() < 0.95
+
+
+def test_directions_that_are_drawn_in_are_inside():
+    X = turning(12)
+    unlike = to_nearest(X)
+    drawn = performances_of(X, unlike=unlike, threshold=0.02)
+    assert (unlike(drawn) <= 0.02).all()
+    np.testing.assert_allclose(norms(drawn), 1, atol=1e-12)
+
+
+def test_which_features_are_directions():
+    X = turning()
+    found = [(c.start, c.stop) for c in directions_in(X)]
+    assert found == [(1, 4), (4, 7)]
+    # In the plane two; shortened a little by a warp, they still are.
+    plane = X[..., 1:3] / np.linalg.norm(X[..., 1:3], axis=2, keepdims=True)
+    both = np.concatenate([X[..., :1], plane, 0.999 * X[..., 1:4]], axis=2)
+    assert [(c.start, c.stop) for c in directions_in(both)] == [(1, 3), (3, 6)]
+    for numbers in (X[..., [0, 7]], 2 * X, waves(9), X[..., [1, 3, 2, 5]] + 0.01):
+        assert not [c for c in directions_in(numbers) if c.stop - c.start == 3]
+    assert directions_in(waves(9)) == directions_in(np.ones((2, 3, 1))) == []
+
+
 # -- people -----------------------------------------------------------------------------
 
 
@@ -272,3 +332,13 @@ def test_sampled_bends_are_bodies(bends_on_one_clock):
     assert np.min(ankles) > -0.10
     assert np.min(hands) > -0.20
     assert np.max(knees) < 0
+
+
+def test_sampled_performances_of_cosines_have_whole_limbs(bends):
+    """Of people who bend: inside, and no limb shrinks; 3.9 % did below 0.9, mixed as numbers."""
+    postures = make_pipeline(DirectionCosines(bends.skeleton), DenseSynchronizer(n_frames=50))
+    model = ActionModel().fit(postures.fit_transform(bends.data), groups=bends.actor)
+    drawn = model.sample(40, random_state=0)
+    assert (model.predict(drawn) == 1).all()
+    lengths = np.linalg.norm(drawn[..., 1:].reshape(40, 50, 12, 3), axis=3)
+    np.testing.assert_allclose(lengths, 1, atol=1e-6)

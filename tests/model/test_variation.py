@@ -164,7 +164,7 @@ def test_the_mean_lies_in_its_band():
     shares = []
     for sizes in ([1] * 4, [5] * 4, [2] * 6, [2] * 12, [5, 2, 1, 4, 3]):
         hits = []
-        for seed in range(50):
+        for seed in range(30):
             X, groups = people(sizes, seed)
             band = mean_band(X, groups, 0.95, seed)
             hits.append((np.abs(X.mean(axis=0)) <= band).all())

@@ -31,7 +31,6 @@ def piecewise(X):
 
 TIES = {
     "held": held,
-    "rounded": lambda X: [x.round(1) for x in X],
     "held and rounded": lambda X: held([x.round(1) for x in X]),
     "piecewise constant": piecewise,
     "whole numbers": lambda X: [x.round() for x in X],
@@ -47,29 +46,29 @@ def real_aspace(bends):
 
 @pytest.fixture(scope="module", params=["bending_aspace", "real_aspace"])
 def performances(request):
-    return request.getfixturevalue(request.param)[:20]
+    return request.getfixturevalue(request.param)[:16]
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize("settings", SETTINGS)
 @pytest.mark.parametrize("ties", TIES)
 def test_equal_bits_alone_and_in_groups(performances, ties, settings, dtype):
-    """One by one, three, thirteen, and all: bundles of different shapes and layouts."""
+    """Six by themselves, three, thirteen, and all: bundles of different shapes and layouts."""
     X = [x.astype(dtype) for x in TIES[ties](performances)]
-    n_frames = 60 if len(X[0]) > 150 or settings == "half frames" else None
+    n_frames = 40 if ties != "as they are" or settings == "half frames" else None
     sync = DenseSynchronizer(n_frames, **SETTINGS[settings]).fit(X)
     together = sync.match(X)
     assert together.distances.dtype == np.float64
-    for size in (1, 3, 13):
-        groups = [sync.match(X[i : i + size]) for i in range(0, len(X), size)]
+    for size, last in ((1, 6), (3, len(X)), (13, len(X))):
+        groups = [sync.match(X[i : i + size]) for i in range(0, last, size)]
         for whole, *parts in zip(together, *groups, strict=True):
-            assert np.concatenate(parts).tobytes() == whole.tobytes()
+            assert np.concatenate(parts).tobytes() == whole[:last].tobytes()
 
 
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_single_precision_among_double(performances, settings):
     X = [x.astype(np.float32) for x in performances]
-    sync = DenseSynchronizer(60, **SETTINGS[settings]).fit(X)
+    sync = DenseSynchronizer(40, **SETTINGS[settings]).fit(X)
     alone = sync.match(X).times
     among = sync.match([*X, performances[0]]).times[:-1]
     np.testing.assert_array_equal(among, alone)

@@ -1,0 +1,162 @@
+"""Cycles of real people: their period against foot geometry, what is not cyclic, foot strikes.
+
+    python benchmarks/cycles.py DATA_FOLDER
+
+A foot strikes where its ankle is farthest ahead of the pelvis, seen along the hips; such a maximum
+stands out by 0.3 of the whole swing. A step is the time from one strike to the next, of either
+foot; a stride that to the next of the same foot. A period is held against twice the median step:
+the jogs begin from standing, and their first stride is longer. The mean stride is shown beside.
+Deviations of foot strikes are those of their phases from the mean phase of the foot, in hundredths
+of a cycle, within takes and within all takes of an action. Takes are cut by what was learnt from
+other actors or, where there is one actor, from the other takes.
+"""
+
+import argparse
+import copy
+import functools
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import find_peaks
+from sklearn.model_selection import LeaveOneGroupOut
+from sklearn_motionsync import CycleSegmenter
+from sklearn_motionsync.datasets import load_performances
+
+CYCLIC = {"cmu07_walk": "walk", "hdm05": "jogLeftCircle4StepsRstart"}
+ONE_CYCLE = "sneak2StepsLStart"
+SINGLE = {
+    "hdm05": (
+        "depositFloorR",
+        "grabHighR",
+        "hopBothLegs1hops",
+        "elbowToKnee1RepsLelbowStart",
+        ONE_CYCLE,
+    ),
+    "utkinect": ("sitDown", "standUp", "pickUp", "throw", "push", "pull"),
+}
+# Standard deviation, in seconds, of the filter before maxima are looked for; least time between.
+SMOOTHING, APART = 0.02, 0.3
+
+
+def read(folder, archive, label):
+    """The takes of an action: positions, actors, frames a second, skeleton."""
+    bunch = copy.copy(_load(Path(folder) / archive / f"{archive}_positions.npz"))
+    # Of fewer than 8 frames nothing can be said.
+    chosen = [i for i in np.flatnonzero(bunch.target == label) if len(bunch.data[i]) >= 8]
+    bunch.data = [bunch.data[i] for i in chosen]
+    bunch.actor, bunch.take = bunch.actor[chosen], bunch.take[chosen]
+    bunch.frame_rate = bunch.frame_rate[chosen]
+    return bunch
+
+
+@functools.cache
+def _load(path):
+    return load_performances(path)
+
+
+def foot_strikes(positions, skeleton, frame_rate):
+    """Frames, with fractions, in which the left and the right ankle are farthest ahead."""
+    points = np.asarray(positions, dtype=float).reshape(len(positions), -1, 3)
+
+    def at(landmark):
+        return points[:, skeleton.index_of(landmark)]
+
+    across = (at("left_hip") - at("right_hip")) * [1, 0, 1]
+    forward = np.cross(across, [0, 1, 0])
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+    strikes = []
+    for side in ("left", "right"):
+        ahead = ((at(f"{side}_ankle") - at("pelvis")) * forward).sum(axis=1)
+        ahead = gaussian_filter1d(ahead, SMOOTHING * frame_rate, mode="nearest")
+        apart = max(1, int(APART * frame_rate))
+        k, _ = find_peaks(ahead, prominence=0.3 * np.ptp(ahead), distance=apart)
+        before, here, after = ahead[k - 1], ahead[k], ahead[k + 1]
+        strikes.append(k + (before - after) / (2 * (before - 2 * here + after)))
+    return strikes
+
+
+def references(strikes):
+    """Twice the median step, and the mean stride, in frames."""
+    steps = np.diff(np.sort(np.concatenate(strikes)))
+    return 2 * np.median(steps), np.concatenate([np.diff(s) for s in strikes]).mean()
+
+
+def deviations(phases, strikes):
+    """Mean deviations of the phases of foot strikes, in hundredths of a cycle: within takes, all.
+
+    Parameters
+    ----------
+    phases : list of ndarray (n_frames_i,)
+    strikes : list of [left, right]
+    """
+    found = [
+        [np.interp(s, np.arange(len(p)), p) for s in of_take]
+        for p, of_take in zip(phases, strikes, strict=True)
+    ]
+    within = [around(foot) for of_take in found for foot in of_take if len(foot) > 1]
+    whole = [around(np.concatenate(of_foot)) for of_foot in zip(*found, strict=True)]
+    return [100 * np.abs(np.concatenate(d)).mean() for d in (within, whole)]
+
+
+def around(phases):
+    """Deviations from the mean direction of phases."""
+    mean = np.angle(np.exp(2j * np.pi * phases).mean()) / (2 * np.pi)
+    return (phases - mean + 0.5) % 1 - 0.5
+
+
+def phases_of_others(bunch, **params):
+    """Phases of every take, by a segmenter that knows the takes of other people only."""
+    groups = bunch.actor if len(set(bunch.actor)) > 1 else bunch.take
+    out = [None] * len(bunch.data)
+    for train, test in LeaveOneGroupOut().split(bunch.data, groups=groups):
+        # Which foot is farther ahead depends on who is left out.
+        segmenter = CycleSegmenter(bunch.skeleton, start="right", **params)
+        segmenter.fit([bunch.data[i] for i in train])
+        for i, phases in zip(test, segmenter.phases([bunch.data[i] for i in test]), strict=True):
+            out[i] = phases
+    return out
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("data", help="folder of hdm05, cmu07_walk and utkinect")
+    folder = parser.parse_args().data
+    inside = {"steps": [], "strides": []}
+    for archive, label in CYCLIC.items():
+        bunch = read(folder, archive, label)
+        report = CycleSegmenter(bunch.skeleton).report(bunch.data)
+        print(f"{label}\n  actor   frames  period  strength  cycles  error: steps  strides (%)")
+        strikes = []
+        for x, rate, actor, row in zip(
+            bunch.data, bunch.frame_rate, bunch.actor, report.itertuples(), strict=True
+        ):
+            strikes.append(foot_strikes(x, bunch.skeleton, rate))
+            errors = [100 * (row.period / period - 1) for period in references(strikes[-1])]
+            for name, error in zip(inside, errors, strict=True):
+                inside[name].append(row.cyclic and abs(error) <= 5)
+            print(
+                f"  {actor:6} {row.n_frames:7d} {row.period:7.1f} {row.strength:9.2f}"
+                f" {row.n_cycles:7.2f} {errors[0]:13.1f} {errors[1]:8.1f}"
+            )
+        print("  deviation of foot strikes:    within takes   all takes (hundredths of a cycle)")
+        found = {}
+        for refine in (False, True):
+            found[refine] = deviations(phases_of_others(bunch, refine=refine), strikes)
+            name = "circular matching" if refine else "constant period"
+            print(f"    {name:20} {found[refine][0]:18.2f} {found[refine][1]:11.2f}")
+        ratio = np.divide(found[True], found[False])
+        print(f"    {'ratio':20} {ratio[0]:18.2f} {ratio[1]:11.2f}")
+    for name, good in inside.items():
+        print(f"period within 5 % by {name}: {sum(good)} of {len(good)}")
+    print("\nnot to be cyclic                takes  called cyclic  highest strength")
+    for archive, labels in SINGLE.items():
+        for label in labels:
+            bunch = read(folder, archive, label)
+            report = CycleSegmenter(bunch.skeleton).report(bunch.data)
+            called, strongest = report["cyclic"].sum(), report["strength"].max()
+            print(f"  {label:30} {len(report):4d} {called:14d} {strongest:17.2f}")
+
+
+if __name__ == "__main__":
+    main()

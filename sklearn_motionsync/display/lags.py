@@ -1,0 +1,230 @@
+"""LagDisplay: by what parts of the body lag behind the rest, and how far that is to be believed."""
+
+import numpy as np
+
+from ..pipelines import reach_synchronizer
+from ..synchronizers.lags import Lags
+from ..synchronizers.parts import PartSynchronizer
+from .drawing import COLORS, curves, front_line, legend_above, panels
+from .time_axis import TimeAxis
+
+__all__ = ["LagDisplay"]
+
+_UNITS = {"frames": "frames", "percent": "% of clock", "seconds": "s"}
+_BEHIND = {"rest": "the rest of the body", "body": "the whole body"}
+
+
+class LagDisplay:
+    """A map of lags, part by time, above the curves of every part with their spread.
+
+    The map shows the mean; it is hatched where the 95 % interval of the mean holds 0, so that a lag
+    cannot be told from none. The curves show the same mean and interval, and broken lines a
+    standard deviation of performances beside it: a mean that is sure is no habit yet. Use
+    `from_estimator`.
+
+    Parameters
+    ----------
+    lags : Lags
+        What `PartSynchronizer.lags` reports.
+
+    Attributes
+    ----------
+    figure_ : Figure
+    map_ax_ : Axes
+    axes_ : list of Axes
+        Of the curves, one a part.
+    map_ : QuadMesh
+    unsure_ : list of PolyCollection
+        The hatched stretches of every part.
+    means_ : list of Line2D
+    intervals_ : list of FillBetweenPolyCollection
+    spreads_ : list of LineCollection
+    colorbar_ : Colorbar or None
+
+    Examples
+    --------
+    >>> from sklearn_motionsync import DirectionCosines, LagDisplay, PartSynchronizer
+    >>> from sklearn_motionsync.datasets import make_bending
+    >>> bunch = make_bending(6, n_frames=50, random_state=0)
+    >>> X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+    >>> sync = PartSynchronizer(n_frames=50).fit(X)
+    >>> LagDisplay.from_estimator(sync, X, groups=bunch.actor)
+    LagDisplay(5 parts behind the rest of the body, 6 performances of 4 people)
+    """
+
+    def __init__(self, lags):
+        if not isinstance(lags, Lags):
+            raise ValueError(
+                "lags must be a report of lags, PartSynchronizer.lags(X); got "
+                f"{type(lags).__name__}."
+            )
+        self.lags = lags
+
+    def __repr__(self):
+        return f"LagDisplay({self._describe()})"
+
+    @classmethod
+    def from_estimator(
+        cls,
+        estimator,
+        X,
+        *,
+        groups=None,
+        against="rest",
+        unit="percent",
+        frame_rate=None,
+        ax=None,
+        colorbar=True,
+        **params,
+    ):
+        """Draw the lags of performances.
+
+        Parameters
+        ----------
+        estimator : PartSynchronizer, or Pipeline with one
+            Fitted.
+        X : performances, as the estimator takes them
+        groups, against, unit, frame_rate
+            As in ``PartSynchronizer.lags``.
+        ax : Axes, or one for the map and one for each part, default=None
+        colorbar : bool, default=True
+        **params : dict
+            What steps before take besides.
+
+        Returns
+        -------
+        LagDisplay
+        """
+        caller = f"{cls.__name__}.from_estimator"
+        reached = reach_synchronizer(estimator, X, params, caller, kind=PartSynchronizer)
+        how = {"against": against, "unit": unit, "frame_rate": frame_rate}
+        lags = reached.synchronizer.lags(reached.performances, groups, **how)
+        return cls(lags).plot(ax, colorbar=colorbar)
+
+    @classmethod
+    def from_predictions(cls, lags, *, ax=None, colorbar=True):
+        """Draw a report of lags.
+
+        Parameters
+        ----------
+        lags : Lags
+        ax : Axes, or one for the map and one for each part, default=None
+        colorbar : bool, default=True
+
+        Returns
+        -------
+        LagDisplay
+        """
+        return cls(lags).plot(ax, colorbar=colorbar)
+
+    def plot(self, ax=None, *, colorbar=True):
+        """Draw.
+
+        Parameters
+        ----------
+        ax : Axes, or one for the map and one for each part, default=None
+        colorbar : bool, default=True
+
+        Returns
+        -------
+        self
+        """
+        n_parts, n_frames = self.lags.values.shape[1:]
+        spots = [(0, slice(None)), *((1, i) for i in range(n_parts))]
+        size = (max(5.0, 1.9 * n_parts), 3.4 + 0.25 * n_parts)
+        self.figure_, (self.map_ax_, *self.axes_) = panels(ax, spots, 2, n_parts, size)
+        axis = TimeAxis("frames" if self.lags.unit == "frames" else "percent", n_frames)
+        table = self.lags.over_time()
+        columns = {
+            name: table[name].to_numpy().reshape(n_parts, n_frames)
+            for name in ("mean", "sd", "low", "high")
+        }
+        self._draw_map(axis, columns, colorbar)
+        self._draw_curves(axis, columns)
+        return self
+
+    def _draw_map(self, axis, columns, colorbar):
+        mean, top = columns["mean"], self.map_ax_
+        largest = np.abs(mean).max() or 1.0
+        self.map_ = top.pcolormesh(
+            axis.clock,
+            np.arange(len(mean)),
+            mean,
+            cmap="RdBu_r",
+            vmin=-largest,
+            vmax=largest,
+            shading="nearest",
+            rasterized=True,
+        )
+        # What is not known to be another lag than none is not told from it.
+        unsure = ~((columns["low"] > 0) | (columns["high"] < 0))
+        self.unsure_ = [
+            top.fill_between(
+                axis.clock,
+                i - 0.5,
+                i + 0.5,
+                where=where,
+                step="mid",
+                facecolor="none",
+                edgecolor="0.35",
+                hatch="////",
+                linewidth=0,
+            )
+            for i, where in enumerate(unsure)
+        ]
+        top.set_yticks(range(len(mean)), self._names())
+        top.set_ylim(len(mean) - 0.5, -0.5)
+        top.set_xlim(axis.clock[0], axis.clock[-1])
+        top.set_xlabel(axis.label)
+        top.set_title(self._describe(), fontsize="medium")
+        top.grid(False)
+        self.colorbar_ = None
+        if colorbar:
+            self.colorbar_ = self.figure_.colorbar(self.map_, ax=top)
+            self.colorbar_.set_label(f"mean lag, {_UNITS[self.lags.unit]}")
+
+    def _draw_curves(self, axis, columns):
+        self.means_, self.intervals_, self.spreads_ = [], [], []
+        mean, sd = columns["mean"], np.nan_to_num(columns["sd"])
+        reach = 1.05 * max((np.abs(mean) + sd).max(), 1e-9)
+        for i, ax in enumerate(self.axes_):
+            ax.axhline(0, color="0.3", linewidth=0.8)
+            style = {"color": COLORS["envelope"], "alpha": 0.6, "linewidth": 0}
+            ends = columns["low"][i], columns["high"][i]
+            self.intervals_.append(ax.fill_between(axis.clock, *ends, **style))
+            ends = mean[i] - sd[i], mean[i] + sd[i]
+            style = {"colors": COLORS["pattern"], "linewidths": 0.9, "linestyles": "--"}
+            self.spreads_.append(curves(ax, [axis.clock] * 2, ends, **style))
+            self.means_.append(front_line(ax, axis.clock, mean[i], color=COLORS["mean"]))
+            ax.set_title(self.lags.parts[i], fontsize="small")
+            ax.set_xlim(axis.clock[0], axis.clock[-1])
+            ax.set_ylim(-reach, reach)
+            ax.set_xlabel(axis.label, fontsize="small")
+            if i:
+                ax.tick_params(labelleft=False)
+        self.axes_[0].set_ylabel(f"late by, {_UNITS[self.lags.unit]}")
+        who = "performances" if self.lags.groups is None else "people"
+        handles = [self.means_[0], self.intervals_[0], self.spreads_[0]]
+        labels = [
+            "mean",
+            f"95 % interval of the mean, over {who}",
+            "an SD of performances beside it",
+        ]
+        legend_above(self.axes_, handles, labels)
+
+    def _names(self):
+        """Names of the parts, with their repeatability where it is known."""
+        if self.lags.groups is None:
+            return list(self.lags.parts)
+        icc = self.lags.summary()["icc"]
+        return [f"{part} (ICC {x:.2f})" if x == x else part for part, x in icc.items()]
+
+    def _describe(self):
+        n_sequences, n_parts = self.lags.values.shape[:2]
+        behind = _BEHIND.get(self.lags.against, f"the {self.lags.against}")
+        parts = f"{n_parts} parts" if n_parts > 1 else self.lags.parts[0]
+        people = ""
+        if self.lags.groups is not None:
+            people = f" of {len(np.unique(self.lags.groups))} people"
+        count = f"{n_sequences} performance{'s' * (n_sequences != 1)}"
+        return f"{parts} behind {behind}, {count}{people}"

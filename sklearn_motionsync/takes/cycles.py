@@ -1,0 +1,392 @@
+"""CycleSegmenter: long takes of a movement that repeats, cut into its cycles."""
+
+from numbers import Integral, Real
+
+import numpy as np
+import pandas as pd
+from sklearn.base import BaseEstimator, _fit_context, clone
+from sklearn.utils._param_validation import Interval, StrOptions
+from sklearn.utils.validation import check_is_fitted
+
+from ..body.skeleton import Skeleton
+from ..fitting import at_once, of_one_state
+from ..gate import as_numbers
+from ..notebook import DocumentedMixin
+from ..performances import check_performances
+from ..sequences import as_collection
+from ..tables import as_pandas
+from .circular import PHASES, Sampled, average, cycles_of, follow, keep_pace, top_of
+from .compared import compared, names_of_compared, start_curves
+from .origin import cut_takes
+from .self_correlation import LEAST_CYCLES, correlate
+
+__all__ = ["CycleSegmenter", "examined", "taken"]
+
+# How often the takes are matched to the template in a fit, which is estimated again each time.
+_ROUNDS = 2
+_COLUMNS = {"take": int, "start": int, "stop": int, "complete": bool, "score": float}
+
+
+class CycleSegmenter(DocumentedMixin, BaseEstimator):
+    """Cut long takes of walking, running, or any movement that repeats, into its cycles.
+
+    1. Find the period of each take from its self-correlation, and whether it has one:
+       `self_correlation`.
+    2. Average the cycles of all takes at constant period: the template of one cycle.
+    3. Let every take follow the template, repeated without end, by dense matching: the phase wraps,
+       and begins and ends anywhere. Average again, twice.
+    4. Let the template begin where a foot is farthest ahead, or a feature has its maximum.
+    5. Cut where the phase of a take is a whole number.
+
+    Takes that are segmented later follow the template of ``fit``, so that all are cut at the same
+    phase. One take makes several performances, which `transform` may not do: use `segment`.
+
+    Parameters
+    ----------
+    skeleton : Skeleton, default=None
+        That of takes of joint positions: directions of limbs are compared then, so that neither
+        path nor heading matters, and the positions are cut as they are. None compares the features
+        as they are, of which those with the largest variance count most.
+    start : {"left", "right", "ahead"}, str or int, default=None
+        Where cycles begin. With a skeleton ``"left"`` or ``"right"``: where that ankle is farthest
+        ahead of the pelvis, about when the foot strikes; ``"ahead"``: that of the foot which comes
+        farther. Or a feature of what is compared, by name or index: where it has its maximum.
+        None is ``"ahead"`` where the skeleton has feet, otherwise the feature that repeats best.
+    threshold : float, default=0.4
+        The self-correlation from which a take is cyclic, from 0 to 1. Fixed on walks, runs, and
+        single actions of people.
+    refine : bool, default=True
+        Whether takes follow the template; False cuts at their constant mean period.
+    incomplete : bool, default=False
+        Whether what comes before the first and after the last whole cycle is given, too.
+    not_cyclic : {"raise", "skip"}, default="raise"
+        What is done with a take without a cycle, or with fewer than 1.6 of them.
+
+    Attributes
+    ----------
+    template_ : ndarray, shape (32, 2 * n_compared)
+        The mean cycle from its start on: postures as deviations from the mean of a take, and
+        velocities, both in units of their own size.
+    start_ : str
+        What begins a cycle: ``"left"``, ``"right"``, or the name of a feature.
+    periods_ : ndarray, shape (n_takes,)
+        Frames of a cycle of each take, NaN for those that were left out.
+    n_features_in_ : int
+        Features of a frame.
+    feature_names_in_ : ndarray of str
+        Names of the columns; only if the input had names.
+
+    See Also
+    --------
+    self_correlation : The first step by itself.
+    datasets.cut_at_events : Where events are known.
+
+    Notes
+    -----
+    A cycle lasts at least half of the mean one of its take. Pace may change slowly by a fifth and
+    more. A template is not to be expected from takes of different movements: fit each by
+    itself. Features of different units are to be scaled before, ``FrameWise(StandardScaler())``.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync import CycleSegmenter
+    >>> from sklearn_motionsync.datasets import make_gait
+    >>> bunch = make_gait(4, n_cycles=5, takes=True, random_state=0)
+    >>> segmenter = CycleSegmenter(start=0).fit(bunch.data[:3])
+    >>> cycles, origin = segmenter.segment(bunch.data[3:])
+    >>> len(cycles), cycles[0].shape[1]
+    (5, 4)
+    >>> origin[["take", "start", "stop"]].iloc[0].tolist()
+    [0, 18, 119]
+    >>> segmenter.report([bunch.data[3], bunch.data[3][:155]])["reason"].tolist()
+    ['', 'holds 1.55 cycles']
+    """
+
+    _parameter_constraints: dict = {
+        "skeleton": [Skeleton, None],
+        "start": [str, Integral, None],
+        "threshold": [Interval(Real, 0, 1, closed="both")],
+        "refine": ["boolean"],
+        "incomplete": ["boolean"],
+        "not_cyclic": [StrOptions({"raise", "skip"})],
+    }
+
+    def __init__(
+        self,
+        skeleton=None,
+        start=None,
+        threshold=0.4,
+        refine=True,
+        incomplete=False,
+        not_cyclic="raise",
+    ):
+        self.skeleton = skeleton
+        self.start = start
+        self.threshold = threshold
+        self.refine = refine
+        self.incomplete = incomplete
+        self.not_cyclic = not_cyclic
+
+    @at_once
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X, y=None):
+        """Learn one cycle, and where it begins.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or one take (n_frames, n_features)
+            Takes.
+        y : ignored
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        ValueError
+            If the input breaks the contract, a take is not cyclic or too short and
+            ``not_cyclic="raise"``, or none is left; or there is no such `start`.
+        """
+        given, takes = taken(self, X, reset=True)
+        features, found = examined(given, takes, self.skeleton)
+        kept = self._kept(takes, found)
+        if not kept:
+            raise ValueError(
+                f"None of the {len(takes)} takes is cyclic: {_reason(found[0], self.threshold)} is "
+                "take 0. See report(X); give takes that repeat, or another threshold."
+            )
+        curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
+        sampled = [Sampled(features[i], found[i].period) for i in kept]
+        values = [take.values for take in sampled]
+        phases = self._together(sampled)
+        self.start_, begin = self._begin(curves, sampled, phases)
+        self.template_ = average(values, [p - begin for p in phases])
+        self.periods_ = np.array([f.period for f in found])
+        self.periods_[[i for i in range(len(takes)) if i not in kept]] = np.nan
+        return self
+
+    @of_one_state
+    def segment(self, X):
+        """Cut takes into cycles.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or one take (n_frames, n_features)
+
+        Returns
+        -------
+        performances : list of ndarray, or of DataFrame, (n_frames_i, n_features)
+            The cycles, take by take, by time. They hold the frame in which the next one begins,
+            too: first and last frame show the same phase. Those of DataFrames are called by the
+            label of the take and their number, so that `to_frame` makes one table of them.
+        origin : DataFrame
+            One row a performance: ``take``, index or label of the take, to group by; ``start`` and
+            ``stop``, frames of the take, of which the last is excluded; ``complete``, whether it is
+            a whole cycle; ``score``, its likeness to the template, 1 at most.
+
+        Raises
+        ------
+        ValueError
+            As from ``fit``; but the lists are empty if no take is left.
+        """
+        check_is_fitted(self)
+        given, takes = taken(self, X, reset=False)
+        rows = []
+        for i, take, phases in self._phases(given, takes):
+            rows += [(i, *row) for row in cycles_of(take, phases, self.template_, self.incomplete)]
+        table = pd.DataFrame(rows, columns=list(_COLUMNS)).astype(_COLUMNS)
+        return cut_takes(given, takes, table)
+
+    @at_once
+    def fit_segment(self, X, y=None):
+        """Fit, and cut the same takes.
+
+        Parameters
+        ----------
+        X : as in ``fit``
+        y : ignored
+
+        Returns
+        -------
+        performances, origin
+            As from ``segment``.
+        """
+        return self.fit(X).segment(X)
+
+    @of_one_state
+    def phases(self, X):
+        """The phase of every frame.
+
+        Parameters
+        ----------
+        X : as in ``segment``
+
+        Returns
+        -------
+        list of ndarray (n_frames_i,)
+            In cycles: whole numbers where a cycle begins, from 0 to 1 at the first frame. NaN for
+            takes that are skipped.
+        """
+        check_is_fitted(self)
+        given, takes = taken(self, X, reset=False)
+        out = [np.full(len(take), np.nan) for take in takes]
+        for i, take, phases in self._phases(given, takes):
+            out[i] = take.at_frames(phases)
+        return out
+
+    def report(self, X):
+        """What the self-correlation says of takes; it needs no fit.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or one take (n_frames, n_features)
+
+        Returns
+        -------
+        DataFrame
+            One row a take, indexed by its label: ``n_frames``; ``period``, frames of a cycle, NaN
+            without any; ``n_cycles``; ``strength``, the self-correlation at the period; ``cyclic``,
+            whether it can be segmented; and the ``reason`` why not.
+        """
+        self._validate_params()
+        given, takes = taken(clone(self), X, reset=True)
+        _, found = examined(given, takes, self.skeleton)
+        reasons = [_reason(f, self.threshold) for f in found]
+        return pd.DataFrame(
+            {
+                "n_frames": [len(take) for take in takes],
+                "period": [f.period for f in found],
+                "n_cycles": [f.n_cycles for f in found],
+                "strength": [f.strength for f in found],
+                "cyclic": [not reason for reason in reasons],
+                "reason": reasons,
+            },
+            index=pd.Index(takes.labels, tupleize_cols=False, name="take"),
+        )
+
+    def periods(self, X):
+        """Mean frames of a cycle of each take, with fractions; NaN of takes that are not cyclic.
+
+        Parameters
+        ----------
+        X : as in ``report``
+
+        Returns
+        -------
+        ndarray, shape (n_takes,)
+        """
+        report = self.report(X)
+        return report["period"].where(report["cyclic"]).to_numpy()
+
+    def is_cyclic(self, X):
+        """Whether takes can be segmented; it needs no fit.
+
+        Parameters
+        ----------
+        X : as in ``report``
+
+        Returns
+        -------
+        ndarray of bool, shape (n_takes,)
+        """
+        return self.report(X)["cyclic"].to_numpy()
+
+    # -- what fit and answers share ---------------------------------------------------------
+
+    def _kept(self, takes, found):
+        """Indices of the takes that have cycles; a refusal, if others are not to be skipped."""
+        reasons = [_reason(f, self.threshold) for f in found]
+        bad = next((i for i, reason in enumerate(reasons) if reason), None)
+        if bad is not None and self.not_cyclic == "raise":
+            what, strength = _name_take(takes, bad), found[bad].strength
+            short = reasons[bad].startswith("holds")
+            why = (
+                f"{reasons[bad]} of about {found[bad].period:.0f} frames, and {LEAST_CYCLES} are "
+                "needed to see that it repeats. Give a longer take"
+                if short
+                else f"is not cyclic, or has less than {LEAST_CYCLES} cycles: its self-correlation "
+                f"has the strength {strength:.2f}, below threshold={self.threshold:g}. Leave it out"
+            )
+            raise ValueError(f'{what} {why}, or set not_cyclic="skip"; report(X) tells of all.')
+        return [i for i, reason in enumerate(reasons) if not reason]
+
+    def _phases(self, given, takes):
+        """Yield the index of every take with cycles, its samples, and their phases."""
+        features, found = examined(given, takes, self.skeleton)
+        step = follow if self.refine else keep_pace
+        for i in self._kept(takes, found):
+            take = Sampled(features[i], found[i].period)
+            phases = step(self.template_, take)
+            yield i, take, phases - np.floor(phases[0])
+
+    def _together(self, sampled):
+        """Phases of takes that have no template yet: each makes that of the next ones better."""
+        values, phases = [take.values for take in sampled], []
+        for k, take in enumerate(sampled):
+            known = keep_pace(average(values[:k], phases), take) if k else take.pace
+            phases.append(known)
+        for _ in range(_ROUNDS if self.refine else 0):
+            template = average(values, phases)
+            phases = [follow(template, take) for take in sampled]
+        return phases
+
+    def _begin(self, curves, sampled, phases):
+        """What begins a cycle, and at which phase of the template."""
+        if curves is None:
+            width = sampled[0].values.shape[1] // 2
+            values = [take.values[:, :width] for take in sampled]
+            mean = average(values, phases)
+            repeats = np.square(mean).mean(axis=0)
+            moves = np.square(np.concatenate(values)).mean(axis=0)
+            best = int(np.argmax(repeats / np.where(moves > 0, moves, np.inf)))
+            return names_of_compared(self)[best], top_of(mean[:, best]) / PHASES
+        cycles = {
+            name: average(
+                [take.sample(c[:, np.newaxis]) for take, c in zip(sampled, of_all, strict=True)],
+                phases,
+            )[:, 0]
+            for name, of_all in curves.items()
+        }
+        name = max(cycles, key=lambda name: cycles[name].max())
+        return name, top_of(cycles[name]) / PHASES
+
+
+def taken(segmenter, X, *, reset):
+    """Takes as they were given, a single one as a list, and checked."""
+    X = X if as_collection(X) is not None else [_single(as_pandas(X))]
+    takes = check_performances(segmenter, X, reset=reset, level="sequence")
+    return as_collection(X), takes
+
+
+def _single(X):
+    """One take (n_frames, n_features)."""
+    if isinstance(X, pd.DataFrame):
+        return X
+    take = as_numbers(X, "The take")
+    if take.ndim != 2:
+        raise ValueError(
+            f"Expected 2D array, one take (n_frames, n_features), or a list of takes; got an array "
+            f"of shape {take.shape}. Reshape your data: a single feature is a column, "
+            "x[:, np.newaxis]."
+        )
+    return take
+
+
+def examined(given, takes, skeleton):
+    """What is compared of takes, and their self-correlations."""
+    features = compared(given, takes, skeleton)
+    return features, [correlate(x) for x in features]
+
+
+def _reason(found, threshold):
+    """Why a take cannot be segmented; empty, if it can."""
+    if not found.n_cycles or found.strength < threshold:
+        return "not cyclic"
+    enough = found.n_cycles >= LEAST_CYCLES
+    return "" if enough else f"holds {np.floor(100 * found.n_cycles) / 100:.2f} cycles"
+
+
+def _name_take(takes, i):
+    label = takes.labels[i]
+    return f"Take {i}" if label == i else f"Take {i} ({label!r})"

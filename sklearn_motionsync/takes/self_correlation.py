@@ -1,0 +1,186 @@
+"""How much a take is like itself some time later: what tells its period, or that it has none."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+
+from ..body.direction_cosines import DirectionCosines
+from ..matching.filters import smooth
+from ..sequences import check_members
+from ..tables import as_pandas
+
+__all__ = ["LEAST_CYCLES", "SelfCorrelation", "correlate", "self_correlation"]
+
+# Of shorter takes nobody can say that they repeat.
+LEAST_CYCLES = 1.6
+# The shortest overlap of a take with itself, as a share of it.
+_OVERLAP = 0.3
+# The first peak counts that comes so near to the highest: multiples of a period have peaks, too.
+_NEAR = 0.9
+# Before a peak the correlation falls below this share of it; what does not is a ripple of noise.
+_FALL = 0.5
+# Width of the smoothing, as a share of the time in which the movement changes.
+_SMOOTHING = 1 / 4
+# Variances below this share of the whole are rounding.
+_NOTHING = 1e-12
+
+
+class SelfCorrelation(NamedTuple):
+    """What `self_correlation` finds.
+
+    Attributes
+    ----------
+    correlation : ndarray, shape (n_lags,)
+        Of the take with itself a number of frames later, from -1 to 1: the mean of the two that
+        follow. Lags are 0, 1, ... frames, up to 70 % of the take.
+    posture, velocity : ndarray, shape (n_lags,)
+        Of where the movement is, and of how it goes on.
+    peaks : ndarray of int
+        Lags of those maxima before which the correlation falls below half of them.
+    period : float
+        Frames of a cycle, with fractions: where the first peak is that reaches 90 % of the highest.
+        NaN without any.
+    strength : float
+        The correlation there, 0 without any.
+    n_cycles : float
+        Frames of the take by those of a cycle; 0 without any.
+    """
+
+    correlation: np.ndarray
+    posture: np.ndarray
+    velocity: np.ndarray
+    peaks: np.ndarray
+    period: float
+    strength: float
+    n_cycles: float
+
+
+def self_correlation(take, skeleton=None):
+    r"""Compare a take with itself at every lag: what repeats is like itself after a period.
+
+    Of a lag :math:`L` it compares the frames :math:`a(t) = x(t)` and :math:`b(t) = x(t + L)`, from
+    which the means of this overlap are taken:
+
+    .. math:: r(L) = \frac{\sum_t \langle a(t), b(t) \rangle}
+              {\sqrt{\sum_t |a(t)|^2 \; \sum_t |b(t)|^2}}
+
+    The correlation is the mean of that of the postures and that of their velocities. Velocity by
+    itself takes one stroke of several for the whole; posture by itself sees slow changes. Lags are
+    those at which at least 30 % of the take overlap.
+
+    Parameters
+    ----------
+    take : array-like or DataFrame, shape (n_frames, n_features)
+    skeleton : Skeleton, default=None
+        That of joint positions, whose direction cosines are compared; None compares the features
+        as they are, of which those with the largest variance count most.
+
+    Returns
+    -------
+    SelfCorrelation
+
+    Raises
+    ------
+    ValueError
+        If the take breaks the contract of one performance.
+
+    See Also
+    --------
+    CycleSegmenter : Cuts takes into cycles.
+
+    Notes
+    -----
+    Postures are smoothed by a Gaussian, a fourth as wide as the root of their variance by that of
+    their change in a frame: of a sine, a twenty-fifth of its period. Time and memory grow with the
+    take as a Fourier transform of it does.
+
+    References
+    ----------
+    H. Ning, T. Tan, L. Wang, W. Hu: Kinematics-based tracking of human walking in monocular video
+    sequences. Image and Vision Computing 22 (2004) 429-441.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn_motionsync import self_correlation
+    >>> t = np.arange(200)
+    >>> take = np.column_stack([np.sin(2 * np.pi * t / 63), np.cos(2 * np.pi * t / 63)])
+    >>> found = self_correlation(take)
+    >>> round(found.period, 1), round(found.strength, 2), round(found.n_cycles, 1)
+    (63.0, 1.0, 3.2)
+    >>> self_correlation(take[:70]).period
+    nan
+    """
+    take = as_pandas(take)
+    (array,), _ = check_members([take])
+    if skeleton is not None:
+        (array,) = DirectionCosines(skeleton).fit_transform([take])
+    return correlate(np.asarray(array))
+
+
+def correlate(x):
+    """`self_correlation` of features (n_frames, n_features) that were checked."""
+    n_frames = len(x)
+    x = x.astype(np.float64) - x[0]
+    # In units of a power of two no square is out of range.
+    x = np.ldexp(x, -int(np.frexp(np.abs(x).max())[1]))
+    x -= x.mean(axis=0)
+    width, n_lags = _width(x), int((1 - _OVERLAP) * n_frames) + 1
+    posture, velocity = (
+        _normalized(smooth(x[np.newaxis], width, order)[0], n_lags) for order in (0, 1)
+    )
+    correlation = (posture + velocity) / 2
+    peaks = _peaks_of(correlation, posture)
+    if len(peaks) == 0:
+        return SelfCorrelation(correlation, posture, velocity, peaks, np.nan, 0.0, 0.0)
+    lags, values = _vertices(correlation, peaks)
+    first = int(np.argmax(values >= _NEAR * values.max()))
+    period, strength = float(lags[first]), float(values[first])
+    n_cycles = n_frames / period
+    return SelfCorrelation(correlation, posture, velocity, peaks, period, strength, n_cycles)
+
+
+def _width(x):
+    """Standard deviation, in frames, of a Gaussian that leaves the movement of centred features."""
+    change, bend = (np.square(np.diff(x, k, axis=0)).sum() / max(len(x) - k, 1) for k in (1, 2))
+    # White noise adds 2 to the square of a change where it adds 6 to that of a second difference.
+    change = max(change - bend / 3, change / 100)
+    return _SMOOTHING * np.sqrt(np.square(x).sum() / len(x) / change) if change > 0 else 0.0
+
+
+def _normalized(x, n_lags):
+    """The correlation of features with themselves at every lag, means of each overlap removed."""
+    n, lags = len(x), np.arange(n_lags)
+    x = x - x.mean(axis=0)
+    size = next_fast_len(2 * n, real=True)
+    spectrum = rfft(x, size, axis=0)
+    products = irfft((spectrum.real**2 + spectrum.imag**2).sum(axis=1), size)[:n_lags]
+    counts = n - lags
+    sums = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(x, axis=0)])
+    energy = np.concatenate([[0], np.cumsum(np.square(x).sum(axis=1))])
+    early, late = sums[counts], sums[n] - sums[lags]
+    of_early = energy[counts] - np.square(early).sum(axis=1) / counts
+    of_late = energy[n] - energy[lags] - np.square(late).sum(axis=1) / counts
+    products -= (early * late).sum(axis=1) / counts
+    least = _NOTHING * energy[n]
+    moves = (of_early > least) & (of_late > least)
+    out = np.zeros(n_lags)
+    out[moves] = products[moves] / np.sqrt(of_early[moves] * of_late[moves])
+    return out
+
+
+def _peaks_of(correlation, posture):
+    """Maxima above 0 before which that of the postures falls below half of them."""
+    inner, before, after = correlation[1:-1], correlation[:-2], correlation[2:]
+    peaks = np.flatnonzero((inner > before) & (inner >= after) & (inner > 0)) + 1
+    lowest = np.minimum.accumulate(posture)
+    return peaks[lowest[peaks] < _FALL * correlation[peaks]]
+
+
+def _vertices(correlation, peaks):
+    """Where parabolas through peaks and their neighbours have their maxima, and these."""
+    before, here, after = (correlation[peaks + k] for k in (-1, 0, 1))
+    bend = before - 2 * here + after
+    offsets = (before - after) / (2 * bend)
+    return peaks + offsets, here - bend * offsets**2 / 2

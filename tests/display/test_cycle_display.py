@@ -1,0 +1,79 @@
+"""What the display of cycles draws, read back from its artists."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from sklearn_motionsync import CycleDisplay, CycleSegmenter, self_correlation
+from sklearn_motionsync.datasets import make_bending, make_gait
+
+GAIT = make_gait(2, 4, takes=True, random_state=0)
+HIP = 0
+
+
+@pytest.fixture(scope="module")
+def segmenter():
+    return CycleSegmenter(start=HIP, incomplete=True).fit(GAIT.data)
+
+
+def test_it_draws_the_numbers_of_the_estimator(segmenter):
+    take = GAIT.data[1]
+    display = CycleDisplay.from_estimator(
+        segmenter, GAIT.data, take=1, unit="seconds", frame_rate=100
+    )
+    found = self_correlation(take)
+    np.testing.assert_array_equal(display.correlation_.get_ydata(), found.correlation)
+    np.testing.assert_allclose(display.peaks_.get_xdata(), found.peaks / 100)
+    assert display.period_.get_xdata()[0] == pytest.approx(found.period / 100)
+    assert display.threshold_.get_ydata()[0] == 0.4
+    np.testing.assert_allclose(display.curve_.get_xdata(), np.arange(len(take)) / 100)
+    np.testing.assert_array_equal(display.curve_.get_ydata(), take[:, HIP])
+    origin = segmenter.segment([take])[1]
+    cuts = [segment[0, 0] for segment in display.cuts_.get_segments()]
+    np.testing.assert_allclose(cuts[:-1], origin["start"][origin["complete"]] / 100)
+    assert [a.get_xlabel() for a in display.axes_] == ["lag (s)", "time of the take (s)"]
+    assert display.axes_[1].get_ylabel() == "x0"
+    cycles = len(cuts) - 1
+    assert repr(display).endswith(f"period {found.period:.1f} frames, {cycles} whole cycles)")
+    other = CycleDisplay.from_estimator(segmenter, GAIT.data, feature="x2", unit="percent")
+    np.testing.assert_array_equal(other.curve_.get_ydata(), GAIT.data[0][:, 2])
+    assert other.curve_.get_xdata()[-1] == 100
+
+
+def test_a_take_that_is_refused_is_drawn_without_cuts():
+    """A fit is not needed for that."""
+    bunch = make_bending(1, random_state=0)
+    display = CycleDisplay.from_estimator(CycleSegmenter(bunch.skeleton), bunch.data)
+    assert (display.period_, len(display.cuts_.get_segments())) == (None, 0)
+    assert display.axes_[0].get_title() == "not cyclic"
+    assert display.axes_[1].get_ylabel() == "left ankle ahead (legs)"
+
+
+def test_axes_that_are_given(segmenter):
+    _, axes = plt.subplots(2)
+    display = CycleDisplay.from_estimator(segmenter, GAIT.data, ax=axes)
+    assert display.axes_ == list(axes)
+    assert display.plot(plt.figure().add_subplot()).axes_ != list(axes)
+
+
+def test_what_is_refused(segmenter):
+    for change, message in (
+        ({"take": 2}, "take must be from 0 to 1, got"),
+        ({"feature": "knee"}, "no feature 'knee'"),
+        ({"unit": "hours"}, "unit must be one of"),
+        ({"unit": "seconds"}, "needs frame_rate"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            CycleDisplay.from_estimator(segmenter, GAIT.data, **change)
+    with pytest.raises(ValueError, match="Give a CycleSegmenter, got int"):
+        CycleDisplay.from_estimator(1, GAIT.data)
+    good = {"correlation": [1, 0, 0.5, 0], "peaks": [2], "curve": np.zeros(5), "cuts": [0, 2]}
+    assert repr(CycleDisplay(**good, period=2.1).plot()).startswith("CycleDisplay(5 frames")
+    for change, message in (
+        ({"correlation": [[1]]}, "The correlation must have the shape"),
+        ({"peaks": [4]}, "peaks must be whole numbers from 0 to 3"),
+        ({"cuts": [0.5]}, "cuts must be whole numbers from 0 to 4"),
+        ({"period": 9}, "period must be a lag"),
+        ({"threshold": "high"}, "threshold must be a number"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            CycleDisplay(**good | change)

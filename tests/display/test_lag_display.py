@@ -1,0 +1,77 @@
+"""What the display of lags draws, read back from its map and curves."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import DirectionCosines, LagDisplay, Lags, PartSynchronizer
+from sklearn_motionsync.datasets import make_bending
+
+N_FRAMES = 21
+
+
+@pytest.fixture(scope="module")
+def lags():
+    """Of twelve performances of four people; the arm is late in the second half, the leg never."""
+    rng, groups = np.random.default_rng(0), np.repeat(range(4), 3)
+    values = rng.normal(0, 0.3, (12, 2, N_FRAMES))
+    values[:, 0, 11:] += 5
+    return Lags(values, ["arm", "leg"], "rest", "frames", groups, list("abcd"))
+
+
+def test_the_map_shows_the_mean_and_where_it_is_not_told_from_none(lags):
+    display = LagDisplay.from_predictions(lags)
+    table = lags.over_time()
+    np.testing.assert_array_equal(display.map_.get_array().ravel(), table["mean"])
+    low, high = display.map_.get_clim()
+    assert low == -high == -table["mean"].abs().max()
+    arm, leg = (patch.get_paths() for patch in display.unsure_)
+    assert max(path.vertices[:, 0].max() for path in arm) < 12
+    assert max(path.vertices[:, 0].max() for path in leg) > 15
+    assert all(patch.get_hatch() for patch in display.unsure_)
+    title = "2 parts behind the rest of the body, 12 performances of 4 people"
+    assert display.map_ax_.get_title() == title
+    names = [label.get_text() for label in display.map_ax_.get_yticklabels()]
+    icc = lags.summary()["icc"]
+    assert names == [f"arm (ICC {icc['arm']:.2f})", f"leg (ICC {icc['leg']:.2f})"]
+
+
+def test_the_curves_show_the_spread(lags):
+    display = LagDisplay.from_predictions(lags, colorbar=False)
+    assert display.colorbar_ is None
+    for i, part in enumerate(["arm", "leg"]):
+        table = lags.over_time().loc[part]
+        np.testing.assert_array_equal(display.means_[i].get_ydata(), table["mean"])
+        drawn = [np.array(line)[:, 1] for line in display.spreads_[i].get_segments()]
+        np.testing.assert_allclose(
+            drawn, [table["mean"] - table["sd"], table["mean"] + table["sd"]]
+        )
+        heights = display.intervals_[i].get_paths()[0].vertices[:, 1]
+        assert (heights.min(), heights.max()) == pytest.approx(
+            (table["low"].min(), table["high"].max())
+        )
+    assert "over people" in display.axes_[0].get_legend().get_texts()[1].get_text()
+
+
+def test_one_performance_has_no_interval(lags):
+    display = LagDisplay.from_predictions(Lags(lags.values[:1], lags.parts, "leg", "percent"))
+    assert display.map_ax_.get_title() == "2 parts behind the leg, 1 performance"
+    assert display.unsure_[0].get_paths()
+    assert display.map_ax_.get_xlim() == (0, 100)
+
+
+def test_of_a_pipeline_on_given_axes():
+    bunch = make_bending(4, n_frames=30, random_state=0)
+    sync = PartSynchronizer(coupling=0.01, n_frames=30, metric=None, consensus=1)
+    pipe = make_pipeline(DirectionCosines(bunch.skeleton), sync).fit(bunch.data)
+    ax = plt.figure().subplots(1, 2)[1]
+    display = LagDisplay.from_estimator(pipe, bunch.data, against="trunk", unit="frames", ax=ax)
+    X = pipe[:-1].transform(bunch.data)
+    np.testing.assert_array_equal(display.lags.values, sync.lags(X, against="trunk").values)
+    assert display.figure_ is ax.figure
+    assert [a.get_title() for a in display.axes_] == display.lags.parts
+
+
+def test_what_is_no_report_is_refused(lags):
+    with pytest.raises(ValueError, match=r"lags must be a report of lags.*got ndarray"):
+        LagDisplay(lags.values)

@@ -1,0 +1,368 @@
+"""Parts of the body with warps of their own: lags put in come back, and the coupling takes them."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import f_oneway, ttest_1samp
+from sklearn import clone
+from sklearn_motionsync import (
+    DenseSynchronizer,
+    DirectionCosines,
+    Lags,
+    PartSynchronizer,
+    Skeleton,
+    to_frame,
+)
+from sklearn_motionsync.datasets import load_performances, make_bending
+
+PARTS = ["left arm", "right arm", "left leg", "right leg", "trunk"]
+ARMS = {name: Skeleton.paper().parts()[name] for name in ("right arm", "left arm")}
+P = 100
+
+
+def lag_of(size, share):
+    """A smooth lag of so many frames of 100, at shares of the clip."""
+    return size * np.sin(np.pi * share) ** 2
+
+
+def delayed(x, columns, size):
+    """A performance, with features that come late."""
+    frames, out = np.arange(len(x)), x.copy()
+    last = frames[-1]
+    at = frames - lag_of(size, frames / last) * last / (P - 1)
+    for k in columns:
+        out[:, k] = np.interp(at, frames, x[:, k])
+    return out
+
+
+def lag_to_find(times, size):
+    """What was met at ``times`` is met that much later: s - lag(s) = times, solved for s."""
+    s = np.linspace(0, P - 1, 9001)
+    return np.interp(times, s - lag_of(size, s / (P - 1)), s) - times
+
+
+@pytest.fixture(scope="module")
+def postures():
+    bunch = make_bending(7, n_frames=60, random_state=0)
+    return DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+
+
+@pytest.fixture(scope="module")
+def fitted(postures):
+    return PartSynchronizer(n_frames=60, coupling=0).fit(postures)
+
+
+@pytest.fixture(scope="module")
+def grabs(real_data):
+    """Real grabs as postures, and who performs."""
+    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    chosen = np.flatnonzero(bunch.target == "grabHighR")
+    postures = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
+    return [x.astype(float) for x in postures], bunch.actor[chosen]
+
+
+# -- real people -------------------------------------------------------------------------
+
+
+def test_a_lag_of_an_arm_comes_back_against_the_pattern_of_other_people(grabs):
+    """Also of the arm that grabs, with which the warp of the whole body goes."""
+    X, actor = grabs
+    sync = PartSynchronizer(ARMS, 0, n_frames=P).fit([X[i] for i in np.where(actor != "bd")[0]])
+    new = [X[i] for i in np.where(actor == "bd")[0]]
+    cases = [(part, size) for part in ARMS for size in (3, 6, 10)]
+    late = [delayed(x, sync.parts_[part], size) for part, size in cases for x in new]
+    lags = sync.lags(new + late)
+    times = sync.match_parts(new)
+    without, *within = lags.values.reshape(-1, len(new), len(ARMS), P)
+    for (part, size), found in zip(cases, within, strict=True):
+        put_in = lag_to_find(times[part].times, size)
+        errors = (found - without)[:, lags.parts.index(part)] - put_in
+        assert np.median(np.abs(errors)) < 1, (part, size)
+
+
+def test_a_lag_of_an_arm_comes_back_against_the_same_clip(grabs):
+    X, _ = grabs
+    sync = PartSynchronizer(ARMS, 0, n_frames=P, pattern=0).fit(X[:6])
+    for part in ARMS:
+        late = [delayed(X[0], sync.parts_[part], size) for size in (3, 6, 10)]
+        put_in = [lag_to_find(np.arange(P), size) for size in (3, 6, 10)]
+        errors = sync.match_parts(late)[part].offsets - put_in
+        assert (np.median(np.abs(errors), axis=1) < 1).all()
+
+
+def test_coupling_takes_lags_away(grabs):
+    X, apart = grabs[0][::4], []
+    for coupling in (0, 1e-4, 1e-3, 1e-2, 1e-1, 1):
+        sync = PartSynchronizer(ARMS, coupling, n_frames=50).fit(X)
+        body, parts = sync.match(X).times, sync.match_parts(X)
+        apart.append([np.abs(parts[name].times - body).mean() for name in ARMS])
+    assert (np.diff(apart, axis=0) < 0).all()
+    assert np.max(apart[-1]) < 0.05
+
+
+# -- what a part is matched by -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("settings", [{}, {"consensus": 0}, {"cost": "elastic", "subframes": 2}])
+def test_the_body_is_matched_as_ever(postures, settings):
+    sync = PartSynchronizer(n_frames=40, **settings).fit(postures)
+    dense = DenseSynchronizer(40, **settings).fit(postures)
+    for own, other in zip(sync.match(postures), dense.match(postures), strict=True):
+        np.testing.assert_array_equal(own, other)
+    assert sync.match_parts(postures).keys() == dict.fromkeys(PARTS).keys()
+
+
+def test_infinite_coupling_is_one_warp_for_all(postures):
+    sync = PartSynchronizer(n_frames=40, coupling=np.inf)
+    expected = DenseSynchronizer(40).fit_transform(postures)
+    np.testing.assert_array_equal(sync.fit_transform(postures), expected)
+    assert not sync.lags(postures).values.any()
+
+
+def test_strong_coupling_comes_close_to_it(postures):
+    sync = PartSynchronizer(n_frames=40, coupling=100).fit(postures)
+    assert np.abs(sync.lags(postures).values).max() < 0.1
+
+
+def test_the_coupling_is_in_mean_squares_and_per_cents_of_the_clock():
+    """The path straight to the pattern, by the smallest sum over all paths, cell by cell."""
+    rng, n, coupling = np.random.default_rng(0), 21, 2e-3
+    X = list(np.cumsum(rng.normal(size=(2, n, 3)), axis=1))
+    settings = {"cost": "posture", "consensus": 0, "max_rate": 2, "smoothness": 0, "n_frames": n}
+    sync = PartSynchronizer({"a": [0, 1]}, coupling, pattern=0, **settings).fit(X)
+    body = sync.match(X).offsets[1]
+    part = np.array(X)[:, :, :2]
+    energy = np.square(part - part.mean(axis=(0, 1))).sum(axis=2).mean()
+    weight = coupling * energy * (100 / (n - 1)) ** 2
+    row = {0: (np.square(part[0][0] - part[1][0]).sum(), [0])}
+    for p in range(1, n):
+        new = {}
+        for q in range(n):
+            ways = [row[q - s] for s in (1, 0, 2) if q - s in row and abs(q - p) <= n // 4]
+            if ways:
+                cost, path = min(ways, key=lambda way: way[0])
+                local = np.square(part[0][p] - part[1][q]).sum() + weight * (q - p - body[p]) ** 2
+                new[q] = cost + local, [*path, q]
+        row = new
+    assert np.any(body)
+    found = sync.match_parts(X)["a"].times[1]
+    # A path stands at whole frames; what is left of one is shared.
+    assert np.abs(found - row[n - 1][1]).max() <= 0.5
+    assert np.abs(found - row[n - 1][1]).mean() < 0.3
+
+
+def test_every_part_is_sampled_at_its_own_times(fitted, postures):
+    out, matches = fitted.transform(postures), fitted.match_parts(postures)
+    np.testing.assert_allclose(out[:, :, 0], fitted.match(postures).warp(postures)[:, :, 0])
+    for name, columns in fitted.parts_.items():
+        own = np.stack(
+            [
+                [np.interp(t * (len(x) - 1) / 59, np.arange(len(x)), x[:, k]) for k in columns]
+                for t, x in zip(matches[name].times, postures, strict=True)
+            ]
+        )
+        np.testing.assert_allclose(out[:, :, columns], own.swapaxes(1, 2), atol=1e-12)
+
+
+def test_without_coupling_a_part_does_not_know_the_others(fitted, postures):
+    """Only the pattern, the exemplars and the metric are everybody's."""
+    shaken = [x.copy() for x in postures]
+    for x in shaken:
+        x[:, fitted.parts_["trunk"]] = x[::-1, fitted.parts_["trunk"]]
+    before, after = fitted.match_parts(postures), fitted.match_parts(shaken)
+    for name in PARTS[:-1]:
+        np.testing.assert_array_equal(before[name].times, after[name].times)
+    assert np.abs(before["trunk"].times - after["trunk"].times).max() > 1
+
+
+def test_what_does_not_move_follows_the_body(postures):
+    X = [np.column_stack([x, np.full(len(x), 3.0)]) for x in postures]
+    sync = PartSynchronizer({"still": [37], "arm": [25, 26, 27]}, 0, n_frames=40).fit(X)
+    match = sync.match_parts(X)["still"]
+    np.testing.assert_array_equal(match.times, sync.match(X).times)
+    assert np.isnan(match.distances).all()
+    assert np.isfinite(sync.transform(X)).all()
+
+
+def test_a_copy_of_a_feature_is_matched_as_the_feature(postures):
+    X = [np.column_stack([x, x[:, [26, 27]]]) for x in postures]
+    parts = {"one": [26, 27], "other": [37, 38]}
+    matches = PartSynchronizer(parts, 0, n_frames=40).fit(X).match_parts(X)
+    np.testing.assert_allclose(matches["one"].times, matches["other"].times, atol=1e-6)
+
+
+def test_neither_unit_nor_jobs_change_a_part(fitted, postures):
+    scaled = [1024 * x for x in postures]
+    sync = clone(fitted).set_params(parts=Skeleton.paper().parts(), n_jobs=2).fit(scaled)
+    for name, match in fitted.match_parts(postures).items():
+        other = sync.match_parts(scaled)[name]
+        np.testing.assert_array_equal(match.times, other.times)
+        alone = sync.match_parts(scaled[2:3])[name]
+        np.testing.assert_array_equal(match.times[2:3], alone.times)
+
+
+# -- which features a part has -----------------------------------------------------------
+
+
+def test_parts_of_the_body_are_known(fitted, postures):
+    by_skeleton = Skeleton.paper().parts()
+    names = DirectionCosines(Skeleton.paper()).fit(make_bending(1).data).get_feature_names_out()
+    tables = [pd.DataFrame(x, columns=names) for x in postures]
+    by_name = PartSynchronizer(n_frames=40).fit(tables).parts_
+    assert [*by_skeleton] == [*by_name] == [*fitted.parts_] == PARTS
+    for name in PARTS:
+        assert by_skeleton[name] == by_name[name].tolist() == fitted.parts_[name].tolist()
+    resampled = [np.float32(x[:-1] + x[1:]) / 2 for x in postures]
+    assert [*PartSynchronizer(n_frames=40).fit(resampled).parts_] == PARTS
+    limbs = {names[k].rsplit("_", 1)[0] for k in by_skeleton["left leg"]}
+    assert limbs == {"left_thigh", "left_leg"}
+    assert sorted(k for part in by_skeleton.values() for k in part) == list(range(1, 37))
+
+
+def test_part_of_a_body_has_some_of_the_parts():
+    leg = {"left_hip": "a", "left_knee": "b", "left_ankle": "c"}
+    assert Skeleton(["a", "b", "c"], [-1, 0, 1], leg, n_dims=2).parts() == {
+        "left leg": [0, 1, 2, 3]
+    }
+
+
+def test_other_features_have_no_parts():
+    X = list(np.cumsum(np.random.default_rng(0).normal(size=(4, 20, 37)), axis=1))
+    sync = PartSynchronizer().fit(X)
+    assert sync.parts_ == sync.match_parts(X) == {}
+    np.testing.assert_array_equal(sync.transform(X), DenseSynchronizer().fit_transform(X))
+    with pytest.raises(ValueError, match=r"no parts that could lag.*skeleton\.parts\(\)"):
+        sync.lags(X)
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ({"arm": [37]}, "Part 'arm': There is no feature 37; there are 37"),
+        ({"arm": ["left"]}, "Part 'arm': There is no feature 'left'"),
+        ({"arm": []}, "Part 'arm': features must name at least one"),
+        ({"arm": None}, "Part 'arm': features must name at least one"),
+        ({"arm": [1, 2], "leg": [2]}, "Feature 'x2' is in part 'arm' and again in 'leg'"),
+        ({"rest": [1]}, "A part must have a name, and not 'rest' or 'body'; got 'rest'"),
+        ({1: [1]}, "A part must have a name"),
+        ([1], "The 'parts' parameter of PartSynchronizer"),
+    ],
+)
+def test_parts_that_are_none(postures, parts, message):
+    with pytest.raises(ValueError, match=message):
+        PartSynchronizer(parts).fit(postures)
+
+
+def test_kinds_of_input(postures):
+    names = [f"f{i}" for i in range(37)]
+    parts = {"arm": ["f25", "f26"], "foot": 36}
+    X = [x.astype(np.float32) for x in postures]
+    sync = PartSynchronizer(parts, n_frames=30).set_output(transform="pandas")
+    out = sync.fit_transform(to_frame(X, columns=names, performances=list("abcdefg")))
+    assert out.loc["c"].shape == (30, 37)
+    assert set(out.dtypes) == {np.dtype(np.float32)}
+    copy = pickle.loads(pickle.dumps(sync))
+    tables = [pd.DataFrame(x, columns=names) for x in X]
+    np.testing.assert_array_equal(copy.transform(tables).to_numpy(), out.to_numpy())
+    lags = sync.lags(to_frame(X, columns=names, performances=list("abcdefg")))
+    assert lags.to_frame().loc["g"].columns.tolist() == ["arm", "foot"]
+
+
+def test_univariate_rows():
+    X = np.cumsum(np.random.default_rng(0).normal(size=(5, 30)), axis=1)
+    sync = PartSynchronizer({"all": 0}, coupling=0).fit(X)
+    assert sync.transform(X).shape == (5, 30)
+    assert sync.lags(X).values.shape == (5, 1, 30)
+
+
+# -- the report --------------------------------------------------------------------------
+
+
+def test_lags_are_differences_of_offsets(fitted, postures):
+    parts, body = fitted.match_parts(postures), fitted.match(postures)
+    offsets = np.stack([parts[name].offsets for name in PARTS], axis=1)
+    np.testing.assert_array_equal(
+        fitted.lags(postures, against="body").values, offsets - body.offsets[:, np.newaxis]
+    )
+    between = fitted.lags(postures, against="trunk", unit="percent")
+    assert between.parts == PARTS[:-1]
+    np.testing.assert_allclose(between.values, (offsets[:, :-1] - offsets[:, -1:]) * 100 / 59)
+    seconds = fitted.lags(postures, against="trunk", unit="seconds", frame_rate=30).values
+    lasts = np.array([len(x) - 1 for x in postures])[:, np.newaxis, np.newaxis]
+    np.testing.assert_allclose(seconds, between.values / 100 * lasts / 30)
+
+
+def test_the_rest_of_the_body_does_not_know_the_part(fitted, postures):
+    columns = fitted.parts_["right leg"]
+    shaken = [x.copy() for x in postures]
+    for x in shaken:
+        x[:, columns] = x[::-1, columns]
+    at = PARTS.index("right leg")
+
+    def rest(X):
+        lags = fitted.lags(X).values[:, at]
+        return fitted.match_parts(X)["right leg"].offsets - lags
+
+    np.testing.assert_allclose(rest(shaken), rest(postures), atol=1e-9)
+
+
+def test_spread_within_and_between_people():
+    """Against the F test and the t test of scipy; people of unequal counts."""
+    rng, groups = np.random.default_rng(0), ["b", "a", "a", "c", "b", "c", "c", "a", "c"]
+    own = {"a": 1.0, "b": -2.0, "c": 0.5}
+    values = np.array([own[g] for g in groups])[:, np.newaxis] + rng.normal(size=(9, 6))
+    codes = np.unique(groups, return_inverse=True)[1]
+    lags = Lags(values.reshape(9, 2, 3), ["arm", "leg"], "rest", "frames", codes, list("abc"))
+    table = lags.over_time()
+    assert table.index[4] == ("leg", 1)
+    for column, row in zip(values.T, table.itertuples(), strict=True):
+        samples = [column[codes == g] for g in range(3)]
+        means = [x.mean() for x in samples]
+        ratio = f_oneway(*samples).statistic
+        size = (9 - (3**2 + 2**2 + 4**2) / 9) / 2
+        icc = max(0, (ratio - 1) / (ratio - 1 + size))
+        interval = ttest_1samp(means, 0).confidence_interval()
+        within = np.mean(np.repeat([x.var(ddof=1) for x in samples], [len(x) - 1 for x in samples]))
+        assert row.mean == pytest.approx(np.mean(means))
+        assert (row.low, row.high) == pytest.approx(tuple(interval))
+        assert row.icc == pytest.approx(icc)
+        assert row.sd_within**2 == pytest.approx(within)
+        assert row.sd == pytest.approx(column.std(ddof=1))
+    summary = lags.summary()
+    assert summary.loc["leg", "mean"] == pytest.approx(table.loc["leg", "mean"].mean())
+
+
+def test_habits_are_told_from_chance():
+    rng, groups = np.random.default_rng(1), np.repeat(np.arange(12), 6)
+    habit = rng.normal(0, 3, 12)[groups] + rng.normal(0, 0.5, 72)
+    chance = rng.normal(0, 3, 72)
+    values = np.stack([habit, chance], axis=1)[:, :, np.newaxis] * np.ones(4)
+    icc = Lags(values, ["habit", "chance"], "rest", "frames", groups, None).summary()["icc"]
+    assert icc["habit"] > 0.9
+    assert icc["chance"] < 0.2
+
+
+def test_too_few_to_tell(fitted, postures):
+    everybody = fitted.lags(postures, groups=list("abcdefg")).summary()
+    assert everybody[["sd_within", "sd_between", "icc"]].isna().all(axis=None)
+    assert everybody[["mean", "sd", "low", "high"]].notna().all(axis=None)
+    one = fitted.lags(postures[:1]).summary()
+    assert one["mean"].notna().all()
+    assert one[["sd", "low", "high"]].isna().all(axis=None)
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({"against": "tail"}, "against must be one of .*'rest', 'body', 'left arm'.* got 'tail'"),
+        ({"groups": ["a"]}, "groups must be one for each of the 7 performances"),
+        ({"groups": [*"abcdef", None]}, "Performance 6: its group is missing"),
+        ({"unit": "hours"}, "unit must be one of"),
+        ({"unit": "seconds"}, "needs X.* and frame_rate"),
+    ],
+)
+def test_reports_that_cannot_be_made(fitted, postures, params, message):
+    with pytest.raises(ValueError, match=message):
+        fitted.lags(postures, **params)

@@ -1,0 +1,76 @@
+"""Cycles of real people, of actors not seen; and takes that have none."""
+
+import importlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sklearn_motionsync import CycleSegmenter
+
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+
+
+@pytest.fixture(scope="module")
+def cycles():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(BENCHMARKS)
+        yield importlib.import_module("cycles")
+
+
+@pytest.fixture(scope="module")
+def read(cycles, real_data):
+    return lambda archive, label: cycles.read(real_data, archive, label)
+
+
+def test_periods_are_those_of_the_feet(cycles, read):
+    """On 95 % of the takes within 5 %."""
+    good = []
+    for archive, label in cycles.CYCLIC.items():
+        bunch = read(archive, label)
+        periods = CycleSegmenter(bunch.skeleton).periods(bunch.data)
+        for x, rate, period in zip(bunch.data, bunch.frame_rate, periods, strict=True):
+            strikes = cycles.foot_strikes(x, bunch.skeleton, rate)
+            good.append(abs(period / cycles.references(strikes)[0] - 1) < 0.05)
+    assert len(good) == 26
+    assert np.mean(good) > 0.95
+
+
+def test_single_actions_are_not_cyclic(cycles, read):
+    """Bends, grabs, hops and others; what sneaks two steps holds one cycle."""
+    for archive, labels in cycles.SINGLE.items():
+        for label in labels:
+            bunch = read(archive, label)
+            assert not CycleSegmenter(bunch.skeleton).is_cyclic(bunch.data).any(), label
+    bunch = read("hdm05", cycles.ONE_CYCLE)
+    with pytest.raises(ValueError, match=r"Take 0 (is not cyclic|holds)"):
+        CycleSegmenter(bunch.skeleton).fit(bunch.data)
+
+
+@pytest.mark.parametrize("n_cycles", [1.5, 1.7])
+def test_cycles_that_are_too_few(n_cycles, read):
+    """Walks that are cut short, at 30 and at 60 frames a second."""
+    bunch = read("cmu07_walk", "walk")
+    segmenter = CycleSegmenter(bunch.skeleton)
+    periods = segmenter.periods(bunch.data)
+    short = [x[-round(n_cycles * p) :] for x, p in zip(bunch.data, periods, strict=True)]
+    slow = [x[::2] for x in short]
+    for X in (short, slow):
+        assert (segmenter.is_cyclic(X) == (n_cycles > 1.6)).mean() > 0.95
+        if n_cycles < 1.6:
+            with pytest.raises(ValueError, match=r"Take 0 holds 1\.[45]\d cycles"):
+                segmenter.fit(X)
+
+
+def test_foot_strikes_deviate_less_from_a_phase_that_is_followed(cycles, read):
+    """Than from constant periods, on jogging, 3 actors giving the template for the fourth."""
+    bunch = read("hdm05", cycles.CYCLIC["hdm05"])
+    strikes = [
+        cycles.foot_strikes(x, bunch.skeleton, rate)
+        for x, rate in zip(bunch.data, bunch.frame_rate, strict=True)
+    ]
+    periods = CycleSegmenter(bunch.skeleton).periods(bunch.data)
+    constant = [np.arange(len(x)) / p for x, p in zip(bunch.data, periods, strict=True)]
+    followed = cycles.phases_of_others(bunch)
+    within = [cycles.deviations(phases, strikes)[0] for phases in (followed, constant)]
+    assert within[0] < 2
+    assert within[0] < 0.6 * within[1]

@@ -1,0 +1,406 @@
+"""Blends: one performance comes back, limbs keep their lengths, headings, paths and timing."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    KeyframeSynchronizer,
+    LinearSynchronizer,
+    Match,
+    Skeleton,
+    blend_performances,
+    to_sequences,
+)
+from sklearn_motionsync.datasets import load_performances
+
+PAPER = Skeleton.paper()
+FORMATS = ("paper", "acclaim", "kinect", "kinect_v2", "mediapipe", "plug_in_gait", "unreal")
+
+
+@pytest.fixture(scope="module")
+def pipe(bending):
+    steps = DirectionCosines(bending.skeleton), ASpace(), DenseSynchronizer(n_frames=60)
+    return make_pipeline(*steps).fit(bending.data[:12])
+
+
+def even(*lengths, n_frames=50):
+    """A match of performances that all go evenly with the pattern."""
+    return Match(np.tile(np.arange(float(n_frames)), (len(lengths), 1)))
+
+
+def turned(x, degrees):
+    a = np.deg2rad(degrees)
+    turn = np.array([[np.cos(a), 0, np.sin(a)], [0, 1, 0], [-np.sin(a), 0, np.cos(a)]])
+    return (x.reshape(-1, 3) @ turn.T).reshape(x.shape)
+
+
+def lengths_of(x, skeleton, names=("thigh", "leg", "arm", "forearm")):
+    """(n_frames, n_limbs) by the places of joints: of the two sides, hips, shoulders and trunk."""
+    ends = {"thigh": ("hip", "knee"), "leg": ("knee", "ankle")}
+    ends |= {"arm": ("shoulder", "elbow"), "forearm": ("elbow", "wrist")}
+    pairs = [tuple(f"{s}_{j}" for j in ends[n]) for n in names for s in ("left", "right")]
+    pairs += [(f"left_{j}", f"right_{j}") for j in ("hip", "shoulder")]
+    pairs += [("pelvis", "neck"), ("neck", "head")]
+    joints = x.reshape(len(x), -1, skeleton.n_dims)
+    at = [[joints[:, skeleton.indices_of(n)].mean(axis=1) for n in pair] for pair in pairs]
+    return np.stack([np.linalg.norm(a - b, axis=1) for a, b in at], axis=1)
+
+
+def walker(n_frames, size=1.0, seed=0):
+    """A body that walks along z, of rigid limbs, all of its directions moving; metres."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 1, n_frames)[:, np.newaxis]
+    cosines = DirectionCosines(PAPER).fit(size * standing(2))
+    (names,) = cosines.transform([standing(2)])
+    moves = rng.normal(scale=0.15, size=(2, names.shape[1])) * [[1], [0.5]]
+    moves[:, :4] = 0
+    postures = names[:1] + moves[0] * np.sin(6 * t) + moves[1] * np.cos(9 * t)
+    x = cosines.inverse_transform(postures).reshape(n_frames, -1, 3)
+    x[..., 2] += size * 1.5 * t
+    return x.reshape(n_frames, -1)
+
+
+def standing(n_frames):
+    at = {"pelvis": (0, 1, 0), "neck": (0, 1.5, 0), "head": (0, 1.7, 0)}
+    for side, x in (("left", 1), ("right", -1)):
+        for y, joint in ((1.5, "shoulder"), (1.2, "elbow"), (0.9, "wrist")):
+            at[f"{side}_{joint}"] = (0.2 * x, y, 0.1 * (y < 1))
+        for y, joint in ((1, "hip"), (0.5, "knee"), (0, "ankle")):
+            at[f"{side}_{joint}"] = (0.1 * x, y, 0.1 * (y == 0.5))
+    return np.repeat([np.ravel([at[j] for j in PAPER.joints])], n_frames, axis=0).astype(float)
+
+
+# -- the weights of one performance give it back -----------------------------------------------
+
+
+@pytest.mark.parametrize("i", [0, 5, 11])
+def test_one_performance_comes_back(bending, pipe, i):
+    X = bending.data[:12]
+    found = blend_performances(pipe, X, np.eye(12)[i])
+    assert found.shape == X[i].shape
+    np.testing.assert_allclose(found, X[i], atol=1e-12)
+    cosines = pipe[0]
+    np.testing.assert_allclose(*cosines.transform([found, X[i]]), atol=1e-12)
+
+
+@pytest.mark.parametrize("n_dims", [3, 2])
+@pytest.mark.parametrize("name", FORMATS)
+def test_whatever_skeleton_it_is(name, n_dims):
+    """All joints of it, jittering and walking around, at whatever pace."""
+    skeleton = getattr(Skeleton, name)(n_dims=n_dims)
+    X = [jittering(skeleton, n, seed) for seed, n in enumerate((40, 57))]
+    times = np.sort(np.random.default_rng(2).uniform(0, 29, size=(2, 30)))
+    times[:, [0, 1, -1]] = 0, 0, 29
+    times[1, 10:14] = times[1, 10]
+    for i in (0, 1):
+        found = blend_performances(Match(times), X, {i: 1}, skeleton=skeleton)
+        np.testing.assert_allclose(found, X[i], atol=1e-9)
+
+
+def jittering(skeleton, n_frames, seed):
+    rng = np.random.default_rng(seed)
+    up = "xyz".index(skeleton.up[-1])
+    (body,) = standing(1).reshape(1, -1, 3)
+    places = dict(zip(PAPER.joints, body, strict=True))
+    x = np.tile(places["neck"], (n_frames, len(skeleton.joints), 1))
+    for landmark in skeleton.landmarks:
+        x[:, list(skeleton.indices_of(landmark))] = places[landmark]
+    x += rng.normal(scale=0.03, size=x.shape) + np.cumsum(
+        rng.normal(scale=0.05, size=(n_frames, 1, 3)), axis=0
+    )
+    height = x[..., 1].copy() * (-1 if skeleton.up[0] == "-" else 1)
+    x[..., 1], x[..., up] = x[..., up].copy(), height
+    return x[..., : skeleton.n_dims].reshape(n_frames, -1)
+
+
+@pytest.mark.parametrize(
+    "landmarks",
+    [
+        {"left_hip": "a", "left_knee": ("b", "c"), "left_ankle": "d"},
+        {"left_shoulder": "a", "left_elbow": ("b", "c"), "left_wrist": "d"},
+        {"neck": "a", "head": "b"},
+    ],
+)
+def test_parts_of_bodies_and_markers(landmarks):
+    skeleton = Skeleton(["a", "b", "c", "d", "e"], [-1, -1, -1, -1, 3], landmarks, up="z")
+    X = [np.random.default_rng(s).normal(size=(20 + s, 15)) for s in (0, 1)]
+    for i in (0, 1):
+        found = blend_performances(even(*X), X, {i: 1}, skeleton=skeleton)
+        np.testing.assert_allclose(found, X[i], atol=1e-9)
+    assert np.isfinite(blend_performances(even(*X), X, [0.5, 0.5], skeleton=skeleton)).all()
+
+
+@pytest.mark.parametrize("reference", ["heading", "parent", "world"])
+def test_postures_come_back(bending, pipe, reference):
+    X = bending.data[:12]
+    cosines = DirectionCosines(bending.skeleton, reference).fit(X)
+    postures, match = cosines.transform(X), Match.from_estimator(pipe, X)
+    found = blend_performances(match, postures, {3: 1}, skeleton=cosines)
+    np.testing.assert_allclose(found, postures[3], atol=1e-12)
+    # And in between they are those of the blended bodies, but for the floor.
+    weights = {3: 0.3, 7: 0.7}
+    found = blend_performances(match, postures, weights, skeleton=cosines)
+    if reference == "heading":
+        body = blend_performances(pipe, X, weights)
+        np.testing.assert_allclose(found[:, 1:], cosines.transform(body)[:, 1:], atol=1e-9)
+    norms = np.linalg.norm(found[:, 1:].reshape(len(found), -1, 3), axis=2)
+    np.testing.assert_allclose(norms, 1, atol=1e-12)
+
+
+# -- limbs ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("weights", [[0.5, 0.5], [0.9, 0.1], [1.3, -0.3], [[1, 0], [0, 1]]])
+def test_limbs_keep_their_lengths(weights):
+    X = [walker(60), walker(80, size=1.3, seed=1)]
+    found = blend_performances(even(*X), X, weights, skeleton=PAPER)
+    own = [lengths_of(x, PAPER)[0] for x in X]
+    if np.ndim(weights) == 1:
+        weights = np.repeat([weights], len(found), axis=0)
+    else:
+        # The weights of a transition are even on the clock, and so is this blend's first frame.
+        weights = np.linspace(*weights, len(found))[[0, -1]]
+        found = found[[0, -1]]
+    np.testing.assert_allclose(lengths_of(found, PAPER), weights @ own, atol=1e-9)
+
+
+def test_a_performer_lends_the_limbs():
+    X = [walker(60), walker(80, size=1.3, seed=1)]
+    found = blend_performances(even(*X), X, [1, 0], skeleton=PAPER, lengths_of=1)
+    expected = np.repeat(lengths_of(X[1], PAPER)[:1], 60, axis=0)
+    np.testing.assert_allclose(lengths_of(found, PAPER), expected, atol=1e-9)
+    # The directions stay the first one's, and the larger body goes so much farther.
+    cosines = DirectionCosines(PAPER).fit(X)
+    np.testing.assert_allclose(*(cosines.transform(x)[:, 1:] for x in (found, X[0])), atol=1e-9)
+    way, own = (x[-1, 2] - x[0, 2] for x in (found, X[0]))
+    assert way / own == pytest.approx(1.3)
+
+
+def test_real_people_keep_their_limbs(bends):
+    """Optical motion capture of two people: limbs between the two, and never shrunk."""
+    one, other = (int(np.flatnonzero(bends.actor == a)[0]) for a in ("bd", "tr"))
+    X = [np.asarray(bends.data[i], dtype=float) for i in (one, other)]
+    pipe = make_pipeline(DirectionCosines(bends.skeleton), ASpace(), DenseSynchronizer(n_frames=60))
+    found = blend_performances(pipe.fit(X), X, [0.5, 0.5])
+    rigid = slice(0, 10)  # thighs, legs, arms, forearms, hips, shoulders
+    mean = np.mean([np.median(lengths_of(x, bends.skeleton), axis=0) for x in X], axis=0)
+    lengths = lengths_of(found, bends.skeleton)
+    np.testing.assert_allclose(lengths[:, 0:8], np.tile(mean[:8], (len(found), 1)), rtol=1e-3)
+    assert (lengths[:, rigid] > 0.9 * mean[rigid]).all()
+
+
+# -- heading and path -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("degrees", "share"), [(90, 0.5), (90, 0.25), (-140, 0.5)])
+def test_who_walks_another_way_is_met_halfway(degrees, share):
+    X = [walker(60), turned(walker(60), degrees)]
+    found = blend_performances(even(*X), X, [1 - share, share], skeleton=PAPER)
+    np.testing.assert_allclose(found, turned(X[0], share * degrees), atol=1e-9)
+
+
+def test_headings_are_averaged_on_the_circle():
+    X = [turned(walker(40), degrees) for degrees in (170, -160)]
+    found = blend_performances(even(*X), X, [0.5, 0.5], skeleton=PAPER)
+    np.testing.assert_allclose(found, turned(walker(40), -175), atol=1e-9)
+
+
+def test_who_turns_and_who_does_not_make_one_who_turns_half():
+    x = walker(61)
+    degrees = np.linspace(0, 360, 61)
+    around = np.stack([turned(f, d) for f, d in zip(standing(61), degrees, strict=True)])
+    found = blend_performances(even(x, x), [around, standing(61)], [0.5, 0.5], skeleton=PAPER)
+    half = np.stack([turned(f, d / 2) for f, d in zip(standing(61), degrees, strict=True)])
+    np.testing.assert_allclose(found, half, atol=1e-9)
+
+
+def test_a_walk_that_goes_over_to_another_does_not_leap():
+    X = [walker(60), turned(walker(60, seed=1), 90)]
+    X[1][:, ::3] += 20  # far away
+    found = blend_performances(even(*X), X, [[1, 0], [0, 1]], skeleton=PAPER)
+    pelvis = found[:, [0, 2]]
+    assert np.linalg.norm(np.diff(pelvis, axis=0), axis=1).max() < 0.1
+    np.testing.assert_allclose(found[0], X[0][0], atol=0.02)
+    # At the end it is the second one who walks, the way that the first one faces.
+    steps = [np.diff(x[-3:, [0, 2]], axis=0)[-1] for x in (found, turned(X[1], -90))]
+    np.testing.assert_allclose(*steps, atol=5e-3)
+
+
+# -- timing -----------------------------------------------------------------------------------
+
+
+def late(*events, n_frames=41):
+    """Performances of a peak at these shares of their time, and their match."""
+    frames = np.arange(n_frames)
+    middle = (n_frames - 1) / 2
+    times = [np.interp(frames, [0, middle, 2 * middle], [0, 2 * e * middle, 2 * middle])
+             for e in events]  # fmt: skip
+    return Match(times)
+
+
+def tent(n_frames, event):
+    t = np.arange(n_frames) / (n_frames - 1)
+    return np.interp(t, [0, event, 1], [0, 1, 0])[:, np.newaxis]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 1.0])
+def test_events_and_durations_are_blended(share):
+    X = [tent(101, 0.3), tent(201, 0.6)]
+    found = blend_performances(late(0.3, 0.6), X, [1 - share, share])
+    assert len(found) == 101 + 100 * share
+    # Events 30 and 120 frames from the beginning.
+    assert found.argmax() == round((1 - share) * 30 + share * 120)
+    assert found.max() == pytest.approx(1, abs=0.03)
+
+
+def test_timing_may_be_another_ones():
+    X = [tent(101, 0.3), 2 * tent(201, 0.6)]
+    found = blend_performances(late(0.3, 0.6), X, [1, 0], timing={1: 1})
+    np.testing.assert_allclose(found, X[1] / 2, atol=1e-9)
+
+
+def test_beyond_a_performance_it_goes_on_but_never_back():
+    X = [tent(101, 0.3), tent(101, 0.4)]
+    found = blend_performances(late(0.3, 0.4), X, [1.5, -0.5])
+    assert found.argmax() == 25
+    # Time does not run backwards, where it would: 0.3 - 4 * 0.1 of the time.
+    found = blend_performances(late(0.3, 0.4), X, [5, -4])
+    assert len(found) > 60
+    assert 0 < found.argmax() <= 15 + 1
+
+
+@pytest.mark.parametrize("weights", [[[1, 0], [0, 1]], [[1, 0], [1, 0], [0, 1], [0, 1]]])
+def test_a_transition_takes_the_pace_of_each(weights):
+    X = [np.linspace(0, 1, 51)[:, np.newaxis], np.linspace(0, 1, 201)[:, np.newaxis]]
+    found = blend_performances(late(0.5, 0.5), X, weights)
+    assert len(found) == 126
+    speed = np.diff(found[:, 0])
+    assert speed[0] == pytest.approx(1 / 50, rel=0.05)
+    assert speed[-1] == pytest.approx(1 / 200, rel=0.05)
+
+
+# -- what is given and what comes back ----------------------------------------------------------
+
+
+def test_a_match_gives_what_its_pipeline_gives(bending, pipe):
+    X = bending.data[:4]
+    whole = blend_performances(pipe, X, [0.2, 0, 0.8, 0])
+    match = Match.from_estimator(pipe, X[::2])
+    some = blend_performances(match, X[::2], [0.2, 0.8], skeleton=bending.skeleton)
+    np.testing.assert_array_equal(whole, some)
+
+
+def test_numbers_are_averaged_as_numbers():
+    X = [np.full((5, 2), 1.0), np.full((9, 2), 3.0)]
+    found = blend_performances(LinearSynchronizer().fit(X), X, [0.25, 0.75])
+    np.testing.assert_allclose(found, np.full((8, 2), 2.5))
+
+
+def test_rows_give_a_row():
+    X = np.sin(np.linspace(0, 3, 40) + [[0], [0.1], [0.2]])
+    found = blend_performances(DenseSynchronizer().fit(X), X, [1, 0, 0])
+    np.testing.assert_allclose(found, X[0], atol=1e-12)
+
+
+def test_tables_keep_labels_names_and_frames(bending):
+    tables = [pd.DataFrame(x, columns=bending.skeleton.column_names) for x in bending.data[:3]]
+    pipe = make_pipeline(DirectionCosines(bending.skeleton), DenseSynchronizer()).fit(tables)
+    keys = ["ann", "bob", "cat"]
+    df = pd.concat(tables, keys=keys, names=["who", "time"])
+    for X in (df, to_sequences(df)):
+        found = blend_performances(pipe, X, {"ann": 0.5, "cat": 0.5}, lengths_of="bob")
+        assert list(found.columns) == bending.skeleton.column_names
+        assert found.index.name == "time"
+        assert Skeleton.from_frame(found) == Skeleton.from_frame(tables[0])
+    weights = pd.Series({"bob": 1.0})
+    found = blend_performances(pipe, df, weights)
+    np.testing.assert_allclose(found, tables[1], atol=1e-12)
+    by_number = blend_performances(pipe, df, {1: 1})
+    np.testing.assert_array_equal(by_number, found)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_single_precision_stays(bending, pipe, dtype):
+    X = [x.astype(dtype) for x in bending.data[:3]]
+    for x in X:
+        x.setflags(write=False)
+    found = blend_performances(pipe, X, [0.5, 0.5, 0])
+    assert found.dtype == dtype
+    back = blend_performances(pipe, X, [0, 1, 0])
+    np.testing.assert_allclose(back, X[1], atol=1e-6 if dtype == np.float32 else 1e-12)
+
+
+def test_units_change_nothing(bending, pipe):
+    X = bending.data[:2]
+    match = Match.from_estimator(pipe, X)
+    found = blend_performances(match, X, [0.5, 0.5], skeleton=bending.skeleton)
+    for factor in (2.0**-600, 2.0**40, 2.0**600):
+        scaled = [factor * x for x in X]
+        other = blend_performances(match, scaled, [0.5, 0.5], skeleton=bending.skeleton)
+        np.testing.assert_allclose(other / factor, found, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"weights": [1, 1, 0]}, "sum 1, got 2"),
+        ({"weights": [0.5, 0.5]}, "one for each of the 3 performances"),
+        ({"weights": [np.nan, 1, 0]}, "sum 1, got nan"),
+        ({"weights": [[1, 0, 0], [0, 0, 0]]}, "row 1, must have the sum 1"),
+        ({"weights": np.zeros((2, 2, 3))}, "got shape"),
+        ({"weights": {7: 1}}, "no performance 7"),
+        ({"weights": "one"}, "not a numeric array"),
+        ({"timing": [1, 1, 1]}, "timing must have the sum 1"),
+        ({"lengths_of": "bob"}, "no performance 'bob'"),
+        ({"skeleton": "kinect"}, "must be the Skeleton"),
+        ({"skeleton": Skeleton.kinect()}, "joints need 60"),
+        ({"X": np.zeros((5, 45))}, "Wrap one performance"),
+        ({"X": [np.zeros((9, 3))] * 3}, "joints need 45"),
+    ],
+)
+def test_what_is_refused(bending, pipe, change, message):
+    args = {"X": bending.data[:3], "weights": [1, 0, 0]} | change
+    with pytest.raises(ValueError, match=message):
+        blend_performances(pipe, **args)
+
+
+def test_gaps_are_refused_by_their_frame(bending, pipe):
+    X = [x.copy() for x in bending.data[:2]]
+    X[1][7, 3] = np.nan
+    match = Match.from_estimator(pipe, bending.data[:2])
+    with pytest.raises(ValueError, match="Performance 1, frame 7"):
+        blend_performances(match, X, [1, 0], skeleton=bending.skeleton)
+    with pytest.raises(ValueError, match="matched"):
+        blend_performances(match, X[:1], [1], skeleton=bending.skeleton)
+    with pytest.raises(TypeError, match="matched already"):
+        blend_performances(match, X[:1], [1], keyframes=[])
+    with pytest.raises(ValueError, match="lengths_of is for joint positions"):
+        blend_performances(match, bending.data[:2], [1, 0], lengths_of=0)
+
+
+def test_key_frames_are_handed_on(bending):
+    X, keyframes = bending.data[:4], bending.keyframes[:4]
+    pipe = make_pipeline(DirectionCosines(bending.skeleton), KeyframeSynchronizer())
+    pipe.fit(X, keyframesynchronizer__keyframes=keyframes)
+    found = blend_performances(pipe, X, [0, 1, 0, 0], keyframes=keyframes)
+    np.testing.assert_allclose(found, X[1], atol=1e-12)
+    with pytest.raises(ValueError, match=r"blend_performances\(estimator, X, keyframes="):
+        blend_performances(pipe, X, [0, 1, 0, 0])
+
+
+def test_takes_of_the_kinect(real_data):
+    """Limbs that jitter, forty frames, people who walk about: each comes back."""
+    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
+    chosen = np.flatnonzero(bunch.target == "pickUp")[:4]
+    X = [bunch.data[i] for i in chosen]
+    for i in range(4):
+        found = blend_performances(even(*X), X, {i: 1}, skeleton=bunch.skeleton)
+        np.testing.assert_allclose(found, X[i], atol=1e-12)
+    found = blend_performances(even(*X), X, [0.25] * 4, skeleton=bunch.skeleton)
+    own = [np.linalg.norm(np.diff(x.reshape(len(x), -1, 3)[:, [4, 5]], axis=1), axis=2) for x in X]
+    arm = np.linalg.norm(np.diff(found.reshape(len(found), -1, 3)[:, [4, 5]], axis=1), axis=2)
+    assert min(map(np.min, own)) < arm.min() < arm.max() < max(map(np.max, own))
