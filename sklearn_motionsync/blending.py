@@ -100,6 +100,10 @@ def blend_performances(
     marker, are numbers along the axes of the body. Joints between two landmarks, such as of the
     spine, are put where bones lead from the pelvis. In a picture (``n_dims=2``) nothing is turned.
 
+    Hips within 17 degrees of the vertical show no heading: it goes on evenly from before to after,
+    and in a cartwheel the body is not turned about. Who lies on the side from the first to the last
+    frame has none, and is blended along the axes of the recording.
+
     Feet are not held to the floor: people who stand or step differently slide in between.
 
     Examples

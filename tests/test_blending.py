@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ASpace,
@@ -216,6 +217,37 @@ def test_who_turns_and_who_does_not_make_one_who_turns_half():
     found = blend_performances(even(x, x), [around, standing(61)], [0.5, 0.5], skeleton=PAPER)
     half = np.stack([turned(f, d / 2) for f, d in zip(standing(61), degrees, strict=True)])
     np.testing.assert_allclose(found, half, atol=1e-9)
+
+
+def cartwheel(lean):
+    """All the way round about the pelvis, in a plane that leans by so many degrees."""
+    degrees = np.stack([np.linspace(0, 360, 61), np.full(61, lean)], axis=1)
+    turns = Rotation.from_euler("zx", degrees, degrees=True).as_matrix()
+    body = standing(61).reshape(61, -1, 3) - [0, 1, 0]
+    return (body @ turns.transpose(0, 2, 1)).reshape(61, -1)
+
+
+@pytest.mark.parametrize("leans", [(6, -6), (-2, 2), (8, 4)])
+def test_hips_that_go_over_the_top_do_not_turn_the_body_about(leans):
+    """Seen from above the hips of one turn to the left, of the other to the right."""
+    X = [cartwheel(lean) for lean in leans]
+    found = blend_performances(even(*X), X, [0.5, 0.5], skeleton=PAPER)
+    middle = cartwheel(np.mean(leans))
+    # From the pelvis, the first joint.
+    apart = [x.reshape(61, -1, 3) - x.reshape(61, -1, 3)[:, :1] for x in (found, middle)]
+    np.testing.assert_allclose(*apart, atol=0.05)
+    for i in (0, 1):
+        back = blend_performances(even(*X), X, {i: 1}, skeleton=PAPER)
+        np.testing.assert_allclose(back, X[i], atol=1e-12)
+
+
+def test_who_lies_on_the_side_is_not_turned_by_noise():
+    """Hips stand upright, and tell no heading."""
+    lying = np.repeat(cartwheel(0)[15:16], 61, axis=0)
+    noise = np.random.default_rng(0).normal(scale=0.01, size=(2, *lying.shape))
+    X = list(lying + noise)
+    found = blend_performances(even(*X), X, [0.5, 0.5], skeleton=PAPER)
+    assert np.abs(found - lying).max() < 0.08
 
 
 def test_a_walk_that_goes_over_to_another_does_not_leap():
