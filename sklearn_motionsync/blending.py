@@ -103,7 +103,9 @@ def blend_performances(
 
     Links that are no limbs nor bones, such as from the pelvis to the middle of the hips or to a
     marker, are numbers along the axes of the body. Joints between two landmarks, such as of the
-    spine, are put where bones lead from the pelvis. In a picture (``n_dims=2``) nothing is turned.
+    spine, are put where bones lead from the pelvis. Bones that close a ring with limbs, such as the
+    last one to the head, collar bones, and those from the pelvis to the hips, give way.
+    In a picture (``n_dims=2``) nothing is turned.
 
     Hips within 17 degrees of the vertical show no heading: it goes on evenly from before to after,
     and in a cartwheel the body is not turned about. Who lies on the side from the first to the last
