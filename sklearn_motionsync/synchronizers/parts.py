@@ -73,6 +73,8 @@ exemplars_, misfit_, refinement_, refines_, n_features_in_, feature_names_in_
 
     A part that hardly moves, such as the idle arm of a grab, has no timing that could be told:
     without coupling its warp is chance, and so is its lag. `Lags.summary` shows it by its spread.
+    What falls with the coupling is its distance from the body on average; a single performance of
+    it may jump.
 
     References
     ----------
