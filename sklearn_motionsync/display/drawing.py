@@ -41,6 +41,8 @@ _GROUPS = ["#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"]
 _LINES = ["-", "--", ":", "-."]
 # Points between a legend and a title above it.
 _GAP = 6
+# Sizes of a legend's letters: the largest is taken with which nothing is lost above the figure.
+_SIZES = ["small", "x-small", "xx-small"]
 
 
 def pyplot():
@@ -132,7 +134,8 @@ def front_line(axis, xs, ys, **style):
 def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
     """A legend between panels and their titles, where it hides no curve.
 
-    Panels of a figure without a layout engine become lower by as much.
+    Panels of a figure without a layout engine become lower by as much. Letters become smaller where
+    it would be higher than half of them and what is above.
 
     Parameters
     ----------
@@ -154,17 +157,12 @@ def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
     axis, labels = top[0], [_plain(label) for label in labels]
     extents = [a.get_window_extent() for a in (below or top)]
     room = max(e.x1 for e in extents) - extents[0].x0
-    beside = [a for a in top if abs(a.get_window_extent().y1 - extents[0].y1) < 1]
-    style = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
-    style |= {"fontsize": "small", "title_fontsize": "small", "alignment": "left"}
-    for count in range(min(len(labels), n_cols), 0, -1):
-        legend = axis.legend(handles, labels, title=title, ncols=count, frameon=False, **style)
-        box = legend.get_window_extent()
-        if box.width <= room:
+    height = axis.figure.bbox.y1 - (extents[0].y0 + extents[0].y1) / 2
+    for size in _SIZES:
+        legend, box = _legend(axis, handles, labels, title, n_cols, room, size)
+        if box.height <= height:
             break
-    if title is not None and box.width > room:
-        legend.set_title(fill(title, max(int(len(title) * room / box.width), 12)))
-        box = legend.get_window_extent()
+    beside = [a for a in top if abs(a.get_window_extent().y1 - extents[0].y1) < 1]
     if any(a.get_title() for a in beside):
         # The titles keep the room.
         legend.set_in_layout(False)
@@ -175,6 +173,21 @@ def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
         for a in beside:
             _lower(a, box.height)
     return legend
+
+
+def _legend(axis, handles, labels, title, n_cols, room, size):
+    """A legend in as many columns as there is room for, in letters of a size, and its extent."""
+    style = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
+    style |= {"fontsize": size, "title_fontsize": size, "alignment": "left"}
+    for count in range(min(len(labels), n_cols), 0, -1):
+        legend = axis.legend(handles, labels, title=title, ncols=count, frameon=False, **style)
+        box = legend.get_window_extent()
+        if box.width <= room:
+            break
+    if title is not None and box.width > room:
+        legend.set_title(fill(title, max(int(len(title) * room / box.width), 12)))
+        box = legend.get_window_extent()
+    return legend, box
 
 
 def _lower(axis, height):

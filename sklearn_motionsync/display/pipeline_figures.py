@@ -97,7 +97,8 @@ class PipelineFigures:
         performance stands behind as a pale shadow. A limb departs where one of its cosines is
         farther from the mean than ``limit``; for the height of the pelvis the hips are marked. The
         titles name the limb that departs most, and above them stands whether the model accepts
-        the performance.
+        the performance. It may accept limbs that depart far: it sees no more of them than the
+        `ASpace` keeps. That is then said.
 
         Parameters
         ----------
@@ -167,6 +168,9 @@ class PipelineFigures:
             bodies[..., 1] -= floor
             shadows[..., 1] -= floor
         verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
+        if verdict == "accepted" and _is_unseen(view, i, limbs.columns):
+            by += ": the model sees what the aSpace keeps,\n"
+            by += "which leaves out how far some limbs depart"
         display = cls(
             [[bodies[[frame]]] for frame in strip.frames],
             skeleton,
@@ -266,6 +270,13 @@ def _in_limbs(estimator, X, params, caller):
             f"{[type(step).__name__ for step in steps]}."
         )
     return view, _Limbs(cosines[0], columns, after)
+
+
+def _is_unseen(view, i, columns):
+    """Whether limbs depart rarely, and only by what the aSpace of a model leaves out of them."""
+    seen = (view.synchronised[i] - view.model.mean_) / view.predicted
+    whole, kept = (np.abs(z[:, columns]).max() for z in (view.scores[i], seen))
+    return whole > view.model.simultaneous_factor() >= kept
 
 
 def _gives(step, cosines):

@@ -165,7 +165,7 @@ class SearchDisplay:
         rows = self.segments[(self.segments["take"] == take).to_numpy()]
         spans = np.column_stack([rows["start"], rows["stop"] - rows["start"]]).tolist()
         strip = _BOTTOM - _STRIP, 0.8 * _STRIP
-        axis.broken_barh(spans, strip, facecolors=COLORS["pattern"])
+        axis.broken_barh(spans, strip, facecolors=COLORS["pattern"], edgecolors="white")
 
     def _explain(self):
         from matplotlib.lines import Line2D

@@ -1,5 +1,6 @@
 """find_performances: where in long takes an action happens."""
 
+from bisect import bisect, insort
 from numbers import Integral, Real
 
 import numpy as np
@@ -157,17 +158,19 @@ class _Search:
                 break
             room = self._room(windows[k], tried)
             if room is not None:
-                tried.append(self._moved(windows[k], scores[k], *room))
+                insort(tried, self._moved(windows[k], scores[k], *room))
         found = sorted((hit for hit in tried if hit[2] >= threshold), key=lambda hit: -hit[2])
         return sorted(found[:most])
 
-    def _room(self, window, kept):
-        """From where to where a window may reach; None if it overlaps what is kept."""
-        start, stop = window
-        if any(start < other and this < stop for this, other, _ in kept):
-            return None
-        before = max((other for _, other, _ in kept if other <= start), default=0)
-        return before, min((this for this, _, _ in kept if this >= stop), default=len(self._take))
+    def _room(self, window, tried):
+        """From where to where a window may reach; None if it overlaps what was tried.
+
+        What was tried is in order of time, and does not overlap.
+        """
+        at = bisect(tried, tuple(window))
+        before = tried[at - 1][1] if at else 0
+        after = tried[at][0] if at < len(tried) else len(self._take)
+        return (before, after) if before <= window[0] and window[1] <= after else None
 
     def _moved(self, window, score, first, last):
         """The window with its ends moved, by ever less, to where its score is best."""

@@ -243,6 +243,22 @@ def test_real_people_who_do_something_else(real_bends_of_three):
     assert any("neck" in marked_joints(bad, panel) for panel in (2, 3)), "upright at its height"
 
 
+def test_a_model_accepts_what_its_aspace_does_not_see(bunch):
+    """Of two components none moves the neck sideways."""
+    steps = DirectionCosines(bunch.skeleton), ASpace(2), LinearSynchronizer(40), ActionModel()
+    pipe = make_pipeline(*steps).fit(bunch.data)
+    tilted = bunch.data[3].reshape(-1, 15, 3).copy()
+    tilted[:, PAPER.index_of("head"), 0] += 0.15
+    display = SkeletonDisplay.from_departures(pipe, [tilted.reshape(-1, 45), bunch.data[3]])
+    assert "neck" in display.titles[0]
+    assert find_departures(pipe, [tilted.reshape(-1, 45)]).rare.any()
+    assert "is accepted: the model sees what the aSpace keeps," in display.heading
+    plain = SkeletonDisplay.from_departures(
+        pipe, [tilted.reshape(-1, 45), bunch.data[3]], performance=1
+    )
+    assert "Performance 1 is accepted.\n" in plain.heading
+
+
 @pytest.fixture(scope="module")
 def real_bends_of_three(bends):
     others = bends.actor != "bk"

@@ -265,12 +265,16 @@ def test_a_model_of_rows_in_seconds():
 # -- legends -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("layout", [None, "constrained"])
-@pytest.mark.parametrize("size", [(4.2, 3), (9, 5)])
 @pytest.mark.parametrize("kind", ["model", "model of groups", "synchronization"])
-@pytest.mark.parametrize("own", [True, False])
-def test_legends_stand_above_the_panels(bunch, pipe, layout, size, kind, own):
-    axes = None if own else plt.figure(figsize=size, layout=layout).add_subplot()
+@pytest.mark.parametrize(
+    ("size", "layout"),
+    [
+        (None, None),  # a figure of its own
+        *((size, layout) for size in ((4.2, 3), (9, 5)) for layout in (None, "constrained")),
+    ],
+)
+def test_legends_stand_above_the_panels(bunch, pipe, layout, size, kind):
+    axes = None if size is None else plt.figure(figsize=size, layout=layout).add_subplot()
     if kind == "synchronization":
         display = SynchronizationDisplay.from_estimator(
             pipe, bunch.data, groups=[f"group {g}" for g in range(9)], features=[0], ax=axes
@@ -288,8 +292,23 @@ def test_legends_stand_above_the_panels(bunch, pipe, layout, size, kind, own):
         assert panel.height > 20
         if axis.get_title() and kind == "synchronization":
             assert axis.title.get_window_extent().y0 >= box.y1 - 1
-    if size[0] == 9 or own:
+    if size != (4.2, 3):
         assert box.y1 <= display.figure_.bbox.height + 1
+
+
+@pytest.mark.parametrize("layout", [None, "constrained"])
+def test_many_groups_keep_their_lines_on_small_axes(layout):
+    rng = np.random.default_rng(0)
+    X = np.sin(np.linspace(0, 3, 40)) + rng.normal(size=(16, 1))
+    axes = plt.figure(figsize=(4, 3), layout=layout).add_subplot()
+    display = ActionModelDisplay.from_estimator(
+        ActionModel().fit(X), X, groups=[f"group {i // 2}" for i in range(16)], ax=axes
+    )
+    display.figure_.canvas.draw()
+    legend = display.axes_[0].get_legend()
+    assert sum(text.startswith("group") for text in texts(display.axes_[0])) == 8
+    assert legend.get_window_extent().y1 <= display.figure_.bbox.height
+    assert display.axes_[0].get_window_extent().height > 100
 
 
 def test_drawn_again_on_the_same_axes(bunch, pipe):

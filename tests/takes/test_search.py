@@ -1,5 +1,7 @@
 """Where in takes an action happens: planted movements, real recordings, and what is refused."""
 
+import tracemalloc
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -278,6 +280,16 @@ def test_many_training_performances_are_thinned_out():
     groups = [f"person {i // 8}" for i in range(70)]
     _, origin = find_performances(sync, TAKE[:130], groups=groups, durations=(50, 75))
     np.testing.assert_allclose(spans(origin), TRUE[:1], atol=8)
+
+
+def test_time_and_memory_do_not_explode(pipe):
+    take = np.concatenate([TAKE] * 12)
+    tracemalloc.start()
+    _, origin = find_performances(pipe, take)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(origin) >= 36
+    assert peak < 8e6
 
 
 # -- what is refused -------------------------------------------------------------------------------
