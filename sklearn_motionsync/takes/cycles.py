@@ -18,7 +18,7 @@ from ..tables import as_pandas
 from .circular import PHASES, Sampled, average, cycles_of, follow, keep_pace, top_of
 from .compared import compared, names_of_compared, start_curves
 from .origin import cut_takes
-from .self_correlation import LEAST_CYCLES, correlate
+from .self_correlation import LEAST_CYCLES, asked_of, correlate
 
 __all__ = ["CycleSegmenter", "examined", "taken"]
 
@@ -53,8 +53,9 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         farther. Or a feature of what is compared, by name or index: where it has its maximum.
         None is ``"ahead"`` where the skeleton has feet, otherwise the feature that repeats best.
     threshold : float, default=0.4
-        The self-correlation from which a take is cyclic, from 0 to 1. Fixed on walks, runs, and
-        single actions of people.
+        The self-correlation from which a take is cyclic, from 0 to 1. Of takes of less than two
+        cycles, of which less than one meets another, more is asked: ``threshold / sqrt(n_cycles -
+        1)``. Fixed on walks, runs, and single actions of people.
     refine : bool, default=True
         Whether takes follow the template; False cuts at their constant mean period.
     incomplete : bool, default=False
@@ -299,16 +300,15 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         reasons = [_reason(f, self.threshold) for f in found]
         bad = next((i for i, reason in enumerate(reasons) if reason), None)
         if bad is not None and self.not_cyclic == "raise":
-            what, strength = _name_take(takes, bad), found[bad].strength
-            short = reasons[bad].startswith("holds")
             why = (
                 f"{reasons[bad]} of about {found[bad].period:.0f} frames, and {LEAST_CYCLES} are "
                 "needed to see that it repeats. Give a longer take"
-                if short
+                if reasons[bad].startswith("holds")
                 else f"is not cyclic, or has less than {LEAST_CYCLES} cycles: its self-correlation "
-                f"has the strength {strength:.2f}, below threshold={self.threshold:g}. Leave it out"
+                f"{_lack(found[bad], self.threshold)}. Leave it out"
             )
-            raise ValueError(f'{what} {why}, or set not_cyclic="skip"; report(X) tells of all.')
+            what = f"{_name_take(takes, bad)} {why}"
+            raise ValueError(f'{what}, or set not_cyclic="skip"; report(X) tells of all.')
         return [i for i, reason in enumerate(reasons) if not reason]
 
     def _phases(self, given, takes):
@@ -381,10 +381,18 @@ def examined(given, takes, skeleton):
 
 def _reason(found, threshold):
     """Why a take cannot be segmented; empty, if it can."""
-    if not found.n_cycles or found.strength < threshold:
+    if not found.n_cycles or found.strength < asked_of(found.n_cycles, threshold):
         return "not cyclic"
     enough = found.n_cycles >= LEAST_CYCLES
     return "" if enough else f"holds {np.floor(100 * found.n_cycles) / 100:.2f} cycles"
+
+
+def _lack(found, threshold):
+    """What is missing of a self-correlation that is not cyclic."""
+    if not found.n_cycles:
+        return "has no peak"
+    asked = f"{asked_of(found.n_cycles, threshold):.2f} at {found.n_cycles:.2f} cycles"
+    return f"has the strength {found.strength:.2f}, below {threshold=:g} ({asked})"
 
 
 def _name_take(takes, i):

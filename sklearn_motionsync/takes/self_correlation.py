@@ -3,14 +3,15 @@
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy.fft import irfft, next_fast_len, rfft
 
 from ..body.direction_cosines import DirectionCosines
 from ..matching.filters import smooth
-from ..sequences import check_members
+from ..sequences import as_collection, check_members
 from ..tables import as_pandas
 
-__all__ = ["LEAST_CYCLES", "SelfCorrelation", "correlate", "self_correlation"]
+__all__ = ["LEAST_CYCLES", "SelfCorrelation", "asked_of", "correlate", "self_correlation"]
 
 # Of shorter takes nobody can say that they repeat.
 LEAST_CYCLES = 1.6
@@ -113,6 +114,12 @@ def self_correlation(take, skeleton=None):
     nan
     """
     take = as_pandas(take)
+    several = as_collection(take)
+    if several is not None and not (isinstance(take, pd.DataFrame) and len(several) == 1):
+        raise ValueError(
+            f"Give one take, (n_frames, n_features), got {len(several)} performances; "
+            "CycleSegmenter().report(X) tells of several."
+        )
     (array,), _ = check_members([take])
     if skeleton is not None:
         (array,) = DirectionCosines(skeleton).fit_transform([take])
@@ -126,9 +133,12 @@ def correlate(x):
     # In units of a power of two no square is out of range.
     x = np.ldexp(x, -int(np.frexp(np.abs(x).max())[1]))
     x -= x.mean(axis=0)
-    width, n_lags = _width(x), int((1 - _OVERLAP) * n_frames) + 1
+    width, n_lags, noise = _width(x), int((1 - _OVERLAP) * n_frames) + 1, _noise(x)
     posture, velocity = (
-        _normalized(smooth(x[np.newaxis], width, order)[0], n_lags) for order in (0, 1)
+        _normalized(
+            smooth(x[np.newaxis], width, order)[0], n_lags, noise * _left_of_noise(width, order)
+        )
+        for order in (0, 1)
     )
     correlation = (posture + velocity) / 2
     peaks = _peaks_of(correlation, posture)
@@ -141,6 +151,15 @@ def correlate(x):
     return SelfCorrelation(correlation, posture, velocity, peaks, period, strength, n_cycles)
 
 
+def asked_of(n_cycles, threshold):
+    """The strength from which so many cycles are a repetition.
+
+    The take is compared with itself over all cycles but one. If these are less than a whole one,
+    it is more likely by chance that they are alike.
+    """
+    return threshold / np.sqrt(np.clip(np.asarray(n_cycles) - 1, 1e-12, 1))
+
+
 def _width(x):
     """Standard deviation, in frames, of a Gaussian that leaves the movement of centred features."""
     change, bend = (np.square(np.diff(x, k, axis=0)).sum() / max(len(x) - k, 1) for k in (1, 2))
@@ -149,8 +168,28 @@ def _width(x):
     return _SMOOTHING * np.sqrt(np.square(x).sum() / len(x) / change) if change > 0 else 0.0
 
 
-def _normalized(x, n_lags):
-    """The correlation of features with themselves at every lag, means of each overlap removed."""
+def _noise(x):
+    """White noise a frame in the square of centred features, in the share that is none."""
+    bends = np.diff(x, 3, axis=0)
+    energy = np.square(x).sum() / len(x)
+    # It adds 1 + 9 + 9 + 1 to the square of a third difference, slow movement hardly anything.
+    noise = np.square(bends).sum() / (20 * max(len(bends), 1))
+    return noise * max(1 - noise / energy, 0) if energy > 0 else 0.0
+
+
+def _left_of_noise(width, order):
+    """The share of the variance of white noise that is left by a filter."""
+    middle = int(np.ceil(4 * width)) + 2
+    impulse = np.zeros((1, 2 * middle + 1, 1))
+    impulse[0, middle] = 1
+    return np.square(smooth(impulse, width, order)).sum()
+
+
+def _normalized(x, n_lags, noise):
+    """The correlation of features with themselves at every lag, means of each overlap removed.
+
+    ``noise`` of the squares of every frame is noise.
+    """
     n, lags = len(x), np.arange(n_lags)
     x = x - x.mean(axis=0)
     size = next_fast_len(2 * n, real=True)
@@ -165,9 +204,10 @@ def _normalized(x, n_lags):
     products -= (early * late).sum(axis=1) / counts
     least = _NOTHING * energy[n]
     moves = (of_early > least) & (of_late > least)
+    of_early, of_late = (np.maximum(of - counts * noise, of / 2) for of in (of_early, of_late))
     out = np.zeros(n_lags)
     out[moves] = products[moves] / np.sqrt(of_early[moves] * of_late[moves])
-    return out
+    return np.clip(out, -1, 1)
 
 
 def _peaks_of(correlation, posture):

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync import Skeleton, self_correlation
+from sklearn_motionsync import Skeleton, self_correlation, to_frame
 from sklearn_motionsync.datasets import make_bending, make_gait
 
 
@@ -64,6 +64,20 @@ def test_noise_is_no_cycle_and_hides_none():
     assert self_correlation(drift / drift.std() + 0.05 * noise).strength < 0.3
 
 
+@pytest.mark.parametrize(("size", "lost"), [(0.3, 0.02), (0.6, 0.07)])
+def test_white_noise_takes_little_off_the_strength(size, lost):
+    """Of what repeats, but not quite."""
+    rng = np.random.default_rng(4)
+    path = gaussian_filter1d(rng.normal(size=(320, 4)), 12, axis=0)
+    x = waves(320, 80)
+    x = x / x.std() + 0.8 * path / path.std()
+    expected = self_correlation(x)
+    found = self_correlation(x + size * x.std() * rng.normal(size=x.shape))
+    assert 0.6 < expected.strength < 0.8
+    assert found.strength == pytest.approx(expected.strength, abs=lost)
+    assert found.period == pytest.approx(expected.period, rel=0.02)
+
+
 def test_slow_changes_of_pace_do_not_matter():
     t = np.linspace(0, 1, 600)
     angle = 24 * np.pi * (t + 0.05 * np.sin(np.pi * t))  # cycles of 0.86 to 1.19 of the mean
@@ -106,6 +120,9 @@ def test_takes_of_gait():
         (np.zeros(5), r"shape \(5,\)"),
         (np.zeros((1, 3)), "at least 2 frames"),
         (np.full((9, 2), np.nan), "NaN"),
+        (np.zeros((2, 9, 2)), "Give one take, .* got 2 performances"),
+        ([np.zeros((9, 2)), np.zeros((7, 2))], "got 2 performances; CycleSegmenter"),
+        (to_frame([np.zeros((9, 2)), np.ones((7, 2))]), "got 2 performances"),
         ([["a"], ["b"]], "numeric"),
     ],
 )
