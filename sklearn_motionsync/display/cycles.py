@@ -126,7 +126,7 @@ class CycleDisplay:
             found.peaks,
             curve,
             cuts,
-            threshold=segmenter.threshold,
+            threshold=float(asked_of(np.inf, found.breadth, segmenter.threshold)),
             period=period,
             name=name,
             reason=row["reason"],
@@ -155,8 +155,9 @@ class CycleDisplay:
         (self.correlation_,) = upper.plot(lags, self.correlation, color=blue)
         at, values = lags[self.peaks], self.correlation[self.peaks]
         (self.peaks_,) = upper.plot(at, values, "o", color=blue, fillstyle="none", label="peaks")
-        # More is asked of takes of less than two cycles.
-        asked = asked_of(len(self.curve) / np.arange(1, len(lags)), self.threshold)
+        # More is asked of takes of less than two cycles; of narrow movements it is already.
+        cycles = len(self.curve) / np.arange(1, len(lags))
+        asked = asked_of(cycles, np.inf, self.threshold)
         (self.threshold_,) = upper.plot(
             lags[1:], asked, color="0.4", linestyle="--", linewidth=1, label="threshold"
         )

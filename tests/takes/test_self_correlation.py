@@ -6,6 +6,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync import Skeleton, self_correlation, to_frame
 from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.takes.self_correlation import correlate, reason_of
 
 
 def waves(n_frames, period, n_features=4, seed=0):
@@ -131,3 +132,21 @@ def test_what_is_no_take_is_refused(take, message):
         self_correlation(take)
     with pytest.raises(ValueError, match="15 joints need 45"):
         self_correlation(np.zeros((9, 3)), Skeleton.paper())
+
+
+def test_chance_is_not_cyclic():
+    """Noise in few features is like itself by chance, so more is asked of them."""
+    rng = np.random.default_rng(0)
+    for n_features in (1, 2, 4):
+        takes = [rng.standard_normal((200, n_features)) for _ in range(40)]
+        reasons = [reason_of(correlate(x), 0.4) for x in takes]
+        assert reasons.count("") <= 1, n_features
+    t = 2 * np.pi * np.arange(300)[:, np.newaxis] / 90
+    one = np.sin(t) + 0.3 * rng.standard_normal(t.shape)
+    assert reason_of(correlate(one), 0.4) == ""
+
+
+def test_breadth():
+    found = correlate(np.eye(8)[np.arange(160) // 5 % 8])
+    assert 5 < found.breadth <= 7
+    assert correlate(np.sin(np.arange(100.0))[:, np.newaxis]).breadth == pytest.approx(1)
