@@ -1,5 +1,6 @@
 """find_performances: where in long takes an action happens."""
 
+import warnings
 from bisect import bisect, insort
 from numbers import Integral, Real
 
@@ -78,7 +79,8 @@ def find_performances(
         unlike; for an array from 2/3 to 3/2 of its length.
     groups : array-like, default=None
         Who performed each training performance, or what else makes them resemble each other. By
-        default those that an `ActionModel` in the pipeline was fitted with.
+        default those that an `ActionModel` in the pipeline was fitted with, which it knows of at
+        most 64 performances.
 
     Returns
     -------
@@ -262,9 +264,17 @@ def _groups(pattern, reached, groups):
         return as_codes(groups, len(training.durations))[training.kept]
     models = [step for step in flat_steps(pattern) if isinstance(step, ActionModel)]
     known = [model.groups_ for model in models if hasattr(model, "groups_")]
-    # Of more than a model keeps nobody knows who gave which.
-    complete = len(training.kept) == len(training.durations)
-    return known[0] if known and complete and len(known[0]) == len(training.kept) else None
+    if not known or len(known[0]) == len(training.durations):
+        return known[0] if known else None
+    if len(np.unique(known[0])) < len(known[0]):
+        warnings.warn(
+            f"The model keeps {len(known[0])} of {len(training.durations)} performances, so that "
+            "who gave the others is not known, and each counts for itself: the threshold will be "
+            "too high. Give groups, one for each performance.",
+            UserWarning,
+            stacklevel=4,
+        )
+    return None
 
 
 def _durations(synchronizer, durations):

@@ -325,6 +325,9 @@ def test_many_training_performances_are_thinned_out():
     groups = [f"person {i // 8}" for i in range(70)]
     _, origin = find_performances(sync, TAKE[:130], groups=groups, durations=(50, 75))
     np.testing.assert_allclose(spans(origin), TRUE[:1], atol=8)
+    pipe = make_pipeline(sync, ActionModel()).fit(many, actionmodel__groups=groups)
+    with pytest.warns(UserWarning, match="keeps 64 of 70 .* Give groups"):
+        find_performances(pipe, TAKE[:60])
 
 
 def test_time_and_memory_do_not_explode(pipe):
