@@ -12,11 +12,11 @@ from .body.direction_cosines import DirectionCosines
 from .body.joint_positions import JointPositions
 from .body.limbs import exponent_of
 from .body.skeleton import Skeleton
-from .gate import as_numbers
+from .gate import as_numbers, check_names
 from .pipelines import flat_steps, parts_of, reach_synchronizer
 from .sequences import NOT_ONE, as_collection, check_members
 from .synchronizers.match import Match
-from .tables import labels_of
+from .tables import FRAME, labels_of
 
 __all__ = ["blend_performances"]
 
@@ -26,6 +26,10 @@ _ROUNDING = 1e-5
 _WHOLE = 1e-11
 # Beyond the performances a blend goes at least so many times as fast as the slowest of them.
 _SLOWEST = 0.5
+# So many times as many frames as the longest performance has are a mistake in the weights.
+_LONGEST = 100
+# Steps of time that differ by less, as a share, are of one frame rate.
+_ALIKE = 0.01
 # What tables carry along that only one performance is called.
 _OWN = ("performance", "levels")
 
@@ -75,14 +79,15 @@ def blend_performances(
     Returns
     -------
     ndarray, shape (n_frames, n_features), or DataFrame
-        As performances of X are. Float32 stays.
+        As performances of X are. Float32 stays. Frames of a table are numbered from 0, or go on
+        from 0 by the step of time that those of X have.
 
     Raises
     ------
     ValueError
         If the weights are not one a performance or not of sum 1; if X breaks the contract for
         performances, or that of the skeleton; if there is no such performer; if weights beyond 0
-        and 1 leave the blend no time.
+        and 1 leave the blend no time, or make it a hundred times as long as the longest of X.
 
     See Also
     --------
@@ -98,7 +103,13 @@ def blend_performances(
 
     Links that are no limbs nor bones, such as from the pelvis to the middle of the hips or to a
     marker, are numbers along the axes of the body. Joints between two landmarks, such as of the
-    spine, are put where bones lead from the pelvis. In a picture (``n_dims=2``) nothing is turned.
+    spine, are put where bones lead from the pelvis. Bones that close a ring with limbs, such as the
+    last one to the head, collar bones, and those from the pelvis to the hips, give way.
+    In a picture (``n_dims=2``) nothing is turned.
+
+    Hips within 17 degrees of the vertical show no heading: it goes on evenly from before to after,
+    and in a cartwheel the body is not turned about. Who lies on the side from the first to the last
+    frame has none, and is blended along the axes of the recording.
 
     Feet are not held to the floor: people who stand or step differently slide in between.
 
@@ -140,7 +151,7 @@ def blend_performances(
     out = _blended(arrays, frames, weights, skeleton, owner).astype(arrays[0].dtype, copy=False)
     if is_rows:
         return out[:, 0]
-    return _like(sequences[0], out, levels[-1])
+    return _like(sequences, out, levels[-1])
 
 
 def _read(X, takes_rows):
@@ -185,6 +196,8 @@ def _check(sequences, arrays, skeleton):
                 f"Performance 0 has {arrays[0].shape[1]} features a frame, but postures of these "
                 f"DirectionCosines have {len(names)}. For joint positions give the Skeleton."
             )
+        for i, x in enumerate(sequences):
+            check_names(x, names, f"Performance {i}")
 
 
 def _weights(given, labels, n_frames, what):
@@ -192,31 +205,55 @@ def _weights(given, labels, n_frames, what):
     if isinstance(given, pd.Series):
         given = given.to_dict()
     if isinstance(given, Mapping):
-        row = np.zeros(len(labels))
-        for label, weight in given.items():
-            row[_index(label, labels, what)] += as_numbers(weight, what)
-        given = row
+        given = _row_of(given, labels, what)
     rows = np.atleast_2d(as_numbers(given, what, dtype=np.float64))
     if rows.ndim != 2 or rows.shape[1] != len(labels):
         raise ValueError(
             f"{what} must be one for each of the {len(labels)} performances, or rows of them; got "
             f"shape {np.shape(given)}. Of some, give a dict: {{0: 0.5, 1: 0.5}}."
         )
-    total = rows.sum(axis=1, keepdims=True)
-    wrong = ~(np.abs(total[:, 0] - 1) <= _ROUNDING)
-    if wrong.any():
-        i = int(wrong.argmax())
-        where = f", row {i}," if len(rows) > 1 else ""
-        raise ValueError(
-            f"{what}{where} must have the sum 1, got {total[i, 0]:g}: divide by it. What is to go "
-            "beyond one performance leads away from another, as in [1.5, -0.5]."
-        )
+    _check_rows(rows, labels, what)
     # Rounding is not to be seen in a single weight.
-    rows = rows / total
+    rows = rows / rows.sum(axis=1, keepdims=True)
     if len(rows) == 1:
         return np.repeat(rows, n_frames, axis=0)
     at = np.linspace(0, len(rows) - 1, n_frames)
     return np.column_stack([np.interp(at, np.arange(len(rows)), column) for column in rows.T])
+
+
+def _row_of(given, labels, what):
+    """Weights of some performances as those of all: (n_sequences,)."""
+    row = np.zeros(len(labels))
+    for label, weight in given.items():
+        place, weight = _index(label, labels, what), as_numbers(weight, what)
+        if weight.ndim:
+            raise ValueError(
+                f"{what}: {label!r} has numbers of shape {weight.shape}; a dict has one number for "
+                "each. Weights that change are rows, [[1, 0], [0, 1]]."
+            )
+        row[place] += weight
+    return row
+
+
+def _check_rows(rows, labels, what):
+    """Refuse weights (n_rows, n_sequences) that are no numbers, or not of sum 1."""
+    where = [f", row {i}," if len(rows) > 1 else "" for i in range(len(rows))]
+    wrong = ~np.isfinite(rows)
+    if wrong.any():
+        i, k = np.argwhere(wrong)[0]
+        raise ValueError(
+            f"{what}{where[i]} must be finite numbers, got {rows[i, k]} for performance "
+            f"{labels[k]!r}."
+        )
+    total = rows.sum(axis=1)
+    wrong = np.abs(total - 1) > _ROUNDING
+    if wrong.any():
+        i = int(wrong.argmax())
+        by = ": divide by it" if total[i] > 0 else ""
+        raise ValueError(
+            f"{what}{where[i]} must have the sum 1, got {total[i]:g}{by}. What is to go beyond one "
+            "performance leads away from another, as in [1.5, -0.5]."
+        )
 
 
 def _index(label, labels, what):
@@ -259,6 +296,11 @@ def _paced(met, timing):
         raise ValueError(
             "Weights beyond 0 and 1 leave the blend no time: give timing= weights between."
         )
+    if last > _LONGEST * met.max():
+        raise ValueError(
+            f"Weights beyond 0 and 1 make the blend {last + 1} frames long, the longest "
+            f"performance has {met.max() + 1:.0f}: give timing= weights between."
+        )
     clock = np.arange(met.shape[1])
     at = np.interp(np.linspace(0, passed[-1], last + 1), passed, clock)
     frames = np.stack([np.interp(at, clock, x) for x in met])
@@ -286,11 +328,22 @@ def _blended(arrays, frames, weights, skeleton, owner):
     return np.ldexp(out, k) if k else out
 
 
-def _like(x, array, frame):
-    """An array as the kind of a performance."""
+def _like(sequences, array, name):
+    """An array as the kind of the performances."""
+    x = sequences[0]
     if not isinstance(x, pd.DataFrame):
         return array
-    index = pd.RangeIndex(len(array), name=frame)
-    df = pd.DataFrame(array, columns=x.columns, index=index)
+    df = pd.DataFrame(array, columns=x.columns, index=_clock(sequences, len(array), name))
     df.attrs = {key: value for key, value in x.attrs.items() if key not in _OWN}
     return df
+
+
+def _clock(sequences, n_frames, name):
+    """Frames from 0; or times, if all performances have such, of one frame rate."""
+    indices = [x.index for x in sequences if isinstance(x, pd.DataFrame)]
+    if not all(index.dtype.kind in "fmM" for index in indices):
+        return pd.RangeIndex(n_frames, name=name)
+    steps = [(index[-1] - index[0]) / (len(index) - 1) for index in indices]
+    if max(steps) - min(steps) > _ALIKE * min(steps):
+        return pd.RangeIndex(n_frames, name=FRAME)
+    return pd.Index(np.arange(n_frames) * steps[0], name=name)

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ASpace,
@@ -218,6 +219,37 @@ def test_who_turns_and_who_does_not_make_one_who_turns_half():
     np.testing.assert_allclose(found, half, atol=1e-9)
 
 
+def cartwheel(lean):
+    """All the way round about the pelvis, in a plane that leans by so many degrees."""
+    degrees = np.stack([np.linspace(0, 360, 61), np.full(61, lean)], axis=1)
+    turns = Rotation.from_euler("zx", degrees, degrees=True).as_matrix()
+    body = standing(61).reshape(61, -1, 3) - [0, 1, 0]
+    return (body @ turns.transpose(0, 2, 1)).reshape(61, -1)
+
+
+@pytest.mark.parametrize("leans", [(6, -6), (-2, 2), (8, 4)])
+def test_hips_that_go_over_the_top_do_not_turn_the_body_about(leans):
+    """Seen from above the hips of one turn to the left, of the other to the right."""
+    X = [cartwheel(lean) for lean in leans]
+    found = blend_performances(even(*X), X, [0.5, 0.5], skeleton=PAPER)
+    middle = cartwheel(np.mean(leans))
+    # From the pelvis, the first joint.
+    apart = [x.reshape(61, -1, 3) - x.reshape(61, -1, 3)[:, :1] for x in (found, middle)]
+    np.testing.assert_allclose(*apart, atol=0.05)
+    for i in (0, 1):
+        back = blend_performances(even(*X), X, {i: 1}, skeleton=PAPER)
+        np.testing.assert_allclose(back, X[i], atol=1e-12)
+
+
+def test_who_lies_on_the_side_is_not_turned_by_noise():
+    """Hips stand upright, and tell no heading."""
+    lying = np.repeat(cartwheel(0)[15:16], 61, axis=0)
+    noise = np.random.default_rng(0).normal(scale=0.01, size=(2, *lying.shape))
+    X = list(lying + noise)
+    found = blend_performances(even(*X), X, [0.5, 0.5], skeleton=PAPER)
+    assert np.abs(found - lying).max() < 0.08
+
+
 def test_a_walk_that_goes_over_to_another_does_not_leap():
     X = [walker(60), turned(walker(60, seed=1), 90)]
     X[1][:, ::3] += 20  # far away
@@ -323,6 +355,25 @@ def test_tables_keep_labels_names_and_frames(bending):
     np.testing.assert_array_equal(by_number, found)
 
 
+@pytest.mark.parametrize(
+    ("times", "expected"),
+    [
+        (lambda n: 3 + np.arange(n) / 50, 0.02),
+        (lambda n: pd.to_timedelta(np.arange(n) * 20, unit="ms"), pd.Timedelta("20ms")),
+        (lambda n: pd.date_range("2020", periods=n, freq="20ms"), pd.Timedelta("20ms")),
+        (lambda n: np.linspace(0, 1, n), 1),  # shares of the time: no frame rate
+        (lambda n: np.arange(7, 7 + 2 * n, 2), 1),  # numbers of frames
+    ],
+)
+def test_times_of_tables_go_on_evenly(times, expected):
+    X = [pd.DataFrame(np.ones((n, 2)), pd.Index(times(n), name="time")) for n in (41, 61)]
+    found = blend_performances(even(*X), X, [0.5, 0.5])
+    assert len(found) == 51
+    assert found.index[0] == 0 * expected
+    np.testing.assert_allclose(np.diff(found.index) / expected, 1)
+    assert found.index.name == ("frame" if times(41)[-1] == 1 else "time")
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_single_precision_stays(bending, pipe, dtype):
     X = [x.astype(dtype) for x in bending.data[:3]]
@@ -349,7 +400,10 @@ def test_units_change_nothing(bending, pipe):
     [
         ({"weights": [1, 1, 0]}, "sum 1, got 2"),
         ({"weights": [0.5, 0.5]}, "one for each of the 3 performances"),
-        ({"weights": [np.nan, 1, 0]}, "sum 1, got nan"),
+        ({"weights": [np.nan, 1, 0]}, "must be finite numbers, got nan for performance 0"),
+        ({"weights": [[1, 0, 0], [np.inf, 0, -np.inf]]}, "row 1, must be finite"),
+        ({"weights": [1e9, 1 - 1e9, 0]}, "frames long, the longest performance has 1"),
+        ({"weights": {0: [0, 1], 1: [1, 0]}}, r"0 has numbers of shape \(2,\)"),
         ({"weights": [[1, 0, 0], [0, 0, 0]]}, "row 1, must have the sum 1"),
         ({"weights": np.zeros((2, 2, 3))}, "got shape"),
         ({"weights": {7: 1}}, "no performance 7"),
@@ -380,6 +434,15 @@ def test_gaps_are_refused_by_their_frame(bending, pipe):
         blend_performances(match, X[:1], [1], keyframes=[])
     with pytest.raises(ValueError, match="lengths_of is for joint positions"):
         blend_performances(match, bending.data[:2], [1, 0], lengths_of=0)
+
+
+def test_postures_in_another_order_are_refused(bending):
+    cosines = DirectionCosines(bending.skeleton).fit(bending.data[:2])
+    names = cosines.get_feature_names_out()
+    X = [pd.DataFrame(x, columns=names) for x in cosines.transform(bending.data[:2])]
+    X[1] = X[1][names[::-1]]
+    with pytest.raises(ValueError, match="Performance 1 has the columns"):
+        blend_performances(even(*X), X, [1, 0], skeleton=cosines)
 
 
 def test_key_frames_are_handed_on(bending):

@@ -43,7 +43,7 @@ def client():
     settings = {"n_workers": N_WORKERS, "threads_per_worker": 1, "protocol": "tcp://"}
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", f"{package}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
-        local = distributed.LocalCluster(**settings, dashboard_address=None)
+        local = distributed.LocalCluster(**settings, dashboard_address=":0")
     with local, distributed.Client(local) as client:
         client.run(count)
         yield client
@@ -126,6 +126,7 @@ def test_the_workers_work_and_keep_nothing(client):
     # They are told when the client has forgotten, which takes a moment.
     deadline = time.monotonic() + 60
     while any(client.run(has_data).values()) and time.monotonic() < deadline:
+        gc.collect()
         time.sleep(0.05)
     if any(client.run(has_data).values()):
         pytest.fail("the workers still hold something")

@@ -15,8 +15,9 @@ __all__ = ["Figure", "Plan", "along_angle"]
 
 # Who is nearer than this, in bodies, has no direction from there.
 _APART = 1e-6
-# Hips that show so little of themselves from above, in their lengths, show no heading.
-_SHOWN = 1e-6
+# Hips that show less of themselves from above, in their lengths, show no heading: within 17 degrees
+# of the vertical it leaps from side to side. Nobody's do in 343 real performances (0.33 at least).
+_SHOWN = 0.3
 # Between the joints of a pair: no landmarks, but where both sides are joined to the trunk.
 _MIDDLES = {"hip": "pelvis", "shoulder": "neck"}
 
@@ -190,7 +191,12 @@ class Plan:
         seen = np.flatnonzero(np.hypot(x, z) > _SHOWN)
         if not len(seen):
             return np.zeros(len(points))
-        return np.interp(np.arange(len(points)), seen, np.unwrap(np.arctan2(z[seen], x[seen])))
+        angle = np.arctan2(z[seen], x[seen])
+        # Hips that went over the top, as in a cartwheel, have not turned the body about.
+        period = np.where(np.diff(seen) > 1, np.pi, 2 * np.pi)
+        leaps = period * np.rint(np.diff(angle) / period)
+        angle[1:] -= np.cumsum(leaps)
+        return np.interp(np.arange(len(points)), seen, angle)
 
     def _size(self, positions):
         points, k = landmarks_of(positions, self.skeleton)

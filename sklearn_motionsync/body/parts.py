@@ -31,14 +31,18 @@ def parts_of_limbs(limbs, n_dims, first):
 
 
 def parts_of_names(names):
-    """Features of every part, by index, of features some of which are called <limb>_<axis>."""
+    """Features of every part, by index, of features some of which are called <limb>_<axis>.
+
+    None if the trunk is all there is: then joints are called like its limbs, such as the neck.
+    """
     split = [str(name).rpartition("_") for name in names]
     limb_of = [limb if axis in AXES[3] else None for limb, _, axis in split]
     parts = {
         name: [k for k, limb in enumerate(limb_of) if limb in of_part]
         for name, of_part in PARTS.items()
     }
-    return {name: features for name, features in parts.items() if features}
+    found = {name: features for name, features in parts.items() if features}
+    return {} if [*found] == ["trunk"] else found
 
 
 def parts_of_postures(performances):

@@ -7,6 +7,7 @@ from ..body.formats import SIDES
 from ..features import choose_features
 from ..takes.compared import names_of_compared, start_curves
 from ..takes.cycles import CycleSegmenter, examined, taken
+from ..takes.self_correlation import asked_of
 from .drawing import COLORS, panels
 from .given import as_drawn, as_indices, is_number
 from .time_axis import TimeAxis
@@ -125,7 +126,7 @@ class CycleDisplay:
             found.peaks,
             curve,
             cuts,
-            threshold=segmenter.threshold,
+            threshold=float(asked_of(np.inf, found.breadth, segmenter.threshold)),
             period=period,
             name=name,
             reason=row["reason"],
@@ -154,8 +155,11 @@ class CycleDisplay:
         (self.correlation_,) = upper.plot(lags, self.correlation, color=blue)
         at, values = lags[self.peaks], self.correlation[self.peaks]
         (self.peaks_,) = upper.plot(at, values, "o", color=blue, fillstyle="none", label="peaks")
-        self.threshold_ = upper.axhline(
-            self.threshold, color="0.4", linestyle="--", linewidth=1, label="threshold"
+        # More is asked of takes of less than two cycles; of narrow movements it is already.
+        cycles = len(self.curve) / np.arange(1, len(lags))
+        asked = asked_of(cycles, np.inf, self.threshold)
+        (self.threshold_,) = upper.plot(
+            lags[1:], asked, color="0.4", linestyle="--", linewidth=1, label="threshold"
         )
         self.period_ = None
         if self.period is not None:

@@ -165,7 +165,7 @@ class SearchDisplay:
         rows = self.segments[(self.segments["take"] == take).to_numpy()]
         spans = np.column_stack([rows["start"], rows["stop"] - rows["start"]]).tolist()
         strip = _BOTTOM - _STRIP, 0.8 * _STRIP
-        axis.broken_barh(spans, strip, facecolors=COLORS["pattern"])
+        axis.broken_barh(spans, strip, facecolors=COLORS["pattern"], edgecolors="white")
 
     def _explain(self):
         from matplotlib.lines import Line2D
@@ -193,8 +193,11 @@ def _as_table(rows, name):
     """Rows with the columns take, start and stop; hits have score and threshold, too."""
     needed = ["take", "start", "stop"] + ["score", "threshold"] * (name == "origin")
     if not isinstance(rows, pd.DataFrame):
-        rows = pd.DataFrame(list(rows), columns=needed if len(rows) else None)
-        rows = rows.reindex(columns=needed)
+        rows = [tuple(row) for row in rows]
+        wrong = [row for row in rows if len(row) != len(needed)]
+        if wrong:
+            raise ValueError(f"{name} needs rows ({', '.join(needed)}), got {wrong[0]!r}.")
+        rows = pd.DataFrame(rows, columns=needed)
     missing = [column for column in needed if column not in rows.columns]
     if missing:
         raise ValueError(f"{name} needs the columns {needed}; {missing} are missing.")

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..synchronizers.match import as_match
+from ..tables import labels_of
 from .animation import playable
 from .bodies import (
     bodies_of_postures,
@@ -187,7 +188,7 @@ class SkeletonDisplay(PipelineFigures):
         skeleton : Skeleton or None
             None draws the joints as points without bones, turned as they are, y up.
         names : list of str, default=None
-            What stands under the performances; by default their numbers.
+            What stands under the performances; by default their labels in X, or numbers.
         ax, **view : as for `plot`
 
         Returns
@@ -388,8 +389,9 @@ def _beside_each_other(X, skeleton, names):
     """Performances that are put on the floor, facing forward, and what they are called."""
     X, skeleton = as_performances(X), as_skeleton(skeleton)
     raw = [placed(upright(x, skeleton, i), skeleton) for i, x in enumerate(X)]
-    labels = list(range(len(X))) if names is None else names
-    return raw, as_names(labels, len(X), "names", "performances")
+    if names is None:
+        names = [", ".join(map(str, n)) if isinstance(n, tuple) else n for n in labels_of(X)[0]]
+    return raw, as_names(names, len(X), "names", "performances")
 
 
 def _segments(bodies, bones):

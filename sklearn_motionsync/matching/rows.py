@@ -86,6 +86,11 @@ class Coupling(NamedTuple):
         """That of some pairs, by slices."""
         return self._replace(offsets=self.offsets[rows, columns])
 
+    def cost(self, times):
+        """What warps ``tau`` of all pairs pay, (n_bases, n_moving, P): (n_bases, n_moving)."""
+        away = times - np.arange(times.shape[-1]) - self.offsets
+        return self.weight * np.square(away).sum(axis=-1)
+
 
 class Bundle:
     """The pairs of one tile, whose rows are computed together.

@@ -62,8 +62,9 @@ class Warper:
         bases = Bases(matcher.trellis, features[:, :: matcher.features.subframes].copy())
         disparities = matcher.paths(bases.part(slice(1)), features[1:], coupling)[0]
         lengths = matcher.trellis.costs(bases.sequences[0], features[1:], disparities)
-        times = _times(matcher, bases, disparities[np.newaxis], coupling)[0]
-        return cls(matcher, pattern, bases, times, lengths, votes, warp_smoothing, **own)
+        times = _times(matcher, bases, disparities[np.newaxis], coupling)
+        lengths = _lengths(lengths[np.newaxis], times, coupling)[0]
+        return cls(matcher, pattern, bases, times[0], lengths, votes, warp_smoothing, **own)
 
     def positions(self, arrays):
         """Performances in the unit at every sub-position of the clock (Eq. 7), in double precision.
@@ -101,7 +102,8 @@ class Warper:
     def voted(self, positions, coupling=None):
         """Distances of the direct paths, and smoothed times after the vote of the exemplars.
 
-        A coupling draws the paths, and is no part of their distances.
+        A coupling draws the paths, and what they pay for it makes a route long; it is no part of
+        the distances.
         """
         moving, trellis = self.matcher.features(positions), self.matcher.trellis
         bases = self.bases
@@ -112,13 +114,19 @@ class Warper:
         if not self.votes:
             return trellis.costs(base, moving, disparities[0]), routes[0]
         pairs = zip(bases.sequences, disparities, strict=True)
-        lengths = np.stack([trellis.costs(x, moving, d) for x, d in pairs])
-        distances, times = lengths[0], routes[0]
+        costs = np.stack([trellis.costs(x, moving, d) for x, d in pairs])
+        distances, times = costs[0], routes[0]
         if len(self.to_exemplars):
+            lengths = _lengths(costs, routes, coupling)
             lengths[1:] += self.to_lengths[:, np.newaxis].astype(lengths.dtype)
             times = vote(times, self.to_exemplars, routes[1:], lengths)
-        about = 0.0 if coupling is None else coupling.offsets[0]
-        times = smoothed(times, trellis.reach, self.warp_smoothing, about)
+        if coupling is None:
+            times = smoothed(times, trellis.reach, self.warp_smoothing)
+        else:
+            share, others = _share(bases, coupling), coupling.offsets[0]
+            times = smoothed(times, trellis.reach, self.warp_smoothing, share * others)
+            # A strong coupling leaves nothing, also where the body's warp is steeper than a path.
+            times += share**2 * (others + np.arange(times.shape[1]) - times)
         # A path without any distance is right: the pattern keeps its own pace.
         rounding = 64 * np.finfo(positions.dtype).eps * np.square(base).sum()
         return distances, np.where((distances <= rounding)[:, np.newaxis], routes[0], times)
@@ -127,16 +135,26 @@ class Warper:
 def _times(matcher, bases, disparities, coupling):
     """``tau`` of paths: (n_bases, n_moving, P).
 
-    A path stands at whole steps. Within one the features of a base, of mean squared slope c, and a
-    coupling of the weight w share it: it is moved by w / (w + c) of the way that is left.
+    A path stands at whole steps. Of the way to what it is drawn to, half a step at most, it goes
+    the share of the coupling.
     """
     times = matcher.times(disparities)
     if coupling is None:
         return times
-    slope = np.square(np.diff(bases.sequences, axis=1)).sum(axis=2).mean()
     half = 0.5 / matcher.trellis.table.subframes
     way = coupling.offsets + np.arange(times.shape[-1]) - times
-    return times + coupling.weight / (coupling.weight + slope) * np.clip(way, -half, half)
+    return times + _share(bases, coupling) * np.clip(way, -half, half)
+
+
+def _lengths(costs, times, coupling):
+    """Costs of paths, with what their times pay for a coupling: (n_bases, n_moving)."""
+    return costs.copy() if coupling is None else costs + coupling.cost(times)
+
+
+def _share(bases, coupling):
+    """w / (w + c): what a coupling of the weight w has beside features of mean squared slope c."""
+    slope = np.square(np.diff(bases.sequences, axis=1)).sum(axis=2).mean(dtype=np.float64)
+    return coupling.weight / (coupling.weight + slope)
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,7 +45,7 @@ class PartSynchronizer(DenseSynchronizer):
         twice. By default both arms, both legs and the trunk, if the features are those of
         `DirectionCosines`: called like them, or whole postures without names. Of other features
         there are then no parts, and all follow the body. ``Skeleton.parts()`` gives them for part
-        of a body.
+        of a body. A part of joint positions is named by its columns.
     coupling : float, default=0.001
         How strongly parts are drawn to the body, a pure number: 0 leaves each by itself, infinity
         makes all follow the body. Useful from 0.0001 to 0.01; 0 to measure lags of parts that move
@@ -73,6 +73,8 @@ exemplars_, misfit_, refinement_, refines_, n_features_in_, feature_names_in_
 
     A part that hardly moves, such as the idle arm of a grab, has no timing that could be told:
     without coupling its warp is chance, and so is its lag. `Lags.summary` shows it by its spread.
+    What falls with the coupling is its distance from the body on average; a single performance of
+    it may jump.
 
     References
     ----------
@@ -199,8 +201,8 @@ exemplars_, misfit_, refinement_, refines_, n_features_in_, feature_names_in_
             Who each performance is of: then the spread is told within and between people.
         against : {"rest", "body"} or name of a part, default="rest"
             Later than what. ``"rest"``: than the body without the part, which is matched by
-            itself. ``"body"``: than the whole body, which a part that moves most takes along. A
-            name: than that part.
+            itself; where that does not move, or is nothing, than the whole body. ``"body"``: than
+            the whole body, which a part that moves most takes along. A name: than that part.
         unit : {"frames", "percent", "seconds"}, default="frames"
             Of the lags, as in ``Match.offsets_in``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
@@ -282,10 +284,12 @@ exemplars_, misfit_, refinement_, refines_, n_features_in_, feature_names_in_
 
     def _check_lags(self, against):
         if not self.parts_:
+            why = "the features are not known to be those of DirectionCosines"
+            if self.parts is not None:
+                why = f"parts={self.parts!r} names none"
             raise ValueError(
-                "There are no parts that could lag: the features are not called as those of "
-                "DirectionCosines. Give parts={name: features}, such as skeleton.parts(), and fit "
-                "again."
+                f"There are no parts that could lag: {why}. Fit again, and give parts={{name: "
+                "features}; skeleton.parts() has them of direction cosines."
             )
         known = ["rest", "body", *self.parts_]
         if not (isinstance(against, str) and against in known):

@@ -18,7 +18,7 @@ from ..tables import as_pandas
 from .circular import PHASES, Sampled, average, cycles_of, follow, keep_pace, top_of
 from .compared import compared, names_of_compared, start_curves
 from .origin import cut_takes
-from .self_correlation import LEAST_CYCLES, correlate
+from .self_correlation import LEAST_CYCLES, correlate, lack_of, reason_of
 
 __all__ = ["CycleSegmenter", "examined", "taken"]
 
@@ -53,8 +53,10 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         farther. Or a feature of what is compared, by name or index: where it has its maximum.
         None is ``"ahead"`` where the skeleton has feet, otherwise the feature that repeats best.
     threshold : float, default=0.4
-        The self-correlation from which a take is cyclic, from 0 to 1. Fixed on walks, runs, and
-        single actions of people.
+        The self-correlation from which a take is cyclic, from 0 to 1. More is asked where chance
+        has it easy: of narrow movements up to ``(1 + 2 threshold) / 3``, which is for a single
+        feature (``breadth`` of `self_correlation`), and of less than two cycles that, divided by
+        ``sqrt(n_cycles - 1)``.
     refine : bool, default=True
         Whether takes follow the template; False cuts at their constant mean period.
     incomplete : bool, default=False
@@ -153,8 +155,9 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         kept = self._kept(takes, found)
         if not kept:
             raise ValueError(
-                f"None of the {len(takes)} takes is cyclic: {_reason(found[0], self.threshold)} is "
-                "take 0. See report(X); give takes that repeat, or another threshold."
+                f"None of the {len(takes)} takes is cyclic: take 0 is "
+                f"{reason_of(found[0], self.threshold)!r}. See report(X); give takes that repeat, "
+                "or another threshold."
             )
         curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
         sampled = [Sampled(features[i], found[i].period) for i in kept]
@@ -252,7 +255,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         self._validate_params()
         given, takes = taken(clone(self), X, reset=True)
         _, found = examined(given, takes, self.skeleton)
-        reasons = [_reason(f, self.threshold) for f in found]
+        reasons = [reason_of(f, self.threshold) for f in found]
         return pd.DataFrame(
             {
                 "n_frames": [len(take) for take in takes],
@@ -296,19 +299,18 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
 
     def _kept(self, takes, found):
         """Indices of the takes that have cycles; a refusal, if others are not to be skipped."""
-        reasons = [_reason(f, self.threshold) for f in found]
+        reasons = [reason_of(f, self.threshold) for f in found]
         bad = next((i for i, reason in enumerate(reasons) if reason), None)
         if bad is not None and self.not_cyclic == "raise":
-            what, strength = _name_take(takes, bad), found[bad].strength
-            short = reasons[bad].startswith("holds")
             why = (
                 f"{reasons[bad]} of about {found[bad].period:.0f} frames, and {LEAST_CYCLES} are "
                 "needed to see that it repeats. Give a longer take"
-                if short
+                if reasons[bad].startswith("holds")
                 else f"is not cyclic, or has less than {LEAST_CYCLES} cycles: its self-correlation "
-                f"has the strength {strength:.2f}, below threshold={self.threshold:g}. Leave it out"
+                f"{lack_of(found[bad], self.threshold)}. Leave it out"
             )
-            raise ValueError(f'{what} {why}, or set not_cyclic="skip"; report(X) tells of all.')
+            what = f"{_name_take(takes, bad)} {why}"
+            raise ValueError(f'{what}, or set not_cyclic="skip"; report(X) tells of all.')
         return [i for i, reason in enumerate(reasons) if not reason]
 
     def _phases(self, given, takes):
@@ -377,14 +379,6 @@ def examined(given, takes, skeleton):
     """What is compared of takes, and their self-correlations."""
     features = compared(given, takes, skeleton)
     return features, [correlate(x) for x in features]
-
-
-def _reason(found, threshold):
-    """Why a take cannot be segmented; empty, if it can."""
-    if not found.n_cycles or found.strength < threshold:
-        return "not cyclic"
-    enough = found.n_cycles >= LEAST_CYCLES
-    return "" if enough else f"holds {np.floor(100 * found.n_cycles) / 100:.2f} cycles"
 
 
 def _name_take(takes, i):

@@ -6,10 +6,12 @@ what is another movement look like it, and windows that begin too early or late 
 
 import numpy as np
 
+from ..matching.matcher import Features
 from ..matching.metric import without_mean
-from ..matching.warps import even_slices
+from ..matching.warps import even_slices, normalise
 from ..model.likeness import as_codes, learn_border
 from ..model.manner import energies
+from .chance import chance_movements
 
 __all__ = ["Unlikeness"]
 
@@ -28,8 +30,12 @@ _USUAL_VARIANCE, _USUAL_COUNT = 0.07, 3
 _MOST_BORDER, _LEAST_BORDER = 0.7, 0.15
 # The border where a single performance tells nothing of how people differ.
 _BORDER_OF_ONE = 0.5
+# Of so many movements by chance, this share may be as alike as the border.
+_BY_CHANCE, _CHANCE_SHARE = 1000, 0.005
 # Windows that are compared at a time: bounds the memory, whatever the length of the take.
 _AT_ONCE = 256
+# They are compared at so many positions at most: their paths are not asked for.
+_MOST_POSITIONS = 100
 
 
 class Unlikeness:
@@ -59,26 +65,36 @@ class Unlikeness:
 
     def __init__(self, synchronizer, groups=None, length=True):
         training = synchronizer.training_
-        self._features, self._n_frames = training.features, synchronizer.n_frames_
+        self._set_clock(training.features, synchronizer.n_frames_)
         self._length = _Usual(training.durations) if length else np.zeros_like
+        self._usual_length = np.exp(np.log(training.durations).mean())
         count = len(training.kept)
         positions = self._positions(training.on_clock)
         self._center = positions.mean(axis=(0, 1))
         energy, self._floor = energies(positions)
+        if energy.max() <= self._floor:
+            raise ValueError(
+                "Nobody moves in what is looked for: all times of a take where somebody stands "
+                "are alike. Give a pattern, or fit on performances, that move."
+            )
         self._energy = _Usual(energy)
         self._known = self._views(positions)
         self._squares = [np.vecdot(view, view) for view in self._known]
-        self.known = np.empty(0)
+        self._training, self.known = positions, np.empty(0)
         if count > 1:
             self._groups = as_codes(groups, count)
             own = training.durations[training.kept]
             self.known = self._of(positions, own, self._groups)
 
     def border(self, coverage):
-        """Up to how unlike a share of the performances of new people is expected to be."""
+        """Up to how unlike a share of the performances of new people is expected to be.
+
+        Movements by chance are more unlike, whatever that share.
+        """
         if not len(self.known):
             return _BORDER_OF_ONE
-        return min(max(learn_border(self.known, coverage), _LEAST_BORDER), _MOST_BORDER)
+        learnt = min(learn_border(self.known, coverage), _MOST_BORDER)
+        return max(min(learnt, self._chance()), _LEAST_BORDER)
 
     def __call__(self, take, windows):
         """Of windows (n_windows, 2), start and stop, of a take (n_frames, n_features)."""
@@ -88,10 +104,25 @@ class Unlikeness:
             out[rows] = self._of(positions, windows[rows, 1] - windows[rows, 0])
         return out
 
+    def _set_clock(self, features, n_frames):
+        """Positions of windows, and features of these that are as by the frame of the clock."""
+        cost, subframes, smoothing, unit, metric = features
+        self._n_positions = min((n_frames - 1) * subframes + 1, _MOST_POSITIONS)
+        by_frame = (self._n_positions - 1) / (n_frames - 1)
+        self._features = Features(cost, by_frame, smoothing, unit, metric)
+
+    def _chance(self):
+        """How unlike movements by chance are, all but the most alike."""
+        portions = even_slices(_BY_CHANCE, _AT_ONCE)
+        counts = [portion.stop - portion.start for portion in portions]
+        movements = chance_movements(self._training, counts)
+        found = [self._of(some, np.full(len(some), self._usual_length)) for some in movements]
+        return float(np.quantile(np.concatenate(found), _CHANCE_SHARE))
+
     def _positions(self, performances):
-        """Performances on the clock, in the unit, in double precision."""
+        """Performances at all positions, in the unit, in double precision."""
         arrays = [np.asarray(x, dtype=np.float64) for x in performances]
-        return self._features.positions(arrays, self._n_frames)
+        return self._features.unit(normalise(arrays, self._n_positions))
 
     def _views(self, positions):
         """What is compared of performances: postures beside their mean, and features, as rows."""

@@ -1,5 +1,7 @@
 """find_performances: where in long takes an action happens."""
 
+import warnings
+from bisect import bisect, insort
 from numbers import Integral, Real
 
 import numpy as np
@@ -7,8 +9,9 @@ import pandas as pd
 from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
-from ..gate import as_numbers
+from ..gate import as_numbers, check_finite
 from ..model.action_model import ActionModel
+from ..model.likeness import as_codes
 from ..performances import SequenceLevelMixin, check_performances
 from ..pipelines import find_synchronizer, flat_steps, reach_synchronizer
 from ..sequences import as_collection
@@ -61,11 +64,13 @@ def find_performances(
         feature may be one-dimensional.
     threshold : "learned", float or None, default="learned"
         The lowest score of a hit. ``"learned"``: from the training performances, each compared
-        with those of other groups; at least 0.50 and at most 0.86; 0.61 for an array, half as
-        unlike as standing still. None: whatever is better than what it overlaps, to be compared
+        with those of other groups, but no lower than what movements by chance among their postures
+        hardly ever reach; at least 0.50 and at most 0.86. 0.61 for an array, half as unlike as
+        standing still. None: whatever is better than what it overlaps, to be compared
         with the learnt one.
     coverage : float, default=0.6
-        Share of performances of people not seen, cut out by hand, that a learnt threshold lets in.
+        Share of performances of people not seen, cut out by hand, that a learnt threshold lets in,
+        unless chance gets as far.
     max_hits : int, default=None
         How many are kept of each take, the best ones; by default all.
     durations : (int, int), default=None
@@ -74,7 +79,8 @@ def find_performances(
         unlike; for an array from 2/3 to 3/2 of its length.
     groups : array-like, default=None
         Who performed each training performance, or what else makes them resemble each other. By
-        default those that an `ActionModel` in the pipeline was fitted with.
+        default those that an `ActionModel` in the pipeline was fitted with, which it knows of at
+        most 64 performances.
 
     Returns
     -------
@@ -157,17 +163,19 @@ class _Search:
                 break
             room = self._room(windows[k], tried)
             if room is not None:
-                tried.append(self._moved(windows[k], scores[k], *room))
+                insort(tried, self._moved(windows[k], scores[k], *room))
         found = sorted((hit for hit in tried if hit[2] >= threshold), key=lambda hit: -hit[2])
         return sorted(found[:most])
 
-    def _room(self, window, kept):
-        """From where to where a window may reach; None if it overlaps what is kept."""
-        start, stop = window
-        if any(start < other and this < stop for this, other, _ in kept):
-            return None
-        before = max((other for _, other, _ in kept if other <= start), default=0)
-        return before, min((this for this, _, _ in kept if this >= stop), default=len(self._take))
+    def _room(self, window, tried):
+        """From where to where a window may reach; None if it overlaps what was tried.
+
+        What was tried is in order of time, and does not overlap.
+        """
+        at = bisect(tried, tuple(window))
+        before = tried[at - 1][1] if at else 0
+        after = tried[at][0] if at < len(tried) else len(self._take)
+        return (before, after) if before <= window[0] and window[1] <= after else None
 
     def _moved(self, window, score, first, last):
         """The window with its ends moved, by ever less, to where its score is best."""
@@ -201,20 +209,41 @@ def _reach(pattern, X, groups):
     if not hasattr(pattern, "fit"):
         if groups is not None:
             raise ValueError("groups tell training performances apart; an array is only one.")
-        pattern = as_pandas(pattern)
-        if not isinstance(pattern, pd.DataFrame):
-            pattern = as_numbers(pattern, "The pattern")
-            pattern = pattern[:, np.newaxis] if pattern.ndim == 1 else pattern
-        if pattern.ndim != 2 or len(pattern) < _FEWEST:
-            raise ValueError(
-                f"The pattern has shape {pattern.shape}: give one performance, (n_frames, "
-                f"n_features), of at least {_FEWEST} frames, or a fitted synchronizer."
-            )
+        pattern = _as_pattern(pattern)
         synchronizer = DenseSynchronizer(min(len(pattern), _CLOCK), pattern=0).fit([pattern])
         return synchronizer, synchronizer.check_performances(X), None
-    check_is_fitted(find_synchronizer(pattern)[1])
+    _check_synchronizer(find_synchronizer(pattern)[1])
     reached = reach_synchronizer(pattern, X, {}, "find_performances")
     return reached.synchronizer, reached.performances, _groups(pattern, reached, groups)
+
+
+def _as_pattern(pattern):
+    """One performance: a DataFrame, or an array (n_frames, n_features)."""
+    pattern = as_pandas(pattern)
+    several = isinstance(pattern, (list, tuple, np.ndarray, pd.DataFrame))
+    if several and as_collection(pattern) is not None:
+        raise ValueError(
+            "The pattern is a list of performances, or a 3-D array: give one of them, "
+            "(n_frames, n_features), or fit a synchronizer to all, and give that."
+        )
+    array = as_numbers(pattern, "The pattern")
+    array = array[:, np.newaxis] if array.ndim == 1 else array
+    if array.ndim != 2 or len(array) < _FEWEST:
+        raise ValueError(
+            f"The pattern has shape {array.shape}: give one performance, (n_frames, "
+            f"n_features), of at least {_FEWEST} frames, or a fitted synchronizer."
+        )
+    check_finite(array, "The pattern, frame")
+    return pattern if isinstance(pattern, pd.DataFrame) else array
+
+
+def _check_synchronizer(synchronizer):
+    check_is_fitted(synchronizer)
+    if synchronizer.training_.on_clock.shape[2] != synchronizer.n_features_in_:
+        raise ValueError(
+            f"{type(synchronizer).__name__} was fitted on the rows of a 2-D array, all of one "
+            "length, and hits differ in theirs: fit it on [row[:, np.newaxis] for row in X]."
+        )
 
 
 def _check_lengths(given, takes):
@@ -229,18 +258,23 @@ def _check_lengths(given, takes):
 
 def _groups(pattern, reached, groups):
     training = reached.synchronizer.training_
+    if len(training.durations) < 2:
+        return None
     if groups is not None:
-        if len(groups) != len(training.durations):
-            raise ValueError(
-                f"groups has {len(groups)} labels, and the synchronizer was fitted on "
-                f"{len(training.durations)} performances: give one for each."
-            )
-        return [groups[i] for i in training.kept]
+        return as_codes(groups, len(training.durations))[training.kept]
     models = [step for step in flat_steps(pattern) if isinstance(step, ActionModel)]
     known = [model.groups_ for model in models if hasattr(model, "groups_")]
-    # Of more than a model keeps nobody knows who gave which.
-    complete = len(training.kept) == len(training.durations)
-    return known[0] if known and complete and len(known[0]) == len(training.kept) else None
+    if not known or len(known[0]) == len(training.durations):
+        return known[0] if known else None
+    if len(np.unique(known[0])) < len(known[0]):
+        warnings.warn(
+            f"The model keeps {len(known[0])} of {len(training.durations)} performances, so that "
+            "who gave the others is not known, and each counts for itself: the threshold will be "
+            "too high. Give groups, one for each performance.",
+            UserWarning,
+            stacklevel=4,
+        )
+    return None
 
 
 def _durations(synchronizer, durations):

@@ -3,14 +3,23 @@
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy.fft import irfft, next_fast_len, rfft
 
 from ..body.direction_cosines import DirectionCosines
 from ..matching.filters import smooth
-from ..sequences import check_members
+from ..sequences import as_collection, check_members
 from ..tables import as_pandas
 
-__all__ = ["LEAST_CYCLES", "SelfCorrelation", "correlate", "self_correlation"]
+__all__ = [
+    "LEAST_CYCLES",
+    "SelfCorrelation",
+    "asked_of",
+    "correlate",
+    "lack_of",
+    "reason_of",
+    "self_correlation",
+]
 
 # Of shorter takes nobody can say that they repeat.
 LEAST_CYCLES = 1.6
@@ -22,6 +31,8 @@ _NEAR = 0.9
 _FALL = 0.5
 # Width of the smoothing, as a share of the time in which the movement changes.
 _SMOOTHING = 1 / 4
+# Of narrower movements more is asked.
+_BROAD = 2.25
 # Variances below this share of the whole are rounding.
 _NOTHING = 1e-12
 
@@ -45,6 +56,10 @@ class SelfCorrelation(NamedTuple):
         The correlation there, 0 without any.
     n_cycles : float
         Frames of the take by those of a cycle; 0 without any.
+    breadth : float
+        How many directions of equal variance the movement is worth, the squared sum of the
+        variances along its principal components by the sum of their squares: 1 for a single
+        feature. The fewer, the more easily noise is like itself.
     """
 
     correlation: np.ndarray
@@ -54,6 +69,7 @@ class SelfCorrelation(NamedTuple):
     period: float
     strength: float
     n_cycles: float
+    breadth: float
 
 
 def self_correlation(take, skeleton=None):
@@ -113,6 +129,12 @@ def self_correlation(take, skeleton=None):
     nan
     """
     take = as_pandas(take)
+    several = as_collection(take)
+    if several is not None and not (isinstance(take, pd.DataFrame) and len(several) == 1):
+        raise ValueError(
+            f"Give one take, (n_frames, n_features), got {len(several)} performances; "
+            "CycleSegmenter().report(X) tells of several."
+        )
     (array,), _ = check_members([take])
     if skeleton is not None:
         (array,) = DirectionCosines(skeleton).fit_transform([take])
@@ -126,19 +148,60 @@ def correlate(x):
     # In units of a power of two no square is out of range.
     x = np.ldexp(x, -int(np.frexp(np.abs(x).max())[1]))
     x -= x.mean(axis=0)
-    width, n_lags = _width(x), int((1 - _OVERLAP) * n_frames) + 1
+    width, n_lags, noise = _width(x), int((1 - _OVERLAP) * n_frames) + 1, _noise(x)
+    smoothed = [smooth(x[np.newaxis], width, order)[0] for order in (0, 1)]
     posture, velocity = (
-        _normalized(smooth(x[np.newaxis], width, order)[0], n_lags) for order in (0, 1)
+        _normalized(y, n_lags, noise * _left_of_noise(width, order))
+        for order, y in enumerate(smoothed)
     )
+    breadth = _breadth(smoothed[0])
     correlation = (posture + velocity) / 2
     peaks = _peaks_of(correlation, posture)
     if len(peaks) == 0:
-        return SelfCorrelation(correlation, posture, velocity, peaks, np.nan, 0.0, 0.0)
+        return SelfCorrelation(correlation, posture, velocity, peaks, np.nan, 0.0, 0.0, breadth)
     lags, values = _vertices(correlation, peaks)
     first = int(np.argmax(values >= _NEAR * values.max()))
     period, strength = float(lags[first]), float(values[first])
-    n_cycles = n_frames / period
-    return SelfCorrelation(correlation, posture, velocity, peaks, period, strength, n_cycles)
+    told = period, strength, n_frames / period, breadth
+    return SelfCorrelation(correlation, posture, velocity, peaks, *told)
+
+
+def asked_of(n_cycles, breadth, threshold):
+    """The strength from which so many cycles of a movement are a repetition.
+
+    The take is compared with itself over all cycles but one. If these are less than a whole one, or
+    if the movement has hardly more than one direction, it is more likely by chance that they are
+    alike.
+    """
+    met = np.clip(np.asarray(n_cycles) - 1, 1e-12, 1)
+    asked = 1 - (1 - threshold) * min(1, np.sqrt(breadth / _BROAD))
+    return asked / np.sqrt(met)
+
+
+def reason_of(found, threshold):
+    """Why a take cannot be segmented; empty, if it can."""
+    if not found.n_cycles or found.strength < asked_of(found.n_cycles, found.breadth, threshold):
+        return "not cyclic"
+    enough = found.n_cycles >= LEAST_CYCLES
+    return "" if enough else f"holds {np.floor(100 * found.n_cycles) / 100:.2f} cycles"
+
+
+def lack_of(found, threshold):
+    """What is missing of a self-correlation that is not cyclic."""
+    if not found.n_cycles:
+        return "has no peak"
+    asked = (
+        f"{asked_of(found.n_cycles, found.breadth, threshold):.2f} at {found.n_cycles:.2f} cycles"
+    )
+    return f"has the strength {found.strength:.2f}, below {threshold=:g} ({asked})"
+
+
+def _breadth(x):
+    """The participation ratio of the variances of features along their principal components."""
+    x = x - x.mean(axis=0)
+    products = x.T @ x
+    total = np.trace(products)
+    return float(1 / np.square(products / total).sum()) if total > 0 else 1.0
 
 
 def _width(x):
@@ -149,8 +212,28 @@ def _width(x):
     return _SMOOTHING * np.sqrt(np.square(x).sum() / len(x) / change) if change > 0 else 0.0
 
 
-def _normalized(x, n_lags):
-    """The correlation of features with themselves at every lag, means of each overlap removed."""
+def _noise(x):
+    """White noise a frame in the square of centred features, in the share that is none."""
+    bends = np.diff(x, 3, axis=0)
+    energy = np.square(x).sum() / len(x)
+    # It adds 1 + 9 + 9 + 1 to the square of a third difference, slow movement hardly anything.
+    noise = np.square(bends).sum() / (20 * max(len(bends), 1))
+    return noise * max(1 - noise / energy, 0) if energy > 0 else 0.0
+
+
+def _left_of_noise(width, order):
+    """The share of the variance of white noise that is left by a filter."""
+    middle = int(np.ceil(4 * width)) + 2
+    impulse = np.zeros((1, 2 * middle + 1, 1))
+    impulse[0, middle] = 1
+    return np.square(smooth(impulse, width, order)).sum()
+
+
+def _normalized(x, n_lags, noise):
+    """The correlation of features with themselves at every lag, means of each overlap removed.
+
+    ``noise`` of the squares of every frame is noise.
+    """
     n, lags = len(x), np.arange(n_lags)
     x = x - x.mean(axis=0)
     size = next_fast_len(2 * n, real=True)
@@ -165,9 +248,10 @@ def _normalized(x, n_lags):
     products -= (early * late).sum(axis=1) / counts
     least = _NOTHING * energy[n]
     moves = (of_early > least) & (of_late > least)
+    of_early, of_late = (np.maximum(of - counts * noise, of / 2) for of in (of_early, of_late))
     out = np.zeros(n_lags)
     out[moves] = products[moves] / np.sqrt(of_early[moves] * of_late[moves])
-    return out
+    return np.clip(out, -1, 1)
 
 
 def _peaks_of(correlation, posture):

@@ -24,7 +24,8 @@ def test_it_draws_the_numbers_of_the_estimator(segmenter):
     np.testing.assert_array_equal(display.correlation_.get_ydata(), found.correlation)
     np.testing.assert_allclose(display.peaks_.get_xdata(), found.peaks / 100)
     assert display.period_.get_xdata()[0] == pytest.approx(found.period / 100)
-    assert display.threshold_.get_ydata()[0] == 0.4
+    asked = 1 - 0.6 * np.sqrt(min(1, found.breadth / 2.25))
+    assert display.threshold_.get_ydata()[0] == pytest.approx(asked)
     np.testing.assert_allclose(display.curve_.get_xdata(), np.arange(len(take)) / 100)
     np.testing.assert_array_equal(display.curve_.get_ydata(), take[:, HIP])
     origin = segmenter.segment([take])[1]

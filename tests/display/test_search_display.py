@@ -43,6 +43,10 @@ def test_nothing_found_is_drawn_too():
 def test_what_is_refused():
     with pytest.raises(ValueError, match="none of those that are drawn"):
         SearchDisplay.from_estimator(WAVE, TAKE, segments=[(3, 0, 9)])
+    with pytest.raises(
+        ValueError, match=r"segments needs rows \(take, start, stop\), got \(0, 9\)"
+    ):
+        SearchDisplay.from_estimator(WAVE, TAKE, segments=[(0, 9)])
     with pytest.raises(ValueError, match="are missing"):
         SearchDisplay(pd.DataFrame({"take": [0]}), {0: 9})
     with pytest.raises(ValueError, match="from_predictions"):

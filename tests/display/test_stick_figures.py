@@ -2,6 +2,7 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import pytest
 from IPython.core.formatters import HTMLFormatter
 from sklearn.pipeline import make_pipeline
@@ -364,3 +365,11 @@ def test_performances_beside_each_other_keep_their_pace(bunch):
     assert np.isclose(heights[:, np.newaxis], alone).any(axis=0).all()
     with pytest.raises(ValueError, match="one for each of the 3 performances"):
         SkeletonDisplay.from_performances(X, bunch.skeleton, names=["a"])
+
+
+@pytest.mark.parametrize("keys", [["ann", "bob"], [("ann", 1), ("ann", 2)]])
+def test_performances_of_a_table_are_called_as_there(bunch, keys):
+    tables = [pd.DataFrame(x, columns=bunch.skeleton.column_names) for x in bunch.data[:2]]
+    labels = SkeletonDisplay.from_performances(pd.concat(tables, keys=keys), bunch.skeleton).labels
+    assert labels == [key if isinstance(key, str) else f"{key[0]}, {key[1]}" for key in keys]
+    assert SkeletonDisplay.from_performances(tables, bunch.skeleton).labels == ["0", "1"]

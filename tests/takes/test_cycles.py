@@ -161,8 +161,11 @@ def test_the_foot_that_is_farther_ahead():
 
 def test_what_does_not_repeat_is_refused(gait):
     bunch = make_bending(2, random_state=0)
-    with pytest.raises(ValueError, match=r"Take 0 is not cyclic, or .* below threshold=0.4"):
+    with pytest.raises(ValueError, match=r"Take 0 is not cyclic, or .* has no peak. Leave it out"):
         CycleSegmenter(bunch.skeleton).fit(bunch.data)
+    noise = np.random.default_rng(0).normal(size=(200, 4))
+    with pytest.raises(ValueError, match=r"strength 0\.\d\d, below threshold=0.4 \(0\.\d\d at"):
+        CycleSegmenter().fit(noise)
     short = gait.data[1][: round(1.52 * CycleSegmenter().periods(gait.data)[1])]
     with pytest.raises(
         ValueError, match=r"Take 1 holds 1\.\d\d cycles of about \d+ frames, and 1.6"
@@ -175,6 +178,18 @@ def test_what_does_not_repeat_is_refused(gait):
     assert report["cyclic"].to_dict() == {"ann": True, "bob": False}
     np.testing.assert_array_equal(CycleSegmenter().is_cyclic(named), [True, False])
     assert np.isnan(CycleSegmenter().periods(named)).tolist() == [False, True]
+
+
+def test_of_less_than_two_cycles_more_is_asked():
+    """Of 1.7 cycles 0.7 meet another: the threshold is divided by the root of that."""
+    t = 2 * np.pi * np.arange(300)[:, np.newaxis] / 100
+    waves = np.sin(t + np.arange(3))
+    for threshold, cyclic in ((0.9, [True, False]), (0.7, [True, True])):
+        report = CycleSegmenter(threshold=threshold).report([waves, waves[:170]])
+        assert (report["strength"] > 0.95).all()
+        assert report["cyclic"].tolist() == cyclic
+    with pytest.raises(ValueError, match=r"below threshold=0.9 \(1.\d\d at 1.7\d cycles\)"):
+        CycleSegmenter(threshold=0.9).fit(waves[:170])
 
 
 def test_or_skipped(gait):

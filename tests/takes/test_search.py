@@ -1,5 +1,7 @@
 """Where in takes an action happens: planted movements, real recordings, and what is refused."""
 
+import tracemalloc
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -17,6 +19,9 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.trellis import Trellis
+from sklearn_motionsync.model.likeness import learn_border
+from sklearn_motionsync.takes.chance import chance_movements
+from sklearn_motionsync.takes.likely import Unlikeness
 from sklearn_motionsync.takes.proposals import Proposer, scales
 
 import oracle
@@ -90,7 +95,8 @@ def test_performances_side_by_side_are_found_and_others_are_not(pipe):
 def test_every_way_to_give_the_action_finds_it(pipe):
     detector = ActionDetector(pipe).fit(TRAINING, groups=PEOPLE)
     expected = find_performances(pipe, TAKE)[1]
-    for estimator, groups in ((detector, None), (pipe[0], PEOPLE)):
+    labels = pd.Series(PEOPLE, index=np.arange(len(PEOPLE)) + 7)
+    for estimator, groups in ((detector, None), (pipe[0], PEOPLE), (pipe[0], labels)):
         pd.testing.assert_frame_equal(
             find_performances(estimator, TAKE, groups=groups)[1], expected
         )
@@ -264,6 +270,47 @@ def test_a_learnt_threshold_is_what_people_reach_of_each_other():
     assert all((origin["score"] >= origin["threshold"]).all() for origin in origins)
 
 
+def wander(n_frames, rng):
+    """Two features that forget within 20 frames: means of as many random numbers."""
+    noise = rng.standard_normal((n_frames + 19, 2))
+    return np.lib.stride_tricks.sliding_window_view(noise, 20, axis=0).sum(axis=2) / np.sqrt(20)
+
+
+def test_a_threshold_lets_movements_by_chance_in_hardly_ever():
+    rng = np.random.default_rng(0)
+    bump = np.sin(np.linspace(0, np.pi, 20))[:, np.newaxis]
+    people = [bump * [1, 0.5 * (-1) ** k] + 0.8 * wander(20, rng) for k in range(12)]
+    unlikeness = Unlikeness(DenseSynchronizer(20).fit(people))
+    frames, take = np.concatenate(people), wander(4000, rng)
+    windows = np.arange(0, 3980, 20)[:, np.newaxis] + [0, 20]
+    chance = unlikeness(take * frames.std(axis=0) + frames.mean(axis=0), windows)
+    assert (chance < unlikeness.border(0.6)).mean() < 0.02
+    assert (chance < learn_border(unlikeness.known, 0.6)).mean() > 0.1
+
+
+def test_chance_wanders_about_the_postures_and_repeats_itself():
+    positions = np.random.default_rng(0).standard_normal((30, 50, 3)) * [3, 1, 0] + [5, 0, 7]
+    (some,) = chance_movements(positions, [2000])
+    frames = some.reshape(-1, 3)
+    np.testing.assert_allclose(frames.mean(axis=0), positions.mean(axis=(0, 1)), atol=0.15)
+    np.testing.assert_allclose(
+        np.std(some[:, [0, -1]], axis=(0, 1)), [3, 1, 0], rtol=0.1, atol=1e-9
+    )
+    # Half a length later exp(-1/2) of it is left.
+    left = [np.corrcoef(some[:, 10, k], some[:, 35, k])[0, 1] for k in (0, 1)]
+    np.testing.assert_allclose(left, np.exp(-0.5), atol=0.08)
+    np.testing.assert_array_equal(some, next(chance_movements(positions, [2000])))
+
+
+def test_a_fine_clock_finds_the_same():
+    some = [x[:, :2] for x in TRAINING[::2]]
+    take = TAKE[:260, :2]
+    coarse, fine = (DenseSynchronizer(n, consensus=2).fit(some) for n in (60, 240))
+    first, second = (find_performances(sync, take)[1] for sync in (coarse, fine))
+    np.testing.assert_allclose(spans(first), spans(second), atol=3)
+    np.testing.assert_allclose(first["score"], second["score"], atol=0.005)
+
+
 def test_durations_bound_the_hits(pipe):
     origin = find_performances(pipe, TAKE, durations=(20, 57), threshold=None)[1]
     lengths = origin["stop"] - origin["start"]
@@ -278,6 +325,19 @@ def test_many_training_performances_are_thinned_out():
     groups = [f"person {i // 8}" for i in range(70)]
     _, origin = find_performances(sync, TAKE[:130], groups=groups, durations=(50, 75))
     np.testing.assert_allclose(spans(origin), TRUE[:1], atol=8)
+    pipe = make_pipeline(sync, ActionModel()).fit(many, actionmodel__groups=groups)
+    with pytest.warns(UserWarning, match="keeps 64 of 70 .* Give groups"):
+        find_performances(pipe, TAKE[:60])
+
+
+def test_time_and_memory_do_not_explode(pipe):
+    take = np.concatenate([TAKE] * 12)
+    tracemalloc.start()
+    _, origin = find_performances(pipe, take)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(origin) >= 36
+    assert peak < 8e6
 
 
 # -- what is refused -------------------------------------------------------------------------------
@@ -293,6 +353,8 @@ def test_many_training_performances_are_thinned_out():
         ({"durations": (9, 4)}, "durations must be two whole numbers"),
         ({"durations": 30}, "durations must be two whole numbers"),
         ({"groups": [0, 1]}, "groups has 2 labels, .* 12 performances"),
+        ({"groups": "abcdefghijkl"}, "groups must be a list"),
+        ({"groups": 3}, "groups must be a list"),
     ],
 )
 def test_parameters_that_are_none(pipe, given, message):
@@ -313,6 +375,15 @@ def test_takes_and_patterns_that_are_none(pipe):
         find_performances(movement(2), TAKE)
     with pytest.raises(ValueError, match="an array is only one"):
         find_performances(movement(60), TAKE, groups=[1])
+    with pytest.raises(ValueError, match="The pattern, frame 7"):
+        find_performances(gap, TAKE)
+    with pytest.raises(ValueError, match="fit a synchronizer to all"):
+        find_performances(TRAINING, TAKE)
+    rows = DenseSynchronizer().fit(np.stack([TAKE[:60, 0], TAKE[60:120, 0]]))
+    with pytest.raises(ValueError, match="rows of a 2-D array"):
+        find_performances(rows, TAKE[:, 0])
+    with pytest.raises(ValueError, match="Nobody moves"):
+        find_performances(np.ones((30, 3)), np.ones((90, 3)))
     with pytest.raises(NotFittedError):
         find_performances(DenseSynchronizer(), TAKE)
     with pytest.raises(ValueError, match="no synchronizer"):

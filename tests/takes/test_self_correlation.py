@@ -4,8 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync import Skeleton, self_correlation
+from sklearn_motionsync import Skeleton, self_correlation, to_frame
 from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.takes.self_correlation import correlate, reason_of
 
 
 def waves(n_frames, period, n_features=4, seed=0):
@@ -64,6 +65,20 @@ def test_noise_is_no_cycle_and_hides_none():
     assert self_correlation(drift / drift.std() + 0.05 * noise).strength < 0.3
 
 
+@pytest.mark.parametrize(("size", "lost"), [(0.3, 0.02), (0.6, 0.07)])
+def test_white_noise_takes_little_off_the_strength(size, lost):
+    """Of what repeats, but not quite."""
+    rng = np.random.default_rng(4)
+    path = gaussian_filter1d(rng.normal(size=(320, 4)), 12, axis=0)
+    x = waves(320, 80)
+    x = x / x.std() + 0.8 * path / path.std()
+    expected = self_correlation(x)
+    found = self_correlation(x + size * x.std() * rng.normal(size=x.shape))
+    assert 0.6 < expected.strength < 0.8
+    assert found.strength == pytest.approx(expected.strength, abs=lost)
+    assert found.period == pytest.approx(expected.period, rel=0.02)
+
+
 def test_slow_changes_of_pace_do_not_matter():
     t = np.linspace(0, 1, 600)
     angle = 24 * np.pi * (t + 0.05 * np.sin(np.pi * t))  # cycles of 0.86 to 1.19 of the mean
@@ -106,6 +121,9 @@ def test_takes_of_gait():
         (np.zeros(5), r"shape \(5,\)"),
         (np.zeros((1, 3)), "at least 2 frames"),
         (np.full((9, 2), np.nan), "NaN"),
+        (np.zeros((2, 9, 2)), "Give one take, .* got 2 performances"),
+        ([np.zeros((9, 2)), np.zeros((7, 2))], "got 2 performances; CycleSegmenter"),
+        (to_frame([np.zeros((9, 2)), np.ones((7, 2))]), "got 2 performances"),
         ([["a"], ["b"]], "numeric"),
     ],
 )
@@ -114,3 +132,21 @@ def test_what_is_no_take_is_refused(take, message):
         self_correlation(take)
     with pytest.raises(ValueError, match="15 joints need 45"):
         self_correlation(np.zeros((9, 3)), Skeleton.paper())
+
+
+def test_chance_is_not_cyclic():
+    """Noise in few features is like itself by chance, so more is asked of them."""
+    rng = np.random.default_rng(0)
+    for n_features in (1, 2, 4):
+        takes = [rng.standard_normal((200, n_features)) for _ in range(40)]
+        reasons = [reason_of(correlate(x), 0.4) for x in takes]
+        assert reasons.count("") <= 1, n_features
+    t = 2 * np.pi * np.arange(300)[:, np.newaxis] / 90
+    one = np.sin(t) + 0.3 * rng.standard_normal(t.shape)
+    assert reason_of(correlate(one), 0.4) == ""
+
+
+def test_breadth():
+    found = correlate(np.eye(8)[np.arange(160) // 5 % 8])
+    assert 5 < found.breadth <= 7
+    assert correlate(np.sin(np.arange(100.0))[:, np.newaxis]).breadth == pytest.approx(1)
