@@ -5,7 +5,6 @@ workers hold as soon as few tasks wait for it. So every worker gets a copy under
 which lives as long as the `Held` that had it sent. Nothing here imports Dask unless it is in use.
 """
 
-import contextlib
 import uuid
 
 __all__ = ["Held", "Name", "client_of"]
@@ -48,8 +47,12 @@ class Held:
 
         waiting = self._copies
         while waiting:
-            with contextlib.suppress(TimeoutError):
+            try:
                 wait(list(waiting.values()), timeout=1)
+            except TimeoutError as late:
+                # Dask keeps it in a circle: its frames would keep what is held until some day
+                # garbage is collected.
+                late.__traceback__ = None
             workers = self.client.nthreads()
             waiting = {w: f for w, f in waiting.items() if w in workers and not f.done()}
 

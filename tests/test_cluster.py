@@ -101,10 +101,21 @@ def test_a_fit_sends_the_performances_to_every_worker_once(client, name, monkeyp
     assert sent.sum() <= 1.5 * N_WORKERS * X.nbytes
 
 
+@pytest.fixture
+def no_garbage_is_collected():
+    gc.disable()
+    yield
+    gc.enable()
+
+
+@pytest.mark.usefixtures("no_garbage_is_collected")
 def test_the_workers_work_and_keep_nothing(client):
+    """They are at something else when they are sent their copies, and forget them after the fit."""
     X = walks(60, 40, 4)
+    busy = [client.submit(time.sleep, 1.5, workers=[w], pure=False) for w in client.nthreads()]
     with joblib.parallel_config(backend="dask"):
         DenseSynchronizer().fit(X)
+    del busy
     loaded = client.run(lambda: (os.getpid(), "sklearn_motionsync.matching" in sys.modules))
     assert os.getpid() not in {pid for pid, _ in loaded.values()}
     assert all(matching for _, matching in loaded.values())
