@@ -126,7 +126,6 @@ def test_the_workers_work_and_keep_nothing(client):
     # They are told when the client has forgotten, which takes a moment.
     deadline = time.monotonic() + 60
     while any(client.run(has_data).values()) and time.monotonic() < deadline:
-        gc.collect()
         time.sleep(0.05)
     if any(client.run(has_data).values()):
         pytest.fail("the workers still hold something")
