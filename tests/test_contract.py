@@ -22,6 +22,7 @@ from sklearn_motionsync import (
     JointPositions,
     KeyframeSynchronizer,
     LinearSynchronizer,
+    OnlineSynchronizer,
     PartSynchronizer,
     Skeleton,
     TimingChannel,
@@ -61,7 +62,8 @@ QUICK = DenseSynchronizer(metric=None, refine=False)
 DETECTOR = ActionDetector(make_pipeline(QUICK, ActionModel()))
 CLASSIFIER = InTurns(n_frames=8)
 CHANNELS = [TimingChannel(LinearSynchronizer()), TimingChannel(QUICK, "log_rate")]
-ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR]
+ONLINE = OnlineSynchronizer(LinearSynchronizer())
+ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR, ONLINE]
 BODY_ESTIMATORS = [DirectionCosines(Skeleton.paper()), JointPositions(Skeleton.paper())]
 # Those of other transformers are in tests/test_framewise.py.
 FRAMEWISE = FrameWise(PCA(2))
