@@ -84,7 +84,9 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
 
     The confidence is the share of probability within a twentieth of the clock of the phase, from
     costs that are scaled so that the training performances, each followed with the mean of the
-    others, have theirs right; it falls where recent frames cost more than is usual among these.
+    others, have theirs right; it falls with the square of what recent frames cost more than is
+    usual among these. Another action costs more; a movement that is its own reverse, such as a
+    bend, costs no more backwards, and standing still costs nothing where the mean stands still.
 
     Features that are NaN are not compared; a frame of NaN, or time without frames,
     moves the phase on at the mean pace. Between frames, movements are taken to be straight

@@ -183,7 +183,7 @@ class Stream:
         mass = np.einsum("nq,nq->n", chances, near)
         unlike = np.maximum(self.recent / self.course.calibration.usual, 1)
         # Who has not begun is at the beginning.
-        return np.where(self._age > 0, self._awake * mass / unlike, 1.0)
+        return np.where(self._age > 0, self._awake * mass / unlike**2, 1.0)
 
     @staticmethod
     def chances(costs, temperature):
