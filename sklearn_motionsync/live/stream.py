@@ -42,7 +42,7 @@ class Calibration(NamedTuple):
     temperature : float
         Costs over it are log-probabilities of phases.
     usual : float
-        Recent cost of a sample that 95 % of the action stay below.
+        Recent cost of a sample that half of the action never exceed.
     """
 
     temperature: float

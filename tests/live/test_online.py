@@ -66,9 +66,8 @@ def test_known_warps_are_followed(live, n_frames, bend):
     before = np.interp(np.arange(n_frames) - lag, np.arange(n_frames), phase)
     rate = (phase - before) * live.duration_ / lag
     assert np.median(np.abs(found.rate - rate)[n_frames // 4 :]) < 0.25
-    # What is called probable happens.
-    near = errors <= 0.05 * (P - 1)
-    assert abs(np.mean(found.confidence) - np.mean(near)) < 0.25
+    # Paces and bends beyond those of the training set are believed less.
+    assert np.mean(found.confidence) > (0.8 if bend == 0 else 0.3)
 
 
 def test_frame_by_frame_is_the_same_and_nothing_looks_ahead(live):
