@@ -16,6 +16,8 @@ _WINDOW = 0.03
 _MEMORY = 0.1
 # So many times what the most surprising take exceeds the expected surprise by is too much.
 _EXCESS = 2.0
+# And so many standard deviations of what is expected are by chance.
+_CHANCE = 4.0
 # Of particles at the end so many begin anew in a hundredth of the mean duration.
 _ANEW = 0.02
 
@@ -120,16 +122,16 @@ def _slopes(deviations, step, window):
 
 def _limit(slopes, noise, velocities, step, memory):
     """What surprise is too much: beyond that of all takes at their own phase."""
-    surprise = 1.0
-    largest = 1.0
-    width = slopes.shape[-1]
+    surprise, largest, width = 1.0, 1.0, slopes.shape[-1]
     for p, variance in enumerate(noise):
         whiten = whitening(velocities + variance * np.eye(width))
         # Noise is expected, not drawn: a fit is not random.
         here = np.square(slopes[:, p] @ whiten.T).sum(axis=1) + variance * np.square(whiten).sum()
         surprise = smoothed(surprise, here / width, step, memory)
         largest = np.maximum(largest, surprise)
-    return float(1 + _EXCESS * (np.max(largest) - 1))
+    # As often as a memory holds windows, velocities are independent of those before.
+    chance = _CHANCE * np.sqrt(2 / (width * _MEMORY / _WINDOW))
+    return float(1 + max(_EXCESS * (np.max(largest) - 1), chance))
 
 
 def smoothed(before, now, dt, memory):
