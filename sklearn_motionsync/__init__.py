@@ -49,6 +49,8 @@ from .synchronizers.timing import TimingChannel
 from .takes.cycles import CycleSegmenter
 from .takes.search import find_performances
 from .takes.self_correlation import self_correlation
+from .tracking.track import Track
+from .tracking.tracker import MotionTracker
 
 __version__ = "0.1.0.dev0"
 
@@ -71,6 +73,7 @@ __all__ = [
     "LivePhase",
     "Match",
     "MetricDisplay",
+    "MotionTracker",
     "OnlineSynchronizer",
     "PartSynchronizer",
     "SearchDisplay",
@@ -79,6 +82,7 @@ __all__ = [
     "SynchronizationDisplay",
     "Synchronizer",
     "TimingChannel",
+    "Track",
     "TrellisDisplay",
     "blend_performances",
     "datasets",

@@ -22,6 +22,7 @@ from sklearn_motionsync import (
     JointPositions,
     KeyframeSynchronizer,
     LinearSynchronizer,
+    MotionTracker,
     OnlineSynchronizer,
     PartSynchronizer,
     Skeleton,
@@ -63,7 +64,8 @@ DETECTOR = ActionDetector(make_pipeline(QUICK, ActionModel()))
 CLASSIFIER = InTurns(n_frames=8)
 CHANNELS = [TimingChannel(LinearSynchronizer()), TimingChannel(QUICK, "log_rate")]
 ONLINE = OnlineSynchronizer(LinearSynchronizer())
-ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR, ONLINE]
+TRACKER = MotionTracker(LinearSynchronizer(), n_particles=10, random_state=0)
+ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR, ONLINE, TRACKER]
 BODY_ESTIMATORS = [DirectionCosines(Skeleton.paper()), JointPositions(Skeleton.paper())]
 # Those of other transformers are in tests/test_framewise.py.
 FRAMEWISE = FrameWise(PCA(2))
@@ -165,6 +167,10 @@ def outputs(estimator, X):
         answers += list(estimator.match(X))
     if hasattr(estimator, "follow"):
         answers += list(zip(*estimator.follow(X), strict=True))
+    if hasattr(estimator, "track"):
+        # It takes gaps and single frames, too, which performances have not.
+        tracks = estimator.track(estimator.check_performances(X))
+        answers += [np.stack([track.postures for track in tracks])]
     if hasattr(estimator, "score_samples"):
         answers += [estimator.score_samples(X), estimator.decision_function(X)]
         answers += [estimator.predict(X)]
@@ -496,7 +502,15 @@ def test_unfitted(estimator, performances):
         outputs(clone(estimator), performances)
 
 
-SEQUENCE_LEVEL = [*SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR, CLASSIFIER, ONLINE]
+SEQUENCE_LEVEL = [
+    *SYNCHRONIZERS,
+    *CHANNELS,
+    ActionModel(),
+    DETECTOR,
+    TRACKER,
+    CLASSIFIER,
+    ONLINE,
+]
 
 
 @pytest.mark.parametrize("estimator", SEQUENCE_LEVEL, ids=by_name)
