@@ -302,9 +302,10 @@ class DirectionCosines(PositionsTransformer):
             return cosines
         ankles = [f"{side}_ankle" for side in SIDES if f"{side}_ankle" in self.skeleton.landmarks]
         floor, lengths = lowest([body.at(ankle) for ankle in ankles]), body.typical
-        if np.isnan(lengths).any():
-            lengths = in_proportion(lengths, self._of_twelve(self.limb_lengths_))
         leg = leg_length(lengths, limbs)
+        if np.isnan(leg):
+            whole = in_proportion(lengths, self._of_twelve(self.limb_lengths_))
+            leg = leg_length(whole, limbs)
         return np.column_stack([(body.at("pelvis")[:, 1] - floor) / leg, cosines])
 
     def _lengths(self, given):

@@ -3,9 +3,10 @@
 import numpy as np
 
 from .axes import heading
+from .formats import LANDMARKS
 from .limbs import exponent_of
 
-__all__ = ["hide_whole", "in_proportion", "seen_heading", "typical_lengths"]
+__all__ = ["hide_whole", "in_proportion", "seen_heading", "seen_landmarks", "typical_lengths"]
 
 
 def hide_whole(points):
@@ -13,9 +14,19 @@ def hide_whole(points):
     points[np.isnan(points).any(axis=2)] = np.nan
 
 
+def seen_landmarks(points, landmarks):
+    """Those of the landmarks that some frame of (n_frames, 15, n_dims) points shows."""
+    if not np.isnan(points.sum()):
+        return landmarks
+    hidden = np.isnan(points[:, :, 0]).all(axis=0)
+    return [name for name in landmarks if not hidden[LANDMARKS.index(name)]]
+
+
 def typical_lengths(lengths):
     """Medians (12,) of (n_frames, 12) over the frames that see a limb; NaN of those never seen."""
     typical = np.median(lengths, axis=0)
+    if not np.isnan(typical.sum()):
+        return typical
     for k in np.flatnonzero(np.isnan(typical)):
         seen = lengths[~np.isnan(lengths[:, k]), k]
         if seen.size:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .formats import LANDMARKS, SIDES
-from .hidden import typical_lengths
+from .hidden import seen_landmarks, typical_lengths
 from .limbs import LIMB_NAMES, landmarks_of, size_of, unit
 
 __all__ = ["UPS", "as_recorded", "check_upright", "seems_up", "y_up"]
@@ -143,17 +143,17 @@ def check_upright(points, lengths, skeleton, what):
     what : str
         What to call it in messages, with a capital letter.
     """
-    hidden = np.isnan(points[:, :, 0]).all(axis=0)
-    there = [name for name in skeleton.landmarks if not hidden[LANDMARKS.index(name)]]
+    there = seen_landmarks(points, skeleton.landmarks)
     lower, middle, upper = _levels(points, there)
     if middle is None or (lower is None and upper is None):
         return
     # The legs tell for sure; without them the trunk does.
     bottom, top = (middle, upper) if lower is None else (lower, middle)
-    rises = _rises(bottom, top)[:, 1]
+    rises = top[:, 1] - bottom[:, 1]
     below = np.count_nonzero(rises < 0)
-    if not len(rises) or below < _NEARLY_ALWAYS * (len(rises) - 1):
+    if not below or below < _NEARLY_ALWAYS * (np.count_nonzero(np.isfinite(rises)) - 1):
         return
+    rises = rises[np.isfinite(rises)]
     typical = typical_lengths(lengths)
     limbs = [name for name in skeleton.limbs if not np.isnan(typical[LIMB_NAMES.index(name)])]
     size = size_of(typical, limbs)
