@@ -94,6 +94,9 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
     ``get_feature_names_out``, and tells by ``_features(body)`` what is made of a body.
     """
 
+    # What the contract asks of the input: "allow-nan" of who takes hidden joints.
+    _finite = True
+
     fit_transform = at_once(TransformerMixin.fit_transform)
 
     @of_one_state
@@ -128,9 +131,6 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
         tags.input_tags.allow_nan = self._finite == "allow-nan"
         tags.transformer_tags.preserves_dtype = ["float64", "float32"]
         return tags
-
-    # What the contract asks of the input.
-    _finite = True
 
     def _check(self, X, *, reset):
         finite = self._finite

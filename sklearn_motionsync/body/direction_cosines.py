@@ -89,8 +89,9 @@ class DirectionCosines(PositionsTransformer):
 
     **Live.** No row but the height looks at later frames, so the last row of the frames so far,
     ``transform(frames[: k + 1])[-1]``, is that of the whole take; its floor is the lowest ankle so
-    far. A single frame, ``transform(frame[np.newaxis])[0]``, has its own lowest ankle as floor,
-    so that a jump is not seen, its own leg, and no frame before it that tells the heading.
+    far. The last seconds will do if they show the hips once, and a foot on the floor. A single
+    frame, ``transform(frame[np.newaxis])[0]``, has its own lowest ankle as floor, so that
+    a jump is not seen, its own leg, and no frame before it that tells the heading.
 
     Examples
     --------
@@ -227,7 +228,8 @@ class DirectionCosines(PositionsTransformer):
         performance, and the legs with them, by one height that puts its lowest ankle on the floor.
 
         Some of its rows are a camera: x and y are an orthographic picture from the front. A
-        tracker that sees positions takes them as the projection of a posture.
+        tracker that sees positions takes them as the projection of a posture, and as its offset
+        that height of the legs, 0 elsewhere, where the hips of those it sees are below the pelvis.
 
         Parameters
         ----------

@@ -159,13 +159,15 @@ def check_upright(points, lengths, skeleton, what):
     size = size_of(typical, limbs)
     if np.quantile(rises, _NEARLY_ALWAYS) >= -_CLEARLY * size or not _is_even(typical, limbs):
         return
-    trunk = () if upper is None else _rises(middle, upper)
+    trunk = [] if upper is None else _rises(middle, upper)
     if len(trunk) and trunk[:, 1].mean() > -_CLEARLY * size:
         return
-    rise = _rises(bottom, upper if len(trunk) else middle).mean(axis=0)
+    # From the feet to the head, or as far as is seen.
+    ways = [_rises(bottom, top)] + [trunk] * (lower is not None and len(trunk) > 0)
+    rise = sum(way.mean(axis=0) for way in ways)
     parts = [
         "the pelvis is below the ankles" if lower is not None else "",
-        "the head is below the pelvis" if upper is not None else "",
+        "the head is below the pelvis" if len(trunk) else "",
     ]
     seems = _named(as_recorded(rise, skeleton))
     raise ValueError(
