@@ -7,6 +7,7 @@ matplotlib, in the extra ``plot``, is imported only when something is drawn.
 
 from .cycles import CycleDisplay
 from .lags import LagDisplay
+from .live import PhaseDisplay
 from .metric import MetricDisplay
 from .model import ActionModelDisplay
 from .search import SearchDisplay
@@ -19,6 +20,7 @@ __all__ = [
     "CycleDisplay",
     "LagDisplay",
     "MetricDisplay",
+    "PhaseDisplay",
     "SearchDisplay",
     "SkeletonDisplay",
     "SynchronizationDisplay",

@@ -1,0 +1,245 @@
+"""What `PhaseDisplay` knows of a running performance, and the panels it draws it in."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .bodies import bones_by_side, limits, on_screen, with_landmarks
+from .dial import Dial
+from .drawing import COLORS, front_line, stage, sticks
+
+__all__ = ["Action", "Followed", "Row"]
+
+# How far ahead "soon" is, as a share of the duration at the mean pace.
+_SOON = 0.1
+# Standard deviations to each side that leave out a tenth.
+_BAND = 1.645
+# Points of the predicted rest.
+_FINE = 60
+
+
+class Action(NamedTuple):
+    """What is expected of everybody.
+
+    Attributes
+    ----------
+    n_frames : int
+        Of the clock.
+    duration : float or None
+        Of a performance at the mean pace, in the unit of the times.
+    mean, spread : ndarray (P, n_shown), or None
+    body : ndarray (P, n_joints, n_dims), or None
+        The mean one.
+    """
+
+    n_frames: int
+    duration: float | None = None
+    mean: np.ndarray | None = None
+    spread: np.ndarray | None = None
+    body: np.ndarray | None = None
+
+    def at(self, phase, of):
+        """Something of the frames of the clock at phases between them."""
+        clock = np.arange(self.n_frames)
+        flat = of.reshape(self.n_frames, -1)
+        found = np.stack([np.interp(phase, clock, column) for column in flat.T], axis=-1)
+        return found.reshape(*np.shape(phase), *of.shape[1:])
+
+    def soon(self, phase, rate):
+        """The phase a tenth of the duration later at this rate."""
+        last = self.n_frames - 1
+        return min(phase + _SOON * last * rate, last)
+
+    def rest(self, phase, elapsed):
+        """When what is left will come, and at which phases: (n,) each; empty at the end.
+
+        As long as `OnlineSynchronizer.time_left` guesses.
+        """
+        last = self.n_frames - 1
+        if self.duration is None:
+            return np.empty((2, 0))
+        left = self.duration * (1 - phase / last), max(self.duration - elapsed, 0)
+        if phase >= last:
+            return np.empty((2, 0))
+        return elapsed + np.linspace(0, np.mean(left), _FINE), np.linspace(phase, last, _FINE)
+
+
+class Followed(NamedTuple):
+    """A performance, and where it was said to be.
+
+    Attributes
+    ----------
+    phase, rate, confidence, times : ndarray, shape (n_frames,)
+        Times begin with 0.
+    name : str
+    seen : ndarray (n_frames, n_shown), or None
+    afterwards : ndarray (n_frames,), or None
+        The phase as it is known when all is over.
+    bodies : ndarray (n_frames, n_joints, n_dims), or None
+    """
+
+    phase: np.ndarray
+    rate: np.ndarray
+    confidence: np.ndarray
+    times: np.ndarray
+    name: str
+    seen: np.ndarray | None = None
+    afterwards: np.ndarray | None = None
+    bodies: np.ndarray | None = None
+
+
+class Row:
+    """The panels of one performance: a body if there is one, a dial, the phase, curves.
+
+    Parameters
+    ----------
+    axes : list of Axes
+    followed : Followed
+    action : Action
+    skeleton : Skeleton or None
+        Of bodies.
+    features : list of str
+        Names of the curves.
+    end : float
+        Of the axis of time.
+    azimuth : float
+    """
+
+    def __init__(self, axes, followed, action, skeleton, features, end, azimuth):
+        self.axes, self._of, self._action = list(axes), followed, action
+        axes = list(axes)
+        self.figure = None
+        if followed.bodies is not None:
+            self.figure = _Figure(axes.pop(0), followed, action, skeleton, azimuth)
+        self.dial = Dial(axes.pop(0))
+        self._phase_panel(axes[0], end)
+        self.curves = [
+            _Curve(axis, followed, action, k, name, end)
+            for k, (axis, name) in enumerate(zip(axes[1:], features, strict=True))
+        ]
+
+    def _phase_panel(self, axis, end):
+        grey, blue, orange = (COLORS[k] for k in ("shadow", "performance", "mean"))
+        self.confidence = _area(axis, grey, 0.75, "confidence")
+        self.afterwards = None
+        of, share = self._of, 100 / (self._action.n_frames - 1)
+        if of.afterwards is not None:
+            style = {"color": COLORS["pattern"], "linewidth": 0.9, "linestyle": "--"}
+            label = "afterwards"
+            (self.afterwards,) = axis.plot(of.times, share * of.afterwards, label=label, **style)
+        label = _label("guess", self._action.duration)
+        (self.rest,) = axis.plot([], [], color=orange, linestyle=":", label=label)
+        self.phase = front_line(axis, [], [], color=blue, label="phase, live")
+        axis.set_xlim(0, end)
+        axis.set_ylim(0, 105)
+        axis.set_ylabel("%")
+
+    def show(self, time):
+        """Let it be so late; the artists that have changed."""
+        of, action = self._of, self._action
+        now = max(np.searchsorted(of.times, time, side="right") - 1, 0)
+        phase, rate, confidence = (x[now] for x in (of.phase, of.rate, of.confidence))
+        last, past = action.n_frames - 1, slice(now + 1)
+        soon = action.soon(phase, rate)
+        rest = action.rest(phase, of.times[now])
+        artists = self.dial.show(phase / last, soon / last, rate, confidence)
+        self.phase.set_data(of.times[past], 100 / last * of.phase[past])
+        _fill(self.confidence, of.times[past], 0, 100 * of.confidence[past])
+        self.rest.set_data(rest[0], 100 / last * rest[1])
+        artists += [self.phase, self.confidence, self.rest]
+        if self.figure is not None:
+            artists += self.figure.show(now, soon)
+        for curve in self.curves:
+            artists += curve.show(now, *rest)
+        return artists
+
+
+class _Curve:
+    """A feature: what has been seen of it, and what is expected."""
+
+    def __init__(self, axis, followed, action, k, name, end):
+        self._times, self._seen = followed.times, followed.seen[:, k]
+        self._action, self._k = action, k
+        blue, orange = COLORS["performance"], COLORS["mean"]
+        self.band = _area(axis, COLORS["envelope"], 0.35, _label("90 % band", action.spread))
+        style = {"color": blue, "linewidth": 1, "linestyle": "--", "alpha": 0.6}
+        (self.to_come,) = axis.plot(self._times, self._seen, label="what came", **style)
+        style = {"color": orange, "linewidth": 2, "label": _label("predicted", action.mean)}
+        (self.expected,) = axis.plot([], [], **style)
+        self.seen = front_line(axis, [], [], color=blue, label="seen")
+        (self.now,) = axis.plot([], [], "o", color=blue, markersize=5, zorder=5)
+        everything = [self._seen]
+        if action.mean is not None:
+            mean, wide = action.mean[:, k], 0
+            if action.spread is not None:
+                wide = _BAND * action.spread[:, k]
+            everything += [mean - wide, mean + wide]
+        values = np.concatenate(everything)
+        values = values[np.isfinite(values)]
+        low, high = values.min(initial=np.inf), values.max(initial=-np.inf)
+        if low > high:
+            low, high = 0.0, 0.0
+        margin = 0.06 * (high - low) or 1.0
+        axis.set_ylim(low - margin, high + margin)
+        axis.set_xlim(0, end)
+        axis.set_ylabel(name)
+
+    def show(self, now, times, phases):
+        past = slice(now + 1)
+        self.seen.set_data(self._times[past], self._seen[past])
+        self.now.set_data([self._times[now]], [self._seen[now]])
+        mean, spread = (
+            None if x is None else self._action.at(phases, x[:, self._k])
+            for x in (self._action.mean, self._action.spread)
+        )
+        if mean is not None:
+            self.expected.set_data(times, mean)
+        if spread is not None:
+            _fill(self.band, times, mean - _BAND * spread, mean + _BAND * spread)
+        return [self.seen, self.now, self.expected, self.band]
+
+
+class _Figure:
+    """The body that is seen, before the mean one as it will be soon."""
+
+    def __init__(self, axis, followed, action, skeleton, azimuth):
+        self._action, self._bones = action, bones_by_side(skeleton)
+        self._bodies, mean = (
+            on_screen(with_landmarks(x, skeleton), azimuth) for x in (followed.bodies, action.body)
+        )
+        self._mean = mean
+        self.soon = sticks(axis, COLORS["shadow"], 5, zorder=1)
+        self.bones = {side: sticks(axis, COLORS[side], 2) for side in ("middle", "left", "right")}
+        places = [x.reshape(-1, 2) for x in (self._bodies, mean)]
+        stage(axis, "", *limits(np.concatenate(places)))
+
+    def show(self, now, soon):
+        body, shadow = self._bodies[now], self._action.at(soon, self._mean)
+        everywhere = [bone for bones in self._bones.values() for bone in bones]
+        self.soon.set_segments([shadow[list(bone)] for bone in everywhere])
+        for side, lines in self.bones.items():
+            lines.set_segments([body[list(bone)] for bone in self._bones[side]])
+        return [self.soon, *self.bones.values()]
+
+
+def _label(text, known):
+    """A label in a legend, or none for what is not known."""
+    return text if known is not None else "_nolegend_"
+
+
+def _area(axis, color, alpha, label):
+    """An empty area, to be filled."""
+    from matplotlib.collections import PolyCollection
+
+    area = PolyCollection([], facecolor=color, alpha=alpha, linewidth=0, zorder=1, label=label)
+    return axis.add_collection(area, autolim=False)
+
+
+def _fill(area, xs, lower, upper):
+    """Let an area be between two curves."""
+    if len(xs) == 0:
+        area.set_verts([])
+        return
+    lower, upper = np.broadcast_to(lower, xs.shape), np.broadcast_to(upper, xs.shape)
+    there, back = np.column_stack([xs, upper]), np.column_stack([xs, lower])[::-1]
+    area.set_verts([np.concatenate([there, back])])
