@@ -28,6 +28,7 @@ from .display import (
     SearchDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
+    TrackingDisplay,
     TrellisDisplay,
 )
 from .framewise import FrameWise
@@ -85,6 +86,7 @@ __all__ = [
     "Synchronizer",
     "TimingChannel",
     "Track",
+    "TrackingDisplay",
     "TrellisDisplay",
     "blend_performances",
     "datasets",

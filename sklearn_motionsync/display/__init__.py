@@ -13,6 +13,7 @@ from .model import ActionModelDisplay
 from .search import SearchDisplay
 from .stick_figures import SkeletonDisplay
 from .synchronization import SynchronizationDisplay
+from .tracking import TrackingDisplay
 from .trellis import TrellisDisplay
 
 __all__ = [
@@ -24,5 +25,6 @@ __all__ = [
     "SearchDisplay",
     "SkeletonDisplay",
     "SynchronizationDisplay",
+    "TrackingDisplay",
     "TrellisDisplay",
 ]

@@ -9,7 +9,7 @@ from ..body.limbs import LIMBS
 from ..body.skeleton import Skeleton
 from .given import as_frames
 
-__all__ = ["Strip", "strip_of"]
+__all__ = ["Strip", "bones_of", "limb_of", "strip_of"]
 
 # The pelvis is no limb; it is marked where the legs hang on it.
 _HEIGHT, _PELVIS = "pelvis_height", "hip"
@@ -58,8 +58,8 @@ def strip_of(scores, names, frames, limit, skeleton=None):
     Strip
     """
     skeleton = Skeleton.paper() if skeleton is None else skeleton
-    parts = list(dict.fromkeys(map(_part_of, names)))
-    columns = [[k for k, name in enumerate(names) if _part_of(name) == part] for part in parts]
+    parts = list(dict.fromkeys(map(limb_of, names)))
+    columns = [[k for k, name in enumerate(names) if limb_of(name) == part] for part in parts]
     # The score of a limb is that of the cosine that is farthest off.
     size = np.stack([np.abs(scores[:, c]).max(axis=1) for c in columns], axis=1)
     shown, stretches = _cut(frames, size.max(axis=1), limit)
@@ -70,7 +70,7 @@ def strip_of(scores, names, frames, limit, skeleton=None):
         worst = parts[int(peaks.argmax())]
         said = f"{worst} {_rounded(peaks.max())} std" if departing else "no limb departs"
         titles.append(f"frame {frame}\n{said}")
-        bones = [bone for part in departing for bone in _bones_of(part, skeleton)]
+        bones = [bone for part in departing for bone in bones_of(part, skeleton)]
         marked.append(list(dict.fromkeys(bones)))
     return Strip(shown, titles, marked)
 
@@ -94,7 +94,7 @@ def _typical(stretch, worst, limit):
     return peak if worst[peak] > limit else int(stretch[(len(stretch) - 1) // 2])
 
 
-def _part_of(name):
+def limb_of(name):
     """The limb of a feature, or the height of the pelvis."""
     return name if name == _HEIGHT else name.rpartition("_")[0]
 
@@ -103,7 +103,7 @@ def _rounded(score):
     return f"{score:.0f}" if score >= 10 else f"{score:.1f}"
 
 
-def _bones_of(part, skeleton):
+def bones_of(part, skeleton):
     """The bones of a skeleton that a limb is drawn as."""
     limb = LIMBS[_PELVIS if part == _HEIGHT else part]
     ends = tuple(skeleton.joints.index(name) for name in limb[:2] if name in skeleton.joints)

@@ -19,6 +19,7 @@ __all__ = [
     "taken",
 ]
 
+_PARTS = "phase", "rate", "confidence"
 # By how much rounding may take a phase or a confidence beyond its bounds.
 _ROUNDING = 1e-9
 
@@ -38,7 +39,7 @@ def as_phases(phases, n_frames):
     checked = []
     for i, of in enumerate(listed):
         shape, arrays, bounds = ("n_frames",), [], (n_frames - 1, np.inf, 1)
-        for what, values, most in zip(LivePhase._fields, of, bounds, strict=True):
+        for what, values, most in zip(_PARTS, of, bounds, strict=True):
             array = as_drawn(values, f"Performance {i}: the {what}", shape)
             if not ((array >= -_ROUNDING) & (array <= most + _ROUNDING)).all():
                 raise ValueError(f"Performance {i}: the {what} must be from 0 to {most}.")

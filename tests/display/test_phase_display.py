@@ -137,11 +137,12 @@ def test_what_is_refused(live):
             PhaseDisplay.from_estimator(live, X, **change)
     with pytest.raises(ValueError, match="estimator must be an OnlineSynchronizer, got int"):
         PhaseDisplay.from_estimator(1, X)
-    good = LivePhase([0, 1, 2], [1, 1, 1], [1, 0.5, 0.2])
+    rates, sure = [1, 1, 1], [1, 0.5, 0.2]
+    good = LivePhase([0, 1, 2], rates, sure)
     for phases, known, message in (
         ([1], {}, "phases must be a LivePhase"),
-        (good._replace(phase=[0, 1, 50]), {}, "Performance 0: the phase must be from 0 to 49"),
-        (good._replace(rate=[1, 1]), {}, "Performance 0: the rate must have the shape"),
+        (LivePhase([0, 1, 50], rates, sure), {}, "Performance 0: the phase must be from 0 to 49"),
+        (LivePhase([0, 1, 2], [1, 1], sure), {}, "Performance 0: the rate must have the shape"),
         (good, {"times": [[0, 2, 1]]}, "times must increase"),
         (good, {"seen": [np.zeros((2, 1))]}, "Performance 0: seen must have the shape"),
         (good, {"mean": np.zeros((50, 1))}, "The mean must have the shape"),
