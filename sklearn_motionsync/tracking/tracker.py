@@ -80,7 +80,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     rate_memory_ : float
         Frames of the training performances after which its correlation is 1/e.
     surprise_limit_ : float
-        Mean square of velocities in their standard deviations, over a tenth of the mean duration,
+        Mean square of velocities in their standard deviations, over 9 % of the mean duration,
         beyond which the phase is lost; 1 is expected.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
@@ -95,8 +95,9 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     Notes
     -----
     Nothing seen (all NaN) is no error: the movement goes on by itself, and the covariance grows. An
-    observation that lies ten standard deviations from all that is expected, on average over its
-    numbers, is taken as not seen; if it stays, the phase is lost. A take may begin at any
+    observation ten standard deviations from all that is expected, as the root mean square of its
+    numbers, is taken as not seen, if no training performance came near that; where it stays, the
+    phase is lost. A take may begin at any
     phase; most particles begin at the first frame.
 
     Examples
