@@ -96,7 +96,7 @@ class Running:
     def _begin(self, phases):
         """Begin at phases, knowing nothing of what departs from the mean."""
         learnt, n = self.learnt, len(phases)
-        self.particles = Particles(phases, learnt.pace.spread * self.rng.standard_normal(n))
+        self.particles = Particles(phases, learnt.pace.begin(self.rng, n))
         self.means = np.zeros((n, 2 * learnt.mean.shape[1]))
         self.covariance = learnt.process.stationary
         self.slopes, self.anew = None, np.zeros(n, dtype=bool)

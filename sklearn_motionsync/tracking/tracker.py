@@ -34,8 +34,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     2. Deviations are a Gaussian process in *time*, Matern-3/2, with one length scale and a
        covariance of the features that is shrunk half-way to its diagonal. A Kalman filter follows
        it; what is hidden is left out.
-    3. Particles carry the phase and its rate. The log rate wanders about 0, as far and as fast
-       as in the training performances. One Kalman gain serves all particles.
+    3. Particles carry the phase and its rate. The log rate wanders as far and as fast as
+       in the training performances, about the mean pace. One Kalman gain serves all particles.
     4. Particles are weighed by causal *velocities*: what is seen should move as the mean does along
        the path of the particle. Style persists, so that the likelihood of postures would be far
        too sure; that of velocities is divided by ``tempering``.
