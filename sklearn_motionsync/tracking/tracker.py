@@ -8,6 +8,7 @@ from sklearn.utils import check_consistent_length, check_random_state
 from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.validation import check_is_fitted
 
+from ..blas import on_one_thread
 from ..fitting import at_once, of_one_state
 from ..gate import check_squares
 from ..notebook import DocumentedMixin
@@ -34,8 +35,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     2. Deviations are a Gaussian process in *time*, Matern-3/2, with one length scale and a
        covariance of the features that is shrunk half-way to its diagonal. A Kalman filter follows
        it; what is hidden is left out.
-    3. Particles carry the phase and its rate. The log rate wanders about 0, as far and as fast
-       as in the training performances. One Kalman gain serves all particles.
+    3. Particles carry the phase and its rate. The log rate wanders as far and as fast as
+       in the training performances, about the mean pace. One Kalman gain serves all particles.
     4. Particles are weighed by causal *velocities*: what is seen should move as the mean does along
        the path of the particle. Style persists, so that the likelihood of postures would be far
        too sure; that of velocities is divided by ``tempering``.
@@ -80,7 +81,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     rate_memory_ : float
         Frames of the training performances after which its correlation is 1/e.
     surprise_limit_ : float
-        Mean square of velocities in their standard deviations, over a tenth of the mean duration,
+        Mean square of velocities in their standard deviations, over 9 % of the mean duration,
         beyond which the phase is lost; 1 is expected.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
@@ -95,8 +96,9 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     Notes
     -----
     Nothing seen (all NaN) is no error: the movement goes on by itself, and the covariance grows. An
-    observation that lies ten standard deviations from all that is expected, on average over its
-    numbers, is taken as not seen; if it stays, the phase is lost. A take may begin at any
+    observation ten standard deviations from all that is expected, as the root mean square of its
+    numbers, is taken as not seen, if no training performance came near that; where it stays, the
+    phase is lost. A take may begin at any
     phase; most particles begin at the first frame.
 
     Examples
@@ -195,11 +197,9 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         rates = clock.duration / (lengths[:, np.newaxis] - 1) / match.rates
         with np.errstate(over="ignore", invalid="ignore"):
             check_squares(warped, float(warped.var(axis=(0, 1)).max()), "variances")
-        settings = {"noise": float(self.noise), "tempering": float(self.tempering)}
-        warped = warped.astype(np.float64)
-        self._model = learn(
-            warped, rates, _as_codes(groups, n), clock, n_particles=self.n_particles, **settings
-        )
+        codes, settings = _as_codes(groups, n), (self.noise, self.tempering, self.n_particles)
+        known = warped.astype(np.float64), rates, codes, clock
+        self._model = on_one_thread(learn, *known, *settings)
         self.mean_ = self._model.mean.astype(performances[0].dtype)
         self.covariance_ = self._model.process.covariance
         self.length_scale_ = self._model.process.length_scale
@@ -262,15 +262,9 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self._answer(smooth, X, times, projection)
 
     def reset(self):
-        """Forget what ``step`` has seen: the next observation is the first of a take.
-
-        Returns
-        -------
-        self
-        """
+        """Forget what ``step`` has seen: the next observation is the first of a take."""
         check_is_fitted(self)
         self._running = None
-        return self
 
     def step(self, observation, time=None, projection=None):
         """Take the next observation of a running take.
@@ -302,7 +296,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         values, time = as_frame(observation, time, names, projection, self.frame_rate, after)
         if running is None:
             self._running = running = Running(self._model, self._seed)
-        estimate = running.step(values, time, projection[0])
+        estimate = on_one_thread(running.step, values, time, projection[0])
         return Track(*(part[0] for part in Track.of([estimate], self.mean_.dtype)))
 
     def __sklearn_tags__(self):
@@ -318,8 +312,11 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         names = names_of_input(self) if projection is None else None
         projection = as_projection(projection, model.mean.shape[1])
         takes, single = as_takes(X, times, names, on_rows, projection, self.frame_rate)
-        answers = [method(model, self._seed, *take, projection[0]) for take in takes]
-        tracks = [Track.of(estimates, self.mean_.dtype) for estimates in answers]
+        tracks = []
+        for take in takes:
+            # The matrices are small: threads would wait for each other.
+            estimates = on_one_thread(method, model, self._seed, *take, projection[0])
+            tracks.append(Track.of(estimates, self.mean_.dtype))
         return tracks[0] if single else tracks
 
 
