@@ -6,8 +6,9 @@ from .drawing import COLORS
 
 __all__ = ["Dial"]
 
-# Inner and outer radius of the ring, and of the arc around it; how far out the letters are.
-_RING, _ARC, _LETTERS = (0.78, 1.0), (1.05, 1.13), 1.28
+# Inner and outer radius of the ring, and of the arc around it; how far out the letters are, and
+# where the hand begins.
+_RING, _ARC, _LETTERS, _HAND = (0.78, 1.0), (1.05, 1.13), 1.28, 0.62
 # How strongly what nobody is sure of is still seen.
 _FAINTEST = 0.12
 
@@ -53,7 +54,7 @@ class Dial:
         for quarter, text in enumerate(("0 %", "25", "50", "75")):
             x, y = _at(quarter / 4, _LETTERS + 0.02 * (quarter % 2))
             axis.text(x, y, text, **style)
-        self.share = axis.text(0, 0, "", ha="center", va="center", fontsize="x-large")
+        self.share = axis.text(0, 0, "", ha="center", va="center", fontsize="large")
         self.says = axis.text(0, -1.62, "", ha="center", va="center", fontsize="small")
 
     def show(self, share, soon, rate, confidence):
@@ -64,7 +65,7 @@ class Dial:
         self.ahead.set_theta2(90 - 360 * share)
         # An arc of no length would be a whole ring's outline.
         self.ahead.set_visible(soon > share)
-        self.hand.set_data(*np.transpose([_at(share, 0.52), _at(share, _RING[1])]))
+        self.hand.set_data(*np.transpose([_at(share, _HAND), _at(share, _RING[1])]))
         self.hand.set_linewidth(1 + 4 * confidence)
         self.share.set_text(f"{100 * share:.0f} %")
         self.says.set_text(f"rate {rate:.1f}, confidence {confidence:.2f}")

@@ -312,6 +312,8 @@ class PhaseDisplay:
         ]
         for row, of in zip(self.rows_, self.followed, strict=True):
             row.axes[0].set_title(of.name, fontsize="medium")
+        for axis in by_row[:-1, has_body + 1 :].flat:
+            axis.tick_params(labelbottom=False)
         for axis in by_row[-1, has_body + 1 :]:
             axis.set_xlabel(_UNITS[self.unit])
         self._show(longest[frame])
