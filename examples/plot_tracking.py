@@ -68,8 +68,8 @@ animation
 # -----------------
 # Degrees between true and estimated directions of the hidden limbs, over all eight people; and how
 # many of the true cosines are within the band, of 90 % that are meant. Beside it what is often
-# done: the last posture kept, and a straight line over the gap. These people are computed; those who
-# are recorded differ more from each other, and errors are larger.
+# done: the last posture kept, and a straight line over the gap. These people are computed; those
+# who are recorded differ more from each other, and errors are larger.
 
 
 def degrees(postures, true):
