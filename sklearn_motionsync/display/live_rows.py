@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .bodies import bones_by_side, limits, on_screen, with_landmarks
+from .bodies import bones_by_side, limits, on_screen, place_of, with_landmarks
 from .dial import Dial
 from .drawing import COLORS, front_line, stage, sticks
 
@@ -210,6 +210,10 @@ class _Figure:
         self._mean = mean
         self.soon = sticks(axis, COLORS["shadow"], 5, zorder=1)
         self.bones = {side: sticks(axis, COLORS[side], 2) for side in ("middle", "left", "right")}
+        self.head, self._head = None, None
+        if "head" in skeleton.landmarks:
+            self._head = place_of(self._bodies, skeleton, "head")
+            (self.head,) = axis.plot([], [], "o", color=COLORS["middle"], markersize=5)
         places = [x.reshape(-1, 2) for x in (self._bodies, mean)]
         stage(axis, "", *limits(np.concatenate(places)))
 
@@ -219,7 +223,11 @@ class _Figure:
         self.soon.set_segments([shadow[list(bone)] for bone in everywhere])
         for side, lines in self.bones.items():
             lines.set_segments([body[list(bone)] for bone in self._bones[side]])
-        return [self.soon, *self.bones.values()]
+        artists = [self.soon, *self.bones.values()]
+        if self.head is not None:
+            self.head.set_data(self._head[[now]].T)
+            artists.append(self.head)
+        return artists
 
 
 def _label(text, known):
