@@ -100,7 +100,7 @@ both = PhaseDisplay.from_estimator(
     features="left_forearm_z",
     names=["a bend", "stops half-way"],
 )
-animation = both.animate(seconds=2.5, fps=8)
+animation = both.animate(seconds=2.5, fps=6)
 plt.close()  # the player below shows it
 animation
 
