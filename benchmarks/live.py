@@ -5,7 +5,7 @@
 Every actor is held out in turn: aSpace, synchronizer and mean are learnt of the others, P = 100.
 The reference is the phase of a whole clip, ``DenseSynchronizer(n_frames=100).match(clip)``, read
 the other way round. Errors are in frames of 100, of all frames after the first fifth of a clip, up
-to its last.
+to its last. Takes ten minutes.
 
 1. Phase, median and 90 % quantile of an action.    2. Key moments, those of events.py.
 3. No look-ahead.    4. Speed.    5. Other frame rates, hidden features, frames that are missing.
@@ -19,170 +19,80 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import argparse
 import time
-from typing import NamedTuple
 
 import numpy as np
 from events import EVENTS, P, read_actions
-from live_peers import PEERS, Known, sampled
+from live_peers import PEERS, sampled
+from live_people import held_out
 from sklearn.metrics import roc_auc_score
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, OnlineSynchronizer
 
 ARCHIVES = {"hdm05": "HDM05", "utkinect": "UTKinect"}
 OURS = "OnlineSynchronizer"
-# Frames a second of HDM05.
-FRAME_RATE = 120
+# Frames a second of HDM05: who stands for a second stands for so many.
+SECOND = 120
 
-# -- people who are held out ------------------------------------------------------------
-
-
-class Fold(NamedTuple):
-    """What is known of an action from all actors but one, and the clips of that one."""
-
-    archive: str
-    action: str
-    actor: str
-    online: OnlineSynchronizer
-    known: Known
-    clips: list
-    truths: list
-    landed: dict
-    moments: dict
-    wrong: list
-    training: tuple
-
-    def errors(self, phases):
-        """Absolute errors of the phases of all clips, each after its first fifth."""
-        pairs = zip(phases, self.truths, strict=True)
-        return [np.abs(phase - truth)[-(-len(truth) // 5) :] for phase, truth in pairs]
+# -- lines of tables --------------------------------------------------------------------
 
 
-def phase_of(times, at):
-    """When, on the clock of the pattern, a warp is ``at`` times: the middle of where it stays."""
-    mirrored = len(times) - 1 - _first(len(times) - 1 - times[::-1], len(times) - 1 - at)
-    return (_first(times, at) + mirrored) / 2
+def head(title, folds, *more):
+    columns = ["", *folds, "mean", *more]
+    print(f"\n{title}\n| " + " | ".join(columns) + " |\n|" + "---|" * len(columns))
 
 
-def _first(times, at):
-    """The first moment at which a warp from 0 to P - 1 reaches ``at``."""
-    after = np.minimum(np.searchsorted(times, at), len(times) - 1)
-    before = np.maximum(after - 1, 0)
-    part = (at - times[before]) / np.where(after > 0, times[after] - times[before], 1)
-    return before + part
+def line(name, errors):
+    """Median / 90 % quantile of the errors of each action {action: list of arrays}, and means."""
+    rows = [np.quantile(np.concatenate(some), [0.5, 0.9]) for some in errors.values()]
+    cells = ["{:.1f} / {:.1f}".format(*row) for row in rows]
+    cells.append("{:.2f} / {:.2f}".format(*np.mean(rows, axis=0)))
+    print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
 
 
-def truth_of(times, n_frames):
-    """The phase of every frame of a clip, of its warp."""
-    return phase_of(times, np.linspace(0, P - 1, n_frames))
+def told(errors):
+    return f"{np.mean(errors):.2f} / {np.median(errors):.2f}"
 
 
-def folds(actions, space=True):
-    """Every action with every actor held out; in the aSpace of the others, or cosines."""
-    postures = {
-        (a.archive, a.name): DirectionCosines(a.skeleton).fit_transform(a.data) for a in actions
-    }
-    for action in actions:
-        own = postures[action.archive, action.name]
-        for actor in np.unique(action.actors):
-            train, test = (np.flatnonzero((action.actors == actor) == held) for held in (0, 1))
-            to_points = ASpace().fit([own[i] for i in train]).transform if space else list
-            known, clips = to_points([own[i] for i in train]), to_points([own[i] for i in test])
-            wrong = [
-                postures[other.archive, other.name][i]
-                for other in actions
-                if other.archive == action.archive and other.name != action.name
-                for i in np.flatnonzero(other.actors == actor)
-            ]
-            yield _learn(action, actor, train, test, known, clips, to_points(wrong))
-
-
-def _learn(action, actor, train, test, training, clips, wrong):
-    sync = DenseSynchronizer(n_frames=P).fit(training)
-    online = OnlineSynchronizer(DenseSynchronizer(n_frames=P)).fit(training)
-    seen, whole = sync.match(training).times, sync.match(clips).times
-    landed = {}
-    for event, moments in action.moments.items():
-        shown = train[np.isfinite(moments[train])]
-        rows = np.searchsorted(train, shown)
-        found = [float(phase_of(seen[r], moments[i])) for r, i in zip(rows, shown, strict=True)]
-        landed[event] = np.median(found) if found else np.nan
-    return Fold(
-        action.archive,
-        action.name,
-        actor,
-        online,
-        Known(sync.transform(training).mean(axis=0), sync.pattern_, np.mean([*map(len, training)])),
-        clips,
-        [truth_of(tau, len(x)) for tau, x in zip(whole, clips, strict=True)],
-        landed,
-        {event: moments[test] for event, moments in action.moments.items()},
-        wrong,
-        (training, seen),
-    )
+# -- how right it is --------------------------------------------------------------------
 
 
 def phases_of(fold, method):
     """The phases of the clips of a fold, by ours or by a peer."""
     if method == OURS:
-        return [live.phase for live in fold.online.follow(fold.clips)]
+        return [live.phase for _, live in fold.follow(fold.clips)]
     return [PEERS[method](fold.known, clip) for clip in fold.clips]
 
 
-# -- tables -----------------------------------------------------------------------------
-
-
-def by_action(some):
-    """The folds of each action, in order."""
-    out = {}
-    for fold in some:
-        out.setdefault(fold.action, []).append(fold)
-    return out
-
-
-def show_phase(name, some, methods):
-    """Median / 90 % quantile of the errors of each action, a line a method; and ours at the end."""
-    actions = by_action(some)
-    print(f"\n1. Phase, {name}: median / 90 % quantile of errors (frames of {P})")
-    print("| | " + " | ".join(actions) + " | mean |\n|" + "---|" * (len(actions) + 2))
+def show_phase(name, folds, methods):
+    """The errors of each action, a line a method; and how far from the end clips end."""
+    head(f"1. Phase, {name}: median / 90 % quantile of errors (frames of {P})", folds)
     for method in methods:
-        row = []
-        for of_action in actions.values():
-            errors = [e for fold in of_action for e in fold.errors(phases_of(fold, method))]
-            row.append(np.quantile(np.concatenate(errors), [0.5, 0.9]))
-        _line(method, [*row, np.mean(row, axis=0)])
-    row = []
-    for of_action in actions.values():
-        ends = [live.phase[-1] for f in of_action for live in f.online.follow(f.clips)]
-        row.append(np.quantile(P - 1 - np.array(ends), [0.5, 0.9]))
-    _line(f"{OURS}: P - 1 less the phase of the last frame", [*row, np.mean(row, axis=0)])
+        found = {}
+        for action, some in folds.items():
+            found[action] = [e for fold in some for e in fold.errors(phases_of(fold, method))]
+        line(method, found)
+    ends = {
+        action: [[P - 1 - phase[-1]] for fold in some for phase in phases_of(fold, OURS)]
+        for action, some in folds.items()
+    }
+    line(f"{OURS}: P - 1 less the phase of the last frame", ends)
 
 
-def _line(name, cells, form="{:.1f} / {:.1f}"):
-    """A line of a table; means of medians are told to two places."""
-    last = form.replace(".1f", ".2f").format(*np.atleast_1d(cells[-1]))
-    told = [form.format(*np.atleast_1d(cell)) for cell in cells[:-1]]
-    print(f"| {name} | " + " | ".join([*told, last]) + " |", flush=True)
-
-
-def show_moments(name, some):
-    """Mean / median errors of the phase at key moments: live, of the whole clip, and their ratio."""
-    print(
-        f"\n2. Key moments, {name}: mean / median error of the phase at the event (frames of {P})"
-    )
+def show_moments(name, folds):
+    """Errors of the phase at key moments: live, of the whole clip, and their ratio."""
+    print(f"\n2. Key moments, {name}: mean / median error of the phase (frames of {P})")
     print("| action: event | clips | live | whole clip | ratio of means |\n|---|---|---|---|---|")
     rows = []
-    for action, of_action in by_action(some).items():
-        for event in of_action[0].moments:
-            errors = np.concatenate([moment_errors(fold, event) for fold in of_action])
-            live, whole = (np.array([e.mean(), np.median(e)]) for e in errors.T)
-            rows.append((live, whole))
-            cells = [f"{mean:.2f} / {median:.2f}" for mean, median in (live, whole)]
-            ratio = f"{live[0] / whole[0]:.2f}"
-            print(f"| {action}: {event} | {len(errors)} | {cells[0]} | {cells[1]} | {ratio} |")
-    live, whole = np.mean(rows, axis=0)
-    cells = [f"{mean:.2f} / {median:.2f}" for mean, median in (live, whole)]
-    above = sum(a[0] > 2 * b[0] for a, b in rows)
-    print(f"| mean of {len(rows)} events | | {cells[0]} | {cells[1]} | {live[0] / whole[0]:.2f} |")
-    print(f"ratio of the medians {live[1] / whole[1]:.2f}; events above 2: {above} of {len(rows)}")
+    for action, some in folds.items():
+        for event in some[0].moments:
+            live, whole = np.concatenate([moment_errors(fold, event) for fold in some]).T
+            rows.append([[live.mean(), np.median(live)], [whole.mean(), np.median(whole)]])
+            cells = f"{len(live)} | {told(live)} | {told(whole)} | {live.mean() / whole.mean():.2f}"
+            print(f"| {action}: {event} | {cells} |", flush=True)
+    means, rows = np.mean(rows, axis=0), np.array(rows)
+    cells = " | ".join("{:.2f} / {:.2f}".format(*mean) for mean in means)
+    ratios = means[0] / means[1]
+    print(f"| mean of {len(rows)} events | | {cells} | {ratios[0]:.2f} |")
+    above = (rows[:, 0] > 2 * rows[:, 1]).sum(axis=0)
+    print(f"of medians {ratios[1]:.2f}; events above 2: {above[0]} by mean, {above[1]} by median")
 
 
 def moment_errors(fold, event):
@@ -197,48 +107,53 @@ def moment_errors(fold, event):
     return np.reshape(found, (-1, 2))
 
 
-def show_no_look_ahead(some, cuts=8):
+def show_no_look_ahead(folds, cuts=8):
     """How many answers change once later frames are known, and by ``step``."""
     changed = cases = 0
-    for fold in some:
+    for fold in (fold for some in folds.values() for fold in some):
         clip, online = fold.clips[0], fold.online
         whole = np.array(online.follow([clip])[0])
-        for end in np.unique(np.linspace(1, len(clip) - 1, cuts).astype(int)):
-            part = np.array(online.follow([clip[: end + 1]])[0])
-            changed += part.tobytes() != whole[:, : end + 1].tobytes()
-            cases += 1
+        parts = [
+            np.array(online.follow([clip[: end + 1]])[0])
+            for end in np.unique(np.linspace(1, len(clip) - 1, cuts).astype(int))
+        ]
         online.reset()
-        steps = np.array([online.step(frame) for frame in clip]).T
-        changed += steps.tobytes() != whole.tobytes()
-        cases += 1
+        parts.append(np.array([online.step(frame) for frame in clip]).T)
+        changed += sum(x.tobytes() != whole[:, : x.shape[1]].tobytes() for x in parts)
+        cases += len(parts)
     print(f"\n3. No look-ahead: {changed} of {cases} answers differ in a bit from the whole clip's")
 
 
 def show_speed(name, fold):
     """Frames a second of ``step`` and of ``follow``."""
     online, clip = fold.online, fold.clips[0]
-    print(f"   {name}: {clip.shape[1]} features, {len(fold.clips)} clips", end="")
+    cells = []
     for n_streams in (None, 10, 100):
         frames = clip if n_streams is None else np.repeat(clip[:, np.newaxis], n_streams, axis=1)
-        rates = []
+        took = []
         for _ in range(3):
             online.reset(n_streams=n_streams)
             begin = time.perf_counter()
             for frame in frames:
                 online.step(frame)
-            rates.append(len(frames) * (n_streams or 1) / (time.perf_counter() - begin))
-        print(f"; step, {n_streams or 'one'} at once {np.median(rates):,.0f}", end="")
+            took.append(time.perf_counter() - begin)
+        count = n_streams or 1
+        cells.append(f"step, streams: {count}: {len(clip) * count / np.median(took):,.0f}")
     begin = time.perf_counter()
     online.follow(fold.clips)
     rate = sum(map(len, fold.clips)) / (time.perf_counter() - begin)
-    print(f"; follow {rate:,.0f} frames a second", flush=True)
+    cells.append(f"follow, clips: {len(fold.clips)}: {rate:,.0f}")
+    print(f"   {name}, {clip.shape[1]} features: {'; '.join(cells)} frames a second", flush=True)
+
+
+# -- what is seen otherwise -------------------------------------------------------------
 
 
 def disturbed(clip, rng):
-    """The clip as other sensors see it: {name: (frames, times in frames of training, kept)}."""
+    """A clip of cosines as others see it: {name: (frames, stamps, frames that they are)}."""
     n, frames = len(clip), np.arange(float(len(clip)))
     jitter = np.clip(frames + rng.uniform(-0.4, 0.4, n), 0, n - 1)
-    third = np.where(rng.random(clip.shape) < 1 / 3, np.nan, clip)
+    third = rng.random(clip.shape) < 1 / 3
     # The first cosine is the height of the pelvis; every limb has three.
     limbs = np.insert(np.repeat(rng.permutation((clip.shape[1] - 1) // 3), 3) < 4, 0, False)
     kept = rng.random(n) >= 0.3
@@ -246,136 +161,135 @@ def disturbed(clip, rng):
     return {
         "every frame": (clip, None, frames),
         "every fourth frame": (clip[::4], frames[::4], frames[::4]),
-        "jittered by 0.4 frames": (sampled(clip, jitter), jitter, jitter),
+        "stamps that jitter by up to 0.4 frames": (sampled(clip, jitter), jitter, jitter),
         "30 % of the frames left out": (clip[kept], frames[kept], frames[kept]),
         "30 % of the frames NaN": (np.where(kept[:, np.newaxis], clip, np.nan), None, frames),
-        "a third of the features NaN, anew each frame": (third, None, frames),
+        "a third of the features NaN, others in each frame": (
+            np.where(third, np.nan, clip),
+            None,
+            frames,
+        ),
         "4 of the 12 limbs NaN all the time": (np.where(limbs, np.nan, clip), None, frames),
     }
 
 
-def show_rates(name, some):
-    """Median / 90 % quantile of errors of what is seen at another rate, or in part."""
-    actions, rng = by_action(some), np.random.default_rng(0)
-    print(f"\n5. Seen otherwise, {name}: median / 90 % quantile of errors (frames of {P})")
-    print("| | " + " | ".join(actions) + " | mean |\n|" + "---|" * (len(actions) + 2))
-    found = {}
-    for action, of_action in actions.items():
-        for fold in of_action:
+def show_disturbed(name, folds):
+    """Errors of what is seen at another rate, or in part."""
+    rng, found = np.random.default_rng(0), {}
+    for action, some in folds.items():
+        for fold in some:
             for clip, truth in zip(fold.clips, fold.truths, strict=True):
-                for kind, (seen, times, at) in disturbed(clip, rng).items():
-                    stamps = None if times is None else [times]
-                    phase = fold.online.follow([seen], times=stamps)[0].phase
+                for kind, (seen, stamps, at) in disturbed(clip, rng).items():
+                    times = None if stamps is None else [stamps]
+                    phase = fold.online.follow([seen], times=times)[0].phase
                     errors = np.abs(phase - np.interp(at, np.arange(len(truth)), truth))
-                    late = at >= len(truth) / 5
-                    found.setdefault(kind, {}).setdefault(action, []).append(errors[late])
-    for kind, of_kind in found.items():
-        row = [np.quantile(np.concatenate(errors), [0.5, 0.9]) for errors in of_kind.values()]
-        _line(kind, [*row, np.mean(row, axis=0)])
+                    errors = errors[at >= len(truth) / 5]
+                    found.setdefault(kind, {}).setdefault(action, []).append(errors)
+    head(f"5. Seen otherwise, {name}: median / 90 % quantile of errors (frames of {P})", folds)
+    for kind, errors in found.items():
+        line(kind, errors)
 
 
-def show_negatives(name, some):
+# -- who does not do it -----------------------------------------------------------------
+
+
+def show_negatives(name, folds):
     """How well confidence tells the action from what is none, at half of a clip and at its end."""
-    print(f"\n6. Confidence, {name}: quantiles 10, 50, 90 % and AUC against clips of the action")
+    print(f"\n6. Confidence, {name}: quantiles 10, 50, 90 %, AUC against clips of the action")
     print("| | half the clip | AUC | end | AUC | AUC at the end, by action |")
     print("|---|---|---|---|---|---|")
     found = {}
-    for action, of_action in by_action(some).items():
-        for fold in of_action:
-            still = [np.repeat(x[:1], round(fold.known.duration), axis=0) for x in fold.clips]
-            backwards = [x[::-1] for x in fold.clips]
-            kinds = {"the action": fold.clips, "another action": fold.wrong}
-            kinds |= {"standing still": still, "backwards": backwards}
+    for action, some in folds.items():
+        for fold in some:
+            kinds = {
+                "the action": fold.clips,
+                "another action": fold.wrong,
+                "standing still": [np.repeat(x[:1], len(x), axis=0) for x in fold.clips],
+                "backwards": [x[::-1] for x in fold.clips],
+            }
             for kind, clips in kinds.items():
-                said = [live.confidence[[len(x) // 2, -1]] for x, live in _followed(fold, clips)]
+                said = [live.confidence[[len(x) // 2, -1]] for x, live in fold.follow(clips)]
                 found.setdefault(kind, {}).setdefault(action, []).extend(said)
     right = found["the action"]
-    for kind, of_kind in found.items():
-        said = np.concatenate(list(of_kind.values())).T
-        aucs = np.array([[_auc(right[a], of_kind[a], when) for a in right] for when in (0, 1)])
-        cells = []
-        for quantiles, auc in zip(np.quantile(said, [0.1, 0.5, 0.9], axis=1).T, aucs, strict=True):
-            cells.append(" ".join(f"{q:.2f}" for q in quantiles) + f" | {auc.mean():.2f}")
-        print(
-            f"| {kind} | {cells[0]} | {cells[1]} | " + " ".join(f"{a:.2f}" for a in aucs[1]) + " |"
-        )
+    for kind, wrong in found.items():
+        said = np.concatenate(list(wrong.values()))
+        half, end = ([auc(right[a], wrong[a], when) for a in right] for when in (0, 1))
+        quantiles = np.quantile(said, [0.1, 0.5, 0.9], axis=0).T
+        cells = [
+            " ".join(f"{q:.2f}" for q in of_time) + f" | {np.mean(aucs):.2f}"
+            for of_time, aucs in zip(quantiles, (half, end), strict=True)
+        ]
+        by_action = " ".join(f"{a:.2f}" for a in end)
+        print(f"| {kind} | {cells[0]} | {cells[1]} | {by_action} |", flush=True)
 
 
-def _followed(fold, clips):
-    return zip(clips, fold.online.follow(clips), strict=True)
-
-
-def _auc(right, wrong, when):
+def auc(right, wrong, when):
     scores = [said[when] for said in (*right, *wrong)]
     return roc_auc_score(np.repeat([1, 0], [len(right), len(wrong)]), scores)
 
 
-def show_pauses(some, pause=FRAME_RATE):
-    """Errors of those who stand a second before they begin, or in the middle."""
-    print("\n   Standing for a second: median / 90 % quantile of errors, while standing and after")
-    print("| | " + " | ".join(by_action(some)) + " | mean |")
-    print("|" + "---|" * (len(by_action(some)) + 2))
-    for where, share in (("before it begins", 0), ("in the middle", 0.5)):
-        rows = {"while": [], "after": []}
-        for of_action in by_action(some).values():
-            found = {"while": [], "after": []}
-            for fold in of_action:
+def show_pauses(folds):
+    """Errors of those who stand for a second before they begin, or in the middle."""
+    title = "   Standing for a second, while it lasts and after: median / 90 % quantile of errors"
+    head(title, folds)
+    for where, share in (("before the beginning", 0), ("in the middle", 0.5)):
+        found = {"while": {}, "after": {}}
+        for action, some in folds.items():
+            for fold in some:
                 for clip, truth in zip(fold.clips, fold.truths, strict=True):
                     k = round(share * (len(clip) - 1))
-                    order = np.insert(np.arange(len(clip)), k, np.full(pause, k))
-                    phase = fold.online.follow([clip[order]])[0].phase
-                    errors = np.abs(phase - truth[order])
-                    found["while"].append(errors[k : k + pause])
-                    found["after"].append(errors[pause + max(k, len(clip) // 5) :])
-            for when, errors in found.items():
-                rows[when].append(np.quantile(np.concatenate(errors), [0.5, 0.9]))
-        for when, row in rows.items():
-            _line(f"{where}, {when}", [*row, np.mean(row, axis=0)])
+                    order = np.insert(np.arange(len(clip)), k, np.full(SECOND, k))
+                    errors = np.abs(fold.online.follow([clip[order]])[0].phase - truth[order])
+                    after = errors[SECOND + max(k, len(clip) // 5) :]
+                    for when, part in (("while", errors[k : k + SECOND]), ("after", after)):
+                        found[when].setdefault(action, []).append(part)
+        for when, errors in found.items():
+            line(f"{where}, {when}", errors)
 
 
 # -- time to finish ---------------------------------------------------------------------
 
-PRIORS = (25, 50, 100, 200)
 
-
-def time_left(fold, elapsed, phase, rate):
-    """Frames until the end, by every estimator, of frames elapsed, phase and rate: {name: frames}."""
-    mean, left = fold.known.duration - 1, P - 1 - phase
-    usual = left * fold.known.tick
-    out = {"mean duration less elapsed": np.maximum(mean - elapsed, 0)}
-    out["what is left, at the mean pace"] = usual
-    out["what is left, at the current rate"] = usual / np.maximum(rate, 0.2)
-    out["what is left, at the pace so far"] = left * elapsed / np.maximum(phase, 1)
-    for prior in PRIORS:
-        # As if so many frames of the pattern had gone at the mean pace before.
-        pace = (elapsed + prior * fold.known.tick) / (phase + prior)
-        out[f"pace so far and {prior} frames at the mean pace"] = left * pace
-    out["mean of the first two"] = (out["mean duration less elapsed"] + usual) / 2
+def time_left(known, elapsed, phase, rate):
+    """Frames until the end, by every way to tell: {name: frames}, of frames elapsed."""
+    left = P - 1 - phase
+    usual = left * known.tick
+    less = np.maximum(known.duration - 1 - elapsed, 0)
+    out = {
+        "mean duration less elapsed": less,
+        "phase left, at the mean pace": usual,
+        "phase left, at the rate": usual / np.maximum(rate, 0.2),
+        "phase left, at the pace so far": left * elapsed / np.maximum(phase, 1),
+    }
+    for prior in (50, 100, 200):
+        # As if so many frames of the pattern had passed at the mean pace before.
+        pace = (elapsed + prior * known.tick) / (phase + prior)
+        out[f"the pace so far and of {prior} frames before"] = left * pace
+    out["mean of the first two"] = (less + usual) / 2
     return out
 
 
-def show_finish(name, some):
+def show_finish(name, folds):
     """Mean absolute errors, in % of the clip, at 25, 50 and 75 % of it."""
-    actions, found = by_action(some), {}
-    for action, of_action in actions.items():
-        for fold in of_action:
-            for clip, live in _followed(fold, fold.clips):
+    found = {}
+    for action, some in folds.items():
+        for fold in some:
+            for clip, live in fold.follow(fold.clips):
                 last = len(clip) - 1
                 at = np.round(np.array([0.25, 0.5, 0.75]) * last).astype(int)
-                for kind, frames in time_left(fold, at, live.phase[at], live.rate[at]).items():
+                for kind, frames in time_left(
+                    fold.known, at, live.phase[at], live.rate[at]
+                ).items():
                     errors = 100 * np.abs(frames - (last - at)) / last
                     found.setdefault(kind, {}).setdefault(action, []).append(errors)
-    print(
-        f"\n7. Time to finish, {name}: mean absolute error in % of the clip at 25, 50, 75 % of it"
-    )
-    print("| | " + " | ".join(actions) + " | mean | better on |\n|" + "---|" * (len(actions) + 3))
-    first = None
-    for kind, of_kind in found.items():
-        rows = np.array([np.mean(errors, axis=0) for errors in of_kind.values()])
-        first = rows if first is None else first
-        cells = [" ".join(f"{x:.1f}" for x in row) for row in (*rows, rows.mean(axis=0))]
-        better = f"{np.sum(rows.mean(axis=1) < first.mean(axis=1))} of {len(rows)}"
-        print(f"| {kind} | " + " | ".join(cells) + f" | {better} |")
+    title = f"7. Time to finish, {name}: mean absolute error in % of the clip at 25, 50, 75 % of it"
+    head(title, folds, "better on")
+    tables = {kind: [np.mean(x, axis=0) for x in some.values()] for kind, some in found.items()}
+    first = np.mean(next(iter(tables.values())), axis=1)
+    for kind, rows in tables.items():
+        cells = [" ".join(f"{x:.1f}" for x in row) for row in (*rows, np.mean(rows, axis=0))]
+        better = f"{np.sum(np.mean(rows, axis=1) < first)} of {len(rows)}"
+        print(f"| {kind} | " + " | ".join([*cells, better]) + " |")
 
 
 def main():
@@ -383,38 +297,34 @@ def main():
     parser.add_argument("folder", help="folder of hdm05 and utkinect")
     parser.add_argument("--tables", nargs="*", type=int, default=range(1, 8))
     args = parser.parse_args()
-    tables = set(args.tables)
-    events = [event for event in EVENTS if event.archive in ARCHIVES]
-    actions = read_actions(args.folder, events)
+    actions = read_actions(args.folder, [e for e in EVENTS if e.archive in ARCHIVES])
     points = {
-        name: list(folds([a for a in actions if a.archive == archive]))
+        name: held_out([a for a in actions if a.archive == archive])
         for archive, name in ARCHIVES.items()
     }
-    cosines = list(folds([a for a in actions if a.archive == "hdm05"], space=False))
-    for name, some in points.items():
-        if 1 in tables:
-            show_phase(name, some, [OURS, *PEERS])
-    if 1 in tables:
-        show_phase("HDM05, cosines", cosines, [OURS])
-    for name, some in points.items():
-        if 2 in tables:
-            show_moments(name, some)
-    if 3 in tables:
-        show_no_look_ahead(points["HDM05"])
-    if 4 in tables:
-        print("\n4. Speed")
-        show_speed("aSpace", points["HDM05"][0])
-        show_speed("cosines", cosines[0])
-    if 5 in tables:
-        show_rates("HDM05, cosines", cosines)
-    for name, some in points.items():
-        if 6 in tables:
-            show_negatives(name, some)
-    if 6 in tables:
-        show_pauses(points["HDM05"])
-    for name, some in points.items():
-        if 7 in tables:
-            show_finish(name, some)
+    cosines = held_out([a for a in actions if a.archive == "hdm05"], space=False)
+    bends = "depositFloorR"
+    tables = {
+        1: lambda: (
+            [show_phase(name, folds, [OURS, *PEERS]) for name, folds in points.items()],
+            show_phase("HDM05, cosines", cosines, [OURS]),
+        ),
+        2: lambda: [show_moments(name, folds) for name, folds in points.items()],
+        3: lambda: show_no_look_ahead(points["HDM05"]),
+        4: lambda: (
+            print("\n4. Speed"),
+            show_speed("aSpace", points["HDM05"][bends][0]),
+            show_speed("cosines", cosines[bends][0]),
+        ),
+        5: lambda: show_disturbed("HDM05, cosines", cosines),
+        6: lambda: (
+            [show_negatives(name, folds) for name, folds in points.items()],
+            show_pauses(points["HDM05"]),
+        ),
+        7: lambda: [show_finish(name, folds) for name, folds in points.items()],
+    }
+    for number in args.tables:
+        tables[number]()
 
 
 if __name__ == "__main__":

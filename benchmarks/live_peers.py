@@ -162,7 +162,7 @@ class Dixon:
         self.before = self.turn = None
 
     def next(self):
-        """Take in one row, and columns until the next row is wanted: the column of the best cell."""
+        """The column of the best cell, after one more row and columns until a row is wanted."""
         if self.turn is not None:
             self.row += 1
             for j in range(max(0, self.column - self.window + 1), self.column + 1):

@@ -24,8 +24,8 @@ def peers():
 
 
 @pytest.fixture(scope="module")
-def live():
-    return importlib.import_module("live")
+def people():
+    return importlib.import_module("live_people")
 
 
 def curve(phase):
@@ -39,12 +39,12 @@ def known(peers):
     return peers.Known(mean, mean, 199.0)
 
 
-def test_a_warp_read_the_other_way_round_is_in_the_middle_of_where_it_stays(live):
+def test_a_warp_read_the_other_way_round_is_in_the_middle_of_where_it_stays(people):
     times = np.array([0, 0, 1, 3, 3, 3, 4, 6, 7, 7.0])
-    found = live.phase_of(times, np.array([0, 0.5, 2, 3, 5, 7]))
+    found = people.phase_of(times, np.array([0, 0.5, 2, 3, 5, 7]))
     np.testing.assert_allclose(found, [0.5, 1.5, 2.5, 4, 6.5, 8.5])
     linear = np.arange(100.0)
-    np.testing.assert_allclose(live.truth_of(linear, 199), np.arange(199) / 2)
+    np.testing.assert_allclose(people.truth_of(linear, 199), np.arange(199) / 2)
 
 
 def test_ticks_are_frames_of_the_pattern_at_the_mean_pace(known):
