@@ -30,6 +30,8 @@ from .display import (
     TrellisDisplay,
 )
 from .framewise import FrameWise
+from .live.online import OnlineSynchronizer
+from .live.stream import LivePhase
 from .long_tables import to_sequences
 from .model.action_model import ActionModel
 from .model.departures import find_departures
@@ -66,8 +68,10 @@ __all__ = [
     "LagDisplay",
     "Lags",
     "LinearSynchronizer",
+    "LivePhase",
     "Match",
     "MetricDisplay",
+    "OnlineSynchronizer",
     "PartSynchronizer",
     "SearchDisplay",
     "Skeleton",

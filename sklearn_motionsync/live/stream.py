@@ -1,0 +1,180 @@
+"""Streams: where running performances are, by the rows of the trellis (Eqs. 16 and 17)."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..matching.causal import CausalDerivative
+from ..matching.running import Running
+from ..matching.trellis import Trellis
+from .compared import LiveFeatures
+from .ticks import Ticks
+
+__all__ = ["Calibration", "Course", "LivePhase", "Stream"]
+
+# Shares of the clock: over which rate and likeness are told, and how near a phase counts as right.
+_RECENT, _NEAR = 0.1, 0.05
+
+
+class LivePhase(NamedTuple):
+    """Where a performance is.
+
+    Attributes
+    ----------
+    phase : float, or ndarray
+        Frame of the pattern, from 0 to P - 1.
+    rate : float, or ndarray
+        Frames of the pattern in the time of one at the mean pace of the training set.
+    confidence : float, or ndarray
+        From 0 to 1: how probable it is that the phase is right to a twentieth of the clock.
+    """
+
+    phase: float | np.ndarray
+    rate: float | np.ndarray
+    confidence: float | np.ndarray
+
+
+class Calibration(NamedTuple):
+    """What the costs of paths say of performances of the action.
+
+    Attributes
+    ----------
+    temperature : float
+        Costs over it are log-probabilities of phases.
+    usual : float
+        Recent cost of a sample that 95 % of the action stay below.
+    """
+
+    temperature: float
+    usual: float
+
+
+class Course(NamedTuple):
+    """What running performances follow.
+
+    Attributes
+    ----------
+    trellis : Trellis
+    features : LiveFeatures
+    width : float
+        Time constant of the filters, in frames of the clock.
+    step : float
+        From one frame of the clock to the next, in frames of the training performances.
+    calibration : Calibration
+    """
+
+    trellis: Trellis
+    features: LiveFeatures
+    width: float
+    step: float
+    calibration: Calibration = Calibration(1.0, np.inf)
+
+    @property
+    def n_frames(self):
+        """``P``."""
+        return self.trellis.reach + 1
+
+
+class Stream:
+    """Performances that run, all seen at the same times.
+
+    Parameters
+    ----------
+    course : Course
+    n_streams : int
+    n_features : int
+    """
+
+    def __init__(self, course, n_streams, n_features):
+        self.course = course
+        self.running = Running(course.trellis, course.features.moving, n_streams)
+        self.recent = np.zeros(n_streams)
+        self._ticks = Ticks(course.step, course.n_frames)
+        self._derivative = CausalDerivative(course.width, (n_streams, n_features))
+        # The phases of the last ticks, in a ring; and how many ticks streams have run.
+        self._lag = max(2, round(_RECENT * course.n_frames))
+        self._phases = np.zeros((self._lag + 1, n_streams))
+        self._age = np.zeros(n_streams, dtype=np.intp)
+        self._floor = np.zeros(n_streams)
+
+    def restart(self, stream):
+        """Let one of them begin anew with its next tick."""
+        self.running.restart(stream)
+        self._derivative.restart(stream)
+        self._age[stream] = self._floor[stream] = self.recent[stream] = 0
+        self._phases[:, stream] = 0
+
+    def take(self, frames, stamp):
+        """Take the frames (n_streams, n_features) of a moment, and say where all of them are."""
+        for sample in self._ticks.take(frames, stamp):
+            self.tick(sample)
+        rate = self._rates()
+        last = self.course.n_frames - 1
+        phase = np.minimum(self._now() + rate * self._ticks.since, last)
+        return LivePhase(phase, rate, self._confidence())
+
+    def tick(self, sample):
+        """Take the sample of a tick, in the unit of the data."""
+        features = self.course.features
+        postures = features.unit(sample)
+        velocity = self._derivative.step(postures)
+        # What does not move is 0 in the unit, seen or not.
+        seen = ~(np.isnan(velocity) | np.isnan(sample))
+        whole = seen.all(axis=1)
+        compared = features(velocity, postures)
+        compared[~whole] = 0
+        self.running.advance(compared, self._parts(seen, whole, velocity, postures))
+        self._note(seen)
+
+    def _parts(self, seen, whole, velocity, postures):
+        groups = {}
+        for n in np.flatnonzero(~whole):
+            groups.setdefault(tuple(np.flatnonzero(seen[n]).tolist()), []).append(int(n))
+        return {
+            tuple(rows): self.course.features.part(columns, velocity[rows], postures[rows])
+            for columns, rows in groups.items()
+        }
+
+    def _note(self, seen):
+        """Keep what rate and confidence are told from."""
+        n_ticks = self.running.n_samples
+        self._phases[(n_ticks - 1) % len(self._phases)] = self._best_phases()
+        least = self.running.costs.min(axis=1)
+        share = seen.mean(axis=1)
+        # Of what is seen: a hidden body is neither like nor unlike.
+        weight = np.where(share > 0, 1 / np.minimum(self._age + 1, self._lag), 0)
+        cost = (least - self._floor) / np.where(share > 0, share, 1)
+        self.recent += weight * (cost - self.recent)
+        self._floor = least
+        self._age += 1
+
+    def _best_phases(self):
+        return self.running.ends() / self.course.trellis.table.subframes
+
+    def _now(self):
+        return self._phases[(self.running.n_samples - 1) % len(self._phases)]
+
+    def _rates(self):
+        """Slope of the last phases; at first it is taken to be about 1."""
+        back = np.clip(self._age - 1, 0, self._lag)
+        then = (self.running.n_samples - 1 - back) % len(self._phases)
+        moved = self._now() - self._phases[then, np.arange(len(back))]
+        prior = self._lag - back
+        fastest = self.course.trellis.table.steps.max() / self.course.trellis.table.subframes
+        return np.clip((moved + prior) / (back + prior), 0, fastest)
+
+    def _confidence(self):
+        chances = self.chances(self.running.costs, self.course.calibration.temperature)
+        subframes = self.course.trellis.table.subframes
+        at = self._now()[:, np.newaxis] * subframes
+        near = max(1, _NEAR * (self.course.n_frames - 1)) * subframes
+        mass = np.where(np.abs(np.arange(chances.shape[1]) - at) <= near, chances, 0).sum(axis=1)
+        unlike = np.maximum(self.recent / self.course.calibration.usual, 1)
+        # Who has not begun is at the beginning.
+        return np.where(self._age > 0, mass / unlike, 1.0)
+
+    @staticmethod
+    def chances(costs, temperature):
+        """Probabilities of phases of which these are the costs: (..., Q)."""
+        weights = np.exp((costs.min(axis=-1, keepdims=True) - costs) / temperature)
+        return weights / weights.sum(axis=-1, keepdims=True)
