@@ -28,6 +28,10 @@ from sklearn.metrics import roc_auc_score
 
 ARCHIVES = {"hdm05": "HDM05", "utkinect": "UTKinect"}
 OURS = "OnlineSynchronizer"
+VARIANTS = {
+    f"{OURS}, metric=None": {"metric": None},
+    f"{OURS}, cost='posture'": {"cost": "posture"},
+}
 # Frames a second of HDM05: who stands for a second stands for so many.
 SECOND = 120
 
@@ -57,7 +61,9 @@ def told(errors):
 def phases_of(fold, method):
     """The phases of the clips of a fold, by ours or by a peer."""
     if method == OURS:
-        return [live.phase for _, live in fold.follow(fold.clips)]
+        return fold.phases
+    if method in VARIANTS:
+        return fold.phases_with(**VARIANTS[method])
     return [PEERS[method](fold.known, clip) for clip in fold.clips]
 
 
@@ -70,7 +76,7 @@ def show_phase(name, folds, methods):
             found[action] = [e for fold in some for e in fold.errors(phases_of(fold, method))]
         line(method, found)
     ends = {
-        action: [[P - 1 - phase[-1]] for fold in some for phase in phases_of(fold, OURS)]
+        action: [[P - 1 - phase[-1]] for fold in some for phase in fold.phases]
         for action, some in folds.items()
     }
     line(f"{OURS}: P - 1 less the phase of the last frame", ends)
@@ -98,8 +104,7 @@ def show_moments(name, folds):
 def moment_errors(fold, event):
     """Errors of the phase at an event, (n_clips that show it, 2): live and of the whole clip."""
     found = []
-    answers = phases_of(fold, OURS)
-    for phase, truth, moment in zip(answers, fold.truths, fold.moments[event], strict=True):
+    for phase, truth, moment in zip(fold.phases, fold.truths, fold.moments[event], strict=True):
         if np.isfinite(moment + fold.landed[event]):
             frame, frames = moment * (len(truth) - 1) / (P - 1), np.arange(len(truth))
             at = np.array([np.interp(frame, frames, phases) for phases in (phase, truth)])
@@ -132,7 +137,7 @@ def show_speed(name, fold):
         frames = clip if n_streams is None else np.repeat(clip[:, np.newaxis], n_streams, axis=1)
         took = []
         for _ in range(3):
-            online.reset(n_streams=n_streams)
+            online.reset()
             begin = time.perf_counter()
             for frame in frames:
                 online.step(frame)
@@ -208,7 +213,8 @@ def show_negatives(name, folds):
                 "backwards": [x[::-1] for x in fold.clips],
             }
             for kind, clips in kinds.items():
-                said = [live.confidence[[len(x) // 2, -1]] for x, live in fold.follow(clips)]
+                said = [live.confidence for live in fold.online.follow(clips)]
+                said = [confidence[[len(confidence) // 2, -1]] for confidence in said]
                 found.setdefault(kind, {}).setdefault(action, []).extend(said)
     right = found["the action"]
     for kind, wrong in found.items():
@@ -274,7 +280,7 @@ def show_finish(name, folds):
     found = {}
     for action, some in folds.items():
         for fold in some:
-            for clip, live in fold.follow(fold.clips):
+            for clip, live in zip(fold.clips, fold.live, strict=True):
                 last = len(clip) - 1
                 at = np.round(np.array([0.25, 0.5, 0.75]) * last).astype(int)
                 for kind, frames in time_left(
@@ -306,7 +312,8 @@ def main():
     bends = "depositFloorR"
     tables = {
         1: lambda: (
-            [show_phase(name, folds, [OURS, *PEERS]) for name, folds in points.items()],
+            show_phase("HDM05", points["HDM05"], [OURS, *VARIANTS, *PEERS]),
+            show_phase("UTKinect", points["UTKinect"], [OURS, *PEERS]),
             show_phase("HDM05, cosines", cosines, [OURS]),
         ),
         2: lambda: [show_moments(name, folds) for name, folds in points.items()],

@@ -3,7 +3,8 @@
 The phase of a frame is read off the warp of the whole clip, the other way round (`truth_of`).
 """
 
-from typing import NamedTuple
+import functools
+from dataclasses import dataclass
 
 import numpy as np
 from events import P
@@ -11,7 +12,8 @@ from live_peers import Known
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, OnlineSynchronizer
 
 
-class Fold(NamedTuple):
+@dataclass(frozen=True)
+class Fold:
     """What is known of an action from all actors but one, and the clips of that one.
 
     ``truths``: the phases of the frames of each clip. ``moments`` {event: (n_clips,)}: when the
@@ -22,15 +24,26 @@ class Fold(NamedTuple):
     action: str
     online: OnlineSynchronizer
     known: Known
+    training: list
     clips: list
     truths: list
     moments: dict
     landed: dict
     wrong: list
 
-    def follow(self, clips):
-        """What is said of clips: pairs of a clip and its live phase."""
-        return list(zip(clips, self.online.follow(clips), strict=True))
+    @functools.cached_property
+    def live(self):
+        """What is said of the clips, frame by frame: a `LivePhase` of arrays each."""
+        return self.online.follow(self.clips)
+
+    @property
+    def phases(self):
+        return [live.phase for live in self.live]
+
+    def phases_with(self, **params):
+        """The same of a synchronizer with other parameters."""
+        online = OnlineSynchronizer(DenseSynchronizer(n_frames=P, **params)).fit(self.training)
+        return [live.phase for live in online.follow(self.clips)]
 
     def errors(self, phases):
         """Absolute errors of the phases of all clips, each after its first fifth."""
@@ -83,7 +96,8 @@ def held_out(actions, space=True):
 
 
 def _learn(action, train, test, training, clips, wrong):
-    sync = DenseSynchronizer(n_frames=P).fit(training)
+    online = OnlineSynchronizer(DenseSynchronizer(n_frames=P)).fit(training)
+    sync = online.synchronizer_
     seen, whole = sync.match(training).times, sync.match(clips).times
     landed = {}
     for event, moments in action.moments.items():
@@ -93,8 +107,9 @@ def _learn(action, train, test, training, clips, wrong):
     duration = float(np.mean([len(x) for x in training]))
     return Fold(
         action=action.name,
-        online=OnlineSynchronizer(DenseSynchronizer(n_frames=P)).fit(training),
-        known=Known(sync.transform(training).mean(axis=0), sync.pattern_, duration),
+        online=online,
+        known=Known(online.mean_, sync.pattern_, duration),
+        training=training,
         clips=clips,
         truths=[truth_of(tau, len(x)) for tau, x in zip(whole, clips, strict=True)],
         moments={event: moments[test] for event, moments in action.moments.items()},
