@@ -16,7 +16,6 @@ _MOST = 24
 # Temperatures that are tried, in mean squared features of a sample; the least chance that counts.
 _TEMPERATURES = np.geomspace(0.01, 1e3, 41)
 _LEAST = 1e-12
-_USUAL = 0.95
 
 
 def calibrate(course_of, performances, warped, times):
@@ -48,7 +47,7 @@ def calibrate(course_of, performances, warped, times):
         for k, temperature in enumerate(energy * _TEMPERATURES):
             right = Stream.chances(rows, temperature)[np.arange(len(rows)), truth]
             scores[k] += np.log(np.maximum(right, _LEAST)).mean()
-    usual = np.quantile(np.concatenate(recent), _USUAL)
+    usual = np.median([np.max(costs) for costs in recent])
     return Calibration(float(energy * _TEMPERATURES[scores.argmax()]), float(usual))
 
 

@@ -19,7 +19,7 @@ from ..synchronizers.dense import DenseSynchronizer
 from .calibration import calibrate
 from .compared import LiveFeatures
 from .session import Session
-from .stream import Course
+from .stream import UNKNOWN, Course
 from .times import as_stamps
 
 __all__ = ["OnlineSynchronizer"]
@@ -78,13 +78,15 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
 
     What is compared is what the synchronizer has learnt, made of causal velocities and of postures
     less the mean posture; the filter of velocities comes late, on both sides alike. The phase may
-    go back when a frame shows that it was wrong. Nobody has to stand still before the beginning,
-    but whoever does stays at phase 0. After the end the phase stays at P - 1: call ``reset`` for
-    the next performance.
+    go back when a frame shows that it was wrong. Nobody has to stand still before the beginning;
+    whoever does stays where the mean performance has not moved much yet. Who stays in the last
+    posture is at the end, P - 1: call ``reset`` for the next performance.
 
     The confidence is the share of probability within a twentieth of the clock of the phase, from
     costs that are scaled so that the training performances, each followed with the mean of the
-    others, have theirs right; it falls where recent frames cost more than is usual among these.
+    others, have theirs right; it falls with the square of what recent frames cost more than is
+    usual among these. Another action costs more; a movement that is its own reverse, such as a
+    bend, costs no more backwards, and standing still costs nothing where the mean stands still.
 
     Features that are NaN are not compared; a frame of NaN, or time without frames,
     moves the phase on at the mean pace. Between frames, movements are taken to be straight
@@ -103,15 +105,15 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
     >>> frames = features.transform(bunch.data[11:])[0]
     >>> for k, frame in enumerate(frames[: len(frames) // 2]):
     ...     here = live.step(frame, time=k / 30)
-    >>> round(here.phase / (live.n_frames_ - 1), 1)
-    0.5
+    >>> 0.4 < here.phase / (live.n_frames_ - 1) < 0.6
+    True
 
-    Somebody who only stands there has not begun:
+    Somebody who only stands there does not get on:
 
     >>> live.reset()
     >>> for k in range(200):
     ...     here = live.step(frames[0])
-    >>> here.phase
+    >>> here.rate
     0.0
     """
 
@@ -165,9 +167,8 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         self.n_frames_ = sync.n_frames_
         self.mean_ = warped.mean(axis=0)
         self.duration_ = float(np.mean([len(x) for x in performances]) - 1)
-        course = self._course(self.mean_)
         found = calibrate(self._course, performances, warped, match.times)
-        self._following = course._replace(calibration=found)
+        self._following = self._course(self.mean_, found)
         self._session = Session()
         return self
 
@@ -196,7 +197,8 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
             frames before, or time stands still or goes back. The performance then goes on as if
             the frame had not been given.
         """
-        check_is_fitted(self)
+        if "_session" not in vars(self):
+            check_is_fitted(self)
         return self._session.step(self._following, self._frame(frame), time, self.frame_rate)
 
     def reset(self, stream=None):
@@ -257,19 +259,22 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
             found.append(session.history)
         return found
 
-    def _course(self, mean):
+    def _course(self, mean, calibration=UNKNOWN):
         """What is followed with this mean."""
         features = self.synchronizer_.training_.features
         width = self.smoothing * (self.n_frames_ - 1)
         compared = LiveFeatures(features, mean, _SUBFRAMES, width)
         mu = self.smoothness * float(np.square(compared.moving).sum(axis=1).mean())
         table = step_table(features.cost, self.max_rate, _SUBFRAMES)
-        trellis = Trellis(table, mu, self.n_frames_ - 1, running=True)
-        return Course(trellis, compared, width, self.duration_ / (self.n_frames_ - 1))
+        last = self.n_frames_ - 1
+        trellis = Trellis(table, mu, last + compared.rest, running=True)
+        step = self.duration_ / last
+        return Course(self.n_frames_, trellis, compared, width, step, calibration)
 
     def _frame(self, frame):
         """A frame as numbers, of one stream or of several."""
-        frame = as_numbers(frame, "The frame", dtype=np.float64)
+        if not (isinstance(frame, np.ndarray) and frame.dtype == np.float64):
+            frame = as_numbers(frame, "The frame", dtype=np.float64)
         width = self.mean_.shape[1]
         if frame.ndim == 0 and width == 1:
             frame = frame[np.newaxis]

@@ -10,7 +10,7 @@ from ..matching.trellis import Trellis
 from .compared import LiveFeatures
 from .ticks import Ticks
 
-__all__ = ["Calibration", "Course", "LivePhase", "Stream"]
+__all__ = ["UNKNOWN", "Calibration", "Course", "LivePhase", "Stream"]
 
 # Shares of the clock: over which rate and likeness are told, and how near a phase counts as right.
 _RECENT, _NEAR = 0.1, 0.05
@@ -42,11 +42,14 @@ class Calibration(NamedTuple):
     temperature : float
         Costs over it are log-probabilities of phases.
     usual : float
-        Recent cost of a sample that 95 % of the action stay below.
+        Recent cost of a sample that half of the action never exceed.
     """
 
     temperature: float
     usual: float
+
+
+UNKNOWN = Calibration(1.0, np.inf)
 
 
 class Course(NamedTuple):
@@ -54,7 +57,10 @@ class Course(NamedTuple):
 
     Attributes
     ----------
+    n_frames : int
+        ``P``.
     trellis : Trellis
+        It goes on after the end, where the performer rests.
     features : LiveFeatures
     width : float
         Time constant of the filters, in frames of the clock.
@@ -63,16 +69,12 @@ class Course(NamedTuple):
     calibration : Calibration
     """
 
+    n_frames: int
     trellis: Trellis
     features: LiveFeatures
     width: float
     step: float
-    calibration: Calibration = Calibration(1.0, np.inf)
-
-    @property
-    def n_frames(self):
-        """``P``."""
-        return self.trellis.reach + 1
+    calibration: Calibration
 
 
 class Stream:
@@ -93,9 +95,19 @@ class Stream:
         self._derivative = CausalDerivative(course.width, (n_streams, n_features))
         # The phases of the last ticks, in a ring; and how many ticks streams have run.
         self._lag = max(2, round(_RECENT * course.n_frames))
+        self._near = max(1.0, _NEAR * (course.n_frames - 1))
+        table = course.trellis.table
+        self._fastest = table.steps.max() / table.subframes
+        # Phases of positions: who rests is at the end.
+        places = np.arange(len(course.features.moving)) / table.subframes
+        self._clock = np.minimum(places, course.n_frames - 1)
         self._phases = np.zeros((self._lag + 1, n_streams))
         self._age = np.zeros(n_streams, dtype=np.intp)
-        self._floor = np.zeros(n_streams)
+        self._floor, self._all_seen = np.zeros(n_streams), np.ones(n_streams)
+        # The share of the last ticks that showed anything.
+        self._awake = np.ones(n_streams)
+        # Phases, rates and confidences of the last tick, when somebody has asked.
+        self._told = None
 
     def restart(self, stream):
         """Let one of them begin anew with its next tick."""
@@ -103,15 +115,17 @@ class Stream:
         self._derivative.restart(stream)
         self._age[stream] = self._floor[stream] = self.recent[stream] = 0
         self._phases[:, stream] = 0
+        self._told = None
 
     def take(self, frames, stamp):
         """Take the frames (n_streams, n_features) of a moment, and say where all of them are."""
         for sample in self._ticks.take(frames, stamp):
             self.tick(sample)
-        rate = self._rates()
-        last = self.course.n_frames - 1
-        phase = np.minimum(self._now() + rate * self._ticks.since, last)
-        return LivePhase(phase, rate, self._confidence())
+        if self._told is None:
+            self._told = self._now(), self._rates(), self._confidence()
+        phase, rate, confidence = self._told
+        phase = np.minimum(phase + rate * self._ticks.since, self.course.n_frames - 1)
+        return LivePhase(phase, rate, confidence)
 
     def tick(self, sample):
         """Take the sample of a tick, in the unit of the data."""
@@ -119,12 +133,15 @@ class Stream:
         postures = features.unit(sample)
         velocity = self._derivative.step(postures)
         # What does not move is 0 in the unit, seen or not.
-        seen = ~(np.isnan(velocity) | np.isnan(sample))
-        whole = seen.all(axis=1)
-        compared = features(velocity, postures)
-        compared[~whole] = 0
-        self.running.advance(compared, self._parts(seen, whole, velocity, postures))
-        self._note(seen)
+        hidden = np.isnan(velocity) | np.isnan(sample)
+        self._told = None
+        compared, parts, share = features(velocity, postures), None, self._all_seen
+        if hidden.any():
+            share = 1 - hidden.mean(axis=1)
+            compared[share < 1] = 0
+            parts = self._parts(~hidden, share == 1, velocity, postures)
+        self.running.advance(compared, parts)
+        self._note(share)
 
     def _parts(self, seen, whole, velocity, postures):
         groups = {}
@@ -135,43 +152,38 @@ class Stream:
             for columns, rows in groups.items()
         }
 
-    def _note(self, seen):
-        """Keep what rate and confidence are told from."""
-        n_ticks = self.running.n_samples
-        self._phases[(n_ticks - 1) % len(self._phases)] = self._best_phases()
-        least = self.running.costs.min(axis=1)
-        share = seen.mean(axis=1)
+    def _note(self, share):
+        """Keep what rate and confidence are told from, of a tick that shows a share of features."""
+        ends, least = self.running.best()
+        self._phases[(self.running.n_samples - 1) % len(self._phases)] = self._clock[ends]
         # Of what is seen: a hidden body is neither like nor unlike.
-        weight = np.where(share > 0, 1 / np.minimum(self._age + 1, self._lag), 0)
-        cost = (least - self._floor) / np.where(share > 0, share, 1)
-        self.recent += weight * (cost - self.recent)
+        weight = 1 / np.minimum(self._age + 1, self._lag)
+        self._awake += weight * ((share > 0) - self._awake)
+        weight *= share > 0
+        self.recent += weight * (
+            (least - self._floor) / np.where(share > 0, share, 1) - self.recent
+        )
         self._floor = least
         self._age += 1
-
-    def _best_phases(self):
-        return self.running.ends() / self.course.trellis.table.subframes
 
     def _now(self):
         return self._phases[(self.running.n_samples - 1) % len(self._phases)]
 
     def _rates(self):
         """Slope of the last phases; at first it is taken to be about 1."""
-        back = np.clip(self._age - 1, 0, self._lag)
+        back = np.minimum(np.maximum(self._age - 1, 0), self._lag)
         then = (self.running.n_samples - 1 - back) % len(self._phases)
         moved = self._now() - self._phases[then, np.arange(len(back))]
-        prior = self._lag - back
-        fastest = self.course.trellis.table.steps.max() / self.course.trellis.table.subframes
-        return np.clip((moved + prior) / (back + prior), 0, fastest)
+        rate = (moved + self._lag - back) / self._lag
+        return np.minimum(np.maximum(rate, 0), self._fastest)
 
     def _confidence(self):
         chances = self.chances(self.running.costs, self.course.calibration.temperature)
-        subframes = self.course.trellis.table.subframes
-        at = self._now()[:, np.newaxis] * subframes
-        near = max(1, _NEAR * (self.course.n_frames - 1)) * subframes
-        mass = np.where(np.abs(np.arange(chances.shape[1]) - at) <= near, chances, 0).sum(axis=1)
+        near = np.abs(self._clock - self._now()[:, np.newaxis]) <= self._near
+        mass = np.einsum("nq,nq->n", chances, near)
         unlike = np.maximum(self.recent / self.course.calibration.usual, 1)
         # Who has not begun is at the beginning.
-        return np.where(self._age > 0, mass / unlike, 1.0)
+        return np.where(self._age > 0, self._awake * mass / unlike**2, 1.0)
 
     @staticmethod
     def chances(costs, temperature):

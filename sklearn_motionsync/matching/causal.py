@@ -28,7 +28,9 @@ class CausalDerivative:
         self._keep = float(np.exp(-1 / width)) if width > 0 else 0.0
         self._longest = max(1.0, _BRIDGED * width)
         self._last = np.full(shape, np.nan)
-        # Samples since the last was seen; what each filter holds, and of how much of its weight.
+        # Samples since the last was seen; what each filter holds, and of how much weight that is.
+        # Steady: everything was seen in the last sample, and has been for long.
+        self._steady = False
         self._age = np.zeros(shape)
         self._held = np.zeros((2, *shape))
         self._weight = np.ones((2, *shape))
@@ -37,6 +39,7 @@ class CausalDerivative:
         """Forget what one stream has done."""
         self._last[stream], self._age[stream] = np.nan, 0
         self._held[:, stream], self._weight[:, stream] = 0, 1
+        self._steady = False
 
     def step(self, sample):
         """Velocity by the sample, NaN where it is not known: (n_streams, n_features).
@@ -47,6 +50,17 @@ class CausalDerivative:
             NaN where nothing was seen. Across a short gap a movement is taken to be even; after a
             long one the filter begins with the second sample.
         """
+        if self._steady and not np.isnan(sample).any():
+            velocity = sample - self._last
+            for held in self._held:
+                held += (1 - self._keep) * (velocity - held)
+                velocity = held.copy()
+            self._last = np.array(sample)
+            return velocity
+        return self._step(sample)
+
+    def _step(self, sample):
+        """The same where something is not seen, or was not."""
         self._age += 1
         seen = ~np.isnan(sample)
         lost = seen & (self._age > self._longest) & ~np.isnan(self._last)
@@ -58,14 +72,17 @@ class CausalDerivative:
         keep = np.where(known, self._keep**gap, 1)
         velocity = difference
         for held, weight in zip(self._held, self._weight, strict=True):
-            held *= keep
-            held += (1 - keep) * velocity
             weight *= keep
             weight += 1 - keep
-            velocity = held / np.where(weight > 0, weight, 1)
+            # What is held is the mean of what has been seen.
+            held += np.where(weight > 0, (1 - keep) / np.where(weight > 0, weight, 1), 0) * (
+                velocity - held
+            )
+            velocity = held.copy()
         self._held[:, lost] = 0
         self._last = np.where(seen, sample, self._last)
         self._age[seen] = 0
+        self._steady = bool(seen.all() and (self._weight > 1 - 1e-12).all())
         return np.where(known, velocity, np.nan)
 
 

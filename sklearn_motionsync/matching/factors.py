@@ -43,8 +43,7 @@ class Bases:
 
     def by_group(self):
         """The left factor of every group of steps. Long takes make it large: it is not kept."""
-        weights = [(group.moving, group.inner, group.penalty) for group in self.trellis.groups]
-        return _left_factor(self.sequences, *zip(*weights, strict=True))
+        return _left_factor(self.sequences, *self.trellis.of_group)
 
     @functools.cached_property
     def by_step(self):

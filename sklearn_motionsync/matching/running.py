@@ -33,7 +33,8 @@ class Running:
         nothing = np.empty((n_streams, 0, moving.shape[1]), dtype=moving.dtype)
         self._bundle = Bundle(trellis, Bases(trellis, nothing), right_factor(moving[np.newaxis]))
         self._states = self._bundle.states(2)
-        self._energy = np.zeros(n_streams)
+        self._energy = np.full(n_streams, self._bundle.right[:, 0, -2].sum())
+        self._rank = TIE[moving.dtype] * np.arange(trellis.width + 1.0)[:, np.newaxis]
         self._begins = np.zeros(n_streams, dtype=bool)
 
     def restart(self, stream):
@@ -72,11 +73,14 @@ class Running:
         """``S(p, q)`` of the last sample: (n_streams, Q)."""
         return np.maximum(self._last_row().T, 0)
 
-    def ends(self):
-        """Where the best paths end, in positions: (n_streams,); of equal ends the earliest."""
-        row, energy = self._last_row(), self._energy + self._bundle.right[:, 0, -2].sum()
-        rank = np.arange(len(row), dtype=row.dtype)[:, np.newaxis]
-        return (row + TIE[row.dtype] * energy * rank).argmin(axis=0)
+    def best(self):
+        """Where the best paths end, in positions, and their costs: (n_streams,) each.
+
+        Of equal ends it is the earliest.
+        """
+        row = self._last_row()
+        ends = (row + self._rank * self._energy).argmin(axis=0)
+        return ends, np.maximum(row[ends, np.arange(len(ends))], 0)
 
     def _last_row(self):
         row = self._states[(self.n_samples - 1) % 2].reshape(-1, len(self._energy))

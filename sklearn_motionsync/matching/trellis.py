@@ -78,6 +78,8 @@ class Trellis:
         self.groups, group_of_step = group_steps(table, mu, self.slopes)
         # Of every step: its penalty, and the weights of |x_m|^2 and of the inner product.
         self.of_step = np.stack([mu * table.penalty, table.moving, table.inner])
+        weights = [(group.moving, group.inner, group.penalty) for group in self.groups]
+        self.of_group = np.array(weights).T
         self.entry_of_step = np.argsort(table.steps)
         self.penalty_by_step = mu * table.penalty[self.entry_of_step]
         self.scale_by_step = table.inner[self.entry_of_step] / 2

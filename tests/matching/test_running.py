@@ -51,7 +51,7 @@ def test_equals_every_path(n_streams):
                 known = best.get(q, (np.inf, None))[0]
                 np.testing.assert_allclose(live.costs[n, q], known, atol=1e-12)
             end = min(best, key=lambda q: best[q][0])
-            assert live.ends()[n] == end
+            assert live.best()[0][n] == end
             np.testing.assert_array_equal(paths[n], best[end][1])
 
 
@@ -66,7 +66,7 @@ def test_is_the_trellis_of_what_is_over_to_the_last_bit(n_streams):
     assert live.n_samples == 90
     np.testing.assert_array_equal(live.costs, trellis.ends(bases, moving[np.newaxis])[:, 0])
     paths = trellis.paths(bases, moving[np.newaxis])[:, 0]
-    np.testing.assert_array_equal(live.ends(), paths[:, -1])
+    np.testing.assert_array_equal(live.best()[0], paths[:, -1])
     again = trellis.paths(bases, moving[np.newaxis], max_bytes=0)[:, 0]
     np.testing.assert_array_equal(again, paths)
 
