@@ -130,7 +130,7 @@ def show_no_look_ahead(folds, cuts=8):
 
 
 def show_speed(name, fold):
-    """Frames a second of ``step`` and of ``follow``."""
+    """Frames a second of one processor, by ``step`` and by ``follow``."""
     online, clip = fold.online, fold.clips[0]
     cells = []
     for n_streams in (None, 10, 100):
@@ -138,15 +138,15 @@ def show_speed(name, fold):
         took = []
         for _ in range(3):
             online.reset()
-            begin = time.perf_counter()
+            begin = time.process_time()
             for frame in frames:
                 online.step(frame)
-            took.append(time.perf_counter() - begin)
+            took.append(time.process_time() - begin)
         count = n_streams or 1
         cells.append(f"step, streams: {count}: {len(clip) * count / np.median(took):,.0f}")
-    begin = time.perf_counter()
+    begin = time.process_time()
     online.follow(fold.clips)
-    rate = sum(map(len, fold.clips)) / (time.perf_counter() - begin)
+    rate = sum(map(len, fold.clips)) / (time.process_time() - begin)
     cells.append(f"follow, clips: {len(fold.clips)}: {rate:,.0f}")
     print(f"   {name}, {clip.shape[1]} features: {'; '.join(cells)} frames a second", flush=True)
 
@@ -200,37 +200,36 @@ def show_disturbed(name, folds):
 
 def show_negatives(name, folds):
     """How well confidence tells the action from what is none, at half of a clip and at its end."""
-    print(f"\n6. Confidence, {name}: quantiles 10, 50, 90 %, AUC against clips of the action")
-    print("| | half the clip | AUC | end | AUC | AUC at the end, by action |")
-    print("|---|---|---|---|---|---|")
+    title = "at half the clip and at its end: median phase; confidence, its quantiles 10, 50, 90 %"
+    print(f"\n6. Confidence, {name}, {title}, and AUC against clips of the action")
+    print("| | phase | confidence | AUC | phase | confidence | AUC | AUC at the end, by action |")
+    print("|" + "---|" * 8)
     found = {}
     for action, some in folds.items():
         for fold in some:
             kinds = {
-                "the action": fold.clips,
-                "another action": fold.wrong,
-                "standing still": [np.repeat(x[:1], len(x), axis=0) for x in fold.clips],
-                "backwards": [x[::-1] for x in fold.clips],
+                "the action": fold.live,
+                "another action": fold.online.follow(fold.wrong[::3]),
+                "standing still": fold.online.follow([x[[0] * len(x)] for x in fold.clips]),
+                "backwards": fold.online.follow([x[::-1] for x in fold.clips]),
             }
-            for kind, clips in kinds.items():
-                said = [live.confidence for live in fold.online.follow(clips)]
-                said = [confidence[[len(confidence) // 2, -1]] for confidence in said]
+            for kind, lives in kinds.items():
+                said = [np.array(live)[[0, 2]][:, [live.phase.size // 2, -1]] for live in lives]
                 found.setdefault(kind, {}).setdefault(action, []).extend(said)
     right = found["the action"]
     for kind, wrong in found.items():
-        said = np.concatenate(list(wrong.values()))
-        half, end = ([auc(right[a], wrong[a], when) for a in right] for when in (0, 1))
-        quantiles = np.quantile(said, [0.1, 0.5, 0.9], axis=0).T
-        cells = [
-            " ".join(f"{q:.2f}" for q in of_time) + f" | {np.mean(aucs):.2f}"
-            for of_time, aucs in zip(quantiles, (half, end), strict=True)
-        ]
-        by_action = " ".join(f"{a:.2f}" for a in end)
-        print(f"| {kind} | {cells[0]} | {cells[1]} | {by_action} |", flush=True)
+        phases, confidences = np.concatenate(list(wrong.values())).transpose(1, 2, 0)
+        cells = []
+        for when, (phase, confidence) in enumerate(zip(phases, confidences, strict=True)):
+            aucs = [auc(right[a], wrong[a], when) for a in right]
+            quantiles = " ".join(f"{q:.2f}" for q in np.quantile(confidence, [0.1, 0.5, 0.9]))
+            cells += [f"{np.median(phase):.0f}", quantiles, f"{np.mean(aucs):.2f}"]
+        cells.append(" ".join(f"{a:.2f}" for a in aucs))
+        print(f"| {kind} | " + " | ".join(cells) + " |", flush=True)
 
 
 def auc(right, wrong, when):
-    scores = [said[when] for said in (*right, *wrong)]
+    scores = [said[1, when] for said in (*right, *wrong)]
     return roc_auc_score(np.repeat([1, 0], [len(right), len(wrong)]), scores)
 
 
@@ -265,13 +264,13 @@ def time_left(known, elapsed, phase, rate):
         "mean duration less elapsed": less,
         "phase left, at the mean pace": usual,
         "phase left, at the rate": usual / np.maximum(rate, 0.2),
-        "phase left, at the pace so far": left * elapsed / np.maximum(phase, 1),
     }
-    for prior in (50, 100, 200):
+    for prior in (0, 100):
         # As if so many frames of the pattern had passed at the mean pace before.
-        pace = (elapsed + prior * known.tick) / (phase + prior)
-        out[f"the pace so far and of {prior} frames before"] = left * pace
-    out["mean of the first two"] = (less + usual) / 2
+        pace = (elapsed + prior * known.tick) / np.maximum(phase + prior, 1)
+        out[f"phase left, at the pace so far and of {prior} frames before"] = left * pace
+    share = phase / (P - 1)
+    out["the first two, the second by the share of phase"] = (1 - share) * less + share * usual
     return out
 
 
