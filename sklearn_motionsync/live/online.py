@@ -107,6 +107,8 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
     ...     here = live.step(frame, time=k / 30)
     >>> 0.4 < here.phase / (live.n_frames_ - 1) < 0.6
     True
+    >>> 1 < live.time_left() < len(frames) / 30  # seconds
+    True
 
     Somebody who only stands there does not get on:
 
@@ -212,6 +214,21 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         """
         check_is_fitted(self)
         self._session.reset(stream)
+
+    def time_left(self):
+        """How long the performance will go on: a guess, without promise.
+
+        The mean of two: what is left of the mean duration after the time that has passed, and what
+        is left of the phase at the mean pace. docs/method.md has a table of how wrong it is.
+
+        Returns
+        -------
+        float, or ndarray of shape (n_streams,)
+            Seconds if there is a ``frame_rate``, else frames of the training performances.
+        """
+        check_is_fitted(self)
+        left = self._session.time_left(self._following)
+        return left if self.frame_rate is None else left / self.frame_rate
 
     @property
     def history(self):

@@ -13,7 +13,7 @@ class Session:
 
     def __init__(self):
         self._stream = self._shape = self._stamp = None
-        self._said = []
+        self._said, self._began = [], None
 
     @property
     def history(self):
@@ -37,6 +37,8 @@ class Session:
             )
         for n in streams:
             self._stream.restart(int(n))
+            # It begins with the next frame.
+            self._began[n] = np.nan
 
     def step(self, course, frame, time=None, frame_rate=None):
         """Take a frame (n_features,) or (n_streams, n_features), and say where they are."""
@@ -50,9 +52,21 @@ class Session:
         frames = np.atleast_2d(frame)
         if self._stream is None:
             self._stream = Stream(course, *frames.shape)
+            self._began = np.full(len(frames), np.nan)
+        self._began = np.where(np.isnan(self._began), stamp, self._began)
         self._shape, self._stamp = frame.shape, stamp
         found = self._stream.take(frames, stamp)
         if frame.ndim == 1:
             found = LivePhase(*(float(values[0]) for values in found))
         self._said.append(found)
         return found
+
+    def time_left(self, course):
+        """Frames of the training performances until the end, of every performance that runs."""
+        if not self._said:
+            return course.duration
+        elapsed = self._stamp - self._began
+        phase = np.atleast_1d(self._said[-1].phase)
+        by_phase = course.duration * (1 - phase / (course.n_frames - 1))
+        left = (by_phase + np.maximum(course.duration - elapsed, 0)) / 2
+        return left if len(self._shape) == 2 else float(left[0])

@@ -76,6 +76,11 @@ class Course(NamedTuple):
     step: float
     calibration: Calibration
 
+    @property
+    def duration(self):
+        """Of a performance at the mean pace, in frames of the training performances."""
+        return self.step * (self.n_frames - 1)
+
 
 class Stream:
     """Performances that run, all seen at the same times.

@@ -247,3 +247,25 @@ def test_single_precision_and_one_training_performance():
     live = OnlineSynchronizer(DenseSynchronizer(P, metric=None, refine=False)).fit(X[:1])
     (found,) = live.follow(X[1:])
     assert np.median(error(found, performed(50, 0.3)[1])) < 1.5
+
+
+def test_the_time_that_is_left(live):
+    """The mean of what is left of the mean duration, and of the phase at the mean pace."""
+    live = copy.deepcopy(live).set_params(frame_rate=10)
+    live.reset()
+    assert live.time_left() == pytest.approx(live.duration_ / 10)
+    x, _ = performed(60)
+    for k, frame in enumerate(x):
+        phase = live.step(frame, 100 + k / 10).phase
+        mean = live.duration_ / 10
+        assert live.time_left() == pytest.approx(
+            (max(mean - k / 10, 0) + mean * (1 - phase / (P - 1))) / 2
+        )
+    live.reset()
+    live.step(x[[0, 0]], 0)
+    live.step(x[[9, 9]], 0.9)
+    live.reset(0)
+    live.step(x[[0, 10]], 1.0)
+    first, second = live.time_left()
+    assert first == pytest.approx(live.duration_ / 10, abs=0.2)
+    assert second < first - 0.5
