@@ -141,12 +141,13 @@ def open_end_dtw(known, clip, kind="velocities"):
     return known.at_frames(phases, len(clip))
 
 
-def dixon(known, clip, kind="velocities", window=25, max_run=3):
+def dixon(known, clip, kind="velocities", window=5, max_run=2):
     """On-line time warping: a window that goes on by rows, columns or both, greedily.
 
     S. Dixon, "Live tracking of musical performances using on-line time warping", DAFx 2005. In the
     newest row and column the cheapest cell by the length of its path says which goes on; after
-    ``max_run`` of a kind it is the other's turn. A path pays double for a diagonal step.
+    ``max_run`` of a kind it is the other's turn. A path pays double for a diagonal step. Window and
+    run are the best of fifteen pairs on UTKinect.
     """
     warping = Dixon(cdist(*_compared(known, clip, kind)), window, max_run)
     phases = [warping.next() for _ in range(len(warping.costs))]
@@ -232,10 +233,14 @@ def nearest_posture(known, clip):
 
 
 PEERS = {
-    "rows by hand: mean, backward derivatives": rows,
-    "median performance instead of the mean": lambda *given: rows(*given, pattern="median"),
-    "central derivative of the pattern": lambda *given: rows(*given, velocity=central_velocity),
-    "postures": rows_of_postures,
+    "velocities by hand: mean, one-sided on both sides": rows,
+    "the same, median performance instead of the mean": lambda *given: rows(
+        *given, pattern="median"
+    ),
+    "the same, central derivative of the pattern": lambda *given: rows(
+        *given, velocity=central_velocity
+    ),
+    "the same, postures instead of velocities": rows_of_postures,
     "open-end DTW, velocities": open_end_dtw,
     "open-end DTW, postures": lambda *given: open_end_dtw(*given, kind="postures"),
     "Dixon's online DTW, velocities": dixon,

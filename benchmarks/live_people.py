@@ -41,8 +41,10 @@ class Fold:
         return [live.phase for live in self.live]
 
     def phases_with(self, **params):
-        """The same of a synchronizer with other parameters."""
-        online = OnlineSynchronizer(DenseSynchronizer(n_frames=P, **params)).fit(self.training)
+        """The same of a synchronizer with other parameters, on the clock of the same pattern."""
+        pattern = self.online.synchronizer_.pattern_index_
+        sync = DenseSynchronizer(n_frames=P, pattern=pattern, **params)
+        online = OnlineSynchronizer(sync).fit(self.training)
         return [live.phase for live in online.follow(self.clips)]
 
     def errors(self, phases):
