@@ -1,0 +1,120 @@
+"""People whose phase is told live: what is known of an action from others, and what is true.
+
+The phase of a frame is read off the warp of the whole clip, the other way round (`truth_of`).
+"""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from events import P
+from live_peers import Known
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, OnlineSynchronizer
+
+
+@dataclass(frozen=True)
+class Fold:
+    """What is known of an action from all actors but one, and the clips of that one.
+
+    ``truths``: the phases of the frames of each clip. ``moments`` {event: (n_clips,)}: when the
+    clips show the events of events.py. ``landed`` {event: phase}: where the pattern has them.
+    ``wrong``: what the same actor does otherwise.
+    """
+
+    action: str
+    online: OnlineSynchronizer
+    known: Known
+    training: list
+    clips: list
+    truths: list
+    moments: dict
+    landed: dict
+    wrong: list
+
+    @functools.cached_property
+    def live(self):
+        """What is said of the clips, frame by frame: a `LivePhase` of arrays each."""
+        return self.online.follow(self.clips)
+
+    @property
+    def phases(self):
+        return [live.phase for live in self.live]
+
+    def phases_with(self, **params):
+        """The same of a synchronizer with other parameters, on the clock of the same pattern."""
+        pattern = self.online.synchronizer_.pattern_index_
+        sync = DenseSynchronizer(n_frames=P, pattern=pattern, **params)
+        online = OnlineSynchronizer(sync).fit(self.training)
+        return [live.phase for live in online.follow(self.clips)]
+
+    def errors(self, phases):
+        """Absolute errors of the phases of all clips, each after its first fifth."""
+        pairs = zip(phases, self.truths, strict=True)
+        return [np.abs(phase - truth)[-(-len(truth) // 5) :] for phase, truth in pairs]
+
+
+def phase_of(times, at):
+    """When, on the clock of the pattern, a warp is at ``at``: the middle of where it stays."""
+    last = len(times) - 1
+    return (_first(times, at) + last - _first(last - times[::-1], last - at)) / 2
+
+
+def _first(times, at):
+    """The first moment at which a warp from 0 to P - 1 reaches ``at``."""
+    after = np.minimum(np.searchsorted(times, at), len(times) - 1)
+    before = np.maximum(after - 1, 0)
+    part = (at - times[before]) / np.where(after > 0, times[after] - times[before], 1)
+    return before + part
+
+
+def truth_of(times, n_frames):
+    """The phase of every frame of a clip, of its warp."""
+    return phase_of(times, np.linspace(0, len(times) - 1, n_frames))
+
+
+def held_out(actions, space=True):
+    """A fold for every action and actor, by action; in the aSpace of the others, or cosines.
+
+    The actions are of one archive.
+    """
+    postures = {a.name: DirectionCosines(a.skeleton).fit_transform(a.data) for a in actions}
+    folds: dict = {}
+    for action in actions:
+        own = postures[action.name]
+        for actor in np.unique(action.actors):
+            train, test = (np.flatnonzero((action.actors == actor) == held) for held in (0, 1))
+            others = [own[i] for i in train]
+            points = ASpace().fit(others).transform if space else list
+            wrong = [
+                postures[a.name][i]
+                for a in actions
+                if a is not action
+                for i in np.flatnonzero(a.actors == actor)
+            ]
+            clips = points(others), points([own[i] for i in test]), points(wrong)
+            fold = _learn(action, train, test, *clips)
+            folds.setdefault(action.name, []).append(fold)
+    return folds
+
+
+def _learn(action, train, test, training, clips, wrong):
+    online = OnlineSynchronizer(DenseSynchronizer(n_frames=P)).fit(training)
+    sync = online.synchronizer_
+    seen, whole = sync.match(training).times, sync.match(clips).times
+    landed = {}
+    for event, moments in action.moments.items():
+        pairs = zip(seen, moments[train], strict=True)
+        found = [float(phase_of(tau, m)) for tau, m in pairs if np.isfinite(m)]
+        landed[event] = np.median(found) if found else np.nan
+    duration = float(np.mean([len(x) for x in training]))
+    return Fold(
+        action=action.name,
+        online=online,
+        known=Known(online.mean_, sync.pattern_, duration),
+        training=training,
+        clips=clips,
+        truths=[truth_of(tau, len(x)) for tau, x in zip(whole, clips, strict=True)],
+        moments={event: moments[test] for event, moments in action.moments.items()},
+        landed=landed,
+        wrong=wrong,
+    )

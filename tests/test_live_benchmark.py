@@ -1,0 +1,124 @@
+"""The benchmark of the live phase: the phase of a whole clip, ticks, and the peers it is beside."""
+
+import importlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import cdist
+
+BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _beside_each_other():
+    """The modules of the benchmarks import each other as they lie there."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(BENCHMARKS)
+        yield
+
+
+@pytest.fixture(scope="module")
+def peers():
+    return importlib.import_module("live_peers")
+
+
+@pytest.fixture(scope="module")
+def people():
+    return importlib.import_module("live_people")
+
+
+def curve(phase):
+    return np.column_stack([np.cos(0.06 * phase), np.sin(0.05 * phase), 0.01 * phase])
+
+
+@pytest.fixture
+def known(peers):
+    """A movement of a hundred frames, of which performances usually have 199."""
+    mean = curve(np.arange(100.0))
+    return peers.Known(mean, mean, 199.0)
+
+
+def test_a_warp_read_the_other_way_round_is_in_the_middle_of_where_it_stays(people):
+    times = np.array([0, 0, 1, 3, 3, 3, 4, 6, 7, 7.0])
+    found = people.phase_of(times, np.array([0, 0.5, 2, 3, 5, 7]))
+    np.testing.assert_allclose(found, [0.5, 1.5, 2.5, 4, 6.5, 8.5])
+    linear = np.arange(100.0)
+    np.testing.assert_allclose(people.truth_of(linear, 199), np.arange(199) / 2)
+
+
+def test_ticks_are_frames_of_the_pattern_at_the_mean_pace(known):
+    np.testing.assert_allclose(known.ticks(curve(np.arange(199) / 2)), known.mean, atol=1e-12)
+    # Between two ticks the phase goes on; and it stays within the clock.
+    np.testing.assert_allclose(known.at_frames([0, 3, 99], 7), [0, 0.5, 3, 3.5, 99, 99, 99])
+
+
+def test_every_follower_finds_a_clip_that_is_the_mean(peers, known):
+    clip = curve(np.arange(199) / 2)
+    for name, follow in peers.PEERS.items():
+        phases = follow(known, clip)
+        assert phases.shape == (199,), name
+        late = np.abs(phases - np.arange(199) / 2)[40:]
+        # Only the one whose two sides do not fit each other is late.
+        assert np.median(late) < (4 if "central" in name else 1), name
+
+
+def test_followers_see_nothing_of_what_is_to_come(peers, known):
+    clip = curve(np.linspace(0, 99, 150))
+    for name in set(peers.PEERS) - {"linear, duration known"}:
+        whole = peers.PEERS[name](known, clip)
+        for n_frames in (2, 61, 120):
+            part = peers.PEERS[name](known, clip[:n_frames])
+            np.testing.assert_array_equal(part, whole[:n_frames], err_msg=name)
+
+
+def test_rows_end_where_the_cheapest_of_all_paths_ends(peers, monkeypatch):
+    monkeypatch.setattr(peers, "SUBFRAMES", 1)
+    monkeypatch.setattr(peers, "MAX_RATE", 2)
+    rng = np.random.default_rng(0)
+    base, moving = rng.standard_normal((4, 2)), rng.standard_normal((6, 2))
+    mu = 0.1 * np.square(moving).sum(axis=1).mean()
+    best = {}
+    for code in np.ndindex(3, 3, 3):
+        q = np.concatenate([[0], np.cumsum(code)])
+        if q[-1] < len(moving):
+            weight = 1 + 0.2 * (np.array(code) - 1)
+            apart = base[1:] - weight[:, np.newaxis] * moving[q[1:]]
+            cost = np.square(apart).sum() + mu * np.square(np.array(code) - 1).sum()
+            best[q[-1]] = min(cost, best.get(q[-1], np.inf))
+    found = peers.follow_rows(base, moving, smoothness=0.1, rate_weight=0.2)
+    assert found[-1] == min(best, key=best.get)
+
+
+def path_costs(costs):
+    """Cheapest paths of time warping to every cell, a diagonal step costing double."""
+    total = np.full(costs.shape, np.inf)
+    total[0, 0] = costs[0, 0]
+    for i, j in np.ndindex(costs.shape):
+        for back, weight in (((1, 0), 1), ((0, 1), 1), ((1, 1), 2)):
+            k, m = i - back[0], j - back[1]
+            if k >= 0 and m >= 0:
+                total[i, j] = min(total[i, j], total[k, m] + weight * costs[i, j])
+    return total
+
+
+def test_open_end_dtw_is_the_best_cell_of_each_row(peers, known):
+    clip = curve(np.linspace(0, 90, 170)) + 0.05 * np.random.default_rng(0).standard_normal(
+        (170, 3)
+    )
+    ticks = known.ticks(clip)
+    total = path_costs(cdist(ticks, known.mean))
+    i, j = np.indices(total.shape)
+    expected = (total / (i + j + 1)).argmin(axis=1)
+    found = peers.open_end_dtw(known, clip, kind="postures")
+    np.testing.assert_array_equal(found[:: round(known.tick)], expected)
+
+
+def test_dixon_with_a_window_of_everything_goes_on_both_ways(peers, known):
+    clip = curve(np.linspace(0, 99, 199))
+    costs = cdist(known.ticks(clip), known.mean)
+    warping = peers.Dixon(costs, window=len(costs), max_run=3)
+    columns = [warping.next() for _ in costs]
+    # Rows and columns came in turn, so that the whole square was seen.
+    np.testing.assert_allclose(warping.total, path_costs(costs))
+    assert columns == list(range(100))
