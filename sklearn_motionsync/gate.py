@@ -200,9 +200,10 @@ def check_finite(array, where, names=None, frames=None, *, allow_nan=False):
     kind = "NaN" if np.isnan(array[frame, feature]) else "infinity"
     label = "" if frames is None or frames[frame] == frame else f" ({frames[frame]})"
     name = "" if names is None else f" ({names[feature]!r})"
+    advice = "Give NaN where nothing is known" if allow_nan else "Interpolate the gap"
     raise ValueError(
         f"{where} {frame}{label}, feature {feature}{name} is {kind}; the input must be finite. "
-        "Interpolate the gap, or drop the performance. (Input X contains NaN or infinity.)"
+        f"{advice}, or drop the performance. (Input X contains NaN or infinity.)"
     )
 
 

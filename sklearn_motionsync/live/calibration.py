@@ -16,6 +16,9 @@ _MOST = 24
 # Temperatures that are tried, in mean squared features of a sample; the least chance that counts.
 _TEMPERATURES = np.geomspace(0.01, 1e3, 41)
 _LEAST = 1e-12
+# Of one performance alone: temperature and usual cost as other actions of people have them, in mean
+# squared features.
+_ALONE = 0.5, 0.2
 
 
 def calibrate(course_of, performances, warped, times):
@@ -37,17 +40,20 @@ def calibrate(course_of, performances, warped, times):
     """
     n, total = len(performances), warped.sum(axis=0, dtype=np.float64)
     chosen = np.unique(np.linspace(0, n - 1, _MOST).round().astype(np.intp))
-    scores, recent, energy = np.zeros(len(_TEMPERATURES)), [], None
+    scores, recent = np.zeros(len(_TEMPERATURES)), []
+    # What does not move costs nothing, whatever the unit.
+    energy = float(np.square(course_of(total / n).features.moving).sum(axis=1).mean()) or 1.0
+    if n == 1:
+        return Calibration(*(energy * share for share in _ALONE))
     for i in chosen:
-        course = course_of((total - warped[i]) / (n - 1) if n > 1 else total)
-        if energy is None:
-            energy = np.square(course.features.moving).sum(axis=1).mean()
+        course = course_of((total - warped[i]) / (n - 1))
         rows, truth, costs = _followed(course, performances[i], times[i])
         recent.append(costs)
         for k, temperature in enumerate(energy * _TEMPERATURES):
             right = Stream.chances(rows, temperature)[np.arange(len(rows)), truth]
             scores[k] += np.log(np.maximum(right, _LEAST)).mean()
-    usual = np.median([np.max(costs) for costs in recent])
+    # Copies of one performance cost each other nothing, but for rounding.
+    usual = max(np.median([np.max(costs) for costs in recent]), _LEAST * energy)
     return Calibration(float(energy * _TEMPERATURES[scores.argmax()]), float(usual))
 
 

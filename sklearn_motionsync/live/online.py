@@ -3,17 +3,18 @@
 from numbers import Real
 
 import numpy as np
+import pandas as pd
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, _fit_context, clone
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
 from ..fitting import at_once
-from ..gate import as_numbers
+from ..gate import as_numbers, check_names
 from ..matching.costs import step_table
 from ..matching.filters import SMOOTHING
 from ..matching.trellis import Trellis
 from ..notebook import DocumentedMixin
-from ..performances import SequenceLevelMixin, check_performances
+from ..performances import SequenceLevelMixin, check_performances, names_of_input
 from ..synchronizers.base import Synchronizer
 from ..synchronizers.dense import DenseSynchronizer
 from .calibration import calibrate
@@ -84,9 +85,10 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
 
     The confidence is the share of probability within a twentieth of the clock of the phase, from
     costs that are scaled so that the training performances, each followed with the mean of the
-    others, have theirs right; it falls with the square of what recent frames cost more than is
-    usual among these. Another action costs more; a movement that is its own reverse, such as a
-    bend, costs no more backwards, and standing still costs nothing where the mean stands still.
+    others, have theirs right (of a single one, what is usual among people is taken); it falls with
+    the square of what recent frames cost more than is usual among these. Another action costs more;
+    a movement that is its own reverse, such as a bend, costs no more backwards, and standing still
+    costs nothing where the mean stands still.
 
     Features that are NaN are not compared; a frame of NaN, or time without frames,
     moves the phase on at the mean pace. Between frames, movements are taken to be straight
@@ -195,9 +197,9 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         Raises
         ------
         ValueError
-            If the frame is infinite or has another width, there are not as many streams as in the
-            frames before, or time stands still or goes back. The performance then goes on as if
-            the frame had not been given.
+            If the frame is infinite, has another width or other names, there are not as many
+            streams as in the frames before, or time stands still or goes back. The performance
+            then goes on as if the frame had not been given.
         """
         if "_session" not in vars(self):
             check_is_fitted(self)
@@ -282,8 +284,9 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         width = self.smoothing * (self.n_frames_ - 1)
         compared = LiveFeatures(features, mean, _SUBFRAMES, width)
         mu = self.smoothness * float(np.square(compared.moving).sum(axis=1).mean())
-        table = step_table(features.cost, self.max_rate, _SUBFRAMES)
         last = self.n_frames_ - 1
+        # No step is longer than the pattern.
+        table = step_table(features.cost, min(self.max_rate, last), _SUBFRAMES)
         trellis = Trellis(table, mu, last + compared.rest, running=True)
         step = self.duration_ / last
         return Course(self.n_frames_, trellis, compared, width, step, calibration)
@@ -291,6 +294,9 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
     def _frame(self, frame):
         """A frame as numbers, of one stream or of several."""
         if not (isinstance(frame, np.ndarray) and frame.dtype == np.float64):
+            # A row of a table has the names of its columns.
+            row = frame.to_frame().T if isinstance(frame, pd.Series) else frame
+            check_names(row, names_of_input(self), "The frame")
             frame = as_numbers(frame, "The frame", dtype=np.float64)
         width = self.mean_.shape[1]
         if frame.ndim == 0 and width == 1:

@@ -58,8 +58,11 @@ class Session:
         found = self._stream.take(frames, stamp)
         if frame.ndim == 1:
             found = LivePhase(*(float(values[0]) for values in found))
+            self._said.append(found)
+            return found
         self._said.append(found)
-        return found
+        # Who writes to the arrays does not write to what is kept.
+        return LivePhase(*map(np.copy, found))
 
     def time_left(self, course):
         """Frames of the training performances until the end, of every performance that runs."""

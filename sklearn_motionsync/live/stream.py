@@ -117,6 +117,7 @@ class Stream:
     def restart(self, stream):
         """Let one of them begin anew with its next tick."""
         self.running.restart(stream)
+        self._ticks.restart(stream)
         self._derivative.restart(stream)
         self._age[stream] = self._floor[stream] = self.recent[stream] = 0
         self._phases[:, stream] = 0

@@ -28,7 +28,12 @@ class Ticks:
     def __init__(self, step, n_frames):
         self._step, self._n_frames = step, n_frames
         self._next = self._stamp = self._frame = None
+        self._begun = []
         self.since = 0.0
+
+    def restart(self, stream):
+        """Let one stream begin anew: there is no line to its next frame from the one before."""
+        self._begun.append(stream)
 
     def take(self, frame, stamp):
         """Yield the frames (n_streams, n_features) of all ticks until now.
@@ -39,7 +44,9 @@ class Ticks:
         stamp : float
         """
         if self._stamp is None:
-            self._next, self._stamp, self._frame = stamp, stamp, frame
+            self._next, self._stamp, self._frame = stamp, stamp, frame.copy()
+        self._frame[self._begun] = frame[self._begun]
+        self._begun = []
         gap = (stamp - self._stamp) / self._step
         if gap > _FORGOTTEN * self._n_frames:
             # The clock goes on at this frame.
@@ -50,7 +57,8 @@ class Ticks:
         while self._next <= stamp + 1e-9 * self._step:
             yield self._at(self._next, frame, stamp, bridged)
             self._next += self._step
-        self._stamp, self._frame = stamp, frame
+        # Cameras write all their frames to the same place.
+        self._stamp, self._frame = stamp, frame.copy()
         self.since = max(0.0, 1 - (self._next - stamp) / self._step)
 
     def _at(self, time, frame, stamp, bridged):

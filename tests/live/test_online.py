@@ -4,6 +4,7 @@ import copy
 import pickle
 
 import numpy as np
+import pandas as pd
 import pytest
 from sklearn.base import clone
 from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer, OnlineSynchronizer
@@ -247,6 +248,65 @@ def test_single_precision_and_one_training_performance():
     live = OnlineSynchronizer(DenseSynchronizer(P, metric=None, refine=False)).fit(X[:1])
     (found,) = live.follow(X[1:])
     assert np.median(error(found, performed(50, 0.3)[1])) < 1.5
+    # How people differ cannot be told of one of them.
+    assert found.confidence.mean() > 0.5
+
+
+def test_what_does_not_move_or_does_not_differ_is_followed():
+    x, _ = performed(40)
+    still = OnlineSynchronizer(LinearSynchronizer()).fit([np.ones((40, 3))] * 2)
+    for y in (x, np.ones((40, 3))):
+        assert np.isfinite(still.follow([y])[0]).all()
+    alike = OnlineSynchronizer(LinearSynchronizer()).fit([x] * 3)
+    (found,) = alike.follow([x])
+    np.testing.assert_array_equal(found.phase, np.arange(40))
+    assert found.confidence.min() > 0.9
+
+
+def test_no_step_is_longer_than_the_pattern(live):
+    X = [performed(20, bend)[0] for bend in (0.0, 0.3)]
+    a, b = (OnlineSynchronizer(DenseSynchronizer(20), max_rate=r).fit(X) for r in (19, 1e9))
+    np.testing.assert_array_equal(a.follow(X), b.follow(X))
+
+
+def test_names_of_features_are_kept_to():
+    X = [pd.DataFrame(performed(30, bend)[0], columns=list("abc")) for bend in (0.0, 0.3)]
+    live = OnlineSynchronizer(DenseSynchronizer(30)).fit(X)
+    said = live.step(X[0].iloc[0])
+    live.reset()
+    assert live.step(X[0].to_numpy()[0]) == said
+    for row in (X[0].iloc[1][::-1], X[0].iloc[1:3, ::-1]):
+        with pytest.raises(ValueError, match=r"The frame has the columns .*'c', 'b', 'a'"):
+            live.step(row)
+
+
+def test_frames_may_all_be_written_to_one_place_and_answers_written_to(live):
+    x, _ = performed(50, 0.3)
+    said, _ = runs(live, np.stack([x, x], axis=1))
+    live, place = copy.deepcopy(live), np.empty((2, 3))
+    live.reset()
+    for frame, right in zip(x, said, strict=True):
+        place[:] = frame
+        here = live.step(place)
+        np.testing.assert_array_equal(here, right)
+        for values in here:
+            values[:] = 99
+    np.testing.assert_array_equal(live.history.rate, [right.rate for right in said])
+
+
+def test_who_begins_anew_does_not_come_from_where_it_was(live):
+    """Ticks between the last frame of a performance and the first of the next see the latter."""
+    x, _ = performed(60, 0.0, 0.02, 6)
+    times = 1.7 * np.arange(20)
+    first, second = x[::3], x[1::3]
+    _, session = runs(live, np.stack([first, first], axis=1), times)
+    session.reset(1)
+    late = [
+        session.step(np.stack([first[-1], frame]), times[-1] + 1.7 * (k + 1)).phase[1]
+        for k, frame in enumerate(second)
+    ]
+    (alone,) = live.follow([second], [times])
+    np.testing.assert_allclose(late, alone.phase, atol=2)
 
 
 def test_the_time_that_is_left(live):
