@@ -47,6 +47,8 @@ from .synchronizers.timing import TimingChannel
 from .takes.cycles import CycleSegmenter
 from .takes.search import find_performances
 from .takes.self_correlation import self_correlation
+from .tracking.track import Track
+from .tracking.tracker import MotionTracker
 
 __version__ = "0.1.0.dev0"
 
@@ -68,6 +70,7 @@ __all__ = [
     "LinearSynchronizer",
     "Match",
     "MetricDisplay",
+    "MotionTracker",
     "PartSynchronizer",
     "SearchDisplay",
     "Skeleton",
@@ -75,6 +78,7 @@ __all__ = [
     "SynchronizationDisplay",
     "Synchronizer",
     "TimingChannel",
+    "Track",
     "TrellisDisplay",
     "blend_performances",
     "datasets",

@@ -36,6 +36,8 @@ FLOORS = [
     "synchronizers",
     "blending",
     "model",
+    "live",
+    "tracking",
     "recognition",
     "takes",
     "datasets",

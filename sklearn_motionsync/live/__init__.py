@@ -1,0 +1,1 @@
+"""Live: performances that are still running, frame by frame."""

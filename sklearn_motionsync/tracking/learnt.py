@@ -1,0 +1,147 @@
+"""What a tracker learns of performances: their mean, how people depart from it, and their pace."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .kalman import whitening
+from .process import Pace, Process, left_out, shrunk_covariance
+from .slopes import Slopes
+
+__all__ = ["Clock", "Learnt", "at_phases", "learn", "smoothed"]
+
+# Window of causal velocities, as a share of the mean duration: that of the synchronizers' filter.
+_WINDOW = 0.03
+# How long a surprise is remembered, as a share of the mean duration.
+_MEMORY = 0.1
+# So many times what the most surprising take exceeds the expected surprise by is too much.
+_EXCESS = 2.0
+# And so many standard deviations of what is expected are by chance.
+_CHANCE = 4.0
+# Of particles at the end so many begin anew in a hundredth of the mean duration.
+_ANEW = 0.02
+
+
+class Clock(NamedTuple):
+    """The clock of the pattern, and time that is told in frames of the training performances.
+
+    Attributes
+    ----------
+    last : float
+        The last frame of the clock.
+    duration : float
+        Mean time from the first frame of a performance to its last.
+    """
+
+    last: float
+    duration: float
+
+    @property
+    def speed(self):
+        """Frames of the clock that a performance of mean duration passes a unit of time."""
+        return self.last / self.duration
+
+    def anew(self, dt):
+        """How probable it is that what is over has begun anew after a time."""
+        return 1 - (1 - _ANEW) ** (100 * dt / self.duration)
+
+    @property
+    def window(self):
+        return _WINDOW * self.duration
+
+    @property
+    def memory(self):
+        return _MEMORY * self.duration
+
+
+class Learnt(NamedTuple):
+    """All that a tracker goes by.
+
+    Attributes
+    ----------
+    mean : ndarray, shape (P, n_features)
+    process : Process
+        Of deviations from the mean.
+    pace : Pace
+    clock : Clock
+    velocities : ndarray, shape (n_features, n_features)
+        Covariance of what causal velocities of people differ by from that of the mean.
+    limit : float
+        Surprise that no person of the training set reaches, where 1 is expected.
+    noise, tempering : float
+    n_particles : int
+    """
+
+    mean: np.ndarray
+    process: Process
+    pace: Pace
+    clock: Clock
+    velocities: np.ndarray
+    limit: float
+    noise: float
+    tempering: float
+    n_particles: int
+
+
+def learn(warped, rates, groups, clock, *, noise, tempering, n_particles):
+    """Learn from synchronised performances.
+
+    Parameters
+    ----------
+    warped : ndarray, shape (n, P, n_features)
+        At least two performances.
+    rates : ndarray, shape (n, P)
+        Frames of the clock that they pass while a performance of mean duration passes one.
+    groups : ndarray of int, shape (n,)
+        Whose they are, at least two.
+    clock : Clock
+    noise, tempering, n_particles :
+        As of the tracker.
+    """
+    deviations, step = left_out(warped, groups), 1 / clock.speed
+    process, pace = Process.learn(deviations, step), Pace.learn(rates, step)
+    slopes, unit_noise = _slopes(deviations, step, clock.window)
+    velocities = shrunk_covariance(slopes)
+    limit = _limit(slopes, unit_noise * noise**2, velocities, step, clock.memory)
+    mean = warped.mean(axis=0)
+    return Learnt(mean, process, pace, clock, velocities, limit, noise, tempering, n_particles)
+
+
+def _slopes(deviations, step, window):
+    """Causal velocities (n, P - 1, n_features), and what noise adds to their variances (P - 1,)."""
+    n, n_frames, width = deviations.shape
+    slopes, seen, found = Slopes(n, width, window), np.ones(width, dtype=bool), []
+    for p in range(n_frames):
+        slopes.wait(step)
+        slopes.add(deviations[:, p], seen)
+        if p:
+            found.append(slopes.of(seen))
+    values, noise = zip(*found, strict=True)
+    return np.stack(values, axis=1), np.array([a[0] for a in noise])
+
+
+def _limit(slopes, noise, velocities, step, memory):
+    """What surprise is too much: beyond that of all takes at their own phase."""
+    surprise, largest, width = 1.0, 1.0, slopes.shape[-1]
+    for p, variance in enumerate(noise):
+        whiten = whitening(velocities + variance * np.eye(width))
+        # Noise is expected, not drawn: a fit is not random.
+        here = np.square(slopes[:, p] @ whiten.T).sum(axis=1) + variance * np.square(whiten).sum()
+        surprise = smoothed(surprise, here / width, step, memory)
+        largest = np.maximum(largest, surprise)
+    # As often as a memory holds windows, velocities are independent of those before.
+    chance = _CHANCE * np.sqrt(2 / (width * _MEMORY / _WINDOW))
+    return float(1 + max(_EXCESS * (np.max(largest) - 1), chance))
+
+
+def smoothed(before, now, dt, memory):
+    """What is remembered of a quantity, that of long ago less and less."""
+    left = np.exp(-dt / memory)
+    return left * before + (1 - left) * now
+
+
+def at_phases(mean, phases):
+    """The mean (P, n_features) at phases (n,): (n, n_features)."""
+    left = np.minimum(phases.astype(np.intp), len(mean) - 2)
+    weight = (phases - left)[:, np.newaxis]
+    return mean[left] * (1 - weight) + mean[left + 1] * weight

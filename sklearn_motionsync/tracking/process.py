@@ -1,0 +1,147 @@
+"""How postures depart from the mean: a Gaussian process in time, and the pace of people."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+__all__ = ["Pace", "Process", "left_out", "shrunk_covariance"]
+
+# How far a covariance is drawn to its diagonal.
+_SHRINKAGE = 0.5
+# Smallest variance of a feature, as a share of the largest: one in which nobody differed, too.
+_FLOOR = 1e-9
+# A process that hardly moves has a decay of one over so many clips.
+_LONGEST = 1000.0
+# Rates beyond these, in either direction, are pauses or misses of a warp, and tell nothing.
+_FASTEST = 4.0
+# Autocorrelation of the log rate after the time that it is remembered.
+_FORGOTTEN = np.exp(-1)
+
+
+class Process(NamedTuple):
+    """A Matern-3/2 process of several features, whose states are values and their derivatives.
+
+    ``k(s) = (1 + l s) exp(-l s) C`` for elapsed time ``s``; so the derivative has the covariance
+    ``l^2 C`` and is independent of the value at the same time.
+
+    Attributes
+    ----------
+    covariance : ndarray, shape (n_features, n_features)
+        ``C``, of the values.
+    decay : float
+        ``l = sqrt(3) / length scale``, per frame.
+    """
+
+    covariance: np.ndarray
+    decay: float
+
+    @classmethod
+    def learn(cls, deviations, step):
+        """The process behind what performances differ by from the mean of others.
+
+        Parameters
+        ----------
+        deviations : ndarray, shape (n, P, n_features)
+        step : float
+            Time between two of their frames.
+        """
+        covariance = shrunk_covariance(deviations)
+        variances, moves = np.diag(covariance), np.square(np.diff(deviations, axis=1) / step)
+        # Each feature counts by its own spread, so that units do not matter; who does not differ
+        # does not count.
+        differs = variances > 2 * _FLOOR * variances.max()
+        ratio = (moves.mean(axis=(0, 1)) / variances)[differs].mean()
+        slowest = 1 / (_LONGEST * step * deviations.shape[1])
+        return cls(covariance, float(max(np.sqrt(ratio), slowest)))
+
+    @property
+    def length_scale(self):
+        return float(np.sqrt(3) / self.decay)
+
+    @property
+    def stationary(self):
+        """Covariance of the states (2 n_features, 2 n_features) when nothing has been seen."""
+        zero = np.zeros_like(self.covariance)
+        return np.block([[self.covariance, zero], [zero, self.decay**2 * self.covariance]])
+
+    def transition(self, dt):
+        """How states (value, derivative) go on over a time: (2, 2), the same for all features."""
+        decay = self.decay
+        rows = [[1 + decay * dt, dt], [-(decay**2) * dt, 1 - decay * dt]]
+        return np.exp(-decay * dt) * np.array(rows)
+
+    def predict(self, means, covariance, dt):
+        """States after a time in which nothing is seen.
+
+        Parameters
+        ----------
+        means : ndarray, shape (n, 2 n_features)
+        covariance : ndarray, shape (2 n_features, 2 n_features)
+        dt : float
+
+        Returns
+        -------
+        means, covariance
+        """
+        here, width = self.transition(dt), means.shape[1] // 2
+        values, derivatives = means[:, :width], means[:, width:]
+        parts = [a * values + b * derivatives for a, b in here.tolist()]
+        means = np.concatenate(parts, axis=1)
+        stationary = self.stationary
+        # Q = S - A S A', so that what is stationary stays; A takes blocks, not single features.
+        rest = covariance - stationary
+        for _ in range(2):
+            rest = (here @ rest.reshape(2, -1)).reshape(rest.shape).T
+        return means, rest + stationary
+
+
+class Pace(NamedTuple):
+    """How fast people go through an action: a log rate that forgets.
+
+    Attributes
+    ----------
+    spread : float
+        Standard deviation of the log rate.
+    memory : float
+        Time after which its correlation is 1/e.
+    """
+
+    spread: float
+    memory: float
+
+    @classmethod
+    def learn(cls, rates, step):
+        """From rates (n, P) of performances along the clock, whose frames are a step apart."""
+        logs = np.log(np.clip(rates, 1 / _FASTEST, _FASTEST))
+        n_frames, power = logs.shape[1], float(np.square(logs).mean())
+        for lag in range(1, n_frames):
+            if (logs[:, lag:] * logs[:, :-lag]).mean() <= _FORGOTTEN * power:
+                return cls(power**0.5, float(lag * step))
+        return cls(power**0.5, float(n_frames * step))
+
+
+def left_out(performances, groups):
+    """What every performance differs by from the mean of those of other groups.
+
+    Parameters
+    ----------
+    performances : ndarray, shape (n, P, n_features)
+    groups : ndarray of int, shape (n,)
+        At least two, counted from 0.
+    """
+    counts = np.bincount(groups)[:, np.newaxis, np.newaxis]
+    sums = np.zeros((len(counts), *performances.shape[1:]))
+    np.add.at(sums, groups, performances)
+    others = (sums.sum(axis=0) - sums) / (len(performances) - counts)
+    return performances - others[groups]
+
+
+def shrunk_covariance(deviations):
+    """Second moments of deviations from 0, half-way to their diagonal, which is nowhere 0."""
+    flat = deviations.reshape(-1, deviations.shape[-1])
+    moments = flat.T @ flat / len(flat)
+    variances = np.diag(moments).copy()
+    largest = variances.max() if variances.max() > 0 else 1.0
+    moments *= 1 - _SHRINKAGE
+    np.fill_diagonal(moments, np.maximum(variances, _FLOOR * largest))
+    return moments

@@ -1,0 +1,202 @@
+"""A take that is being followed: particles, what departs from the mean, and whether it is lost."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .kalman import correct, whitening
+from .learnt import at_phases, smoothed
+from .particles import Particles, weighted_median
+from .slopes import Slopes
+
+__all__ = ["Estimate", "Running", "follow"]
+
+# An observation this far from all that is expected, in variances a number, shows something else.
+_IMPOSSIBLE = 100.0
+# Particles are drawn anew when fewer than such a share of them tell anything.
+_DRAWN_BELOW = 0.5
+# One of so many begins somewhere on the clock, for who joins a movement that has begun.
+_SOMEWHERE = 10
+# What is lost is sought again after so many memories of surprise.
+_SOUGHT_AGAIN = 3.0
+
+
+class Estimate(NamedTuple):
+    """What is known at a frame, in the order of a `Track`."""
+
+    posture: np.ndarray
+    covariance: np.ndarray
+    phase: float
+    rate: float
+    effective_size: float
+    lost: bool
+
+
+class Running:
+    """A take that is followed frame by frame.
+
+    All particles share one covariance of their deviations, as it depends on what is seen and not on
+    the phase; so one gain corrects them all (a Rao-Blackwellised filter).
+
+    Parameters
+    ----------
+    learnt : Learnt
+    seed : int
+
+    Attributes
+    ----------
+    time : float or None
+        Of the last frame.
+    particles : Particles
+        Weighted by the last frame.
+    begins : bool
+        Whether they knew nothing of what was before the last frame.
+    anew : ndarray of bool, shape (n_particles,)
+        Which began the movement once more.
+    taken : ndarray of bool, shape (n_observed,)
+        What of the last frame was believed.
+    """
+
+    def __init__(self, learnt, seed):
+        self.learnt, self.rng = learnt, np.random.default_rng(seed)
+        self.time, self.lost, self.slopes = None, False, None
+        n = learnt.n_particles
+        somewhere = np.arange(n) % _SOMEWHERE == _SOMEWHERE - 1
+        self._begin(np.where(somewhere, np.linspace(0, learnt.clock.last, n), 0.0))
+
+    def step(self, values, time, matrix):
+        """Take an observation.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n_observed,)
+            NaN where nothing is seen.
+        time : float
+            In frames of the training performances, later than that of the step before.
+        matrix : ndarray, shape (n_observed, n_features)
+            What of a posture is observed.
+
+        Returns
+        -------
+        Estimate
+        """
+        dt = 0.0 if self.time is None else time - self.time
+        self.begins, self.time, self.sought = self.time is None, time, self.sought + dt
+        if self.lost and self.sought > _SOUGHT_AGAIN * self.learnt.clock.memory:
+            self._seek()
+        elif dt > 0:
+            self._go_on(dt, matrix)
+        expected = at_phases(self.learnt.mean, self.particles.phases)
+        self.taken = np.zeros(len(values), dtype=bool)
+        seen = ~np.isnan(values)
+        if seen.any():
+            self._observe(values, seen, matrix, expected, dt)
+        return self._estimate(expected)
+
+    # -- steps of a step --------------------------------------------------------------------
+
+    def _begin(self, phases):
+        """Begin at phases, knowing nothing of what departs from the mean."""
+        learnt, n = self.learnt, len(phases)
+        self.particles = Particles(phases, learnt.pace.spread * self.rng.standard_normal(n))
+        self.means = np.zeros((n, 2 * learnt.mean.shape[1]))
+        self.covariance = learnt.process.stationary
+        self.slopes, self.anew = None, np.zeros(n, dtype=bool)
+        self.surprise, self.sought = 1.0, 0.0
+
+    def _seek(self):
+        """Seek the phase anew, over all of the clock."""
+        n = self.learnt.n_particles
+        self._begin((self.rng.random() + np.arange(n)) / n * self.learnt.clock.last)
+        # Only what is seen from now on tells that it is found.
+        self.begins, self.surprise = True, self.learnt.limit
+
+    def _go_on(self, dt, matrix):
+        """Let a time pass."""
+        learnt, width = self.learnt, self.learnt.mean.shape[1]
+        if self.particles.effective_size < _DRAWN_BELOW * learnt.n_particles:
+            chosen = self.particles.draw(self.rng)
+            self.means = self.means[chosen]
+            if self.slopes is not None:
+                self.slopes.keep(chosen)
+        self.means, self.covariance = learnt.process.predict(self.means, self.covariance, dt)
+        self.anew = self.particles.move(dt, learnt.pace, learnt.clock, self.rng)
+        # The body stays where it is; only what it departs from is the beginning now.
+        jump = learnt.mean[-1] - learnt.mean[0]
+        self.means[self.anew, :width] += jump
+        if self.slopes is not None and self.slopes.ages.shape[1] == len(matrix):
+            self.slopes.wait(dt)
+            self.slopes.shift(self.anew, matrix @ jump)
+        else:
+            self.slopes = None
+
+    def _observe(self, values, seen, matrix, expected, dt):
+        """Believe what is possible: correct the deviations, and weigh the particles."""
+        some = matrix[seen]
+        with np.errstate(over="ignore", invalid="ignore"):
+            residuals = values[seen] - expected @ some.T
+            innovations = residuals - self.means[:, : some.shape[1]] @ some.T
+            covariance, correction = correct(self.covariance, some, innovations, self.learnt.noise)
+            # Not a number is impossible, too.
+            possible = bool((correction.surprise <= _IMPOSSIBLE).any())
+        if not possible:
+            self._wonder(2 * self.learnt.limit, dt)
+            return
+        self.taken = seen
+        self.means = self.means + innovations @ correction.gain.T
+        self.covariance = covariance
+        if self.slopes is None:
+            self.slopes = Slopes(len(expected), len(matrix), self.learnt.clock.window)
+        self.slopes.add(residuals, seen)
+        self._weigh(self.slopes.known(seen), matrix, dt)
+
+    def _weigh(self, known, matrix, dt):
+        """Weigh the particles by the velocities that are known, bool (n_observed,)."""
+        n_known = int(known.sum())
+        if n_known == 0:
+            return
+        learnt, clock, some = self.learnt, self.learnt.clock, matrix[known]
+        slopes, noise = self.slopes.of(known)
+        spread = some @ learnt.velocities @ some.T + np.diag(learnt.noise**2 * noise)
+        distances = np.square(slopes @ whitening(spread).T).sum(axis=1)
+        # Evidence counts by the time that it stems from, so that the frame rate does not matter.
+        share = 100 * min(dt, clock.window) / clock.duration
+        self.particles.weigh(-0.5 * share / learnt.tempering * distances)
+        surprise = float(self.particles.weights @ distances) / n_known
+        # The mean of fewer numbers varies more.
+        fewer = min(np.sqrt(n_known / learnt.mean.shape[1]), 1.0)
+        self._wonder(1 + (surprise - 1) * fewer, dt)
+
+    def _wonder(self, surprise, dt):
+        """Remember a surprise, of which too much says that the phase is lost."""
+        limit = self.learnt.limit
+        self.surprise = smoothed(self.surprise, surprise, dt, self.learnt.clock.memory)
+        if self.lost:
+            self.lost = bool(self.surprise > (1 + limit) / 2)
+        elif self.surprise > limit:
+            self.lost, self.sought = True, np.inf
+
+    def _estimate(self, expected):
+        """What the particles say together: mean and covariance of a mixture."""
+        particles, width = self.particles, expected.shape[1]
+        weights = particles.weights
+        postures = expected + self.means[:, :width]
+        posture = weights @ postures
+        off = (postures - posture) * np.sqrt(weights)[:, np.newaxis]
+        return Estimate(
+            posture,
+            self.covariance[:width, :width] + off.T @ off,
+            weighted_median(particles.phases, weights),
+            weighted_median(particles.rates(self.learnt.clock.last), weights),
+            particles.effective_size,
+            self.lost,
+        )
+
+
+def follow(learnt, seed, values, times, matrix):
+    """Estimates of all frames of a take, each from what was seen up to it.
+
+    Parameters and returns are those of `smooth`.
+    """
+    running = Running(learnt, seed)
+    return [running.step(now, float(t), matrix) for now, t in zip(values, times, strict=True)]

@@ -1,0 +1,329 @@
+"""MotionTracker: the body behind observations with gaps and noise, by the model of its action."""
+
+from numbers import Integral, Real
+
+import numpy as np
+from sklearn.base import BaseEstimator, _fit_context, clone
+from sklearn.utils import check_consistent_length, check_random_state
+from sklearn.utils._param_validation import HasMethods, Interval
+from sklearn.utils.validation import check_is_fitted
+
+from ..fitting import at_once, of_one_state
+from ..gate import check_squares
+from ..notebook import DocumentedMixin
+from ..performances import SequenceLevelMixin, names_of_input
+from ..synchronizers.dense import DenseSynchronizer
+from ..synchronizers.match import check_answer
+from .learnt import Clock, learn
+from .observed import as_frame, as_projection, as_takes
+from .running import Running, follow
+from .smoother import smooth
+from .track import Track
+
+__all__ = ["MotionTracker"]
+
+
+class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
+    """Follow a body that is partly hidden, by what its action looks like and how people vary.
+
+    Given the phase p of the action, a posture is ``mean(p) + deviation``, and what is seen of it
+    ``y = H posture + b + noise``.
+
+    1. The mean is that of the synchronised training performances; deviations are what each differs
+       by from the mean of others, so that they are those of a stranger.
+    2. Deviations are a Gaussian process in *time*, Matern-3/2, with one length scale and a
+       covariance of the features that is shrunk half-way to its diagonal. A Kalman filter follows
+       it; what is hidden is left out.
+    3. Particles carry the phase and its rate. The log rate wanders about 0, as far and as fast
+       as in the training performances. One Kalman gain serves all particles.
+    4. Particles are weighed by causal *velocities*: what is seen should move as the mean does along
+       the path of the particle. Style persists, so that the likelihood of postures would be far
+       too sure; that of velocities is divided by ``tempering``.
+    5. If what is seen moves otherwise at all phases than people of the training set did, the
+       phase is lost: particles are spread over the whole clock, and again until one fits. A
+       movement that is over may begin anew.
+
+    Parameters
+    ----------
+    synchronizer : synchronizer, default=None
+        Not fitted; None is `DenseSynchronizer()`.
+    n_particles : int, default=500
+    noise : float, default=0.05
+        Standard deviation of observations, in the unit of the features; the default is one of
+        direction cosines.
+    tempering : float, default=10
+        By what the log-likelihood of the velocities at every hundredth of the mean duration is
+        divided.
+    frame_rate : float, default=None
+        Frames a second of the training performances; time stamps are then in seconds. None: they
+        are in frames of the training performances.
+    random_state : int, RandomState instance or None, default=None
+        From which ``fit`` draws the seed of all takes: each begins with the same, so that the same
+        observations give the same answer, alone or in company.
+
+    Attributes
+    ----------
+    mean_ : ndarray, shape (P, n_features)
+        The mean performance.
+    n_frames_ : int
+        ``P``, frames of the clock.
+    duration_ : float
+        Mean number of frames of the training performances.
+    synchronizer_ : synchronizer
+        The fitted one.
+    covariance_ : ndarray, shape (n_features, n_features)
+        Of deviations from the mean.
+    length_scale_ : float
+        Of the Matern-3/2 process, in frames of the training performances.
+    rate_spread_ : float
+        Standard deviation of the log rate.
+    rate_memory_ : float
+        Frames of the training performances after which its correlation is 1/e.
+    surprise_limit_ : float
+        Mean square of velocities in their standard deviations, over a tenth of the mean duration,
+        beyond which the phase is lost; 1 is expected.
+    n_features_in_ : int
+        Features of a frame (columns, for 2-D input).
+    feature_names_in_ : ndarray of str
+        Names of the features; only if the input had names.
+
+    See Also
+    --------
+    DirectionCosines : Makes postures of joint positions, which all people share.
+    DenseSynchronizer : What puts the training performances on one clock.
+
+    Notes
+    -----
+    Nothing seen (all NaN) is no error: the movement goes on by itself, and the covariance grows. An
+    observation that lies ten standard deviations from all that is expected, on average over its
+    numbers, is taken as not seen; if it stays, the phase is lost. A take may begin at any
+    phase; most particles begin at the first frame.
+
+    Examples
+    --------
+    A movement of which one of two features is hidden for a while.
+
+    >>> import numpy as np
+    >>> from sklearn_motionsync import LinearSynchronizer, MotionTracker
+    >>> t = np.linspace(0, 1, 60)
+    >>> def movement(size):
+    ...     return np.column_stack([size * np.cos(6 * t), size * np.sin(6 * t)])
+    >>> tracker = MotionTracker(LinearSynchronizer(), noise=0.02, random_state=0)
+    >>> tracker = tracker.fit([movement(size) for size in (0.9, 1.0, 1.1, 1.2)])
+    >>> take = movement(1.05)
+    >>> hidden = take.copy()
+    >>> hidden[20:40, 1] = np.nan
+    >>> track = tracker.track(hidden)
+    >>> track
+    Track(60 frames of 2 features, 0 of them lost)
+    >>> bool(np.abs(track.postures - take).max() < 0.1)
+    True
+
+    Frame by frame it is the same.
+
+    >>> for frame in hidden[:30]:
+    ...     now = tracker.step(frame)
+    >>> bool((now.postures == track.postures[29]).all())
+    True
+    """
+
+    _parameter_constraints: dict = {
+        "synchronizer": [HasMethods(["fit", "match"]), None],
+        "n_particles": [Interval(Integral, 1, None, closed="left")],
+        "noise": [Interval(Real, 0, None, closed="neither")],
+        "tempering": [Interval(Real, 0, None, closed="neither")],
+        "frame_rate": [Interval(Real, 0, None, closed="neither"), None],
+        "random_state": ["random_state"],
+    }
+
+    def __init__(
+        self,
+        synchronizer=None,
+        n_particles=500,
+        noise=0.05,
+        tempering=10.0,
+        frame_rate=None,
+        random_state=None,
+    ):
+        self.synchronizer = synchronizer
+        self.n_particles = n_particles
+        self.noise = noise
+        self.tempering = tempering
+        self.frame_rate = frame_rate
+        self.random_state = random_state
+
+    @at_once
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X, y=None, groups=None):
+        """Learn the mean, how people depart from it, and their pace.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+        y : ignored
+        groups : array-like, shape (n_sequences,), default=None
+            Who performed: deviations are from the mean of other groups. By default, or if there is
+            only one, every performance counts for itself.
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        ValueError
+            If the input breaks the contract, there is only one performance, or not one group for
+            each; or their unit is such that variances are beyond the precision.
+        """
+        performances = self._check_training_set(X)
+        n = len(performances)
+        if n < 2:
+            raise ValueError(
+                "A tracker learns how people vary from at least 2 performances, got n_samples = 1."
+            )
+        if groups is not None:
+            check_consistent_length(performances, groups)
+        sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
+        self.synchronizer_ = sync.fit(X)
+        match = sync.match(X)
+        check_answer(match, n, sync.n_frames_, type(sync).__name__)
+        warped = match.warp(performances)
+        lengths = np.array([len(x) for x in performances], dtype=np.float64)
+        self.n_frames_, self.duration_ = int(sync.n_frames_), float(lengths.mean())
+        clock = Clock(self.n_frames_ - 1.0, self.duration_ - 1.0)
+        rates = clock.duration / (lengths[:, np.newaxis] - 1) / match.rates
+        with np.errstate(over="ignore", invalid="ignore"):
+            check_squares(warped, float(warped.var(axis=(0, 1)).max()), "variances")
+        settings = {"noise": float(self.noise), "tempering": float(self.tempering)}
+        warped = warped.astype(np.float64)
+        self._model = learn(
+            warped, rates, _as_codes(groups, n), clock, n_particles=self.n_particles, **settings
+        )
+        self.mean_ = self._model.mean.astype(performances[0].dtype)
+        self.covariance_ = self._model.process.covariance
+        self.length_scale_ = self._model.process.length_scale
+        self.rate_spread_, self.rate_memory_ = self._model.pace
+        self.surprise_limit_ = self._model.limit
+        self._seed = int(check_random_state(self.random_state).randint(2**31 - 1))
+        self._running = None
+        return self
+
+    @of_one_state
+    def track(self, X, times=None, projection=None):
+        """Follow takes: what is known at every frame by what was seen up to it.
+
+        Parameters
+        ----------
+        X : array-like (n_frames, n_observed), DataFrame, or a list or 3-D array of takes
+            Observations, NaN where nothing is seen. After a fit on 2-D input the rows of a 2-D
+            array are takes.
+        times : array-like, shape (n_frames,), or a list of them, default=None
+            When frames were seen, increasing: in seconds with a ``frame_rate``, else in frames of
+            the training performances. None: a frame of these after the other.
+        projection : array-like (n_observed, n_features) or (matrix, offset), default=None
+            What is observed of postures: ``matrix @ posture + offset``. None: all of it.
+
+        Returns
+        -------
+        Track, or list of Track
+            A list for a collection.
+
+        Raises
+        ------
+        ValueError
+            If takes or times break the contract, widths differ from those of ``fit`` or the
+            projection, or anything is infinite.
+        """
+        return self._answer(follow, X, times, projection)
+
+    @of_one_state
+    def smooth(self, X, times=None, projection=None):
+        """Repair takes that are over: what is known at every frame by all that was seen.
+
+        Phases are drawn back from the end by the particles of the filter, 20 paths of them, and a
+        smoother estimates the deviations along each.
+
+        Parameters
+        ----------
+        X, times, projection :
+            As for ``track``.
+
+        Returns
+        -------
+        Track, or list of Track
+            A list for a collection.
+
+        Raises
+        ------
+        ValueError
+            As from ``track``.
+        """
+        return self._answer(smooth, X, times, projection)
+
+    def reset(self):
+        """Forget what ``step`` has seen: the next observation is the first of a take.
+
+        Returns
+        -------
+        self
+        """
+        check_is_fitted(self)
+        self._running = None
+        return self
+
+    def step(self, observation, time=None, projection=None):
+        """Take the next observation of a running take.
+
+        Parameters
+        ----------
+        observation : array-like, shape (n_observed,)
+            NaN where nothing is seen.
+        time : float, default=None
+            As for ``track``, later than that of the step before. None: a frame later.
+        projection : as for ``track``
+
+        Returns
+        -------
+        Track
+            Of this frame: ``postures`` (n_features,), ``covariances`` (n_features, n_features),
+            numbers. It is what ``track`` says of it.
+
+        Raises
+        ------
+        ValueError
+            As from ``track``, or if time does not increase. The take is then as it was before.
+        """
+        check_is_fitted(self)
+        running = self._running
+        after = None if running is None else running.time
+        names = names_of_input(self) if projection is None else None
+        projection = as_projection(projection, self._model.mean.shape[1])
+        values, time = as_frame(observation, time, names, projection, self.frame_rate, after)
+        if running is None:
+            self._running = running = Running(self._model, self._seed)
+        estimate = running.step(values, time, projection[0])
+        return Track(*(part[0] for part in Track.of([estimate], self.mean_.dtype)))
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.three_d_array = True
+        return tags
+
+    # -- what answers share -----------------------------------------------------------------
+
+    def _answer(self, method, X, times, projection):
+        check_is_fitted(self)
+        model, on_rows = self._model, self._fitted_on_rows
+        names = names_of_input(self) if projection is None else None
+        projection = as_projection(projection, model.mean.shape[1])
+        takes, single = as_takes(X, times, names, on_rows, projection, self.frame_rate)
+        answers = [method(model, self._seed, *take, projection[0]) for take in takes]
+        tracks = [Track.of(estimates, self.mean_.dtype) for estimates in answers]
+        return tracks[0] if single else tracks
+
+
+def _as_codes(groups, n):
+    """Groups counted from 0; every performance one of its own without any, or if all are one."""
+    codes = np.arange(n) if groups is None else np.unique(groups, return_inverse=True)[1].ravel()
+    return codes if codes.max() > 0 else np.arange(n)
