@@ -22,6 +22,7 @@ from sklearn_motionsync import (
     JointPositions,
     KeyframeSynchronizer,
     LinearSynchronizer,
+    MotionTracker,
     PartSynchronizer,
     Skeleton,
     TimingChannel,
@@ -61,7 +62,8 @@ QUICK = DenseSynchronizer(metric=None, refine=False)
 DETECTOR = ActionDetector(make_pipeline(QUICK, ActionModel()))
 CLASSIFIER = InTurns(n_frames=8)
 CHANNELS = [TimingChannel(LinearSynchronizer()), TimingChannel(QUICK, "log_rate")]
-ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR]
+TRACKER = MotionTracker(LinearSynchronizer(), n_particles=10, random_state=0)
+ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR, TRACKER]
 BODY_ESTIMATORS = [DirectionCosines(Skeleton.paper()), JointPositions(Skeleton.paper())]
 # Those of other transformers are in tests/test_framewise.py.
 FRAMEWISE = FrameWise(PCA(2))
@@ -161,6 +163,10 @@ def outputs(estimator, X):
         answers += [np.asarray(x) for x in estimator.transform(X)]
     if hasattr(estimator, "match"):
         answers += list(estimator.match(X))
+    if hasattr(estimator, "track"):
+        # It takes gaps and single frames, too, which performances have not.
+        tracks = estimator.track(estimator.check_performances(X))
+        answers += [np.stack([track.postures for track in tracks])]
     if hasattr(estimator, "score_samples"):
         answers += [estimator.score_samples(X), estimator.decision_function(X)]
         answers += [estimator.predict(X)]
@@ -487,7 +493,7 @@ def test_unfitted(estimator, performances):
         outputs(clone(estimator), performances)
 
 
-SEQUENCE_LEVEL = [*SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR, CLASSIFIER]
+SEQUENCE_LEVEL = [*SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR, TRACKER, CLASSIFIER]
 
 
 @pytest.mark.parametrize("estimator", SEQUENCE_LEVEL, ids=by_name)

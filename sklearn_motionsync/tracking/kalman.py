@@ -6,6 +6,10 @@ import numpy as np
 
 __all__ = ["Correction", "correct", "whitening"]
 
+# By such a share the spread of innovations is taken larger, so that what it leaves of a covariance
+# is none below 0 by rounding, however small the noise.
+_MARGIN = 1e-13
+
 
 class Correction(NamedTuple):
     """What an observation does to states.
@@ -13,16 +17,13 @@ class Correction(NamedTuple):
     Attributes
     ----------
     gain : ndarray, shape (n_states, n_seen)
-    rest : ndarray, shape (n_states, n_states)
-        ``I - K H``, what is left of a state.
-    weigh : ndarray, shape (n_states, n_seen)
+    weigh : ndarray, shape (n_features, n_seen)
         ``H' S^-1``, by which a smoother takes innovations back.
     surprise : ndarray, shape (n,)
         Squared Mahalanobis distances of the innovations, per observed number.
     """
 
     gain: np.ndarray
-    rest: np.ndarray
     weigh: np.ndarray
     surprise: np.ndarray
 
@@ -44,22 +45,19 @@ def correct(covariance, matrix, innovations, noise):
     Returns
     -------
     covariance : ndarray, shape (n_states, n_states)
-        After it, by Joseph's form, which stays positive.
+        After it: symmetric, as a square of the Cholesky form is taken away.
     Correction
     """
     n_seen, n_features = matrix.shape
     carried = covariance[:, :n_features] @ matrix.T
     spread = matrix @ carried[:n_features]
-    spread[np.diag_indices(n_seen)] += noise**2
+    diagonal = np.diag_indices(n_seen)
+    spread[diagonal] = (spread[diagonal] + noise**2) * (1 + _MARGIN)
     whiten = whitening(spread)
-    weigh = np.zeros((len(covariance), n_seen))
-    weigh[:n_features] = matrix.T @ whiten.T @ whiten
-    gain = covariance @ weigh
-    rest = np.eye(len(covariance))
-    rest[:, :n_features] -= gain @ matrix
-    covariance = rest @ covariance @ rest.T + noise**2 * gain @ gain.T
+    told = whiten @ carried.T
     surprise = np.square(innovations @ whiten.T).sum(axis=1) / n_seen
-    return covariance, Correction(gain, rest, weigh, surprise)
+    correction = Correction(told.T @ whiten, matrix.T @ whiten.T @ whiten, surprise)
+    return covariance - told.T @ told, correction
 
 
 def whitening(covariance):

@@ -61,8 +61,7 @@ class Process(NamedTuple):
     @property
     def stationary(self):
         """Covariance of the states (2 n_features, 2 n_features) when nothing has been seen."""
-        zero = np.zeros_like(self.covariance)
-        return np.block([[self.covariance, zero], [zero, self.decay**2 * self.covariance]])
+        return np.kron(np.diag([1.0, self.decay**2]), self.covariance)
 
     def transition(self, dt):
         """How states (value, derivative) go on over a time: (2, 2), the same for all features."""
@@ -87,12 +86,11 @@ class Process(NamedTuple):
         values, derivatives = means[:, :width], means[:, width:]
         parts = [a * values + b * derivatives for a, b in here.tolist()]
         means = np.concatenate(parts, axis=1)
-        stationary = self.stationary
-        # Q = S - A S A', so that what is stationary stays; A takes blocks, not single features.
-        rest = covariance - stationary
         for _ in range(2):
-            rest = (here @ rest.reshape(2, -1)).reshape(rest.shape).T
-        return means, rest + stationary
+            covariance = (here @ covariance.reshape(2, -1)).reshape(covariance.shape).T
+        # Q = S - A S A', so that what is stationary stays.
+        powers = np.diag([1.0, self.decay**2])
+        return means, covariance + np.kron(powers - here @ powers @ here.T, self.covariance)
 
 
 class Pace(NamedTuple):

@@ -46,7 +46,7 @@ class Slopes:
         """Take values (n, n_seen) of the features that are seen now, bool (width,)."""
         self.ages[0, seen] += 1
         self.squares[0, seen] += 1
-        self.values[0][:, seen] += values
+        self.values[0][:, _where(seen)] += values
 
     def keep(self, chosen):
         """Go on with some of the sequences, maybe several times."""
@@ -62,6 +62,7 @@ class Slopes:
 
     def of(self, known):
         """Slopes (n, n_known), and their variance under unit noise of the values (n_known,)."""
+        known = _where(known)
         zero, one, two = self.ages[:, known]
         zeros, ones, twos = self.squares[:, known]
         spread = zero * two - one**2
@@ -69,3 +70,8 @@ class Slopes:
         slopes = (one / spread) * values - (zero / spread) * aged
         noise = (zero**2 * twos - 2 * zero * one * ones + one**2 * zeros) / spread**2
         return slopes, noise
+
+
+def _where(mask):
+    """An index that makes no copy where all is meant."""
+    return slice(None) if mask.all() else mask

@@ -150,10 +150,13 @@ def _back(learnt, pasts, passed):
         means = frame.means - adjoint @ spread
         states.append((means, spread - spread @ information @ spread))
         if frame.correction is not None:
-            rest, weigh = frame.correction.rest, frame.correction.weigh
-            adjoint = adjoint @ rest - frame.innovations @ weigh.T
+            gain, weigh, n_features = *frame.correction[:2], len(frame.correction.weigh)
+            rest = np.eye(shape[1])
+            rest[:, :n_features] -= gain @ frame.matrix
+            adjoint = adjoint @ rest
+            adjoint[:, :n_features] -= frame.innovations @ weigh.T
             information = rest.T @ information @ rest
-            information[:, : frame.matrix.shape[1]] += weigh @ frame.matrix
+            information[:n_features, :n_features] += weigh @ frame.matrix
         if past.begins:
             adjoint, information = np.zeros_like(adjoint), np.zeros_like(information)
         else:
