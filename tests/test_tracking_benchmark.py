@@ -105,3 +105,39 @@ def test_particles_follow_a_posture_that_is_hidden_in_part(trackers):
     y[10:, 2] = np.nan
     (found,) = particles.run([y], rng)
     assert np.abs(found - takes[0]).mean() < 0.05
+
+
+@pytest.fixture(scope="module")
+def hidden():
+    return importlib.import_module("hidden_limbs")
+
+
+@pytest.mark.parametrize(("n_frames", "gap"), [(70, 30), (31, 10)])
+def test_hidden_are_six_limbs_or_everything_for_a_second_and_never_the_ends(hidden, n_frames, gap):
+    takes, rng = [np.zeros((n_frames, 37))] * 40, np.random.default_rng(0)
+    half, all_of, some = (np.array(hidden.hide(takes, kind, rng)) for kind in hidden.KINDS)
+    for masks in (half, some):
+        limbs = masks[..., 1:].reshape(40, n_frames, 12, 3)
+        assert not masks[..., 0].any()
+        assert (limbs.all(axis=-1) == limbs.any(axis=-1)).all()
+        assert set(limbs[..., 0].any(axis=1).sum(axis=-1)) == {6}
+    assert half.all(axis=1).sum() == 40 * 18
+    assert (all_of.any(axis=2) == all_of.all(axis=2)).all()
+    for masks in (all_of, some):
+        times = masks.any(axis=2)
+        assert set(times.sum(axis=1)) == {gap}
+        assert not times[:, [0, -1]].any()
+
+
+def test_an_angle_is_of_hidden_limbs_and_of_directions_however_long(hidden):
+    truth, estimate, mask = np.zeros((2, 37)), np.zeros((2, 37)), np.zeros((2, 37), dtype=bool)
+    truth[:, 1::3], estimate[:, 1::3] = 1, 7
+    # A quarter turn of the second limb in the first frame; of the third, in the second, unseen.
+    estimate[0, 4:7], estimate[1, 7:10] = (0, 0.1, 0), (0, 1, 0)
+    mask[:, 4:7] = True
+    assert hidden.angles(estimate, truth, mask) == pytest.approx(45, abs=1e-3)
+
+
+def test_the_phase_of_a_path_is_in_the_middle_of_where_it_stands_still(hidden):
+    times = np.array([0, 1, 1, 1, 4.0])
+    assert hidden.phases_of(times, 5) == pytest.approx([0, 2, 2 + 2 / 3, 2 + 4 / 3, 4])
