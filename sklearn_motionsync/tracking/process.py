@@ -10,12 +10,10 @@ __all__ = ["Pace", "Process", "left_out", "shrunk_covariance"]
 _SHRINKAGE = 0.5
 # Smallest variance of a feature, as a share of the largest: one in which nobody differed, too.
 _FLOOR = 1e-9
-# A process that hardly moves has a decay of one over so many clips.
-_LONGEST = 1000.0
+# Where the Matern-3/2 correlation (1 + x) exp(-x) is a half.
+_HALF = 1.6783469900166605
 # Rates beyond these, in either direction, are pauses or misses of a warp, and tell nothing.
 _FASTEST = 4.0
-# Autocorrelation of the log rate after the time that it is remembered.
-_FORGOTTEN = np.exp(-1)
 
 
 class Process(NamedTuple):
@@ -46,13 +44,9 @@ class Process(NamedTuple):
             Time between two of their frames.
         """
         covariance = shrunk_covariance(deviations)
-        variances, moves = np.diag(covariance), np.square(np.diff(deviations, axis=1) / step)
-        # Each feature counts by its own spread, so that units do not matter; who does not differ
-        # does not count.
-        differs = variances > 2 * _FLOOR * variances.max()
-        ratio = (moves.mean(axis=(0, 1)) / variances)[differs].mean()
-        slowest = 1 / (_LONGEST * step * deviations.shape[1])
-        return cls(covariance, float(max(np.sqrt(ratio), slowest)))
+        # Each feature counts by its own spread, so that units do not matter.
+        lag = _lag_of(deviations / np.sqrt(np.diag(covariance)), 0.5)
+        return cls(covariance, _HALF / (lag * step))
 
     @property
     def length_scale(self):
@@ -111,11 +105,8 @@ class Pace(NamedTuple):
     def learn(cls, rates, step):
         """From rates (n, P) of performances along the clock, whose frames are a step apart."""
         logs = np.log(np.clip(rates, 1 / _FASTEST, _FASTEST))
-        n_frames, power = logs.shape[1], float(np.square(logs).mean())
-        for lag in range(1, n_frames):
-            if (logs[:, lag:] * logs[:, :-lag]).mean() <= _FORGOTTEN * power:
-                return cls(power**0.5, float(lag * step))
-        return cls(power**0.5, float(n_frames * step))
+        spread = float(np.sqrt(np.square(logs).mean()))
+        return cls(spread, _lag_of(logs[:, :, np.newaxis], np.exp(-1)) * step)
 
 
 def left_out(performances, groups):
@@ -143,3 +134,17 @@ def shrunk_covariance(deviations):
     moments *= 1 - _SHRINKAGE
     np.fill_diagonal(moments, np.maximum(variances, _FLOOR * largest))
     return moments
+
+
+def _lag_of(series, level):
+    """Frames after which the autocorrelation about 0 of (n, P, n_features) falls to a level.
+
+    It is that of all frames where it never does, or there is nothing to correlate.
+    """
+    n_frames, power, before = series.shape[1], float(np.square(series).mean()), 1.0
+    for lag in range(1, n_frames if power > 0 else 1):
+        now = float((series[:, lag:] * series[:, :-lag]).mean()) / power
+        if now <= level:
+            return lag - 1 + (before - level) / (before - now)
+        before = now
+    return float(n_frames)
