@@ -30,6 +30,8 @@ from .display import (
     TrellisDisplay,
 )
 from .framewise import FrameWise
+from .live.online import OnlineSynchronizer
+from .live.stream import LivePhase
 from .long_tables import to_sequences
 from .model.action_model import ActionModel
 from .model.departures import find_departures
@@ -68,9 +70,11 @@ __all__ = [
     "LagDisplay",
     "Lags",
     "LinearSynchronizer",
+    "LivePhase",
     "Match",
     "MetricDisplay",
     "MotionTracker",
+    "OnlineSynchronizer",
     "PartSynchronizer",
     "SearchDisplay",
     "Skeleton",

@@ -12,7 +12,8 @@ from ..performances import check_performances, restore
 from .axes import heading
 from .columns import AXES, check_columns
 from .formats import LANDMARKS
-from .limbs import LIMB_NAMES, LIMBS, landmarks_of, leg_length, limbs_of, size_of
+from .hidden import hide_whole, seen_heading, typical_lengths
+from .limbs import LIMB_NAMES, LIMBS, landmarks_of, largest_of, limbs_of, size_of
 from .skeleton import Skeleton
 from .upright import check_upright, y_up
 
@@ -28,11 +29,12 @@ class Body(NamedTuple):
     Attributes
     ----------
     points : ndarray, shape (n_frames, 15, n_dims)
-        Of the landmarks; 0 for those that lack.
+        Of the landmarks; 0 for those that lack, NaN where they are hidden.
     limbs : ndarray, shape (n_frames, 12, n_dims)
-        Those of `skeleton`; whatever the others.
+        Those of `skeleton`; whatever the others. NaN where an end is hidden.
     lengths : ndarray, shape (n_frames, 12)
-        Of the limbs, above 0; of hips and shoulders that a picture shows end-on, 0.
+        Of the limbs, above 0; of hips and shoulders that a picture shows end-on, 0; NaN where
+        they are hidden.
     exponent : int
     skeleton : Skeleton
     """
@@ -48,14 +50,14 @@ class Body(NamedTuple):
         return self.points[:, LANDMARKS.index(landmark)]
 
     @property
-    def leg(self):
-        """Length of the stretched leg: of the performance's median limbs."""
-        return leg_length(np.median(self.lengths, axis=0), self.skeleton.limbs)
+    def typical(self):
+        """Lengths (12,) of the performance's median limbs; NaN of those never seen."""
+        return typical_lengths(self.lengths)
 
     @property
     def size(self):
-        """The same, or of a body without a whole leg the length of all its limbs."""
-        return size_of(np.median(self.lengths, axis=0), self.skeleton.limbs)
+        """Length of their stretched leg; of a body without a whole one, of all of them."""
+        return size_of(self.typical, self.skeleton.limbs)
 
     @property
     def directions(self):
@@ -71,11 +73,18 @@ class Body(NamedTuple):
 
         None where nothing tells them: in the plane, and without hips and shoulders.
         """
-        across = next((name for name in ACROSS if name in self.skeleton.limbs), None)
-        if across is None or self.skeleton.n_dims == 2:
+        across = [name for name in ACROSS if name in self.skeleton.limbs]
+        if not across or self.skeleton.n_dims == 2:
             return None
-        i = LIMB_NAMES.index(across)
-        return heading(self.limbs[:, i] / self.lengths[:, i, np.newaxis])
+        ways = self._along(across.pop(0))
+        if not np.isnan(ways[:, 0]).any():
+            return heading(ways)
+        return seen_heading(ways, *map(self._along, across))
+
+    def _along(self, limb):
+        """Directions (n_frames, n_dims) of a limb that has a length."""
+        i = LIMB_NAMES.index(limb)
+        return self.limbs[:, i] / self.lengths[:, i, np.newaxis]
 
 
 class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
@@ -84,6 +93,9 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
     Whoever inherits has a ``skeleton``, a ``fit`` that calls ``_check(X, reset=True)``, a
     ``get_feature_names_out``, and tells by ``_features(body)`` what is made of a body.
     """
+
+    # What the contract asks of the input: "allow-nan" of who takes hidden joints.
+    _finite = True
 
     fit_transform = at_once(TransformerMixin.fit_transform)
 
@@ -116,11 +128,13 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.three_d_array = True
+        tags.input_tags.allow_nan = self._finite == "allow-nan"
         tags.transformer_tags.preserves_dtype = ["float64", "float32"]
         return tags
 
     def _check(self, X, *, reset):
-        performances = check_performances(self, X, reset=reset, level="posture")
+        finite = self._finite
+        performances = check_performances(self, X, reset=reset, level="posture", finite=finite)
         skeleton = self.skeleton
         width, expected = performances[0].shape[1], skeleton.n_dims * len(skeleton.joints)
         if width != expected:
@@ -139,16 +153,20 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
         skeleton = self.skeleton
         points, exponent = landmarks_of(performances[i], skeleton)
         points = y_up(points, skeleton)
+        if self._finite is not True:
+            hide_whole(points)
         limbs = limbs_of(points)
         lengths = np.linalg.norm(limbs, axis=2)
         # What is less is rounding of the coordinates.
-        largest = max(points.max(), -points.min())
-        without = lengths <= np.finfo(lengths.dtype).eps * largest
+        without = lengths <= np.finfo(lengths.dtype).eps * largest_of(points)
         there = skeleton.limbs
         for k, name in enumerate(LIMB_NAMES):
-            lacks = name not in there
-            if lacks or (skeleton.n_dims == 2 and name in ACROSS and without[:, k].all()):
+            if name not in there:
                 limbs[:, k], lengths[:, k], without[:, k] = 0, 0, False
+            elif skeleton.n_dims == 2 and name in ACROSS:
+                end_on = without[:, k].copy()
+                if (end_on | np.isnan(lengths[:, k])).all():
+                    limbs[end_on, k], lengths[end_on, k], without[end_on, k] = 0, 0, False
         if without.any():
             frame, limb = np.argwhere(without)[0]
             name = LIMB_NAMES[limb]

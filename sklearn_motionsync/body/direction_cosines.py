@@ -1,20 +1,19 @@
 """DirectionCosines: from joint positions to postures, and back (Eq. 1)."""
 
 import numpy as np
-import pandas as pd
 from sklearn.base import _fit_context
 from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..fitting import at_once, of_one_state
-from ..gate import as_numbers
 from ..performances import check_transformed, restore
 from .axes import along_parents, turned
 from .base import ACROSS, PositionsTransformer
-from .built import built
+from .built import built, checked_lengths, matrix_of
 from .columns import AXES
 from .formats import SIDES
-from .limbs import LIMB_NAMES, exponent_of, unit
+from .hidden import hide_whole, in_proportion, typical_lengths
+from .limbs import LIMB_NAMES, exponent_of, leg_length, lowest, places_of, unit
 from .skeleton import Skeleton
 
 __all__ = ["DirectionCosines"]
@@ -47,12 +46,17 @@ class DirectionCosines(PositionsTransformer):
         nearest limb above it that is there; the hip's are those of ``"heading"``. ``"world"``:
         those of the recording, of which y is made the vertical one. A picture shows no heading:
         in the plane ``"heading"`` is ``"world"``, x across the picture and y up.
+    hidden : {"refuse", "nan"}, default="refuse"
+        What becomes of NaN, joints that were not seen. ``"refuse"``: it is an error. ``"nan"``: a
+        joint is hidden in a frame if any of its coordinates is NaN, and so is a landmark that is
+        the mean of it and others; limbs of which an end is hidden are NaN in that frame, and what
+        is seen stays as it is.
 
     Attributes
     ----------
     limb_lengths_ : ndarray, shape (n_limbs,)
-        Median length of each of ``skeleton.limbs`` over the postures seen in ``fit``, in the unit
-        of the positions; what ``inverse_transform`` builds a body of.
+        Median length of each of ``skeleton.limbs`` over the postures of ``fit`` that show it, in
+        the unit of the positions; what ``inverse_transform`` builds a body of.
     n_features_in_ : int
         The number of joints times that of their axes.
     feature_names_in_ : ndarray of str
@@ -72,7 +76,22 @@ class DirectionCosines(PositionsTransformer):
 
     In a picture, hips and shoulders that coincide in a whole performance point at the camera: both
     of their cosines are 0, as the two of three would be. A joint that was not found, and that the
-    program put at (0, 0), is to be repaired or left out: no position tells it from others.
+    program put at (0, 0), is to be repaired, left out, or made NaN where ``hidden="nan"``: no
+    position tells it from others.
+
+    **Hidden joints.** Where the hips are hidden, axes of ``"heading"`` and ``"parent"`` face along
+    the shoulders, turned by as much as they were against the hips when both were last seen; if
+    they never were, along the shoulders. Where those are hidden, too, the body faces where it
+    faced before; until anything tells, all limbs are NaN. With ``"parent"`` a limb is NaN if the
+    limbs it hangs on are. The height needs the pelvis in its frame, an ankle in any frame, and
+    the lengths of the legs: of limbs that a performance never shows they are those of ``fit``,
+    in proportion to the limbs that it shows.
+
+    **Live.** No row but the height looks at later frames, so the last row of the frames so far,
+    ``transform(frames[: k + 1])[-1]``, is that of the whole take; its floor is the lowest ankle so
+    far. The last seconds will do if they show the hips once, and a foot on the floor. A single
+    frame, ``transform(frame[np.newaxis])[0]``, has its own lowest ankle as floor, so that
+    a jump is not seen, its own leg, and no frame before it that tells the heading.
 
     Examples
     --------
@@ -100,11 +119,13 @@ class DirectionCosines(PositionsTransformer):
     _parameter_constraints: dict = {
         "skeleton": [Skeleton],
         "reference": [StrOptions({"heading", "parent", "world"})],
+        "hidden": [StrOptions({"refuse", "nan"})],
     }
 
-    def __init__(self, skeleton, reference="heading"):
+    def __init__(self, skeleton, reference="heading", hidden="refuse"):
         self.skeleton = skeleton
         self.reference = reference
+        self.hidden = hidden
 
     @at_once
     @_fit_context(prefer_skip_nested_validation=True)
@@ -124,16 +145,24 @@ class DirectionCosines(PositionsTransformer):
         Raises
         ------
         ValueError
-            As from ``transform``.
+            As from ``transform``, or if a limb is hidden throughout.
         """
         performances = self._check(X, reset=True)
         limbs = self.skeleton.limbs
         bodies = [self._body(performances, i)[2:4] for i in range(len(performances))]
-        unit_of_all = max(k for _, k in bodies)
+        # What is hidden throughout has no unit.
+        unit_of_all = max((k for x, k in bodies if (x > 0).any()), default=0)
         lengths = [x if k == unit_of_all else np.ldexp(x, k - unit_of_all) for x, k in bodies]
         with np.errstate(over="ignore"):
-            found = np.ldexp(np.median(np.concatenate(lengths), axis=0), unit_of_all)
-        found = found[_places_of(limbs)]
+            found = np.ldexp(typical_lengths(np.concatenate(lengths)), unit_of_all)
+        found = found[places_of(limbs)]
+        if np.isnan(found).any():
+            never = [name for name, length in zip(limbs, found, strict=True) if np.isnan(length)]
+            raise ValueError(
+                f"The limbs {never} are hidden in every frame of every performance, so that their "
+                "lengths cannot be learnt. Fit on performances that show them, or leave their "
+                "landmarks out of the skeleton: Skeleton(..., landmarks={'left_wrist': None, ...})."
+            )
         has_length = (found > 0) | self._may_lack_length
         if not has_length.all() or not np.isfinite(found).all():
             raise ValueError(
@@ -161,6 +190,9 @@ class DirectionCosines(PositionsTransformer):
         A posture without a height has its pelvis at height 0; so has a part of the body that no
         limb joins to the pelvis its uppermost joint.
 
+        With ``hidden="nan"`` a limb of which a cosine is NaN is hidden: joints that hang on it are
+        NaN, and where the height is, all are.
+
         Parameters
         ----------
         X : list of arrays (n_frames_i, 37), 3-D array, or 2-D array
@@ -180,12 +212,70 @@ class DirectionCosines(PositionsTransformer):
             ``get_feature_names_out``, or ``limb_lengths`` are not numbers above 0, one a limb.
         """
         check_is_fitted(self)
-        lengths = self.limb_lengths_
-        if limb_lengths is not None:
-            lengths = _checked_lengths(limb_lengths, self.skeleton.limbs)
-        performances = check_transformed(self, X, self.get_feature_names_out())
+        lengths = self._lengths(limb_lengths)
+        names = self.get_feature_names_out()
+        performances = check_transformed(self, X, names, finite=self._finite)
         arrays = [self._positions(performances, i, lengths) for i in range(len(performances))]
         return restore(self, performances, arrays, columns=self.skeleton.body().column_names)
+
+    @of_one_state
+    def position_matrix(self, limb_lengths=None):
+        """The linear map from postures to joint positions, for given limb lengths.
+
+        The pelvis is at its height above the origin, and each joint at the end of its limb. That
+        is what ``inverse_transform`` gives of cosines of length 1, but for its last step: the
+        matrix leaves the hips beside the pelvis, where ``inverse_transform`` moves those of a
+        performance, and the legs with them, by one height that puts its lowest ankle on the floor.
+
+        Some of its rows are a camera: x and y are an orthographic picture from the front. A
+        tracker that sees positions takes them as the projection of a posture, and as its offset
+        that height of the legs, 0 elsewhere, where the hips of those it sees are below the pelvis.
+
+        Parameters
+        ----------
+        limb_lengths : array-like of shape (n_limbs,), default=None
+            Length of each limb, above 0; by default ``limb_lengths_``.
+
+        Returns
+        -------
+        matrix : ndarray of float64, shape (n_dims * n_joints, n_features)
+            ``postures @ matrix.T`` are positions of the joints of ``skeleton.body()``, y up, x to
+            the left of who faces along z; with ``reference="world"`` along the recording's axes.
+        names : list of str
+            Of its rows, ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, ...
+
+        Raises
+        ------
+        ValueError
+            If ``reference="parent"``, whose axes turn with the posture: that is not linear. Or if
+            ``limb_lengths`` are not numbers above 0, one a limb.
+
+        Examples
+        --------
+        >>> from sklearn_motionsync import DirectionCosines
+        >>> from sklearn_motionsync.datasets import make_bending
+        >>> bunch = make_bending(2, random_state=0)
+        >>> cosines = DirectionCosines(bunch.skeleton).fit(bunch.data)
+        >>> matrix, names = cosines.position_matrix()
+        >>> matrix.shape, names[:3]
+        ((45, 37), ['pelvis_x', 'pelvis_y', 'pelvis_z'])
+
+        A picture from the front, in which the left arm is hidden:
+
+        >>> hidden = ("left_elbow", "left_wrist")
+        >>> seen = [name[-1] in "xy" and not name.startswith(hidden) for name in names]
+        >>> picture = cosines.transform(bunch.data)[0] @ matrix[seen].T
+        >>> picture.shape[1]
+        26
+        """
+        check_is_fitted(self)
+        if self.reference == "parent":
+            raise ValueError(
+                "Positions are no linear map of cosines along parent limbs, which turn with the "
+                "posture. Use reference='heading' or 'world', or inverse_transform."
+            )
+        lengths = self._lengths(limb_lengths).astype(np.float64)
+        return matrix_of(self._of_twelve(lengths), self.skeleton), self.skeleton.body().column_names
 
     def get_feature_names_out(self, input_features=None):
         """Names of the 37 parameters: ``pelvis_height``, ``hip_x``, ..., ``right_forearm_z``.
@@ -209,12 +299,30 @@ class DirectionCosines(PositionsTransformer):
             cosines = turned(cosines, heading)
         if self.reference == "parent":
             cosines = along_parents(cosines, limbs)
-        cosines = cosines[:, _places_of(limbs)].reshape(len(cosines), -1)
+        cosines = cosines[:, places_of(limbs)].reshape(len(cosines), -1)
         if not self.skeleton.has_height:
             return cosines
         ankles = [f"{side}_ankle" for side in SIDES if f"{side}_ankle" in self.skeleton.landmarks]
-        floor = min(body.at(ankle)[:, 1].min() for ankle in ankles)
-        return np.column_stack([(body.at("pelvis")[:, 1] - floor) / body.leg, cosines])
+        floor, lengths = lowest([body.at(ankle) for ankle in ankles]), body.typical
+        leg = leg_length(lengths, limbs)
+        if np.isnan(leg):
+            whole = in_proportion(lengths, self._of_twelve(self.limb_lengths_))
+            leg = leg_length(whole, limbs)
+        return np.column_stack([(body.at("pelvis")[:, 1] - floor) / leg, cosines])
+
+    def _lengths(self, given):
+        if given is None:
+            return self.limb_lengths_
+        return checked_lengths(given, self.skeleton.limbs)
+
+    def _of_twelve(self, lengths):
+        whole = np.zeros(len(LIMB_NAMES), dtype=lengths.dtype)
+        whole[places_of(self.skeleton.limbs)] = lengths
+        return whole
+
+    @property
+    def _finite(self):
+        return "allow-nan" if self.hidden == "nan" else True
 
     @property
     def _may_lack_length(self):
@@ -237,46 +345,25 @@ class DirectionCosines(PositionsTransformer):
             )
         # A mean or an approximation of cosines is shorter than 1, a limb is not.
         cosines = np.zeros((len(given), len(LIMB_NAMES), n_dims), dtype=given.dtype)
-        cosines[:, _places_of(limbs)] = unit(given)
+        cosines[:, places_of(limbs)] = unit(given)
         if self.reference == "parent":
             cosines = along_parents(cosines, limbs, inverse=True)
         k = exponent_of(lengths.max(), postures.dtype)
-        whole = np.zeros(len(LIMB_NAMES), dtype=postures.dtype)
         heights = postures[:, 0] if first else None
         with np.errstate(over="ignore", invalid="ignore"):
-            whole[_places_of(limbs)] = np.ldexp(lengths, -k)
+            whole = self._of_twelve(np.ldexp(lengths, -k)).astype(postures.dtype)
             body = built(heights, cosines, whole, self.skeleton)
             positions = np.ldexp(body, k) if k else body
-            sound = np.isfinite(positions.sum()) or np.isfinite(positions).all()
+            sound = np.isfinite(positions.sum()) or self._is_sound(positions)
         if not sound or lengths[lengths > 0].min(initial=1) < np.finfo(positions.dtype).tiny:
             raise ValueError(
                 f"{performances.called(i)}: the positions are beyond {positions.dtype} numbers. "
                 "Give limb_lengths in another unit, or smaller heights of the pelvis."
             )
+        if self._finite is not True:
+            hide_whole(positions.reshape(len(positions), -1, n_dims))
         return positions
 
-
-def _places_of(limbs):
-    """Where limbs are among all twelve: a slice, if they are all."""
-    if len(limbs) == len(LIMB_NAMES):
-        return slice(None)
-    return [LIMB_NAMES.index(name) for name in limbs]
-
-
-def _checked_lengths(limb_lengths, limbs):
-    """One length above 0 for each limb."""
-    names = list(limb_lengths.index) if isinstance(limb_lengths, pd.Series) else limbs
-    if names not in (limbs, list(range(len(limbs)))):
-        raise ValueError(f"limb_lengths is indexed by {names}; select {limbs}, in that order.")
-    lengths = as_numbers(limb_lengths, "limb_lengths", dtype=np.float64)
-    if lengths.shape != (len(limbs),):
-        raise ValueError(
-            f"limb_lengths needs one length for each of {limbs}, got shape {lengths.shape}."
-        )
-    wrong = ~((lengths > 0) & np.isfinite(lengths))
-    if wrong.any():
-        limb = int(wrong.argmax())
-        raise ValueError(
-            f"limb_lengths must be numbers above 0, got {lengths[limb]:g} for {limbs[limb]!r}."
-        )
-    return lengths
+    def _is_sound(self, positions):
+        beyond = np.isinf(positions) if self._finite == "allow-nan" else ~np.isfinite(positions)
+        return not beyond.any()

@@ -14,9 +14,12 @@ __all__ = [
     "ancestor_of",
     "exponent_of",
     "landmarks_of",
+    "largest_of",
     "leg_length",
     "limbs_between",
     "limbs_of",
+    "lowest",
+    "places_of",
     "size_of",
     "stretched_legs",
     "unit",
@@ -78,12 +81,12 @@ def landmarks_of(positions, skeleton):
     """(n_frames, 15, n_dims) places of the landmarks along the recording's axes, and ``k``.
 
     They are in units of ``2**k``, in which no square leaves the range of the numbers, and no
-    digit is lost. A landmark that the skeleton lacks is at 0.
+    digit is lost. A landmark that the skeleton lacks is at 0; one whose joints have NaN has NaN.
     """
     joints = positions.reshape(len(positions), -1, skeleton.n_dims)
     columns = {LANDMARKS.index(name): skeleton.indices_of(name) for name in skeleton.landmarks}
     used = joints[:, sorted({j for of_one in columns.values() for j in of_one})]
-    k = exponent_of(max(used.max(), -used.min()), used.dtype)
+    k = exponent_of(largest_of(used), used.dtype)
     if k:
         joints = np.ldexp(joints, -k)
     if len(columns) == len(LANDMARKS):
@@ -95,6 +98,12 @@ def landmarks_of(positions, skeleton):
         if len(of_one) > 1:
             points[:, place] = sum(joints[:, j] for j in of_one) / len(of_one)
     return points, k
+
+
+def largest_of(values):
+    """The largest absolute value of those that are not NaN; 0 if all are."""
+    largest = max(values.max(), -values.min())
+    return np.fmax.reduce(np.abs(values), axis=None, initial=0) if np.isnan(largest) else largest
 
 
 def exponent_of(largest, dtype):
@@ -111,6 +120,13 @@ def limbs_of(points):
     return points[:, end] - points[:, start]
 
 
+def places_of(limbs):
+    """Where limbs are among all twelve: a slice, if they are all."""
+    if len(limbs) == len(LIMB_NAMES):
+        return slice(None)
+    return [LIMB_NAMES.index(name) for name in limbs]
+
+
 def leg_length(lengths, limbs=LIMB_NAMES):
     """Length of the stretched leg, the mean of the sides that have one."""
     sides = stretched_legs(limbs)
@@ -125,11 +141,19 @@ def size_of(lengths, limbs):
     return sum(lengths[LIMB_NAMES.index(name)] for name in limbs)
 
 
+def lowest(tracks):
+    """The lowest height of (n_frames, n_dims) tracks, the second axis vertical; NaN of none."""
+    return np.fmin.reduce([np.fmin.reduce(track[:, 1]) for track in tracks])
+
+
 def unit(vectors):
-    """Directions of vectors (..., n_dims) of any length; what has none stays 0."""
+    """Directions of vectors (..., n_dims) of any length; what has none stays 0, or NaN."""
     norm = np.linalg.norm(vectors, axis=-1, keepdims=True)
     small = np.finfo(vectors.dtype).tiny ** 0.25
-    if not (norm.min() > small and norm.max() < 1 / small):
+    shortest, longest = norm.min(), norm.max()
+    if np.isnan(longest):
+        shortest, longest = (f.reduce(norm, axis=None) for f in (np.fmin, np.fmax))
+    if not (shortest > small and longest < 1 / small):
         largest = np.abs(vectors).max(axis=-1, keepdims=True)
         vectors = vectors / np.where(largest > 0, largest, 1)
         norm = np.linalg.norm(vectors, axis=-1, keepdims=True)

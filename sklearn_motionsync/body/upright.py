@@ -3,6 +3,7 @@
 import numpy as np
 
 from .formats import LANDMARKS, SIDES
+from .hidden import seen_landmarks, typical_lengths
 from .limbs import LIMB_NAMES, landmarks_of, size_of, unit
 
 __all__ = ["UPS", "as_recorded", "check_upright", "seems_up", "y_up"]
@@ -78,12 +79,12 @@ def seems_up(positions, skeleton):
     if not positions.size:
         return None
     points, _ = landmarks_of(positions, skeleton)
-    lower, middle, upper = _levels(points, skeleton)
+    lower, middle, upper = _levels(points, skeleton.landmarks)
     ways = [b - a for a, b in ((lower, middle), (middle, upper)) if a is not None and b is not None]
     if not ways:
         return None
     hands, shoulders = (
-        _first(points, skeleton, [f"{side}_{part}" for side in SIDES])
+        _first(points, skeleton.landmarks, [f"{side}_{part}" for side in SIDES])
         for part in ("wrist", "shoulder")
     )
     if lower is None and hands is not None and shoulders is not None:
@@ -102,19 +103,19 @@ def _named(rise):
     return f"{'-' if rise[axis] < 0 else ''}{'xyz'[axis]}"
 
 
-def _levels(points, skeleton):
+def _levels(points, landmarks):
     """Tracks (n_frames, n_dims) of the feet, the pelvis and the head; None for what lacks."""
     return (
-        _first(points, skeleton, [f"{side}_ankle" for side in SIDES]),
-        _first(points, skeleton, ["pelvis"], [f"{side}_hip" for side in SIDES]),
-        _first(points, skeleton, ["head"], ["neck"], [f"{side}_shoulder" for side in SIDES]),
+        _first(points, landmarks, [f"{side}_ankle" for side in SIDES]),
+        _first(points, landmarks, ["pelvis"], [f"{side}_hip" for side in SIDES]),
+        _first(points, landmarks, ["head"], ["neck"], [f"{side}_shoulder" for side in SIDES]),
     )
 
 
-def _first(points, skeleton, *choices):
+def _first(points, landmarks, *choices):
     """The mean of those landmarks of a choice that are there, of the first choice that has any."""
     for choice in choices:
-        there = [LANDMARKS.index(name) for name in choice if name in skeleton.landmarks]
+        there = [LANDMARKS.index(name) for name in choice if name in landmarks]
         if there:
             return sum(points[:, place] / len(there) for place in there)
     return None
@@ -135,39 +136,51 @@ def check_upright(points, lengths, skeleton, what):
     Parameters
     ----------
     points : ndarray, shape (n_frames, 15, n_dims)
-        Landmarks, the second axis vertical.
+        Landmarks, the second axis vertical; NaN where they are hidden, which tells nothing.
     lengths : ndarray, shape (n_frames, 12)
         Of the limbs.
     skeleton : Skeleton
     what : str
         What to call it in messages, with a capital letter.
     """
-    lower, middle, upper = _levels(points, skeleton)
+    there = seen_landmarks(points, skeleton.landmarks)
+    lower, middle, upper = _levels(points, there)
     if middle is None or (lower is None and upper is None):
         return
     # The legs tell for sure; without them the trunk does.
     bottom, top = (middle, upper) if lower is None else (lower, middle)
-    if np.count_nonzero(top[:, 1] < bottom[:, 1]) < _NEARLY_ALWAYS * (len(points) - 1):
+    rises = top[:, 1] - bottom[:, 1]
+    below = np.count_nonzero(rises < 0)
+    if not below or below < _NEARLY_ALWAYS * (np.count_nonzero(np.isfinite(rises)) - 1):
         return
-    typical = np.median(lengths, axis=0)
-    size = size_of(typical, skeleton.limbs)
-    below = np.quantile(top[:, 1] - bottom[:, 1], _NEARLY_ALWAYS) < -_CLEARLY * size
-    if not below or not _is_even(typical, skeleton.limbs):
+    rises = rises[np.isfinite(rises)]
+    typical = typical_lengths(lengths)
+    limbs = [name for name in skeleton.limbs if not np.isnan(typical[LIMB_NAMES.index(name)])]
+    size = size_of(typical, limbs)
+    if np.quantile(rises, _NEARLY_ALWAYS) >= -_CLEARLY * size or not _is_even(typical, limbs):
         return
-    if upper is not None and (upper - middle)[:, 1].mean() > -_CLEARLY * size:
+    trunk = [] if upper is None else _rises(middle, upper)
+    if len(trunk) and trunk[:, 1].mean() > -_CLEARLY * size:
         return
-    rise = ((middle if upper is None else upper) - bottom).mean(axis=0)
-    told = as_recorded(rise, skeleton)
+    # From the feet to the head, or as far as is seen.
+    ways = [_rises(bottom, top)] + [trunk] * (lower is not None and len(trunk) > 0)
+    rise = sum(way.mean(axis=0) for way in ways)
     parts = [
         "the pelvis is below the ankles" if lower is not None else "",
-        "the head is below the pelvis" if upper is not None else "",
+        "the head is below the pelvis" if len(trunk) else "",
     ]
-    seems = _named(told)
+    seems = _named(as_recorded(rise, skeleton))
     raise ValueError(
         f"{what} is upside down: {' and '.join(filter(None, parts))}. The skeleton says that "
         f"{_signed(skeleton.up)} is up, but {_signed(seems)} seems to be. Turn the skeleton, not "
         f"the positions: Skeleton(..., up={seems!r}), or Skeleton.from_frame(df, up={seems!r})."
     )
+
+
+def _rises(lower, upper):
+    """The ways up (n_seen, n_dims) in the frames that see both ends."""
+    rises = upper - lower
+    return rises[~np.isnan(rises[:, 1])]
 
 
 def _signed(up):

@@ -19,7 +19,8 @@ class Cost(NamedTuple):
     Attributes
     ----------
     features : callable
-        ``features(on_clock, subframes, smoothing)``: what is compared at every position.
+        ``features(postures, derive)``: what is compared at every position. ``derive(postures)``
+        are their velocities, by the frame; they are a new array.
     weights : callable
         ``weights(rates)``: ``b``, ``g`` and ``phi`` of `StepTable` at local rates.
     degree : int
@@ -76,7 +77,13 @@ def cost_features(on_clock, cost, subframes=1, smoothing=SMOOTHING):
     -------
     ndarray, shape (n_sequences, Q, n_features)
     """
-    return COSTS[cost].features(on_clock, subframes, smoothing)
+
+    def derive(postures):
+        velocity = smooth(postures, smoothing * (postures.shape[1] - 1), order=1)
+        velocity *= subframes
+        return velocity
+
+    return COSTS[cost].features(on_clock, derive)
 
 
 def step_table(cost="posture", max_rate=2, subframes=1):
@@ -118,8 +125,8 @@ def step_table(cost="posture", max_rate=2, subframes=1):
 # -- the costs ------------------------------------------------------------------------------
 
 
-def _postures(on_clock, subframes, smoothing):
-    return on_clock
+def _postures(postures, derive):
+    return postures
 
 
 def _posture_weights(rates):
@@ -127,10 +134,8 @@ def _posture_weights(rates):
     return ones, 2 * ones, np.abs(rates - 1)
 
 
-def _velocities(on_clock, subframes, smoothing):
-    velocity = smooth(on_clock, smoothing * (on_clock.shape[1] - 1), order=1)
-    velocity *= subframes
-    return velocity
+def _velocities(postures, derive):
+    return derive(postures)
 
 
 def _velocity_weights(rates):
@@ -138,9 +143,9 @@ def _velocity_weights(rates):
     return omega**2, 2 * omega, np.square(rates - 1)
 
 
-def _square_roots(on_clock, subframes, smoothing):
-    velocity = _velocities(on_clock, subframes, smoothing)
-    speed = np.linalg.norm(velocity, axis=2, keepdims=True)
+def _square_roots(postures, derive):
+    velocity = derive(postures)
+    speed = np.linalg.norm(velocity, axis=-1, keepdims=True)
     return velocity / np.sqrt(np.maximum(speed, np.finfo(speed.dtype).tiny))
 
 

@@ -41,8 +41,11 @@ class Metric(NamedTuple):
         velocity, positions : ndarray, shape (n_sequences, Q, n_features)
             In the unit.
         """
-        dtype = positions.dtype
-        velocity, postures = self._parts(velocity, positions)
+        return self.of_parts(*self._parts(velocity, positions))
+
+    def of_parts(self, velocity, postures):
+        """What is compared of compressed velocities and centred postures (..., n_told)."""
+        dtype = postures.dtype
         # Products of one sequence each: what a sequence gives does not depend on its company.
         out = velocity @ self.velocity.astype(dtype, copy=False)
         out += postures @ self.posture.astype(dtype, copy=False)
@@ -99,10 +102,10 @@ def compressed(velocity, energy):
 
     Parameters
     ----------
-    velocity : ndarray, shape (n_sequences, Q, n_features)
+    velocity : ndarray, shape (..., n_features)
     energy : float
         The mean squared speed: a speed that is the root of it is halfway between linear and root.
     """
     scaled = velocity / np.sqrt(energy).astype(velocity.dtype)
-    scaled /= np.sqrt(1 + np.linalg.norm(scaled, axis=2, keepdims=True))
+    scaled /= np.sqrt(1 + np.linalg.norm(scaled, axis=-1, keepdims=True))
     return scaled

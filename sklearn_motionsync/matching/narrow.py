@@ -26,7 +26,7 @@ def suits(bundle):
     consecutive = n_steps == trellis.table.steps.max() + 1
     cells = bundle.n_frames * (2 * trellis.width + 1) * bundle.pairs
     few = cells <= NARROW_CELLS * len(trellis.groups) and cells * n_steps <= _NARROW_WAYS
-    return consecutive and few and not trellis.free
+    return consecutive and few and not (trellis.free or trellis.running)
 
 
 def narrow_paths(bundle):

@@ -6,8 +6,7 @@ What the code relies on:
   pairs of the bundle at once.
 - Rows are flat, the offset first and the pair last: the cells before a step are one slice.
 - Local costs are matrix products of a left factor (the bases) and a right one (the moving
-  sequences). Steps of equal weights form a group and share one; penalties that a whole group
-  pays are in the product.
+  sequences), as `factors` makes them, one a group of steps.
 """
 
 import functools
@@ -16,56 +15,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["PRODUCT_ROWS", "Bases", "Bundle", "Coupling", "group_steps", "right_factor"]
+__all__ = ["PRODUCT_ROWS", "TIE", "Bundle", "Coupling", "group_steps"]
 
 # Samples of a single base that share one product.
 PRODUCT_ROWS = 16
 # Ties: costs of paths that differ by less than this share of all energy are equal. Rounding to
 # double precision moves them by a thousandth of it; in single precision there is no room between
 # rounding and data, so that rounding decides.
-_TIE = {np.dtype(np.float64): 2.0**-40, np.dtype(np.float32): 0.0}
-
-
-class Bases:
-    """Base sequences, and what is known of them before anything is matched to them.
-
-    Parameters
-    ----------
-    trellis : Trellis
-    sequences : ndarray, shape (n_bases, P, n_features)
-    """
-
-    def __init__(self, trellis, sequences):
-        self.trellis, self.sequences = trellis, sequences
-
-    def __len__(self):
-        return len(self.sequences)
-
-    def __getstate__(self):
-        # What can be computed again is neither sent away nor saved.
-        return {"trellis": self.trellis, "sequences": self.sequences}
-
-    def part(self, rows):
-        """Some of them, by a slice."""
-        if rows == slice(0, len(self)):
-            return self
-        return Bases(self.trellis, self.sequences[rows])
-
-    @functools.cached_property
-    def energy(self):
-        """``sum_p |x_n(p)|^2``: (n_bases,)."""
-        return np.einsum("npk,npk->n", self.sequences, self.sequences)
-
-    def by_group(self):
-        """The left factor of every group of steps. Long takes make it large: it is not kept."""
-        weights = [(group.moving, group.inner, group.penalty) for group in self.trellis.groups]
-        return _left_factor(self.sequences, *zip(*weights, strict=True))
-
-    @functools.cached_property
-    def by_step(self):
-        """The left factor of every step, steps in order, for narrow bundles; kept for the next."""
-        penalty, moving, inner = self.trellis.of_step[:, self.trellis.entry_of_step]
-        return _left_factor(self.sequences, moving, inner, penalty)
+TIE = {np.dtype(np.float64): 2.0**-40, np.dtype(np.float32): 0.0}
 
 
 class Coupling(NamedTuple):
@@ -123,7 +80,7 @@ class Bundle:
         """
         energy = self.right[..., -2].sum(axis=0)[:, np.newaxis] + self.bases.energy
         rank = np.arange(len(self.trellis.slopes), dtype=self.dtype)[:, np.newaxis]
-        return _TIE[self.dtype] * rank * energy.ravel()
+        return TIE[self.dtype] * rank * energy.ravel()
 
     @functools.cached_property
     def drawn_to(self):
@@ -176,48 +133,67 @@ class Bundle:
         """Compute the rows ``S(p, .)`` from ``first`` on, before ``last``, in a ring of rows.
 
         Yields every p when its row is there. If ``first`` is not 0 its row must be there already.
+        """
+        last = self.n_frames if last is None else last
+        # Blocks round differently: who is still running does not know them yet.
+        alone = self.n_bases == 1 and not self.trellis.running
+        costs = self.costs_of_blocks if alone else self.costs_of_samples
+        lows, highs = self.trellis.windows(self.n_frames)
+        for p, local in costs(first, last, lows, highs):
+            if p == 0 or p > first:
+                self.take_row(states, p, local, lows[p], highs[p])
+            yield p
+
+    def take_row(self, states, p, local, low, high):
+        """``S(p, .)`` of the row before it and the costs of its window, one flat array a group.
+
         Cells that no path reaches stay infinite: the windows first only grow, over
         cells never written, then only shrink, reading inside the row before.
         """
-        pairs, rows, keep = self.pairs, list(states), len(states)
-        plan = [_plan(group, pairs, states.dtype) for group in self.trellis.groups]
-        room, level = np.empty((2, (2 * self.trellis.width + 1) * pairs), dtype=states.dtype)
-        last = self.n_frames if last is None else last
-        costs = self.costs_of_samples if self.n_bases > 1 else self.costs_of_blocks
-        lows, highs = self.trellis.windows(self.n_frames)
-        rest = plan[1:]
-        for p, local in costs(first, last, lows, highs):
-            start = (self.centre + lows[p]) * pairs
-            stop = (self.centre + highs[p] + 1) * pairs
-            new, old = rows[p % keep][start:stop], rows[(p - 1) % keep]
-            if p == 0:
-                unit = self.trellis.unit_group
-                np.subtract(local[unit], self.trellis.groups[unit].penalty, out=new)
-            elif p > first:
-                best = _best_step(old, start, stop, plan[0], new, level)
-                np.add(best, local[0], out=new)
-                for i, levels in enumerate(rest, 1):
-                    trial = room[: stop - start]
-                    best = _best_step(old, start, stop, levels, trial, level)
-                    np.minimum(new, np.add(best, local[i], out=trial), out=new)
-            if self.coupling is not None and (p == 0 or p > first):
-                new += self.coupled(p, lows[p], highs[p])
-            yield p
+        pairs, keep = self.pairs, len(states)
+        start, stop = (self.centre + low) * pairs, (self.centre + high + 1) * pairs
+        new, old = states[p % keep, start:stop], states[(p - 1) % keep]
+        if p == 0:
+            unit = self.trellis.unit_group
+            np.subtract(local[unit], self.trellis.groups[unit].penalty, out=new)
+        else:
+            first, *rest = self._levels
+            room, level = self._rooms
+            best = _best_step(old, start, stop, first, new, level)
+            np.add(best, local[0], out=new)
+            for i, levels in enumerate(rest, 1):
+                trial = room[: stop - start]
+                best = _best_step(old, start, stop, levels, trial, level)
+                np.minimum(new, np.add(best, local[i], out=trial), out=new)
+        if self.coupling is not None:
+            new += self.coupled(p, low, high)
+
+    @functools.cached_property
+    def _levels(self):
+        return [_plan(group, self.pairs, self.dtype) for group in self.trellis.groups]
+
+    @functools.cached_property
+    def _rooms(self):
+        return np.empty((2, (2 * self.trellis.width + 1) * self.pairs), dtype=self.dtype)
 
     def costs_of_samples(self, first, last, lows, highs):
         """Yield ``p`` and the costs of its window, one flat array a group: a product a sample."""
-        sub, n_groups = self.trellis.table.subframes, len(self.trellis.groups)
-        n_factors = self.right.shape[2]
-        widest = (2 * self.trellis.width + 1) * self.pairs
-        room = np.empty(n_groups * widest, dtype=self.dtype)
         for p in range(first, last):
-            at = self.trellis.lead + p * sub
-            window = self.right[at + lows[p] : at + highs[p] + 1]
-            factor = window.reshape(-1, n_factors)
-            costs = room[: n_groups * len(factor) * self.n_bases].reshape(n_groups, -1)
-            products = costs.reshape(n_groups, -1, self.n_bases)
-            np.matmul(factor, self.left[p], out=products)
-            yield p, costs
+            yield p, self.costs_of_sample(p, self.left[p], lows[p], highs[p])
+
+    def costs_of_sample(self, p, left, low, high):
+        """The same of one sample, of its left factor (n_groups, n_features + 2, n_bases)."""
+        at = self.trellis.lead + p * self.trellis.stride
+        factor = self.right[at + low : at + high + 1].reshape(-1, self.right.shape[2])
+        costs = self._room_of_costs[: len(left) * len(factor) * self.n_bases]
+        costs = costs.reshape(len(left), -1)
+        np.matmul(factor, left, out=costs.reshape(len(left), -1, self.n_bases))
+        return costs
+
+    @functools.cached_property
+    def _room_of_costs(self):
+        widest = (2 * self.trellis.width + 1) * self.pairs
+        return np.empty(len(self.trellis.groups) * widest, dtype=self.dtype)
 
     def costs_of_blocks(self, first, last, lows, highs):
         """The same for a single base: a product a block of samples."""
@@ -289,7 +265,7 @@ class Bundle:
             value = states[(p - 1) % len(states)].take(here - back)
             value += charges
             if several:
-                q = trellis.lead + p * trellis.table.subframes - self.centre
+                q = trellis.lead + p * trellis.stride - self.centre
                 y = positions.take(here // self.n_bases + q * n_moving, axis=0)
                 value += weight * y[:, -2]
                 y = y.reshape(-1, self.n_bases, n_factors)[..., :-2]
@@ -312,12 +288,11 @@ class _Group(NamedTuple):
     levels: list
 
 
-def group_steps(table, mu):
+def group_steps(table, mu, slopes):
     """Groups of steps of equal weights, and the group of every step."""
     weights = np.column_stack([table.moving, table.inner])
     unique, group_of_step = np.unique(weights, axis=0, return_inverse=True)
     group_of_step = group_of_step.ravel()
-    slopes = table.steps - table.subframes
     groups = []
     for i, (moving, inner) in enumerate(unique):
         mine = group_of_step == i
@@ -355,29 +330,3 @@ def _best_step(old, start, stop, levels, out, scratch):
             view = np.add(view, penalty, out=target)
         best = view if best is None else np.minimum(best, view, out=out)
     return best
-
-
-def right_factor(moving):
-    """(Q, n_moving, n_features + 2): x_m(q), |x_m(q)|^2 and 1."""
-    n_moving, n_positions, n_features = moving.shape
-    right = np.empty((n_positions, n_moving, n_features + 2), dtype=moving.dtype)
-    right[..., :-2] = moving.transpose(1, 0, 2)
-    right[..., -2] = np.einsum("mqk,mqk->mq", moving, moving).T
-    right[..., -1] = 1
-    return right
-
-
-def _left_factor(bases, moving, inner, penalty):
-    """(P, n_groups, n_features + 2, n_bases): times the right factor, the local costs.
-
-    Given the weights of |x_m|^2 and of the inner product, and the penalty, of every group.
-    """
-    n_bases, n_frames, n_features = bases.shape
-    shape = n_frames, len(moving), n_features + 2, n_bases
-    left = np.empty(shape, dtype=bases.dtype)
-    frames, energy = bases.transpose(1, 2, 0), np.einsum("npk,npk->pn", bases, bases)
-    moving, inner, penalty = np.asarray([moving, inner, penalty], dtype=bases.dtype)
-    np.multiply(frames[:, np.newaxis], -inner[:, np.newaxis, np.newaxis], out=left[:, :, :-2])
-    left[:, :, -2] = moving[:, np.newaxis]
-    np.add(energy[:, np.newaxis], penalty[:, np.newaxis], out=left[:, :, -1])
-    return left

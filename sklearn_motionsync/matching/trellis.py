@@ -17,6 +17,8 @@ Invariants the code relies on:
 - With free ends a path begins and ends at any disparity. The moving sequence then goes on for
   ``width`` positions at both ends, so that every cell of the band is inside: Q is
   ``(P - 1) * subframes + 1 + 2 * width``, and p meets ``q = width + p * subframes + d``.
+- A base that is still running has no clock yet: its row holds all positions of the moving
+  sequence, ``q = d`` at every p. Its begin is pinned, its end is anywhere.
 - A step looks only at the row before it. A row has no dependency inside
   itself and is computed for all bases, disparities and moving sequences at once.
 - The sequence index is stored last, so that every window of ``q`` is one
@@ -27,7 +29,8 @@ import numpy as np
 
 from . import narrow
 from .costs import step_table
-from .rows import Bases, Bundle, group_steps, right_factor
+from .factors import Bases, right_factor
+from .rows import Bundle, group_steps
 from .warps import even_slices
 
 __all__ = ["Trellis"]
@@ -56,26 +59,34 @@ class Trellis:
     free : bool, default=False
         Whether both ends are free. Neither then costs anything: what a path pays for is the
         samples of the base and the steps between them.
+    running : bool, default=False
+        Whether bases may stop at any sample and end at any position of the moving sequence, which
+        has ``max_disparity * subframes + 1`` of them.
     """
 
-    def __init__(self, table, mu, max_disparity, free=False):
-        self.table, self.mu, self.free = table, mu, free
+    def __init__(self, table, mu, max_disparity, free=False, running=False):
+        self.table, self.mu, self.free, self.running = table, mu, free, running
         self.reach = max_disparity
         self.width = max_disparity * table.subframes
-        # Where sample 0 of the base meets the moving sequence, and where paths may end.
+        # Where sample 0 of the base meets the moving sequence, by how many positions it moves on
+        # from sample to sample, and where paths may end.
         self.lead = self.width if free else 0
-        self.ends_at = np.arange(-self.lead, self.lead + 1)
-        self.groups, group_of_step = group_steps(table, mu)
+        self.stride = 0 if running else table.subframes
+        self.ends_at = np.arange(-self.lead, (self.width if running else self.lead) + 1)
+        # By how much a step changes the disparity.
+        self.slopes = table.steps - self.stride
+        self.groups, group_of_step = group_steps(table, mu, self.slopes)
         # Of every step: its penalty, and the weights of |x_m|^2 and of the inner product.
         self.of_step = np.stack([mu * table.penalty, table.moving, table.inner])
+        weights = [(group.moving, group.inner, group.penalty) for group in self.groups]
+        self.of_group = np.array(weights).T
         self.entry_of_step = np.argsort(table.steps)
         self.penalty_by_step = mu * table.penalty[self.entry_of_step]
         self.scale_by_step = table.inner[self.entry_of_step] / 2
         self.scales = bool((self.scale_by_step != 1).any())
-        # By how much it changes the disparity; ``pad`` cells at both ends of a row hold infinity.
-        self.slopes = table.steps - table.subframes
+        # So many cells at both ends of a row hold infinity.
         self.pad = int(np.abs(self.slopes).max())
-        self.unit_group = group_of_step[self.slopes == 0][0]
+        self.unit_group = group_of_step[table.steps == table.subframes][0]
         self._windows = {}
 
     @classmethod
@@ -186,7 +197,7 @@ class Trellis:
 
     def _costs(self, base, moving, disparities):
         n_moving, n_positions, n_features = moving.shape
-        q = disparities + (self.lead + self.table.subframes * np.arange(len(base)))
+        q = disparities + (self.lead + self.stride * np.arange(len(base)))
         steps = np.full_like(q, self.table.subframes)
         np.subtract(q[:, 1:], q[:, :-1], out=steps[:, 1:])
         q += n_positions * np.arange(n_moving)[:, np.newaxis]
@@ -228,6 +239,9 @@ class Trellis:
         """Lowest and highest disparity, at every sample, of a path in the band."""
         if self.free:
             return [-self.width] * n_frames, [self.width] * n_frames
+        if self.running:
+            highs = np.minimum(self.width, int(self.slopes.max()) * np.arange(n_frames))
+            return [0] * n_frames, highs.tolist()
         known = self._windows.get(n_frames)
         if known is not None:
             return known

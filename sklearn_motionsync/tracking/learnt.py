@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .kalman import whitening
+from .kalman import correct, whitening
 from .process import Pace, Process, left_out, shrunk_covariance
 from .slopes import Slopes
 
@@ -12,12 +12,15 @@ __all__ = ["Clock", "Learnt", "at_phases", "learn", "smoothed"]
 
 # Window of causal velocities, as a share of the mean duration: that of the synchronizers' filter.
 _WINDOW = 0.03
-# How long a surprise is remembered, as a share of the mean duration.
-_MEMORY = 0.1
+# How long a surprise is remembered, in windows.
+_WINDOWS = 3.0
 # So many times what the most surprising take exceeds the expected surprise by is too much.
 _EXCESS = 2.0
 # And so many standard deviations of what is expected are by chance.
 _CHANCE = 4.0
+# An observation so far from all that is expected, in variances a number, or so many times farther
+# than any of the training takes, shows something else.
+_POSSIBLE, _FARTHER = 100.0, 10.0
 # Of particles at the end so many begin anew in a hundredth of the mean duration.
 _ANEW = 0.02
 
@@ -47,11 +50,13 @@ class Clock(NamedTuple):
 
     @property
     def window(self):
-        return _WINDOW * self.duration
+        """Of causal velocities: at least a frame."""
+        return max(_WINDOW * self.duration, 1.0)
 
     @property
     def memory(self):
-        return _MEMORY * self.duration
+        """Of surprises."""
+        return _WINDOWS * self.window
 
 
 class Learnt(NamedTuple):
@@ -67,7 +72,9 @@ class Learnt(NamedTuple):
     velocities : ndarray, shape (n_features, n_features)
         Covariance of what causal velocities of people differ by from that of the mean.
     limit : float
-        Surprise that no person of the training set reaches, where 1 is expected.
+        Surprise by velocities that no person of the training set reaches, where 1 is expected.
+    possible : float
+        The same of postures at a single frame, far beyond which none is believed.
     noise, tempering : float
     n_particles : int
     """
@@ -78,6 +85,7 @@ class Learnt(NamedTuple):
     clock: Clock
     velocities: np.ndarray
     limit: float
+    possible: float
     noise: float
     tempering: float
     n_particles: int
@@ -103,8 +111,10 @@ def learn(warped, rates, groups, clock, *, noise, tempering, n_particles):
     slopes, unit_noise = _slopes(deviations, step, clock.window)
     velocities = shrunk_covariance(slopes)
     limit = _limit(slopes, unit_noise * noise**2, velocities, step, clock.memory)
+    possible = _possible(deviations, process, step, noise)
     mean = warped.mean(axis=0)
-    return Learnt(mean, process, pace, clock, velocities, limit, noise, tempering, n_particles)
+    limits, settings = (limit, possible), (noise, tempering, n_particles)
+    return Learnt(mean, process, pace, clock, velocities, *limits, *settings)
 
 
 def _slopes(deviations, step, window):
@@ -130,8 +140,22 @@ def _limit(slopes, noise, velocities, step, memory):
         surprise = smoothed(surprise, here / width, step, memory)
         largest = np.maximum(largest, surprise)
     # As often as a memory holds windows, velocities are independent of those before.
-    chance = _CHANCE * np.sqrt(2 / (width * _MEMORY / _WINDOW))
+    chance = _CHANCE * np.sqrt(2 / (width * _WINDOWS))
     return float(1 + max(_EXCESS * (np.max(largest) - 1), chance))
+
+
+def _possible(deviations, process, step, noise):
+    """What distance of an observation is possible: at their own phase all takes are much nearer."""
+    n, n_frames, width = deviations.shape
+    means, covariance, largest = np.zeros((n, 2 * width)), process.stationary, 0.0
+    for p in range(n_frames):
+        if p:
+            means, covariance = process.predict(means, covariance, step)
+        innovations = deviations[:, p] - means[:, :width]
+        covariance, correction = correct(covariance, np.eye(width), innovations, noise)
+        means = means + innovations @ correction.gain.T
+        largest = max(largest, float(correction.surprise.max()))
+    return max(_POSSIBLE, _FARTHER * largest)
 
 
 def smoothed(before, now, dt, memory):

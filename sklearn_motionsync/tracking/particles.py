@@ -44,10 +44,10 @@ class Particles:
         rng : numpy.random.Generator
         """
         n, before = len(self.logs), self.logs
-        kept = np.exp(-dt / pace.memory)
-        self.logs = kept * before + pace.spread * np.sqrt(1 - kept**2) * rng.standard_normal(n)
+        expected, pushed = pace.expect(before, dt)
+        self.logs = expected + pushed * rng.standard_normal(n)
         anew = (self.phases >= clock.last) & (rng.random(n) < clock.anew(dt))
-        fresh = pace.spread * rng.standard_normal(n)
+        fresh = pace.begin(rng, n)
         # The rate on the way is that half-way between its logs.
         moved = self.phases + np.exp((before + self.logs) / 2) * dt * clock.speed
         self.phases = np.where(anew, 0.0, np.minimum(moved, clock.last))

@@ -88,7 +88,7 @@ class Process(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """How fast people go through an action: a log rate that forgets.
+    """How fast people go through an action: a log rate about 0 that forgets.
 
     Attributes
     ----------
@@ -100,6 +100,15 @@ class Pace(NamedTuple):
 
     spread: float
     memory: float
+
+    def begin(self, rng, n):
+        """Log rates of performances that nothing is known of: (n,)."""
+        return self.spread * rng.standard_normal(n)
+
+    def expect(self, logs, dt):
+        """Log rates to be expected after a time, and the standard deviation about them."""
+        kept = np.exp(-dt / self.memory)
+        return kept * logs, self.spread * np.sqrt(1 - kept**2)
 
     @classmethod
     def learn(cls, rates, step):

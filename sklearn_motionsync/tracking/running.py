@@ -11,8 +11,6 @@ from .slopes import Slopes
 
 __all__ = ["Estimate", "Running", "follow"]
 
-# An observation this far from all that is expected, in variances a number, shows something else.
-_IMPOSSIBLE = 100.0
 # Particles are drawn anew when fewer than such a share of them tell anything.
 _DRAWN_BELOW = 0.5
 # One of so many begins somewhere on the clock, for who joins a movement that has begun.
@@ -98,7 +96,7 @@ class Running:
     def _begin(self, phases):
         """Begin at phases, knowing nothing of what departs from the mean."""
         learnt, n = self.learnt, len(phases)
-        self.particles = Particles(phases, learnt.pace.spread * self.rng.standard_normal(n))
+        self.particles = Particles(phases, learnt.pace.begin(self.rng, n))
         self.means = np.zeros((n, 2 * learnt.mean.shape[1]))
         self.covariance = learnt.process.stationary
         self.slopes, self.anew = None, np.zeros(n, dtype=bool)
@@ -138,7 +136,7 @@ class Running:
             innovations = residuals - self.means[:, : some.shape[1]] @ some.T
             covariance, correction = correct(self.covariance, some, innovations, self.learnt.noise)
             # Not a number is impossible, too.
-            possible = bool((correction.surprise <= _IMPOSSIBLE).any())
+            possible = bool((correction.surprise <= self.learnt.possible).any())
         if not possible:
             self._wonder(2 * self.learnt.limit, dt)
             return

@@ -93,10 +93,9 @@ def _log_transition(learnt, before, after, chosen):
     phases, logs = after.phases[chosen, np.newaxis], after.logs[chosen, np.newaxis]
     gone = before.phases + np.exp((before.logs + logs) / 2) * dt * clock.speed
     odds = -0.5 * np.square((phases - np.minimum(gone, clock.last)) / _LOOSE)
-    kept = np.exp(-dt / pace.memory)
-    pushed = pace.spread * np.sqrt(1 - kept**2)
+    expected, pushed = pace.expect(before.logs, dt)
     if pushed > 0:
-        odds -= 0.5 * np.square((logs - kept * before.logs) / pushed)
+        odds -= 0.5 * np.square((logs - expected) / pushed)
     # What began anew had been over.
     over = np.where(before.phases >= clock.last, 0.0, -np.inf)
     return np.where(after.anew[chosen, np.newaxis], over, odds)

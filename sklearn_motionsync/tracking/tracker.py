@@ -34,8 +34,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     2. Deviations are a Gaussian process in *time*, Matern-3/2, with one length scale and a
        covariance of the features that is shrunk half-way to its diagonal. A Kalman filter follows
        it; what is hidden is left out.
-    3. Particles carry the phase and its rate. The log rate wanders about 0, as far and as fast
-       as in the training performances. One Kalman gain serves all particles.
+    3. Particles carry the phase and its rate. The log rate wanders as far and as fast as
+       in the training performances, about the mean pace. One Kalman gain serves all particles.
     4. Particles are weighed by causal *velocities*: what is seen should move as the mean does along
        the path of the particle. Style persists, so that the likelihood of postures would be far
        too sure; that of velocities is divided by ``tempering``.
@@ -80,7 +80,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     rate_memory_ : float
         Frames of the training performances after which its correlation is 1/e.
     surprise_limit_ : float
-        Mean square of velocities in their standard deviations, over a tenth of the mean duration,
+        Mean square of velocities in their standard deviations, over 9 % of the mean duration,
         beyond which the phase is lost; 1 is expected.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
@@ -95,8 +95,9 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     Notes
     -----
     Nothing seen (all NaN) is no error: the movement goes on by itself, and the covariance grows. An
-    observation that lies ten standard deviations from all that is expected, on average over its
-    numbers, is taken as not seen; if it stays, the phase is lost. A take may begin at any
+    observation ten standard deviations from all that is expected, as the root mean square of its
+    numbers, is taken as not seen, if no training performance came near that; where it stays, the
+    phase is lost. A take may begin at any
     phase; most particles begin at the first frame.
 
     Examples

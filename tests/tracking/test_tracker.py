@@ -6,10 +6,16 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn import clone
-from sklearn_motionsync import DirectionCosines, LinearSynchronizer, MotionTracker, Track
+from sklearn_motionsync import (
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    MotionTracker,
+    Track,
+)
+from sklearn_motionsync.datasets import load_performances
 
 LIMBS = np.arange(1, 37).reshape(12, 3)
-NOISE = 0.05
 
 
 def movement(size, n=60):
@@ -17,12 +23,12 @@ def movement(size, n=60):
     return np.column_stack([size * np.cos(6 * t), size * np.sin(6 * t), size * np.sin(3 * t)])
 
 
+TRAINING = [movement(0.9, 55), movement(1.0, 60), movement(1.1, 62), movement(1.2, 65)]
+
+
 @pytest.fixture(scope="module")
 def tracker():
-    training = [
-        movement(size, n) for size, n in zip((0.9, 1.0, 1.1, 1.2), (55, 60, 62, 65), strict=True)
-    ]
-    return MotionTracker(LinearSynchronizer(), 100, noise=0.02, random_state=0).fit(training)
+    return MotionTracker(LinearSynchronizer(), 100, noise=0.02, random_state=0).fit(TRAINING)
 
 
 @pytest.fixture
@@ -52,13 +58,10 @@ def test_a_take_is_its_frames(tracker, take):
 
 
 def test_equal_seeds_give_equal_answers(tracker, take):
-    twin = clone(tracker).fit(
-        [movement(s, n) for s, n in zip((0.9, 1.0, 1.1, 1.2), (55, 60, 62, 65), strict=True)]
-    )
+    twin = clone(tracker).fit(TRAINING)
     for method in ("track", "smooth"):
         alone = getattr(tracker, method)(take)
-        for track in getattr(twin, method)([take, take[:50], take])[::2]:
-            same(track, alone)
+        same(getattr(twin, method)([take[:9], take])[1], alone)
         assert isinstance(alone, Track)
         assert repr(alone) == "Track(60 frames of 3 features, 0 of them lost)"
 
@@ -72,12 +75,8 @@ def test_tracking_leaves_a_running_take_alone(tracker, take):
 
 
 def test_seconds_are_frames_over_the_rate(tracker, take):
-    seconds = clone(tracker).set_params(frame_rate=30)
-    seconds.fit(
-        [movement(s, n) for s, n in zip((0.9, 1.0, 1.1, 1.2), (55, 60, 62, 65), strict=True)]
-    )
+    seconds = clone(tracker).set_params(frame_rate=30).fit(TRAINING)
     times = np.arange(60.0)
-    # A power of two: times are the same to the last bit.
     same(tracker.track(take, times=times), tracker.track(take))
     near = seconds.track(take, times=times / 30)
     for a, b in zip(near, tracker.track(take), strict=True):
@@ -282,33 +281,45 @@ def test_one_performance_is_not_enough(tracker):
 
 
 def test_people_not_seen(bends):
-    """Bends at 30 Hz, the last actor held out: phase, hidden limbs, other movements."""
+    """Bends at 30 Hz, an actor held out: the phase, and half of the limbs, hidden for a second."""
     X = [x[::4] for x in DirectionCosines(bends.skeleton).fit_transform(bends.data)]
-    of = bends.actor == bends.actor[-1]
-    known = [x for x, held in zip(X, of, strict=True) if not held]
-    tracker = MotionTracker(n_particles=200, random_state=0).fit(known, groups=bends.actor[~of])
+    held = bends.actor == bends.actor[-1]
+    known = [x for x, of in zip(X, held, strict=True) if not of]
+    sync = DenseSynchronizer(metric=None, refine=False)
+    tracker = MotionTracker(sync, 100, random_state=0).fit(known, groups=bends.actor[~held])
     rng = np.random.default_rng(0)
-    errors, phases = [], []
-    for i in np.flatnonzero(of)[:3]:
-        seen = X[i] + NOISE * rng.standard_normal(X[i].shape)
-        hidden = LIMBS[rng.permutation(12)[:6]].ravel()
-        seen[:, hidden] = np.nan
+    squares, phases = [], []
+    for i in np.flatnonzero(held)[:2]:
+        seen = X[i] + 0.05 * rng.standard_normal(X[i].shape)
+        hidden = np.ix_(np.arange(30, 60), LIMBS[rng.permutation(12)[:6]].ravel())
+        seen[hidden] = np.nan
         track, smooth = tracker.track(seen), tracker.smooth(seen)
         matched = tracker.synchronizer_.match([X[i]]).frames([len(X[i])])[0]
         truth = np.interp(np.arange(len(X[i])), matched, np.arange(len(matched)))
-        mean = [np.interp(truth, np.arange(tracker.n_frames_), m) for m in tracker.mean_.T]
-        off = np.array(mean).T - X[i]
-        errors.append(
-            [
-                np.square(e)[:, hidden].sum()
-                for e in (track.postures - X[i], smooth.postures - X[i], off)
-            ]
-        )
+        # The mean is told the phase.
+        frames = np.arange(tracker.n_frames_)
+        mean = np.column_stack([np.interp(truth, frames, m) for m in tracker.mean_.T])
+        answers = track.postures, smooth.postures, mean
+        squares.append([np.square(x - X[i])[hidden].sum() for x in answers])
         phases.append(100 / tracker.n_frames_ * np.abs(track.phases - truth)[len(truth) // 5 :])
         assert track.lost.mean() < 0.05
-        assert tracker.track(X[i][::-1]).phases.shape == truth.shape
-    filtered, smoothed, mean = np.sqrt(np.mean(errors, axis=0))
+    filtered, smoothed, mean = np.sqrt(np.mean(squares, axis=0))
     assert np.median(np.concatenate(phases)) < 4
-    # The mean is given the phase.
-    assert smoothed < filtered * 1.02
-    assert filtered < 0.95 * mean
+    assert filtered < 0.8 * mean
+    assert smoothed < 0.9 * filtered
+
+
+def test_other_actions_of_people_are_lost(real_data):
+    """Jogging is no bend."""
+    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    some = {
+        name: np.flatnonzero(bunch.target == name)[:6]
+        for name in ("depositFloorR", "jogLeftCircle4StepsRstart")
+    }
+    cosines = DirectionCosines(bunch.skeleton)
+    bends, jogs = (
+        [x[::4] for x in cosines.fit_transform([bunch.data[i] for i in k])] for k in some.values()
+    )
+    tracker = MotionTracker(LinearSynchronizer(), 100, random_state=0).fit(bends)
+    assert tracker.track(jogs[0]).lost.mean() > 0.4
+    assert not tracker.track(bends[0]).lost.any()

@@ -1,0 +1,197 @@
+"""Streams: where running performances are, by the rows of the trellis (Eqs. 16 and 17)."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..matching.causal import CausalDerivative
+from ..matching.running import Running
+from ..matching.trellis import Trellis
+from .compared import LiveFeatures
+from .ticks import Ticks
+
+__all__ = ["UNKNOWN", "Calibration", "Course", "LivePhase", "Stream"]
+
+# Shares of the clock: over which rate and likeness are told, and how near a phase counts as right.
+_RECENT, _NEAR = 0.1, 0.05
+
+
+class LivePhase(NamedTuple):
+    """Where a performance is.
+
+    Attributes
+    ----------
+    phase : float, or ndarray
+        Frame of the pattern, from 0 to P - 1.
+    rate : float, or ndarray
+        Frames of the pattern in the time of one at the mean pace of the training set.
+    confidence : float, or ndarray
+        From 0 to 1: how probable it is that the phase is right to a twentieth of the clock.
+    """
+
+    phase: float | np.ndarray
+    rate: float | np.ndarray
+    confidence: float | np.ndarray
+
+
+class Calibration(NamedTuple):
+    """What the costs of paths say of performances of the action.
+
+    Attributes
+    ----------
+    temperature : float
+        Costs over it are log-probabilities of phases.
+    usual : float
+        Recent cost of a sample that half of the action never exceed.
+    """
+
+    temperature: float
+    usual: float
+
+
+UNKNOWN = Calibration(1.0, np.inf)
+
+
+class Course(NamedTuple):
+    """What running performances follow.
+
+    Attributes
+    ----------
+    n_frames : int
+        ``P``.
+    trellis : Trellis
+        It goes on after the end, where the performer rests.
+    features : LiveFeatures
+    width : float
+        Time constant of the filters, in frames of the clock.
+    step : float
+        From one frame of the clock to the next, in frames of the training performances.
+    calibration : Calibration
+    """
+
+    n_frames: int
+    trellis: Trellis
+    features: LiveFeatures
+    width: float
+    step: float
+    calibration: Calibration
+
+    @property
+    def duration(self):
+        """Of a performance at the mean pace, in frames of the training performances."""
+        return self.step * (self.n_frames - 1)
+
+
+class Stream:
+    """Performances that run, all seen at the same times.
+
+    Parameters
+    ----------
+    course : Course
+    n_streams : int
+    n_features : int
+    """
+
+    def __init__(self, course, n_streams, n_features):
+        self.course = course
+        self.running = Running(course.trellis, course.features.moving, n_streams)
+        self.recent = np.zeros(n_streams)
+        self._ticks = Ticks(course.step, course.n_frames)
+        self._derivative = CausalDerivative(course.width, (n_streams, n_features))
+        # The phases of the last ticks, in a ring; and how many ticks streams have run.
+        self._lag = max(2, round(_RECENT * course.n_frames))
+        self._near = max(1.0, _NEAR * (course.n_frames - 1))
+        table = course.trellis.table
+        self._fastest = table.steps.max() / table.subframes
+        # Phases of positions: who rests is at the end.
+        places = np.arange(len(course.features.moving)) / table.subframes
+        self._clock = np.minimum(places, course.n_frames - 1)
+        self._phases = np.zeros((self._lag + 1, n_streams))
+        self._age = np.zeros(n_streams, dtype=np.intp)
+        self._floor, self._all_seen = np.zeros(n_streams), np.ones(n_streams)
+        # The share of the last ticks that showed anything.
+        self._awake = np.ones(n_streams)
+        # Phases, rates and confidences of the last tick, when somebody has asked.
+        self._told = None
+
+    def restart(self, stream):
+        """Let one of them begin anew with its next tick."""
+        self.running.restart(stream)
+        self._derivative.restart(stream)
+        self._age[stream] = self._floor[stream] = self.recent[stream] = 0
+        self._phases[:, stream] = 0
+        self._told = None
+
+    def take(self, frames, stamp):
+        """Take the frames (n_streams, n_features) of a moment, and say where all of them are."""
+        for sample in self._ticks.take(frames, stamp):
+            self.tick(sample)
+        if self._told is None:
+            self._told = self._now(), self._rates(), self._confidence()
+        phase, rate, confidence = self._told
+        phase = np.minimum(phase + rate * self._ticks.since, self.course.n_frames - 1)
+        return LivePhase(phase, rate, confidence)
+
+    def tick(self, sample):
+        """Take the sample of a tick, in the unit of the data."""
+        features = self.course.features
+        postures = features.unit(sample)
+        velocity = self._derivative.step(postures)
+        # What does not move is 0 in the unit, seen or not.
+        hidden = np.isnan(velocity) | np.isnan(sample)
+        self._told = None
+        compared, parts, share = features(velocity, postures), None, self._all_seen
+        if hidden.any():
+            share = 1 - hidden.mean(axis=1)
+            compared[share < 1] = 0
+            parts = self._parts(~hidden, share == 1, velocity, postures)
+        self.running.advance(compared, parts)
+        self._note(share)
+
+    def _parts(self, seen, whole, velocity, postures):
+        groups = {}
+        for n in np.flatnonzero(~whole):
+            groups.setdefault(tuple(np.flatnonzero(seen[n]).tolist()), []).append(int(n))
+        return {
+            tuple(rows): self.course.features.part(columns, velocity[rows], postures[rows])
+            for columns, rows in groups.items()
+        }
+
+    def _note(self, share):
+        """Keep what rate and confidence are told from, of a tick that shows a share of features."""
+        ends, least = self.running.best()
+        self._phases[(self.running.n_samples - 1) % len(self._phases)] = self._clock[ends]
+        # Of what is seen: a hidden body is neither like nor unlike.
+        weight = 1 / np.minimum(self._age + 1, self._lag)
+        self._awake += weight * ((share > 0) - self._awake)
+        weight *= share > 0
+        self.recent += weight * (
+            (least - self._floor) / np.where(share > 0, share, 1) - self.recent
+        )
+        self._floor = least
+        self._age += 1
+
+    def _now(self):
+        return self._phases[(self.running.n_samples - 1) % len(self._phases)]
+
+    def _rates(self):
+        """Slope of the last phases; at first it is taken to be about 1."""
+        back = np.minimum(np.maximum(self._age - 1, 0), self._lag)
+        then = (self.running.n_samples - 1 - back) % len(self._phases)
+        moved = self._now() - self._phases[then, np.arange(len(back))]
+        rate = (moved + self._lag - back) / self._lag
+        return np.minimum(np.maximum(rate, 0), self._fastest)
+
+    def _confidence(self):
+        chances = self.chances(self.running.costs, self.course.calibration.temperature)
+        near = np.abs(self._clock - self._now()[:, np.newaxis]) <= self._near
+        mass = np.einsum("nq,nq->n", chances, near)
+        unlike = np.maximum(self.recent / self.course.calibration.usual, 1)
+        # Who has not begun is at the beginning.
+        return np.where(self._age > 0, self._awake * mass / unlike**2, 1.0)
+
+    @staticmethod
+    def chances(costs, temperature):
+        """Probabilities of phases of which these are the costs: (..., Q)."""
+        weights = np.exp((costs.min(axis=-1, keepdims=True) - costs) / temperature)
+        return weights / weights.sum(axis=-1, keepdims=True)
