@@ -14,7 +14,9 @@ from scipy.linalg.lapack import dposv
 
 # What keeps covariances of features that never move invertible: a twentieth of a degree.
 LEAST, TINY = 1e-6, 1e-9
-# Settings that are tried: length scales and time constants are in frames.
+# Of the rate of particles over postures so much is left after a frame, a third after half a second.
+RATE_KEPT = np.exp(-1 / 15)
+# Settings that are tried; length scales are in frames.
 LENGTHS = (5, 8, 12, 18, 27)
 SHARES = (0.1, 0.25, 0.5)
 RIDGES = (0.01, 0.1, 1, 10, 100)
@@ -24,7 +26,7 @@ FACTORS = (0.01, 0.1, 1, 10)
 
 
 class Linear(NamedTuple):
-    """``x' = transition x + N(0, drive)``, begins as N(start, spread); its beginning is seen."""
+    """``x' = transition x + N(0, drive)`` from N(start, spread); its first entries are seen."""
 
     transition: np.ndarray
     drive: np.ndarray
@@ -41,7 +43,7 @@ class Estimates(NamedTuple):
 
 
 def kalman(model, y, noise, smooth=False):
-    """Filter a take ``y`` (n_frames, d), NaN where hidden; smooth it (Rauch, Tung, Striebel)."""
+    """Filter a take ``y`` (n_frames, d), NaN where hidden; smooth it by the pass of Rauch."""
     F, d = model.transition, y.shape[1]
     before, after = [], []
     x, P = model.start, model.spread
@@ -123,6 +125,7 @@ class Peer(NamedTuple):
         ]
 
     def likelihood(self, takes, noise):
+        """Log-density of whole takes."""
         return log_likelihood(self.model, [x - self.mean for x in takes], noise)
 
 
@@ -243,42 +246,57 @@ class PostureParticles:
         return min(abs(a @ b / (a @ a)), 0.999) ** pace
 
     def run(self, takes, rng):
+        """Postures of takes, at every frame by what was seen up to it."""
         longest = max(map(len, takes))
         y = [np.pad(x, ((0, longest - len(x)), (0, 0)), constant_values=np.nan) for x in takes]
         y = np.stack(y) - self.centre
-        k, P = len(takes), len(self.mean)
-        phase = np.zeros((k, self.n))
-        log_rate = self.pace + self.spread * rng.standard_normal((k, self.n))
-        about = np.broadcast_to(self.mean[0], (k, self.n, self.mean.shape[1]))
-        x = about + self.std[0] * rng.standard_normal(about.shape)
-        log_weights, out = np.zeros((k, self.n)), []
-        for t in range(y.shape[1]):
+        state = self._begin(len(takes), rng)
+        log_weights, out = np.zeros((len(takes), self.n)), []
+        for t in range(longest):
             if t:
-                # The walk of the rate forgets in half a second what its spread allows.
-                log_rate = self.pace + 0.935 * (log_rate - self.pace)
-                log_rate += np.sqrt(1 - 0.935**2) * self.spread * rng.standard_normal(phase.shape)
-                phase = np.minimum(phase + np.exp(log_rate), P - 1)
-                old, at = about, np.rint(phase).astype(int)
-                about, std = self.mean[at], self.std[at]
-                fresh = np.sqrt(1 - self.kept**2) * std * rng.standard_normal(std.shape)
-                x = about + np.clip(self.kept * (x - old) + fresh, -3 * std, 3 * std)
-            seen = ~np.isnan(y[:, t])
-            # |y - x axes|^2 of what is seen, in units of noise and what the space leaves out.
-            scaled = seen[:, None] * self.axes / (self.noise**2 + self.residual)
-            pull = (scaled @ np.where(seen, y[:, t], 0.0)[..., None])[..., 0]
-            log_weights += ((pull[:, None] - 0.5 * x @ (scaled @ self.axes.T)) * x).sum(axis=-1)
+                state = self._go_on(*state, rng)
+            x = state[0]
+            log_weights = log_weights + self._log_likelihood(x, y[:, t])
             weights = np.exp(log_weights - log_weights.max(axis=1, keepdims=True))
             weights /= weights.sum(axis=1, keepdims=True)
             out.append((weights[..., None] * x).sum(axis=1) @ self.axes + self.centre)
-            drawn = _systematic(weights, rng)
-            poor = 1 / (weights**2).sum(axis=1) < self.n / 2
-            drawn[~poor] = np.arange(self.n)
-            log_weights = np.where(poor[:, None], 0.0, np.log(weights + 1e-300))
-            rows = np.arange(k)[:, None]
-            x, about = x[rows, drawn], about[rows, drawn]
-            phase, log_rate = phase[rows, drawn], log_rate[rows, drawn]
+            drawn, log_weights = self._draw(weights, rng)
+            rows = np.arange(len(takes))[:, None]
+            state = [part[rows, drawn] for part in state]
         means = np.stack(out, axis=1)
         return [means[i, : len(take)] for i, take in enumerate(takes)]
+
+    def _begin(self, k, rng):
+        """Points, the means that they deviate from, phases and log rates of k takes."""
+        log_rates = self.pace + self.spread * rng.standard_normal((k, self.n))
+        about = np.broadcast_to(self.mean[0], (k, self.n, self.mean.shape[1]))
+        x = about + self.std[0] * rng.standard_normal(about.shape)
+        return x, about, np.zeros((k, self.n)), log_rates
+
+    def _go_on(self, x, about, phases, log_rates, rng):
+        """A frame later."""
+        log_rates = self.pace + RATE_KEPT * (log_rates - self.pace)
+        pushed = np.sqrt(1 - RATE_KEPT**2) * self.spread
+        log_rates = log_rates + pushed * rng.standard_normal(phases.shape)
+        phases = np.minimum(phases + np.exp(log_rates), len(self.mean) - 1)
+        at = np.rint(phases).astype(int)
+        std, fresh = self.std[at], np.sqrt(1 - self.kept**2) * rng.standard_normal(x.shape)
+        deviations = np.clip(self.kept * (x - about) + std * fresh, -3 * std, 3 * std)
+        return self.mean[at] + deviations, self.mean[at], phases, log_rates
+
+    def _log_likelihood(self, x, y):
+        """|y - x axes|^2 of what is seen, in units of noise and what the space leaves out."""
+        seen = ~np.isnan(y)
+        scaled = seen[:, None] * self.axes / (self.noise**2 + self.residual)
+        pull = scaled @ np.where(seen, y, 0.0)[..., None]
+        return (x @ pull)[..., 0] - 0.5 * (x @ (scaled @ self.axes.T) * x).sum(axis=-1)
+
+    def _draw(self, weights, rng):
+        """Those that go on, drawn anew where less than half tell anything, and log-weights."""
+        drawn = _systematic(weights, rng)
+        rich = 1 / (weights**2).sum(axis=1) >= self.n / 2
+        drawn[rich] = np.arange(self.n)
+        return drawn, np.where(rich[:, None], np.log(weights + 1e-300), 0.0)
 
 
 def _systematic(weights, rng):

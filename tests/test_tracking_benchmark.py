@@ -54,7 +54,7 @@ def case(request, trackers):
     takes = [np.cumsum(rng.standard_normal((20, 2)), axis=0) for _ in range(3)]
     settings = {"constant_velocity": (1,), "autoregression": (1,), "pooled_matern": (4, 0.25)}
     peer = getattr(trackers, request.param)(takes, *settings[request.param])
-    model = peer.model._replace(start=rng.standard_normal(4))
+    model = trackers.Linear(*peer.model[:2], rng.standard_normal(4), peer.model.spread)
     return model, rng.standard_normal((6, 2)), rng.standard_normal((4, 2))
 
 
