@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dtrtri
 
 __all__ = ["Correction", "correct", "whitening"]
 
@@ -62,4 +63,4 @@ def correct(covariance, matrix, innovations, noise):
 
 def whitening(covariance):
     """A matrix that makes what has this covariance white: the inverse of its Cholesky factor."""
-    return np.linalg.inv(np.linalg.cholesky(covariance))
+    return dtrtri(np.linalg.cholesky(covariance), lower=1)[0]

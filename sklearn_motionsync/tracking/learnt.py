@@ -91,7 +91,7 @@ class Learnt(NamedTuple):
     n_particles: int
 
 
-def learn(warped, rates, groups, clock, *, noise, tempering, n_particles):
+def learn(warped, rates, groups, clock, noise, tempering, n_particles):
     """Learn from synchronised performances.
 
     Parameters

@@ -84,7 +84,9 @@ class Process(NamedTuple):
             covariance = (here @ covariance.reshape(2, -1)).reshape(covariance.shape).T
         # Q = S - A S A', so that what is stationary stays.
         powers = np.diag([1.0, self.decay**2])
-        return means, covariance + np.kron(powers - here @ powers @ here.T, self.covariance)
+        pushed = (powers - here @ powers @ here.T)[:, np.newaxis, :, np.newaxis]
+        blocks = pushed * self.covariance[:, np.newaxis]
+        return means, covariance + blocks.reshape(covariance.shape)
 
 
 class Pace(NamedTuple):

@@ -8,6 +8,7 @@ from sklearn.utils import check_consistent_length, check_random_state
 from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.validation import check_is_fitted
 
+from ..blas import on_one_thread
 from ..fitting import at_once, of_one_state
 from ..gate import check_squares
 from ..notebook import DocumentedMixin
@@ -196,11 +197,9 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         rates = clock.duration / (lengths[:, np.newaxis] - 1) / match.rates
         with np.errstate(over="ignore", invalid="ignore"):
             check_squares(warped, float(warped.var(axis=(0, 1)).max()), "variances")
-        settings = {"noise": float(self.noise), "tempering": float(self.tempering)}
-        warped = warped.astype(np.float64)
-        self._model = learn(
-            warped, rates, _as_codes(groups, n), clock, n_particles=self.n_particles, **settings
-        )
+        codes, settings = _as_codes(groups, n), (self.noise, self.tempering, self.n_particles)
+        known = warped.astype(np.float64), rates, codes, clock
+        self._model = on_one_thread(learn, *known, *settings)
         self.mean_ = self._model.mean.astype(performances[0].dtype)
         self.covariance_ = self._model.process.covariance
         self.length_scale_ = self._model.process.length_scale
@@ -263,15 +262,9 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self._answer(smooth, X, times, projection)
 
     def reset(self):
-        """Forget what ``step`` has seen: the next observation is the first of a take.
-
-        Returns
-        -------
-        self
-        """
+        """Forget what ``step`` has seen: the next observation is the first of a take."""
         check_is_fitted(self)
         self._running = None
-        return self
 
     def step(self, observation, time=None, projection=None):
         """Take the next observation of a running take.
@@ -303,7 +296,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         values, time = as_frame(observation, time, names, projection, self.frame_rate, after)
         if running is None:
             self._running = running = Running(self._model, self._seed)
-        estimate = running.step(values, time, projection[0])
+        estimate = on_one_thread(running.step, values, time, projection[0])
         return Track(*(part[0] for part in Track.of([estimate], self.mean_.dtype)))
 
     def __sklearn_tags__(self):
@@ -319,8 +312,11 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         names = names_of_input(self) if projection is None else None
         projection = as_projection(projection, model.mean.shape[1])
         takes, single = as_takes(X, times, names, on_rows, projection, self.frame_rate)
-        answers = [method(model, self._seed, *take, projection[0]) for take in takes]
-        tracks = [Track.of(estimates, self.mean_.dtype) for estimates in answers]
+        tracks = []
+        for take in takes:
+            # The matrices are small: threads would wait for each other.
+            estimates = on_one_thread(method, model, self._seed, *take, projection[0])
+            tracks.append(Track.of(estimates, self.mean_.dtype))
         return tracks[0] if single else tracks
 
 
