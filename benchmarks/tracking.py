@@ -138,15 +138,13 @@ def run(action, others, seeds, n_takes):
 
 def show_ratios(reports):
     """Mean over actions and kinds of the ratio of mean errors; over seeds, mean and spread."""
-    print(f"{len(reports)} actions so far" if len(reports) > 1 else "one action so far")
+    print(f"actions so far: {len(reports)}")
     for name, to, most in BARS:
         ratios = np.array([report.means(name) / report.means(to) for report in reports])
         by_seed = ratios.mean(axis=(0, 2))
         each = ", ".join(f"{x:.2f}" for x in ratios.mean(axis=(1, 2)))
-        print(
-            f"{name} to {to}: {by_seed.mean():.3f} +- {by_seed.std():.3f} (at most {most};", end=""
-        )
-        print(f" by action {each})")
+        found = f"{by_seed.mean():.3f} +- {by_seed.std():.3f}"
+        print(f"{name} to {to}: {found} (at most {most}; by action {each})")
     for kind in ("nothing", "half"):
         medians = np.mean([np.median(report.phases[kind]) for report in reports])
         print(f"phase, {kind} hidden, mean of the medians of actions: {medians:.2f} (at most 4)")
