@@ -22,7 +22,7 @@ _CHANCE = 4.0
 # than any of the training takes, shows something else.
 _POSSIBLE, _FARTHER = 100.0, 10.0
 # Of particles at the end so many begin anew in a hundredth of the mean duration.
-_ANEW = 0.02
+_ANEW = 0.01
 
 
 class Clock(NamedTuple):

@@ -242,7 +242,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         """Repair takes that are over: what is known at every frame by all that was seen.
 
         Phases are drawn back from the end by the particles of the filter, 20 paths of them, and a
-        smoother estimates the deviations along each.
+        smoother estimates the deviations along each. On its way back it needs about 0.1 MB a frame
+        of 37 features.
 
         Parameters
         ----------
