@@ -16,9 +16,9 @@ _MOST = 24
 # Temperatures that are tried, in mean squared features of a sample; the least chance that counts.
 _TEMPERATURES = np.geomspace(0.01, 1e3, 41)
 _LEAST = 1e-12
-# Of one performance alone: temperature and usual cost as other actions of people have them, in mean
+# Of one performance alone: temperature and usual cost as 16 actions of people have them, in mean
 # squared features.
-_ALONE = 0.5, 0.2
+_ALONE = 0.7, 0.5
 
 
 def calibrate(course_of, performances, warped, times):

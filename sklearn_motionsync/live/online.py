@@ -203,7 +203,9 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         """
         if "_session" not in vars(self):
             check_is_fitted(self)
-        return self._session.step(self._following, self._frame(frame), time, self.frame_rate)
+        frame, given = self._frame(frame), None if time is None else [time]
+        stamps = as_stamps(given, 1, self.frame_rate, "The frame", self._session.stamp)
+        return self._session.step(self._following, frame, float(stamps[0]))
 
     def reset(self, stream=None):
         """Begin anew with the next frame.
