@@ -295,7 +295,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
 
     def _frame(self, frame):
         """A frame as numbers, of one stream or of several."""
-        if not (isinstance(frame, np.ndarray) and frame.dtype == np.float64):
+        if type(frame) is not np.ndarray or frame.dtype != np.float64:
             # A row of a table has the names of its columns.
             row = frame.to_frame().T if isinstance(frame, pd.Series) else frame
             check_names(row, names_of_input(self), "The frame")

@@ -35,7 +35,7 @@ class Session:
         count = 0 if self._shape is None else [1, *self._shape][-2]
         streams = np.atleast_1d(stream)
         runs = streams.dtype.kind in "iu" and ((-count <= streams) & (streams < count)).all()
-        if not runs:
+        if not runs and len(streams):
             raise ValueError(
                 f"stream={stream!r}, but {count} performances run: give an index of these or "
                 "several, or None for all."
