@@ -11,14 +11,14 @@ from .stream import Calibration, Stream
 
 __all__ = ["calibrate"]
 
-# So many performances tell enough.
-_MOST = 24
+# So many performances, and so many moments of each, tell enough.
+_MOST, _MOMENTS = 24, 120
 # Temperatures that are tried, in mean squared features of a sample; the least chance that counts.
 _TEMPERATURES = np.geomspace(0.01, 1e3, 41)
 _LEAST = 1e-12
-# Of one performance alone: temperature and usual cost as other actions of people have them, in mean
+# Of one performance alone: temperature and usual cost as 16 actions of people have them, in mean
 # squared features.
-_ALONE = 0.5, 0.2
+_ALONE = 0.7, 0.5
 
 
 def calibrate(course_of, performances, warped, times):
@@ -58,18 +58,19 @@ def calibrate(course_of, performances, warped, times):
 
 
 def _followed(course, performance, times):
-    """Costs of all phases at all ticks, the right phases, and recent costs."""
+    """Costs of all phases at even moments, the right phases there, and recent costs of ticks."""
     stream, duration = Stream(course, 1, performance.shape[1]), len(performance) - 1
     ticks = np.arange(0, duration * (1 + 1e-9), course.step)
     share = ticks / duration
     last = course.n_frames - 1
-    rows, recent = [], []
-    for sample in sample_at([performance], share[np.newaxis] * last, course.n_frames)[0]:
+    rows, recent, every = [], [], -(-len(ticks) // _MOMENTS)
+    for k, sample in enumerate(sample_at([performance], share[np.newaxis] * last, last + 1)[0]):
         stream.tick(sample[np.newaxis])
-        rows.append(stream.running.costs[0])
         recent.append(stream.recent[0])
+        if k % every == 0:
+            rows.append(stream.running.costs[0])
     # Where tau stands still, any phase of that while is as right.
     rising = times + 1e-9 * np.arange(len(times))
     phases = np.interp(share * last, rising, np.arange(len(times)))
     truth = np.round(phases * course.trellis.table.subframes).astype(np.intp)
-    return np.array(rows), truth, np.array(recent)
+    return np.array(rows), truth[::every], np.array(recent)

@@ -203,7 +203,9 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         """
         if "_session" not in vars(self):
             check_is_fitted(self)
-        return self._session.step(self._following, self._frame(frame), time, self.frame_rate)
+        frame, given = self._frame(frame), None if time is None else [time]
+        stamps = as_stamps(given, 1, self.frame_rate, "The frame", self._session.stamp)
+        return self._session.step(self._following, frame, float(stamps[0]))
 
     def reset(self, stream=None):
         """Begin anew with the next frame.
@@ -293,7 +295,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
 
     def _frame(self, frame):
         """A frame as numbers, of one stream or of several."""
-        if not (isinstance(frame, np.ndarray) and frame.dtype == np.float64):
+        if type(frame) is not np.ndarray or frame.dtype != np.float64:
             # A row of a table has the names of its columns.
             row = frame.to_frame().T if isinstance(frame, pd.Series) else frame
             check_names(row, names_of_input(self), "The frame")

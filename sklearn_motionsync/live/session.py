@@ -3,16 +3,21 @@
 import numpy as np
 
 from .stream import LivePhase, Stream
-from .times import as_stamps
 
 __all__ = ["Session"]
 
 
 class Session:
-    """Performances that run side by side, from their first frame on."""
+    """Performances that run side by side, from their first frame on.
+
+    Attributes
+    ----------
+    stamp : float or None
+        When the last frame was seen, in frames of the training performances; None before the first.
+    """
 
     def __init__(self):
-        self._stream = self._shape = self._stamp = None
+        self._stream = self._shape = self.stamp = None
         self._said, self._began = [], None
 
     @property
@@ -30,7 +35,7 @@ class Session:
         count = 0 if self._shape is None else [1, *self._shape][-2]
         streams = np.atleast_1d(stream)
         runs = streams.dtype.kind in "iu" and ((-count <= streams) & (streams < count)).all()
-        if not runs:
+        if not runs and len(streams):
             raise ValueError(
                 f"stream={stream!r}, but {count} performances run: give an index of these or "
                 "several, or None for all."
@@ -40,21 +45,19 @@ class Session:
             # It begins with the next frame.
             self._began[n] = np.nan
 
-    def step(self, course, frame, time=None, frame_rate=None):
+    def step(self, course, frame, stamp):
         """Take a frame (n_features,) or (n_streams, n_features), and say where they are."""
         if self._shape not in (None, frame.shape):
             raise ValueError(
                 f"The frames before had the shape {self._shape}, this one has {frame.shape}: give "
                 "the same performances in each, NaN for what is not seen, or call reset()."
             )
-        given = None if time is None else [time]
-        stamp = float(as_stamps(given, 1, frame_rate, "The frame", self._stamp)[0])
         frames = np.atleast_2d(frame)
         if self._stream is None:
             self._stream = Stream(course, *frames.shape)
             self._began = np.full(len(frames), np.nan)
         self._began = np.where(np.isnan(self._began), stamp, self._began)
-        self._shape, self._stamp = frame.shape, stamp
+        self._shape, self.stamp = frame.shape, stamp
         found = self._stream.take(frames, stamp)
         if frame.ndim == 1:
             found = LivePhase(*(float(values[0]) for values in found))
@@ -68,7 +71,7 @@ class Session:
         """Frames of the training performances until the end, of every performance that runs."""
         if not self._said:
             return course.duration
-        elapsed = self._stamp - self._began
+        elapsed = self.stamp - self._began
         phase = np.atleast_1d(self._said[-1].phase)
         by_phase = course.duration * (1 - phase / (course.n_frames - 1))
         left = (by_phase + np.maximum(course.duration - elapsed, 0)) / 2

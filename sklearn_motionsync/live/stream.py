@@ -163,14 +163,12 @@ class Stream:
         ends, least = self.running.best()
         self._phases[(self.running.n_samples - 1) % len(self._phases)] = self._clock[ends]
         # Of what is seen: a hidden body is neither like nor unlike.
-        weight = 1 / np.minimum(self._age + 1, self._lag)
-        self._awake += weight * ((share > 0) - self._awake)
-        weight *= share > 0
-        self.recent += weight * (
-            (least - self._floor) / np.where(share > 0, share, 1) - self.recent
-        )
-        self._floor = least
         self._age += 1
+        weight, shows = 1 / np.minimum(self._age, self._lag), share > 0
+        self._awake += weight * (shows - self._awake)
+        risen = (least - self._floor) / np.where(shows, share, 1)
+        self.recent += weight * shows * (risen - self.recent)
+        self._floor = least
 
     def _now(self):
         return self._phases[(self.running.n_samples - 1) % len(self._phases)]
@@ -186,7 +184,7 @@ class Stream:
     def _confidence(self):
         chances = self.chances(self.running.costs, self.course.calibration.temperature)
         near = np.abs(self._clock - self._now()[:, np.newaxis]) <= self._near
-        mass = np.einsum("nq,nq->n", chances, near)
+        mass = np.vecdot(chances, near)
         unlike = np.maximum(self.recent / self.course.calibration.usual, 1)
         # Who has not begun is at the beginning.
         return np.where(self._age > 0, self._awake * mass / unlike**2, 1.0)

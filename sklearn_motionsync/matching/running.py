@@ -55,7 +55,7 @@ class Running:
         high = int(min(self.trellis.width, self.trellis.slopes.max() * p))
         local = bundle.costs_of_sample(p, self._left(samples), 0, high)
         by_stream = local.reshape(len(local), high + 1, -1)
-        self._energy += np.einsum("nk,nk->n", samples, samples)
+        self._energy += np.vecdot(samples, samples)
         for streams, parts in (own or {}).items():
             by_stream[:, :, streams] = self._costs_of_part(parts, len(streams), high)
         bundle.take_row(self._states, p, local, 0, high)

@@ -192,6 +192,7 @@ def test_a_frame_that_is_refused_changes_nothing(live):
             (frame[:2], None, r"must have shape \(3,\), or \(n_streams, 3\)"),
             (np.append(frame[:2], np.inf), None, "Feature 2 of the frame is infinite"),
             (["a", "b", "c"], None, "The frame"),
+            (np.ma.masked_array(frame, [0, 0, 1]), None, "The frame .* mask"),
             (np.stack([frame, frame]), None, r"had the shape \(3,\), this one has \(2, 3\)"),
             (frame, k - 1.0, "time stamps must increase"),
             (frame, np.nan, "must be finite"),
@@ -208,6 +209,7 @@ def test_only_what_runs_begins_anew(live):
     with pytest.raises(ValueError, match="0 performances run"):
         live.reset(0)
     live.step(np.zeros((2, 3)))
+    live.reset([])
     for stream in (2, -3, "a", 0.5):
         with pytest.raises(ValueError, match="2 performances run"):
             live.reset(stream)
