@@ -269,9 +269,11 @@ def time_left(known, elapsed, phase, rate):
         # As if so many frames of the pattern had passed at the mean pace before.
         pace = (elapsed + prior * known.tick) / np.maximum(phase + prior, 1)
         out[f"phase left, at the pace so far and of {prior} frames before"] = left * pace
-    out["mean of the first two: `time_left`"] = (less + usual) / 2
+    out["mean of the first two"] = (less + usual) / 2
     share = phase / (P - 1)
-    out["the first two, the second by the share of phase"] = (1 - share) * less + share * usual
+    out["the first two, the second by the share of phase: `time_left`"] = (
+        1 - share
+    ) * less + share * usual
     return out
 
 

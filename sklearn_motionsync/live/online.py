@@ -19,7 +19,7 @@ from ..synchronizers.base import Synchronizer
 from ..synchronizers.dense import DenseSynchronizer
 from .calibration import calibrate
 from .compared import LiveFeatures
-from .session import Session
+from .session import Session, gathered
 from .stream import UNKNOWN, Course
 from .times import as_stamps
 
@@ -222,8 +222,9 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
     def time_left(self):
         """How long the performance will go on: a guess, without promise.
 
-        The mean of two: what is left of the mean duration after the time that has passed, and what
-        is left of the phase at the mean pace. docs/method.md has a table of how wrong it is.
+        A mean of what is left of the mean duration after the time that has passed, and of what is
+        left of the phase at the mean pace, which counts the more the farther the phase is.
+        docs/method.md has a table of how wrong it is.
 
         Returns
         -------
@@ -236,7 +237,10 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
 
     @property
     def history(self):
-        """Phases, rates and confidences since the last ``reset`` of all: `LivePhase` of arrays."""
+        """Phases, rates and confidences since the last ``reset`` of all: `LivePhase` of arrays.
+
+        Of a stream that goes on and on it is the last 100,000 frames.
+        """
         check_is_fitted(self)
         return self._session.history
 
@@ -274,10 +278,8 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         found = []
         for i, (x, t) in enumerate(zip(performances, times, strict=True)):
             stamps = as_stamps(t, len(x), self.frame_rate, performances.called(i))
-            session = Session()
-            for frame, stamp in zip(x.astype(np.float64), stamps, strict=True):
-                session.step(self._following, frame, stamp)
-            found.append(session.history)
+            session, frames = Session(), zip(x.astype(np.float64), stamps, strict=True)
+            found.append(gathered([session.step(self._following, *frame) for frame in frames]))
         return found
 
     def _course(self, mean, calibration=UNKNOWN):

@@ -1,10 +1,15 @@
 """Sessions: what runs, since when, and what has been said of it."""
 
+from collections import deque
+
 import numpy as np
 
 from .stream import LivePhase, Stream
 
-__all__ = ["Session"]
+__all__ = ["Session", "gathered"]
+
+# Answers that are kept; a stream may go on for days.
+_KEPT = 100_000
 
 
 class Session:
@@ -18,14 +23,12 @@ class Session:
 
     def __init__(self):
         self._stream = self._shape = self.stamp = None
-        self._said, self._began = [], None
+        self._said, self._began = deque(maxlen=_KEPT), None
 
     @property
     def history(self):
         """What was said, frame by frame: `LivePhase` of arrays."""
-        if not self._said:
-            return LivePhase(*np.empty((3, 0)))
-        return LivePhase(*(np.array(values) for values in zip(*self._said, strict=True)))
+        return gathered(self._said) if self._said else LivePhase(*np.empty((3, 0)))
 
     def reset(self, stream=None):
         """Begin anew: all, or some streams."""
@@ -71,8 +74,15 @@ class Session:
         """Frames of the training performances until the end, of every performance that runs."""
         if not self._said:
             return course.duration
-        elapsed = self.stamp - self._began
-        phase = np.atleast_1d(self._said[-1].phase)
-        by_phase = course.duration * (1 - phase / (course.n_frames - 1))
-        left = (by_phase + np.maximum(course.duration - elapsed, 0)) / 2
+        # Who begins anew with the next frame has not begun.
+        begun = ~np.isnan(self._began)
+        elapsed = np.where(begun, self.stamp - self._began, 0)
+        share = np.where(begun, self._said[-1].phase, 0) / (course.n_frames - 1)
+        by_time = np.maximum(course.duration - elapsed, 0)
+        left = (1 - share) * by_time + share * course.duration * (1 - share)
         return left if len(self._shape) == 2 else float(left[0])
+
+
+def gathered(said):
+    """Answers one after the other as one, of arrays."""
+    return LivePhase(*(np.array(values) for values in zip(*said, strict=True)))

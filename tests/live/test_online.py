@@ -312,7 +312,7 @@ def test_who_begins_anew_does_not_come_from_where_it_was(live):
 
 
 def test_the_time_that_is_left(live):
-    """The mean of what is left of the mean duration, and of the phase at the mean pace."""
+    """A mean of what is left of the mean duration, and of the phase at the mean pace."""
     live = copy.deepcopy(live).set_params(frame_rate=10)
     live.reset()
     assert live.time_left() == pytest.approx(live.duration_ / 10)
@@ -321,12 +321,13 @@ def test_the_time_that_is_left(live):
         phase = live.step(frame, 100 + k / 10).phase
         mean = live.duration_ / 10
         assert live.time_left() == pytest.approx(
-            (max(mean - k / 10, 0) + mean * (1 - phase / (P - 1))) / 2
+            (1 - phase / (P - 1)) * (max(mean - k / 10, 0) + mean * phase / (P - 1))
         )
     live.reset()
     live.step(x[[0, 0]], 0)
     live.step(x[[9, 9]], 0.9)
     live.reset(0)
+    assert live.time_left()[0] == pytest.approx(live.duration_ / 10)
     live.step(x[[0, 10]], 1.0)
     first, second = live.time_left()
     assert first == pytest.approx(live.duration_ / 10, abs=0.2)
