@@ -74,12 +74,11 @@ class CausalDerivative:
         for held, weight in zip(self._held, self._weight, strict=True):
             weight *= keep
             weight += 1 - keep
-            # What is held is the mean of what has been seen.
+            # What is held is the mean of what has been seen: of the first alone, if that has no weight.
             held += np.where(weight > 0, (1 - keep) / np.where(weight > 0, weight, 1), 0) * (
                 velocity - held
             )
             velocity = held.copy()
-        self._held[:, lost] = 0
         self._last = np.where(seen, sample, self._last)
         self._age[seen] = 0
         self._steady = bool(seen.all() and (self._weight > 1 - 1e-12).all())

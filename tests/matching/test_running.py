@@ -110,3 +110,13 @@ def test_a_stream_begins_anew_and_the_others_go_on():
             late.advance(bases[1:, p])
     np.testing.assert_allclose(both.costs[0], alone.costs[0], atol=1e-12)
     np.testing.assert_allclose(both.costs[1], late.costs[0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("sample", "place"), [(1.0, 1.0), (1.0, 0.0), (0.0, 1.0)])
+def test_of_equal_ends_it_is_the_earliest(sample, place):
+    live = Running(Trellis(step_table(max_rate=2), 0.0, 8, running=True), np.full((9, 3), place))
+    for p in range(4):
+        live.advance(np.full((1, 3), sample))
+        ends, costs = live.best()
+        assert ends == 0
+        assert costs == (p + 1) * 3 * (sample - place) ** 2
