@@ -74,7 +74,7 @@ class CausalDerivative:
         for held, weight in zip(self._held, self._weight, strict=True):
             weight *= keep
             weight += 1 - keep
-            # What is held is the mean of what has been seen: of the first alone, if that has no weight.
+            # The mean of what has been seen; what had no weight is replaced.
             held += np.where(weight > 0, (1 - keep) / np.where(weight > 0, weight, 1), 0) * (
                 velocity - held
             )
