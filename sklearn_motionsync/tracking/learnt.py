@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .kalman import correct, whitening
+from .kalman import correct, squared_lengths, whitening
 from .process import Pace, Process, left_out, shrunk_covariance
 from .slopes import Slopes
 
@@ -136,7 +136,7 @@ def _limit(slopes, noise, velocities, step, memory):
     for p, variance in enumerate(noise):
         whiten = whitening(velocities + variance * np.eye(width))
         # Noise is expected, not drawn: a fit is not random.
-        here = np.square(slopes[:, p] @ whiten.T).sum(axis=1) + variance * np.square(whiten).sum()
+        here = squared_lengths(slopes[:, p] @ whiten.T) + variance * np.square(whiten).sum()
         surprise = smoothed(surprise, here / width, step, memory)
         largest = np.maximum(largest, surprise)
     # As often as a memory holds windows, velocities are independent of those before.
@@ -147,13 +147,13 @@ def _limit(slopes, noise, velocities, step, memory):
 def _possible(deviations, process, step, noise):
     """What distance of an observation is possible: at their own phase all takes are much nearer."""
     n, n_frames, width = deviations.shape
-    means, covariance, largest = np.zeros((n, 2 * width)), process.stationary, 0.0
+    means, covariance, largest = np.zeros((2, n, width)), process.stationary, 0.0
     for p in range(n_frames):
         if p:
             means, covariance = process.predict(means, covariance, step)
-        innovations = deviations[:, p] - means[:, :width]
+        innovations = deviations[:, p] - means[0]
         covariance, correction = correct(covariance, np.eye(width), innovations, noise)
-        means = means + innovations @ correction.gain.T
+        means = means + correction.moves
         largest = max(largest, float(correction.surprise.max()))
     return max(_POSSIBLE, _FARTHER * largest)
 
@@ -167,5 +167,7 @@ def smoothed(before, now, dt, memory):
 def at_phases(mean, phases):
     """The mean (P, n_features) at phases (n,): (n, n_features)."""
     left = np.minimum(phases.astype(np.intp), len(mean) - 2)
-    weight = (phases - left)[:, np.newaxis]
-    return mean[left] * (1 - weight) + mean[left + 1] * weight
+    postures = np.diff(mean, axis=0)[left]
+    postures *= (phases - left)[:, np.newaxis]
+    postures += mean[left]
+    return postures

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .kalman import correct, whitening
+from .kalman import correct, squared_lengths, whitening
 from .learnt import at_phases, smoothed
 from .particles import Particles, weighted_median
 from .slopes import Slopes
@@ -97,7 +97,7 @@ class Running:
         """Begin at phases, knowing nothing of what departs from the mean."""
         learnt, n = self.learnt, len(phases)
         self.particles = Particles(phases, learnt.pace.begin(self.rng, n))
-        self.means = np.zeros((n, 2 * learnt.mean.shape[1]))
+        self.means = np.zeros((2, n, learnt.mean.shape[1]))
         self.covariance = learnt.process.stationary
         self.slopes, self.anew = None, np.zeros(n, dtype=bool)
         self.surprise, self.sought = 1.0, 0.0
@@ -111,17 +111,17 @@ class Running:
 
     def _go_on(self, dt, matrix):
         """Let a time pass."""
-        learnt, width = self.learnt, self.learnt.mean.shape[1]
+        learnt = self.learnt
         if self.particles.effective_size < _DRAWN_BELOW * learnt.n_particles:
             chosen = self.particles.draw(self.rng)
-            self.means = self.means[chosen]
+            self.means = self.means[:, chosen]
             if self.slopes is not None:
                 self.slopes.keep(chosen)
         self.means, self.covariance = learnt.process.predict(self.means, self.covariance, dt)
         self.anew = self.particles.move(dt, learnt.pace, learnt.clock, self.rng)
         # The body stays where it is; only what it departs from is the beginning now.
         jump = learnt.mean[-1] - learnt.mean[0]
-        self.means[self.anew, :width] += jump
+        self.means[0, self.anew] += jump
         if self.slopes is not None and self.slopes.ages.shape[1] == len(matrix):
             self.slopes.wait(dt)
             self.slopes.shift(self.anew, matrix @ jump)
@@ -133,7 +133,7 @@ class Running:
         some = matrix[seen]
         with np.errstate(over="ignore", invalid="ignore"):
             residuals = values[seen] - expected @ some.T
-            innovations = residuals - self.means[:, : some.shape[1]] @ some.T
+            innovations = residuals - self.means[0] @ some.T
             covariance, correction = correct(self.covariance, some, innovations, self.learnt.noise)
             # Not a number is impossible, too.
             possible = bool((correction.surprise <= self.learnt.possible).any())
@@ -141,7 +141,7 @@ class Running:
             self._wonder(2 * self.learnt.limit, dt)
             return
         self.taken = seen
-        self.means = self.means + innovations @ correction.gain.T
+        self.means += correction.moves
         self.covariance = covariance
         if self.slopes is None:
             self.slopes = Slopes(len(expected), len(matrix), self.learnt.clock.window)
@@ -156,7 +156,7 @@ class Running:
         learnt, clock, some = self.learnt, self.learnt.clock, matrix[known]
         slopes, noise = self.slopes.of(known)
         spread = some @ learnt.velocities @ some.T + np.diag(learnt.noise**2 * noise)
-        distances = np.square(slopes @ whitening(spread).T).sum(axis=1)
+        distances = squared_lengths(slopes @ whitening(spread).T)
         # Evidence counts by the time that it stems from, so that the frame rate does not matter.
         share = 100 * min(dt, clock.window) / clock.duration
         self.particles.weigh(-0.5 * share / learnt.tempering * distances)
@@ -178,9 +178,10 @@ class Running:
         """What the particles say together: mean and covariance of a mixture."""
         particles, width = self.particles, expected.shape[1]
         weights = particles.weights
-        postures = expected + self.means[:, :width]
+        postures = expected + self.means[0]
         posture = weights @ postures
-        off = (postures - posture) * np.sqrt(weights)[:, np.newaxis]
+        off = postures - posture
+        off *= np.sqrt(weights)[:, np.newaxis]
         return Estimate(
             posture,
             self.covariance[:width, :width] + off.T @ off,
