@@ -100,14 +100,14 @@ class Running:
         self.means = np.zeros((2, n, learnt.mean.shape[1]))
         self.covariance = learnt.process.stationary
         self.slopes, self.anew = None, np.zeros(n, dtype=bool)
-        self.surprise, self.sought = 1.0, 0.0
+        self.surprise, self.sought = np.ones(2), 0.0
 
     def _seek(self):
         """Seek the phase anew, over all of the clock."""
         n = self.learnt.n_particles
         self._begin((self.rng.random() + np.arange(n)) / n * self.learnt.clock.last)
         # Only what is seen from now on tells that it is found.
-        self.begins, self.surprise = True, self.learnt.limit
+        self.begins, self.surprise = True, self.learnt.limits
 
     def _go_on(self, dt, matrix):
         """Let a time pass."""
@@ -138,7 +138,7 @@ class Running:
             # Not a number is impossible, too.
             possible = bool((correction.surprise <= self.learnt.possible).any())
         if not possible:
-            self._wonder(2 * self.learnt.limit, dt)
+            self._wonder(2 * self.learnt.limits, dt)
             return
         self.taken = seen
         self.means += correction.moves
@@ -146,13 +146,23 @@ class Running:
         if self.slopes is None:
             self.slopes = Slopes(len(expected), len(matrix), self.learnt.clock.window)
         self.slopes.add(residuals, seen)
-        self._weigh(self.slopes.known(seen), matrix, dt)
+        departure = self._departure(self.particles.weights @ residuals, some)
+        known = self.slopes.known(seen)
+        surprise = self._weigh(known, matrix, dt) if known.any() else self.surprise[0]
+        self._wonder(np.array([surprise, departure]), dt)
+
+    def _departure(self, residuals, some):
+        """Surprise by a posture of which residuals (n_seen,) from the mean are seen."""
+        learnt = self.learnt
+        spread = some @ learnt.process.covariance @ some.T + learnt.noise**2 * np.eye(len(some))
+        white = whitening(spread) @ residuals
+        return self._of_fewer(white @ white / len(some), len(some))
 
     def _weigh(self, known, matrix, dt):
-        """Weigh the particles by the velocities that are known, bool (n_observed,)."""
-        n_known = int(known.sum())
-        if n_known == 0:
-            return
+        """Weigh the particles by the velocities that are known, bool (n_observed,).
+
+        Returns their surprise.
+        """
         learnt, clock, some = self.learnt, self.learnt.clock, matrix[known]
         slopes, noise = self.slopes.of(known)
         spread = some @ learnt.velocities @ some.T + np.diag(learnt.noise**2 * noise)
@@ -160,18 +170,19 @@ class Running:
         # Evidence counts by the time that it stems from, so that the frame rate does not matter.
         share = 100 * min(dt, clock.window) / clock.duration
         self.particles.weigh(-0.5 * share / learnt.tempering * distances)
-        surprise = float(self.particles.weights @ distances) / n_known
-        # The mean of fewer numbers varies more.
-        fewer = min(np.sqrt(n_known / learnt.mean.shape[1]), 1.0)
-        self._wonder(1 + (surprise - 1) * fewer, dt)
+        return self._of_fewer(self.particles.weights @ distances / len(some), len(some))
+
+    def _of_fewer(self, surprise, n):
+        """A surprise that is the mean of n numbers: that of fewer varies more."""
+        return 1 + (surprise - 1) * min(np.sqrt(n / self.learnt.mean.shape[1]), 1.0)
 
     def _wonder(self, surprise, dt):
-        """Remember a surprise, of which too much says that the phase is lost."""
-        limit = self.learnt.limit
+        """Remember surprises (2,), of which too much says that the phase is lost."""
+        limits = self.learnt.limits
         self.surprise = smoothed(self.surprise, surprise, dt, self.learnt.clock.memory)
         if self.lost:
-            self.lost = bool(self.surprise > (1 + limit) / 2)
-        elif self.surprise > limit:
+            self.lost = bool((self.surprise > (1 + limits) / 2).any())
+        elif (self.surprise > limits).any():
             self.lost, self.sought = True, np.inf
 
     def _estimate(self, expected):

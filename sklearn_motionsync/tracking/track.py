@@ -25,7 +25,7 @@ class Track(NamedTuple):
         How many particles of equal weight would tell as much, ``1 / sum w^2``. Of a smoothed take:
         how many different particles its paths go through.
     lost : ndarray of bool, shape (n_frames,)
-        Whether the body does not move as the model says at any phase.
+        Whether the body moves otherwise, or looks otherwise, than the model says at any phase.
     """
 
     postures: np.ndarray

@@ -172,6 +172,15 @@ def test_other_movements_are_lost_and_found_again(tracker):
     assert np.abs(track.phases[-20:] - np.arange(40, 60)).max() < 5
 
 
+def test_who_moves_alike_but_looks_otherwise_is_lost(tracker):
+    """Postures four standard deviations of people off; half of that are nobody's mistake."""
+    noise = np.sqrt(np.diag(tracker.covariance_) + tracker.noise**2)
+    for off, lost in ((1.5, False), (4.0, True)):
+        track = tracker.track(movement(1.05) + off * noise * [1, -1, 1])
+        assert track.lost[20:].any() == lost
+    assert tracker.departure_limit_ == 9
+
+
 def test_a_second_performance_begins_anew(tracker):
     """Right after the first, and after a pause at the end."""
     one = movement(1.05)
