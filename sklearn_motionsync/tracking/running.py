@@ -181,7 +181,9 @@ class Running:
         limits = self.learnt.limits
         self.surprise = smoothed(self.surprise, surprise, dt, self.learnt.clock.memory)
         if self.lost:
-            self.lost = bool((self.surprise > (1 + limits) / 2).any())
+            # Who looks odd and moves alike is found: style persists.
+            found = np.array([(1 + limits[0]) / 2, limits[1]])
+            self.lost = bool((self.surprise > found).any())
         elif (self.surprise > limits).any():
             self.lost, self.sought = True, np.inf
 

@@ -39,7 +39,8 @@ class Track(NamedTuple):
     def of(cls, estimates, dtype):
         """Estimates of frames one after the other, postures in a precision."""
         postures, covariances, *numbers = map(np.array, zip(*estimates, strict=True))
-        return cls(postures.astype(dtype), covariances.astype(dtype), *numbers)
+        postures, covariances = (x.astype(dtype, copy=False) for x in (postures, covariances))
+        return cls(postures, covariances, *numbers)
 
     def __repr__(self):
         postures = np.atleast_2d(self.postures)
