@@ -63,6 +63,10 @@ class Running:
         self._begin(np.where(somewhere, np.linspace(0, learnt.clock.last, n), 0.0))
 
     def step(self, values, time, matrix):
+        """Take an observation, and say what is known: an `Estimate`. Parameters as of `take`."""
+        return self._estimate(self.take(values, time, matrix))
+
+    def take(self, values, time, matrix):
         """Take an observation.
 
         Parameters
@@ -76,7 +80,8 @@ class Running:
 
         Returns
         -------
-        Estimate
+        ndarray, shape (n_particles, n_features)
+            The mean at the phases of the particles.
         """
         dt = 0.0 if self.time is None else time - self.time
         self.begins, self.time, self.sought = self.time is None, time, self.sought + dt
@@ -89,7 +94,7 @@ class Running:
         seen = ~np.isnan(values)
         if seen.any():
             self._observe(values, seen, matrix, expected, dt)
-        return self._estimate(expected)
+        return expected
 
     # -- steps of a step --------------------------------------------------------------------
 

@@ -67,10 +67,10 @@ def smooth(learnt, seed, values, times, matrix):
     running, pasts = Running(learnt, seed), []
     for now, time in zip(values, times, strict=True):
         dt = 0.0 if running.time is None else time - running.time
-        lost = running.step(now, time, matrix).lost
+        running.take(now, time, matrix)
         p, seen = running.particles, np.where(running.taken, now, np.nan)
-        past = dt, p.phases, p.logs, p.log_weights, running.anew, running.begins, seen, lost
-        pasts.append(_Past(*past))
+        past = dt, p.phases, p.logs, p.log_weights, running.anew, running.begins, seen
+        pasts.append(_Past(*past, running.lost))
     chosen = _draw_back(learnt, pasts, running.rng)
     return _estimates(learnt, pasts, chosen, matrix)
 
