@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .kalman import correct, whitening
+from .kalman import correct, squared_lengths, whitening
 from .process import Pace, Process, left_out, shrunk_covariance
 from .slopes import Slopes
 
@@ -18,6 +18,8 @@ _WINDOWS = 3.0
 _EXCESS = 2.0
 # And so many standard deviations of what is expected are by chance.
 _CHANCE = 4.0
+# Postures three standard deviations of people from the mean, for long, are of nobody.
+_NOBODY = 9.0
 # An observation so far from all that is expected, in variances a number, or so many times farther
 # than any of the training takes, shows something else.
 _POSSIBLE, _FARTHER = 100.0, 10.0
@@ -71,8 +73,8 @@ class Learnt(NamedTuple):
     clock : Clock
     velocities : ndarray, shape (n_features, n_features)
         Covariance of what causal velocities of people differ by from that of the mean.
-    limit : float
-        Surprise by velocities that no person of the training set reaches, where 1 is expected.
+    limits : ndarray, shape (2,)
+        Surprise by velocities, and by postures, that nobody reaches, where 1 is expected.
     possible : float
         The same of postures at a single frame, far beyond which none is believed.
     noise, tempering : float
@@ -84,7 +86,7 @@ class Learnt(NamedTuple):
     pace: Pace
     clock: Clock
     velocities: np.ndarray
-    limit: float
+    limits: np.ndarray
     possible: float
     noise: float
     tempering: float
@@ -110,11 +112,15 @@ def learn(warped, rates, groups, clock, noise, tempering, n_particles):
     process, pace = Process.learn(deviations, step), Pace.learn(rates, step)
     slopes, unit_noise = _slopes(deviations, step, clock.window)
     velocities = shrunk_covariance(slopes)
-    limit = _limit(slopes, unit_noise * noise**2, velocities, step, clock.memory)
-    possible = _possible(deviations, process, step, noise)
-    mean = warped.mean(axis=0)
-    limits, settings = (limit, possible), (noise, tempering, n_particles)
-    return Learnt(mean, process, pace, clock, velocities, *limits, *settings)
+    fast = _largest(slopes, unit_noise * noise**2, velocities, step, clock.memory)
+    noises = np.full(deviations.shape[1], noise**2)
+    far = _largest(deviations, noises, process.covariance, step, clock.memory)
+    # As often as a memory holds windows, velocities are independent of those before.
+    chance = _CHANCE * np.sqrt(2 / (warped.shape[2] * _WINDOWS))
+    excess = max(_EXCESS * (fast - 1), chance), max(_EXCESS * (far - 1), _NOBODY - 1)
+    limits, possible = 1 + np.array(excess), _possible(deviations, process, step, noise)
+    known = warped.mean(axis=0), process, pace, clock, velocities, limits, possible
+    return Learnt(*known, noise, tempering, n_particles)
 
 
 def _slopes(deviations, step, window):
@@ -130,30 +136,28 @@ def _slopes(deviations, step, window):
     return np.stack(values, axis=1), np.array([a[0] for a in noise])
 
 
-def _limit(slopes, noise, velocities, step, memory):
-    """What surprise is too much: beyond that of all takes at their own phase."""
-    surprise, largest, width = 1.0, 1.0, slopes.shape[-1]
+def _largest(departures, noise, covariance, step, memory):
+    """The largest surprise of takes (n, n_frames, n_features) at their own phase, at least 1."""
+    surprise, largest, width = 1.0, 1.0, departures.shape[-1]
     for p, variance in enumerate(noise):
-        whiten = whitening(velocities + variance * np.eye(width))
+        whiten = whitening(covariance + variance * np.eye(width))
         # Noise is expected, not drawn: a fit is not random.
-        here = np.square(slopes[:, p] @ whiten.T).sum(axis=1) + variance * np.square(whiten).sum()
+        here = squared_lengths(departures[:, p] @ whiten.T) + variance * np.square(whiten).sum()
         surprise = smoothed(surprise, here / width, step, memory)
         largest = np.maximum(largest, surprise)
-    # As often as a memory holds windows, velocities are independent of those before.
-    chance = _CHANCE * np.sqrt(2 / (width * _WINDOWS))
-    return float(1 + max(_EXCESS * (np.max(largest) - 1), chance))
+    return float(np.max(largest))
 
 
 def _possible(deviations, process, step, noise):
     """What distance of an observation is possible: at their own phase all takes are much nearer."""
     n, n_frames, width = deviations.shape
-    means, covariance, largest = np.zeros((n, 2 * width)), process.stationary, 0.0
+    means, covariance, largest = np.zeros((2, n, width)), process.stationary, 0.0
     for p in range(n_frames):
         if p:
             means, covariance = process.predict(means, covariance, step)
-        innovations = deviations[:, p] - means[:, :width]
+        innovations = deviations[:, p] - means[0]
         covariance, correction = correct(covariance, np.eye(width), innovations, noise)
-        means = means + innovations @ correction.gain.T
+        means = means + correction.moves
         largest = max(largest, float(correction.surprise.max()))
     return max(_POSSIBLE, _FARTHER * largest)
 
@@ -167,5 +171,7 @@ def smoothed(before, now, dt, memory):
 def at_phases(mean, phases):
     """The mean (P, n_features) at phases (n,): (n, n_features)."""
     left = np.minimum(phases.astype(np.intp), len(mean) - 2)
-    weight = (phases - left)[:, np.newaxis]
-    return mean[left] * (1 - weight) + mean[left + 1] * weight
+    postures = np.diff(mean, axis=0)[left]
+    postures *= (phases - left)[:, np.newaxis]
+    postures += mean[left]
+    return postures

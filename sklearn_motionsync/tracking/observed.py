@@ -46,6 +46,11 @@ def as_projection(projection, n_features):
             "projection must be a matrix (n_observed, n_features), or the pair (matrix, offset); "
             f"got a tuple of {len(projection)}."
         )
+    if isinstance(projection, list) and len({np.ndim(part) for part in projection}) > 1:
+        raise ValueError(
+            "projection must be a matrix (n_observed, n_features), or the tuple (matrix, offset); "
+            "got a list of things of several dimensions."
+        )
     pair = projection if isinstance(projection, tuple) else (projection,)
     matrix = as_numbers(pair[0], "The projection", dtype=np.float64)
     if matrix.ndim != 2 or matrix.shape[1] != n_features or len(matrix) == 0:
@@ -140,10 +145,9 @@ def _takes_of_matrix(X, on_rows):
 def _one_each(times, n):
     if times is None:
         return [None] * n
-    if len(times) != n:
-        raise ValueError(
-            f"There are {n} takes, but {len(times)} sequences of times: give one for each."
-        )
+    given = len(times) if np.iterable(times) else "no"
+    if given != n:
+        raise ValueError(f"There are {n} takes, but {given} sequences of times: give one for each.")
     return list(times)
 
 

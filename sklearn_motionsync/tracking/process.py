@@ -68,7 +68,8 @@ class Process(NamedTuple):
 
         Parameters
         ----------
-        means : ndarray, shape (n, 2 n_features)
+        means : ndarray, shape (2, n, n_features)
+            Of n hypotheses: their values, then derivatives.
         covariance : ndarray, shape (2 n_features, 2 n_features)
         dt : float
 
@@ -76,10 +77,8 @@ class Process(NamedTuple):
         -------
         means, covariance
         """
-        here, width = self.transition(dt), means.shape[1] // 2
-        values, derivatives = means[:, :width], means[:, width:]
-        parts = [a * values + b * derivatives for a, b in here.tolist()]
-        means = np.concatenate(parts, axis=1)
+        here = self.transition(dt)
+        means = (here @ means.reshape(2, -1)).reshape(means.shape)
         for _ in range(2):
             covariance = (here @ covariance.reshape(2, -1)).reshape(covariance.shape).T
         # Q = S - A S A', so that what is stationary stays.

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .kalman import correct, whitening
+from .kalman import correct, squared_lengths, whitening
 from .learnt import at_phases, smoothed
 from .particles import Particles, weighted_median
 from .slopes import Slopes
@@ -63,6 +63,10 @@ class Running:
         self._begin(np.where(somewhere, np.linspace(0, learnt.clock.last, n), 0.0))
 
     def step(self, values, time, matrix):
+        """Take an observation, and say what is known: an `Estimate`. Parameters as of `take`."""
+        return self._estimate(self.take(values, time, matrix))
+
+    def take(self, values, time, matrix):
         """Take an observation.
 
         Parameters
@@ -76,7 +80,8 @@ class Running:
 
         Returns
         -------
-        Estimate
+        ndarray, shape (n_particles, n_features)
+            The mean at the phases of the particles.
         """
         dt = 0.0 if self.time is None else time - self.time
         self.begins, self.time, self.sought = self.time is None, time, self.sought + dt
@@ -89,7 +94,7 @@ class Running:
         seen = ~np.isnan(values)
         if seen.any():
             self._observe(values, seen, matrix, expected, dt)
-        return self._estimate(expected)
+        return expected
 
     # -- steps of a step --------------------------------------------------------------------
 
@@ -97,31 +102,31 @@ class Running:
         """Begin at phases, knowing nothing of what departs from the mean."""
         learnt, n = self.learnt, len(phases)
         self.particles = Particles(phases, learnt.pace.begin(self.rng, n))
-        self.means = np.zeros((n, 2 * learnt.mean.shape[1]))
+        self.means = np.zeros((2, n, learnt.mean.shape[1]))
         self.covariance = learnt.process.stationary
         self.slopes, self.anew = None, np.zeros(n, dtype=bool)
-        self.surprise, self.sought = 1.0, 0.0
+        self.surprise, self.sought = np.ones(2), 0.0
 
     def _seek(self):
         """Seek the phase anew, over all of the clock."""
         n = self.learnt.n_particles
         self._begin((self.rng.random() + np.arange(n)) / n * self.learnt.clock.last)
         # Only what is seen from now on tells that it is found.
-        self.begins, self.surprise = True, self.learnt.limit
+        self.begins, self.surprise = True, self.learnt.limits
 
     def _go_on(self, dt, matrix):
         """Let a time pass."""
-        learnt, width = self.learnt, self.learnt.mean.shape[1]
+        learnt = self.learnt
         if self.particles.effective_size < _DRAWN_BELOW * learnt.n_particles:
             chosen = self.particles.draw(self.rng)
-            self.means = self.means[chosen]
+            self.means = self.means[:, chosen]
             if self.slopes is not None:
                 self.slopes.keep(chosen)
         self.means, self.covariance = learnt.process.predict(self.means, self.covariance, dt)
         self.anew = self.particles.move(dt, learnt.pace, learnt.clock, self.rng)
         # The body stays where it is; only what it departs from is the beginning now.
         jump = learnt.mean[-1] - learnt.mean[0]
-        self.means[self.anew, :width] += jump
+        self.means[0, self.anew] += jump
         if self.slopes is not None and self.slopes.ages.shape[1] == len(matrix):
             self.slopes.wait(dt)
             self.slopes.shift(self.anew, matrix @ jump)
@@ -133,54 +138,68 @@ class Running:
         some = matrix[seen]
         with np.errstate(over="ignore", invalid="ignore"):
             residuals = values[seen] - expected @ some.T
-            innovations = residuals - self.means[:, : some.shape[1]] @ some.T
+            innovations = residuals - self.means[0] @ some.T
             covariance, correction = correct(self.covariance, some, innovations, self.learnt.noise)
             # Not a number is impossible, too.
             possible = bool((correction.surprise <= self.learnt.possible).any())
         if not possible:
-            self._wonder(2 * self.learnt.limit, dt)
+            self._wonder(2 * self.learnt.limits, dt)
             return
         self.taken = seen
-        self.means = self.means + innovations @ correction.gain.T
+        self.means += correction.moves
         self.covariance = covariance
         if self.slopes is None:
             self.slopes = Slopes(len(expected), len(matrix), self.learnt.clock.window)
         self.slopes.add(residuals, seen)
-        self._weigh(self.slopes.known(seen), matrix, dt)
+        departure = self._departure(self.particles.weights @ residuals, some)
+        known = self.slopes.known(seen)
+        surprise = self._weigh(known, matrix, dt) if known.any() else self.surprise[0]
+        self._wonder(np.array([surprise, departure]), dt)
+
+    def _departure(self, residuals, some):
+        """Surprise by a posture of which residuals (n_seen,) from the mean are seen."""
+        learnt = self.learnt
+        spread = some @ learnt.process.covariance @ some.T + learnt.noise**2 * np.eye(len(some))
+        white = whitening(spread) @ residuals
+        return self._of_fewer(white @ white / len(some), len(some))
 
     def _weigh(self, known, matrix, dt):
-        """Weigh the particles by the velocities that are known, bool (n_observed,)."""
-        n_known = int(known.sum())
-        if n_known == 0:
-            return
+        """Weigh the particles by the velocities that are known, bool (n_observed,).
+
+        Returns their surprise.
+        """
         learnt, clock, some = self.learnt, self.learnt.clock, matrix[known]
         slopes, noise = self.slopes.of(known)
         spread = some @ learnt.velocities @ some.T + np.diag(learnt.noise**2 * noise)
-        distances = np.square(slopes @ whitening(spread).T).sum(axis=1)
+        distances = squared_lengths(slopes @ whitening(spread).T)
         # Evidence counts by the time that it stems from, so that the frame rate does not matter.
         share = 100 * min(dt, clock.window) / clock.duration
         self.particles.weigh(-0.5 * share / learnt.tempering * distances)
-        surprise = float(self.particles.weights @ distances) / n_known
-        # The mean of fewer numbers varies more.
-        fewer = min(np.sqrt(n_known / learnt.mean.shape[1]), 1.0)
-        self._wonder(1 + (surprise - 1) * fewer, dt)
+        return self._of_fewer(self.particles.weights @ distances / len(some), len(some))
+
+    def _of_fewer(self, surprise, n):
+        """A surprise that is the mean of n numbers: that of fewer varies more."""
+        return 1 + (surprise - 1) * min(np.sqrt(n / self.learnt.mean.shape[1]), 1.0)
 
     def _wonder(self, surprise, dt):
-        """Remember a surprise, of which too much says that the phase is lost."""
-        limit = self.learnt.limit
+        """Remember surprises (2,), of which too much says that the phase is lost."""
+        limits = self.learnt.limits
         self.surprise = smoothed(self.surprise, surprise, dt, self.learnt.clock.memory)
         if self.lost:
-            self.lost = bool(self.surprise > (1 + limit) / 2)
-        elif self.surprise > limit:
+            # Who looks odd and moves alike is found: style persists.
+            found = np.array([(1 + limits[0]) / 2, limits[1]])
+            self.lost = bool((self.surprise > found).any())
+        elif (self.surprise > limits).any():
             self.lost, self.sought = True, np.inf
 
     def _estimate(self, expected):
         """What the particles say together: mean and covariance of a mixture."""
         particles, width = self.particles, expected.shape[1]
         weights = particles.weights
-        postures = expected + self.means[:, :width]
+        postures = expected + self.means[0]
         posture = weights @ postures
-        off = (postures - posture) * np.sqrt(weights)[:, np.newaxis]
+        off = postures - posture
+        off *= np.sqrt(weights)[:, np.newaxis]
         return Estimate(
             posture,
             self.covariance[:width, :width] + off.T @ off,

@@ -39,8 +39,8 @@ class Slopes:
             one += dt * zero
             for moment in (zero, one, two):
                 moment *= share
-        self.values[1] += dt * self.values[0]
-        self.values *= left
+        on = left * np.array([[1.0, 0.0], [dt, 1.0]])
+        self.values = (on @ self.values.reshape(2, -1)).reshape(self.values.shape)
 
     def add(self, values, seen):
         """Take values (n, n_seen) of the features that are seen now, bool (width,)."""
@@ -67,7 +67,8 @@ class Slopes:
         zeros, ones, twos = self.squares[:, known]
         spread = zero * two - one**2
         values, aged = self.values[:, :, known]
-        slopes = (one / spread) * values - (zero / spread) * aged
+        slopes = (one / spread) * values
+        slopes -= (zero / spread) * aged
         noise = (zero**2 * twos - 2 * zero * one * ones + one**2 * zeros) / spread**2
         return slopes, noise
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .kalman import correct
+from .kalman import Correction, correct
 from .learnt import at_phases
 from .particles import systematic
 from .running import Estimate, Running
@@ -15,6 +15,8 @@ __all__ = ["smooth"]
 _PATHS = 20
 # Frames of the clock by which a path may miss where a particle would have gone.
 _LOOSE = 0.5
+# Frames of which the way back keeps all states at once.
+_PART = 100
 
 
 class _Past(NamedTuple):
@@ -31,14 +33,15 @@ class _Past(NamedTuple):
 
 
 class _Passed(NamedTuple):
-    """What a backwards pass needs of a frame of the filter along known phases."""
+    """What a backwards pass needs of a frame of the filter along known phases.
 
-    expected: np.ndarray
-    means: np.ndarray
-    covariance: np.ndarray
-    matrix: np.ndarray
-    innovations: np.ndarray
-    correction: object
+    Postures are (n_paths, n_features); the spread is what of the covariance of the states concerns
+    the values, (2 n_features, n_features); a correction is None where nothing is seen.
+    """
+
+    postures: np.ndarray
+    spread: np.ndarray
+    correction: Correction | None
 
 
 def smooth(learnt, seed, values, times, matrix):
@@ -64,10 +67,10 @@ def smooth(learnt, seed, values, times, matrix):
     running, pasts = Running(learnt, seed), []
     for now, time in zip(values, times, strict=True):
         dt = 0.0 if running.time is None else time - running.time
-        lost = running.step(now, time, matrix).lost
+        running.take(now, time, matrix)
         p, seen = running.particles, np.where(running.taken, now, np.nan)
-        past = dt, p.phases, p.logs, p.log_weights, running.anew, running.begins, seen, lost
-        pasts.append(_Past(*past))
+        past = dt, p.phases, p.logs, p.log_weights, running.anew, running.begins, seen
+        pasts.append(_Past(*past, running.lost))
     chosen = _draw_back(learnt, pasts, running.rng)
     return _estimates(learnt, pasts, chosen, matrix)
 
@@ -102,63 +105,83 @@ def _log_transition(learnt, before, after, chosen):
 
 
 def _estimates(learnt, pasts, chosen, matrix):
-    """The mixture over the paths, at every frame."""
-    passed = _along(learnt, pasts, chosen, matrix)
-    states = _back(learnt, pasts, passed)
-    out = []
-    for past, some, frame, (means, covariance) in zip(pasts, chosen, passed, states, strict=True):
-        width = frame.expected.shape[1]
-        postures = frame.expected + means[:, :width]
-        phases = past.phases[some]
-        rates = np.where(phases < learnt.clock.last, np.exp(past.logs[some]), 0.0)
-        spread = covariance[:width, :width] + np.cov(postures.T, ddof=0).reshape(width, width)
-        whole = postures.mean(axis=0), spread, np.median(phases), np.median(rates)
-        out.append(Estimate(*whole, float(len(np.unique(some))), past.lost))
-    return out
+    """The mixture over the paths, at every frame.
+
+    The filter runs along the paths twice, first for its states at the beginning of each part.
+    """
+    parts, states = [slice(i, i + _PART) for i in range(0, len(pasts), _PART)], [None]
+    for part in parts[:-1]:
+        states.append(_along(learnt, pasts[part], chosen[part], matrix, states[-1])[1])
+    out, later = [], None
+    for part, state in zip(parts[::-1], states[::-1], strict=True):
+        passed, _ = _along(learnt, pasts[part], chosen[part], matrix, state)
+        frames = zip(pasts[part], chosen[part], passed, strict=True)
+        for past, some, frame in reversed(list(frames)):
+            out.append(_estimate(learnt, past, some, *_smoothed(frame, later)))
+            later = _taken_back(learnt, past, frame, later)
+    return out[::-1]
 
 
-def _along(learnt, pasts, chosen, matrix):
-    """The Kalman filter along all paths, which one gain serves."""
+def _estimate(learnt, past, some, postures, covariance):
+    """What paths with these postures (n_paths, n_features) say together."""
+    phases = past.phases[some]
+    rates = np.where(phases < learnt.clock.last, np.exp(past.logs[some]), 0.0)
+    spread = covariance + np.cov(postures.T, ddof=0).reshape(covariance.shape)
+    whole = postures.mean(axis=0), spread, np.median(phases), np.median(rates)
+    return Estimate(*whole, float(len(np.unique(some))), past.lost)
+
+
+def _along(learnt, pasts, chosen, matrix, state):
+    """The Kalman filter along all paths, which one gain serves, on from a state.
+
+    Returns the frames as a list of `_Passed`, and the state after them: means and covariance.
+    """
     width, passed = learnt.mean.shape[1], []
     for past, some in zip(pasts, chosen, strict=True):
         if past.begins:
-            means = np.zeros((len(some), 2 * width))
-            covariance = learnt.process.stationary
+            means, covariance = np.zeros((2, len(some), width)), learnt.process.stationary
         else:
-            means, covariance = learnt.process.predict(means, covariance, past.dt)
-            means[past.anew[some], :width] += learnt.mean[-1] - learnt.mean[0]
-        expected = at_phases(learnt.mean, past.phases[some])
+            means, covariance = learnt.process.predict(*state, past.dt)
+            means[0, past.anew[some]] += learnt.mean[-1] - learnt.mean[0]
+        expected, correction = at_phases(learnt.mean, past.phases[some]), None
         seen = ~np.isnan(past.values)
-        rows = matrix[seen]
-        innovations, correction = None, None
         if seen.any():
-            innovations = past.values[seen] - (expected + means[:, :width]) @ rows.T
+            rows = matrix[seen]
+            innovations = past.values[seen] - (expected + means[0]) @ rows.T
             covariance, correction = correct(covariance, rows, innovations, learnt.noise)
-            means = means + innovations @ correction.gain.T
-        passed.append(_Passed(expected, means, covariance, rows, innovations, correction))
-    return passed
+            means = means + correction.moves
+        passed.append(_Passed(expected + means[0], covariance[:, :width].copy(), correction))
+        state = means, covariance
+    return passed, state
 
 
-def _back(learnt, pasts, passed):
-    """Means and covariance of the states at every frame, by what was seen later, too."""
-    shape = passed[-1].means.shape
-    adjoint, information = np.zeros(shape), np.zeros((shape[1], shape[1]))
-    states = []
-    for past, frame in zip(pasts[::-1], passed[::-1], strict=True):
-        spread = frame.covariance
-        means = frame.means - adjoint @ spread
-        states.append((means, spread - spread @ information @ spread))
-        if frame.correction is not None:
-            gain, weigh, n_features = *frame.correction[:2], len(frame.correction.weigh)
-            rest = np.eye(shape[1])
-            rest[:, :n_features] -= gain @ frame.matrix
-            adjoint = adjoint @ rest
-            adjoint[:, :n_features] -= frame.innovations @ weigh.T
-            information = rest.T @ information @ rest
-            information[:n_features, :n_features] += weigh @ frame.matrix
-        if past.begins:
-            adjoint, information = np.zeros_like(adjoint), np.zeros_like(information)
-        else:
-            whole = np.kron(learnt.process.transition(past.dt), np.eye(shape[1] // 2))
-            adjoint, information = adjoint @ whole, whole.T @ information @ whole
-    return states[::-1]
+def _smoothed(frame, later):
+    """Postures and their covariance at a frame, by what was seen later, too.
+
+    ``later`` is an adjoint (n_paths, 2 n_features) and an information (2 n_features,) * 2 of the
+    states at the frame; None if nothing later tells of them.
+    """
+    postures, spread = frame.postures, frame.spread
+    covariance = spread[: spread.shape[1]]
+    if later is None:
+        return postures, covariance
+    adjoint, information = later
+    return postures - adjoint @ spread, covariance - spread.T @ information @ spread
+
+
+def _taken_back(learnt, past, frame, later):
+    """What a frame and those later tell of the states at the frame before."""
+    if past.begins:
+        return None
+    (n, width), correction = frame.postures.shape, frame.correction
+    if later is None:
+        later = np.zeros((n, 2 * width)), np.zeros((2 * width, 2 * width))
+    adjoint, information = later
+    if correction is not None:
+        looks, rest = correction.looks, np.eye(2 * width)
+        rest[:, :width] -= correction.told.T @ looks
+        adjoint, information = adjoint @ rest, rest.T @ information @ rest
+        adjoint[:, :width] -= correction.white @ looks
+        information[:width, :width] += looks.T @ looks
+    whole = np.kron(learnt.process.transition(past.dt), np.eye(width))
+    return adjoint @ whole, whole.T @ information @ whole

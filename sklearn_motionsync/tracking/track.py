@@ -25,7 +25,7 @@ class Track(NamedTuple):
         How many particles of equal weight would tell as much, ``1 / sum w^2``. Of a smoothed take:
         how many different particles its paths go through.
     lost : ndarray of bool, shape (n_frames,)
-        Whether the body does not move as the model says at any phase.
+        Whether the body moves otherwise, or looks otherwise, than the model says at any phase.
     """
 
     postures: np.ndarray
@@ -39,7 +39,8 @@ class Track(NamedTuple):
     def of(cls, estimates, dtype):
         """Estimates of frames one after the other, postures in a precision."""
         postures, covariances, *numbers = map(np.array, zip(*estimates, strict=True))
-        return cls(postures.astype(dtype), covariances.astype(dtype), *numbers)
+        postures, covariances = (x.astype(dtype, copy=False) for x in (postures, covariances))
+        return cls(postures, covariances, *numbers)
 
     def __repr__(self):
         postures = np.atleast_2d(self.postures)

@@ -40,9 +40,9 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     4. Particles are weighed by causal *velocities*: what is seen should move as the mean does along
        the path of the particle. Style persists, so that the likelihood of postures would be far
        too sure; that of velocities is divided by ``tempering``.
-    5. If what is seen moves otherwise at all phases than people of the training set did, the
-       phase is lost: particles are spread over the whole clock, and again until one fits. A
-       movement that is over may begin anew.
+    5. If what is seen moves otherwise at all phases than people of the training set did, or stays
+       farther from the mean posture, the phase is lost: particles are spread over the whole clock,
+       and again until one fits. A movement that is over may begin anew.
 
     Parameters
     ----------
@@ -83,6 +83,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     surprise_limit_ : float
         Mean square of velocities in their standard deviations, over 9 % of the mean duration,
         beyond which the phase is lost; 1 is expected.
+    departure_limit_ : float
+        The same of departures from the mean posture: at least 9, three standard deviations.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -98,8 +100,11 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     Nothing seen (all NaN) is no error: the movement goes on by itself, and the covariance grows. An
     observation ten standard deviations from all that is expected, as the root mean square of its
     numbers, is taken as not seen, if no training performance came near that; where it stays, the
-    phase is lost. A take may begin at any
-    phase; most particles begin at the first frame.
+    phase is lost. A take may begin at any phase; most particles begin at the first frame. After a
+    gap in time as long as the movement, particles wait at the end, for another beginning.
+
+    Who stands still in a posture of the action, or does it backwards, is not called lost: postures
+    are possible, and velocities not odd enough. Of few people the limit of velocities is tight.
 
     Examples
     --------
@@ -204,7 +209,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         self.covariance_ = self._model.process.covariance
         self.length_scale_ = self._model.process.length_scale
         self.rate_spread_, self.rate_memory_ = self._model.pace
-        self.surprise_limit_ = self._model.limit
+        self.surprise_limit_, self.departure_limit_ = map(float, self._model.limits)
         self._seed = int(check_random_state(self.random_state).randint(2**31 - 1))
         self._running = None
         return self
@@ -242,8 +247,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         """Repair takes that are over: what is known at every frame by all that was seen.
 
         Phases are drawn back from the end by the particles of the filter, 20 paths of them, and a
-        smoother estimates the deviations along each. On its way back it needs about 0.1 MB a frame
-        of 37 features.
+        smoother estimates the deviations along each. It needs about 0.04 MB a frame of 37 features.
 
         Parameters
         ----------

@@ -80,6 +80,21 @@ def test_postures_at_known_phases(fitted, seen, method, projection):
         np.testing.assert_allclose(answer.covariances[i], covariance, rtol=0, atol=1e-9)
 
 
+def test_smoothing_a_long_take(fitted):
+    """Of more frames than its way back keeps at once."""
+    rng = np.random.default_rng(5)
+    times = np.cumsum(rng.uniform(0.03, 0.07, 230))
+    blind = fitted.track(np.full((230, 3), np.nan), times=times)
+    values = with_gaps(blind.postures + 0.1 * rng.standard_normal((230, 3)))
+    values[95:105] = np.nan
+    answer = fitted.smooth(values, times=times)
+    given = fitted, answer.phases, values, times, np.eye(3), np.zeros(3)
+    for i in (0, 99, 100, 199, 229):
+        mean, covariance = posterior(*given, i, 229)
+        np.testing.assert_allclose(answer.postures[i], mean, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(answer.covariances[i], covariance, rtol=0, atol=1e-9)
+
+
 def dense_filter(tracker, phases, values, times):
     """A Kalman filter as in textbooks: number by number, its noise integrated over time."""
     decay, width = np.sqrt(3) / tracker.length_scale_, values.shape[1]

@@ -172,6 +172,24 @@ def test_other_movements_are_lost_and_found_again(tracker):
     assert np.abs(track.phases[-20:] - np.arange(40, 60)).max() < 5
 
 
+def test_who_moves_alike_but_looks_otherwise_is_lost(tracker):
+    """Postures four standard deviations of people off; half of that are nobody's mistake."""
+    noise = np.sqrt(np.diag(tracker.covariance_) + tracker.noise**2)
+    for off, lost in ((1.5, False), (4.0, True)):
+        track = tracker.track(movement(1.05) + off * noise * [1, -1, 1])
+        assert track.lost[20:].any() == lost
+    assert tracker.departure_limit_ == 9
+
+
+def test_who_looks_odd_is_found_again(tracker):
+    """Two and a half standard deviations off; 20 frames of something else before."""
+    noise = np.sqrt(np.diag(tracker.covariance_) + tracker.noise**2)
+    odd = np.cumsum(np.random.default_rng(0).standard_normal((20, 3)) / 4, axis=0)
+    track = tracker.track(np.concatenate([odd, movement(1.05) + 2.5 * noise * [1, -1, 1]]))
+    assert track.lost[:20].any()
+    assert not track.lost[-30:].any()
+
+
 def test_a_second_performance_begins_anew(tracker):
     """Right after the first, and after a pause at the end."""
     one = movement(1.05)
@@ -232,6 +250,8 @@ def put(x, value):
         (movement(1), {"times": np.r_[0:30, 20:50]}, r"The take: time stamps must increase"),
         (movement(1), {"times": np.arange(59)}, r"one a frame, shape \(60,\)"),
         ([movement(1)], {"times": [None, None]}, r"1 takes, but 2 sequences of times"),
+        ([movement(1)], {"times": 3.0}, r"1 takes, but no sequences of times"),
+        (movement(1), {"projection": [np.eye(3), np.zeros(3)]}, r"or the tuple \(matrix, offset\)"),
         (movement(1), {"projection": np.eye(2)}, r"shape \(n_observed, 3\)"),
         (movement(1), {"projection": (np.eye(3), [1.0])}, r"offset .* shape \(3,\)"),
         (movement(1), {"projection": np.full((1, 3), np.nan)}, "is NaN"),
