@@ -30,6 +30,9 @@ def playable(figure, show, count, fps, *, closes):
     """
     from matplotlib.animation import FuncAnimation
 
+    # Known beforehand: nothing is imported any more while Python ends.
+    still_there = pyplot().fignum_exists
+
     class Playable(FuncAnimation):
         """Its places stay, its pictures are small, and it fetches nothing."""
 
@@ -46,6 +49,11 @@ def playable(figure, show, count, fps, *, closes):
             finally:
                 del figure.canvas.draw_idle
                 figure.set_layout_engine(layout)
+
+        def __del__(self):
+            # Who has closed the figure does not wait for it.
+            if still_there(getattr(figure, "number", None)):
+                super().__del__()
 
         def _repr_html_(self):
             html = self.to_jshtml()

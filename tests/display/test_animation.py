@@ -1,7 +1,10 @@
 """The player of animations: its buttons are there, with and without a network."""
 
+import gc
 import re
+import warnings
 
+import matplotlib.pyplot as plt
 import pytest
 from sklearn_motionsync import SkeletonDisplay
 
@@ -23,3 +26,16 @@ def test_every_button_has_a_picture_and_a_name(player):
     pictures = [picture.strip() for _, picture in buttons]
     assert all(re.fullmatch(r"<svg .*<path .*</svg>", p) for p in pictures), pictures
     assert len(set(pictures)) == 9
+
+
+def test_who_closes_the_figure_is_not_warned(bending):
+    display = SkeletonDisplay.from_positions(bending.data[0], bending.skeleton)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for closes in (False, True):
+            animation = display.animate(seconds=0.2, fps=10)
+            if closes:
+                plt.close()
+            del animation
+            gc.collect()
+            assert len(caught) == 1, closes
