@@ -39,3 +39,14 @@ def test_who_closes_the_figure_is_not_warned(bending):
             del animation
             gc.collect()
             assert len(caught) == 1, closes
+
+
+def test_every_picture_is_drawn_once_and_places_stay(bending):
+    display = SkeletonDisplay.from_positions(bending.data[0], bending.skeleton)
+    layout, axis = display.figure_.get_layout_engine(), display.axes_[0]
+    drawn = []
+    axis.draw = lambda renderer: drawn.append(type(axis).draw(axis, renderer))
+    display.animate(seconds=0.3, fps=10).to_jshtml()
+    # And once before them, to find the places.
+    assert len(drawn) == 1 + 3
+    assert display.figure_.get_layout_engine() is layout
