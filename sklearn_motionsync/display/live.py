@@ -75,8 +75,9 @@ class PhaseDisplay:
     features : list of str, default=None
         Names of what is drawn.
     bodies : list of array-like (n_frames_i, n_joints, n_dims), default=None
-        Joint positions, y up.
+        Joint positions, y up; NaN where they were not seen.
     mean_body : array-like, shape (P, n_joints, n_dims), default=None
+        The mean of them; together with bodies.
     skeleton : Skeleton, default=None
         Of the bodies.
     names : list of str, default=None
@@ -191,7 +192,8 @@ class PhaseDisplay:
         training : the performances of ``fit``, default=None
             Their spread about the mean is drawn as a band.
         body : DirectionCosines or Pipeline, default=None
-            Fitted; what made the features, with ``inverse_transform``. The body is then drawn, too.
+            Fitted; what made the features, with ``inverse_transform``. The body is then drawn, too;
+            limbs of which a cosine is NaN are not. In a pipeline one NaN hides the body.
         names : list of str, default=None
             Of those that are drawn; by default their labels in X, or numbers.
         frame, ax, azimuth : as for `plot`

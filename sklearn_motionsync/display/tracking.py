@@ -146,7 +146,7 @@ class TrackingDisplay:
         estimator : MotionTracker
             Fitted.
         X : array-like (n_frames, n_observed), or takes, as ``estimator.track`` takes them
-        truth : array-like (n_frames, n_features), or as many as takes, default=None
+        truth : array-like (n_frames, n_features), or as many as takes, as X, default=None
         smooth : bool, default=False
             Whether ``estimator.smooth`` answers, which knows all of the take at every frame.
         times : array-like (n_frames,), or as many as takes, default=None
