@@ -88,7 +88,8 @@ def test_a_single_frame_long_names_and_shared_axes(tracker):
     track = tracker.track(SEEN)
     _, axes = plt.subplots(3, 2, sharey="row")
     for column, rates in zip(axes.T, (track.rates, 3 * track.rates), strict=True):
-        TrackingDisplay.from_predictions(track._replace(rates=rates), features=0, ax=column)
+        of_rates = Track(*track[:3], rates, *track[4:])
+        TrackingDisplay.from_predictions(of_rates, features=0, ax=column)
     assert axes[2, 0].get_ylim()[1] > 3 * track.rates.max()
 
 
