@@ -30,22 +30,31 @@ def playable(figure, show, count, fps, *, closes):
     """
     from matplotlib.animation import FuncAnimation
 
+    # Known beforehand: nothing is imported any more while Python ends.
+    still_there = pyplot().fignum_exists
+
     class Playable(FuncAnimation):
         """Its places stay, its pictures are small, and it fetches nothing."""
 
         def to_jshtml(self, *args, **kwargs):
-            # To find the places of the panels costs more than to draw.
+            # To find the places of the panels costs more than to draw; and while they may be
+            # sought, every picture is drawn twice.
             layout = figure.get_layout_engine()
             figure.draw_without_rendering()
-            figure.set_layout_engine("none")
+            figure.get_layout_engine = _nothing
             # Pictures are saved; drawn on the canvas before, they would take twice as long.
             figure.canvas.draw_idle = _nothing
             try:
                 with pyplot().rc_context({"savefig.dpi": _DPI}):
                     return with_own_buttons(super().to_jshtml(*args, **kwargs))
             finally:
-                del figure.canvas.draw_idle
+                del figure.canvas.draw_idle, figure.get_layout_engine
                 figure.set_layout_engine(layout)
+
+        def __del__(self):
+            # Who has closed the figure does not wait for it.
+            if still_there(getattr(figure, "number", None)):
+                super().__del__()
 
         def _repr_html_(self):
             html = self.to_jshtml()

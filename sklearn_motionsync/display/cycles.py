@@ -9,7 +9,7 @@ from ..takes.compared import names_of_compared, start_curves
 from ..takes.cycles import CycleSegmenter, examined, taken
 from ..takes.self_correlation import asked_of
 from .drawing import COLORS, panels
-from .given import as_drawn, as_indices, is_number
+from .given import as_drawn, as_index, is_number
 from .time_axis import TimeAxis
 
 __all__ = ["CycleDisplay"]
@@ -111,7 +111,7 @@ class CycleDisplay:
         fitted = hasattr(estimator, "template_")
         segmenter = CycleSegmenter(**estimator.get_params()).set_params(not_cyclic="skip")
         given, takes = taken(segmenter, X, reset=True)
-        (i,) = as_indices(take, len(takes), "take")
+        i = as_index(take, len(takes), "take")
         (x,), (found,) = examined(given[i : i + 1], takes[i : i + 1], segmenter.skeleton)
         row = segmenter.report(given[i : i + 1]).iloc[0]
         name, curve = _curve_of(segmenter, estimator if fitted else None, given[i], x, feature)

@@ -16,6 +16,7 @@ __all__ = [
     "as_drawn",
     "as_durations",
     "as_frames",
+    "as_index",
     "as_indices",
     "as_labels",
     "as_limit",
@@ -70,6 +71,13 @@ def as_indices(indices, count, what):
             f"{indices if listed is None else listed!r}: give whole numbers."
         )
     return [int(i) for i in listed]
+
+
+def as_index(index, count, what):
+    """One index from 0 to ``count - 1``."""
+    if not isinstance(index, Real):
+        raise ValueError(f"{what} must be one number from 0 to {count - 1}, got {index!r}.")
+    return as_indices(index, count, what)[0]
 
 
 def as_frames(frames, n_frames):

@@ -1,6 +1,7 @@
 """PhaseDisplay: where running performances are, and what is expected of the rest of them."""
 
 from itertools import pairwise
+from textwrap import fill
 
 import numpy as np
 
@@ -11,8 +12,7 @@ from ..live.online import OnlineSynchronizer
 from .animation import playable
 from .drawing import legend_above, panels
 from .given import (
-    as_behind,
-    as_drawn,
+    as_index,
     as_indices,
     as_names,
     as_pictures,
@@ -21,6 +21,8 @@ from .given import (
     is_number,
 )
 from .live_given import (
+    as_expected,
+    as_moving,
     as_phases,
     bodies_of_features,
     each_of,
@@ -28,6 +30,7 @@ from .live_given import (
     path_of,
     spread_of,
     taken,
+    times_of,
 )
 from .live_rows import Action, Followed, Row
 
@@ -39,6 +42,8 @@ _FEW_PERFORMANCES = 4
 _BODY, _DIAL, _PHASE, _CURVE = 3, 3, 5, 5
 # Inches of a column, and of a row.
 _COLUMN, _ROW = 0.72, 2.35
+# Letters of a name in a line above a panel.
+_LETTERS = 24
 _UNITS = {"frames": "time (frames)", "seconds": "time (s)"}
 
 
@@ -70,8 +75,9 @@ class PhaseDisplay:
     features : list of str, default=None
         Names of what is drawn.
     bodies : list of array-like (n_frames_i, n_joints, n_dims), default=None
-        Joint positions, y up.
+        Joint positions, y up; NaN where they were not seen.
     mean_body : array-like, shape (P, n_joints, n_dims), default=None
+        The mean of them; together with bodies.
     skeleton : Skeleton, default=None
         Of the bodies.
     names : list of str, default=None
@@ -125,7 +131,7 @@ class PhaseDisplay:
             raise ValueError(f"n_frames must be frames of the clock, at least 2; got {n_frames!r}.")
         if duration is not None and not (is_number(duration, 0) and duration > 0):
             raise ValueError(f"duration must be a number above 0, or None; got {duration!r}.")
-        if unit not in _UNITS:
+        if unit not in list(_UNITS):
             raise ValueError(f"unit must be one of {list(_UNITS)}, got {unit!r}.")
         phases = as_phases(phases, n_frames)
         count = len(phases)
@@ -137,17 +143,13 @@ class PhaseDisplay:
         seen = each_of(seen, lengths, "seen", ("n_shown",))
         afterwards = each_of(afterwards, lengths, "afterwards", (), gaps=True)
         n_shown = 0 if seen[0] is None else seen[0].shape[1]
-        mean, spread = (
-            x if x is None else as_drawn(x, what, (n_frames, n_shown))
-            for x, what in ((mean, "The mean"), (spread, "The spread"))
-        )
+        # All of them have the features of the first.
+        seen = each_of(None if seen[0] is None else seen, lengths, "seen", (n_shown,))
+        mean, spread = as_expected(mean, spread, n_frames, n_shown)
         if features is None:
             features = [f"x{k}" for k in range(n_shown)]
         self.features = as_names(features, n_shown, "features", "features that are seen")
-        if bodies is not None:
-            bodies = as_behind([bodies], 1, skeleton)[0]
-            mean_body = as_behind([[mean_body]], 1, skeleton)[0][0]
-        bodies = [None] * count if bodies is None else bodies
+        bodies, mean_body = as_moving(bodies, mean_body, lengths, n_frames, self.skeleton)
         self.action = Action(int(n_frames), duration, mean, spread, mean_body)
         self.followed = [
             Followed(*phases[i], from_zero(times[i], n, i), self.names[i], *rest)
@@ -190,7 +192,8 @@ class PhaseDisplay:
         training : the performances of ``fit``, default=None
             Their spread about the mean is drawn as a band.
         body : DirectionCosines or Pipeline, default=None
-            Fitted; what made the features, with ``inverse_transform``. The body is then drawn, too.
+            Fitted; what made the features, with ``inverse_transform``. The body is then drawn, too;
+            limbs of which a cosine is NaN are not. In a pipeline one NaN hides the body.
         names : list of str, default=None
             Of those that are drawn; by default their labels in X, or numbers.
         frame, ax, azimuth : as for `plot`
@@ -214,12 +217,7 @@ class PhaseDisplay:
             performances = range(min(_FEW_PERFORMANCES, len(arrays)))
         chosen = as_indices(performances, len(arrays), "performances")
         if times is not None:
-            listed = [times] if single else times
-            if len(listed) != len(arrays):
-                raise ValueError(
-                    f"There are {len(arrays)} performances, but times of {len(listed)}."
-                )
-            times = [listed[i] for i in chosen]
+            times = times_of(live, [times] if single else times, chosen, arrays, labels)
         phases = live.follow(given(chosen), times)
         seen = [np.asarray(arrays[i], dtype=np.float64) for i in chosen]
         own = names_of_features(body, live, live.mean_.shape[1])
@@ -289,7 +287,7 @@ class PhaseDisplay:
         longest = max((of.times for of in self.followed), key=lambda times: times[-1])
         if frame is None:
             frame = len(longest) - 1
-        (frame,) = as_indices(frame, len(longest), "frame")
+        frame = as_index(frame, len(longest), "frame")
         has_body = self.followed[0].bodies is not None
         widths = [_BODY] * has_body + [_DIAL, _PHASE] + [_CURVE] * len(self.features)
         starts = np.cumsum([0, *widths])
@@ -302,22 +300,21 @@ class PhaseDisplay:
         for axis in self.axes_:
             if axis in before:
                 axis.clear()
-        end = longest[-1]
-        if self.action.duration is not None:
-            end = max(end, self.action.duration)
+        end = max(self.action.latest(of) for of in self.followed)
         by_row = np.array(self.axes_, dtype=object).reshape(n_rows, -1)
         self.rows_ = [
-            Row(axes, of, self.action, self.skeleton, self.features, 1.02 * end, azimuth)
+            Row(axes, of, self.action, self.skeleton, self.features, 1.02 * end or 1.0, azimuth)
             for axes, of in zip(by_row, self.followed, strict=True)
         ]
         for row, of in zip(self.rows_, self.followed, strict=True):
-            row.axes[0].set_title(of.name, fontsize="medium")
+            row.axes[0].set_title(fill(of.name, _LETTERS), fontsize="medium", parse_math=False)
         for axis in by_row[:-1, has_body + 1 :].flat:
             axis.tick_params(labelbottom=False)
         for axis in by_row[-1, has_body + 1 :]:
             axis.set_xlabel(_UNITS[self.unit])
         self._show(longest[frame])
-        for axis in by_row[0, has_body + 1 :]:
+        # Curves share the legend of the first.
+        for axis in by_row[0, has_body + 1 : has_body + 3]:
             handles, labels = axis.get_legend_handles_labels()
             legend_above([axis], handles, labels, n_cols=2)
         return self

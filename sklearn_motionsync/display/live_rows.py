@@ -1,5 +1,6 @@
 """What `PhaseDisplay` knows of a running performance, and the panels it draws it in."""
 
+from textwrap import fill
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,8 @@ _SOON = 0.1
 _BAND = 1.645
 # Points of the predicted rest.
 _FINE = 60
+# Letters of a name beside a panel.
+_LETTERS = 24
 
 
 class Action(NamedTuple):
@@ -50,18 +53,26 @@ class Action(NamedTuple):
         last = self.n_frames - 1
         return min(phase + _SOON * last * rate, last)
 
-    def rest(self, phase, elapsed):
-        """When what is left will come, and at which phases: (n,) each; empty at the end.
+    def left(self, phase, elapsed):
+        """How long it will go on, as `OnlineSynchronizer.time_left` guesses."""
+        by_phase = self.duration * (1 - phase / (self.n_frames - 1))
+        return (by_phase + np.maximum(self.duration - elapsed, 0)) / 2
 
-        As long as `OnlineSynchronizer.time_left` guesses.
-        """
-        last = self.n_frames - 1
+    def latest(self, of):
+        """When the last is seen of a performance, or was expected at any of its frames."""
         if self.duration is None:
+            return of.times[-1]
+        goes_on = of.phase < self.n_frames - 1
+        expected = of.times + np.where(goes_on, self.left(of.phase, of.times), 0)
+        return max(of.times[-1], expected.max())
+
+    def rest(self, phase, elapsed):
+        """When what is left will come, and at which phases: (n,) each; empty at the end."""
+        last = self.n_frames - 1
+        if self.duration is None or phase >= last:
             return np.empty((2, 0))
-        left = self.duration * (1 - phase / last), max(self.duration - elapsed, 0)
-        if phase >= last:
-            return np.empty((2, 0))
-        return elapsed + np.linspace(0, np.mean(left), _FINE), np.linspace(phase, last, _FINE)
+        left = self.left(phase, elapsed)
+        return elapsed + np.linspace(0, left, _FINE), np.linspace(phase, last, _FINE)
 
 
 class Followed(NamedTuple):
@@ -182,7 +193,7 @@ class _Curve:
         margin = 0.06 * (high - low) or 1.0
         axis.set_ylim(low - margin, high + margin)
         axis.set_xlim(0, end)
-        axis.set_ylabel(name)
+        axis.set_ylabel(fill(name, _LETTERS))
 
     def show(self, now, times, phases):
         past = slice(now + 1)

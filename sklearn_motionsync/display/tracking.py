@@ -1,6 +1,7 @@
 """TrackingDisplay: what was seen of a body, what is known of the rest, and how well."""
 
 from copy import copy
+from textwrap import fill
 
 import numpy as np
 
@@ -12,8 +13,8 @@ from ..tracking.track import Track
 from ..tracking.tracker import MotionTracker
 from .departing import bones_of, limb_of
 from .drawing import COLORS, legend_above, panels
-from .given import as_drawn, as_frames, as_indices, as_names
-from .live_given import from_zero, taken
+from .given import as_drawn, as_frames, as_index, as_names
+from .live_given import from_zero, one_each, taken, times_of
 from .stick_figures import SkeletonDisplay
 
 __all__ = ["TrackingDisplay"]
@@ -25,6 +26,8 @@ _BAND = 1.645
 _UNITS = {"frames": "time (frames)", "seconds": "time (s)"}
 # Inches of a panel, and of all.
 _PANEL, _WIDTH = 1.15, 8.5
+# Letters of a name beside a panel.
+_LETTERS = 18
 
 
 class TrackingDisplay:
@@ -89,13 +92,14 @@ class TrackingDisplay:
         unit="frames",
     ):
         if not isinstance(track, Track) or np.ndim(track.postures) != 2:
+            got = "that of one frame" if isinstance(track, Track) else type(track).__name__
             raise ValueError(
-                "track must be the Track of one take, as from MotionTracker.track; got "
-                f"{type(track).__name__}. Of a list of them give one."
+                f"track must be the Track of one take, as from MotionTracker.track; got {got}. Of "
+                "a list of them give one."
             )
         if n_frames is not None and (not is_whole(n_frames) or n_frames < 2):
             raise ValueError(f"n_frames must be frames of the clock, at least 2; got {n_frames!r}.")
-        if unit not in _UNITS:
+        if unit not in list(_UNITS):
             raise ValueError(f"unit must be one of {list(_UNITS)}, got {unit!r}.")
         shape = np.shape(track.postures)
         self.track, self.n_frames, self.unit = track, n_frames, unit
@@ -142,7 +146,7 @@ class TrackingDisplay:
         estimator : MotionTracker
             Fitted.
         X : array-like (n_frames, n_observed), or takes, as ``estimator.track`` takes them
-        truth : array-like (n_frames, n_features), or as many as takes, default=None
+        truth : array-like (n_frames, n_features), or as many as takes, as X, default=None
         smooth : bool, default=False
             Whether ``estimator.smooth`` answers, which knows all of the take at every frame.
         times : array-like (n_frames,), or as many as takes, default=None
@@ -165,10 +169,15 @@ class TrackingDisplay:
         """
         if not isinstance(estimator, MotionTracker):
             raise ValueError(f"Give a MotionTracker, got {type(estimator).__name__}.")
-        given, arrays, _, single = taken(estimator, X)
-        (i,) = as_indices(take, len(arrays), "take")
-        if not single:
-            times, truth = (_one_of(x, i, len(arrays)) for x in (times, truth))
+        given, arrays, labels, single = taken(estimator, X)
+        i = as_index(take, len(arrays), "take")
+        if times is not None:
+            of_all = [times] if single else times
+            (times,) = times_of(estimator, of_all, [i], arrays, labels, "takes")
+        if truth is not None:
+            truth = one_each(
+                taken(estimator, truth, "The truth")[1], len(arrays), "truth", "takes"
+            )[i]
         method = estimator.smooth if smooth else estimator.track
         (track,) = method(given([i]), None if times is None else [times], projection)
         rate = 1.0 if estimator.frame_rate is None else estimator.frame_rate
@@ -241,7 +250,7 @@ class TrackingDisplay:
         lost = np.asarray(self.track.lost, dtype=bool)
         self.lost_ = [self._spans(axis, lost, label="lost", **hatched) for axis in self.axes_]
         for axis in self.axes_:
-            axis.set_xlim(self.times[0], self.times[-1])
+            axis.set_xlim(0, self.times[-1] or 1.0)
             axis.tick_params(labelbottom=axis is self.axes_[-1])
         self.axes_[-1].set_xlabel(_UNITS[self.unit])
         self.figure_.align_ylabels(self.axes_)
@@ -334,7 +343,7 @@ class TrackingDisplay:
         if self.observed is not None:
             style = {"color": COLORS["pattern"], "markersize": 2.5, "label": "seen"}
             self.observed_ += axis.plot(self.times, self.observed[:, k], ".", **style)
-        axis.set_ylabel(self.names[k], fontsize="small")
+        axis.set_ylabel(fill(self.names[k], _LETTERS), fontsize="small")
 
     def _draw_progress(self, upper, lower):
         phases, label = self.track.phases, "phase (frame)"
@@ -346,7 +355,8 @@ class TrackingDisplay:
         upper.set_ylabel(label, fontsize="small")
         lower.axhline(1, color=COLORS["envelope"], linewidth=1, linestyle="--")
         (self.rate_,) = lower.plot(self.times, self.track.rates, color=blue)
-        lower.set_ylim(bottom=0)
+        # The axis of another display may be shared.
+        lower.set_ylim(0, max(lower.get_ylim()[1], 1.1 * max(1, *self.track.rates)))
         lower.set_ylabel("rate", fontsize="small")
 
     def _spans(self, axis, mask, **style):
@@ -366,17 +376,6 @@ class TrackingDisplay:
             for x in (self.track.postures, self.truth)
         )
         return skeleton, estimate, truth
-
-
-def _one_of(values, i, count):
-    """What belongs to one of several takes."""
-    if values is None:
-        return None
-    if len(values) != count:
-        raise ValueError(
-            f"There are {count} takes, but times or truth of {len(values)}: give one of each."
-        )
-    return values[i]
 
 
 def _positions(cosines, postures, skeleton):

@@ -1,7 +1,10 @@
 """The player of animations: its buttons are there, with and without a network."""
 
+import gc
 import re
+import warnings
 
+import matplotlib.pyplot as plt
 import pytest
 from sklearn_motionsync import SkeletonDisplay
 
@@ -23,3 +26,27 @@ def test_every_button_has_a_picture_and_a_name(player):
     pictures = [picture.strip() for _, picture in buttons]
     assert all(re.fullmatch(r"<svg .*<path .*</svg>", p) for p in pictures), pictures
     assert len(set(pictures)) == 9
+
+
+def test_who_closes_the_figure_is_not_warned(bending):
+    display = SkeletonDisplay.from_positions(bending.data[0], bending.skeleton)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for closes in (False, True):
+            animation = display.animate(seconds=0.2, fps=10)
+            if closes:
+                plt.close()
+            del animation
+            gc.collect()
+            assert len(caught) == 1, closes
+
+
+def test_every_picture_is_drawn_once_and_places_stay(bending):
+    display = SkeletonDisplay.from_positions(bending.data[0], bending.skeleton)
+    layout, axis = display.figure_.get_layout_engine(), display.axes_[0]
+    drawn = []
+    axis.draw = lambda renderer: drawn.append(type(axis).draw(axis, renderer))
+    display.animate(seconds=0.3, fps=10).to_jshtml()
+    # And once before them, to find the places.
+    assert len(drawn) == 1 + 3
+    assert display.figure_.get_layout_engine() is layout

@@ -2,8 +2,12 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import pytest
+from sklearn.exceptions import NotFittedError
+from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
+    ASpace,
     DirectionCosines,
     LinearSynchronizer,
     LivePhase,
@@ -121,8 +125,50 @@ def test_what_is_not_known_is_not_drawn(live):
     live.reset()
     rows = np.array([np.sin(np.linspace(0, size, 30)) for size in (3, 3.1, 3.2)])
     univariate = OnlineSynchronizer(LinearSynchronizer()).fit(rows)
-    (row,) = PhaseDisplay.from_estimator(univariate, rows, performances=2).rows_
+    table = pd.DataFrame(rows, index=list("abc"))
+    (row,) = PhaseDisplay.from_estimator(univariate, table, performances=2, training=rows).rows_
     np.testing.assert_array_equal(row.curves[0].to_come.get_ydata(), rows[2])
+    assert row.axes[0].get_title() == "c"
+    with pytest.raises(ValueError, match=r"2-D; got an array of shape \(30,\)"):
+        PhaseDisplay.from_estimator(univariate, rows[0])
+
+
+def test_bodies_have_gaps_where_they_are_not_seen(live):
+    """Limb by limb; of points of a space, which come from all limbs, the whole body."""
+    x = X[6].copy()
+    names = list(COSINES.get_feature_names_out())
+    x[20:30, [names.index(f"left_leg_{axis}") for axis in "xyz"]] = np.nan
+    row = PhaseDisplay.from_estimator(live, x, body=COSINES, frame=FRAME, features=0).rows_[0]
+    gaps = {
+        side: sum(np.isnan(path.vertices).any() for path in row.figure.bones[side].get_paths())
+        for side in ("left", "right")
+    }
+    assert gaps == {"left": 1, "right": 0}
+    space = make_pipeline(DirectionCosines(BUNCH.skeleton), ASpace()).fit(BUNCH.data[:6])
+    points = space.transform(BUNCH.data)
+    on_space = OnlineSynchronizer(LinearSynchronizer(50)).fit(points[:6])
+    points[6][FRAME, 0] = np.nan
+    display = PhaseDisplay.from_estimator(on_space, points[6], body=space, frame=FRAME)
+    for frame, nothing in ((FRAME, True), (FRAME + 1, False)):
+        bones = display.plot(display.axes_, frame=frame).rows_[0].figure.bones["left"]
+        assert all(np.isnan(path.vertices).all() == nothing for path in bones.get_paths())
+
+
+def test_names_and_the_last_guess_have_room(live):
+    name = "a name that is longer than its panel is wide, for $5"
+    display = PhaseDisplay.from_estimator(live, X[6], names=[name], features=[0, 1])
+    row = display.rows_[0]
+    assert [axis.get_legend() is None for axis in display.axes_] == [True, False, False, True]
+    display.figure_.draw_without_rendering()
+    extent = row.axes[0].title.get_window_extent()
+    assert extent.x0 >= 0
+    assert extent.y1 <= display.figure_.bbox.y1
+    # Who stops is expected to need half of what is left.
+    stops = LivePhase(np.full(90, 25), np.zeros(90), np.ones(90))
+    (row,) = PhaseDisplay.from_predictions(stops, 51, duration=60).rows_
+    assert row.rest.get_xdata()[-1] == 89 + 15
+    assert row.axes[1].get_xlim()[1] > 89 + 15
+    PhaseDisplay.from_predictions(LivePhase([0], [1], [1]), 51)
 
 
 def test_what_is_refused(live):
@@ -130,22 +176,37 @@ def test_what_is_refused(live):
         ({"performances": 8}, "performances must be from 0 to 7"),
         ({"features": "tail_x"}, "no feature 'tail_x'"),
         ({"frame": 900}, "frame must be from 0 to"),
+        ({"frame": [1, 2]}, "frame must be one number from 0 to"),
         ({"times": [np.arange(3)]}, "There are 8 performances, but times of 1"),
+        ({"times": 3}, "There are 8 performances, but times of 3"),
+        ({"times": [np.arange(3)] * 8, "performances": 5}, "Performance 5: times must be one a"),
         ({"names": ["one"]}, "names must be a list of text"),
     ):
         with pytest.raises(ValueError, match=message):
             PhaseDisplay.from_estimator(live, X, **change)
     with pytest.raises(ValueError, match="estimator must be an OnlineSynchronizer, got int"):
         PhaseDisplay.from_estimator(1, X)
+    with pytest.raises(NotFittedError):
+        PhaseDisplay.from_estimator(OnlineSynchronizer(), X)
+    with pytest.raises(ValueError, match="Found 0 performances"):
+        PhaseDisplay.from_estimator(live, [])
+    body = np.zeros((3, len(BUNCH.skeleton.joints), 3))
+    moving = {"bodies": [body], "skeleton": BUNCH.skeleton}
     rates, sure = [1, 1, 1], [1, 0.5, 0.2]
-    good = LivePhase([0, 1, 2], rates, sure)
+    good, rows = LivePhase([0, 1, 2], rates, sure), np.zeros((3, 1))
     for phases, known, message in (
         ([1], {}, "phases must be a LivePhase"),
         (LivePhase([0, 1, 50], rates, sure), {}, "Performance 0: the phase must be from 0 to 49"),
         (LivePhase([0, 1, 2], [1, 1], sure), {}, "Performance 0: the rate must have the shape"),
         (good, {"times": [[0, 2, 1]]}, "times must increase"),
         (good, {"seen": [np.zeros((2, 1))]}, "Performance 0: seen must have the shape"),
-        (good, {"mean": np.zeros((50, 1))}, "The mean must have the shape"),
+        (good, {"seen": [rows], "mean": np.zeros((3, 1))}, "The mean must have the shape"),
+        (good, {"mean": np.zeros((50, 1))}, "mean is of what is drawn; give seen, too"),
+        (good, {"seen": [rows], "spread": np.zeros((50, 1))}, "spread is of what is drawn"),
+        ([good, good], {"seen": [rows, np.zeros((3, 2))]}, "Performance 1: seen must have"),
+        (good, moving, "give mean_body and skeleton"),
+        (good, moving | {"mean_body": body}, "The mean body must have the shape"),
+        (good, moving | {"bodies": [body[1:]], "mean_body": body}, "Performance 0: bodies must"),
         (good, {"duration": 0}, "duration must be"),
         (good, {"unit": "hours"}, "unit must be one of"),
     ):

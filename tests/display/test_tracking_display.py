@@ -2,7 +2,9 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import pytest
+from sklearn.exceptions import NotFittedError
 from sklearn_motionsync import (
     DirectionCosines,
     LinearSynchronizer,
@@ -77,6 +79,32 @@ def test_lost_spans_and_features_that_are_chosen(tracker):
     assert legend == ["90 %", "estimate", "lost"]
 
 
+def test_a_single_frame_long_names_and_shared_axes(tracker):
+    names = [f"the flexion of the right upper extremity {k}" for k in range(X[0].shape[1])]
+    display = TrackingDisplay.from_estimator(tracker, SEEN[:1], names=names)
+    label = display.axes_[0].yaxis.label
+    display.figure_.draw_without_rendering()
+    assert label.get_window_extent().height < display.figure_.bbox.height / 6
+    track = tracker.track(SEEN)
+    _, axes = plt.subplots(3, 2, sharey="row")
+    for column, rates in zip(axes.T, (track.rates, 3 * track.rates), strict=True):
+        of_rates = Track(*track[:3], rates, *track[4:])
+        TrackingDisplay.from_predictions(of_rates, features=0, ax=column)
+    assert axes[2, 0].get_ylim()[1] > 3 * track.rates.max()
+
+
+def test_truth_comes_as_takes_do(tracker):
+    table = pd.concat(
+        [pd.DataFrame(X[3]), pd.DataFrame(SEEN)], keys=["a", "b"], names=["take", "frame"]
+    )
+    display = TrackingDisplay.from_estimator(tracker, table, truth=table.fillna(0), take=1)
+    np.testing.assert_array_equal(display.truth, np.nan_to_num(SEEN))
+    rows = np.array([np.sin(np.linspace(0, size, 30)) for size in (3, 3.1, 3.2)])
+    univariate = MotionTracker(LinearSynchronizer(), n_particles=20, random_state=0).fit(rows)
+    display = TrackingDisplay.from_estimator(univariate, rows, truth=rows, take=1)
+    np.testing.assert_array_equal(display.truth[:, 0], rows[1])
+
+
 def test_bodies(display):
     """Hidden limbs are violet, the truth is a shadow, and what is not seen is not there."""
     strip = display.strip(COSINES, frames=[2, 10])
@@ -116,14 +144,20 @@ def test_several_takes_and_projections(tracker):
 def test_what_is_refused(tracker, display):
     for change, message in (
         ({"take": 1}, "take must be from 0 to 0"),
+        ({"take": [0]}, "take must be one number from 0 to 0"),
         ({"features": "tail_x"}, "no feature 'tail_x'"),
         ({"truth": X[4][1:]}, "The truth must have the shape"),
         ({"names": ["one"]}, "names must be a list of text"),
     ):
         with pytest.raises(ValueError, match=message):
             TrackingDisplay.from_estimator(tracker, SEEN, **change)
-    with pytest.raises(ValueError, match="There are 2 takes, but times or truth of 1"):
+    with pytest.raises(ValueError, match="There are 2 takes, but truth of 1"):
         TrackingDisplay.from_estimator(tracker, [SEEN, SEEN], truth=[X[4]])
+    back = np.arange(len(SEEN))[::-1]
+    with pytest.raises(ValueError, match="Performance 1: time stamps must increase"):
+        TrackingDisplay.from_estimator(tracker, [SEEN, SEEN], take=1, times=[back, back])
+    with pytest.raises(NotFittedError):
+        TrackingDisplay.from_estimator(MotionTracker(), SEEN)
     for given, message in ((1, "got int"), (tracker.fit, "got method")):
         with pytest.raises(ValueError, match=f"Give a MotionTracker, {message}"):
             TrackingDisplay.from_estimator(given, SEEN)
