@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..live.times import time_left
 from .bodies import bones_by_side, limits, on_screen, place_of, with_landmarks
 from .dial import Dial
 from .drawing import COLORS, front_line, stage, sticks
@@ -55,8 +56,7 @@ class Action(NamedTuple):
 
     def left(self, phase, elapsed):
         """How long it will go on, as `OnlineSynchronizer.time_left` guesses."""
-        by_phase = self.duration * (1 - phase / (self.n_frames - 1))
-        return (by_phase + np.maximum(self.duration - elapsed, 0)) / 2
+        return time_left(phase / (self.n_frames - 1), elapsed, self.duration)
 
     def latest(self, of):
         """When the last is seen of a performance, or was expected at any of its frames."""

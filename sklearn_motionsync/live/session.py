@@ -5,6 +5,7 @@ from collections import deque
 import numpy as np
 
 from .stream import LivePhase, Stream
+from .times import time_left
 
 __all__ = ["Session", "gathered"]
 
@@ -78,8 +79,7 @@ class Session:
         begun = ~np.isnan(self._began)
         elapsed = np.where(begun, self.stamp - self._began, 0)
         share = np.where(begun, self._said[-1].phase, 0) / (course.n_frames - 1)
-        by_time = np.maximum(course.duration - elapsed, 0)
-        left = (1 - share) * by_time + share * course.duration * (1 - share)
+        left = time_left(share, elapsed, course.duration)
         return left if len(self._shape) == 2 else float(left[0])
 
 

@@ -1,10 +1,10 @@
-"""Time stamps of frames that come one after the other, in frames of the training performances."""
+"""Time stamps of frames, in frames of the training performances; and how much time is left."""
 
 import numpy as np
 
 from ..gate import as_numbers
 
-__all__ = ["as_stamps"]
+__all__ = ["as_stamps", "time_left"]
 
 
 def as_stamps(times, n_frames, frame_rate=None, what="The frame", after=None):
@@ -53,3 +53,22 @@ def as_stamps(times, n_frames, frame_rate=None, what="The frame", after=None):
             "Leave out a frame that comes twice or late; begin another performance with reset()."
         )
     return stamps * scale
+
+
+def time_left(share, elapsed, duration):
+    """How long a performance will go on: a guess.
+
+    Of what is left of the mean duration, and of the phase at the mean pace, the second counts the
+    more the farther the phase is.
+
+    Parameters
+    ----------
+    share : ndarray
+        The phase, from 0 to 1.
+    elapsed : ndarray
+        Since the beginning.
+    duration : float
+        Mean duration, in the same unit.
+    """
+    by_time = np.maximum(duration - elapsed, 0)
+    return (1 - share) * by_time + share * duration * (1 - share)
