@@ -71,11 +71,13 @@ class LiveFeatures:
         columns : tuple of int
         velocity, postures : ndarray, shape (n_streams, n_features)
         """
-        if columns not in self._parts:
-            # Who is hidden stays so for a while; two sets are enough for one that flickers.
-            self._parts = dict(list(self._parts.items())[-1:])
-            self._parts[columns] = self._part(list(columns))
-        found = self._parts[columns]
+        known = self._parts
+        if columns not in known:
+            # Who is hidden stays so for a while; two sets are enough for one that flickers. Other
+            # threads may follow at the same time: what is known is replaced, never changed.
+            known = {**dict(list(known.items())[-1:]), columns: self._part(list(columns))}
+            self._parts = known
+        found = known[columns]
         if found is None:
             return None
         part, moving = found
