@@ -1,5 +1,6 @@
 """Settings and data all tests share."""
 
+import importlib
 import os
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from sklearn_motionsync import ASpace, DirectionCosines
 from sklearn_motionsync.datasets import load_performances, make_bending
 
+BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 REAL_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
@@ -20,6 +22,14 @@ def real_data():
     if not REAL_DATA.is_dir():
         pytest.skip("the real motion capture is not beside the repository (../shared/data)")
     return REAL_DATA
+
+
+@pytest.fixture(scope="module")
+def benchmark():
+    """Imports modules of the benchmarks, which import each other as they lie there."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(BENCHMARKS)
+        yield importlib.import_module
 
 
 @pytest.fixture(scope="session")

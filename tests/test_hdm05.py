@@ -1,23 +1,17 @@
 """The archive of HDM05 that is made from the downloaded files, against the one that tests read."""
 
-import importlib
 import re
 import shutil
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from sklearn_motionsync.datasets import load_performances
 
-BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
-
 
 @pytest.fixture(scope="module")
-def hdm05():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(BENCHMARKS)
-        yield importlib.import_module("hdm05")
+def hdm05(benchmark):
+    return benchmark("hdm05")
 
 
 def make(hdm05, monkeypatch, *args):

@@ -1,31 +1,18 @@
 """The benchmark of the live phase: the phase of a whole clip, ticks, and the peers it is beside."""
 
-import importlib
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
-BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _beside_each_other():
-    """The modules of the benchmarks import each other as they lie there."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(BENCHMARKS)
-        yield
+@pytest.fixture(scope="module")
+def peers(benchmark):
+    return benchmark("live_peers")
 
 
 @pytest.fixture(scope="module")
-def peers():
-    return importlib.import_module("live_peers")
-
-
-@pytest.fixture(scope="module")
-def people():
-    return importlib.import_module("live_people")
+def people(benchmark):
+    return benchmark("live_people")
 
 
 def curve(phase):

@@ -1,8 +1,5 @@
 """The benchmark of action models: wrong performances, people held out, and the tables."""
 
-import importlib
-from pathlib import Path
-
 import numpy as np
 import pytest
 from joblib import parallel_config
@@ -11,30 +8,20 @@ from sklearn_motionsync import ASpace, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending
 from threadpoolctl import threadpool_limits
 
-BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _beside_each_other():
-    """The modules of the benchmarks import each other as they lie there."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(BENCHMARKS)
-        yield
+@pytest.fixture(scope="module")
+def negatives(benchmark):
+    return benchmark("negatives")
 
 
 @pytest.fixture(scope="module")
-def negatives():
-    return importlib.import_module("negatives")
+def judges(benchmark):
+    return benchmark("judges")
 
 
 @pytest.fixture(scope="module")
-def judges():
-    return importlib.import_module("judges")
-
-
-@pytest.fixture(scope="module")
-def model():
-    return importlib.import_module("model")
+def model(benchmark):
+    return benchmark("model")
 
 
 @pytest.fixture(scope="module")

@@ -1,10 +1,8 @@
 """The benchmark of recognition: folds of people, probabilities, and the tables without peers."""
 
-import importlib
 import json
 from functools import partial
 from itertools import compress
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,25 +12,15 @@ from sklearn_motionsync import ActionClassifier, DirectionCosines, JointPosition
 from sklearn_motionsync.datasets import make_bending
 from threadpoolctl import threadpool_limits
 
-BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _beside_each_other():
-    """The modules of the benchmarks import each other as they lie there."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(BENCHMARKS)
-        yield
+@pytest.fixture(scope="module")
+def recognition(benchmark):
+    return benchmark("recognition")
 
 
 @pytest.fixture(scope="module")
-def recognition():
-    return importlib.import_module("recognition")
-
-
-@pytest.fixture(scope="module")
-def recognizers():
-    return importlib.import_module("recognizers")
+def recognizers(benchmark):
+    return benchmark("recognizers")
 
 
 @pytest.fixture(scope="module")

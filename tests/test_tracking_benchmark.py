@@ -1,27 +1,14 @@
 """The benchmark of trackers: its filters against the joint Gaussian, and what it hides."""
 
-import importlib
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
-BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _beside_each_other():
-    """The modules of the benchmarks import each other as they lie there."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(BENCHMARKS)
-        yield
-
 
 @pytest.fixture(scope="module")
-def trackers():
-    return importlib.import_module("trackers")
+def trackers(benchmark):
+    return benchmark("trackers")
 
 
 def joint(model, n, d):
@@ -108,8 +95,8 @@ def test_particles_follow_a_posture_that_is_hidden_in_part(trackers):
 
 
 @pytest.fixture(scope="module")
-def hidden():
-    return importlib.import_module("hidden_limbs")
+def hidden(benchmark):
+    return benchmark("hidden_limbs")
 
 
 @pytest.mark.parametrize(("n_frames", "gap"), [(70, 30), (31, 10)])

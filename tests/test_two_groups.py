@@ -1,8 +1,6 @@
 """Two groups of people: whether they differ in shape or in timing, by the test of the benchmark."""
 
-import importlib
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,15 +8,12 @@ from scipy.stats import binom
 from sklearn_motionsync.datasets import make_gait
 from threadpoolctl import threadpool_limits
 
-BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 SHOWN = ("hip_flexion", "knee_flexion")
 
 
 @pytest.fixture(scope="module")
-def groups():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(BENCHMARKS)
-        yield importlib.import_module("groups")
+def groups(benchmark):
+    return benchmark("groups")
 
 
 def hotelling(fields, in_second):

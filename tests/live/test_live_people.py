@@ -1,22 +1,17 @@
 """The phase of running performances of people that the synchronizer has not seen."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, OnlineSynchronizer
 from sklearn_motionsync.datasets import load_performances
 
-ARCHIVE = Path(__file__).resolve().parents[3] / "shared" / "data" / "hdm05" / "hdm05_positions.npz"
 P = 100
 
 
 @pytest.fixture(scope="module")
-def clips():
-    if not ARCHIVE.exists():
-        pytest.skip(f"motion capture of people is not at {ARCHIVE}")
-    return load_performances(ARCHIVE)
+def clips(real_data):
+    return load_performances(real_data / "hdm05" / "hdm05_positions.npz")
 
 
 def of(clips, action, actor, held_out):

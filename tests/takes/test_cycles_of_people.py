@@ -1,20 +1,13 @@
 """Cycles of real people, of actors not seen; and takes that have none."""
 
-import importlib
-from pathlib import Path
-
 import numpy as np
 import pytest
 from sklearn_motionsync import CycleSegmenter
 
-BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
-
 
 @pytest.fixture(scope="module")
-def cycles():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(BENCHMARKS)
-        yield importlib.import_module("cycles")
+def cycles(benchmark):
+    return benchmark("cycles")
 
 
 @pytest.fixture(scope="module")
