@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 
-__all__ = ["even_slices", "follow", "normalise", "sample"]
+__all__ = ["at_times", "even_slices", "follow", "normalise", "sample"]
 
 # Sequences sampled together: bounds the memory of what stands in between.
 _SAMPLED_AT_ONCE = 64
@@ -86,3 +86,22 @@ def follow(warps, times):
     low = np.take_along_axis(warps, left, axis=-1)
     high = np.take_along_axis(warps, left + 1, axis=-1)
     return low * (1 - weight) + high * weight
+
+
+def at_times(sequence, times):
+    """A sequence at times in frames, on straight lines; beyond its ends it holds.
+
+    Parameters
+    ----------
+    sequence : ndarray, shape (n_frames, n_features)
+    times : ndarray, any shape
+
+    Returns
+    -------
+    ndarray, shape (*times.shape, n_features)
+        In double precision.
+    """
+    times = np.clip(times, 0, len(sequence) - 1)
+    left = np.minimum(times.astype(np.intp), len(sequence) - 2)
+    weight = (times - left)[..., np.newaxis]
+    return sequence[left] * (1 - weight) + sequence[left + 1] * weight

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..matching.matcher import Features
 from ..matching.trellis import Trellis
-from ..matching.warps import even_slices
+from ..matching.warps import at_times, even_slices
 
-__all__ = ["Proposer", "at_times", "scales"]
+__all__ = ["Proposer", "scales"]
 
 # On so many frames the pattern is looked for: only where it is, roughly, matters here.
 _CLOCK = 50
@@ -97,17 +97,3 @@ def scales(shortest, longest):
     """Numbers of frames from the shortest to the longest, by a constant ratio or less."""
     count = int(np.ceil(np.log(longest / shortest) / np.log(_RATIO))) + 1
     return np.unique(np.round(np.geomspace(shortest, longest, count)).astype(np.intp))
-
-
-def at_times(take, times):
-    """A take at times in frames; beyond its ends it holds: (..., n_features), in double precision.
-
-    Parameters
-    ----------
-    take : ndarray, shape (n_frames, n_features)
-    times : ndarray, any shape
-    """
-    times = np.clip(times, 0, len(take) - 1)
-    left = np.minimum(times.astype(np.intp), len(take) - 2)
-    weight = (times - left)[..., np.newaxis]
-    return take[left] * (1 - weight) + take[left + 1] * weight

@@ -8,7 +8,7 @@ from .kalman import correct, squared_lengths, whitening
 from .process import Pace, Process, left_out, shrunk_covariance
 from .slopes import Slopes
 
-__all__ = ["Clock", "Learnt", "at_phases", "learn", "smoothed"]
+__all__ = ["Clock", "Learnt", "learn", "smoothed"]
 
 # Window of causal velocities, as a share of the mean duration: that of the synchronizers' filter.
 _WINDOW = 0.03
@@ -166,12 +166,3 @@ def smoothed(before, now, dt, memory):
     """What is remembered of a quantity, that of long ago less and less."""
     left = np.exp(-dt / memory)
     return left * before + (1 - left) * now
-
-
-def at_phases(mean, phases):
-    """The mean (P, n_features) at phases (n,): (n, n_features)."""
-    left = np.minimum(phases.astype(np.intp), len(mean) - 2)
-    postures = np.diff(mean, axis=0)[left]
-    postures *= (phases - left)[:, np.newaxis]
-    postures += mean[left]
-    return postures

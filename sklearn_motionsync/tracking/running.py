@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..matching.warps import at_times
 from .kalman import correct, squared_lengths, whitening
-from .learnt import at_phases, smoothed
+from .learnt import smoothed
 from .particles import Particles, weighted_median
 from .slopes import Slopes
 
@@ -89,7 +90,7 @@ class Running:
             self._seek()
         elif dt > 0:
             self._go_on(dt, matrix)
-        expected = at_phases(self.learnt.mean, self.particles.phases)
+        expected = at_times(self.learnt.mean, self.particles.phases)
         self.taken = np.zeros(len(values), dtype=bool)
         seen = ~np.isnan(values)
         if seen.any():

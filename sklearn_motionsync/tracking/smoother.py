@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..matching.warps import at_times
 from .kalman import Correction, correct
-from .learnt import at_phases
 from .particles import systematic
 from .running import Estimate, Running
 
@@ -143,7 +143,7 @@ def _along(learnt, pasts, chosen, matrix, state):
         else:
             means, covariance = learnt.process.predict(*state, past.dt)
             means[0, past.anew[some]] += learnt.mean[-1] - learnt.mean[0]
-        expected, correction = at_phases(learnt.mean, past.phases[some]), None
+        expected, correction = at_times(learnt.mean, past.phases[some]), None
         seen = ~np.isnan(past.values)
         if seen.any():
             rows = matrix[seen]
