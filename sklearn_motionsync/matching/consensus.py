@@ -3,7 +3,7 @@
 import numpy as np
 
 from .filters import smooth
-from .warps import follow
+from .warps import even_slices, follow
 
 __all__ = ["choose_exemplars", "smoothed", "vote"]
 
@@ -12,6 +12,8 @@ __all__ = ["choose_exemplars", "smoothed", "vote"]
 _FALL = 1.5
 # Share of the weight by which rounding may move a half.
 _ROUNDING = 2.0**-40
+# Comparisons that are made at once: they stay in the cache.
+_COMPARED = 200_000
 
 
 def choose_exemplars(global_distances, n_exemplars, pattern_index):
@@ -60,27 +62,31 @@ def vote(direct, to_exemplars, from_exemplars, lengths):
     -------
     ndarray, shape (n_sequences, P)
     """
-    at = np.broadcast_to(to_exemplars[:, np.newaxis], from_exemplars.shape)
-    routes = np.concatenate([direct[np.newaxis], follow(from_exemplars, at)])
+    by_way = follow(from_exemplars, to_exemplars[:, np.newaxis])
+    routes = np.concatenate([direct[np.newaxis], by_way])
     typical = np.median(lengths, axis=0)
     typical = np.where(typical > 0, typical, 1)
-    return _weighted_median(routes, np.exp(-_FALL * lengths / typical))
+    weights, out = np.exp(-_FALL * lengths / typical), np.empty(direct.shape)
+    for some in even_slices(len(out), max(1, _COMPARED // (len(routes) ** 2 * out.shape[1]))):
+        out[some] = _weighted_median(routes[:, some], weights[:, some])
+    return out
 
 
 def _weighted_median(values, weights):
     """Median over the first axis of (n, n_sequences, P), with weights (n, n_sequences).
 
-    Between the two values that halve the weight exactly it is their mean, as without weights.
+    Between the two values that halve the weight exactly it is their mean, as without weights. Few
+    values are sooner compared with each other than sorted.
     """
-    values = np.moveaxis(values, 0, -1)
-    order = np.argsort(values, axis=-1)
-    values = np.take_along_axis(values, order, axis=-1)
-    weights = np.broadcast_to(weights.T[:, np.newaxis], values.shape)
-    held = np.cumsum(np.take_along_axis(weights, order, axis=-1), axis=-1)
-    half = held[..., -1:] / 2
-    low, high = (held < half * (1 - _ROUNDING)), (held <= half * (1 + _ROUNDING))
-    at = np.stack([low.sum(axis=-1), high.sum(axis=-1)], axis=-1)
-    return np.take_along_axis(values, at, axis=-1).mean(axis=-1)
+    n, n_sequences, n_frames = values.shape
+    values, weights = np.ascontiguousarray(values.swapaxes(0, 1)), weights.T[:, np.newaxis]
+    below = (values[:, :, np.newaxis] <= values[:, np.newaxis]).astype(weights.dtype)
+    held = np.matmul(weights, below.reshape(n_sequences, n, -1)).reshape(values.shape)
+    half = weights.sum(axis=2, keepdims=True) / 2
+    # The smallest value up to which there is half of the weight, and up to which there is more.
+    low = np.where(held >= half * (1 - _ROUNDING), values, np.inf).min(axis=1)
+    high = np.where(held > half * (1 + _ROUNDING), values, np.inf).min(axis=1)
+    return (low + high) / 2
 
 
 def smoothed(times, reach, width, about=0.0):

@@ -1,6 +1,7 @@
 """Warps: sequences sampled along them (Eqs. 7 and 18), and warps read at other times."""
 
 import itertools
+import math
 
 import numpy as np
 
@@ -80,12 +81,19 @@ def even_slices(n, size):
 
 
 def follow(warps, times):
-    """Piecewise-linear warps ``(..., P)`` read at times ``(..., P')`` in frames."""
-    left = np.clip(times.astype(np.intp), 0, warps.shape[-1] - 2)
+    """Piecewise-linear warps ``(..., P)`` read at times ``(..., P')`` in frames.
+
+    Both have as many axes; along all but the last the times are as many, or one for all.
+    """
+    *shape, n_frames = warps.shape
+    left = np.clip(times.astype(np.intp), 0, n_frames - 2)
     weight = times - left
-    low = np.take_along_axis(warps, left, axis=-1)
-    high = np.take_along_axis(warps, left + 1, axis=-1)
-    return low * (1 - weight) + high * weight
+    flat = np.ascontiguousarray(warps).reshape(-1)
+    at = left + n_frames * np.arange(math.prod(shape)).reshape(*shape, 1)
+    out = flat.take(at) * (1 - weight)
+    at += 1
+    out += flat.take(at) * weight
+    return out
 
 
 def at_times(sequence, times):
