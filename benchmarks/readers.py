@@ -1,7 +1,7 @@
 """`read_motion` against parsers of a page of plain NumPy, for docs/speed.md.
 
-The plain ones believe every file: no checks, no messages, no encodings, no missing frames. Both give
-the same positions, which is checked first; then they run in turns. Beside the files given, two BVH
+The plain ones believe every file: no checks, no messages, no encodings, no gaps. Both give the same
+positions, which is checked first; then they run in turns. Beside the files given, two BVH
 files of 31 joints are written, of 200 and of 20,000 frames.
 
     python benchmarks/readers.py ../shared/data/original_files/*/*.*
