@@ -54,8 +54,12 @@ class MotionText:
 
     def lines(self):
         """All lines that are left."""
-        while words := self.line():
-            yield words
+        if self._words:
+            yield self.line()
+        for line in self._lines:
+            self.line_number += 1
+            if words := line.split():
+                yield words
 
     def word(self, expected):
         """The next word; a brace is always a word of its own."""
@@ -75,7 +79,7 @@ class MotionText:
         except ValueError:
             numbers = array.array("d", [math.nan])
         # Python reads 1_0 as a number, files do not mean it.
-        if not all(map(math.isfinite, numbers)) or b"_" in b"".join(words):
+        if b"_" in b"".join(words) or not all(map(math.isfinite, numbers)):
             bad = next(word for word in words if not _is_number(word))
             raise self.error(f"{what} needs finite numbers, got {show([bad])}.")
         return numbers
