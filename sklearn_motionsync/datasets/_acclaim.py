@@ -19,9 +19,9 @@ def read_acclaim(path, asf):
     bones = skeleton.bones
     check_positions(path, text.size, len(values), len(bones))
     parents = [bone.parent for bone in bones]
-    tree, translations = _body(skeleton, parents, degrees)
-    positions = tree.positions(path, values, translations)
     with np.errstate(over="ignore", invalid="ignore"):
+        tree, translations = _body(skeleton, parents, degrees)
+        positions = tree.positions(path, values, translations)
         positions /= skeleton.length_unit
         positions *= _METRES_PER_INCH
     if not np.isfinite(positions).all():
@@ -100,31 +100,31 @@ def _body(skeleton, parents, degrees):
     """The tree of the bones, and the function that turns values into translations.
 
     A bone turns about its own axes, C: its rotation in its parent is C M inv(C), with M the
-    motion. Its joint is its far end, so its own rotation acts on its offset, after it was moved
-    along its own axes. So axes are C of the bone, turned. The root's C is where it begins, so its
-    rotation is C M; it moves along the axes of the world, and its offset does not turn.
+    motion, which it is moved before, along C. Its joint is its far end, so its own rotation acts
+    on its offset. The root's C is where it begins, so its rotation is C M; it moves along the axes
+    of the world, from its offset, and bones that hang on it are told in what it turns to.
     """
     bones = skeleton.bones
     own = _own_axes(bones, skeleton.degrees)
-    shifts, back = own.copy(), own.copy()
-    shifts[:, :, 0] = back[:, :, 0] = np.eye(3)
-    back = back.swapaxes(0, 1)
+    back = own.swapaxes(0, 1).copy()
+    back[:, :, 0] = np.eye(3)
     offsets = np.array([bone.offset for bone in bones]).T
     far_ends = along(back, offsets)
     begin = np.zeros((3, len(bones), 1))
     begin[:, 0, 0], far_ends[:, 0] = offsets[:, 0], 0
-    # In the parent's own axes; the root's parent is the world.
     above = back[:, :, parents]
     above[:, :, 0] = np.eye(3)
-    shifts, own = along(above[:, :, None], shifts), along(above[:, :, None], own)
+    at_rest = along(above[:, :, None], own)
+    shifts = at_rest.copy()
+    shifts[:, :, 0] = np.eye(3)
     (axes, moved, columns), turning = _columns(bones)
 
     def translations(values):
         steps = np.zeros((3, len(bones), len(values)))
         steps[axes, moved] = values[:, columns].T
-        return along(shifts[..., None], steps) + along(above[..., None], begin)
+        return along(shifts[..., None], steps) + begin
 
-    return Tree(parents, turning, degrees, own, far_ends), translations
+    return Tree(parents, turning, degrees, at_rest, far_ends), translations
 
 
 def _own_axes(bones, degrees):

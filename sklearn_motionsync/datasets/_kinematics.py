@@ -6,8 +6,10 @@ import numpy as np
 
 from ._guard import check_growth
 
-# Joints times frames that are placed at once, so that they stay in the processor's cache.
-_BLOCK = 2**14
+# Joints times frames of a level that are placed at once, in the mean: enough for NumPy's calls not
+# to count, and few enough for the processor's cache. And those of all levels, for memory's sake.
+_LEVEL = 2**12
+_BLOCK = 2**20
 # The two axes that turn about a third, the first to where the second was.
 _OTHERS = {"X": (1, 2), "Y": (2, 0), "Z": (0, 1)}
 
@@ -47,7 +49,7 @@ class Tree:
         along the axes of the parent, (3, n_joints, n_frames); it is overwritten.
         """
         positions = np.empty((len(values), self._n_joints, 3))
-        step = max(1, _BLOCK // self._n_joints)
+        step = max(1, min(_LEVEL * len(self._levels), _BLOCK) // self._n_joints)
         with np.errstate(over="ignore", invalid="ignore"):
             for first in range(0, len(values), step):
                 some = values[first : first + step]
