@@ -5,7 +5,8 @@ import array
 import numpy as np
 
 from ._asf import read_asf
-from ._kinematics import MotionText, check_positions, decode, joint_positions, rotations, show
+from ._kinematics import Tree, along, check_positions, turn
+from ._text import MotionText, decode, show
 
 _METRES_PER_INCH = 0.0254
 
@@ -18,8 +19,9 @@ def read_acclaim(path, asf):
     bones = skeleton.bones
     check_positions(path, text.size, len(values), len(bones))
     parents = [bone.parent for bone in bones]
-    positions = joint_positions(path, parents, values, _transforms(skeleton, degrees))
     with np.errstate(over="ignore", invalid="ignore"):
+        tree, translations = _body(skeleton, parents, degrees)
+        positions = tree.positions(path, values, translations)
         positions /= skeleton.length_unit
         positions *= _METRES_PER_INCH
     if not np.isfinite(positions).all():
@@ -94,52 +96,67 @@ def _read_setting(text, words, header):
         header["frame_rate"] = rate
 
 
-def _transforms(skeleton, degrees):
-    """The function that turns values into translations and rotations.
+def _body(skeleton, parents, degrees):
+    """The tree of the bones, and the function that turns values into translations.
 
     A bone turns about its own axes, C: its rotation in its parent is C M inv(C), with M the
-    motion. Its joint is its far end, so its own rotation acts on its offset. The root's C is
-    where it begins, so its rotation is C M; it moves along the axes of the world.
-    Degrees of freedom act in the order in which they are named, about fixed axes.
+    motion, which it is moved before, along C. Its joint is its far end, so its own rotation acts
+    on its offset. The root's C is where it begins, so its rotation is C M; it moves along the axes
+    of the world, from its offset, and bones that hang on it are told in what it turns to.
     """
     bones = skeleton.bones
-    n = len(bones)
-    axes = np.array([bone.axis for bone in bones])
+    own = _own_axes(bones, skeleton.degrees)
+    back = own.swapaxes(0, 1).copy()
+    back[:, :, 0] = np.eye(3)
+    offsets = np.array([bone.offset for bone in bones]).T
+    far_ends = along(back, offsets)
+    begin = np.zeros((3, len(bones), 1))
+    begin[:, 0, 0], far_ends[:, 0] = offsets[:, 0], 0
+    above = back[:, :, parents]
+    above[:, :, 0] = np.eye(3)
+    at_rest = along(above[:, :, None], own)
+    shifts = at_rest.copy()
+    shifts[:, :, 0] = np.eye(3)
+    (axes, moved, columns), turning = _columns(bones)
+
+    def translations(values):
+        steps = np.zeros((3, len(bones), len(values)))
+        steps[axes, moved] = values[:, columns].T
+        return along(shifts[..., None], steps) + begin
+
+    return Tree(parents, turning, degrees, at_rest, far_ends), translations
+
+
+def _own_axes(bones, degrees):
+    """C (3, 3, n_bones)."""
+    axes = np.repeat(np.eye(3)[:, :, None], len(bones), axis=2)
     orders = {}
     for j, bone in enumerate(bones):
-        orders.setdefault(bone.axis_order, []).append((j, range(3 * j, 3 * j + 3)))
-    frames = rotations(axes.reshape(1, -1), orders, n, skeleton.degrees)
-    back = frames.swapaxes(2, 3).copy()
-    back[0] = np.eye(3)
-    shift = frames.copy()
-    shift[0] = np.eye(3)
-    offsets = np.array([bone.offset for bone in bones])[:, None, :, None]
-    moving, turning = _columns(bones)
-
-    def transforms(values):
-        turned = frames @ rotations(values, turning, n, degrees) @ back
-        translations = np.zeros((n, len(values), 3))
-        translations[moving[0], :, moving[1]] = values[:, moving[2]].T
-        along = turned.copy()
-        along[0] = np.eye(3)
-        far_ends = shift @ translations[..., None] + along @ offsets
-        return far_ends[..., 0], turned
-
-    return transforms
+        orders.setdefault(bone.axis_order, []).append(j)
+    for order, members in orders.items():
+        angles = np.array([bones[j].axis for j in members]).T
+        turned = axes[:, :, members]
+        # Axes that stay where they are turn as those that turn along, the last first.
+        turn(turned, order[::-1].upper(), np.radians(angles[::-1]) if degrees else angles[::-1])
+        axes[:, :, members] = turned
+    return axes
 
 
 def _columns(bones):
-    """Joints, axes and columns of the translations (3, n), and the rotations by their order."""
+    """Axes, joints and columns of the translations (3, n), and the turns by their axes.
+
+    Degrees of freedom act in the order in which they are named, about axes that stay.
+    """
     moving, turning, column = [], {}, 0
     for j, bone in enumerate(bones):
         order, columns = "", []
         for kind, axis in bone.dofs:
             if kind == "t":
-                moving.append((j, "xyz".index(axis), column))
+                moving.append(("xyz".index(axis), j, column))
             else:
-                order += axis
+                order += axis.upper()
                 columns.append(column)
             column += 1
         if order:
-            turning.setdefault(order, []).append((j, columns))
+            turning.setdefault(order[::-1], []).append((j, columns[::-1]))
     return np.array(moving, dtype=int).reshape(-1, 3).T, turning

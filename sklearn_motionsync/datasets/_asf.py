@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ._kinematics import MotionText, decode, show
+from ._text import MotionText, decode, show
 
 _DOFS = ("tx", "ty", "tz", "rx", "ry", "rz")
 

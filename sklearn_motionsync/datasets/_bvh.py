@@ -1,19 +1,11 @@
 """BVH: a tree of joints with offsets and channels, then the channels of every frame."""
 
-import array
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ._kinematics import (
-    MotionText,
-    check_positions,
-    decode,
-    joint_positions,
-    rotations,
-    show,
-    unique,
-)
+from ._kinematics import Tree, check_positions
+from ._text import MotionText, decode, show, unique
 
 _KEYWORDS = (b"HIERARCHY", b"ROOT", b"JOINT", b"END", b"OFFSET", b"CHANNELS", b"MOTION", b"{", b"}")
 _CHANNELS = [axis + kind for kind in (b"POSITION", b"ROTATION") for axis in (b"X", b"Y", b"Z")]
@@ -43,10 +35,11 @@ def read_bvh(path):
     values, frame_rate = _read_motion(text, n_channels)
     check_positions(path, text.size, len(values), len(joints))
     parents = [joint.parent for joint in joints]
+    turning, translations = _motion(joints)
     return {
         "joints": unique([joint.name for joint in joints]),
         "parents": parents,
-        "positions": joint_positions(path, parents, values, _transforms(joints)),
+        "positions": Tree(parents, turning).positions(path, values, translations),
         "frame_rate": frame_rate,
         "units": None,
         "up": "y",
@@ -137,16 +130,13 @@ def _read_motion(text, n_channels):
             f"Frames: says {n_frames}, each of {n_channels} channels, but only {text.n_left} bytes "
             "follow; the file is not complete, or that line is wrong."
         )
-    values = array.array("d")
-    what = "a frame (one number a channel)"
-    for words in text.lines():
-        values.extend(text.numbers(words, n_channels, what))
-    if len(values) != n_frames * n_channels:
+    values = text.table(n_channels, "a frame (one number a channel)")
+    if len(values) != n_frames:
         raise text.error(
-            f"Frames: says {n_frames}, but {len(values) // n_channels} frames follow; the file is "
-            "not complete, or that line is wrong."
+            f"Frames: says {n_frames}, but {len(values)} frames follow; the file is not complete, "
+            "or that line is wrong."
         )
-    return np.frombuffer(values).reshape(n_frames, n_channels), 1 / frame_time
+    return values, 1 / frame_time
 
 
 def _read_field(text, name):
@@ -157,28 +147,27 @@ def _read_field(text, name):
     return value.strip()
 
 
-def _transforms(joints):
-    """The function that turns channels into translations and rotations."""
-    offsets = np.array([joint.offset for joint in joints])
+def _motion(joints):
+    """Which channels turn the joints, and the function that turns channels into translations."""
+    offsets = np.array([joint.offset for joint in joints]).T[:, :, None]
     moving, turning = [], {}
     column = 0
     for j, joint in enumerate(joints):
         axes, columns = "", []
         for channel in joint.channels:
             if channel.endswith(b"POSITION"):
-                moving.append((j, b"XYZ".index(channel[:1]), column))
+                moving.append((b"XYZ".index(channel[:1]), j, column))
             else:
-                # Upper case: the axes turn along. The first rotation is the outermost.
                 axes += channel[:1].decode()
                 columns.append(column)
             column += 1
         if axes:
             turning.setdefault(axes, []).append((j, columns))
-    moving = np.array(moving, dtype=int).reshape(-1, 3).T
+    components, moved, columns = np.array(moving, dtype=int).reshape(-1, 3).T
 
-    def transforms(values):
-        translations = np.repeat(offsets[:, None], len(values), axis=1)
-        translations[moving[0], :, moving[1]] = values[:, moving[2]].T
-        return translations, rotations(values, turning, len(joints), degrees=True)
+    def translations(values):
+        result = np.repeat(offsets, len(values), axis=2)
+        result[components, moved] = values[:, columns].T
+        return result
 
-    return transforms
+    return turning, translations

@@ -7,7 +7,7 @@ import numpy as np
 from ._c3d_events import find_events, find_first_frame
 from ._c3d_file import BLOCK, C3DFile, Parameters
 from ._c3d_groups import find_channels, find_labels, find_point_groups, find_scales
-from ._kinematics import unique
+from ._text import unique
 
 # Where Cortex did not see a marker.
 _NOWHERE = 9999999.0

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from ._kinematics import decode
+from ._text import decode
 
 BLOCK = 512
 _LITTLE, _DEC, _BIG = 84, 85, 86

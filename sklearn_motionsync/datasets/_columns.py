@@ -3,7 +3,7 @@
 import array
 import math
 
-from ._kinematics import show
+from ._text import show
 
 # What programs write where they have no number, without its sign.
 _NOTHING = {b"", b"nan", b"na", b"n/a", b"null", b"none", b"-", b"inf", b"infinity"}

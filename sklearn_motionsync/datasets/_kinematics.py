@@ -1,121 +1,17 @@
-"""What the readers of motion files share: words and numbers of a text, and forward kinematics."""
+"""Forward kinematics: where the joints of a tree are, from how each moves in its parent."""
 
-import array
-import io
-import math
+import itertools
 
 import numpy as np
 
 from ._guard import check_growth
 
-# Joints times frames whose rotations are held at once.
-_BLOCK = 2**17
-
-
-class MotionText:
-    """The words of a text file, one by one or line by line, and where they stand.
-
-    Words are bytes: old files hold any encoding in their comments.
-    """
-
-    def __init__(self, path):
-        data = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
-        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        self.path = path
-        self.size = len(data)
-        self.line_number = 0
-        self.is_whole = True  # the line read last has an end
-        self._lines = io.BytesIO(data)
-        self._words = []  # those left of this line, the last first
-
-    @property
-    def n_left(self):
-        """Bytes after the line read last."""
-        return self.size - self._lines.tell()
-
-    def row(self):
-        """The next line that has words, as it is; empty at the end."""
-        while line := self._lines.readline():
-            self.line_number += 1
-            if line.strip():
-                self.is_whole = line.endswith(b"\n")
-                return line.removesuffix(b"\n")
-        return b""
-
-    def line(self):
-        """The words of the next line that has any, or what is left of this one; [] at the end."""
-        words, self._words = self._words[::-1], []
-        return words or self.row().split()
-
-    def lines(self):
-        """All lines that are left."""
-        while words := self.line():
-            yield words
-
-    def word(self, expected):
-        """The next word; a brace is always a word of its own."""
-        if not self._words:
-            line = b" ".join(self.line())
-            self._words = line.replace(b"{", b" { ").replace(b"}", b" } ").split()[::-1]
-        if not self._words:
-            raise self.error(f"the file ends where {expected} should follow; it is not complete.")
-        return self._words.pop()
-
-    def numbers(self, words, n, what):
-        """`n` finite numbers."""
-        if len(words) != n:
-            raise self.error(f"{what} needs {n} numbers, got {len(words)} ({show(words)}).")
-        try:
-            numbers = array.array("d", map(float, words))
-        except ValueError:
-            numbers = array.array("d", [math.nan])
-        # Python reads 1_0 as a number, files do not mean it.
-        if not all(map(math.isfinite, numbers)) or b"_" in b"".join(words):
-            bad = next(word for word in words if not _is_number(word))
-            raise self.error(f"{what} needs finite numbers, got {show([bad])}.")
-        return numbers
-
-    def error(self, message):
-        return ValueError(f"{self.path}, line {self.line_number}: {message}")
-
-
-def _is_number(word):
-    try:
-        return math.isfinite(float(word)) and b"_" not in word
-    except ValueError:
-        return False
-
-
-def show(words):
-    """Words as an error message quotes them, never more than a line."""
-    text = decode(b" ".join(words[:8])[:61])
-    return repr(text if len(text) <= 60 else text[:60] + "...")
-
-
-def decode(name):
-    """The text of a name: UTF-8, or ISO-8859-1 if it is not."""
-    try:
-        return name.decode("utf-8")
-    except UnicodeDecodeError:
-        return name.decode("latin-1")
-
-
-def unique(names):
-    """The names, with ``_2``, ``_3``, ... behind those that came before."""
-    taken, last = set(names), {}
-    result = []
-    for name in names:
-        new = name
-        if name in last:
-            # Counting on from the last number keeps this linear.
-            while new in taken:
-                last[name] += 1
-                new = f"{name}_{last[name]}"
-            taken.add(new)
-        else:
-            last[name] = 1
-        result.append(new)
-    return result
+# Joints times frames of a level that are placed at once, in the mean: enough for NumPy's calls not
+# to count, and few enough for the processor's cache. And those of all levels, for memory's sake.
+_LEVEL = 2**12
+_BLOCK = 2**20
+# The two axes that turn about a third, the first to where the second was.
+_OTHERS = {"X": (1, 2), "Y": (2, 0), "Z": (0, 1)}
 
 
 def check_positions(path, size, n_frames, n_joints):
@@ -123,59 +19,112 @@ def check_positions(path, size, n_frames, n_joints):
     check_growth(path, size, n_frames * n_joints * 24, f"{n_frames} frames of {n_joints} joints")
 
 
-def rotations(values, groups, n_joints, degrees):
-    """Rotation matrices (n_joints, n_frames, 3, 3), of angles (n_frames, n_values).
+class Tree:
+    """A tree of joints, each with axes of its own that turn with it.
 
-    `groups` maps an order of axes, as SciPy writes it, to a list of (joint, columns).
-    Joints in no group do not turn.
+    Parameters
+    ----------
+    parents : list of int
+        The parent of each joint, -1 for roots.
+    turning : dict of str to list of (int, list of int)
+        The axes about which joints turn, such as "ZXY", each turned by those before it; and the
+        joints that do, each with the columns of its angles. Others do not turn.
+    degrees : bool
+        Whether angles are degrees.
+    at_rest : array (3, 3, n_joints), default=None
+        Each joint's axes before it turns, as columns, in those of its parent; by default the same.
+    bones : array (3, n_joints), default=None
+        From where a joint turns to where it is said to be, along its axes; by default nothing.
     """
-    from scipy.spatial.transform import Rotation
 
-    matrices = np.zeros((n_joints, len(values), 3, 3))
-    matrices[..., range(3), range(3)] = 1
-    for order, members in groups.items():
-        joints, columns = map(np.array, zip(*members, strict=True))
-        angles = values[:, columns].swapaxes(0, 1).reshape(-1, len(order))
-        turned = Rotation.from_euler(order, angles, degrees=degrees).as_matrix()
-        matrices[joints] = turned.reshape(len(joints), len(values), 3, 3)
-    return matrices
+    def __init__(self, parents, turning, degrees=True, at_rest=None, bones=None):
+        self._n_joints = len(parents)
+        self._degrees, self._at_rest, self._bones = degrees, at_rest, bones
+        self._levels = _levels(parents, turning, leaves_turn=bones is not None)
+
+    def positions(self, path, values, translations):
+        """Positions (n_frames, n_joints, 3) for values (n_frames, n_values).
+
+        ``translations(values)`` gives, for some frames, what lies between a joint and its parent
+        along the axes of the parent, (3, n_joints, n_frames); it is overwritten.
+        """
+        positions = np.empty((len(values), self._n_joints, 3))
+        step = max(1, min(_LEVEL * len(self._levels), _BLOCK) // self._n_joints)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for first in range(0, len(values), step):
+                some = values[first : first + step]
+                placed = self._place(some, translations(some))
+                positions[first : first + step] = placed.transpose(2, 1, 0)
+        if not np.isfinite(positions).all():
+            frame, joint = np.argwhere(~np.isfinite(positions))[0, :2]
+            raise ValueError(
+                f"{path}: joint {joint} is infinitely far away in frame {frame}; offsets, lengths "
+                "or translations in the file are too large to be true."
+            )
+        return positions
+
+    def _place(self, values, places):
+        """Translations in parents become places in the world, level by level."""
+        angles = np.ascontiguousarray(values.T)
+        if self._degrees:
+            angles = np.radians(angles)
+        # Those of the level above are all that a level needs; above the roots is the world.
+        axes = np.broadcast_to(np.eye(3)[:, :, None, None], (3, 3, 1, len(values)))
+        for joints, parents, above, turns in self._levels:
+            axes = axes[:, :, above]
+            moved = along(axes, places[:, joints])
+            places[:, joints] = moved if parents is None else moved + places[:, parents]
+            if self._at_rest is not None:
+                axes = along(axes[:, :, None], self._at_rest[:, :, joints, None])
+            for names, part, columns in turns:
+                turn(axes[:, :, part], names, angles[columns])
+            if self._bones is not None:
+                places[:, joints] += along(axes, self._bones[:, joints, None])
+        return places
 
 
-def joint_positions(path, parents, values, transforms):
-    """Positions (n_frames, n_joints, 3) of a tree of joints.
+def _levels(parents, turning, leaves_turn):
+    """Joints with equally many ancestors, which are placed at once.
 
-    ``transforms(values)`` gives the translations (n_joints, n_frames, 3) and rotations
-    (n_joints, n_frames, 3, 3) of joints in their parents, for some frames' values.
+    For each level its joints, their parents (None above the roots), these in the level above, and
+    for each order of axes the joints that turn so, as a part of the level, and their columns.
     """
-    parents = np.asarray(parents)
-    positions = np.empty((len(values), len(parents), 3))
-    step = max(1, _BLOCK // len(parents))
-    with np.errstate(over="ignore", invalid="ignore"):
-        for first in range(0, len(values), step):
-            placed = _place(parents, *transforms(values[first : first + step]))
-            positions[first : first + step] = placed.swapaxes(0, 1)
-    if not np.isfinite(positions).all():
-        frame, joint = np.argwhere(~np.isfinite(positions))[0, :2]
-        raise ValueError(
-            f"{path}: joint {joint} is infinitely far away in frame {frame}; offsets, lengths or "
-            "translations in the file are too large to be true."
-        )
-    return positions
+    children = {}
+    for j, parent in enumerate(parents):
+        children.setdefault(parent, []).append(j)
+    # Nothing hangs on a leaf, so nobody sees it turn.
+    turns_as = {
+        j: (axes, columns)
+        for axes, members in turning.items()
+        for j, columns in members
+        if leaves_turn or j in children
+    }
+    levels, at = [], {-1: 0}
+    joints = children[-1]
+    while joints:
+        joints.sort(key=lambda j: turns_as.get(j, ("",))[0])
+        above = [parents[j] for j in joints]
+        turns, first = [], 0
+        for axes, group in itertools.groupby(joints, lambda j: turns_as.get(j, ("",))[0]):
+            group = list(group)
+            if axes:
+                columns = np.array([turns_as[j][1] for j in group]).T
+                turns.append((axes, slice(first, first + len(group)), columns))
+            first += len(group)
+        levels.append((joints, above if levels else None, [at[j] for j in above], turns))
+        at = {j: i for i, j in enumerate(joints)}
+        joints = [child for j in joints for child in children.get(j, ())]
+    return levels
 
 
-def _place(parents, translations, rotations):
-    """Translations in the world; both arrays are overwritten.
+def along(axes, vectors):
+    """Vectors (3, ...) that are told along axes (3, 3, ...), whose second index tells which."""
+    return axes[:, 0] * vectors[0] + axes[:, 1] * vectors[1] + axes[:, 2] * vectors[2]
 
-    Each joint is known relative to an ancestor, its parent at first. Every pass replaces
-    the ancestor by the ancestor's own, so the number of passes is the logarithm of the
-    depth: a chain of many thousand joints costs no more than a bush.
-    """
-    ancestor = parents.copy()
-    while (joints := np.flatnonzero(ancestor >= 0)).size:
-        above = ancestor[joints]
-        turn = rotations[above]
-        moved = (turn @ translations[joints][..., None])[..., 0] + translations[above]
-        rotations[joints] = turn @ rotations[joints]
-        translations[joints] = moved
-        ancestor[joints] = ancestor[above]
-    return translations
+
+def turn(axes, names, angles):
+    """Turn axes (3, 3, ...) about some of themselves, as they are then, by angles (n, ...)."""
+    for name, c, s in zip(names, np.cos(angles), np.sin(angles), strict=True):
+        i, j = _OTHERS[name]
+        first, second = axes[:, i], axes[:, j]
+        axes[:, i], axes[:, j] = c * first + s * second, c * second - s * first

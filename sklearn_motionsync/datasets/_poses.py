@@ -9,7 +9,7 @@ import pandas as pd
 from ..tables import FRAME, label_of_part
 from ._clock import find_rate, tell_uneven
 from ._gaps import check_max_gap, fill_gaps
-from ._kinematics import unique
+from ._text import unique
 
 # What the dimensions are called, the older names last.
 _NAMES = {

@@ -7,7 +7,7 @@ import numpy as np
 
 from ._columns import check_n_rows, check_time, count_decimals, fields_of, read_numbers
 from ._guard import check_growth
-from ._kinematics import MotionText, decode, show, unique
+from ._text import MotionText, decode, show, unique
 
 # The parts of one column, by the DataType of the file.
 _PARTS = {

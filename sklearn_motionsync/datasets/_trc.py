@@ -6,7 +6,8 @@ import re
 import numpy as np
 
 from ._columns import check_n_rows, check_time, count_decimals, fields_of, read_numbers
-from ._kinematics import MotionText, check_positions, decode, show, unique
+from ._kinematics import check_positions
+from ._text import MotionText, decode, show, unique
 
 # Where Cortex did not see a marker.
 _NOWHERE = 9999999.0

@@ -62,6 +62,15 @@ def test_where_the_root_begins(tmp_path):
     np.testing.assert_allclose(joint(df, "thigh")[0] / INCH, [6, 3, 4])
 
 
+def test_a_hierarchy_in_any_order(tmp_path):
+    expected = acclaim(tmp_path)
+    asf = ASF.replace("root thigh\n    thigh shin", "thigh shin\n    root thigh")
+    assert asf != ASF
+    df = acclaim(tmp_path, asf)
+    assert df.attrs["joints"] == ["root", "shin", "thigh"]
+    pd.testing.assert_frame_equal(df[expected.columns], expected)
+
+
 def test_radians(tmp_path):
     expected = acclaim(tmp_path)
     asf = ASF.replace("angle deg", "angle rad").replace("0 0 90", f"0 0 {np.pi / 2}")
@@ -118,6 +127,13 @@ def test_bad_asf(tmp_path, old, new, message):
     with pytest.raises(ValueError, match=rf"a\.asf, line \d+: |a\.asf: {message}") as caught:
         acclaim(tmp_path, asf)
     caught.match(message)
+
+
+def test_bones_out_of_this_world(tmp_path):
+    old = "direction 0 -1 0\n    length 4\n    axis 0 0 90"
+    asf = ASF.replace(old, "direction 1 1 1\n    length 1.7e308\n    axis 30 40 50")
+    with pytest.raises(ValueError, match="joint 1 is infinitely far away in frame 0"):
+        acclaim(tmp_path, asf)
 
 
 @pytest.mark.parametrize(

@@ -85,6 +85,111 @@ def test_very_many_joints(tmp_path, deep):
     assert df.iloc[1, -3:].tolist() == [1, n if deep else 1, 0]
 
 
+def test_many_joints_that_turn(tmp_path):
+    """A chain that bends to half a circle, in more frames than are placed at once."""
+    n, n_frames = 600, 2000
+    joint = "JOINT a { OFFSET 0 1 0 CHANNELS 1 Zrotation "
+    text = (
+        f"HIERARCHY\nROOT a {{ OFFSET 0 0 0 {joint * n + '} ' * n}}}\nMOTION\nFrames: {n_frames}\n"
+    )
+    turns = np.linspace(0, 180 / n, n_frames).round(6)
+    text += "Frame Time: 1\n" + "".join(f"{turn} " * n + "\n" for turn in turns)
+    df = read_motion(put(tmp_path, text))
+    angles = np.radians(turns)[:, None] * np.arange(n)
+    expected = np.column_stack([-np.sin(angles).sum(axis=1), np.cos(angles).sum(axis=1)])
+    np.testing.assert_allclose(df.iloc[:, -3:-1], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_any_tree_against_the_oracle(tmp_path, seed):
+    """Channels in any number and order, not the same in joints of one level; several roots."""
+    rng = np.random.default_rng(seed)
+    names = [axis + kind for axis in "XYZ" for kind in ("position", "rotation")]
+    n_channels = 0
+
+    def one(word, depth):
+        nonlocal n_channels
+        channels = rng.permutation(names)[: rng.integers(7)]
+        n_channels += len(channels)
+        offset = " ".join(map(str, rng.uniform(-9, 9, 3).round(2)))
+        inner = [one("JOINT", depth + 1) for _ in range(rng.integers(4) if depth < 5 else 0)]
+        inner = inner or ["End Site {\nOFFSET 1 2 3\n}"] * rng.integers(2)
+        head = f"{word} j{rng.integers(10**9)} {{\nOFFSET {offset}"
+        return "\n".join([head, f"CHANNELS {len(channels)} {' '.join(channels)}", *inner, "}"])
+
+    roots = [one("ROOT", 0) for _ in range(3)]
+    numbers = rng.uniform(-400, 400, (4, n_channels)).round(3)
+    rows = [" ".join(map(str, row)) for row in numbers]
+    text = "\n".join(["HIERARCHY", *roots, "MOTION", "Frames: 4", "Frame Time: 1", *rows])
+    df = read_motion(put(tmp_path, text))
+    expected = bvh_oracle(text)
+    assert n_channels > 20
+    assert set(df.attrs["joints"]) == set(expected)
+    for name, track in expected.items():
+        np.testing.assert_allclose(joint(df, name), track, atol=1e-9)
+
+
+def test_a_frame_does_not_depend_on_those_around(tmp_path, benchmark):
+    benchmark("readers").write_bvh(tmp_path / "long.bvh", 3000)
+    df = read_motion(tmp_path / "long.bvh")
+    head, motion = (tmp_path / "long.bvh").read_text().split("Frames: 3000\n")
+    rows = motion.splitlines()
+    for first, n in ((0, 1), (1234, 7), (2990, 10)):
+        few = [f"Frames: {n}", rows[0], *rows[1 + first : 1 + first + n]]
+        some = read_motion(put(tmp_path, head + "\n".join(few)))
+        np.testing.assert_array_equal(some, df.iloc[first : first + n])
+
+
+def moves(rows):
+    """A file of one joint that moves, with rows of text."""
+    return small("3 Xposition Yposition Zposition", f"Frames: {len(rows)}\nFrame Time: 1\n") + (
+        "\n".join(rows)
+    )
+
+
+def test_numbers_are_read_to_the_last_digit(tmp_path):
+    rng = np.random.default_rng(0)
+    formats = ["%r", "%.6f", "%.17g", "%.25g", "%e", "%+.3E", "%d"]
+    values = rng.uniform(-1, 1, 3000) * 10.0 ** rng.integers(-40, 41, 3000)
+    words = [formats[i % 7] % float(value) for i, value in enumerate(values)]
+    words[:6] = ["+5", ".5", "5.", "-.5e-3", "1e-400", "-0"]
+    df = read_motion(put(tmp_path, moves([" ".join(words[i : i + 3]) for i in range(0, 3000, 3)])))
+    assert df.to_numpy().ravel().tolist() == list(map(float, words))
+
+
+@pytest.mark.parametrize("blank", ["  ", " \t", "\t", "\f", "\v"])
+def test_blanks_of_any_kind(tmp_path, blank):
+    rows = [f"{blank}1{blank}2 3{blank}", blank, "", f"4 5{blank}6{blank} "]
+    text = moves(rows).replace("Frames: 4", "Frames: 2")
+    assert read_motion(put(tmp_path, text)).to_numpy().tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+@pytest.mark.parametrize(
+    "word", ["1e", "1e+", "+-1", "1.2.3", ".", "-", "e5", "1-2", "1_0", "0x1", "1,5", "inf", "\xb2"]
+)
+def test_words_that_are_no_numbers(tmp_path, word):
+    with pytest.raises(ValueError, match=r"line 11: a frame .* needs finite numbers, got "):
+        read_motion(put(tmp_path, moves(["1 2 3", f"1 {word} 3", "1 2 3"])))
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("1 1e 3", "needs finite numbers, got '1e'"),
+        ("1 1e999 3", "needs finite numbers, got '1e999'"),
+        ("1 2", "needs 3 numbers, got 2 \\('1 2'\\)"),
+        ("1 2 3 4 5 6", "needs 3 numbers, got 6"),
+        ('1 2 "3"', "needs finite numbers"),
+    ],
+)
+def test_errors_far_into_a_file(tmp_path, row, message):
+    rows = ["123.456789 -123.456789 0.123456"] * 80_000
+    rows[5] = ""
+    rows[70_000] = row
+    with pytest.raises(ValueError, match=rf"a\.bvh, line 70010: a frame .* {message}"):
+        read_motion(put(tmp_path, moves(rows)))
+
+
 def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame Time: 1\n1 2 3\n"):
     return f"HIERARCHY\nROOT a\n{{\nOFFSET 0 0 0\nCHANNELS {channels}\n}}\nMOTION\n{motion}"
 

@@ -62,6 +62,17 @@ def test_damaged_files(tmp_path):
 
 
 @pytest.mark.parametrize(
+    "name", ["bvh/007_01.bvh", "asf_amc/02_02.amc", "asf_amc/HDM_bk_depositFloorR_011_120.amc"]
+)
+def test_as_plain_parsers_read_it(real_data, benchmark, name):
+    path = real_data / "original_files" / name
+    expected = benchmark("readers").PLAIN[path.suffix](path)
+    scale = 1e-12 * np.abs(expected).max()
+    df = read_motion(path)
+    np.testing.assert_allclose(df.to_numpy().reshape(expected.shape), expected, atol=scale, rtol=0)
+
+
+@pytest.mark.parametrize(
     "name", ["bvh/007_01.bvh", "asf_amc/02_01.amc", "asf_amc/HDM_bd_depositFloorR_001_120.amc"]
 )
 def test_from_a_file_to_postures(real_data, name):
