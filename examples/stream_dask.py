@@ -38,12 +38,12 @@ def give(client, model, name="model"):
     client.register_plugin(Fitted(model), name=name)
 
 
-def on_worker(performances, method="transform", name="model"):
-    """What the model that was given to a worker says of performances."""
-    return stream_files.answer(get_worker().plugins[name].model, method, performances)
+def on_worker(performances, method="transform", model="model"):
+    """What the model that a worker was given under this name says of performances."""
+    return stream_files.answer(get_worker().plugins[model].model, method, performances)
 
 
-def stream(client, portions, method="transform", name="model"):
+def stream(client, portions, method="transform", model="model"):
     """Yield what the workers say of portions, in order.
 
     Parameters
@@ -52,8 +52,8 @@ def stream(client, portions, method="transform", name="model"):
     portions : iterable of lists of arrays (n_frames_i, n_features), or of 3-D arrays
         Taken as workers get free, so that any number of them passes through little memory.
     method : {"transform", "match", "score_samples"}, default="transform"
-    name : str, default="model"
-        Of what was given to the workers.
+    model : str, default="model"
+        The name under which the workers were given it.
 
     Yields
     ------
@@ -62,7 +62,7 @@ def stream(client, portions, method="transform", name="model"):
     waiting = deque()
     for portion in portions:
         # Within the task, which Dask keeps until it is done: so it survives its worker.
-        waiting.append(client.submit(on_worker, portion, method, name, pure=False))
+        waiting.append(client.submit(on_worker, portion, method, model, pure=False))
         while len(waiting) > _AHEAD * max(1, sum(client.nthreads().values())):
             yield waiting.popleft().result()
     while waiting:

@@ -64,8 +64,13 @@ def stream(model, portions, results, method="transform", n_jobs=None):
     missing = list(left(portions, results, method))
     tasks = (joblib.delayed(answer_file)(str(model), digest, method, *pair) for pair in missing)
     # One portion a task: what is killed loses no more than it has in hand.
-    parallel = joblib.Parallel(n_jobs=n_jobs, batch_size=1, return_as="generator")
-    for (source, _), wrong in zip(missing, parallel(tasks), strict=True):
+    share_out = functools.partial(joblib.Parallel, n_jobs=n_jobs, batch_size=1)
+    try:
+        answers = share_out(return_as="generator")(tasks)
+    except ValueError:
+        # Joblib before 1.4 tells how a cluster is getting on only when all is done.
+        answers = share_out()(tasks)
+    for (source, _), wrong in zip(missing, answers, strict=True):
         yield source, wrong
 
 

@@ -226,9 +226,11 @@ def test_a_stream_takes_portions_as_workers_get_free(client, fitted, portions_of
 
 
 def test_bags_and_arrays_of_dask(client, fitted, portions_of_walks, expected):
+    other = DenseSynchronizer(search="sampled", n_frames=50).fit(walks(60, 60, 8))
+    stream_dask.give(client, other)
     stream_dask.give(client, fitted, name="walks")
     few, stacked = portions_of_walks[:3], np.concatenate(expected[:3])
-    ask = {"method": "transform", "name": "walks"}
+    ask = {"method": "transform", "model": "walks"}
     bag = dask.bag.from_delayed([delayed(portion) for portion in few])
     warped = bag.map_partitions(stream_dask.on_worker, **ask).compute()
     assert np.stack(warped).tobytes() == stacked.tobytes()
