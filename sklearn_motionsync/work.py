@@ -13,7 +13,7 @@ from joblib.parallel import get_active_backend
 from sklearn import config_context, get_config
 
 from .blas import on_one_thread
-from .cluster import Held, Name, client_of
+from .cluster import Held, Name, client_of, ray_of, results_of_ray
 
 try:
     from sklearn.callback import CallbackSupportMixin
@@ -77,7 +77,10 @@ def _results(function, portions, common, n_jobs, prefer, begun):
     # Not by scikit-learn's own Parallel, whose threads restore each other's warning filters. The
     # configuration is this thread's: those that hand out portions have one of their own.
     config = get_config()
-    tasks = (delayed(_configured)(config, call, function, *shared, *p) for p in portions)
+    calls = ((config, call, function, *shared, *portion) for portion in portions)
+    if ray_of(backend) is not None:
+        return results_of_ray(backend, _configured, calls, effective_n_jobs(n_jobs))
+    tasks = (delayed(_configured)(*call) for call in calls)
     try:
         parallel = Parallel(n_jobs=n_jobs, prefer=prefer, return_as="generator")
     except ValueError:
@@ -105,11 +108,15 @@ class Common:
 
     def __init__(self, here, sent=None):
         self.here, self._sent = here, here if sent is None else sent
-        self._held = None
+        self._held = self._stored = None
 
     def sent_to(self, backend):
         """What portions are given under a backend: on a cluster the name of what it holds."""
-        client = client_of(backend)
+        client, ray = client_of(backend), ray_of(backend)
+        if ray is not None:
+            if self._stored is None:
+                self._stored = ray.put(self.here)
+            return self._stored
         if client is None:
             return self.here
         if self._held is None or self._held.client is not client:

@@ -2,28 +2,34 @@
 
 import gc
 import os
+import pickle
+import signal
 import sys
 import time
 from pathlib import Path
 
+import dask.array
+import dask.bag
 import distributed
 import joblib
 import numpy as np
 import pytest
 import sklearn_motionsync
+from dask import delayed
 from sklearn_motionsync import DenseSynchronizer
 from sklearn_motionsync.cluster import Held, Name
 from sklearn_motionsync.synchronizers import portions
 
+import stream_dask
+import stream_files
+
 N_WORKERS = 2
 
 
-@pytest.fixture(scope="module")
-def client():
-    """Two worker processes that count the bytes they receive, from whomever."""
-    package = Path(sklearn_motionsync.__file__).parents[1]
+class Counting(distributed.WorkerPlugin):
+    """Has a worker count the bytes it receives, from whomever."""
 
-    def count():
+    def setup(self, worker):
         from tornado.iostream import IOStream
 
         IOStream.n_bytes = 0
@@ -40,13 +46,23 @@ def client():
         counting("read_bytes", int)
         counting("read_into", lambda buffer: memoryview(buffer).nbytes)
 
+
+@pytest.fixture(scope="module")
+def client():
+    """Two worker processes that count the bytes they receive."""
+    package = Path(sklearn_motionsync.__file__).parents[1]
+    examples = Path(stream_dask.__file__).parent
+    found = [str(package), str(examples), os.environ.get("PYTHONPATH", "")]
     settings = {"n_workers": N_WORKERS, "threads_per_worker": 1, "protocol": "tcp://"}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", f"{package}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
-        local = distributed.LocalCluster(**settings, dashboard_address=":0")
-    with local, distributed.Client(local) as client:
-        client.run(count)
-        yield client
+        # For those, too, that come in the place of one that is killed.
+        patch.setenv("PYTHONPATH", os.pathsep.join(found))
+        with (
+            distributed.LocalCluster(**settings, dashboard_address=":0") as local,
+            distributed.Client(local) as client,
+        ):
+            client.register_plugin(Counting(), name="counting")
+            yield client
 
 
 def received(client):
@@ -157,3 +173,106 @@ def test_a_worker_that_comes_later(client):
             largest += [client.submit(lambda n: n.value().max(), unknown, **task).result()]
         assert (received(client) - before).sum() < 1.2 * value.nbytes
     assert set(largest) == {value.max()}
+
+
+# -- streams of portions ------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    """It would share out its work, if it were asked outside of a task."""
+    return DenseSynchronizer(search="sampled", n_jobs=-1).fit(walks(60, 60, 8))
+
+
+@pytest.fixture(scope="module")
+def portions_of_walks():
+    return np.split(walks(480, 60, 8), 12)
+
+
+@pytest.fixture(scope="module")
+def expected(fitted, portions_of_walks):
+    return [stream_files.answer(fitted, "transform", each) for each in portions_of_walks]
+
+
+def test_a_stream_sends_the_model_once_and_every_portion_to_one_worker(
+    client, fitted, portions_of_walks, expected
+):
+    data = sum(portion.nbytes for portion in portions_of_walks)
+    with distributed.get_task_stream(client) as tasks:
+        before = received(client)
+        stream_dask.give(client, fitted)
+        answers = list(stream_dask.stream(client, portions_of_walks))
+        sent = (received(client) - before).sum()
+    assert [answer.tobytes() for answer in answers] == [each.tobytes() for each in expected]
+    assert data < sent <= 1.2 * (N_WORKERS * len(pickle.dumps(fitted)) + data)
+    assert len(tasks.data) == len(portions_of_walks)
+    assert len({task["worker"] for task in tasks.data}) == N_WORKERS
+
+
+def test_a_stream_takes_portions_as_workers_get_free(client, fitted, portions_of_walks):
+    taken = []
+
+    def portions():
+        for portion in portions_of_walks:
+            taken.append(portion)
+            yield portion
+
+    stream_dask.give(client, fitted)
+    answers = stream_dask.stream(client, portions(), method="match")
+    first = next(answers)
+    assert len(taken) == 2 * N_WORKERS + 1
+    assert first["times"].tobytes() == fitted.match(portions_of_walks[0]).times.tobytes()
+    answers.close()
+
+
+def test_bags_and_arrays_of_dask(client, fitted, portions_of_walks, expected):
+    other = DenseSynchronizer(search="sampled", n_frames=50).fit(walks(60, 60, 8))
+    stream_dask.give(client, other)
+    stream_dask.give(client, fitted, name="walks")
+    few, stacked = portions_of_walks[:3], np.concatenate(expected[:3])
+    ask = {"method": "transform", "model": "walks"}
+    bag = dask.bag.from_delayed([delayed(portion) for portion in few])
+    warped = bag.map_partitions(stream_dask.on_worker, **ask).compute()
+    assert np.stack(warped).tobytes() == stacked.tobytes()
+    array = dask.array.concatenate([dask.array.from_array(p, chunks=p.shape) for p in few])
+    known = {"dtype": array.dtype, "meta": np.empty((0, 0, 0)), "chunks": array.chunks}
+    warped = array.map_blocks(stream_dask.on_worker, **ask, **known)
+    assert warped.compute().tobytes() == stacked.tobytes()
+
+
+def test_files_by_the_workers(client, fitted, portions_of_walks, expected, tmp_path):
+    (tmp_path / "walks").mkdir()
+    joblib.dump(fitted, tmp_path / "model.joblib")
+    for i, portion in enumerate(portions_of_walks[:4]):
+        np.save(tmp_path / "walks" / f"{i}.npy", portion)
+    files = [tmp_path / "model.joblib", tmp_path / "walks", tmp_path / "warped"]
+    before = received(client)
+    with joblib.parallel_config(backend="dask"):
+        assert [wrong for _, wrong in stream_files.stream(*files)] == [None] * 4
+    # Only the names of the files.
+    assert (received(client) - before).sum() < 0.2 * portions_of_walks[0].nbytes
+    for i, each in enumerate(expected[:4]):
+        assert np.load(tmp_path / "warped" / f"{i}.npy").tobytes() == each.tobytes()
+
+
+def test_a_worker_that_is_killed_changes_no_bit(client, fitted, portions_of_walks, expected):
+    stream_dask.give(client, fitted)
+    pids = client.run(os.getpid)
+    answers = stream_dask.stream(client, portions_of_walks)
+    found = [next(answers)]
+    # At work, with another portion waiting.
+    os.kill(next(iter(pids.values())), getattr(signal, "SIGKILL", signal.SIGTERM))
+    found += answers
+    assert [answer.tobytes() for answer in found] == [each.tobytes() for each in expected]
+    # Who comes in its place has the model, too.
+    deadline = time.monotonic() + 60
+    while len(set(client.run(os.getpid).values()) - set(pids.values())) == 0:
+        if time.monotonic() > deadline:
+            pytest.fail("no worker came in the place of the killed one")
+        time.sleep(0.1)
+    client.wait_for_workers(N_WORKERS, timeout=60)
+    for worker in client.nthreads():
+        task = client.submit(
+            stream_dask.on_worker, portions_of_walks[0], workers=[worker], pure=False
+        )
+        assert task.result().tobytes() == expected[0].tobytes()

@@ -1,0 +1,178 @@
+"""From files to files: every method's own results, whatever is killed on the way."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pytest
+import sklearn_motionsync
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, Match
+
+import stream_files
+
+SCRIPT = Path(stream_files.__file__)
+PACKAGE = Path(sklearn_motionsync.__file__).parents[1]
+
+
+def walks(n, seed):
+    random = np.random.default_rng(seed)
+    lengths = random.integers(30, 50, n)
+    return [np.cumsum(random.standard_normal((length, 3)), axis=0) for length in lengths]
+
+
+def alike(performances, dtype):
+    return np.stack([x[:30] for x in performances]).astype(dtype)
+
+
+PORTIONS = {
+    "a.npz": walks(6, 1),
+    "b.npy": alike(walks(5, 2), np.float64),
+    "c.npz": walks(1, 3),
+    "d.npy": alike(walks(4, 4), np.float32),
+}
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    steps = ASpace(2), DenseSynchronizer(n_frames=40), ActionModel()
+    return make_pipeline(*steps).fit(walks(12, 0))
+
+
+@pytest.fixture
+def files(fitted, tmp_path):
+    """The model, the portions, and a folder for results that is not there yet."""
+    (tmp_path / "walks").mkdir()
+    joblib.dump(fitted, tmp_path / "model.joblib")
+    joblib.dump(fitted[:-1], tmp_path / "synchronizer.joblib")
+    for name, portion in PORTIONS.items():
+        if name.endswith(".npz"):
+            np.savez(tmp_path / "walks" / name, *portion)
+        else:
+            np.save(tmp_path / "walks" / name, portion)
+    return tmp_path / "synchronizer.joblib", tmp_path / "walks", tmp_path / "out"
+
+
+def run(*arguments):
+    """The script, or code that imports it, in a process of its own."""
+    paths = [str(PACKAGE), str(SCRIPT.parent), os.environ.get("PYTHONPATH", "")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    command = [sys.executable, *map(str, arguments)]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def results(folder):
+    return {path.name: np.load(path) for path in folder.iterdir() if path.suffix != ".json"}
+
+
+def assert_synchronized(folder, fitted):
+    found = results(folder)
+    assert sorted(found) == ["a.npy", "b.npy", "c.npy", "d.npy"]
+    for name, portion in PORTIONS.items():
+        expected, got = fitted[:-1].transform(portion), found[f"{name[0]}.npy"]
+        assert (got.dtype, got.tobytes()) == (expected.dtype, expected.tobytes())
+
+
+def test_portions_are_synchronized_alone_or_by_two(files, fitted):
+    model, walks, out = files
+    assert [wrong for _, wrong in stream_files.stream(*files)] == [None] * 4
+    assert_synchronized(out, fitted)
+    two = run(SCRIPT, model, walks, out.with_name("two"), "--n-jobs", 2)
+    assert (two.returncode, two.stderr) == (0, "")
+    assert two.stdout.split("\n")[:2] == ["a.npz: done", "b.npy: done"]
+    assert_synchronized(out.with_name("two"), fitted)
+
+
+def test_match_and_score_samples(files, fitted):
+    whole = files[0].with_name("model.joblib")
+    assert len(list(stream_files.stream(*files, method="match"))) == 4
+    scored = files[2].with_name("scored")
+    assert len(list(stream_files.stream(whole, files[1], scored, "score_samples"))) == 4
+    for name, portion in PORTIONS.items():
+        match = Match.from_estimator(fitted, portion)
+        with np.load(files[2] / f"{name[0]}.npz") as found:
+            assert found["times"].tobytes() == match.times.tobytes()
+            assert found["distances"].tobytes() == match.distances.tobytes()
+        scores = np.load(scored / f"{name[0]}.npy")
+        assert scores.tobytes() == fitted.score_samples(portion).tobytes()
+
+
+# Killed when the third result is written, but has no name yet.
+KILLED = """
+import os, signal, sys
+import stream_files
+
+n_written, keep = 0, os.fsync
+
+def write(file):
+    global n_written
+    n_written += 1
+    if n_written == 3:
+        os.kill(os.getpid(), getattr(signal, "SIGKILL", signal.SIGTERM))
+    keep(file)
+
+os.fsync = write
+list(stream_files.stream(*sys.argv[1:]))
+"""
+
+
+def test_after_a_kill_it_goes_on_where_it_stopped(files, fitted):
+    _, _, out = files
+    assert run("-c", KILLED, *files).returncode != 0
+    done = {path.name: path.stat().st_mtime_ns for path in out.glob("*.npy")}
+    assert sorted(done) == ["a.npy", "b.npy"]
+    assert len(list(out.glob("*.part"))) == 1
+    assert [source.name for source, _ in stream_files.stream(*files)] == ["c.npz", "d.npy"]
+    assert {name: (out / name).stat().st_mtime_ns for name in done} == done
+    assert_synchronized(out, fitted)
+    assert list(stream_files.stream(*files)) == []
+
+
+def test_a_portion_that_is_newer_is_computed_again(files):
+    assert len(list(stream_files.stream(*files))) == 4
+    source, target = files[1] / "c.npz", files[2] / "c.npy"
+    np.savez(source, *walks(2, 5))
+    os.utime(target, (0, 0))
+    assert list(stream_files.stream(*files)) == [(source, None)]
+    assert len(np.load(target)) == 2
+
+
+def test_a_portion_that_is_refused_does_not_stop_the_others(files, capsys):
+    wrong = alike(walks(3, 6), np.float64)
+    wrong[1, 4, 2] = np.nan
+    np.save(files[1] / "b.npy", wrong)
+    assert stream_files.main([str(path) for path in files]) == 1
+    assert re.search(r"^b\.npy: Performance 1.*NaN", capsys.readouterr().out, re.MULTILINE)
+    assert sorted(results(files[2])) == ["a.npy", "c.npy", "d.npy"]
+
+
+def test_results_of_two_models_are_not_mixed(files, fitted):
+    assert len(list(stream_files.stream(*files))) == 4
+    with pytest.raises(ValueError, match=r"results of another method \(made_by.json\)"):
+        next(stream_files.stream(*files, method="match"))
+    joblib.dump(DenseSynchronizer(n_frames=30).fit(walks(12, 0)), files[0])
+    told = stream_files.main([str(path) for path in files])
+    assert "holds results of another model (made_by.json): give another folder" in told
+    note = json.loads((files[2] / "made_by.json").read_text(encoding="utf-8"))
+    assert note["sklearn_motionsync"] == sklearn_motionsync.__version__
+    assert_synchronized(files[2], fitted)
+
+
+def test_folders_that_say_nothing_or_too_much(files):
+    with pytest.raises(ValueError, match=r"no portions in .*: files \.npy or \.npz"):
+        next(stream_files.stream(files[0], files[0].parent / "none", files[2]))
+    np.save(files[1] / "a.npy", PORTIONS["b.npy"])
+    with pytest.raises(ValueError, match=r"a\.npy and a\.npz would have one result"):
+        next(stream_files.stream(*files))
+
+
+def test_a_process_opens_the_model_once_as_memory_maps(files):
+    fitted = stream_files.loaded(str(files[0]), "as it is")
+    assert stream_files.loaded(str(files[0]), "as it is") is fitted
+    assert isinstance(fitted[-1].pattern_, np.memmap)
+    assert isinstance(stream_files.read(files[1] / "b.npy"), np.memmap)
