@@ -4,13 +4,16 @@ Searching among many: every performance is compared with the same few references
 whoever is worse than the leader beyond doubt is out; the others meet twice as many references,
 and so on until one is left or all references are used. Differences to the leader
 are taken reference by reference, so that a reference that is far from everybody does not
-count (Baharav and Tse, "Ultra fast medoid identification via correlated sequential halving").
+count (Baharav and Tse, "Ultra fast medoid identification via correlated sequential halving"), and
+adjusted for where the references happen to stand.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import stdtrit
+
+from .paired import PairedTests
 
 __all__ = [
     "Median",
@@ -22,12 +25,13 @@ __all__ = [
     "sum_all",
 ]
 
-# References of the first round: enough for a paired t test of anybody against the leader.
+# References of the first round: enough for a paired t test of anybody against the leader, and to
+# know where everybody stands.
 _REFERENCES = 32
 # Probability, at most, that any rejection in a search is an error.
 _ERROR = 0.01
-# Matches a search may spend: this share of all, but at least so many a performance.
-_SHARE, _EACH = 0.09, 150
+# Matches a search may spend, a performance; of them the last two, who meet all, need two.
+_BUDGET, _LAST = 150, 2
 
 
 class Median(NamedTuple):
@@ -45,6 +49,12 @@ class Median(NamedTuple):
         Whether this is the median of Eq. 19: by all matches, or because every other performance
         was worse in a paired test, all tests together erring with 1 % probability.
     n_matches : int
+    in_doubt : int
+        How many other performances no test rejected: 0 if certified. Of a population, how many
+        may be better in all of it.
+    excess : float
+        With 99 % probability the global distance is at most ``1 + excess`` times that of
+        the true median (of a population: in it, of the best of these); 0 if certified.
     """
 
     index: int | None
@@ -52,12 +62,20 @@ class Median(NamedTuple):
     estimates: np.ndarray
     certified: bool
     n_matches: int
+    in_doubt: int
+    excess: float
 
     @classmethod
-    def unknown(cls, n):
+    def unknown(cls, n, n_matches=0):
         """Nobody asked which of n performances is the median."""
         nothing = np.full(n, np.nan)
-        return cls(None, nothing, nothing, False, 0)
+        return cls(None, nothing, nothing, False, n_matches, n, np.nan)
+
+    @property
+    def achieved(self):
+        """What can be said of the choice, by name."""
+        names = "n_matches", "certified", "in_doubt", "excess"
+        return {name: getattr(self, name) for name in names}
 
 
 def median_of(sequences):
@@ -69,7 +87,7 @@ def median_of(sequences):
     squares = np.einsum("ij,ij->i", deviations, deviations, dtype=np.float64)
     sums = len(sequences) * squares + squares.sum()
     rounding = rounding_of(sequences - sequences.mean(axis=(0, 1)))
-    return Median(first_smallest(sums, rounding), sums, sums, True, 0)
+    return Median(first_smallest(sums, rounding), sums, sums, True, 0, 0, 0.0)
 
 
 def rounding_of(deviations):
@@ -78,7 +96,7 @@ def rounding_of(deviations):
     return 8 * np.finfo(deviations.dtype).eps * energy
 
 
-def sum_all(compare, n, rounding):
+def sum_all(compare, n, rounding, population=None):
     """The median by all matches.
 
     Parameters
@@ -90,48 +108,62 @@ def sum_all(compare, n, rounding):
         Number of performances.
     rounding : float
         How far rounding can move a global distance.
+    population : int, default=None
+        Of how many these were drawn at random; by default these are all. Who of them is the most
+        typical of a larger one is a matter of tests, for which all distances are kept.
     """
+    if population is not None and population > n:
+        everybody = np.arange(n)
+        table = _matrix(compare, everybody, everybody)
+        race = _Race(table[:, :_REFERENCES], everybody, rounding, population)
+        race.leave(everybody, table)
+        sums = table.sum(axis=1)
+        index = first_smallest(sums, rounding)
+        return Median(index, sums, sums, *race.outcome(index, table[index], n * n))
     sums = np.zeros(n)
     for rows, _, block in compare(np.arange(n), np.arange(n)):
         sums[rows] += block.sum(axis=1, dtype=np.float64)
-    return Median(first_smallest(sums, rounding), sums, sums, True, n * n)
+    return Median(first_smallest(sums, rounding), sums, sums, True, n * n, 0, 0.0)
 
 
 def estimate_distances(compare, n, random_state):
     """Global distances by a few references, as for ``sum_all``; no median is chosen."""
     references = random_state.permutation(n)[:_REFERENCES]
     table = _matrix(compare, np.arange(n), references)
-    estimates = (n - 1) * _paired(table, np.arange(n), references).mean(axis=1).filled(0)
-    return Median(None, np.full(n, np.nan), estimates, False, n * len(references))
+    itself = (references, np.arange(len(references)))
+    table[itself] = 0
+    met = np.full(n, len(references))
+    met[references] -= 1
+    estimates = (n - 1) * table.sum(axis=1) / np.maximum(met, 1)
+    return Median(None, np.full(n, np.nan), estimates, False, table.size, n, np.nan)
 
 
-def search_median(compare, n, rounding, random_state):
+def search_median(compare, n, rounding, random_state, population=None):
     """The median by as few matches as it takes; parameters as for ``sum_all``."""
     references = random_state.permutation(n)
-    alive, table = np.arange(n), np.empty((n, 0))
-    estimates, distances = np.zeros(n), np.full(n, np.nan)
-    budget, spent, certified = max(_SHARE * n * n, _EACH * n), 0, True
-    seen, rounds = min(_REFERENCES, n), int(np.ceil(np.log2(max(n / _REFERENCES, 1)))) + 1
-    while True:
-        more = references[table.shape[1] : seen]
-        spent += len(alive) * len(more)
-        table = np.hstack([table, _matrix(compare, alive, more)])
-        paired = _paired(table, alive, references[:seen])
-        means = paired.mean(axis=1).filled(0)
+    alive, seen = np.arange(n), min(_REFERENCES, n)
+    table = _matrix(compare, alive, references[:seen])
+    race = _Race(table, references, rounding, population or n)
+    estimates, distances, spent = np.zeros(n), np.full(n, np.nan), table.size
+    while seen < n:
+        means = race.means(alive, table)
         estimates[alive] = (n - 1) * means
-        if seen == n:
-            break
-        keep = _not_worse(paired, means.argmin(), n, rounds, rounding)
+        keep = race.may_win(means.argmin(), alive, table)
         # Half of what is left for one round; what the last one needs is never touched.
-        affordable = (budget - spent) / (2 * min(seen, n - seen))
-        if keep.sum() > max(affordable, 2):
-            certified = False
-            keep = _best(np.where(keep, means, np.inf), max(int(affordable), 2), rounding / n)
+        affordable = int(((_BUDGET - _LAST) * n - spent) / (2 * min(seen, n - seen)))
+        if keep.sum() > max(affordable, _LAST):
+            best = _best(np.where(keep, means, np.inf), max(affordable, _LAST), rounding / n)
+            race.leave(alive[keep & ~best], table[keep & ~best])
+            keep = best
         alive, table = alive[keep], table[keep]
-        seen = n if len(alive) == 1 else min(2 * seen, n)
+        more = references[seen:] if len(alive) == 1 else references[seen : 2 * seen]
+        table, seen = np.hstack([table, _matrix(compare, alive, more)]), seen + len(more)
+        spent += len(alive) * len(more)
     distances[alive] = estimates[alive] = table.sum(axis=1)
-    index = int(alive[first_smallest(distances[alive], rounding)])
-    return Median(index, distances, estimates, certified, spent)
+    first = first_smallest(distances[alive], rounding)
+    race.finish(alive, table)
+    index = int(alive[first])
+    return Median(index, distances, estimates, *race.outcome(index, table[first], spent))
 
 
 def first_smallest(values, rounding):
@@ -146,24 +178,95 @@ def _matrix(compare, bases, moving):
     return out
 
 
-def _paired(table, alive, references):
-    """The matches of each performance with all references but itself."""
-    return np.ma.array(table, mask=alive[:, np.newaxis] == references)
-
-
 def _best(values, count, rounding):
     """Which values are the smallest; of those that differ by rounding only the first ones."""
     order = np.argsort(np.maximum(values, values.min() + rounding), kind="stable")
     return np.isin(np.arange(len(values)), order[:count])
 
 
-def _not_worse(paired, leader, n, rounds, rounding):
-    """Which performances may still be the median: paired t tests against the leader."""
-    n_references = paired.shape[1]
-    difference = paired - paired[leader]
-    mean, count = difference.mean(axis=1), difference.count(axis=1)
-    # The references are drawn without replacement from the n performances.
-    error = difference.std(axis=1, ddof=1) * np.sqrt((1 - n_references / n) / count)
-    critical = stdtrit(np.maximum(count - 1, 1), 1 - _ERROR / (n * rounds))
-    beyond = mean > critical * error + rounding / n
-    return ~beyond.filled(False)
+class _Race:
+    """Who is out, and who left undecided.
+
+    A test is of one of ``n`` performances, by the references of one of the rounds, against whoever
+    leads: no more than ``n`` times the rounds can harm the median, and so many share the error.
+
+    Parameters
+    ----------
+    table : ndarray, shape (n, n_landmarks)
+        Distances of all to the first references.
+    references : ndarray of int, shape (n,)
+        In the order in which they are met.
+    rounding : float
+    population : int
+        Whose median is sought; these n are all of them, or drawn at random.
+    """
+
+    def __init__(self, table, references, rounding, population):
+        n = len(table)
+        rounds = int(np.ceil(np.log2(max(n / _REFERENCES, 1)))) + 1
+        self._tests = PairedTests(table, references[: table.shape[1]])
+        self._references, self._population = references, max(population, n)
+        self._error, self._rounding = _ERROR / (n * rounds), rounding / n
+        self._undecided = []
+
+    def means(self, alive, table):
+        """Mean distances to all others, estimated."""
+        return self._tests.means(table, alive, self._references[: table.shape[1]])
+
+    def may_win(self, leader, alive, table):
+        """Which performances may still be the median of these n; the leader is a row's number."""
+        n = len(self._references)
+        out = self._least(alive[leader], table[leader], alive, table, n) > 0
+        if self._population > n:
+            self.leave(alive[out], table[out])
+        return ~out
+
+    def leave(self, alive, table):
+        """These go, though nothing is proven yet."""
+        self._undecided.append((alive, table))
+
+    def finish(self, alive, table):
+        """These have met all references: who is the best of them is no matter of tests."""
+        if self._population > len(self._references):
+            self.leave(alive, table)
+
+    def outcome(self, index, row, n_matches):
+        """The last fields of the `Median`: how sure it is after the tests of all who left.
+
+        Parameters
+        ----------
+        index : int
+            The one that was chosen.
+        row : ndarray, shape (n,)
+            Its distances to all references.
+        n_matches : int
+
+        Returns
+        -------
+        tuple (certified, n_matches, in_doubt, excess)
+        """
+        least = [np.empty(0)]
+        for alive, table in self._undecided:
+            others = alive != index
+            least.append(self._least(index, row, alive[others], table[others], self._population))
+        least = np.concatenate(least)
+        in_doubt, gap = int((least <= 0).sum()), max(0.0, -least.min(initial=0))
+        return in_doubt == 0, n_matches, in_doubt, self._excess(gap, row[self._references != index])
+
+    def _excess(self, gap, distances):
+        """What a gap is of the mean distance that remains if it is taken off."""
+        if gap == 0:
+            return 0.0
+        n, mean = len(self._references), distances.mean()
+        if self._population > n:
+            error = distances.std() * np.sqrt(1 / n - 1 / self._population)
+            mean -= stdtrit(max(n - 2, 1), 1 - self._error) * error
+        return float(gap / (mean - gap)) if gap < mean else np.inf
+
+    def _least(self, leader, row, alive, table, population):
+        """By how much, at least, performances are farther from the others than the leader."""
+        seen = table.shape[1]
+        met = self._references[:seen]
+        found = self._tests.against(leader, row[:seen], table, alive, met, population)
+        doubt = stdtrit(found.freedom, 1 - self._error) * found.error
+        return found.mean - doubt - self._rounding

@@ -45,9 +45,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
        with both ends pinned and the local rate between 0 and ``max_rate``. By default
        velocities and postures in the learnt metric stand in for the points x (see ``cost``).
-    4. The pattern is the performance with the smallest global distance
-       ``C_n = sum_m D_{n,m}`` (Eq. 19), the "median" one; among more than 100 it is found
-       by a part of all matches (see ``search``).
+    4. The pattern has the smallest global distance ``C_n = sum_m D_{n,m}`` (Eq. 19): it is the
+       "median" performance, among more than 100 found by a part of all matches (see ``search``).
     5. Consensus: the time of the pattern reaches a performance straight, or by way of
        one of ``consensus`` exemplars, typical performances of the training set; the median
        of these routes, weighted by how alike the performances along them are, outvotes a path
@@ -112,9 +111,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         Positions a frame at which a path may stand. More than 1 serves direct paths
         (``consensus=0``); the vote, its smoothing and the refinement are finer anyway.
     search : {"auto", "exhaustive", "sampled"}, default="auto"
-        How the median is found. ``"exhaustive"``: by all ``N (N - 1)`` matches. ``"sampled"``: by
-        matches with random references, as few as it takes to be sure; see ``certified_``.
-        ``"auto"``: exhaustively up to 100 performances.
+        How the median is found: by all matches, or by those with random references, as few as it
+        takes to be sure (see ``search_``). ``"auto"``: by all up to 100 performances.
     random_state : int, RandomState instance or None, default=0
         Draws the references of a sampled search. The default makes equal input give equal results.
     n_jobs : int, default=None
@@ -136,12 +134,15 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         ``C_n`` of Eq. 19 where it is exact: for every performance after an exhaustive search, for
         the best few after a sampled one; NaN for the others, and if nobody needed them.
     certified_ : bool
-        Whether the pattern is the median of Eq. 19: known from all matches, or because a paired
-        test rejected every other performance, all tests together erring with a probability of
-        1 %. False if the pattern was given, or a sampled search ran out of the matches
-        it may spend: 9 % of all, or 150 a performance if that is more.
+        Whether the pattern is the median of Eq. 19: known from all matches, or because paired
+        tests, which err with a probability of 1 % all together, rejected every other performance.
+        False if the pattern was given, or a search has spent its 150 matches a performance.
     n_matches_ : int
         Matches made to choose the pattern and the exemplars.
+    search_ : Bunch
+        ``n_matches``, ``certified``, as above; ``in_doubt``, how many others no test rejected;
+        ``excess``: with a probability of 99 % the pattern's ``C_n`` is at most ``1 + excess``
+        times the smallest. All are in doubt, the excess is NaN, if the pattern was given.
     metric_ : Bunch or None
         What was learnt: ``share``, the part of every feature in what is compared, about 0 for
         noise; ``energy``, its part in the plain velocities, which would be compared without a
@@ -335,8 +336,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     def _choose_median(self, shared, features, progress):
         """The median (Eq. 19), by all matches or some; without it, what exemplars are chosen by."""
         n, rounding, wanted = len(features), rounding_of(features), self._wants_median
-        portions = {"n_jobs": self.n_jobs, "progress": progress}
-        compare = partial(compare_in_portions, shared, **portions)
+        compare = partial(compare_in_portions, shared, n_jobs=self.n_jobs, progress=progress)
         if not wanted and (self.consensus == 0 or n <= self.consensus):
             # None of them, or all, are exemplars.
             median = Median.unknown(n)
@@ -346,8 +346,9 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             median = search_median(compare, n, rounding, check_random_state(self.random_state))
         else:
             median = estimate_distances(compare, n, check_random_state(self.random_state))
-        self.n_matches_ = median.n_matches
-        self.certified_ = median.certified and wanted
+        known = median if wanted else Median.unknown(n, median.n_matches)
+        self.n_matches_, self.certified_ = known.n_matches, known.certified
+        self.search_ = Bunch(**known.achieved)
         return median
 
     def _choose_exemplars(self, training, matcher, source, estimates):

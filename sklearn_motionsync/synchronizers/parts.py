@@ -58,8 +58,8 @@ cost, smoothness, max_rate, subframes, search, random_state, n_jobs, verbose
     ----------
     parts_ : dict of str to ndarray of int
         Indices of the features of every part.
-    pattern_, pattern_index_, n_frames_, global_distances_, certified_, n_matches_, metric_, mu_, \
-exemplars_, misfit_, refinement_, refines_, n_features_in_, feature_names_in_
+    pattern_, pattern_index_, n_frames_, global_distances_, certified_, n_matches_, search_, \
+metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, feature_names_in_
         Of the whole body, as of `DenseSynchronizer`.
 
     See Also
