@@ -78,7 +78,7 @@ def _weighted_median(values, weights):
     Between the two values that halve the weight exactly it is their mean, as without weights. Few
     values are sooner compared with each other than sorted.
     """
-    n, n_sequences, n_frames = values.shape
+    n, n_sequences, _ = values.shape
     values, weights = np.ascontiguousarray(values.swapaxes(0, 1)), weights.T[:, np.newaxis]
     below = (values[:, :, np.newaxis] <= values[:, np.newaxis]).astype(weights.dtype)
     held = np.matmul(weights, below.reshape(n_sequences, n, -1)).reshape(values.shape)
@@ -89,7 +89,7 @@ def _weighted_median(values, weights):
     return (low + high) / 2
 
 
-def smoothed(times, reach, width, about=0.0):
+def smoothed(times, reach, width, about=0.0, at=None):
     """Warps (n_sequences, P) whose offsets are smoothed and in the band, pinned, non-decreasing.
 
     Parameters
@@ -101,12 +101,14 @@ def smoothed(times, reach, width, about=0.0):
         Standard deviation of the Gaussian, as a share of the clip.
     about : ndarray, shape (n_sequences, P), default=0.0
         Offsets that are smooth as they are: what differs from them is smoothed.
+    at : ndarray of int, shape (P,), default=None
+        At which frames, evenly spaced, the times are; by default at all.
     """
     n_frames = times.shape[1]
-    frames, sigma = np.arange(n_frames), width * (n_frames - 1)
+    sigma, frames = width * (n_frames - 1), np.arange(n_frames) if at is None else at
     offsets = times - frames - about
     if sigma > 1 / 3:
         offsets = smooth(offsets[:, :, np.newaxis], sigma)[:, :, 0]
         offsets[:, [0, -1]] = 0
     times = frames + np.clip(offsets + about, -reach, reach)
-    return np.maximum.accumulate(np.clip(times, 0, n_frames - 1), axis=1)
+    return np.maximum.accumulate(np.clip(times, 0, frames[-1]), axis=1)

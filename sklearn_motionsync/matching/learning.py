@@ -35,13 +35,15 @@ _KEPT = 0.99
 _LONGEST = 0.3
 
 
-def learn_metric(match, positions, velocity):
+def learn_metric(match, at, positions, velocity):
     """Learn the metric of a training set, or of some of it.
 
     Parameters
     ----------
     match : callable
-        ``match(features)``: voted times (n_sequences, n_sequences, P) of all ordered pairs.
+        ``match(features)``: voted times (n_sequences, n_sequences, n_at) of all ordered pairs.
+    at : ndarray of int, shape (n_at,)
+        Frames of the base that these times belong to, evenly spaced.
     positions, velocity : ndarray, shape (n_sequences, P, n_features)
         Postures on the clock and their velocities, in the unit.
 
@@ -59,11 +61,11 @@ def learn_metric(match, positions, velocity):
     fast = compressed(velocity[:, :, told], _energy(velocity[:, :, told]))
     first = _square_root(metric_matrix(fast, _unmatched(fast)))
     voted = match(fast @ first if first.any() else fast)
-    told |= moves & ~told & _believed(postures, velocity, voted)
+    told |= moves & ~told & _believed(postures, velocity, at, voted)
     postures, energy = postures[:, :, told], _energy(velocity[:, :, told])
     fast = compressed(velocity[:, :, told], energy)
-    of_fast, alike = _matched(fast, voted, weighted=True)
-    of_postures, longer = _matched(postures, voted, weighted=False)
+    of_fast, alike = _matched(fast, at, voted, weighted=True)
+    of_postures, longer = _matched(postures, at, voted, weighted=False)
     by_fast = _square_root(metric_matrix(fast, of_fast))
     # Differences that stay alike for longer are fewer pieces of evidence.
     by_postures = _square_root(metric_matrix(postures, of_postures)) * np.sqrt(alike / longer)
@@ -80,20 +82,20 @@ def _energy(velocity):
     return float(np.square(velocity).sum(axis=2).mean())
 
 
-def _believed(postures, velocity, times=None):
+def _believed(postures, velocity, *matched):
     """Whether performances agree in a feature, in posture and velocity together: (n_features,)."""
-    evidence = _evidence(postures, times) + _evidence(velocity, times)
+    evidence = _evidence(postures, *matched) + _evidence(velocity, *matched)
     return evidence / np.sqrt(2) > _DOUBT
 
 
-def _evidence(block, times):
+def _evidence(block, at=None, times=None):
     """Mean correlation of two performances in every feature, in its standard errors.
 
     Parameters
     ----------
     block : ndarray, shape (n_sequences, P, n_features)
-    times : ndarray, shape (n_sequences, n_sequences, P), or None
-        Matched ones, or the same for all.
+    at, times : ndarray, shapes (n_at,) and (n_sequences, n_sequences, n_at), default=None
+        Matched times of frames of the base; by default the same for all.
 
     Two series that have nothing to do with each other, of autocorrelation r, correlate by the
     root of ``(1 + 2 sum r^2) / P``; every two performances are a pair of its own.
@@ -104,11 +106,11 @@ def _evidence(block, times):
         cross = np.square(block.sum(axis=0)).sum(axis=0) - own
         norm = own * (n_sequences - 1)
     else:
-        cross, other = np.zeros((2, n_features))
-        for n, moving in enumerate(_others(block, times)):
-            cross += np.einsum("pk,mpk->k", block[n], moving)
+        bases, (cross, other) = block[:, at], np.zeros((2, n_features))
+        for base, moving in zip(bases, _others(block, times), strict=True):
+            cross += np.einsum("pk,mpk->k", base, moving)
             other += np.square(moving).sum(axis=(0, 1))
-        norm = np.sqrt(own * (n_sequences - 1) * other)
+        norm = np.sqrt(np.square(bases).sum(axis=(0, 1)) * (n_sequences - 1) * other)
     power = _power(block).sum(axis=0)
     correlation = irfft(power, 2 * len(power) - 2, axis=0)[:n_frames]
     correlation /= np.where(own > 0, correlation[0], 1)
@@ -167,24 +169,26 @@ def _unmatched(block):
     return 2 * (n_sequences * _moments(block) - outer) / (n_sequences - 1)
 
 
-def _matched(block, times, weighted):
+def _matched(block, at, times, weighted):
     """Covariance R of differences at matched times, and for how many frames they stay alike.
 
     Parameters
     ----------
     block : ndarray, shape (n_sequences, P, n_features)
-    times : ndarray, shape (n_sequences, n_sequences, P)
-        ``tau`` of all ordered pairs.
+    at : ndarray of int, shape (n_at,)
+        Frames of the base.
+    times : ndarray, shape (n_sequences, n_sequences, n_at)
+        ``tau`` there, of all ordered pairs.
     weighted : bool
         Whether the moving sequence counts with the weight of its rate, as velocities do.
     """
-    n_sequences, n_frames, n_features = block.shape
+    n_sequences, n_features, n_frames = len(block), block.shape[2], len(at)
     covariance, power = np.zeros((n_features, n_features)), 0
     for n, moving in enumerate(_others(block, times)):
         if weighted:
-            rates = np.gradient(np.delete(times[n], n, axis=0), axis=1)
+            rates = np.gradient(np.delete(times[n], n, axis=0), at, axis=1)
             moving *= (1 + RATE_WEIGHT * (rates - 1))[:, :, np.newaxis]
-        differences = block[n] - moving
+        differences = block[n, at] - moving
         flat = differences.reshape(-1, n_features)
         covariance += flat.T @ flat
         power = power + _power(differences).sum(axis=(0, 2))
@@ -193,7 +197,7 @@ def _matched(block, times, weighted):
 
 
 def _others(block, times):
-    """Yield, for every sequence, all others at its times: (n_sequences - 1, P, n_features)."""
+    """Yield, for every sequence, all others at its times: (n_sequences - 1, n_at, n_features)."""
     for n in range(len(block)):
         others = np.delete(np.arange(len(block)), n)
         yield sample(list(block[others]), times[n, others], block.shape[1])
@@ -206,7 +210,7 @@ def _power(block):
 
 
 def _length(autocovariance):
-    """Frames for which something stays alike, from its autocovariance at lags 0, 1, ..."""
+    """For how many lags something stays alike, from its autocovariance at lags 0, 1, ..."""
     if not autocovariance[0] > 0:
         return 1.0
     correlation = autocovariance / autocovariance[0]

@@ -17,6 +17,8 @@ __all__ = ["Features", "Matcher"]
 
 # Of a clip so many frames tell the metric.
 LEARNING_FRAMES = 100
+# At so many of them differences are taken.
+VOTED_FRAMES = 51
 
 
 class Features(NamedTuple):
@@ -73,12 +75,17 @@ class Features(NamedTuple):
         some = np.round(some).astype(np.intp)
         settings["max_rate"] = min(settings["max_rate"], len(some) - 1)
 
+        # A smoothed warp is known by fewer frames than it takes to find it.
+        at = np.round(np.linspace(0, len(some) - 1, min(len(some), VOTED_FRAMES))).astype(np.intp)
+
         def match(compared):
+            # What rounding does to a path is nothing beside what noise does.
+            compared = compared.astype(np.float32)
             matcher = Matcher.of(self._replace(subframes=1), compared, **settings)
-            return matcher.all_voted(compared, consensus, warp_smoothing)
+            return matcher.all_voted(compared, at, consensus, warp_smoothing)
 
         positions, velocity = positions[:, some], velocity[:, some]
-        metric = learn_metric(match, positions, velocity)
+        metric = learn_metric(match, at, positions, velocity)
         if metric is None:
             return None
         shares = metric.shares(velocity, positions), energy_shares(velocity)
@@ -155,21 +162,39 @@ class Matcher(NamedTuple):
 
     def paths(self, bases, moving, coupling=None):
         """Disparities of the best paths: (n_bases, n_moving, P)."""
-        max_bytes = get_config()["working_memory"] * 2**20 // 2
-        return self.trellis.paths(bases, moving, max_bytes, coupling)
+        return self.paths_and_costs(bases, moving, coupling)[0]
 
-    def all_voted(self, sequences, consensus, warp_smoothing):
-        """Times of all ordered pairs of sequences, at the pace of the frames, after the vote."""
-        disparities = self.paths(sequences, sequences)
-        pairs = zip(sequences, disparities, strict=True)
-        distances = np.stack([self.trellis.costs(x, sequences, d) for x, d in pairs])
-        times, out = self.times(disparities), np.empty(disparities.shape)
+    def paths_and_costs(self, bases, moving, coupling=None):
+        """The same, and the costs of the recurrence (n_bases, n_moving)."""
+        max_bytes = get_config()["working_memory"] * 2**20 // 2
+        return self.trellis.paths_and_costs(bases, moving, max_bytes, coupling)
+
+    def all_voted(self, sequences, at, consensus, warp_smoothing):
+        """Times of all ordered pairs of sequences at some frames, after the vote.
+
+        Parameters
+        ----------
+        sequences : ndarray, shape (n_sequences, P, n_features)
+            At the pace of the frames.
+        at : ndarray of int, shape (n_at,)
+            Frames of the base, 0 and P - 1 among them.
+        consensus : int
+        warp_smoothing : float
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, n_sequences, n_at)
+        """
+        disparities, costs = self.paths_and_costs(sequences, sequences)
+        times, costs = self.times(disparities), costs.astype(np.float64)
+        direct = times[:, :, at]
+        out = np.empty(direct.shape)
         for n in range(len(out)):
-            k = choose_exemplars(distances.sum(axis=1), consensus, n)
-            lengths = np.concatenate([distances[[n]], distances[n, k, np.newaxis] + distances[k]])
-            voted = vote(times[n], times[n, k], times[k], lengths)
-            out[n] = smoothed(voted, self.trellis.reach, warp_smoothing)
-        return out
+            k = choose_exemplars(costs.sum(axis=1), consensus, n)
+            lengths = np.concatenate([costs[[n]], costs[n, k, np.newaxis] + costs[k]])
+            out[n] = vote(direct[n], direct[n, k], times[k], lengths)
+        reach = self.trellis.reach
+        return smoothed(out.reshape(-1, len(at)), reach, warp_smoothing, at=at).reshape(out.shape)
 
     def times(self, disparities):
         """``tau``, in frames, of disparities."""

@@ -30,7 +30,7 @@ def suits(bundle):
 
 
 def narrow_paths(bundle):
-    """Disparities of the best paths of a bundle: (n_bases, n_moving, P)."""
+    """Disparities of the best paths of a bundle, (n_bases, n_moving, P), and their costs."""
     trellis, pairs = bundle.trellis, bundle.pairs
     ways, states = _ways(bundle), bundle.states(bundle.n_frames)
     edge, item = trellis.pad * pairs, states.itemsize
@@ -47,7 +47,8 @@ def narrow_paths(bundle):
     for p in range(1, bundle.n_frames):
         way = np.add(ways[p], before[p - 1], out=ways[p])
         np.minimum.reduce(way, axis=0, out=rows[p])
-    return _walk(bundle, ways)
+    costs = np.maximum(rows[-1, middle], 0).reshape(-1, bundle.n_bases).T
+    return _walk(bundle, ways), costs
 
 
 def _ways(bundle):

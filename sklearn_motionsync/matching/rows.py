@@ -109,8 +109,11 @@ class Bundle:
         states = self.states(2)
         for _ in self.advance(states):
             pass
-        best = np.maximum(self._last_row(states), 0)
-        return best.reshape(len(best), -1, self.n_bases).transpose(2, 1, 0)
+        return self._by_pair(np.maximum(self._last_row(states), 0))
+
+    def _by_pair(self, costs):
+        """(n_bases, n_moving, n_ends), from (n_ends, pairs)."""
+        return costs.reshape(len(costs), -1, self.n_bases).transpose(2, 1, 0)
 
     def _last_row(self, states):
         """``S(P - 1, d)`` of the disparities at which a path may end: (n_ends, pairs)."""
@@ -118,13 +121,14 @@ class Bundle:
         cells = states[(self.n_frames - 1) % len(states)].reshape(-1, self.pairs)
         return cells[ends[0] : ends[-1] + 1]
 
-    def _best_ends(self, states):
+    def _best_ends(self, last_row):
         """Where the best paths end, (pairs,); of equal ends the nearest to the middle."""
         ends = self.trellis.ends_at
+        if len(ends) == 1:
+            return np.repeat(ends, self.pairs)
         nearest = np.argsort(np.abs(ends), kind="stable")
-        costs = self._last_row(states)[nearest]
-        if len(nearest) > 1:
-            costs += self.handicaps[1] * np.arange(len(nearest))[:, np.newaxis]
+        costs = last_row[nearest]
+        costs += self.handicaps[1] * np.arange(len(nearest))[:, np.newaxis]
         return ends[nearest[costs.argmin(axis=0)]]
 
     # -- forward: the recurrence, Eq. 16 --------------------------------------
@@ -217,9 +221,10 @@ class Bundle:
     # -- backward: the path, Eq. 17 -------------------------------------------
 
     def paths(self, max_bytes, ends=None):
-        """Disparities of the best paths: (n_bases, n_moving, P).
+        """Disparities of the best paths, (n_bases, n_moving, P), and the costs (n_bases, n_moving).
 
-        Given ``ends``, those of the best paths to each of them: (n_bases, n_moving, n_ends, P).
+        Given ``ends``, those of the best paths to each of them: (n_bases, n_moving, n_ends, P), and
+        (n_bases, n_moving, n_ends).
 
         If not all rows may be kept, every ``length``-th is, and the rows between two of them
         are computed again, from the last to the first.
@@ -232,7 +237,11 @@ class Bundle:
         for p in self.advance(states):
             if length < n_frames and p % length == 0:
                 kept[p] = states[p % 2].copy()
-        there = self._best_ends(states) if ends is None else np.asarray(ends)[:, np.newaxis]
+        last_row = self._last_row(states)
+        there = self._best_ends(last_row) if ends is None else np.asarray(ends)[:, np.newaxis]
+        lines = np.broadcast_to(there, (1 if ends is None else len(ends), self.pairs))
+        costs = np.take_along_axis(last_row, lines - self.trellis.ends_at[0], axis=0)
+        costs = self._by_pair(np.maximum(costs, 0))
         here = (there + self.centre) * self.pairs + np.arange(self.pairs)
         at = np.empty((n_frames, here.size), dtype=np.intp)
         at[-1] = here.ravel()
@@ -246,8 +255,8 @@ class Bundle:
             self._retrace(states, at, first, last)
         found = self.disparities(at // self.pairs - self.centre)
         if ends is None:
-            return found
-        return found.reshape(self.n_bases, len(ends), -1, n_frames).swapaxes(1, 2)
+            return found, costs[:, :, 0]
+        return found.reshape(self.n_bases, len(ends), -1, n_frames).swapaxes(1, 2), costs
 
     def _retrace(self, states, at, first, last):
         """Follow the paths back from row ``last`` to ``first``: the step that won each time."""

@@ -134,15 +134,23 @@ class Trellis:
             pair alone: what other pairs are given changes rounding, and in double precision
             rounding decides nothing.
         """
+        return self.paths_and_costs(bases, moving, max_bytes, coupling)[0]
+
+    def paths_and_costs(self, bases, moving, max_bytes=1 << 29, coupling=None):
+        """The same, and what the recurrence says that they cost: (n_bases, n_moving).
+
+        That is rounded as the tile is, and not as `costs` adds it up: enough to compare paths by.
+        """
         if not isinstance(bases, Bases):
             bases = Bases(self, bases)
         shape = len(bases), len(moving), bases.sequences.shape[1]
         disparities = np.empty(shape, dtype=np.int32)
+        costs = np.empty(shape[:2], dtype=bases.sequences.dtype)
         for rows, columns, bundle in self.bundles(bases, moving, coupling):
             few = narrow.suits(bundle)
             found = narrow.narrow_paths(bundle) if few else bundle.paths(max_bytes)
-            disparities[rows, columns] = found
-        return disparities
+            disparities[rows, columns], costs[rows, columns] = found
+        return disparities, costs
 
     def ends(self, bases, moving):
         """Cost of the best path to every end, for every ordered pair.
@@ -174,7 +182,7 @@ class Trellis:
         shape = len(bases), len(moving), len(ends), bases.shape[1]
         disparities = np.empty(shape, dtype=np.int32)
         for rows, columns, bundle in self.bundles(Bases(self, bases), moving):
-            disparities[rows, columns] = bundle.paths(max_bytes, ends)
+            disparities[rows, columns] = bundle.paths(max_bytes, ends)[0]
         return disparities
 
     def costs(self, base, moving, disparities):

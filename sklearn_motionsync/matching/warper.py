@@ -63,7 +63,8 @@ class Warper:
         disparities = matcher.paths(bases.part(slice(1)), features[1:], coupling)[0]
         lengths = matcher.trellis.costs(bases.sequences[0], features[1:], disparities)
         times = _times(matcher, bases, disparities[np.newaxis], coupling)
-        lengths = _lengths(lengths[np.newaxis], times, coupling)[0]
+        if coupling is not None:
+            lengths = (lengths + coupling.cost(times))[0]
         return cls(matcher, pattern, bases, times[0], lengths, votes, warp_smoothing, **own)
 
     def positions(self, arrays):
@@ -109,15 +110,17 @@ class Warper:
         bases = self.bases
         if moving.dtype != bases.sequences.dtype:
             bases = Bases(trellis, bases.sequences.astype(moving.dtype))
-        base, disparities = bases.sequences[0], self.matcher.paths(bases, moving, coupling)
+        base = bases.sequences[0]
+        disparities, lengths = self.matcher.paths_and_costs(bases, moving, coupling)
         routes = _times(self.matcher, bases, disparities, coupling)
+        distances, times = trellis.costs(base, moving, disparities[0]), routes[0]
         if not self.votes:
-            return trellis.costs(base, moving, disparities[0]), routes[0]
-        pairs = zip(bases.sequences, disparities, strict=True)
-        costs = np.stack([trellis.costs(x, moving, d) for x, d in pairs])
-        distances, times = costs[0], routes[0]
+            return distances, times
         if len(self.to_exemplars):
-            lengths = _lengths(costs, routes, coupling)
+            if coupling is not None:
+                pairs = zip(bases.sequences, disparities, strict=True)
+                costs = np.stack([trellis.costs(x, moving, d) for x, d in pairs])
+                lengths = costs + coupling.cost(routes)
             lengths[1:] += self.to_lengths[:, np.newaxis].astype(lengths.dtype)
             times = vote(times, self.to_exemplars, routes[1:], lengths)
         if coupling is None:
@@ -144,11 +147,6 @@ def _times(matcher, bases, disparities, coupling):
     half = 0.5 / matcher.trellis.table.subframes
     way = coupling.offsets + np.arange(times.shape[-1]) - times
     return times + _share(bases, coupling) * np.clip(way, -half, half)
-
-
-def _lengths(costs, times, coupling):
-    """Costs of paths, with what their times pay for a coupling: (n_bases, n_moving)."""
-    return costs.copy() if coupling is None else costs + coupling.cost(times)
 
 
 def _share(bases, coupling):
