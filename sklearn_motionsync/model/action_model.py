@@ -240,7 +240,7 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
     def _learn(self, performances, groups, before):
         """Learn of performances that came after others."""
         seen, codes, stay = before.after(performances, groups)
-        self.n_samples_seen_, self.n_frames_ = seen.n, len(seen.mean)
+        self.n_samples_seen_, self.n_frames_ = seen.n, len(seen.origin)
         with np.errstate(over="ignore", invalid="ignore"):
             self.mean_, self.variance_, spread = (
                 np.asarray(x, dtype=seen.kept.dtype)

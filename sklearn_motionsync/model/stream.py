@@ -29,10 +29,14 @@ class Stream:
         Performances that came.
     n_groups : int
         Groups of these.
-    labels : dict
-        Of the groups that have one, with their numbers from 0, in the order in which groups came.
-    mean, squares : ndarray, shape (P, n_features), float64
-        Mean of all, and the sum of their squared deviations from it.
+    labels : tuple of pairs
+        Labels of the groups that have one, and their numbers: from 0, in the order in which groups
+        came.
+    origin : ndarray, shape (P, n_features), float64
+        The first one. Means are taken of what others differ by from it: those are small numbers,
+        however far away the origin of the data is.
+    away, squares : ndarray, shape (P, n_features), float64
+        Mean of all less the origin, and the sum of the squared deviations from the mean.
     bounds : tuple of two ndarray, shape (n_features,)
         The least and the largest number of each feature.
     kept : ndarray, shape (n_kept, P, n_features)
@@ -47,14 +51,20 @@ class Stream:
 
     n: int = 0
     n_groups: int = 0
-    labels: dict = field(default_factory=dict)
-    mean: np.ndarray = 0.0
+    labels: tuple = ()
+    origin: np.ndarray = None
+    away: np.ndarray = 0.0
     squares: np.ndarray = 0.0
     bounds: tuple = (np.inf, -np.inf)
     kept: np.ndarray = ()
     groups: np.ndarray = field(default_factory=lambda: np.array([], dtype=np.intp))
     turns: np.ndarray = field(default_factory=lambda: np.array([], dtype=np.uint64))
     gone: Logs = field(default_factory=Logs)
+
+    @property
+    def mean(self):
+        """Of all performances, (P, n_features)."""
+        return self.origin + self.away
 
     @property
     def variance(self):
@@ -111,12 +121,13 @@ class Stream:
             if label not in labels:
                 labels[label] = n_groups
                 n_groups += 1
-        return np.array([labels[label] for label in given]), labels, n_groups
+        return np.array([labels[label] for label in given]), tuple(labels.items()), n_groups
 
     def _add(self, performances):
         """Number, mean and variance by Welford's recurrence: one after the other, in doubles."""
         n, (least, most) = self.n, self.bounds
-        mean, squares = (np.zeros(performances[0].shape) + x for x in (self.mean, self.squares))
+        origin = performances[0].astype(np.float64) if self.origin is None else self.origin
+        mean, squares = (np.zeros(origin.shape) + x for x in (self.away, self.squares))
         # What is beyond all numbers is refused when all have come.
         with np.errstate(over="ignore", invalid="ignore"):
             for _, some in portions(performances):
@@ -124,10 +135,12 @@ class Stream:
                 most = np.maximum(some.max(axis=(0, 1)), most)
                 for x in some:
                     n += 1
-                    away = x - mean
-                    mean += away / n
-                    squares += away * (x - mean)
-        return {"n": n, "mean": mean, "squares": squares, "bounds": (least, most)}
+                    away = x - origin
+                    step = away - mean
+                    mean += step / n
+                    squares += step * (away - mean)
+        moments = {"n": n, "origin": origin, "away": mean, "squares": squares}
+        return moments | {"bounds": (least, most)}
 
 
 def spread_out(groups):
