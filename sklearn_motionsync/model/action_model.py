@@ -246,8 +246,9 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
                 np.asarray(x, dtype=seen.kept.dtype)
                 for x in (seen.mean, seen.variance, seen.spread)
             )
-        check_squares(np.stack(seen.bounds), float(spread), "variances")
-        self._floor = _VARIANCE_FLOOR * (float(spread) if spread > 0 else 1.0)
+        spread = float(spread)
+        check_squares(np.stack(seen.bounds), spread, "variances")
+        self._floor = _VARIANCE_FLOOR * (spread if spread > 0 else 1.0)
         self.groups_, self._seen = seen.groups, seen
         if seen.n_groups < 2:
             # Nobody can be compared with others yet.
