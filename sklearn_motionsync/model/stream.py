@@ -102,13 +102,15 @@ class Stream:
         chosen, n_before = _lowest(turns), len(self.kept)
         stay = np.zeros(len(turns), dtype=bool)
         stay[chosen] = True
-        seen = self._add(performances)
-        later = replace(self, n_groups=n_groups, labels=labels, **seen)
-        if stay[n_before:].any():
+        later = replace(self, n_groups=n_groups, labels=labels, **self._add(performances))
+        # Double precision as soon as anything came in it.
+        dtype = later.bounds[0].dtype
+        if stay[n_before:].any() or self.kept.dtype != dtype:
             old = [self.kept[i] for i in chosen[chosen < n_before]]
             new = [performances[i - n_before] for i in chosen[chosen >= n_before]]
             whose = np.concatenate([self.groups, codes])[chosen]
-            later = replace(later, kept=np.stack(old + new), groups=whose, turns=turns[chosen])
+            kept = np.stack(old + new).astype(dtype, copy=False)
+            later = replace(later, kept=kept, groups=whose, turns=turns[chosen])
         return later, codes, stay
 
     def _number(self, groups, n):

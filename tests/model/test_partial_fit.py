@@ -292,6 +292,11 @@ def test_single_precision_stays_until_a_portion_has_more():
     both = np.concatenate([X[:6].astype("f4").astype("f8"), X[6:]])
     assert_same_state(model, ActionModel().fit(both))
     assert model.partial_fit(X[:6].astype("f4")).variance_.dtype == np.float64
+    # Also if the only one in double precision is not kept.
+    many = curves(77, n_frames=10).astype("f4").astype("f8")
+    model = ActionModel().partial_fit(many[:76].astype("f4")).partial_fit(many[76:])
+    assert_same_state(model, ActionModel().fit(many))
+    assert 76 not in model.groups_
 
 
 # -- memory -----------------------------------------------------------------------------
