@@ -68,7 +68,7 @@ TESTS = {
     "model/likeness": ["model/test_likeness.py", "model/test_detector.py"],
     "model/manner": ["model/test_detector.py"],
     "model/sampling": ["model/test_sampling.py"],
-    "model/stream": ["model/test_partial_fit.py", "model/test_likeness.py"],
+    "model/stream": ["model/test_partial_fit.py", "model/test_[al]*.py"],
     "model/variation": ["model/test_variation.py", "model/test_bands.py"],
     "model/views": ["model/test_bands.py", "display/test_departing.py", "display/test_displays.py"],
     "model": ["model/test_[abd]*.py"],
