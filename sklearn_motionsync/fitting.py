@@ -1,8 +1,12 @@
 """A fit is all or nothing: it works on a copy of the estimator, whose state is taken over whole."""
 
 import functools
+import threading
 
-__all__ = ["at_once", "of_one_state"]
+__all__ = ["at_once", "carried_on", "of_one_state"]
+
+# Held for the moment in which an estimator takes over what was learnt.
+_TAKING_OVER = threading.Lock()
 
 
 def at_once(method):
@@ -30,13 +34,45 @@ def at_once(method):
             result = method(twin, *args, **kwargs)
         except BaseException:
             # What another thread has fitted meanwhile is not ours to forget.
-            if vars(self) is before:
-                self.__dict__ = blank
+            with _TAKING_OVER:
+                if vars(self) is before:
+                    self.__dict__ = blank
             raise
-        after = _unfitted(vars(self))
-        learnt = {k: v for k, v in vars(twin).items() if k not in blank or v is not blank[k]}
-        self.__dict__ = {**after, **learnt, "_learnt": tuple(learnt)}
+        with _TAKING_OVER:
+            _take_over(self, twin, blank)
         return self if result is twin else result
+
+    return on_a_copy
+
+
+def carried_on(method):
+    """Decorate a ``partial_fit``, so that a portion is learnt whole, once, or not at all.
+
+    Several threads may give portions to one estimator: one that comes second is learnt again, on
+    top of the first. A call that fails, or is interrupted, leaves the estimator as it was.
+
+    Parameters
+    ----------
+    method : callable
+        May set attributes as it goes, but never changes their values; of ``self`` it gets a copy.
+        Returns it.
+
+    Returns
+    -------
+    callable
+    """
+
+    @functools.wraps(method)
+    def on_a_copy(self, *args, **kwargs):
+        while True:
+            before = vars(self)
+            blank = _unfitted(before)
+            twin = _with_state(self, dict(before))
+            method(twin, *args, **kwargs)
+            with _TAKING_OVER:
+                if vars(self) is before:
+                    _take_over(self, twin, blank)
+                    return self
 
     return on_a_copy
 
@@ -53,6 +89,14 @@ def of_one_state(method):
         return method(_with_state(self, vars(self)), *args, **kwargs)
 
     return of_a_snapshot
+
+
+def _take_over(estimator, twin, blank):
+    """Replace what an estimator has learnt by what its twin has, who was blank."""
+    after = _unfitted(vars(estimator))
+    learnt = {k: v for k, v in vars(twin).items() if k not in blank or v is not blank[k]}
+    learnt.pop("_learnt", None)
+    estimator.__dict__ = {**after, **learnt, "_learnt": tuple(learnt)}
 
 
 def _with_state(estimator, state):

@@ -1,19 +1,22 @@
 """The action model: mean performance, variance at every posture, envelope (section 4)."""
 
+from dataclasses import replace
 from numbers import Real
 
 import numpy as np
 from sklearn.base import BaseEstimator, _fit_context
-from sklearn.utils import check_consistent_length
+from sklearn.exceptions import NotFittedError
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
-from ..fitting import at_once, of_one_state
+from ..fitting import at_once, carried_on
 from ..gate import check_squares
 from ..notebook import DocumentedMixin
 from ..performances import SequenceLevelMixin
 from .envelope import EnvelopeMixin
-from .likeness import Neighbours, as_codes, spread_out
+from .judging import JudgingMixin
+from .likeness import Logs, Neighbours, as_codes
+from .stream import Stream
 from .variation import predictive_variance
 
 __all__ = ["ActionModel"]
@@ -23,7 +26,7 @@ __all__ = ["ActionModel"]
 _VARIANCE_FLOOR = 1e-9
 
 
-class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstimator):
+class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstimator):
     """What an action looks like at every instant, and how much people vary there.
 
     1. The mean performance and the variance of every posture, over synchronised
@@ -60,11 +63,14 @@ class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstima
         drawn a little towards its mean over the frames, never 0.
     deviations_ : ndarray, shape (n_kept, P, n_features)
         Training performances less the mean: those that others are compared with and drawn from.
-        At most 64, one of every group and the rest evenly spaced.
+        At most 64, one of every group and the rest evenly spread.
     groups_ : ndarray of int, shape (n_kept,)
         The groups of these, counted from 0 in the order in which they come.
     dissimilarities_ : ndarray, shape (n_sequences,)
-        Of every training performance to those of other groups that are kept.
+        Of every training performance to those of other groups that are kept; after
+        ``partial_fit``, of those of its last call.
+    n_samples_seen_ : int
+        Performances in all calls.
     threshold_ : float
         The border: performances with a dissimilarity up to this are inside.
     n_frames_ : int
@@ -133,27 +139,76 @@ class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstima
             that variances are beyond the precision; if all are of one group, or there is not a
             group for each performance.
         """
-        X = np.stack(_alike(self._check_training_set(X)))
-        if len(X) < 2:
+        performances = _alike(self._check_training_set(X))
+        if len(performances) < 2:
             raise ValueError(
                 "A model of how performances vary needs at least 2 performances, got n_samples = 1."
             )
-        groups = as_codes(groups, len(X))
-        self.n_frames_ = X.shape[1]
-        with np.errstate(over="ignore", invalid="ignore"):
-            self.mean_ = X.mean(axis=0)
-            self.variance_ = X.var(axis=0)
-            spread = float(X.var(axis=(0, 1)).max())
-        check_squares(X, spread, "variances")
-        self._floor = _VARIANCE_FLOOR * (spread if spread > 0 else 1.0)
-        kept = spread_out(groups)
-        self.deviations_, self.groups_ = X[kept] - self.mean_, groups[kept]
-        known = X[kept].astype(np.float64)
-        self.predictive_variance_ = predictive_variance(known, self.groups_).astype(X.dtype)
-        self._neighbours = Neighbours(known, self.groups_)
-        self.dissimilarities_ = self._neighbours.dissimilarity(X, groups)
-        self.threshold_ = self._neighbours.border(self.dissimilarities_, self.coverage)
+        as_codes(groups, len(performances))
+        self._learn(performances, groups, Stream())
         return self
+
+    @carried_on
+    @_fit_context(prefer_skip_nested_validation=True)
+    def partial_fit(self, X, y=None, groups=None):
+        """Learn of more performances, after those of earlier calls or of ``fit``.
+
+        For more than memory holds, and for those that come in later. Of the performances themselves
+        only 64 are kept, so that a call costs the same however many came before.
+        Mean, variances, and who is kept are those of one ``fit`` on all, to the last bit,
+        whatever the portions. So is the border of up to 64 in all; of more, those that came
+        before are as unlike as they were to the ones that were kept when they came, or left.
+
+        Parameters
+        ----------
+        X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
+            Synchronised performances, at least one, on the clock of the earlier ones. The rows of a
+            2-D array are univariate ones.
+        y : ignored
+        groups : array-like, shape (n_sequences,), default=None
+            Who performed. The same label is the same person in all calls. By default every
+            performance counts for itself.
+
+        Returns
+        -------
+        self
+            As long as all performances are one, or of one group, only ``mean_``, ``variance_``
+            and what is kept: how people vary is not known, and questions raise `NotFittedError`.
+
+        Raises
+        ------
+        ValueError
+            If the performances have different lengths, or others than the earlier ones; if their
+            unit is such that variances are beyond the precision, or there is not a group for each.
+            The model is as it was then.
+
+        Examples
+        --------
+        Pipelines have no ``partial_fit``: fit the steps before the model on some performances, and
+        give it what they make of all, portion by portion.
+
+        >>> from sklearn.pipeline import make_pipeline
+        >>> from sklearn_motionsync import ActionModel, ASpace, LinearSynchronizer
+        >>> from sklearn_motionsync.datasets import make_bending
+        >>> portions = [make_bending(10, random_state=seed).data for seed in range(3)]
+        >>> before = make_pipeline(ASpace(3), LinearSynchronizer(50)).fit(portions[0])
+        >>> model = ActionModel()
+        >>> for portion in portions:
+        ...     model = model.partial_fit(before.transform(portion))
+        >>> model.n_samples_seen_
+        30
+        """
+        if hasattr(self, "_seen"):
+            performances, seen = self._check_clock(X), self._seen
+        else:
+            performances, seen = _alike(self._check_training_set(X)), Stream()
+        self._learn(performances, groups, seen)
+        return self
+
+    @property
+    def deviations_(self):
+        """Training performances that are kept, less the mean: (n_kept, P, n_features)."""
+        return self._seen.kept - self.mean_
 
     def check_performances(self, X):
         """Check that performances are synchronised, and to the clock of the model.
@@ -174,6 +229,47 @@ class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstima
             If the input breaks the contract, performances have different lengths, or others than
             the model.
         """
+        self._check_learnt()
+        return self._check_clock(X)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.three_d_array = True
+        return tags
+
+    def _learn(self, performances, groups, before):
+        """Learn of performances that came after others."""
+        seen, codes, stay = before.after(performances, groups)
+        self.n_samples_seen_, self.n_frames_ = seen.n, len(seen.origin)
+        with np.errstate(over="ignore", invalid="ignore"):
+            self.mean_, self.variance_, spread = (
+                np.asarray(x, dtype=seen.kept.dtype)
+                for x in (seen.mean, seen.variance, seen.spread)
+            )
+        spread = float(spread)
+        check_squares(np.stack(seen.bounds), spread, "variances")
+        self._floor = _VARIANCE_FLOOR * (spread if spread > 0 else 1.0)
+        self.groups_, self._seen = seen.groups, seen
+        if seen.n_groups < 2:
+            # Nobody can be compared with others yet.
+            return
+        known_before = self._of_kept if seen.kept is before.kept else None
+        if known_before is None:
+            known = seen.kept.astype(np.float64)
+            variance = predictive_variance(known, seen.groups)
+            self.predictive_variance_ = variance.astype(seen.kept.dtype)
+            self._neighbours = Neighbours(known, seen.groups)
+            known_before = self._neighbours.dissimilarity(before.kept, before.groups)
+        self.dissimilarities_ = self._neighbours.dissimilarity(performances, codes)
+        at_hand = np.concatenate([known_before, self.dissimilarities_])
+        self._of_kept = at_hand[stay]
+        self._unlike = seen.gone + Logs.of(at_hand)
+        # Those that go are not seen again: this is what stays of them.
+        self._seen = replace(seen, gone=seen.gone + Logs.of(at_hand[~stay]))
+        self.threshold_ = self._neighbours.border(self._unlike, self.coverage)
+
+    def _check_clock(self, X):
+        """Performances on the clock of the model."""
         performances = _alike(super().check_performances(X))
         if len(performances[0]) != self.n_frames_:
             raise ValueError(
@@ -183,131 +279,15 @@ class ActionModel(DocumentedMixin, EnvelopeMixin, SequenceLevelMixin, BaseEstima
             )
         return performances
 
-    @of_one_state
-    def score_samples(self, X):
-        """Log-density of performances: independent normal distributions at every posture.
-
-        It tells which of two models fits a performance better; it is not what ``predict`` asks,
-        as doing nothing is dense.
-
-        Parameters
-        ----------
-        X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
-            Synchronised performances.
-
-        Returns
-        -------
-        ndarray, shape (n_sequences,)
-        """
-        X = np.stack(self.check_performances(X))
-        # What is too far away for any number has the density 0.
-        with np.errstate(over="ignore"):
-            squares = np.square((X - self.mean_) / self._std()).sum(axis=(1, 2))
-        return self._log_density(squares)
-
-    @of_one_state
-    def score(self, X, y=None, sample_weight=None):
-        """Mean log-density of performances.
-
-        Parameters
-        ----------
-        X : as for ``score_samples``
-        y : ignored
-        sample_weight : array-like, shape (n_sequences,), default=None
-            How much each performance counts; by default all alike.
-
-        Returns
-        -------
-        float
-        """
-        densities = self.score_samples(X)
-        if sample_weight is not None:
-            check_consistent_length(densities, sample_weight)
-        return float(np.average(densities, weights=sample_weight))
-
-    @of_one_state
-    def dissimilarity(self, X):
-        """How unlike performances are to the most similar training performances.
-
-        Parameters
-        ----------
-        X : as for ``score_samples``
-
-        Returns
-        -------
-        ndarray, shape (n_sequences,)
-            0 equal, 1 as unlike as standing still.
-        """
-        performances = self.check_performances(X)
-        return self._neighbours.dissimilarity(performances)
-
-    @of_one_state
-    def threshold_at(self, coverage):
-        """The border of another coverage.
-
-        Parameters
-        ----------
-        coverage : float
-            Share of performances of people not seen to be accepted, between 0 and 1.
-
-        Returns
-        -------
-        float
-            ``threshold_`` for the ``coverage`` of the model.
-
-        Raises
-        ------
-        ValueError
-            If it is no share.
-        """
+    def _check_learnt(self):
+        """Whether it is known how people vary."""
         check_is_fitted(self)
-        if not (isinstance(coverage, Real) and 0 < coverage < 1):
-            raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
-        return self._neighbours.border(self.dissimilarities_, coverage)
-
-    @of_one_state
-    def decision_function(self, X):
-        """How far inside the border performances are: ``threshold_`` less their dissimilarity.
-
-        Parameters
-        ----------
-        X : as for ``score_samples``
-
-        Returns
-        -------
-        ndarray, shape (n_sequences,)
-            Negative outside.
-        """
-        found = self.dissimilarity(X)
-        return self.threshold_ - found
-
-    @of_one_state
-    def predict(self, X):
-        """Whether performances are the action: at most as unlike as people are expected to be.
-
-        Parameters
-        ----------
-        X : as for ``score_samples``
-
-        Returns
-        -------
-        ndarray of int, shape (n_sequences,)
-            1 inside, -1 outside.
-        """
-        return np.where(self.decision_function(X) >= 0, 1, -1)
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.input_tags.three_d_array = True
-        return tags
-
-    def _std(self):
-        return np.sqrt(np.maximum(self.variance_, self._floor))
-
-    def _log_density(self, squares):
-        """Log-density of performances with these sums of squared standard deviations."""
-        log_std = np.log(self._std()).sum(dtype=np.float64)
-        return -0.5 * squares - log_std - 0.5 * self.mean_.size * np.log(2 * np.pi)
+        if not hasattr(self, "threshold_"):
+            raise NotFittedError(
+                "A model of how performances vary needs at least 2 performances, of different "
+                f"groups; so far came {self.n_samples_seen_}, of one group. Give others to "
+                "partial_fit, or no groups, and every performance counts for itself."
+            )
 
 
 def _alike(performances):

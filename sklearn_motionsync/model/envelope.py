@@ -4,7 +4,6 @@ from numbers import Integral
 
 import numpy as np
 from sklearn.utils import check_random_state
-from sklearn.utils.validation import check_is_fitted
 
 from ..fitting import of_one_state
 from ..gate import as_numbers, check_finite, check_names
@@ -35,7 +34,7 @@ class EnvelopeMixin:
         -------
         ndarray of bool, shape (n_postures,)
         """
-        check_is_fitted(self)
+        self._check_learnt()
         frame = self._check_frame(frame)
         check_names(postures, names_of_input(self), "postures")
         postures = as_numbers(postures, "postures", dtype=self.mean_.dtype)
@@ -69,7 +68,7 @@ class EnvelopeMixin:
         --------
         mean_envelope : Holds the mean, not performances.
         """
-        check_is_fitted(self)
+        self._check_learnt()
         if simultaneous:
             reach = self.simultaneous_factor() * np.sqrt(self.predictive_variance_)
         else:
@@ -92,7 +91,7 @@ class EnvelopeMixin:
         -------
         lower, upper : ndarray, shape (P, n_features)
         """
-        check_is_fitted(self)
+        self._check_learnt()
         reach = mean_band(self._known(), self.groups_, self.coverage, random_state)
         reach = reach.astype(self.mean_.dtype)
         return self.mean_ - reach, self.mean_ + reach
@@ -108,7 +107,7 @@ class EnvelopeMixin:
         -------
         float
         """
-        check_is_fitted(self)
+        self._check_learnt()
         return simultaneous_factor(self._known(), self.groups_, self.coverage)
 
     @of_one_state
@@ -163,7 +162,7 @@ class EnvelopeMixin:
         --------
         blend_performances : Mixtures of one's own, in timing too.
         """
-        check_is_fitted(self)
+        self._check_learnt()
         if not isinstance(n, Integral) or n < 1:
             raise ValueError(f"n must be a whole number of samples, at least 1; got {n!r}.")
         random_state = check_random_state(random_state)
@@ -184,7 +183,7 @@ class EnvelopeMixin:
 
     def _known(self):
         """The training performances that are kept."""
-        return np.asarray(self.mean_ + self.deviations_, dtype=np.float64)
+        return self._seen.kept.astype(np.float64)
 
     def _check_frame(self, frame):
         if not isinstance(frame, Integral) or not 0 <= frame < self.n_frames_:

@@ -1,22 +1,25 @@
 """How unlike a performance is to those that were learnt, and how unlike people may be."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
+from ..blas import on_one_thread
 from ..matching.filters import smooth
 
 __all__ = [
+    "Logs",
     "Neighbours",
     "as_codes",
+    "check_labels",
     "learn_border",
     "learn_reach",
+    "portions",
     "power_of_two",
-    "spread_out",
 ]
 
-# Most performances that others are compared with: predicting takes time and memory in proportion.
-_MOST_KEPT = 64
 # Of the nearest ones, so many count: one alone may be a stray.
 _NEAREST = 2
 # Say of the mean posture: people stand differently, but a movement elsewhere is another one.
@@ -30,6 +33,8 @@ _PRIOR_VARIANCE, _PRIOR_COUNT = 0.07, 3
 _LEAST = 1e-9
 # Who stands still is as unlike to people who move as 1; that is never accepted.
 _STANDS_STILL = 1 - 1e-6
+# Labels of NumPy that are equal to plain ones, as which they are kept.
+_PLAIN = np.str_, np.number, np.bool_
 # Performances that are multiplied at a time, always so many, so that no result depends on the
 # others; and those that are in memory at a time.
 _TILE, _PORTION = 8, 64
@@ -77,22 +82,16 @@ class Neighbours:
         ndarray (n,)
             Infinite if no neighbour is a number away.
         """
-        found = np.empty(len(performances))
-        for start in range(0, len(found), _PORTION):
-            rows = slice(start, start + _PORTION)
-            ratios = self._ratios(np.asarray(performances[rows], dtype=np.float64))
-            if groups is not None:
-                ratios[groups[rows, np.newaxis] == self._groups] = np.inf
-            found[rows] = _mean_of_smallest(ratios)
-        return found
+        # Products of eight rows are too small to be shared by threads.
+        return on_one_thread(self._compare, performances, groups)
 
-    def border(self, dissimilarities, coverage):
+    def border(self, unlike, coverage):
         """Up to how unlike somebody new is to be expected.
 
         Parameters
         ----------
-        dissimilarities : ndarray (n,)
-            Those of performances to neighbours of other groups.
+        unlike : Logs
+            Of the dissimilarities of performances to neighbours of other groups.
         coverage : float
             Share of new performances within the border.
 
@@ -101,8 +100,17 @@ class Neighbours:
         float
             Less than standing still, unless nobody moves.
         """
-        border = learn_border(dissimilarities, coverage)
+        border = unlike.border(coverage)
         return border if self.stand_still else min(border, _STANDS_STILL)
+
+    def _compare(self, performances, groups):
+        found = np.empty(len(performances))
+        for rows, some in portions(performances):
+            ratios = self._ratios(some.astype(np.float64, copy=False))
+            if groups is not None:
+                ratios[groups[rows, np.newaxis] == self._groups] = np.inf
+            found[rows] = _mean_of_smallest(ratios)
+        return found
 
     def _ratios(self, performances):
         """How unlike performances (n, P, n_features) are to each of the neighbours (n, n_kept).
@@ -139,6 +147,52 @@ class Neighbours:
         return smooth(performances, _SMOOTHING * (n_frames - 1), order=1).reshape(n, -1)
 
 
+@dataclass(frozen=True)
+class Logs:
+    """The logarithms of dissimilarities, as far as a border depends on them; they can be added.
+
+    Parameters
+    ----------
+    n : int, default=0
+        How many.
+    mean : float, default=0.0
+    squares : float, default=0.0
+        The sum of their squared deviations from the mean.
+    """
+
+    n: int = 0
+    mean: float = 0.0
+    squares: float = 0.0
+
+    @classmethod
+    def of(cls, values):
+        """Those of dissimilarities (n,), not negative."""
+        if not len(values):
+            return cls()
+        logs = np.log(np.maximum(values, _LEAST))
+        mean = logs.mean()
+        return cls(len(logs), float(mean), float(np.square(logs - mean).sum()))
+
+    def __add__(self, other):
+        if not self.n or not other.n:
+            return self if self.n else other
+        n, apart = self.n + other.n, other.mean - self.mean
+        squares = self.squares + other.squares + apart**2 * self.n * other.n / n
+        return Logs(n, self.mean + apart * other.n / n, squares)
+
+    def border(self, coverage):
+        """What a new dissimilarity stays below with this probability; see `learn_border`."""
+        with np.errstate(over="ignore"):
+            return float(np.exp(self.mean + _reach(self.n, self.squares, coverage)))
+
+
+def portions(performances):
+    """Performances (n, P, n_features) by portions: pairs of a slice and an array."""
+    for start in range(0, len(performances), _PORTION):
+        rows = slice(start, start + _PORTION)
+        yield rows, np.asarray(performances[rows])
+
+
 def power_of_two(performances):
     """What to multiply them by, for squares that are numbers; no bit is lost by it."""
     largest = np.abs(performances).max()
@@ -162,9 +216,7 @@ def learn_border(values, coverage):
     -------
     float
     """
-    logs = np.log(np.maximum(values, _LEAST))
-    with np.errstate(over="ignore"):
-        return float(np.exp(logs.mean() + learn_reach(logs - logs.mean(), coverage)))
+    return Logs.of(values).border(coverage)
 
 
 def learn_reach(deviations, coverage, usual=_PRIOR_VARIANCE):
@@ -183,9 +235,12 @@ def learn_reach(deviations, coverage, usual=_PRIOR_VARIANCE):
     -------
     float
     """
-    n = len(deviations)
+    return _reach(len(deviations), np.square(deviations).sum(), coverage, usual)
+
+
+def _reach(n, squares, coverage, usual=_PRIOR_VARIANCE):
     freedom = n - 1 + _PRIOR_COUNT
-    squares = np.square(deviations).sum() + _PRIOR_COUNT * usual
+    squares = squares + _PRIOR_COUNT * usual
     return float(student.ppf(coverage, freedom) * np.sqrt(squares / freedom * (1 + 1 / n)))
 
 
@@ -195,10 +250,24 @@ def as_codes(groups, n_performances):
     Raises
     ------
     ValueError
-        If there is not one for each performance, or one is missing, or only one in all.
+        As from `check_labels`, and if there is only one in all.
     """
     if groups is None:
         return np.arange(n_performances)
+    labels = check_labels(groups, n_performances, at_least=2)
+    code = {label: i for i, label in enumerate(dict.fromkeys(labels))}
+    return np.array([code[label] for label in labels])
+
+
+def check_labels(groups, n_performances, at_least=1):
+    """The labels of groups, one for each performance, as a list.
+
+    Raises
+    ------
+    ValueError
+        If there is not one for each performance, or one is missing, or there are too few different
+        ones.
+    """
     if isinstance(groups, (str, bytes, dict)) or np.ndim(groups) != 1:
         raise ValueError(
             "groups must be a list with one label for each performance, such as who performed "
@@ -215,40 +284,13 @@ def as_codes(groups, n_performances):
             f"groups does not say who gave performance {missing.index(True)}: it is missing. Give "
             "everybody a label, or leave such performances out."
         )
-    labels = list(dict.fromkeys(groups))
-    if len(labels) < 2:
+    labels = [label.item() if isinstance(label, _PLAIN) else label for label in groups]
+    if len(set(labels)) < at_least:
         raise ValueError(
             f"All performances are of the group {labels[0]!r}: how groups differ cannot be learnt "
             "of one. Give no groups, and every performance counts for itself."
         )
-    code = {label: i for i, label in enumerate(labels)}
-    return np.array([code[label] for label in groups])
-
-
-def spread_out(groups, most=_MOST_KEPT):
-    """Which performances are kept: one of every group, then evenly spaced, in order.
-
-    Parameters
-    ----------
-    groups : ndarray of int (n,)
-    most : int, default=64
-
-    Returns
-    -------
-    ndarray of int
-    """
-    n = len(groups)
-    if n <= most:
-        return np.arange(n)
-    first = _evenly(np.sort(np.unique(groups, return_index=True)[1]), most)
-    rest = np.setdiff1d(np.arange(n), first)
-    return np.sort(np.concatenate([first, _evenly(rest, most - len(first))]))
-
-
-def _evenly(indices, most):
-    if len(indices) <= most:
-        return indices
-    return indices[np.linspace(0, len(indices) - 1, most).round().astype(int)]
+    return labels
 
 
 def _mean_of_smallest(ratios):

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from .likeness import Neighbours, learn_reach, spread_out
+from .likeness import Logs, Neighbours, learn_reach
+from .stream import spread_out
 
 __all__ = ["Course", "Usual", "energies"]
 
@@ -29,10 +30,10 @@ class Course:
 
     def __init__(self, performances, groups, coverage):
         kept = spread_out(groups)
-        on_clock = np.asarray(performances, dtype=np.float64)
-        self._neighbours = Neighbours(on_clock[kept], groups[kept])
-        dissimilarities = self._neighbours.dissimilarity(on_clock, groups)
-        self.border = self._neighbours.border(dissimilarities, coverage)
+        known = np.stack([performances[i] for i in kept]).astype(np.float64)
+        self._neighbours = Neighbours(known, groups[kept])
+        unlike = Logs.of(self._neighbours.dissimilarity(performances, groups))
+        self.border = self._neighbours.border(unlike, coverage)
 
     def __call__(self, performances):
         return self._neighbours.dissimilarity(performances) / self.border

@@ -95,7 +95,7 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
         If a step between them cannot be taken back.
     """
     before, model = find_step(estimator, ActionModel)
-    check_is_fitted(model)
+    check_is_fitted(model, "threshold_")
     names, params = names_of(before, model, model.mean_.shape[1]), params or {}
     asked = any(isinstance(f, str) and f not in names for f in as_features(features))
     way = None

@@ -263,14 +263,18 @@ def _groups(pattern, reached, groups):
     if groups is not None:
         return as_codes(groups, len(training.durations))[training.kept]
     models = [step for step in flat_steps(pattern) if isinstance(step, ActionModel)]
-    known = [model.groups_ for model in models if hasattr(model, "groups_")]
-    if not known or len(known[0]) == len(training.durations):
-        return known[0] if known else None
-    if len(np.unique(known[0])) < len(known[0]):
+    fitted = [model for model in models if hasattr(model, "groups_")]
+    if not fitted:
+        return None
+    known, n_seen = fitted[0].groups_, fitted[0].n_samples_seen_
+    # A model may have learnt of others since.
+    if len(known) == n_seen == len(training.durations):
+        return known
+    if len(np.unique(known)) < len(known):
         warnings.warn(
-            f"The model keeps {len(known[0])} of {len(training.durations)} performances, so that "
-            "who gave the others is not known, and each counts for itself: the threshold will be "
-            "too high. Give groups, one for each performance.",
+            f"The model keeps {len(known)} of {n_seen} performances, the synchronizer learnt of "
+            f"{len(training.durations)}, so that who gave these is not known, and each counts for "
+            "itself: the threshold will be too high. Give groups, one for each performance.",
             UserWarning,
             stacklevel=4,
         )

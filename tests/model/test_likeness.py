@@ -7,7 +7,8 @@ from scipy.stats import lognorm, norm
 from scipy.stats import t as student
 from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import load_performances
-from sklearn_motionsync.model.likeness import learn_border, spread_out
+from sklearn_motionsync.model.likeness import learn_border
+from sklearn_motionsync.model.stream import spread_out
 
 
 def curves(n, seed=0, n_frames=40, spread=0.2):

@@ -330,6 +330,15 @@ def test_many_training_performances_are_thinned_out():
         find_performances(pipe, TAKE[:60])
 
 
+def test_a_model_that_learnt_of_others_since_does_not_say_who_gave_these():
+    many = [movement(30 + i, 0.9 + i / 20, 1) for i in range(6)]
+    sync = LinearSynchronizer(30).fit(many)
+    model = ActionModel().fit(sync.transform(many[:4]), groups=[0, 0, 1, 1])
+    model.partial_fit(sync.transform(many[2:]), groups=[0, 0, 1, 1])
+    with pytest.warns(UserWarning, match="keeps 8 of 8 .* learnt of 6, .* Give groups"):
+        find_performances(make_pipeline(sync, model), TAKE[:60])
+
+
 def test_time_and_memory_do_not_explode(pipe):
     take = np.concatenate([TAKE] * 12)
     tracemalloc.start()

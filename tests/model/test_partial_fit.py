@@ -1,0 +1,314 @@
+"""Performances that come portion by portion: against one fit on all, and against slow loops."""
+
+import math
+import pickle
+import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sklearn.exceptions import NotFittedError
+from sklearn.utils.validation import check_is_fitted
+from sklearn_motionsync import ActionModel, find_departures, to_frame
+from sklearn_motionsync.model.stream import spread_out
+from test_likeness import curves, slow_border, slow_dissimilarity, slow_ratio
+
+few = settings(max_examples=12, deadline=None, derandomize=True, database=None)
+
+
+def in_portions(X, groups=None, cuts=(), model=None):
+    model = ActionModel() if model is None else model
+    groups = None if groups is None else list(groups)
+    edges = [0, *sorted(cuts), len(X)]
+    for start, stop in pairwise(edges):
+        if start < stop:
+            some = None if groups is None else groups[start:stop]
+            assert model.partial_fit(X[start:stop], groups=some) is model
+    return model
+
+
+def learnt(model):
+    """All that does not depend on portions."""
+    names = ("mean_", "variance_", "predictive_variance_", "deviations_", "groups_")
+    return {name: getattr(model, name) for name in (*names, "n_samples_seen_", "n_frames_")}
+
+
+def assert_same_state(model, expected):
+    for name, value in learnt(expected).items():
+        np.testing.assert_array_equal(getattr(model, name), value, err_msg=name)
+        assert np.asarray(getattr(model, name)).dtype == np.asarray(value).dtype, name
+
+
+# -- as one fit -------------------------------------------------------------------------
+
+
+@few
+@given(st.data())
+def test_portions_make_the_model_of_one_fit_to_the_last_bit(data):
+    n = data.draw(st.integers(2, 64))
+    X = curves(n, seed=data.draw(st.integers(0, 99)), n_frames=12)
+    X = X.astype(data.draw(st.sampled_from(["f4", "f8"])))
+    groups = data.draw(st.none() | st.lists(st.sampled_from("abcde"), min_size=n, max_size=n))
+    if groups is not None:
+        groups[-1] = "somebody else"
+    cuts = data.draw(st.lists(st.integers(0, n)))
+    model, expected = in_portions(X, groups, cuts), ActionModel().fit(X, groups=groups)
+    assert_same_state(model, expected)
+    assert model.threshold_ == expected.threshold_
+    new = curves(5, seed=7, spread=0.4, n_frames=12).astype(X.dtype)
+    for ask in ("predict", "decision_function", "score_samples", "standard_scores"):
+        np.testing.assert_array_equal(getattr(model, ask)(new), getattr(expected, ask)(new))
+    for frame in (None, 4):
+        drawn = [m.sample(3, frame=frame, random_state=0) for m in (model, expected)]
+        np.testing.assert_array_equal(*drawn)
+    np.testing.assert_array_equal(model.envelope(True), expected.envelope(True))
+
+
+@pytest.mark.parametrize("size", [1, 7, 100])
+def test_of_many_the_same_are_kept_whatever_the_portions(size):
+    X, groups = curves(130, n_frames=10), np.arange(130) ** 2 // 400
+    for some in (None, groups):
+        model = in_portions(X, some, range(0, 130, size))
+        assert_same_state(model, ActionModel().fit(X, groups=some))
+        assert len(model.groups_) == 64
+
+
+def test_mean_and_variance_are_exact_to_rounding():
+    """Far from the origin, where sums of squares would have no digit left."""
+    rng = np.random.default_rng(0)
+    X = 1e7 + rng.standard_normal((300, 3, 2))
+    for dtype in ("f8", "f4"):
+        some = (X - (0 if dtype == "f8" else 1e7 - 100)).astype(dtype)
+        model = in_portions(some, cuts=[1, 2, 50, 51])
+        exact = [[[Fraction(float(v)) for v in some[:, p, k]] for k in (0, 1)] for p in range(3)]
+        for p, k in np.ndindex(3, 2):
+            mean = sum(exact[p][k]) / 300
+            variance = sum((v - mean) ** 2 for v in exact[p][k]) / 300
+            bound = 1e-14 if dtype == "f8" else 1e-7
+            assert math.isclose(model.mean_[p, k], mean, rel_tol=bound)
+            assert math.isclose(model.variance_[p, k], variance, rel_tol=bound)
+
+
+def test_fit_starts_anew_and_partial_fit_goes_on():
+    X = curves(20, n_frames=10)
+    model = ActionModel().fit(X[:8])
+    assert_same_state(model.partial_fit(X[8:]), ActionModel().fit(X))
+    assert_same_state(model.fit(X[8:]), ActionModel().fit(X[8:]))
+    assert not hasattr(model.fit(X), "feature_names_in_")
+    np.testing.assert_array_equal(model.dissimilarities_, ActionModel().fit(X).dissimilarities_)
+    again = pickle.loads(pickle.dumps(ActionModel().fit(X[:8])))
+    assert_same_state(again.partial_fit(X[8:]), ActionModel().fit(X))
+
+
+def test_labels_go_on():
+    """The same label is the same person; who has none counts for himself, also in between."""
+    X = curves(9, n_frames=10)
+    model = ActionModel().partial_fit(X[:3], groups=["b", "a", "b"])
+    model.partial_fit(X[3:5]).partial_fit(X[5:], groups=np.array(["a", "c", "b", "a"]))
+    assert model.groups_.tolist() == [0, 1, 0, 2, 3, 1, 4, 0, 1]
+    assert_same_state(model, ActionModel().fit(X, groups=list("bab12acba")))
+
+
+# -- who is kept ------------------------------------------------------------------------
+
+
+def slow_choice(groups, most=64):
+    """First of every group, then the others; each by its multiple of the golden ratio."""
+    golden = math.isqrt(5 << 128) - (1 << 64) >> 1
+    order, seen = [], []
+    for i, group in enumerate(groups):
+        first = group not in seen
+        seen += [group] if first else []
+        number = len(seen) - 1 if first else i
+        order.append((not first, (number * (golden | 1)) % (1 << 64), i))
+    return sorted(i for _, _, i in sorted(order)[:most])
+
+
+@pytest.mark.parametrize("groups", [[0] * 500, list(range(300)), [i // 4 for i in range(700)]])
+def test_who_is_kept_is_spread_evenly(groups):
+    kept = spread_out(np.array(groups))
+    assert kept.tolist() == slow_choice(groups)
+    # At three distances, none of them above twice the mean.
+    gaps = np.diff(np.array(groups)[kept] if len(set(groups)) > 64 else kept)
+    assert len(set(gaps)) <= 3
+    assert max(gaps) <= 2 * len(set(groups) if len(set(groups)) > 64 else groups) / 64
+
+
+def test_of_two_kinds_in_turn_both_are_kept():
+    for period in (2, 3, 4, 5, 8):
+        counts = np.bincount(spread_out(np.zeros(999, dtype=int)) % period)
+        assert counts.min() > 0.6 * 64 / period
+
+
+# -- the border -------------------------------------------------------------------------
+
+
+def test_those_that_go_count_as_unlike_as_they_were():
+    """Of a stream of three portions, by loops: the border, and what is told of the last portion."""
+    X, groups = curves(80, n_frames=8), np.arange(80) % 9
+    ratios = np.array(
+        [[slow_ratio(x, y) if i > j else 0 for j, y in enumerate(X)] for i, x in enumerate(X)]
+    )
+    ratios += ratios.T
+    edges, kept, values = [0, 68, 74, 80], [], {}
+    for start, stop in pairwise(edges):
+        at_hand = [*kept, *range(start, stop)]
+        kept = slow_choice(groups[:stop])
+        for i in at_hand:
+            values[i] = np.mean(sorted(ratios[i, j] for j in kept if groups[j] != groups[i])[:2])
+    model = in_portions(X, groups, edges)
+    np.testing.assert_array_equal(model.groups_, groups[kept])
+    np.testing.assert_allclose(model.threshold_, slow_border(list(values.values()), 0.95))
+    last = [values[i] for i in range(74, 80)]
+    np.testing.assert_allclose(model.dissimilarities_, last, rtol=1e-9)
+    # That of one fit differs by whom the earlier ones were compared with.
+    expected = ActionModel().fit(X, groups=groups).threshold_
+    assert model.threshold_ != expected
+    np.testing.assert_allclose(model.threshold_, expected, rtol=0.1)
+
+
+def test_a_stream_accepts_as_many_as_stated():
+    new = curves(300, seed=5, n_frames=12)
+    accepted = [
+        (in_portions(curves(200, seed, n_frames=12), cuts=range(0, 200, 25)).predict(new) == 1)
+        for seed in range(6, 12)
+    ]
+    assert abs(np.mean(accepted) - 0.95) < 0.03
+
+
+# -- not enough yet ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("groups", [None, ["ann"] * 3])
+def test_of_one_group_it_is_not_known_how_people_vary(groups):
+    X = curves(9, n_frames=10)
+    n = 1 if groups is None else 3
+    model = ActionModel().partial_fit(X[:n], groups=groups)
+    check_is_fitted(model)
+    np.testing.assert_allclose(model.mean_, X[:n].mean(axis=0))
+    np.testing.assert_allclose(model.variance_, X[:n].var(axis=0), atol=1e-15)
+    questions = [
+        lambda: model.predict(X),
+        lambda: model.score_samples(X),
+        lambda: model.standard_scores(X),
+        lambda: model.threshold_at(0.5),
+        lambda: model.accepts(X[0, :2], 0),
+        lambda: model.envelope(),
+        lambda: model.mean_envelope(),
+        lambda: model.simultaneous_factor(),
+        lambda: model.sample(),
+        lambda: model.check_performances(X),
+    ]
+    for ask in questions:
+        with pytest.raises(NotFittedError, match=f"2 performances, .* so far came {n}, of one"):
+            ask()
+    with pytest.raises(NotFittedError, match="not fitted yet"):
+        find_departures(model, X)
+    model.partial_fit(X[n:], groups=None if groups is None else ["bob"] * 6)
+    groups = None if groups is None else groups + ["bob"] * 6
+    assert_same_state(model, ActionModel().fit(X, groups=groups))
+
+
+def test_many_of_one_group_before_another_comes():
+    """Those of the first that have gone could be compared with nobody: they have no say."""
+    X, groups = curves(150, n_frames=10), [0] * 140 + [1] * 10
+    model = in_portions(X, groups, [100, 140])
+    known = [i for i in slow_choice(groups[:140]) if i < 140]
+    kept = slow_choice(groups)
+    at_hand = [*known, *range(140, 150)]
+    others = [[X[j] for j in kept if groups[j] != groups[i]] for i in at_hand]
+    values = [slow_dissimilarity(X[i], y) for i, y in zip(at_hand, others, strict=True)]
+    np.testing.assert_allclose(model.threshold_, slow_border(values, 0.95))
+
+
+# -- all or nothing ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("X", "groups", "message"),
+    [
+        (curves(3, n_frames=11), None, "have 11 frames, the model 10"),
+        ([np.zeros((10, 2)), np.zeros((9, 2))], None, "Performance 1 has 9 frames"),
+        (np.full((3, 10, 2), np.nan), None, "Performance 0, frame 0, feature 0 is NaN"),
+        (np.zeros((3, 10, 3)), None, "3 features a frame, but ActionModel is expecting 2"),
+        (1e200 * curves(3, n_frames=10), None, "variances are beyond float64"),
+        (curves(3, n_frames=10), ["a", None, "b"], "does not say who gave performance 1"),
+        (curves(3, n_frames=10), ["a"], "groups has 1 labels, and there are 3"),
+        (np.zeros((3, 10)), None, "wrap one sequence as"),
+        ([], None, "Found 0 performances"),
+    ],
+)
+def test_a_portion_that_is_refused_leaves_the_model_as_it_was(X, groups, message):
+    model = ActionModel().partial_fit(curves(6, n_frames=10), groups=list("aabbcc"))
+    before = pickle.dumps(model)
+    with pytest.raises(ValueError, match=message):
+        model.partial_fit(X, groups=groups)
+    assert pickle.dumps(model) == before
+
+
+def test_a_first_portion_that_is_refused_leaves_nothing():
+    model = ActionModel()
+    with pytest.raises(ValueError, match="Performance 1 has 9 frames"):
+        model.partial_fit([np.zeros((10, 2)), np.zeros((9, 2))])
+    assert vars(model) == vars(ActionModel())
+
+
+def test_portions_from_several_threads_all_count():
+    X = curves(60, n_frames=10)
+    model = ActionModel()
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda i: model.partial_fit(X[5 * i : 5 * i + 5]), range(12)))
+    assert model.n_samples_seen_ == 60
+    np.testing.assert_allclose(model.mean_, X.mean(axis=0), atol=1e-12)
+
+
+# -- kinds of input ---------------------------------------------------------------------
+
+
+def test_portions_of_any_kind():
+    X = curves(12, n_frames=10)
+    named = [to_frame(X[:5], columns=["x", "y"]), [pd.DataFrame(x, columns=["x", "y"]) for x in X]]
+    model = ActionModel().partial_fit(named[0]).partial_fit(named[1][5:])
+    assert_same_state(model, ActionModel().fit(X))
+    assert model.feature_names_in_.tolist() == ["x", "y"]
+    with pytest.raises(ValueError, match="feature names should match"):
+        model.partial_fit([x[["y", "x"]] for x in named[1]])
+    rows = ActionModel().partial_fit(X[:1, :, 0]).partial_fit(X[1:, :, 0])
+    assert_same_state(rows, ActionModel().fit(X[:, :, 0]))
+    assert rows.sample(2, random_state=0).shape == (2, 10)
+
+
+def test_single_precision_stays_until_a_portion_has_more():
+    X = curves(12, n_frames=10)
+    model = ActionModel().partial_fit(X[:6].astype("f4"))
+    assert model.mean_.dtype == model.deviations_.dtype == np.float32
+    model.partial_fit(X[6:])
+    assert model.mean_.dtype == model.deviations_.dtype == np.float64
+    both = np.concatenate([X[:6].astype("f4").astype("f8"), X[6:]])
+    assert_same_state(model, ActionModel().fit(both))
+    assert model.partial_fit(X[:6].astype("f4")).variance_.dtype == np.float64
+    # Also if the only one in double precision is not kept.
+    many = curves(77, n_frames=10).astype("f4").astype("f8")
+    model = ActionModel().partial_fit(many[:76].astype("f4")).partial_fit(many[76:])
+    assert_same_state(model, ActionModel().fit(many))
+    assert 76 not in model.groups_
+
+
+# -- memory -----------------------------------------------------------------------------
+
+
+def test_a_fit_takes_no_memory_for_what_it_is_given():
+    """All but what is told of each performance: of 6400 bytes at most a tenth."""
+    some = list(np.ascontiguousarray(curves(50, n_frames=200)[:, :, [0, 1] * 4], dtype="f4"))
+    peaks = []
+    for n in (300, 1300):
+        tracemalloc.start()
+        ActionModel().fit((some * 26)[:n])
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert (peaks[1] - peaks[0]) / 1000 < 640
