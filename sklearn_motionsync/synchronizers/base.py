@@ -36,18 +36,15 @@ class TrainingSet(NamedTuple):
     Attributes
     ----------
     performances : Performances
-    on_clock : ndarray, shape (n_sequences, P, n_features)
-        Linearly normalised (Eq. 7).
     unit : Unit
         In which they are about 1.
     scaled : ndarray, shape (n_sequences, P, n_features)
-        Those on the clock, in this unit.
+        Linearly normalised (Eq. 7), in this unit: the only copy of all of them.
     given : ndarray, shape (n_frames, n_features), or None
         The pattern, if it was given as an array.
     """
 
     performances: Performances
-    on_clock: np.ndarray
     unit: Unit
     scaled: np.ndarray
     given: np.ndarray | None
@@ -199,9 +196,9 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         ndarray, shape (n_sequences, P, n_features)
             One feature for the rows of a 2-D array.
         """
-        on_clock = normalise(self.check_performances(X), self.n_frames_)
-        self._check_unit(on_clock, self._unit.exponent)
-        return on_clock
+        performances = self.check_performances(X)
+        self._check_unit(performances)
+        return normalise(performances, self.n_frames_)
 
     def get_feature_names_out(self, input_features=None):
         """Names of the outputs: the features of a frame; for 2-D input, one name a frame.
@@ -278,17 +275,17 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         features = Features("velocity", 1, SMOOTHING, unit)
         known = {"durations": durations, "kept": kept, "on_clock": on_clock[kept]}
         self.training_ = Bunch(**known, features=features)
-        return TrainingSet(performances, on_clock, unit, unit(on_clock), given)
+        return TrainingSet(performances, unit, unit.fill(on_clock), given)
 
-    def _check_unit(self, sequences, exponent=0, what=None):
-        """Refuse sequences, given in ``2 ** -exponent`` units, far beyond the training set."""
-        sizes = np.maximum(sequences.max(axis=(1, 2)), -sequences.min(axis=(1, 2)))
+    def _check_unit(self, performances, what=None):
+        """Refuse what is far beyond the training set."""
+        sizes = np.array([max(x.max(), -x.min()) for x in performances], dtype=np.float64)
         with np.errstate(over="ignore"):
-            sizes = np.ldexp(sizes.astype(np.float64), -exponent)
+            sizes = np.ldexp(sizes, -self._unit.exponent)
         if not (sizes < _FAR).all():
             i = int(np.argmin(sizes < _FAR))
             raise ValueError(
-                f"{what or f'Performance {i}'} is more than {_FAR:.0e} times as large as the "
+                f"{what or performances.called(i)} is more than {_FAR:.0e} times as large as the "
                 "training set: give it in the same unit."
             )
 
@@ -354,5 +351,5 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         if source is None:
             source = training.performances[self.pattern_index_]
         self.pattern_ = normalise([source], self.n_frames_)[0]
-        self._check_unit(self.pattern_[np.newaxis], self._unit.exponent, "The pattern")
+        self._check_unit([self.pattern_], "The pattern")
         return source

@@ -10,7 +10,7 @@ from sklearn.utils._param_validation import Interval, StrOptions
 from ..fitting import of_one_state
 from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
-from ..matching.holdout import RefinementTrial, Verdict, deal_features
+from ..matching.holdout import Verdict
 from ..matching.matcher import Matcher
 from ..matching.median import Median, estimate_distances, rounding_of, search_median, sum_all
 from ..matching.refinement import choose_smoothing
@@ -19,9 +19,11 @@ from ..matching.warps import normalise
 from ..work import LongWorkMixin, run
 from .balance import warn_of_one_feature
 from .base import Synchronizer
+from .compared import Compared
 from .match import Match
-from .portions import compare_in_portions, in_portions, shared_training_set
+from .portions import compare_in_portions, shared_training_set, warp_in_portions
 from .settings import Settings, features_of, learn_metric
+from .trial import try_refinement
 
 __all__ = ["DenseSynchronizer"]
 
@@ -259,12 +261,10 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     @of_one_state
     def match(self, X):
         performances, warper = self.check_performances(X), self._warper
-        positions = warper.positions(performances)
-        self._check_unit(positions)
+        self._check_unit(performances)
         with self._progress(fits=False) as progress:
             portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "warping"}
-            results = in_portions(warper, "warps", positions, **portions)
-        distances, times = (np.concatenate(parts) for parts in zip(*results, strict=True))
+            distances, times = warp_in_portions(warper, performances, **portions)
         return Match(times, warper.matcher.features.back(distances))
 
     @of_one_state
@@ -314,28 +314,30 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             features = features_of(self, training.unit, learnt=False)
             if learns:
                 features, self.metric_ = learn_metric(self, features, positions)
-            matcher, features = Matcher.learn(features, positions, **self._settings())
+            compared = Compared(features, positions)
+            shape, energy = positions.shape[:2], compared.energy()
+            matcher = Matcher.of_energy(features, shape, energy, **self._settings())
             self.training_.features = matcher.features
-            warn_of_one_feature(self, performances, features)
+            warn_of_one_feature(self, performances, compared)
             self.mu_ = float(matcher.features.back(matcher.trellis.mu))
-            shared = shared_training_set(matcher, positions, features)
-            median = self._choose_median(shared, features, progress)
+            shared = shared_training_set(matcher, positions, compared)
+            rounding = rounding_of(positions.dtype, energy)
+            median = self._choose_median(shared, len(positions), rounding, progress)
             source = self._set_pattern(training, median, matcher.features.degree)
             warper = self._choose_exemplars(training, matcher, source, median.estimates)
             warper = self._decide_on_refinement(training, warper, source, progress, shared)
             self._warper = warper
 
-    def _positions(self, training, chosen=slice(None)):
+    def _positions(self, training):
         """Performances of the training set at every sub-position of the clock, in the unit."""
         if self.subframes == 1:
-            return training.scaled[chosen]
+            return training.scaled
         performances = training.performances
-        some = [performances[i] for i in np.arange(len(performances))[chosen]]
-        return training.unit(normalise(some, self.n_frames_, self.subframes))
+        return training.unit.fill(normalise(performances, self.n_frames_, self.subframes))
 
-    def _choose_median(self, shared, features, progress):
+    def _choose_median(self, shared, n, rounding, progress):
         """The median (Eq. 19), by all matches or some; without it, what exemplars are chosen by."""
-        n, rounding, wanted = len(features), rounding_of(features), self._wants_median
+        wanted = self._wants_median
         compare = partial(compare_in_portions, shared, n_jobs=self.n_jobs, progress=progress)
         if not wanted and (self.consensus == 0 or n <= self.consensus):
             # None of them, or all, are exemplars.
@@ -369,7 +371,11 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         """Whether warps are refined by postures, and the warper that does so or does not."""
         verdict = Verdict()
         if self.refine == "auto" and self.consensus > 0:
-            verdict = self._try_refinement(training, warper, source, progress, shared)
+            others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
+            some = others[:: -(-len(others) // _TRIED) or 1]
+            portions = {"n_jobs": self.n_jobs, "progress": progress}
+            shown = training.scaled, shared, some
+            verdict = try_refinement(warper, source, *shown, self._settings(), **portions)
         names = "ratio", "p_value", "ratio_to_all"
         self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
         self.misfit_ = verdict.misfit
@@ -377,23 +383,6 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         if not self.refines_:
             return warper
         return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.scaled))
-
-    def _try_refinement(self, training, warper, source, progress, shared):
-        """Find out on the performances, or evenly spaced ones of many, whether refining helps."""
-        others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
-        some = others[:: -(-len(others) // _TRIED) or 1]
-        hands = deal_features(training.scaled[some]) if len(some) else []
-        if not hands:
-            return Verdict()
-        positions = self._positions(training, some).astype(np.float64, copy=False)
-        source = warper.positions([source])
-        width = choose_smoothing(training.scaled[some])
-        portion = warper, source, positions, hands, width
-        (trial,) = run(partial(RefinementTrial.of, **self._settings()), [portion])
-        portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "trying to refine"}
-        results = in_portions(trial, "misfits", positions, found=(shared, some), **portions)
-        energy = np.square(trial.pattern - trial.pattern.mean(axis=0)).sum()
-        return Verdict.of(np.concatenate(results, axis=1), energy or 1.0)
 
     def _settings(self):
         """What a `Matcher` learns with."""

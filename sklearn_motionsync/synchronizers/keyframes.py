@@ -187,7 +187,7 @@ class KeyframeSynchronizer(Synchronizer):
             knots = self._given_knots(performances, keyframes)
             # On the mean key-frames all performances are comparable, as on one clock.
             times = self._between(knots.mean(axis=0), knots)
-            comparable = training.unit(sample(performances, times, self.n_frames_))
+            comparable = training.unit.fill(sample(performances, times, self.n_frames_))
         self._set_pattern(training, self._plain_median(comparable))
         if self._given and self.pattern_index_ is not None:
             self.keyframes_ = knots[self.pattern_index_]

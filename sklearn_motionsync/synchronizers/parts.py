@@ -16,7 +16,7 @@ from .dense import DenseSynchronizer
 from .lags import Lags
 from .match import Match
 from .naming import choose_parts, people_of
-from .portions import in_portions
+from .portions import warp_in_portions
 
 __all__ = ["PartSynchronizer"]
 
@@ -251,7 +251,10 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
         source = self._given_pattern(performances)
         if source is None:
             source = performances[self.pattern_index_]
-        chosen = self._everywhere([source, *(performances[k] for k in self.exemplars_)])
+        chosen = [source, *(performances[k] for k in self.exemplars_)]
+        # In double precision, as all that is warped.
+        chosen = [x.astype(np.float64, copy=False) for x in chosen]
+        chosen = normalise(chosen, self.n_frames_, self.subframes)
         (times,) = run(_warps_of_bodies, [(self._warper, chosen)])
         training = normalise(performances, self.n_frames_, self.subframes)
         own = self._warper, times, training, chosen, self.coupling, self._settings()
@@ -264,7 +267,7 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
 
     def _match_parts(self, performances, body, what):
         """A match by part: of the part, or of the rest without it."""
-        found, positions = {}, self._everywhere(performances)
+        found = {}
         with self._progress(fits=False) as progress:
             for name in self.parts_:
                 warper = self._warpers.get((name, what))
@@ -272,15 +275,9 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
                     found[name] = Match(body.times)
                     continue
                 portions = {"n_jobs": self.n_jobs, "progress": progress, "name": f"warping {name}"}
-                results = in_portions(warper, "warps", positions, body.times, **portions)
-                distances, times = (np.concatenate(x) for x in zip(*results, strict=True))
+                distances, times = warp_in_portions(warper, performances, body.times, **portions)
                 found[name] = Match(times, warper.matcher.features.back(distances))
         return found
-
-    def _everywhere(self, performances):
-        """Performances at every position of the clock, in double precision."""
-        arrays = [x.astype(np.float64, copy=False) for x in performances]
-        return normalise(arrays, self.n_frames_, self.subframes)
 
     def _check_lags(self, against):
         if not self.parts_:
