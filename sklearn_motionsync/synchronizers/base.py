@@ -18,7 +18,8 @@ from ..matching.units import Unit
 from ..matching.warps import normalise
 from ..notebook import DocumentedMixin
 from ..performances import Performances, SequenceLevelMixin, names_of_input, restore
-from .match import check_answer
+from ..reading import all_of, parts_of_source
+from .match import Match, check_answer
 
 __all__ = ["Synchronizer", "TrainingSet"]
 
@@ -248,13 +249,46 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
 
     @of_one_state
     def _warp(self, X, **params):
-        performances = self.check_performances(X)
-        match = self.match(performances, **params)
-        check_answer(match, len(performances), self.n_frames_, type(self).__name__)
-        out = match.warp(performances)
+        # What comes along with the performances comes for all of them at once.
+        read = None if params else self._read_in_parts(X)
+        if read is None:
+            performances = self.check_performances(X)
+            out = self._warp_part(performances, **params)
+        else:
+            performances, out = self._warp_parts(*read)
         if performances.kind == "rows":
             return out[:, :, 0]
         return restore(self, performances, out, frames=range(out.shape[1]))
+
+    def _warp_part(self, performances, **params):
+        match = self.match(performances, **params)
+        check_answer(match, len(performances), self.n_frames_, type(self).__name__)
+        return match.warp(performances)
+
+    def _warp_parts(self, n_sequences, parts):
+        """What is known of performances that are read in parts, and these warped."""
+        out, labels, levels = None, [], set()
+        for part in parts:
+            warped, start = self._warp_part(part), len(labels)
+            if out is None:
+                out = np.empty((n_sequences, *warped.shape[1:]), warped.dtype)
+            labels += part.labels
+            levels.add(part.levels)
+            out[start : len(labels)] = warped
+        return all_of(labels, levels, part.names), out
+
+    def _read_in_parts(self, X):
+        check_is_fitted(self)
+        return parts_of_source(self, X, self._fitted_on_rows)
+
+    def _match_in_parts(self, X):
+        """The match of performances by ``_match``, which is given those that are read in parts."""
+        read = self._read_in_parts(X)
+        if read is None:
+            return self._match(self.check_performances(X))
+        matches = [self._match(part) for part in read[1]]
+        times = np.concatenate([match.times for match in matches])
+        return Match(times, np.concatenate([match.distances for match in matches]))
 
     # -- steps of a fit ---------------------------------------------------------------------
 

@@ -53,7 +53,7 @@ class Compared:
         if self.is_kept:
             yield self.kept
             return
-        size = max(1, KEPT_BYTES // (4 * self._positions[0].nbytes))
+        size = max(1, KEPT_BYTES // (16 * self._positions[0].nbytes))
         for rows in even_slices(len(self), size):
             yield self._features(self._positions[rows])
 

@@ -260,7 +260,10 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
     @of_one_state
     def match(self, X):
-        performances, warper = self.check_performances(X), self._warper
+        return self._match_in_parts(X)
+
+    def _match(self, performances):
+        warper = self._warper
         self._check_unit(performances)
         with self._progress(fits=False) as progress:
             portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "warping"}

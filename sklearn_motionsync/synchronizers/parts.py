@@ -10,7 +10,7 @@ from sklearn.utils._param_validation import Interval
 from ..fitting import of_one_state
 from ..matching.parts import PartWarper
 from ..matching.warps import normalise
-from ..performances import names_of_input, restore
+from ..performances import names_of_input
 from ..work import run
 from .dense import DenseSynchronizer
 from .lags import Lags
@@ -149,7 +149,6 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
         self.parts = parts
         self.coupling = coupling
 
-    @of_one_state
     def transform(self, X):
         """Warp every part onto the clock of the pattern, by its own warp (Eq. 18).
 
@@ -163,15 +162,15 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
             ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
             ``set_output(transform="pandas")``.
         """
-        performances = self.check_performances(X)
+        return self._warp(X)
+
+    def _warp_part(self, performances):
         body = self.match(performances)
         out = body.warp(performances)
         for name, match in self._match_parts(performances, body, "part").items():
             columns = self.parts_[name]
             out[:, :, columns] = match.warp([x[:, columns] for x in performances])
-        if performances.kind == "rows":
-            return out[:, :, 0]
-        return restore(self, performances, out, frames=range(out.shape[1]))
+        return out
 
     @of_one_state
     def match_parts(self, X):
