@@ -196,7 +196,7 @@ def taken(X, indices):
         return X[indices]
     if isinstance(X, pd.DataFrame):
         return X.iloc[indices]
-    return [X[i] for i in indices]
+    return [X[int(i)] for i in indices]
 
 
 def _holds_matrices(items):

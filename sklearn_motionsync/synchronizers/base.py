@@ -145,6 +145,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
             If the input breaks the contract, or the pattern does not exist or fit.
         """
         self._learn(self._check_training_set(X))
+        self._number_as_given()
         return self
 
     fit_transform = at_once(TransformerMixin.fit_transform)
@@ -292,6 +293,9 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
 
     # -- steps of a fit ---------------------------------------------------------------------
 
+    def _number_as_given(self):
+        """Performances were numbered as they were learnt from: now as they were given."""
+
     def _set_clock(self, performances):
         """How many frames the clock has, and the performances on it."""
         given = self._given_pattern(performances)
@@ -329,11 +333,12 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         positions = (self.n_frames_ - 1) * subframes + 1
         asked = 8 * len(performances) * positions * performances[0].shape[1]
         if asked > _MOST_BYTES:
+            fewer = " Or learn from some: max_fit=1000." if hasattr(self, "max_fit") else ""
             raise ValueError(
                 f"{len(performances)} performances at {positions} positions of the clock, for "
                 f"n_frames = {self.n_frames_} and subframes = {subframes}, ask for "
                 f"{asked / 2**30:.0f} GB several times over; {_MOST_BYTES / 2**30:.0f} GB is the "
-                "limit. Use fewer frames, subframes or performances."
+                f"limit. Use fewer frames, subframes or performances.{fewer}"
             )
 
     def _given_pattern(self, performances):
@@ -344,7 +349,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         if isinstance(pattern, bool):
             raise ValueError(f"pattern must be 'median', an index or an array, got {pattern}.")
         if isinstance(pattern, Integral):
-            if pattern >= len(performances):
+            if pattern not in performances.numbers:
                 raise ValueError(
                     f"pattern={pattern} is out of range: there are {len(performances)} "
                     f"performances, the last has index {len(performances) - 1}."
@@ -380,7 +385,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         self.global_distances_ = training.unit.back(median.distances, degree)
         self.pattern_index_ = median.index if self._wants_median else None
         if not self._wants_median and training.given is None:
-            self.pattern_index_ = int(self.pattern)
+            self.pattern_index_ = list(training.performances.numbers).index(self.pattern)
         source = training.given
         if source is None:
             source = training.performances[self.pattern_index_]

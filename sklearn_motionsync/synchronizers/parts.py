@@ -51,7 +51,7 @@ class PartSynchronizer(DenseSynchronizer):
         makes all follow the body. Useful from 0.0001 to 0.01; 0 to measure lags of parts that move
         clearly.
     n_frames, pattern, velocity_smoothing, refine, max_offset, metric, consensus, warp_smoothing, \
-cost, smoothness, max_rate, subframes, search, random_state, n_jobs, verbose
+cost, smoothness, max_rate, subframes, search, max_fit, random_state, n_jobs, verbose
         As of `DenseSynchronizer`, for the body and its parts. ``refine`` is for the body only.
 
     Attributes
@@ -59,7 +59,8 @@ cost, smoothness, max_rate, subframes, search, random_state, n_jobs, verbose
     parts_ : dict of str to ndarray of int
         Indices of the features of every part.
     pattern_, pattern_index_, n_frames_, global_distances_, certified_, n_matches_, search_, \
-metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, feature_names_in_
+sample_, typical_share_, metric_, mu_, exemplars_, misfit_, refinement_, refines_, \
+n_features_in_, feature_names_in_
         Of the whole body, as of `DenseSynchronizer`.
 
     See Also
@@ -124,6 +125,7 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
         max_rate=4,
         subframes=1,
         search="auto",
+        max_fit=None,
         random_state=0,
         n_jobs=None,
         verbose=0,
@@ -142,6 +144,7 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
             max_rate=max_rate,
             subframes=subframes,
             search=search,
+            max_fit=max_fit,
             random_state=random_state,
             n_jobs=n_jobs,
             verbose=verbose,
