@@ -12,7 +12,7 @@ __all__ = ["all_of", "parts_of_source"]
 # Bytes of a number, at most.
 _DOUBLE = 8
 # A part ends with the performance that makes it so many bytes, or so many performances.
-_BYTES, _MANY = 1 << 25, 4096
+_BYTES, MANY = 1 << 25, 4096
 
 
 def parts_of_source(estimator, X, on_rows):
@@ -37,7 +37,7 @@ def _read(estimator, source, on_rows):
     for i in range(len(source)):
         part.append(source[i])
         size += int(np.prod(np.shape(part[-1]))) * _DOUBLE
-        if size < _BYTES and len(part) < _MANY and i + 1 < len(source):
+        if size < _BYTES and len(part) < MANY and i + 1 < len(source):
             continue
         if dtype is None:
             dtype = as_numbers(part[0], "Performance 0").dtype

@@ -26,7 +26,7 @@ __all__ = ["Synchronizer", "TrainingSet"]
 # So many times the training set, what differs in it is lost beside a performance.
 _FAR = 1e30
 # What one copy of a training set on the clock may take; a fit holds several.
-_MOST_BYTES = 4 * 2**30
+MOST_BYTES = 4 * 2**30
 # Of a training set so many performances are kept.
 _MOST_KEPT = 64
 
@@ -332,12 +332,12 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         subframes = getattr(self, "subframes", 1)
         positions = (self.n_frames_ - 1) * subframes + 1
         asked = 8 * len(performances) * positions * performances[0].shape[1]
-        if asked > _MOST_BYTES:
+        if asked > MOST_BYTES:
             fewer = " Or learn from some: max_fit=1000." if hasattr(self, "max_fit") else ""
             raise ValueError(
                 f"{len(performances)} performances at {positions} positions of the clock, for "
                 f"n_frames = {self.n_frames_} and subframes = {subframes}, ask for "
-                f"{asked / 2**30:.0f} GB several times over; {_MOST_BYTES / 2**30:.0f} GB is the "
+                f"{asked / 2**30:.0f} GB several times over; {MOST_BYTES / 2**30:.0f} GB is the "
                 f"limit. Use fewer frames, subframes or performances.{fewer}"
             )
 

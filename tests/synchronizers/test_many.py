@@ -64,7 +64,7 @@ SYNCHRONIZERS = {
 @pytest.fixture
 def small_parts(monkeypatch):
     """Five performances at a time."""
-    monkeypatch.setattr(reading, "_MANY", 5)
+    monkeypatch.setattr(reading, "MANY", 5)
 
 
 def peak_of(call):
@@ -266,7 +266,7 @@ def test_who_is_not_in_the_sample_is_not_checked_and_who_is_named_by_its_index()
 def test_the_limit_names_the_way_out(monkeypatch):
     from sklearn_motionsync.synchronizers import base
 
-    monkeypatch.setattr(base, "_MOST_BYTES", 6 * X.size)
+    monkeypatch.setattr(base, "MOST_BYTES", 6 * X.size)
     with pytest.raises(ValueError, match="Or learn from some: max_fit=1000"):
         DenseSynchronizer().fit(X)
     with pytest.raises(ValueError, match=r"or performances\.$"):
@@ -281,3 +281,17 @@ def test_the_share_by_drawing(n, in_doubt):
     share = typical_share(in_doubt, n, 10**9)
     assert (drawn <= share).mean() == pytest.approx(0.95, abs=0.006)
     assert typical_share(3, 12, 12) == 0.25
+
+
+def test_the_statement_holds():
+    """Every performance is a number times one curve: the typical ones are next to the mean."""
+    curve, held, shares = np.sin(np.linspace(0, 3, 5))[:, np.newaxis], [], []
+    for seed in range(30):
+        numbers = np.random.default_rng(seed).standard_normal(2000)
+        sync = DenseSynchronizer(**PAPER, max_fit=200, random_state=seed)
+        sync.set_params(max_offset=0).fit(numbers[:, np.newaxis, np.newaxis] * curve)
+        far = np.abs(numbers - numbers.mean())
+        held.append((far < far[sync.pattern_index_]).mean() <= sync.typical_share_)
+        shares.append(sync.typical_share_)
+    assert np.mean(held) >= 0.95
+    assert np.median(shares) < 0.7
