@@ -45,17 +45,29 @@ class Compared:
             return self._kept
 
     def of(self, indices):
-        """Of some."""
-        return self._features(self._positions[indices])
+        """Of some, (n_indices, Q, n_compared)."""
+        portions = [indices[rows] for rows in self._slices(len(indices))]
+        first = self._features(self._positions[portions[0]])
+        if len(portions) == 1:
+            return first
+        out, stop = np.empty((len(indices), *first.shape[1:]), first.dtype), len(first)
+        out[:stop] = first
+        for some in portions[1:]:
+            start, stop = stop, stop + len(some)
+            out[start:stop] = self._features(self._positions[some])
+        return out
 
     def portions(self):
         """Yield those of all, a portion at a time."""
         if self.is_kept:
             yield self.kept
             return
-        size = max(1, KEPT_BYTES // (16 * self._positions[0].nbytes))
-        for rows in even_slices(len(self), size):
+        for rows in self._slices(len(self)):
             yield self._features(self._positions[rows])
+
+    def _slices(self, n):
+        """Of so many performances, slices whose features take half a dozen copies in the making."""
+        return even_slices(n, max(1, KEPT_BYTES // (16 * self._positions[0].nbytes)))
 
     def energy(self):
         """The sum of the squares of all."""
