@@ -18,7 +18,7 @@ __all__ = ["Unit", "exponent_of", "squared_distances"]
 _STILL = 2.0**-44
 _COPY = 2.0**-30
 # Numbers that are looked at together: what stands in between is no copy of a large set.
-_AT_ONCE = 1 << 20
+AT_ONCE = 1 << 20
 
 
 class Unit(NamedTuple):
@@ -106,7 +106,7 @@ class Unit(NamedTuple):
 
 def _portions(on_clock):
     """Slices of sequences that are looked at together."""
-    return even_slices(len(on_clock), max(1, _AT_ONCE // max(1, on_clock[0].size)))
+    return even_slices(len(on_clock), max(1, AT_ONCE // max(1, on_clock[0].size)))
 
 
 def _centre(on_clock, size):

@@ -17,7 +17,7 @@ _STILL = 1e-24
 # Correlations of principal components are not larger by rounding.
 _UNCORRELATED = 1e-5
 # Performances that are looked at together.
-_AT_ONCE = 256
+AT_ONCE = 256
 
 
 def warn_of_one_feature(synchronizer, performances, compared):
@@ -75,7 +75,7 @@ def _are_principal_components(performances):
     # About a posture that is near, so that no digits are lost.
     origin = performances[0].mean(axis=0, dtype=np.float64) / largest
     total, products, count = 0, 0, 0
-    for rows in even_slices(len(performances), _AT_ONCE):
+    for rows in even_slices(len(performances), AT_ONCE):
         frames = np.concatenate(list(performances[rows])).astype(np.float64) / largest
         frames -= origin
         total, products = total + frames.sum(axis=0), products + frames.T @ frames

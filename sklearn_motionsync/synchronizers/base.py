@@ -156,6 +156,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Memory maps, and what gives performances by index, are read in parts, once each.
 
         Returns
         -------
