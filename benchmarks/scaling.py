@@ -3,8 +3,8 @@
 Random bends of 100 frames as points of their aSpace, 16 features, single precision, which are made
 once, in five minutes. Every line is of a process of its own. Memory is its peak above what it had
 when it began, data in memory included; pages of a memory map that were looked at count, though the
-system can take them back. Processor time of one thread. ``memory`` takes ten minutes, ``sample`` one,
-``many`` ten.
+system can take them back. Processor time of one thread. ``memory`` takes ten minutes, ``sample``
+one, ``many`` ten.
 
     OMP_NUM_THREADS=1 python benchmarks/scaling.py [memory] [sample] [many]
 """
