@@ -10,7 +10,7 @@ from sklearn.utils._set_output import _get_output_config
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from .gate import check_finite, check_names, names_of, refuse
-from .sequences import ACCEPTED, NOT_ONE, as_collection, check_members
+from .sequences import ACCEPTED, NOT_ONE, as_collection, as_source, check_members
 from .tables import (
     INDEX_NAMES,
     as_pandas,
@@ -58,12 +58,15 @@ class Performances(tuple):
         ``feature_names_in_`` of the estimator that checked them.
     levels : tuple of str
         Names of the levels of an index; the last is that of the frames.
+    numbers : sequence of int
+        What number each has in all that was given.
     """
 
-    def __new__(cls, arrays, kind, labels, frames, names=None, levels=INDEX_NAMES):
+    def __new__(cls, arrays, kind, labels, frames, names=None, levels=INDEX_NAMES, numbers=None):
         self = super().__new__(cls, arrays)
         self.kind, self.labels, self.frames, self.names = kind, labels, frames, names
         self.levels = levels
+        self.numbers = range(len(self)) if numbers is None else numbers
         return self
 
     def __getitem__(self, index):
@@ -73,15 +76,16 @@ class Performances(tuple):
 
     def called(self, i):
         """What to call one of them in messages."""
-        return name_performance(i, self.labels[i])
+        return name_performance(self.numbers[i], self.labels[i])
 
     def take(self, indices):
         """Some of them: rows, or a list."""
         kind = "rows" if self.kind == "rows" else "list"
         frames = [self.frames[i] for i in indices] if self.frames else []
         labels = [self.labels[i] for i in indices]
+        numbers = [self.numbers[i] for i in indices]
         some = [self[i] for i in indices]
-        return Performances(some, kind, labels, frames, self.names, self.levels)
+        return Performances(some, kind, labels, frames, self.names, self.levels, numbers)
 
     def suits(self, n_features=None, on_rows=None, names=None):
         """Whether an estimator that was fitted on such input would take them."""
@@ -121,16 +125,18 @@ class SequenceLevelMixin:
             self, X, reset=False, level="sequence", on_rows=self._fitted_on_rows
         )
 
-    def _check_training_set(self, X):
-        """The same in ``fit``, where it is learnt what to expect."""
-        performances = check_performances(self, X, reset=True, level="sequence")
+    def _check_training_set(self, X, numbers=None):
+        """The same in ``fit``, where it is learnt what to expect; of some, with their numbers."""
+        performances = check_performances(self, X, reset=True, level="sequence", numbers=numbers)
         self._fitted_on_rows = performances.kind == "rows"
         if not self._fitted_on_rows:
             _warn_of_clocks(performances, names_of_input(self))
         return performances
 
 
-def check_performances(estimator, X, *, reset, level, on_rows=None, finite=True):
+def check_performances(
+    estimator, X, *, reset, level, on_rows=None, finite=True, numbers=None, dtype=None
+):
     """Check the input of an estimator against the contract.
 
     Parameters
@@ -146,6 +152,8 @@ def check_performances(estimator, X, *, reset, level, on_rows=None, finite=True)
         Whether the estimator was fitted on 2-D input and takes nothing else; None: it takes both.
     finite : {True, "allow-nan"}, default=True
         Whether NaN is refused, too.
+    numbers, dtype : default=None
+        Of some of those that were given, as for `check_members`.
 
     Returns
     -------
@@ -154,7 +162,7 @@ def check_performances(estimator, X, *, reset, level, on_rows=None, finite=True)
     sequences = as_collection(X)
     if sequences is None:
         how = {"reset": reset, "level": level, "on_rows": on_rows, "finite": finite}
-        return _check_rows(estimator, X, **how)
+        return _check_rows(estimator, X, numbers=numbers, **how)
     name = type(estimator).__name__
     if on_rows:
         raise ValueError(
@@ -162,10 +170,11 @@ def check_performances(estimator, X, *, reset, level, on_rows=None, finite=True)
             f"{estimator.n_features_in_}) and got a collection of performances. Give it 2-D "
             "input, or fit it on a collection."
         )
-    arrays, names = check_members(sequences, finite=finite)
+    arrays, names = check_members(sequences, finite=finite, numbers=numbers, dtype=dtype)
     if not reset and arrays[0].shape[1] != estimator.n_features_in_:
+        first = 0 if numbers is None else numbers[0]
         raise ValueError(
-            f"Performance 0 has {arrays[0].shape[1]} features a frame, but {name} is "
+            f"Performance {first} has {arrays[0].shape[1]} features a frame, but {name} is "
             f"expecting {estimator.n_features_in_} features as input."
         )
     _check_names(estimator, sequences[0], reset)
@@ -175,8 +184,8 @@ def check_performances(estimator, X, *, reset, level, on_rows=None, finite=True)
     is_array = getattr(X, "ndim", 1) == 3
     kind = "frame" if isinstance(X, pd.DataFrame) else "array" if is_array else "list"
     names = getattr(estimator, "feature_names_in_", None)
-    labels, levels = labels_of(sequences)
-    return Performances(arrays, kind, labels, frame_labels(sequences), names, levels)
+    labels, levels = labels_of(sequences, numbers)
+    return Performances(arrays, kind, labels, frame_labels(sequences), names, levels, numbers)
 
 
 def names_of_input(estimator):
@@ -238,7 +247,8 @@ def labels_as_given(X, reached):
     reached : Performances
         What reaches a later step, maybe without labels.
     """
-    sequences = None if isinstance(X, Performances) else as_collection(X)
+    known = isinstance(X, Performances) or as_source(X) is not None
+    sequences = None if known else as_collection(X)
     if sequences is not None:
         labels, levels = labels_of(sequences)
         if labels != list(range(len(labels))) and len(labels) == len(reached):
@@ -259,7 +269,7 @@ def read_collection(X):
     return check_members(sequences, finite=False)
 
 
-def _check_rows(estimator, X, *, reset, level, on_rows, finite):
+def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
     """A 2-D input: rows are postures, or univariate sequences."""
     if on_rows is False:
         raise ValueError(
@@ -283,7 +293,8 @@ def _check_rows(estimator, X, *, reset, level, on_rows, finite):
     )
     _check_names(estimator, source, reset)
     names = getattr(estimator, "feature_names_in_", None)
-    check_finite(X, "Row", names, index, allow_nan=finite == "allow-nan")
+    called = index if index is not None else numbers
+    check_finite(X, "Row", names, called, allow_nan=finite == "allow-nan")
     if level == "posture":
         levels = INDEX_NAMES[0], getattr(index, "name", None) or INDEX_NAMES[1]
         return Performances([X], "rows", [0], [range(len(X))], levels=levels)
@@ -293,7 +304,8 @@ def _check_rows(estimator, X, *, reset, level, on_rows, finite):
             f"n_features = {X.shape[1]}. For performances of several features use a list."
         )
     rows = [row[:, np.newaxis] for row in X]
-    return Performances(rows, "rows", list(range(len(X))), [], names)
+    labels = list(range(len(X)) if numbers is None else numbers)
+    return Performances(rows, "rows", labels, [], names, numbers=numbers)
 
 
 def _refuse_long_table(name, df):

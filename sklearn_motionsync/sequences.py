@@ -5,7 +5,16 @@ A set of performances is a plain list of 2-D arrays ``(n_frames_i, n_features)``
 indexed by performance, in one level or more, and frame are the same thing. A 2-D array is
 read by rows: postures for the posture-level estimators, univariate sequences for the
 sequence-level ones.
+
+Any other sequence that gives performances by index, ``len(X)`` and ``X[i]``, such as one that opens
+a file for each, or a 3-D data set on disk, is a list of them, too: each is read once, one after the
+other. Synchronizers read it, and memory maps, in parts when they transform and match, and only what
+they need for a fit to a sample (``max_fit``); everybody else takes it into memory. The first
+performance that is read in parts tells the precision of all: beside single precision, double
+precision is refused.
 """
+
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -24,7 +33,16 @@ from .tables import (
     stack_frame,
 )
 
-__all__ = ["ACCEPTED", "NOT_ONE", "as_collection", "check_members", "to_frame"]
+__all__ = [
+    "ACCEPTED",
+    "NOT_ONE",
+    "as_collection",
+    "as_source",
+    "check_members",
+    "count_of",
+    "taken",
+    "to_frame",
+]
 
 ACCEPTED = (
     "A set of performances is a list of 2-D arrays (n_frames, n_features), a 3-D array "
@@ -127,7 +145,58 @@ def as_collection(X):
     if isinstance(X, (list, tuple)):
         items = [as_pandas(x) for x in X]
         return items if len(items) == 0 or _holds_matrices(items) else None
-    return None
+    source = as_source(X)
+    return None if source is None else [source[i] for i in range(len(source))]
+
+
+def as_source(X):
+    """What is better read in parts: given by index, or memory maps; None for all else.
+
+    It is looked at for no longer than it takes to tell.
+    """
+    if isinstance(X, np.ndarray):
+        return X if isinstance(X, np.memmap) and X.ndim == 3 else None
+    if isinstance(X, (list, tuple)):
+        return X if len(X) and all(isinstance(x, np.memmap) and x.ndim == 2 for x in X) else None
+    other = isinstance(X, (Mapping, set, frozenset, str, bytes, pd.DataFrame)) or issparse(X)
+    # A matrix, or a column of objects, is what it says it is.
+    other = other or (hasattr(X, "__array__") and getattr(X, "ndim", 0) != 3)
+    if other or not (hasattr(X, "__len__") and hasattr(X, "__getitem__")):
+        return None
+    if isinstance(as_pandas(X), pd.DataFrame):
+        return None
+    first = as_pandas(X[0]) if len(X) else None
+    return _Source(X, first) if first is None or _depth(first) >= 2 else None
+
+
+class _Source:
+    """A sequence that gives performances by index, of which the first has been read."""
+
+    def __init__(self, given, first):
+        self._given, self._first = given, first
+
+    def __len__(self):
+        return len(self._given)
+
+    def __getitem__(self, i):
+        if i == 0 and self._first is not None:
+            first, self._first = self._first, None
+            return first
+        return as_pandas(self._given[i])
+
+
+def count_of(X):
+    """How many performances there are, or rows."""
+    return X.shape[0] if hasattr(X, "shape") else len(X)
+
+
+def taken(X, indices):
+    """Some performances, or rows, by their indices; nothing else is read."""
+    if isinstance(X, np.ndarray):
+        return X[indices]
+    if isinstance(X, pd.DataFrame):
+        return X.iloc[indices]
+    return [X[int(i)] for i in indices]
 
 
 def _holds_matrices(items):
@@ -155,31 +224,48 @@ def _depth(item):
 # -- checks -------------------------------------------------------------------------
 
 
-def check_members(sequences, *, finite=True):
+def check_members(sequences, *, finite=True, numbers=None, dtype=None):
     """Arrays of one dtype, and the column names they share (None without names).
 
-    ``finite`` is True, False, or "allow-nan" as in scikit-learn.
+    Parameters
+    ----------
+    sequences : list
+    finite : {True, False, "allow-nan"}, default=True
+        As in scikit-learn.
+    numbers : sequence of int, default=None
+        What number each has in all that was given; by default 0, 1, ...
+    dtype : dtype, default=None
+        Of those before: by default single precision if all of these are.
     """
     if len(sequences) == 0:
         raise ValueError(f"Found 0 performances (n_samples=0), at least 1 is needed. {ACCEPTED}.")
-    called = [name_performance(i, label) for i, label in enumerate(labels_of(sequences)[0])]
+    labels, _ = labels_of(sequences, numbers)
+    numbers = range(len(sequences)) if numbers is None else numbers
+    called = [name_performance(i, label) for i, label in zip(numbers, labels, strict=True)]
     arrays = [_as_matrix(what, x) for what, x in zip(called, sequences, strict=True)]
     names, width = names_of(sequences[0]), arrays[0].shape[1]
     for what, x, array in zip(called, sequences, arrays, strict=True):
         if array.shape[1] != width:
             raise ValueError(
-                f"{what} has {array.shape[1]} features a frame, performance 0 has "
+                f"{what} has {array.shape[1]} features a frame, performance {numbers[0]} has "
                 f"{width}. All performances need the same features in the same order."
             )
         if names_of(x) != names:
             raise ValueError(
-                f"{what} has the columns {names_of(x)}, performance 0 has {names}. "
+                f"{what} has the columns {names_of(x)}, performance {numbers[0]} has {names}. "
                 "All performances need the same columns in the same order."
+            )
+        if dtype == np.float32 and array.dtype != dtype:
+            raise ValueError(
+                f"{what} is {array.dtype}, and those before are float32: what is read in parts "
+                "has the precision of the first. Give all as x.astype(np.float32)."
             )
         if finite:
             frames = x.index if isinstance(x, pd.DataFrame) else None
             check_finite(array, f"{what}, frame", names, frames, allow_nan=finite == "allow-nan")
-    dtype = np.float32 if all(a.dtype == np.float32 for a in arrays) else np.float64
+    if dtype is None:
+        single = all(a.dtype == np.float32 for a in arrays)
+        dtype = np.float32 if single else np.float64
     # Row by row in memory, so that no result depends on the layout of the input.
     return [np.ascontiguousarray(a, dtype=dtype) for a in arrays], names
 

@@ -139,10 +139,11 @@ def name_performance(i, label):
     return f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
 
 
-def labels_of(sequences):
+def labels_of(sequences, numbers=None):
     """Labels of performances, and the names of the levels of an index of them.
 
-    Those that a list carries, if it does so throughout and they differ; otherwise 0, 1, ...
+    Those that a list carries, if it does so throughout and they differ; otherwise their numbers,
+    0, 1, ... by default.
     """
     frame = frame_name(sequences) or INDEX_NAMES[1]
     found = [own_label(x) for x in sequences]
@@ -150,7 +151,7 @@ def labels_of(sequences):
     names = {levels for _, levels in found}
     if len(names) == 1 and None not in names and len(set(labels)) == len(labels):
         return labels, (*names.pop(), frame)
-    return list(range(len(sequences))), (INDEX_NAMES[0], frame)
+    return list(range(len(sequences)) if numbers is None else numbers), (INDEX_NAMES[0], frame)
 
 
 def own_label(x):

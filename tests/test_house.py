@@ -27,6 +27,7 @@ FLOORS = [
     "long_tables",
     "sequences",
     "performances",
+    "reading",
     "pipelines",
     "features",
     "aspace",

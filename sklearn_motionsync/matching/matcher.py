@@ -142,10 +142,16 @@ class Matcher(NamedTuple):
     @classmethod
     def of(cls, features, compared, *, smoothness, max_offset, max_rate):
         """The matcher of a training set, of which this is compared."""
-        subframes = features.subframes
-        n_frames = (compared.shape[1] - 1) // subframes + 1
         energy = np.einsum("npk,npk->", compared, compared, dtype=np.float64)
-        mu = float(smoothness * energy / np.prod(compared.shape[:2]))
+        settings = {"smoothness": smoothness, "max_offset": max_offset, "max_rate": max_rate}
+        return cls.of_energy(features, compared.shape[:2], energy, **settings)
+
+    @classmethod
+    def of_energy(cls, features, shape, energy, *, smoothness, max_offset, max_rate):
+        """The matcher of so many performances at so many positions, by the squares of features."""
+        subframes = features.subframes
+        n_frames = (shape[1] - 1) // subframes + 1
+        mu = float(smoothness * energy / np.prod(shape))
         reach = {"max_offset": max_offset, "max_rate": max_rate, "subframes": subframes}
         return cls(features, Trellis.on_clock(features.cost, n_frames, mu, **reach))
 

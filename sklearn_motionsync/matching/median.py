@@ -14,6 +14,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from .paired import PairedTests
+from .warps import even_slices
 
 __all__ = [
     "Median",
@@ -25,6 +26,8 @@ __all__ = [
     "sum_all",
 ]
 
+# Sequences that are looked at together.
+_AT_ONCE = 256
 # References of the first round: enough for a paired t test of anybody against the leader, and to
 # know where everybody stands.
 _REFERENCES = 32
@@ -83,17 +86,20 @@ def median_of(sequences):
 
     ``sum_m |x_n - x_m|^2`` is ``N |x_n - mean|^2`` and a constant, so no pair is compared.
     """
-    deviations = (sequences - sequences.mean(axis=0)).reshape(len(sequences), -1)
-    squares = np.einsum("ij,ij->i", deviations, deviations, dtype=np.float64)
+    typical, centre = sequences.mean(axis=0), sequences.mean(axis=(0, 1))
+    squares, energy = np.empty(len(sequences)), 0.0
+    for rows in even_slices(len(sequences), _AT_ONCE):
+        deviations = (sequences[rows] - typical).reshape(rows.stop - rows.start, -1)
+        squares[rows] = np.einsum("ij,ij->i", deviations, deviations, dtype=np.float64)
+        energy += np.square(sequences[rows] - centre).sum(dtype=np.float64)
     sums = len(sequences) * squares + squares.sum()
-    rounding = rounding_of(sequences - sequences.mean(axis=(0, 1)))
-    return Median(first_smallest(sums, rounding), sums, sums, True, 0, 0, 0.0)
+    index = first_smallest(sums, rounding_of(sequences.dtype, energy))
+    return Median(index, sums, sums, True, 0, 0, 0.0)
 
 
-def rounding_of(deviations):
-    """How far rounding can move a global distance of such sequences, given without their mean."""
-    energy = np.einsum("npk,npk->", deviations, deviations, dtype=np.float64)
-    return 8 * np.finfo(deviations.dtype).eps * energy
+def rounding_of(dtype, energy):
+    """How far rounding can move a global distance of sequences, given the sum of their squares."""
+    return 8 * np.finfo(dtype).eps * energy
 
 
 def sum_all(compare, n, rounding, population=None):

@@ -7,7 +7,7 @@ import numpy as np
 from .matcher import Matcher
 from .rows import Coupling
 from .warper import Warper
-from .warps import follow
+from .warps import follow, normalise
 
 __all__ = ["PartWarper"]
 
@@ -75,6 +75,11 @@ class PartWarper(Warper):
             weight=weight,
             back=np.stack([np.interp(frames, t, frames) for t in times]),
         )
+
+    def positions(self, arrays):
+        """Whole performances at all positions, in double precision, not in the unit."""
+        arrays = [x.astype(np.float64, copy=False) for x in arrays]
+        return normalise(arrays, len(self.pattern), self.matcher.features.subframes)
 
     def warps(self, positions, rows, body):
         """Distances of the direct paths to the pattern, and times ``tau``, of some performances.

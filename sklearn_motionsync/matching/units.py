@@ -9,12 +9,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
+from .warps import even_slices
+
 __all__ = ["Unit", "exponent_of", "squared_distances"]
 
 # A feature whose values differ by less than this share of their size does not move, and features
 # that differ by less than this share of their energy are copies: the rest is rounding.
 _STILL = 2.0**-44
 _COPY = 2.0**-30
+# Numbers that are looked at together: what stands in between is no copy of a large set.
+AT_ONCE = 1 << 20
 
 
 class Unit(NamedTuple):
@@ -40,16 +44,17 @@ class Unit(NamedTuple):
     @classmethod
     def of(cls, on_clock):
         """The unit of a training set on the clock: (n_sequences, P, n_features)."""
-        size = exponent_of(on_clock)
-        sized = np.ldexp(on_clock, -size)
-        centre = sized.mean(axis=(0, 1))
-        spread = np.abs(sized - centre).max(axis=(0, 1))
+        low, high = on_clock.min(axis=(0, 1)), on_clock.max(axis=(0, 1))
+        size = exponent_of(np.stack([low, high]))
+        low, high = np.ldexp(low, -size), np.ldexp(high, -size)
+        centre = _centre(on_clock, size)
+        spread = np.maximum(high - centre, centre - low)
         rounding = max(_STILL, 64 * float(np.finfo(on_clock.dtype).eps))
-        rounding = rounding * np.abs(sized).max(axis=(0, 1))
+        rounding = rounding * np.maximum(high, -low)
         moves = spread > rounding
         exponent = size + exponent_of(spread[moves])
         exponent += exponent % 2
-        copies = _copies((sized - centre).reshape(-1, len(centre)))
+        copies = _copies(lambda: _centred(on_clock, size, centre))
         centre, rounding = (np.ldexp(x, size - exponent) for x in (centre, rounding))
         return cls(centre, exponent, np.where(moves, 0, rounding), copies)
 
@@ -67,6 +72,12 @@ class Unit(NamedTuple):
             kept += (out[..., others] - kept[..., np.newaxis]).sum(axis=-1) / (1 + len(others))
             out[..., others] = 0
         return out
+
+    def fill(self, on_clock):
+        """Take sequences (n_sequences, P, n_features) over into this unit, where they are."""
+        for rows in _portions(on_clock):
+            on_clock[rows] = self(on_clock[rows])
+        return on_clock
 
     def part(self, columns):
         """That of some features alone, by their indices."""
@@ -93,9 +104,35 @@ class Unit(NamedTuple):
             return np.ldexp(np.asarray(values, dtype=np.float64), degree * self.exponent)
 
 
-def _copies(frames):
-    """The columns of centred frames that are there more than once, copies together."""
-    energy = np.square(frames).sum(axis=0, dtype=np.float64)
+def _portions(on_clock):
+    """Slices of sequences that are looked at together."""
+    return even_slices(len(on_clock), max(1, AT_ONCE // max(1, on_clock[0].size)))
+
+
+def _centre(on_clock, size):
+    """The mean posture, in ``2 ** size``."""
+    portions = _portions(on_clock)
+    means = [np.ldexp(on_clock[rows], -size).mean(axis=(0, 1)) for rows in portions]
+    if len(means) == 1:
+        return means[0]
+    weights = [rows.stop - rows.start for rows in portions]
+    return np.average(means, axis=0, weights=weights).astype(on_clock.dtype)
+
+
+def _centred(on_clock, size, centre):
+    """Yield portions of the frames, in ``2 ** size`` and about the centre: (n, n_features)."""
+    for rows in _portions(on_clock):
+        frames = np.ldexp(on_clock[rows], -size)
+        frames -= centre
+        yield frames.reshape(-1, len(centre))
+
+
+def _copies(portions):
+    """The columns of centred frames that are there more than once, copies together.
+
+    ``portions()`` yields the frames.
+    """
+    energy = sum(np.square(frames).sum(axis=0, dtype=np.float64) for frames in portions())
     order = np.argsort(energy, kind="stable")
     alike = np.diff(energy[order]) <= _COPY * energy[order[1:]]
     found = []
@@ -104,8 +141,9 @@ def _copies(frames):
         if len(run) == 1 or energy[run[0]] == 0:
             continue
         run = np.sort(run)
-        columns = frames[:, run].astype(np.float64)
-        distances = energy[run][:, np.newaxis] + energy[run] - 2 * columns.T @ columns
+        columns = (frames[:, run].astype(np.float64) for frames in portions())
+        products = sum(x.T @ x for x in columns)
+        distances = energy[run][:, np.newaxis] + energy[run] - 2 * products
         count, group_of = connected_components(distances <= _COPY * energy[run[0]], directed=False)
         groups = [run[group_of == k] for k in range(count)]
         found.extend(group for group in groups if len(group) > 1)

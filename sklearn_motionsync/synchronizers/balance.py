@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 
+from ..matching.warps import even_slices
 from ..performances import names_of_input
 
 __all__ = ["warn_of_one_feature"]
@@ -15,6 +16,8 @@ _DROWNS = 0.95
 _STILL = 1e-24
 # Correlations of principal components are not larger by rounding.
 _UNCORRELATED = 1e-5
+# Performances that are looked at together.
+AT_ONCE = 256
 
 
 def warn_of_one_feature(synchronizer, performances, compared):
@@ -25,7 +28,7 @@ def warn_of_one_feature(synchronizer, performances, compared):
     synchronizer : DenseSynchronizer
         Its metric is learnt.
     performances : sequence of ndarray (n_frames_i, n_features)
-    compared : ndarray, shape (n_sequences, Q, n_features)
+    compared : Compared
         What is compared of them without a metric; not looked at with one.
     """
     metric, names = synchronizer.metric_, names_of_input(synchronizer)
@@ -48,11 +51,19 @@ def warn_of_one_feature(synchronizer, performances, compared):
 
 def _shares(compared, cost):
     """The share of every feature in what is compared without a metric."""
+    sums = [_sums(x) for x in compared.portions()]
     if cost == "posture":
         # Where all of them are makes no difference.
-        compared = compared - compared.mean(axis=(0, 1))
-    energy = np.einsum("npk,npk->k", compared, compared, dtype=np.float64)
+        centre = sum(total for total, _, _ in sums) / sum(count for _, _, count in sums)
+        sums = [_sums(x - centre.astype(x.dtype)) for x in compared.portions()]
+    energy = sum(squares for _, squares, _ in sums)
     return energy / (energy.sum() or 1.0)
+
+
+def _sums(features):
+    """Of every feature its sum and that of its squares, and how many frames there are."""
+    squares = np.einsum("npk,npk->k", features, features, dtype=np.float64)
+    return features.sum(axis=(0, 1), dtype=np.float64), squares, features[:, :, 0].size
 
 
 def _are_principal_components(performances):
@@ -60,10 +71,16 @@ def _are_principal_components(performances):
 
     They have one unit, and the first has most of the variance by construction.
     """
-    frames = np.concatenate(performances).astype(np.float64)
-    frames /= np.abs(frames).max() or 1.0
-    frames -= frames.mean(axis=0)
-    covariance = frames.T @ frames
+    largest = max(float(np.abs(x).max()) for x in performances) or 1.0
+    # About a posture that is near, so that no digits are lost.
+    origin = performances[0].mean(axis=0, dtype=np.float64) / largest
+    total, products, count = 0, 0, 0
+    for rows in even_slices(len(performances), AT_ONCE):
+        frames = np.concatenate(list(performances[rows])).astype(np.float64) / largest
+        frames -= origin
+        total, products = total + frames.sum(axis=0), products + frames.T @ frames
+        count += len(frames)
+    covariance = products - np.outer(total, total) / count
     variance = np.diag(covariance)
     bound = _UNCORRELATED * np.sqrt(np.outer(variance, variance))
     others = np.abs(covariance - np.diag(variance))

@@ -18,14 +18,15 @@ from ..matching.units import Unit
 from ..matching.warps import normalise
 from ..notebook import DocumentedMixin
 from ..performances import Performances, SequenceLevelMixin, names_of_input, restore
-from .match import check_answer
+from ..reading import all_of, parts_of_source
+from .match import Match, check_answer
 
 __all__ = ["Synchronizer", "TrainingSet"]
 
 # So many times the training set, what differs in it is lost beside a performance.
 _FAR = 1e30
 # What one copy of a training set on the clock may take; a fit holds several.
-_MOST_BYTES = 4 * 2**30
+MOST_BYTES = 4 * 2**30
 # Of a training set so many performances are kept.
 _MOST_KEPT = 64
 
@@ -36,18 +37,15 @@ class TrainingSet(NamedTuple):
     Attributes
     ----------
     performances : Performances
-    on_clock : ndarray, shape (n_sequences, P, n_features)
-        Linearly normalised (Eq. 7).
     unit : Unit
         In which they are about 1.
     scaled : ndarray, shape (n_sequences, P, n_features)
-        Those on the clock, in this unit.
+        Linearly normalised (Eq. 7), in this unit: the only copy of all of them.
     given : ndarray, shape (n_frames, n_features), or None
         The pattern, if it was given as an array.
     """
 
     performances: Performances
-    on_clock: np.ndarray
     unit: Unit
     scaled: np.ndarray
     given: np.ndarray | None
@@ -147,6 +145,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
             If the input breaks the contract, or the pattern does not exist or fit.
         """
         self._learn(self._check_training_set(X))
+        self._number_as_given()
         return self
 
     fit_transform = at_once(TransformerMixin.fit_transform)
@@ -157,6 +156,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Memory maps, and what gives performances by index, are read in parts, once each.
 
         Returns
         -------
@@ -199,9 +199,9 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         ndarray, shape (n_sequences, P, n_features)
             One feature for the rows of a 2-D array.
         """
-        on_clock = normalise(self.check_performances(X), self.n_frames_)
-        self._check_unit(on_clock, self._unit.exponent)
-        return on_clock
+        performances = self.check_performances(X)
+        self._check_unit(performances)
+        return normalise(performances, self.n_frames_)
 
     def get_feature_names_out(self, input_features=None):
         """Names of the outputs: the features of a frame; for 2-D input, one name a frame.
@@ -251,15 +251,51 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
 
     @of_one_state
     def _warp(self, X, **params):
-        performances = self.check_performances(X)
-        match = self.match(performances, **params)
-        check_answer(match, len(performances), self.n_frames_, type(self).__name__)
-        out = match.warp(performances)
+        # What comes along with the performances comes for all of them at once.
+        read = None if params else self._read_in_parts(X)
+        if read is None:
+            performances = self.check_performances(X)
+            out = self._warp_part(performances, **params)
+        else:
+            performances, out = self._warp_parts(*read)
         if performances.kind == "rows":
             return out[:, :, 0]
         return restore(self, performances, out, frames=range(out.shape[1]))
 
+    def _warp_part(self, performances, **params):
+        match = self.match(performances, **params)
+        check_answer(match, len(performances), self.n_frames_, type(self).__name__)
+        return match.warp(performances)
+
+    def _warp_parts(self, n_sequences, parts):
+        """What is known of performances that are read in parts, and these warped."""
+        out, labels, levels = None, [], set()
+        for part in parts:
+            warped, start = self._warp_part(part), len(labels)
+            if out is None:
+                out = np.empty((n_sequences, *warped.shape[1:]), warped.dtype)
+            labels += part.labels
+            levels.add(part.levels)
+            out[start : len(labels)] = warped
+        return all_of(labels, levels, part.names), out
+
+    def _read_in_parts(self, X):
+        check_is_fitted(self)
+        return parts_of_source(self, X, self._fitted_on_rows)
+
+    def _match_in_parts(self, X):
+        """The match of performances by ``_match``, which is given those that are read in parts."""
+        read = self._read_in_parts(X)
+        if read is None:
+            return self._match(self.check_performances(X))
+        matches = [self._match(part) for part in read[1]]
+        times = np.concatenate([match.times for match in matches])
+        return Match(times, np.concatenate([match.distances for match in matches]))
+
     # -- steps of a fit ---------------------------------------------------------------------
+
+    def _number_as_given(self):
+        """Performances were numbered as they were learnt from: now as they were given."""
 
     def _set_clock(self, performances):
         """How many frames the clock has, and the performances on it."""
@@ -278,17 +314,17 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         features = Features("velocity", 1, SMOOTHING, unit)
         known = {"durations": durations, "kept": kept, "on_clock": on_clock[kept]}
         self.training_ = Bunch(**known, features=features)
-        return TrainingSet(performances, on_clock, unit, unit(on_clock), given)
+        return TrainingSet(performances, unit, unit.fill(on_clock), given)
 
-    def _check_unit(self, sequences, exponent=0, what=None):
-        """Refuse sequences, given in ``2 ** -exponent`` units, far beyond the training set."""
-        sizes = np.maximum(sequences.max(axis=(1, 2)), -sequences.min(axis=(1, 2)))
+    def _check_unit(self, performances, what=None):
+        """Refuse what is far beyond the training set."""
+        sizes = np.array([max(x.max(), -x.min()) for x in performances], dtype=np.float64)
         with np.errstate(over="ignore"):
-            sizes = np.ldexp(sizes.astype(np.float64), -exponent)
+            sizes = np.ldexp(sizes, -self._unit.exponent)
         if not (sizes < _FAR).all():
             i = int(np.argmin(sizes < _FAR))
             raise ValueError(
-                f"{what or f'Performance {i}'} is more than {_FAR:.0e} times as large as the "
+                f"{what or performances.called(i)} is more than {_FAR:.0e} times as large as the "
                 "training set: give it in the same unit."
             )
 
@@ -297,12 +333,13 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         subframes = getattr(self, "subframes", 1)
         positions = (self.n_frames_ - 1) * subframes + 1
         asked = 8 * len(performances) * positions * performances[0].shape[1]
-        if asked > _MOST_BYTES:
+        if asked > MOST_BYTES:
+            fewer = " Or learn from some: max_fit=1000." if hasattr(self, "max_fit") else ""
             raise ValueError(
                 f"{len(performances)} performances at {positions} positions of the clock, for "
                 f"n_frames = {self.n_frames_} and subframes = {subframes}, ask for "
-                f"{asked / 2**30:.0f} GB several times over; {_MOST_BYTES / 2**30:.0f} GB is the "
-                "limit. Use fewer frames, subframes or performances."
+                f"{asked / 2**30:.0f} GB several times over; {MOST_BYTES / 2**30:.0f} GB is the "
+                f"limit. Use fewer frames, subframes or performances.{fewer}"
             )
 
     def _given_pattern(self, performances):
@@ -313,7 +350,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         if isinstance(pattern, bool):
             raise ValueError(f"pattern must be 'median', an index or an array, got {pattern}.")
         if isinstance(pattern, Integral):
-            if pattern >= len(performances):
+            if pattern not in performances.numbers:
                 raise ValueError(
                     f"pattern={pattern} is out of range: there are {len(performances)} "
                     f"performances, the last has index {len(performances) - 1}."
@@ -349,10 +386,10 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         self.global_distances_ = training.unit.back(median.distances, degree)
         self.pattern_index_ = median.index if self._wants_median else None
         if not self._wants_median and training.given is None:
-            self.pattern_index_ = int(self.pattern)
+            self.pattern_index_ = list(training.performances.numbers).index(self.pattern)
         source = training.given
         if source is None:
             source = training.performances[self.pattern_index_]
         self.pattern_ = normalise([source], self.n_frames_)[0]
-        self._check_unit(self.pattern_[np.newaxis], self._unit.exponent, "The pattern")
+        self._check_unit([self.pattern_], "The pattern")
         return source

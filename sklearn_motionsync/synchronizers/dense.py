@@ -1,38 +1,21 @@
 """DenseSynchronizer: dense matching to the median performance (Eqs. 7-19)."""
 
-from functools import partial
 from numbers import Integral, Real
 
-import numpy as np
-from sklearn.utils import Bunch, check_random_state
+from sklearn.utils import Bunch
 from sklearn.utils._param_validation import Interval, StrOptions
 
 from ..fitting import of_one_state
-from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
-from ..matching.holdout import RefinementTrial, Verdict, deal_features
-from ..matching.matcher import Matcher
-from ..matching.median import Median, estimate_distances, rounding_of, search_median, sum_all
-from ..matching.refinement import choose_smoothing
-from ..matching.warper import RefinedWarper, Warper
-from ..matching.warps import normalise
-from ..work import LongWorkMixin, run
-from .balance import warn_of_one_feature
 from .base import Synchronizer
 from .match import Match
-from .portions import compare_in_portions, in_portions, shared_training_set
-from .settings import Settings, features_of, learn_metric
+from .portions import warp_in_portions
+from .steps import DenseSteps
 
 __all__ = ["DenseSynchronizer"]
 
-# Up to so many performances all pairs are compared: see docs/scaling.md.
-_EXHAUSTIVE = 100
 
-# Whether refining helps is tried on at most so many performances.
-_TRIED = 12
-
-
-class DenseSynchronizer(LongWorkMixin, Synchronizer):
+class DenseSynchronizer(DenseSteps):
     """Synchronise performances by dense matching to the median one.
 
     1. Normalise all performances linearly to ``P`` frames (Eq. 7).
@@ -113,8 +96,15 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     search : {"auto", "exhaustive", "sampled"}, default="auto"
         How the median is found: by all matches, or by those with random references, as few as it
         takes to be sure (see ``search_``). ``"auto"``: by all up to 100 performances.
+    max_fit : int, default=None
+        Of how many performances, at least 2 and drawn at random, ``fit`` learns everything: clock,
+        metric, pattern, exemplars, whether to refine. The others are not looked at, nor read if
+        ``X`` gives performances by index: a fit takes the same time and memory however many there
+        are. A pattern that is told by its index is among them. None: of all. See
+        ``typical_share_``.
     random_state : int, RandomState instance or None, default=0
-        Draws the references of a sampled search. The default makes equal input give equal results.
+        Draws the references of a sampled search, and who is learnt from. The default makes equal
+        input give equal results.
     n_jobs : int, default=None
         How many jobs share the matches, in ``fit``, ``transform`` and ``match``. None means 1
         unless in a ``joblib.parallel_config`` context, -1 all cores. Results are the same to the
@@ -136,13 +126,22 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     certified_ : bool
         Whether the pattern is the median of Eq. 19: known from all matches, or because paired
         tests, which err with a probability of 1 % all together, rejected every other performance.
-        False if the pattern was given, or a search has spent its 150 matches a performance.
+        False if the pattern was given, or a search has spent its 150 matches a performance. After
+        a fit to a sample: whether nobody else of the sample may be more typical of all.
     n_matches_ : int
         Matches made to choose the pattern and the exemplars.
     search_ : Bunch
         ``n_matches``, ``certified``, as above; ``in_doubt``, how many others no test rejected;
         ``excess``: with a probability of 99 % the pattern's ``C_n`` is at most ``1 + excess``
         times the smallest. All are in doubt, the excess is NaN, if the pattern was given.
+    sample_ : ndarray of int
+        Indices of the performances that were learnt from: all, or ``max_fit`` of them.
+        ``global_distances_`` are those to these, NaN for all others; ``training_`` is of these.
+    typical_share_ : float
+        At most this share of all performances is more typical than the pattern: has a smaller
+        global distance. 0 if that is the certified median of all. After a fit to a sample it holds
+        with a probability of 95 % (beside the 1 % of the search), if the sample stands for all:
+        with 500 that leave no doubt it is 0.006. NaN if the pattern was given.
     metric_ : Bunch or None
         What was learnt: ``share``, the part of every feature in what is compared, about 0 for
         noise; ``energy``, its part in the plain velocities, which would be compared without a
@@ -214,6 +213,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         "max_rate": [Interval(Real, 1, None, closed="left")],
         "subframes": [Interval(Integral, 1, None, closed="left")],
         "search": [StrOptions({"auto", "exhaustive", "sampled"})],
+        "max_fit": [Interval(Integral, 2, None, closed="left"), None],
         "random_state": ["random_state"],
         "n_jobs": [Integral, None],
         "verbose": ["verbose"],
@@ -235,6 +235,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         max_rate=4,
         subframes=1,
         search="auto",
+        max_fit=None,
         random_state=0,
         n_jobs=None,
         verbose=0,
@@ -252,19 +253,21 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         self.max_rate = max_rate
         self.subframes = subframes
         self.search = search
+        self.max_fit = max_fit
         self.random_state = random_state
         self.n_jobs = n_jobs
         self.verbose = verbose
 
     @of_one_state
     def match(self, X):
-        performances, warper = self.check_performances(X), self._warper
-        positions = warper.positions(performances)
-        self._check_unit(positions)
+        return self._match_in_parts(X)
+
+    def _match(self, performances):
+        warper = self._warper
+        self._check_unit(performances)
         with self._progress(fits=False) as progress:
             portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "warping"}
-            results = in_portions(warper, "warps", positions, **portions)
-        distances, times = (np.concatenate(parts) for parts in zip(*results, strict=True))
+            distances, times = warp_in_portions(warper, performances, **portions)
         return Match(times, warper.matcher.features.back(distances))
 
     @of_one_state
@@ -302,99 +305,3 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         frames, offsets, costs, path = warper.disparity_space(positions)
         costs = warper.matcher.features.back(costs)
         return Bunch(frames=frames, offsets=offsets, costs=costs, path=path)
-
-    # -- steps of a fit ---------------------------------------------------------------------
-
-    def _learn(self, performances):
-        with self._progress(fits=True) as progress:
-            training = self._set_clock(performances)
-            learns = self.metric == "learned" and self.cost == "velocity" and self.consensus > 0
-            Settings.of(self, learns).check(self.n_frames_, self.subframes)
-            positions, self.metric_ = self._positions(training), None
-            features = features_of(self, training.unit, learnt=False)
-            if learns:
-                features, self.metric_ = learn_metric(self, features, positions)
-            matcher, features = Matcher.learn(features, positions, **self._settings())
-            self.training_.features = matcher.features
-            warn_of_one_feature(self, performances, features)
-            self.mu_ = float(matcher.features.back(matcher.trellis.mu))
-            shared = shared_training_set(matcher, positions, features)
-            median = self._choose_median(shared, features, progress)
-            source = self._set_pattern(training, median, matcher.features.degree)
-            warper = self._choose_exemplars(training, matcher, source, median.estimates)
-            warper = self._decide_on_refinement(training, warper, source, progress, shared)
-            self._warper = warper
-
-    def _positions(self, training, chosen=slice(None)):
-        """Performances of the training set at every sub-position of the clock, in the unit."""
-        if self.subframes == 1:
-            return training.scaled[chosen]
-        performances = training.performances
-        some = [performances[i] for i in np.arange(len(performances))[chosen]]
-        return training.unit(normalise(some, self.n_frames_, self.subframes))
-
-    def _choose_median(self, shared, features, progress):
-        """The median (Eq. 19), by all matches or some; without it, what exemplars are chosen by."""
-        n, rounding, wanted = len(features), rounding_of(features), self._wants_median
-        compare = partial(compare_in_portions, shared, n_jobs=self.n_jobs, progress=progress)
-        if not wanted and (self.consensus == 0 or n <= self.consensus):
-            # None of them, or all, are exemplars.
-            median = Median.unknown(n)
-        elif self.search == "exhaustive" or (self.search == "auto" and n <= _EXHAUSTIVE):
-            median = sum_all(compare, n, rounding)
-        elif wanted:
-            median = search_median(compare, n, rounding, check_random_state(self.random_state))
-        else:
-            median = estimate_distances(compare, n, check_random_state(self.random_state))
-        known = median if wanted else Median.unknown(n, median.n_matches)
-        self.n_matches_, self.certified_ = known.n_matches, known.certified
-        self.search_ = Bunch(**known.achieved)
-        return median
-
-    def _choose_exemplars(self, training, matcher, source, estimates):
-        """The exemplars, and the warper to the pattern by way of them."""
-        self.exemplars_ = np.empty(0, dtype=np.intp)
-        if self.consensus > 0:
-            self.exemplars_ = choose_exemplars(estimates, self.consensus, self.pattern_index_)
-        chosen = [source, *(training.performances[k] for k in self.exemplars_)]
-        # In double precision, as all that is warped.
-        chosen = [x.astype(np.float64, copy=False) for x in chosen]
-        positions = matcher.features.positions(chosen, self.n_frames_)
-        pattern = positions[0, :: self.subframes]
-        portion = matcher, pattern, positions, self.consensus > 0, self.warp_smoothing
-        (warper,) = run(Warper.to_pattern, [portion])
-        return warper
-
-    def _decide_on_refinement(self, training, warper, source, progress, shared):
-        """Whether warps are refined by postures, and the warper that does so or does not."""
-        verdict = Verdict()
-        if self.refine == "auto" and self.consensus > 0:
-            verdict = self._try_refinement(training, warper, source, progress, shared)
-        names = "ratio", "p_value", "ratio_to_all"
-        self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
-        self.misfit_ = verdict.misfit
-        self.refines_ = bool(verdict.helps if self.refine == "auto" else self.refine)
-        if not self.refines_:
-            return warper
-        return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.scaled))
-
-    def _try_refinement(self, training, warper, source, progress, shared):
-        """Find out on the performances, or evenly spaced ones of many, whether refining helps."""
-        others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
-        some = others[:: -(-len(others) // _TRIED) or 1]
-        hands = deal_features(training.scaled[some]) if len(some) else []
-        if not hands:
-            return Verdict()
-        positions = self._positions(training, some).astype(np.float64, copy=False)
-        source = warper.positions([source])
-        width = choose_smoothing(training.scaled[some])
-        portion = warper, source, positions, hands, width
-        (trial,) = run(partial(RefinementTrial.of, **self._settings()), [portion])
-        portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "trying to refine"}
-        results = in_portions(trial, "misfits", positions, found=(shared, some), **portions)
-        energy = np.square(trial.pattern - trial.pattern.mean(axis=0)).sum()
-        return Verdict.of(np.concatenate(results, axis=1), energy or 1.0)
-
-    def _settings(self):
-        """What a `Matcher` learns with."""
-        return vars(Settings.of(self, self.metric_ is not None))

@@ -11,12 +11,15 @@ from ..fitting import at_once, of_one_state
 from ..gate import as_numbers
 from ..matching.keyframes import curvature_keyframes, match_keyframes
 from ..matching.units import squared_distances
-from ..matching.warps import sample
+from ..matching.warps import even_slices, sample
 from ..pipelines import MissingMetadata
 from .base import Synchronizer
 from .match import Match
 
 __all__ = ["KeyframeSynchronizer"]
+
+# Performances that are handled together.
+_AT_ONCE = 256
 
 
 class KeyframeSynchronizer(Synchronizer):
@@ -167,17 +170,16 @@ class KeyframeSynchronizer(Synchronizer):
                 "The synchronizer was fitted with key-frames: give those of these performances too",
                 "keyframes",
             )
-        if keyframes is None:
-            found = [
-                match_keyframes(self.pattern_, self.keyframes_, x)
-                for x in self.normalize(performances)
-            ]
-            knots = np.stack(found)
-        else:
+        if keyframes is not None:
             knots = self._given_knots(performances, keyframes, len(self.keyframes_))
-        times = self._between(self.keyframes_, knots)
-        synchronised = sample(performances, times, self.n_frames_)
-        return Match(times, squared_distances(synchronised, self.pattern_))
+        distances, times = np.empty(len(performances)), []
+        for rows in even_slices(len(performances), _AT_ONCE):
+            some = performances[rows]
+            own = self._found_knots(some) if keyframes is None else knots[rows]
+            times.append(self._between(self.keyframes_, own))
+            synchronised = sample(some, times[-1], self.n_frames_)
+            distances[rows] = squared_distances(synchronised, self.pattern_)
+        return Match(np.concatenate(times), distances)
 
     def _learn(self, performances, keyframes):
         self._given = keyframes is not None
@@ -187,13 +189,18 @@ class KeyframeSynchronizer(Synchronizer):
             knots = self._given_knots(performances, keyframes)
             # On the mean key-frames all performances are comparable, as on one clock.
             times = self._between(knots.mean(axis=0), knots)
-            comparable = training.unit(sample(performances, times, self.n_frames_))
+            comparable = training.unit.fill(sample(performances, times, self.n_frames_))
         self._set_pattern(training, self._plain_median(comparable))
         if self._given and self.pattern_index_ is not None:
             self.keyframes_ = knots[self.pattern_index_]
         else:
             count = knots.shape[1] if self._given else self.n_keyframes
             self.keyframes_ = curvature_keyframes(self.pattern_, count)
+
+    def _found_knots(self, performances):
+        """Those that are closest to the pattern's, by curvature."""
+        on_clock = self.normalize(performances)
+        return np.stack([match_keyframes(self.pattern_, self.keyframes_, x) for x in on_clock])
 
     def _between(self, knots, others):
         """tau(p): piecewise linear through the ends and the key-frames."""

@@ -4,10 +4,14 @@ import numpy as np
 
 from ..fitting import of_one_state
 from ..matching.units import squared_distances
+from ..matching.warps import even_slices
 from .base import Synchronizer
 from .match import Match
 
 __all__ = ["LinearSynchronizer"]
+
+# Performances that are handled together.
+_AT_ONCE = 256
 
 
 class LinearSynchronizer(Synchronizer):
@@ -55,7 +59,12 @@ class LinearSynchronizer(Synchronizer):
 
     @of_one_state
     def match(self, X):
-        on_clock = self.normalize(X)
-        clock = np.arange(on_clock.shape[1], dtype=np.float64)
-        distances = squared_distances(on_clock, self.pattern_)
-        return Match(np.tile(clock, (len(on_clock), 1)), distances)
+        return self._match_in_parts(X)
+
+    def _match(self, performances):
+        distances = np.empty(len(performances))
+        for rows in even_slices(len(performances), _AT_ONCE):
+            on_clock = self.normalize(performances[rows])
+            distances[rows] = squared_distances(on_clock, self.pattern_)
+        clock = np.arange(self.n_frames_, dtype=np.float64)
+        return Match(np.tile(clock, (len(performances), 1)), distances)

@@ -10,13 +10,13 @@ from sklearn.utils._param_validation import Interval
 from ..fitting import of_one_state
 from ..matching.parts import PartWarper
 from ..matching.warps import normalise
-from ..performances import names_of_input, restore
+from ..performances import names_of_input
 from ..work import run
 from .dense import DenseSynchronizer
 from .lags import Lags
 from .match import Match
 from .naming import choose_parts, people_of
-from .portions import in_portions
+from .portions import warp_in_portions
 
 __all__ = ["PartSynchronizer"]
 
@@ -51,7 +51,7 @@ class PartSynchronizer(DenseSynchronizer):
         makes all follow the body. Useful from 0.0001 to 0.01; 0 to measure lags of parts that move
         clearly.
     n_frames, pattern, velocity_smoothing, refine, max_offset, metric, consensus, warp_smoothing, \
-cost, smoothness, max_rate, subframes, search, random_state, n_jobs, verbose
+cost, smoothness, max_rate, subframes, search, max_fit, random_state, n_jobs, verbose
         As of `DenseSynchronizer`, for the body and its parts. ``refine`` is for the body only.
 
     Attributes
@@ -59,7 +59,8 @@ cost, smoothness, max_rate, subframes, search, random_state, n_jobs, verbose
     parts_ : dict of str to ndarray of int
         Indices of the features of every part.
     pattern_, pattern_index_, n_frames_, global_distances_, certified_, n_matches_, search_, \
-metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, feature_names_in_
+sample_, typical_share_, metric_, mu_, exemplars_, misfit_, refinement_, refines_, \
+n_features_in_, feature_names_in_
         Of the whole body, as of `DenseSynchronizer`.
 
     See Also
@@ -124,6 +125,7 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
         max_rate=4,
         subframes=1,
         search="auto",
+        max_fit=None,
         random_state=0,
         n_jobs=None,
         verbose=0,
@@ -142,6 +144,7 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
             max_rate=max_rate,
             subframes=subframes,
             search=search,
+            max_fit=max_fit,
             random_state=random_state,
             n_jobs=n_jobs,
             verbose=verbose,
@@ -149,7 +152,6 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
         self.parts = parts
         self.coupling = coupling
 
-    @of_one_state
     def transform(self, X):
         """Warp every part onto the clock of the pattern, by its own warp (Eq. 18).
 
@@ -163,15 +165,15 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
             ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
             ``set_output(transform="pandas")``.
         """
-        performances = self.check_performances(X)
+        return self._warp(X)
+
+    def _warp_part(self, performances):
         body = self.match(performances)
         out = body.warp(performances)
         for name, match in self._match_parts(performances, body, "part").items():
             columns = self.parts_[name]
             out[:, :, columns] = match.warp([x[:, columns] for x in performances])
-        if performances.kind == "rows":
-            return out[:, :, 0]
-        return restore(self, performances, out, frames=range(out.shape[1]))
+        return out
 
     @of_one_state
     def match_parts(self, X):
@@ -251,7 +253,10 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
         source = self._given_pattern(performances)
         if source is None:
             source = performances[self.pattern_index_]
-        chosen = self._everywhere([source, *(performances[k] for k in self.exemplars_)])
+        chosen = [source, *(performances[k] for k in self.exemplars_)]
+        # In double precision, as all that is warped.
+        chosen = [x.astype(np.float64, copy=False) for x in chosen]
+        chosen = normalise(chosen, self.n_frames_, self.subframes)
         (times,) = run(_warps_of_bodies, [(self._warper, chosen)])
         training = normalise(performances, self.n_frames_, self.subframes)
         own = self._warper, times, training, chosen, self.coupling, self._settings()
@@ -264,7 +269,7 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
 
     def _match_parts(self, performances, body, what):
         """A match by part: of the part, or of the rest without it."""
-        found, positions = {}, self._everywhere(performances)
+        found = {}
         with self._progress(fits=False) as progress:
             for name in self.parts_:
                 warper = self._warpers.get((name, what))
@@ -272,15 +277,9 @@ metric_, mu_, exemplars_, misfit_, refinement_, refines_, n_features_in_, featur
                     found[name] = Match(body.times)
                     continue
                 portions = {"n_jobs": self.n_jobs, "progress": progress, "name": f"warping {name}"}
-                results = in_portions(warper, "warps", positions, body.times, **portions)
-                distances, times = (np.concatenate(x) for x in zip(*results, strict=True))
+                distances, times = warp_in_portions(warper, performances, body.times, **portions)
                 found[name] = Match(times, warper.matcher.features.back(distances))
         return found
-
-    def _everywhere(self, performances):
-        """Performances at every position of the clock, in double precision."""
-        arrays = [x.astype(np.float64, copy=False) for x in performances]
-        return normalise(arrays, self.n_frames_, self.subframes)
 
     def _check_lags(self, against):
         if not self.parts_:

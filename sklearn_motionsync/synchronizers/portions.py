@@ -7,8 +7,9 @@ from joblib import effective_n_jobs
 
 from ..matching.warps import even_slices
 from ..work import Common, on_cluster, run
+from .compared import Compared, Found
 
-__all__ = ["compare_in_portions", "in_portions", "shared_training_set"]
+__all__ = ["compare_in_portions", "in_portions", "shared_training_set", "warp_in_portions"]
 
 # Sizes of a portion of warping: worth sending away, and small enough to be shared out.
 PORTION_CELLS = 50_000_000
@@ -18,43 +19,77 @@ _LARGEST_SHARE = 0.4
 
 
 class _TrainingSet:
-    """A training set as portions use it; sent away it holds one array, which gives the other.
+    """A training set as portions use it; sent away it holds one array, of which all else is made.
 
     Parameters
     ----------
     matcher : Matcher
     positions : ndarray, shape (n_sequences, Q, n_features)
         The performances at all positions.
-    features : ndarray, shape (n_sequences, Q, n_features), default=None
-        What is compared of them: if given, this is what is sent; if not, it is made of the
-        positions where it is needed.
+    compared : Compared, default=None
+        What is compared of them.
     """
 
-    def __init__(self, matcher, positions, features=None):
+    def __init__(self, matcher, positions, compared=None):
         self.matcher, self.positions = matcher, positions
-        self._given = self._features = features
-        self._lock = threading.Lock()
+        self._compared = compared or Compared(matcher.features, positions)
+        self._held, self._lock = (b"", None), threading.Lock()
 
     def __getstate__(self):
-        positions = self.positions if self._given is None else None
-        return self.matcher, positions, self._given
+        return self.matcher, self.positions
 
     def __setstate__(self, state):
         self.__init__(*state)
 
-    @property
-    def features(self):
-        """Made once in a process, whatever number of its threads ask."""
+    def batches(self, bases, moving, size):
+        """Tiles of pairs, in batches of ``size(n_tiles)`` that need few features.
+
+        If they are not kept, those of the fewer performances are held, and a batch has all tiles of
+        some of the others.
+        """
+        n_compared = self._compared.of(np.arange(1)).shape[2]
+        tiles = list(self.matcher.trellis.tiles(len(bases), len(moving), n_compared))
+        size = size(len(tiles))
+        if self._compared.is_kept:
+            return [tiles[batch] for batch in even_slices(len(tiles), size)]
+        along, batches, last = _along(bases, moving), [], None
+        for tile in sorted(tiles, key=lambda t: (t[along].start, t[1 - along].start)):
+            if not batches or (len(batches[-1]) >= size and tile[along].start != last):
+                batches.append([])
+            batches[-1].append(tile)
+            last = tile[along].start
+        return batches
+
+    def distances(self, bases, moving, tiles):
+        """Of the tiles of one of the `batches` for the same arrays of indices."""
+        return self.matcher.distances(self._features(bases, moving, tiles), bases, moving, tiles)
+
+    def _features(self, bases, moving, tiles):
+        if self._compared.is_kept:
+            return self._compared.kept
+        along = _along(bases, moving)
+        fewer, more = (moving, bases) if along == 0 else (bases, moving)
+        some = [tile[along] for tile in tiles]
+        own = more[min(s.start for s in some) : max(s.stop for s in some)]
+        return Found((own, self._compared.of(own)), self._features_held(fewer))
+
+    def _features_held(self, indices):
+        """Those of many portions: made once in a process, whatever number of its threads ask."""
+        key = indices.tobytes()
         with self._lock:
-            if self._features is None:
-                self._features = self.matcher.features(self.positions)
-            return self._features
+            if self._held[0] != key:
+                self._held = key, (indices, self._compared.of(indices))
+            return self._held[1]
 
 
-def shared_training_set(matcher, positions, features):
-    """A training set as the portions of a fit share it: a cluster is sent its positions once."""
-    sent = _TrainingSet(matcher, positions)
-    return Common(_TrainingSet(matcher, positions, features), sent)
+def _along(bases, moving):
+    """Along which axis of the table of pairs the portions lie: that of more performances."""
+    return int(len(moving) > len(bases))
+
+
+def shared_training_set(matcher, positions, compared):
+    """A training set as the portions of a fit share it: others are sent its positions once."""
+    return Common(_TrainingSet(matcher, positions, compared))
 
 
 def compare_in_portions(training, bases, moving, *, n_jobs, progress):
@@ -62,12 +97,15 @@ def compare_in_portions(training, bases, moving, *, n_jobs, progress):
 
     Which tiles go together makes no difference to the results: a few portions a worker.
     """
-    trellis, features = training.here.matcher.trellis, training.here.features
-    tiles = list(trellis.tiles(len(bases), len(moving), features.shape[2]))
-    cells = max(1, len(bases) * len(moving) // max(1, len(tiles))) * trellis.cells(features)
-    few = -(-len(tiles) // (4 * effective_n_jobs(n_jobs)))
-    batches = even_slices(len(tiles), max(1, min(few, PORTION_CELLS // cells)))
-    portions = [(bases, moving, tiles[batch]) for batch in batches]
+    here = training.here
+
+    def size(n_tiles):
+        cells = max(1, len(bases) * len(moving) // max(1, n_tiles))
+        cells *= here.matcher.trellis.cells(here.positions)
+        few = -(-n_tiles // (4 * effective_n_jobs(n_jobs)))
+        return max(1, min(few, PORTION_CELLS // cells))
+
+    portions = [(bases, moving, batch) for batch in here.batches(bases, moving, size)]
     step = progress.stage(f"comparing {len(bases)} with {len(moving)} performances", len(portions))
     jobs = {"n_jobs": n_jobs, "prefer": "threads", "step": step}
     for blocks in run(_distances, portions, common=(training,), **jobs):
@@ -75,11 +113,70 @@ def compare_in_portions(training, bases, moving, *, n_jobs, progress):
 
 
 def _distances(training, bases, moving, tiles):
-    return training.matcher.distances(training.features, bases, moving, tiles)
+    return training.distances(bases, moving, tiles)
 
 
-def in_portions(warper, method, positions, *along, n_jobs, progress, name, found=None):
-    """Results of a method of a warper, for portions of all performances at all positions.
+def warp_in_portions(warper, arrays, *along, n_jobs, progress, name):
+    """Distances and times of performances, at all positions a portion at a time.
+
+    Parameters
+    ----------
+    warper : Warper
+    arrays : sequence of ndarray (n_frames_i, n_features)
+        As they are: nobody is sent more of them.
+    *along : ndarray, shape (n_sequences, ...)
+        What the warper takes besides.
+    n_jobs : int or None
+    progress : Progress
+    name : str
+        Of the stage.
+
+    Returns
+    -------
+    distances : ndarray, shape (n_sequences,)
+    times : ndarray, shape (n_sequences, P)
+    """
+    slices = _slices(warper, len(arrays))
+    portions = _Portions(slices, lambda rows: (*_together(arrays[rows]), *(x[rows] for x in along)))
+    distances, times = np.empty(len(arrays)), np.empty((len(arrays), len(warper.pattern)))
+    jobs = {"n_jobs": n_jobs, "step": progress.stage(name, len(slices))}
+    results = run(_warps, portions, common=(Common(warper),), **jobs)
+    for rows, (lengths, warps) in zip(slices, results, strict=True):
+        distances[rows], times[rows] = lengths, warps
+    return distances, times
+
+
+class _Portions:
+    """Portions that are made when it is their turn, so that not all of them are there at once."""
+
+    def __init__(self, slices, make):
+        self._slices, self._make = slices, make
+
+    def __len__(self):
+        return len(self._slices)
+
+    def __iter__(self):
+        return map(self._make, self._slices)
+
+
+def _together(arrays):
+    """Arrays as one, which is sent as a whole, and their lengths."""
+    return np.concatenate(list(arrays)), np.array([len(x) for x in arrays])
+
+
+def _warps(warper, frames, lengths, *along):
+    ends = np.cumsum(lengths)
+    arrays = [frames[end - n : end] for end, n in zip(ends, lengths, strict=True)]
+    return warper.warps(warper.positions(arrays), np.s_[:], *along)
+
+
+def _slices(warper, n):
+    cells = len(warper.bases) * len(warper.pattern) * (2 * warper.matcher.trellis.width + 1)
+    return even_slices(n, min(max(1, PORTION_CELLS // cells), _PORTION_SEQUENCES))
+
+
+def in_portions(warper, method, positions, *, n_jobs, progress, name, found):
+    """Results of a method of a warper, for portions of some of a training set at all positions.
 
     Parameters
     ----------
@@ -87,26 +184,22 @@ def in_portions(warper, method, positions, *along, n_jobs, progress, name, found
     method : str
         Of its methods one that takes positions and rows.
     positions : ndarray, shape (n_sequences, Q, n_features)
-    *along : ndarray, shape (n_sequences, ...)
-        What the method takes besides.
     n_jobs : int or None
     progress : Progress
     name : str
         Of the stage.
-    found : tuple (training, rows), default=None
+    found : tuple (training, rows)
         Where a cluster finds them: the `shared_training_set`, and which of it they are.
     """
-    cells = len(warper.bases) * warper.matcher.trellis.cells(positions)
-    size = min(max(1, PORTION_CELLS // cells), _PORTION_SEQUENCES)
-    slices = even_slices(len(positions), size)
+    slices = _slices(warper, len(positions))
     jobs = {"n_jobs": n_jobs, "step": progress.stage(name, len(slices))}
-    if found is not None and on_cluster():
+    if on_cluster():
         training, rows = found
-        if _LARGEST_SHARE * len(training.here.features) < len(warper.bases):
+        if _LARGEST_SHARE * len(training.here.positions) < len(warper.bases):
             jobs["n_jobs"] = 1
         portions = [(method, rows[some]) for some in slices]
         return list(run(_of_training, portions, common=(Common(warper), training), **jobs))
-    portions = [(method, positions[some], *(x[some] for x in along)) for some in slices]
+    portions = [(method, positions[some]) for some in slices]
     return list(run(_of_own, portions, common=(Common(warper),), **jobs))
 
 
@@ -114,5 +207,5 @@ def _of_training(warper, training, method, rows):
     return getattr(warper, method)(training.positions, rows)
 
 
-def _of_own(warper, method, positions, *along):
-    return getattr(warper, method)(positions, np.s_[:], *along)
+def _of_own(warper, method, positions):
+    return getattr(warper, method)(positions, np.s_[:])

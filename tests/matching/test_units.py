@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from sklearn_motionsync.matching import units
 from sklearn_motionsync.matching.units import Unit, exponent_of, squared_distances
 
 
@@ -57,6 +58,25 @@ def test_copies_count_once(sequences):
     X[0, 0, 2] += 3
     shift = unit(X)[0, 0, 0] - expected[0, 0, 0]
     assert shift == pytest.approx(np.ldexp(1.0, -unit.exponent))
+
+
+def test_portions_make_no_difference(sequences, monkeypatch):
+    """One sequence at a time, the last with something of its own."""
+    sequences[:, :, 1] = 0.1
+    X = sequences[:, :, [0, 1, 0, 2, 3]]
+    X[3, 7, 4] = 40
+    whole = Unit.of(X)
+    expected = whole(X)
+    monkeypatch.setattr(units, "AT_ONCE", 200)
+    unit = Unit.of(X)
+    assert unit.exponent == whole.exponent
+    np.testing.assert_allclose(unit.centre, whole.centre, rtol=1e-13)
+    np.testing.assert_array_equal(unit.rounding, whole.rounding)
+    assert [group.tolist() for group in unit.copies] == [[0, 2]]
+    filled = X.copy()
+    assert unit.fill(filled) is filled
+    np.testing.assert_allclose(filled, expected, atol=1e-14)
+    np.testing.assert_array_equal(filled, unit(X))
 
 
 def test_much_alike_and_of_equal_energy_is_no_copy(sequences):

@@ -9,6 +9,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, FrameWise
 from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.synchronizers import balance, compared
 
 SETTINGS = [
     {},
@@ -63,6 +64,16 @@ def test_principal_components_have_one_unit(dtype):
     variance = np.concatenate(points).var(axis=0)
     assert variance[0] > 0.95 * variance.sum()
     assert is_quiet(points)
+
+
+@pytest.mark.parametrize("params", SETTINGS[1:])
+def test_the_same_is_told_in_portions(params, monkeypatch):
+    monkeypatch.setattr(compared, "KEPT_BYTES", 100)
+    monkeypatch.setattr(balance, "AT_ONCE", 2)
+    assert is_quiet(walks((1, 1)), **params)
+    assert is_quiet(ASpace(2).fit_transform([x.to_numpy() for x in walks()]), **params)
+    with pytest.warns(UserWarning, match=r"Feature 'force' holds 9\d.* % of the energy"):
+        DenseSynchronizer(n_frames=30, **params).fit(walks())
 
 
 @pytest.mark.parametrize("name", ["hdm05", "utkinect"])

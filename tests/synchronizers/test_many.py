@@ -1,0 +1,297 @@
+"""Many performances: memory by portions, what is read by index, and fits to a sample."""
+
+import tracemalloc
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.model_selection import cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    KeyframeSynchronizer,
+    LinearSynchronizer,
+    PartSynchronizer,
+    reading,
+    to_frame,
+)
+from sklearn_motionsync.synchronizers import compared
+from sklearn_motionsync.synchronizers.drawing import typical_share
+
+from shift_synchronizer import ShiftSynchronizer
+
+PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0, "max_offset": 0.1}
+
+
+def walks(n, n_frames=30, n_features=3, dtype=np.float64):
+    steps = np.random.default_rng(0).standard_normal((n, n_frames, n_features))
+    return np.cumsum(steps, axis=1).astype(dtype)
+
+
+class Files:
+    """Gives performances by index, and remembers which."""
+
+    def __init__(self, performances):
+        self.performances, self.read = performances, []
+
+    def __len__(self):
+        return len(self.performances)
+
+    def __getitem__(self, i):
+        self.read.append(i)
+        return self.performances[i]
+
+
+X = walks(16, 20)
+KINDS = {
+    "double": X,
+    "single": X.astype(np.float32),
+    "lengths": [x[: 14 + i % 7] for i, x in enumerate(X)],
+    "tables": [pd.DataFrame(x, columns=["a", "b", "c"]) for x in X],
+}
+SYNCHRONIZERS = {
+    "dense": DenseSynchronizer(15),
+    "linear": LinearSynchronizer(15),
+    "keyframes": KeyframeSynchronizer(15),
+    "parts": PartSynchronizer({"arm": [0]}, n_frames=15),
+    "outside": ShiftSynchronizer(15),
+}
+
+
+@pytest.fixture
+def small_parts(monkeypatch):
+    """Five performances at a time."""
+    monkeypatch.setattr(reading, "MANY", 5)
+
+
+def peak_of(call):
+    tracemalloc.start()
+    try:
+        call()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+# -- memory ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("settings", [{}, {"pattern": 3}, {"search": "exhaustive"}, PAPER])
+@pytest.mark.parametrize("n_jobs", [None, 2])
+def test_features_that_are_not_kept_change_nothing(monkeypatch, settings, n_jobs):
+    X = walks(110, 20, dtype=np.float32)
+    kept = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
+    monkeypatch.setattr(compared, "KEPT_BYTES", 1000)
+    made = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
+    assert made.pattern_index_ == kept.pattern_index_
+    assert made.mu_ == pytest.approx(kept.mu_, rel=1e-12)
+    np.testing.assert_allclose(made.global_distances_, kept.global_distances_, rtol=1e-5)
+    np.testing.assert_array_equal(made.exemplars_, kept.exemplars_)
+    np.testing.assert_array_equal(made.match(X[:9]).times, kept.match(X[:9]).times)
+
+
+def test_a_fit_holds_one_copy_and_a_transform_its_result(monkeypatch):
+    monkeypatch.setattr(compared, "KEPT_BYTES", 1 << 20)
+    X = walks(4000, 20, 32, dtype=np.float32)
+    sync = DenseSynchronizer(pattern=0, metric=None, refine=False, max_offset=0.05, consensus=1)
+    assert peak_of(lambda: sync.fit(X)) < 2.6 * X.nbytes
+    assert peak_of(lambda: sync.transform(X)) < 1.9 * X.nbytes
+    linear = LinearSynchronizer().fit(X[:10])
+    assert peak_of(lambda: linear.transform(X)) < 1.7 * X.nbytes
+
+
+# -- what is read by index ------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("small_parts")
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", SYNCHRONIZERS)
+def test_each_is_read_once(name, kind):
+    performances, files = KINDS[kind], Files(KINDS[kind])
+    expected = clone(SYNCHRONIZERS[name]).fit(performances)
+    sync = clone(SYNCHRONIZERS[name]).fit(files)
+    assert sync.pattern_.tobytes() == expected.pattern_.tobytes()
+    warped = sync.transform(files)
+    assert files.read == 2 * list(range(len(X)))
+    assert warped.dtype == expected.pattern_.dtype
+    np.testing.assert_array_equal(warped, expected.transform(performances))
+    times = sync.match(Files(performances)).times
+    np.testing.assert_array_equal(times, expected.match(performances).times)
+
+
+@pytest.mark.usefixtures("small_parts")
+def test_memory_maps(tmp_path):
+    np.save(tmp_path / "all.npy", KINDS["single"])
+    maps = np.load(tmp_path / "all.npy", mmap_mode="r")
+    sync = DenseSynchronizer().fit(maps)
+    expected = sync.transform(KINDS["single"])
+    for given in (maps, list(maps), tuple(maps)):
+        np.testing.assert_array_equal(sync.transform(given), expected)
+    # They tell their precision unread: all of them count, as they do in memory.
+    mixed = [maps[0], *np.load(tmp_path / "all.npy", mmap_mode="r")[1:]]
+    np.save(tmp_path / "one.npy", X[15])
+    mixed[15] = np.load(tmp_path / "one.npy", mmap_mode="r")
+    assert sync.transform(mixed).dtype == np.float64
+
+
+@pytest.mark.usefixtures("small_parts")
+def test_tables_come_out_as_from_a_list():
+    sync = DenseSynchronizer().fit(KINDS["tables"]).set_output(transform="pandas")
+    named = [x.copy() for x in KINDS["tables"]]
+    for x, label in zip(named, "abcdefghijklmnop", strict=True):
+        x.attrs["performance"] = label
+    for given in (KINDS["tables"], named):
+        pd.testing.assert_frame_equal(sync.transform(Files(given)), sync.transform(given))
+
+
+BAD = {
+    "gap": (np.where(np.arange(20)[:, None] == 5, np.nan, X[11]), "frame 5, feature 0 is NaN"),
+    "width": (X[11][:, :2], "has 2 features a frame"),
+    "unit": (1e40 * X[11], "more than 1e\\+30 times as large"),
+    "text": ([["a"] * 3] * 9, "is not a numeric array"),
+}
+
+
+@pytest.mark.usefixtures("small_parts")
+@pytest.mark.parametrize("bad", BAD)
+@pytest.mark.parametrize("name", SYNCHRONIZERS)
+def test_what_is_wrong_is_named_by_its_index(name, bad):
+    sync = clone(SYNCHRONIZERS[name]).fit(X)
+    spoilt = list(X)
+    spoilt[11], message = BAD[bad]
+    with pytest.raises(ValueError, match=f"Performance 11.*{message}"):
+        sync.transform(Files(spoilt))
+
+
+def test_one_precision():
+    sync = LinearSynchronizer().fit(X)
+    single = KINDS["single"]
+    with pytest.raises(ValueError, match="Performance 9 is float64, and those before are float32"):
+        sync.transform(Files([*single[:9], *X[9:]]))
+    assert sync.transform(Files([*X[:9], *single[9:]])).dtype == np.float64
+
+
+def test_it_is_a_collection_for_everybody():
+    files = Files(X)
+    pipe = make_pipeline(ASpace(2), DenseSynchronizer(15, metric=None), ActionModel())
+    expected = cross_val_score(pipe, list(X), cv=3)
+    np.testing.assert_array_equal(cross_val_score(pipe, files, cv=3), expected)
+    assert to_frame(files).equals(to_frame(X))
+    with pytest.raises(ValueError, match="Found 0 performances"):
+        DenseSynchronizer().fit(Files([]))
+
+
+def test_keyframes_come_for_all():
+    knots = [[10.0, 12.0 + i % 5] for i in range(16)]
+    sync = KeyframeSynchronizer().fit(Files(X), keyframes=knots)
+    expected = sync.transform(X, keyframes=knots)
+    np.testing.assert_array_equal(sync.transform(Files(X), keyframes=knots), expected)
+
+
+# -- fits to a sample -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("settings", [{}, PAPER, {"pattern": X[3]}])
+def test_a_fit_to_a_sample_is_a_fit_to_these(settings):
+    files = Files(X)
+    sync = DenseSynchronizer(max_fit=9, **settings).fit(files)
+    sample = sync.sample_
+    assert len(sample) == 9
+    # The first is looked at to tell what they are.
+    assert sorted({0, *files.read}) == sorted({0, *sample.tolist()})
+    assert len(files.read) == len(set(files.read))
+    expected = DenseSynchronizer(**settings).fit(X[sample])
+    np.testing.assert_array_equal(sync.transform(X), expected.transform(X))
+    np.testing.assert_array_equal(sync.exemplars_, sample[expected.exemplars_])
+    np.testing.assert_array_equal(sync.global_distances_[sample], expected.global_distances_)
+    assert np.isnan(np.delete(sync.global_distances_, sample)).all()
+    assert len(sync.global_distances_) == 16
+    if "pattern" not in settings:
+        assert sync.pattern_index_ == sample[expected.pattern_index_]
+        assert sync.pattern_.tobytes() == X[sync.pattern_index_].tobytes()
+        np.testing.assert_array_equal(expected.sample_, np.arange(9))
+        assert 0 < sync.typical_share_ < 1
+    if expected.metric_:
+        learnt = sample[expected.metric_.performances]
+        np.testing.assert_array_equal(sync.metric_.performances, learnt)
+
+
+def test_kinds_of_samples():
+    expected = DenseSynchronizer(max_fit=9).fit(X)
+    for given in (list(X), tuple(X), to_frame(X)):
+        sync = DenseSynchronizer(max_fit=9).fit(given)
+        assert sync.pattern_.tobytes() == expected.pattern_.tobytes()
+        np.testing.assert_array_equal(sync.sample_, expected.sample_)
+    rows = X[:, :, 0]
+    expected = DenseSynchronizer(max_fit=9).fit(rows)
+    for given in (pd.DataFrame(rows), rows.tolist()):
+        sync = DenseSynchronizer(max_fit=9).fit(given)
+        assert sync.pattern_.tobytes() == expected.pattern_.tobytes()
+    whole = DenseSynchronizer(max_fit=16).fit(X)
+    assert whole.pattern_.tobytes() == DenseSynchronizer().fit(X).pattern_.tobytes()
+    assert whole.typical_share_ == 0
+    other = DenseSynchronizer(max_fit=9, random_state=1).fit(X)
+    assert set(other.sample_) != set(expected.sample_)
+
+
+@pytest.mark.parametrize("pattern", [0, 7, 15])
+def test_a_pattern_that_is_given_is_in_the_sample(pattern):
+    sync = DenseSynchronizer(max_fit=5, pattern=pattern).fit(X)
+    assert (sync.pattern_index_, len(sync.sample_)) == (pattern, 5)
+    assert sync.pattern_.tobytes() == X[pattern].tobytes()
+    assert np.isnan(sync.typical_share_)
+    with pytest.raises(ValueError, match="pattern=16 is out of range: there are 16 performances"):
+        DenseSynchronizer(max_fit=5, pattern=16).fit(X)
+
+
+def test_parts_are_learnt_from_the_sample():
+    sync = PartSynchronizer({"arm": [0, 1]}, max_fit=9).fit(X)
+    expected = PartSynchronizer({"arm": [0, 1]}).fit(X[sync.sample_])
+    np.testing.assert_array_equal(sync.transform(X), expected.transform(X))
+
+
+def test_who_is_not_in_the_sample_is_not_checked_and_who_is_named_by_its_index():
+    sample = DenseSynchronizer(max_fit=9).fit(X).sample_
+    spoilt = X.copy()
+    spoilt[np.delete(np.arange(16), sample)] = np.nan
+    DenseSynchronizer(max_fit=9).fit(spoilt)
+    spoilt[sample[7], 3, 1] = np.nan
+    with pytest.raises(ValueError, match=f"Performance {sample[7]}, frame 3, feature 1"):
+        DenseSynchronizer(max_fit=9).fit(spoilt)
+
+
+def test_the_limit_names_the_way_out(monkeypatch):
+    from sklearn_motionsync.synchronizers import base
+
+    monkeypatch.setattr(base, "MOST_BYTES", 6 * X.size)
+    with pytest.raises(ValueError, match="Or learn from some: max_fit=1000"):
+        DenseSynchronizer().fit(X)
+    with pytest.raises(ValueError, match=r"or performances\.$"):
+        LinearSynchronizer().fit(X)
+    DenseSynchronizer(max_fit=9).fit(X)
+
+
+@pytest.mark.parametrize(("n", "in_doubt"), [(20, 0), (20, 4), (200, 10), (5, 4)])
+def test_the_share_by_drawing(n, in_doubt):
+    """Typicality is uniform; the last that may be the pattern is the one after those in doubt."""
+    drawn = np.sort(np.random.default_rng(0).random((20_000, n)), axis=1)[:, in_doubt]
+    share = typical_share(in_doubt, n, 10**9)
+    assert (drawn <= share).mean() == pytest.approx(0.95, abs=0.006)
+    assert typical_share(3, 12, 12) == 0.25
+
+
+def test_the_statement_holds():
+    """Every performance is a number times one curve: the typical ones are next to the mean."""
+    curve, held, shares = np.sin(np.linspace(0, 3, 5))[:, np.newaxis], [], []
+    for seed in range(30):
+        numbers = np.random.default_rng(seed).standard_normal(2000)
+        sync = DenseSynchronizer(**PAPER, max_fit=200, random_state=seed)
+        sync.set_params(max_offset=0).fit(numbers[:, np.newaxis, np.newaxis] * curve)
+        far = np.abs(numbers - numbers.mean())
+        held.append((far < far[sync.pattern_index_]).mean() <= sync.typical_share_)
+        shares.append(sync.typical_share_)
+    assert np.mean(held) >= 0.95
+    assert np.median(shares) < 0.7
