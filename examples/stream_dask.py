@@ -2,12 +2,13 @@
 
     python stream_dask.py model.joblib performances/ synchronized/ --scheduler tcp://head:8786
 
-reads portions here, sends each to one worker, and writes what comes back, as ``stream_files.py``
-does where it runs: files, restarts and promises are the same. Use this if the workers do not see
-your files, and `give` and `on_worker` for bags and arrays of Dask.
+reads portions here, sends each to one worker, and writes what comes back: files, restarts and
+promises are those of ``stream_files.py``, but that it stops at a portion that the model refuses.
+Use this if the workers do not see your files, and `give` and `on_worker` for bags and arrays.
 """
 
 import argparse
+import sys
 from collections import deque
 from pathlib import Path
 
@@ -69,33 +70,35 @@ def stream(client, portions, method="transform", model="model"):
         yield waiting.popleft().result()
 
 
-def main():
-    """What the command line asks for."""
+def main(arguments=None):
+    """What the command line asks for; for the shell, what was wrong with it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("model", type=Path, help="a fitted pipeline, by joblib.dump")
     parser.add_argument("portions", type=Path, help="folder of .npy or .npz files")
     parser.add_argument("results", type=Path, help="folder, made if there is none")
     parser.add_argument("--method", choices=stream_files.METHODS, default="transform")
     parser.add_argument("--scheduler", help="address (default: a cluster on this machine)")
-    given = parser.parse_args()
-    stream_files.claim(given.results, given.model, given.method)
-    missing = list(stream_files.left(given.portions, given.results, given.method))
-    with Client(given.scheduler) as client:
-        for module in (stream_files.__file__, __file__):
-            client.upload_file(module)
-        give(client, joblib.load(given.model))
-        portions = (stream_files.read(source) for source, _ in missing)
-        answers = stream(client, portions, given.method)
-        for source, target in missing:
-            try:
+    given = parser.parse_args(arguments)
+    source = given.model
+    try:
+        stream_files.claim(given.results, given.model, given.method)
+        missing = list(stream_files.left(given.portions, given.results, given.method))
+        with Client(given.scheduler) as client:
+            for module in (stream_files.__file__, __file__):
+                client.upload_file(module)
+            give(client, joblib.load(given.model))
+            portions = (stream_files.read(source) for source, _ in missing)
+            answers = stream(client, portions, given.method)
+            for source, target in missing:
                 stream_files.write(target, next(answers))
-            except ValueError as error:
-                raise ValueError(f"{source}: {error}") from error
-            print(f"{source.name}: done", flush=True)
+                print(f"{source.name}: done", flush=True)
+    except ValueError as error:
+        return f"{source}: {error}"
+    return None
 
 
 if __name__ == "__main__":
     # By its name: what workers are given of this module they find there.
     from stream_dask import main
 
-    main()
+    sys.exit(main())

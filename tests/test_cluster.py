@@ -3,6 +3,7 @@
 import gc
 import os
 import pickle
+import re
 import signal
 import sys
 import time
@@ -240,19 +241,41 @@ def test_bags_and_arrays_of_dask(client, fitted, portions_of_walks, expected):
     assert warped.compute().tobytes() == stacked.tobytes()
 
 
-def test_files_by_the_workers(client, fitted, portions_of_walks, expected, tmp_path):
+@pytest.fixture
+def files(fitted, portions_of_walks, tmp_path):
+    """The model, a folder of portions, and one for results."""
     (tmp_path / "walks").mkdir()
     joblib.dump(fitted, tmp_path / "model.joblib")
     for i, portion in enumerate(portions_of_walks[:4]):
         np.save(tmp_path / "walks" / f"{i}.npy", portion)
-    files = [tmp_path / "model.joblib", tmp_path / "walks", tmp_path / "warped"]
+    return tmp_path / "model.joblib", tmp_path / "walks", tmp_path / "warped"
+
+
+def assert_warped(folder, expected):
+    for i, each in enumerate(expected[:4]):
+        assert np.load(folder / f"{i}.npy").tobytes() == each.tobytes()
+
+
+def test_files_that_the_workers_see(client, files, portions_of_walks, expected):
     before = received(client)
     with joblib.parallel_config(backend="dask"):
         assert [wrong for _, wrong in stream_files.stream(*files)] == [None] * 4
     # Only the names of the files.
     assert (received(client) - before).sum() < 0.2 * portions_of_walks[0].nbytes
-    for i, each in enumerate(expected[:4]):
-        assert np.load(tmp_path / "warped" / f"{i}.npy").tobytes() == each.tobytes()
+    assert_warped(files[2], expected)
+
+
+def test_files_that_they_do_not_see(client, files, expected, capsys):
+    np.save(files[1] / "4.npy", np.full((2, 60, 8), np.nan))
+    asked = [*map(str, files), "--scheduler", client.scheduler.address]
+    assert re.match(r".*4\.npy: Performance 0.*NaN", stream_dask.main(asked), re.DOTALL)
+    assert capsys.readouterr().out.split("\n")[3:] == ["3.npy: done", ""]
+    assert_warped(files[2], expected)
+    (files[1] / "4.npy").unlink()
+    (files[2] / "2.npy").unlink()
+    assert stream_dask.main(asked) is None
+    assert capsys.readouterr().out == "2.npy: done\n"
+    assert_warped(files[2], expected)
 
 
 def test_a_worker_that_is_killed_changes_no_bit(client, fitted, portions_of_walks, expected):
