@@ -11,7 +11,7 @@ __all__ = ["choose_exemplars", "smoothed", "vote"]
 # one without any distance. Measured in docs/method.md.
 _FALL = 1.5
 # Share of the weight by which rounding may move a half.
-_ROUNDING = 2.0**-40
+_ROUNDING = {np.dtype(np.float64): 2.0**-40, np.dtype(np.float32): 2.0**-18}
 # Comparisons that are made at once: they stay in the cache.
 _COMPARED = 200_000
 
@@ -66,7 +66,7 @@ def vote(direct, to_exemplars, from_exemplars, lengths):
     routes = np.concatenate([direct[np.newaxis], by_way])
     typical = np.median(lengths, axis=0)
     typical = np.where(typical > 0, typical, 1)
-    weights, out = np.exp(-_FALL * lengths / typical), np.empty(direct.shape)
+    weights, out = np.exp(-_FALL * lengths / typical), np.empty_like(direct)
     for some in even_slices(len(out), max(1, _COMPARED // (len(routes) ** 2 * out.shape[1]))):
         out[some] = _weighted_median(routes[:, some], weights[:, some])
     return out
@@ -82,14 +82,14 @@ def _weighted_median(values, weights):
     values, weights = np.ascontiguousarray(values.swapaxes(0, 1)), weights.T[:, np.newaxis]
     below = (values[:, :, np.newaxis] <= values[:, np.newaxis]).astype(weights.dtype)
     held = np.matmul(weights, below.reshape(n_sequences, n, -1)).reshape(values.shape)
-    half = weights.sum(axis=2, keepdims=True) / 2
+    half, rounding = weights.sum(axis=2, keepdims=True) / 2, _ROUNDING[weights.dtype]
     # The smallest value up to which there is half of the weight, and up to which there is more.
-    low = np.where(held >= half * (1 - _ROUNDING), values, np.inf).min(axis=1)
-    high = np.where(held > half * (1 + _ROUNDING), values, np.inf).min(axis=1)
+    low = np.where(held >= half * (1 - rounding), values, np.inf).min(axis=1)
+    high = np.where(held > half * (1 + rounding), values, np.inf).min(axis=1)
     return (low + high) / 2
 
 
-def smoothed(times, reach, width, about=0.0, at=None):
+def smoothed(times, reach, width, about=0.0):
     """Warps (n_sequences, P) whose offsets are smoothed and in the band, pinned, non-decreasing.
 
     Parameters
@@ -101,14 +101,12 @@ def smoothed(times, reach, width, about=0.0, at=None):
         Standard deviation of the Gaussian, as a share of the clip.
     about : ndarray, shape (n_sequences, P), default=0.0
         Offsets that are smooth as they are: what differs from them is smoothed.
-    at : ndarray of int, shape (P,), default=None
-        At which frames, evenly spaced, the times are; by default at all.
     """
     n_frames = times.shape[1]
-    sigma, frames = width * (n_frames - 1), np.arange(n_frames) if at is None else at
+    frames, sigma = np.arange(n_frames), width * (n_frames - 1)
     offsets = times - frames - about
     if sigma > 1 / 3:
         offsets = smooth(offsets[:, :, np.newaxis], sigma)[:, :, 0]
         offsets[:, [0, -1]] = 0
     times = frames + np.clip(offsets + about, -reach, reach)
-    return np.maximum.accumulate(np.clip(times, 0, frames[-1]), axis=1)
+    return np.maximum.accumulate(np.clip(times, 0, n_frames - 1), axis=1)

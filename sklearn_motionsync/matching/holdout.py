@@ -28,6 +28,8 @@ _DOUBT = 0.003
 _PRIOR = 2, 0.1
 # Warps matched by all features have seen the noise of those that judge: what that may be worth.
 _SIGHT = 1.2
+# Steps of refining that show whether it helps.
+_STEPS = 14
 
 
 def deal_features(on_clock):
@@ -170,7 +172,7 @@ class RefinementTrial(RefinedWarper):
         for i, (held, shown) in enumerate((self.hands, self.hands[::-1])):
             by_shown = self.blind[i].voted(positions[:, :, shown])[1]
             curves = base[:, shown], moving[:, :, shown]
-            refined = refine_warps(*curves, by_shown, reach, self.noise_width)
+            refined = refine_warps(*curves, by_shown, reach, self.noise_width, _STEPS)
             for j, times in enumerate((by_all, by_shown, refined)):
                 matched = match_postures(postures[:, :, held], times)
                 # Judged by postures as they are: smoothing them blurs what noise tells of time.

@@ -29,21 +29,21 @@ _RIDGE = 0.03
 # Eigenvalues of a metric are raised to this power: half-way to counting all directions alike,
 # which is what is known before anything is learnt. Measured in docs/method.md.
 _TRUST = 0.6
+# Share of all eigenvalues that is what rounding leaves of a direction that tells nothing.
+_NOTHING = 1e-6
 # Directions that make so much of what is compared are enough.
 _KEPT = 0.99
 # Largest lag, as a share of the clip, at which differences are taken to be alike.
 _LONGEST = 0.3
 
 
-def learn_metric(match, at, positions, velocity):
+def learn_metric(match, positions, velocity):
     """Learn the metric of a training set, or of some of it.
 
     Parameters
     ----------
     match : callable
-        ``match(features)``: voted times (n_sequences, n_sequences, n_at) of all ordered pairs.
-    at : ndarray of int, shape (n_at,)
-        Frames of the base that these times belong to, evenly spaced.
+        ``match(features)``: voted times (n_sequences, n_sequences, P) of all ordered pairs.
     positions, velocity : ndarray, shape (n_sequences, P, n_features)
         Postures on the clock and their velocities, in the unit.
 
@@ -59,13 +59,16 @@ def learn_metric(match, at, positions, velocity):
     told = moves & _believed(postures, velocity)
     told = told if told.any() else moves
     fast = compressed(velocity[:, :, told], _energy(velocity[:, :, told]))
-    first = _square_root(metric_matrix(fast, _unmatched(fast)))
+    first = _square_root(metric_matrix(fast, _unmatched(fast))).astype(fast.dtype)
     voted = match(fast @ first if first.any() else fast)
-    told |= moves & ~told & _believed(postures, velocity, at, voted)
-    postures, energy = postures[:, :, told], _energy(velocity[:, :, told])
-    fast = compressed(velocity[:, :, told], energy)
-    of_fast, alike = _matched(fast, at, voted, weighted=True)
-    of_postures, longer = _matched(postures, at, voted, weighted=False)
+    matched = _matched(np.concatenate([postures, velocity], axis=2), voted)
+    n_features = len(moves)
+    there = [x[..., :n_features] for x in matched], [x[..., n_features:] for x in matched]
+    told |= moves & ~told & _believed(postures, velocity, *there)
+    energy = _energy(velocity[:, :, told])
+    postures, fast = postures[:, :, told], compressed(velocity[:, :, told], energy)
+    of_postures, longer = _differences(postures, (x[..., told] for x in there[0]))
+    of_fast, alike = _differences(fast, _paced(there[1], told, energy, voted))
     by_fast = _square_root(metric_matrix(fast, of_fast))
     # Differences that stay alike for longer are fewer pieces of evidence.
     by_postures = _square_root(metric_matrix(postures, of_postures)) * np.sqrt(alike / longer)
@@ -84,33 +87,34 @@ def _energy(velocity):
 
 def _believed(postures, velocity, *matched):
     """Whether performances agree in a feature, in posture and velocity together: (n_features,)."""
-    evidence = _evidence(postures, *matched) + _evidence(velocity, *matched)
+    matched = matched or (None, None)
+    evidence = _evidence(postures, matched[0]) + _evidence(velocity, matched[1])
     return evidence / np.sqrt(2) > _DOUBT
 
 
-def _evidence(block, at=None, times=None):
+def _evidence(block, matched):
     """Mean correlation of two performances in every feature, in its standard errors.
 
     Parameters
     ----------
     block : ndarray, shape (n_sequences, P, n_features)
-    at, times : ndarray, shapes (n_at,) and (n_sequences, n_sequences, n_at), default=None
-        Matched times of frames of the base; by default the same for all.
+    matched : list of ndarray (n_sequences - 1, P, n_features), or None
+        For every sequence, all others at its times; None: the same times for all.
 
     Two series that have nothing to do with each other, of autocorrelation r, correlate by the
     root of ``(1 + 2 sum r^2) / P``; every two performances are a pair of its own.
     """
     n_sequences, n_frames, n_features = block.shape
     own = np.square(block).sum(axis=(0, 1))
-    if times is None:
+    if matched is None:
         cross = np.square(block.sum(axis=0)).sum(axis=0) - own
         norm = own * (n_sequences - 1)
     else:
-        bases, (cross, other) = block[:, at], np.zeros((2, n_features))
-        for base, moving in zip(bases, _others(block, times), strict=True):
+        cross, other = np.zeros((2, n_features))
+        for base, moving in zip(block, matched, strict=True):
             cross += np.einsum("pk,mpk->k", base, moving)
             other += np.square(moving).sum(axis=(0, 1))
-        norm = np.sqrt(np.square(bases).sum(axis=(0, 1)) * (n_sequences - 1) * other)
+        norm = np.sqrt(own * (n_sequences - 1) * other)
     power = _power(block).sum(axis=0)
     correlation = irfft(power, 2 * len(power) - 2, axis=0)[:n_frames]
     correlation /= np.where(own > 0, correlation[0], 1)
@@ -141,8 +145,7 @@ def metric_matrix(block, covariance):
     same = np.linalg.inv(covariance + ridge)
     ratio = same - np.linalg.inv(2 * spread + ridge)
     values, vectors = np.linalg.eigh((ratio + ratio.T) / 2)
-    # What rounding leaves of a direction that tells nothing is nothing.
-    values = np.where(values > 1e-9 * np.trace(same), values, 0)
+    values = np.where(values > _NOTHING * np.trace(same), values, 0)
     shares = np.einsum("ki,kl,li->i", vectors, spread, vectors)
     tempered = values**_TRUST
     tempered *= (values @ shares) / ((tempered @ shares) or 1)
@@ -152,7 +155,7 @@ def metric_matrix(block, covariance):
 def _moments(block):
     """Mean outer product of features with themselves."""
     frames = block.reshape(-1, block.shape[2])
-    return frames.T @ frames / len(frames)
+    return (frames.T @ frames).astype(np.float64) / len(frames)
 
 
 def _square_root(matrix):
@@ -169,38 +172,47 @@ def _unmatched(block):
     return 2 * (n_sequences * _moments(block) - outer) / (n_sequences - 1)
 
 
-def _matched(block, at, times, weighted):
+def _matched(block, times):
+    """For every sequence, all others at its times: (n_sequences - 1, P, n_features) each.
+
+    Parameters
+    ----------
+    block : ndarray, shape (n_sequences, P, n_features)
+    times : ndarray, shape (n_sequences, n_sequences, P)
+        ``tau`` of all ordered pairs.
+    """
+    out = []
+    for n, at in enumerate(times):
+        others = np.delete(np.arange(len(block)), n)
+        out.append(sample(block[others], at[others], block.shape[1]))
+    return out
+
+
+def _paced(matched, told, energy, times):
+    """Yield matched velocities, compressed, with the weights of their rates."""
+    for n, velocity in enumerate(matched):
+        fast, rates = compressed(velocity[..., told], energy), np.gradient(times[n], axis=1)
+        fast *= (1 + RATE_WEIGHT * (np.delete(rates, n, axis=0) - 1))[:, :, np.newaxis]
+        yield fast
+
+
+def _differences(block, matched):
     """Covariance R of differences at matched times, and for how many frames they stay alike.
 
     Parameters
     ----------
     block : ndarray, shape (n_sequences, P, n_features)
-    at : ndarray of int, shape (n_at,)
-        Frames of the base.
-    times : ndarray, shape (n_sequences, n_sequences, n_at)
-        ``tau`` there, of all ordered pairs.
-    weighted : bool
-        Whether the moving sequence counts with the weight of its rate, as velocities do.
+    matched : iterable of ndarray (n_sequences - 1, P, n_features)
     """
-    n_sequences, n_features, n_frames = len(block), block.shape[2], len(at)
-    covariance, power = np.zeros((n_features, n_features)), 0
-    for n, moving in enumerate(_others(block, times)):
-        if weighted:
-            rates = np.gradient(np.delete(times[n], n, axis=0), at, axis=1)
-            moving *= (1 + RATE_WEIGHT * (rates - 1))[:, :, np.newaxis]
-        differences = block[n, at] - moving
+    n_frames, n_features = block.shape[1:]
+    covariance, power, count = np.zeros((n_features, n_features)), 0, 0
+    for base, moving in zip(block, matched, strict=True):
+        differences = base - moving
         flat = differences.reshape(-1, n_features)
         covariance += flat.T @ flat
         power = power + _power(differences).sum(axis=(0, 2))
-    covariance /= n_sequences * (n_sequences - 1) * n_frames
-    return covariance, _length(irfft(power)[: 1 + int(_LONGEST * n_frames)])
-
-
-def _others(block, times):
-    """Yield, for every sequence, all others at its times: (n_sequences - 1, n_at, n_features)."""
-    for n in range(len(block)):
-        others = np.delete(np.arange(len(block)), n)
-        yield sample(list(block[others]), times[n, others], block.shape[1])
+        count += len(flat)
+    return covariance / count, _length(irfft(power)[: 1 + int(_LONGEST * n_frames)])
 
 
 def _power(block):

@@ -1,5 +1,6 @@
 """Matcher: what is compared of performances, and how any two of them are compared."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +18,9 @@ __all__ = ["Features", "Matcher"]
 
 # Of a clip so many frames tell the metric.
 LEARNING_FRAMES = 100
-# At so many of them differences are taken.
-VOTED_FRAMES = 51
+# Frames in the reach of a band from which on finer ones do not matter to who is typical, and by how
+# many times fewer frames than all are worth it.
+_REACH, _WORTH = 8, 1.5
 
 
 class Features(NamedTuple):
@@ -34,6 +36,8 @@ class Features(NamedTuple):
     unit : Unit
     metric : Metric or None
         Learnt of velocities and postures.
+    frames : int, default=None
+        At so many frames alone, evenly spaced, and in single precision.
     """
 
     cost: str
@@ -41,11 +45,17 @@ class Features(NamedTuple):
     velocity_smoothing: float
     unit: Unit
     metric: Metric | None = None
+    frames: int | None = None
 
     def __call__(self, positions):
         """Features, at every position, of postures in the unit: (n_sequences, Q, n_compared)."""
         features = self._of_cost(positions)
-        return features if self.metric is None else self.metric(features, positions)
+        if self.metric is not None:
+            features = self.metric(features, positions)
+        if self.frames is None:
+            return features
+        some = np.round(np.linspace(0, features.shape[1] - 1, self.frames)).astype(np.intp)
+        return features[:, some].astype(np.float32)
 
     def _of_cost(self, positions):
         return cost_features(positions, self.cost, self.subframes, self.velocity_smoothing)
@@ -54,6 +64,24 @@ class Features(NamedTuple):
     def degree(self):
         """With which power of the unit of the data squares of features grow."""
         return COSTS[self.cost].degree if self.metric is None else 0
+
+    def for_search(self, n_frames, max_offset):
+        """The same as a training set is searched by: at fewer frames, if a metric is learnt.
+
+        Who is typical is known from as many as the smoothing of velocities leaves independent, and
+        the band needs.
+        """
+        finest = min(self.velocity_smoothing, max_offset / _REACH)
+        if self.metric is None or n_frames * finest < _WORTH:
+            return self
+        return self._replace(frames=1 + math.ceil(1 / finest))
+
+    def shape(self, positions):
+        """How many performances and positions are compared, and how many of these are a frame."""
+        n_sequences, n_positions = positions.shape[:2]
+        if self.frames is None:
+            return n_sequences, n_positions, self.subframes
+        return n_sequences, self.frames, 1
 
     def plain(self):
         """The same without the metric."""
@@ -68,24 +96,20 @@ class Features(NamedTuple):
         At most ``LEARNING_FRAMES`` frames of each are looked at, which the smoothing of velocities,
         a share of the clip, leaves without loss.
         """
-        positions = positions.astype(np.float64, copy=False)
+        # What rounding does to a metric is nothing beside what noise does.
+        positions = positions.astype(np.float32, copy=False)
         velocity = self._of_cost(positions)
         n_frames = (positions.shape[1] - 1) // self.subframes + 1
         some = np.linspace(0, positions.shape[1] - 1, min(n_frames, LEARNING_FRAMES))
         some = np.round(some).astype(np.intp)
         settings["max_rate"] = min(settings["max_rate"], len(some) - 1)
 
-        # A smoothed warp is known by fewer frames than it takes to find it.
-        at = np.round(np.linspace(0, len(some) - 1, min(len(some), VOTED_FRAMES))).astype(np.intp)
-
         def match(compared):
-            # What rounding does to a path is nothing beside what noise does.
-            compared = compared.astype(np.float32)
             matcher = Matcher.of(self._replace(subframes=1), compared, **settings)
-            return matcher.all_voted(compared, at, consensus, warp_smoothing)
+            return matcher.all_voted(compared, consensus, warp_smoothing)
 
         positions, velocity = positions[:, some], velocity[:, some]
-        metric = learn_metric(match, at, positions, velocity)
+        metric = learn_metric(match, positions, velocity)
         if metric is None:
             return None
         shares = metric.shares(velocity, positions), energy_shares(velocity)
@@ -144,16 +168,32 @@ class Matcher(NamedTuple):
         """The matcher of a training set, of which this is compared."""
         energy = np.einsum("npk,npk->", compared, compared, dtype=np.float64)
         settings = {"smoothness": smoothness, "max_offset": max_offset, "max_rate": max_rate}
-        return cls.of_energy(features, compared.shape[:2], energy, **settings)
+        shape = *compared.shape[:2], features.subframes
+        return cls.of_energy(features, shape, energy, **settings)
 
     @classmethod
     def of_energy(cls, features, shape, energy, *, smoothness, max_offset, max_rate):
-        """The matcher of so many performances at so many positions, by the squares of features."""
-        subframes = features.subframes
-        n_frames = (shape[1] - 1) // subframes + 1
-        mu = float(smoothness * energy / np.prod(shape))
+        """The matcher of a training set, of which features of this shape have this energy.
+
+        Performances, positions, and how many of these are a frame.
+        """
+        n_sequences, n_positions, subframes = shape
+        mu = float(smoothness * energy / (n_sequences * n_positions))
+        n_frames = (n_positions - 1) // subframes + 1
+        return cls.of_clock(features, n_frames, mu, subframes, max_offset, max_rate)
+
+    @classmethod
+    def of_clock(cls, features, n_frames, mu, subframes, max_offset, max_rate):
+        """The matcher on a clock of so many frames, with so many positions a frame."""
         reach = {"max_offset": max_offset, "max_rate": max_rate, "subframes": subframes}
         return cls(features, Trellis.on_clock(features.cost, n_frames, mu, **reach))
+
+    def at_all_frames(self, features, n_frames, *, smoothness, max_offset, max_rate):
+        """The matcher of the same training set by all frames, if this one searches by fewer."""
+        if self.features is features:
+            return self
+        mu = self.trellis.mu
+        return self.of_clock(features, n_frames, mu, features.subframes, max_offset, max_rate)
 
     def distances(self, features, bases, moving, tiles):
         """Synchronisation distances ``D_{n,m}`` of the tiles of the pairs of two index arrays."""
@@ -175,32 +215,17 @@ class Matcher(NamedTuple):
         max_bytes = get_config()["working_memory"] * 2**20 // 2
         return self.trellis.paths_and_costs(bases, moving, max_bytes, coupling)
 
-    def all_voted(self, sequences, at, consensus, warp_smoothing):
-        """Times of all ordered pairs of sequences at some frames, after the vote.
-
-        Parameters
-        ----------
-        sequences : ndarray, shape (n_sequences, P, n_features)
-            At the pace of the frames.
-        at : ndarray of int, shape (n_at,)
-            Frames of the base, 0 and P - 1 among them.
-        consensus : int
-        warp_smoothing : float
-
-        Returns
-        -------
-        ndarray, shape (n_sequences, n_sequences, n_at)
-        """
+    def all_voted(self, sequences, consensus, warp_smoothing):
+        """Times of all ordered pairs of sequences, at the pace of the frames, after the vote."""
         disparities, costs = self.paths_and_costs(sequences, sequences)
-        times, costs = self.times(disparities), costs.astype(np.float64)
-        direct = times[:, :, at]
-        out = np.empty(direct.shape)
+        times = self.times(disparities).astype(costs.dtype)
+        out, typical = np.empty_like(times), costs.sum(axis=1, dtype=np.float64)
         for n in range(len(out)):
-            k = choose_exemplars(costs.sum(axis=1), consensus, n)
+            k = choose_exemplars(typical, consensus, n)
             lengths = np.concatenate([costs[[n]], costs[n, k, np.newaxis] + costs[k]])
-            out[n] = vote(direct[n], direct[n, k], times[k], lengths)
-        reach = self.trellis.reach
-        return smoothed(out.reshape(-1, len(at)), reach, warp_smoothing, at=at).reshape(out.shape)
+            out[n] = vote(times[n], times[n, k], times[k], lengths)
+        flat = out.reshape(-1, out.shape[2])
+        return smoothed(flat, self.trellis.reach, warp_smoothing).reshape(out.shape)
 
     def times(self, disparities):
         """``tau``, in frames, of disparities."""

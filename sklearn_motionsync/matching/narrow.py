@@ -44,9 +44,9 @@ def narrow_paths(bundle):
     rows = states[:, edge : states.shape[1] - edge]
     middle = slice(trellis.width * pairs, (trellis.width + 1) * pairs)
     rows[0, middle] = ways[0, trellis.table.subframes, middle]
-    for p in range(1, bundle.n_frames):
-        way = np.add(ways[p], before[p - 1], out=ways[p])
-        np.minimum.reduce(way, axis=0, out=rows[p])
+    add, smallest = np.add, np.minimum.reduce
+    for way, last, row in zip(ways[1:], before[:-1], rows[1:], strict=True):
+        smallest(add(way, last, way), 0, None, row)
     costs = np.maximum(rows[-1, middle], 0).reshape(-1, bundle.n_bases).T
     return _walk(bundle, ways), costs
 
@@ -86,7 +86,7 @@ def _walk(bundle, ways):
         for pair, cell in enumerate(here.tolist()):
             at[:-1, pair] = _walk_alone(ways, cell, order, shift, bundle.handicaps[:, pair])
     else:
-        handicaps, flat = bundle.handicaps, ways.reshape(n_frames, -1)
+        handicaps, flat = bundle.handicaps, list(ways.reshape(n_frames, -1))
         # The cell of every entry of the step table; that of the first tells where the path is.
         cells = here + (order * n_cells)[:, np.newaxis]
         first = cells[0]

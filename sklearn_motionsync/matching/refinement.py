@@ -82,7 +82,7 @@ def slow_energy(base, matched):
     return np.square(smooth(residuals, sigma)).sum(axis=(1, 2))
 
 
-def refine_warps(base, moving, times, reach, noise_width=0.0):
+def refine_warps(base, moving, times, reach, noise_width=0.0, iterations=_ITERATIONS):
     """Gauss-Newton steps along the tangent that bring matched postures together.
 
     Each step solves for the whole warp at once::
@@ -104,6 +104,8 @@ def refine_warps(base, moving, times, reach, noise_width=0.0):
         Largest offset, in frames.
     noise_width : float, default=0.0
         How wide the postures were smoothed, in frames.
+    iterations : int, default=20
+        Most steps.
 
     Returns
     -------
@@ -116,11 +118,12 @@ def refine_warps(base, moving, times, reach, noise_width=0.0):
     low, high = np.maximum(frames - reach, 0), np.minimum(frames + reach, n_frames - 1)
     energy = np.square(base - base.mean(axis=0)).sum()
     rounding = np.square(16 * np.finfo(base.dtype).eps) * energy / n_frames
-    splines = CubicSpline(frames, moving, axis=1).c.astype(moving.dtype)
+    splines = CubicSpline(frames, moving, axis=1).c.astype(moving.dtype, copy=False)
+    splines = np.ascontiguousarray(splines.transpose(2, 1, 0, 3))
     independent = independent_frames(n_frames, noise_width)
     refined = times.astype(np.float64)
     active = np.arange(len(moving))
-    for _ in range(_ITERATIONS):
+    for _ in range(iterations):
         values, tangents = _evaluate(splines, active, refined[active])
         fitted, gain = _fit_gain(base, values)
         slope, residual = gain * tangents, base - fitted
@@ -141,11 +144,25 @@ def refine_warps(base, moving, times, reach, noise_width=0.0):
 
 
 def _evaluate(splines, active, times):
-    """Cubic splines on whole frames, and their derivatives, each at times of its own."""
-    left = np.clip(times.astype(np.intp), 0, splines.shape[1] - 1)
+    """Cubic splines on whole frames, and their derivatives, each at times of its own.
+
+    Their coefficients are (n_sequences, P - 1, 4, n_features), the highest power first.
+    """
+    pieces = splines.shape[1]
+    left = np.clip(times.astype(np.intp), 0, pieces - 1)
     x = (times - left).astype(splines.dtype)[:, :, np.newaxis]
-    a, b, c, d = splines[:, left, active[:, np.newaxis]]
-    return ((a * x + b) * x + c) * x + d, (3 * a * x + 2 * b) * x + c
+    at = left + pieces * active[:, np.newaxis]
+    a, b, c, d = np.moveaxis(splines.reshape(-1, *splines.shape[2:]).take(at, axis=0), 2, 0)
+    values = a * x
+    values += b
+    tangents = a * (3 * x)
+    tangents += 2 * b
+    for out, last in ((values, c), (tangents, c)):
+        out *= x
+        out += last
+    values *= x
+    values += d
+    return values, tangents
 
 
 def _solve(inner, pull, push, stiffness):

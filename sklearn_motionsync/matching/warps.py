@@ -37,7 +37,7 @@ def sample(arrays, times, n_frames):
 
     Parameters
     ----------
-    arrays : list of ndarray (n_frames_i, n_features)
+    arrays : list of ndarray (n_frames_i, n_features), or 3-D ndarray
     times : ndarray, shape (n_sequences, n_times)
         From 0 to ``n_frames - 1``.
     n_frames : int
@@ -58,7 +58,8 @@ def _sample(arrays, times, n_frames, out):
     at = times * last / (n_frames - 1)
     left = np.minimum(at.astype(np.intp), last - 1)
     weight = (at - left).astype(out.dtype)[:, :, np.newaxis]
-    frames = np.concatenate(arrays)
+    is_one = isinstance(arrays, np.ndarray)
+    frames = arrays.reshape(-1, arrays.shape[2]) if is_one else np.concatenate(arrays)
     left += np.cumsum(last + 1)[:, np.newaxis] - (last + 1)
     with np.errstate(over="ignore", invalid="ignore"):
         has_gaps = not np.isfinite(frames.sum())
@@ -87,7 +88,7 @@ def follow(warps, times):
     """
     *shape, n_frames = warps.shape
     left = np.clip(times.astype(np.intp), 0, n_frames - 2)
-    weight = times - left
+    weight = (times - left).astype(warps.dtype, copy=False)
     flat = np.ascontiguousarray(warps).reshape(-1)
     at = left + n_frames * np.arange(math.prod(shape)).reshape(*shape, 1)
     out = flat.take(at) * (1 - weight)

@@ -37,6 +37,11 @@ class Compared:
         return len(self._positions)
 
     @property
+    def dtype(self):
+        """Of the features."""
+        return self.of(np.arange(1)).dtype
+
+    @property
     def kept(self):
         """Of all, (n_sequences, Q, n_compared): made once, whatever number of threads ask."""
         with self._lock:

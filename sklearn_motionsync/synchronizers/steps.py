@@ -60,16 +60,21 @@ class DenseSteps(LongWorkMixin, Synchronizer):
             features = features_of(self, training.unit, learnt=False)
             if learns:
                 features, self.metric_ = learn_metric(self, features, positions)
-            compared = Compared(features, positions)
-            shape, energy = positions.shape[:2], compared.energy()
-            matcher = Matcher.of_energy(features, shape, energy, **self._settings())
-            self.training_.features = matcher.features
+            settings = self._settings()
+            searched = features.for_search(self.n_frames_, settings["max_offset"])
+            compared = Compared(searched, positions)
+            energy, shape = compared.energy(), searched.shape(positions)
+            searcher = Matcher.of_energy(searched, shape, energy, **settings)
+            matcher = searcher.at_all_frames(features, self.n_frames_, **settings)
+            self.training_.features = features
             warn_of_one_feature(self, performances, compared)
-            self.mu_ = float(matcher.features.back(matcher.trellis.mu))
-            shared = shared_training_set(matcher, positions, compared)
-            rounding = rounding_of(positions.dtype, energy)
+            self.mu_ = float(features.back(matcher.trellis.mu))
+            shared = shared_training_set(searcher, positions, compared)
+            rounding = rounding_of(compared.dtype, energy)
             median = self._choose_median(shared, len(positions), rounding, progress)
-            source = self._set_pattern(training, median, matcher.features.degree)
+            source = self._set_pattern(training, median, features.degree)
+            # Sums over fewer frames, as if over all.
+            self.global_distances_ *= self.n_frames_ / ((shape[1] - 1) // shape[2] + 1)
             warper = self._choose_exemplars(training, matcher, source, median.estimates)
             warper = self._decide_on_refinement(training, warper, source, progress, shared)
             self._warper = warper

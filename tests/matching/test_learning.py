@@ -22,8 +22,8 @@ def curves():
     return positions, np.gradient(positions, axis=1)
 
 
-def slow_compressed(velocity):
-    energy = np.mean([v @ v for x in velocity for v in x])
+def slow_compressed(velocity, energy=None):
+    energy = energy or np.mean([v @ v for x in velocity for v in x])
     return np.array(
         [[v / np.sqrt(energy + np.sqrt(energy) * np.sqrt(v @ v)) for v in x] for x in velocity]
     )
@@ -43,14 +43,15 @@ def slow_matrix(block, differences):
     return out * np.trace(plain @ spread) / np.trace(out @ spread)
 
 
-def slow_differences(block, times, weight):
+def slow_differences(block, times, weight, compress=lambda x: x):
     """Of all ordered pairs of performances, at the times of the moving one."""
     out, frames = [], np.arange(P)
-    for n, base in enumerate(block):
+    for n, base in enumerate(compress(block)):
         for m, other in enumerate(block):
             if n != m:
                 tau = times[n, m]
                 moving = np.column_stack([np.interp(tau, frames, c) for c in other.T])
+                (moving,) = compress([moving])
                 rates = 1 - weight + weight * np.gradient(tau)
                 out.append(base - rates[:, np.newaxis] * moving)
     return out
@@ -87,7 +88,8 @@ def test_the_metric_equals_loops_over_pairs_and_frames(curves):
     first = slow_matrix(fast, slow_differences(fast, unmatched, 0))
     np.testing.assert_allclose(inner(seen[0]), fast_inner(fast, first), atol=1e-9)
     postures = np.array([x - x.mean(axis=0) for x in positions])
-    of_fast = slow_differences(fast, times, 0.2)
+    energy = np.mean([v @ v for x in velocity for v in x])
+    of_fast = slow_differences(velocity, times, 0.2, lambda x: slow_compressed(x, energy))
     of_postures = slow_differences(postures, times, 0)
     weight = slow_length(of_fast) / slow_length(of_postures)
     gram = fast_inner(fast, slow_matrix(fast, of_fast))
