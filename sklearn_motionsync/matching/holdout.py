@@ -75,7 +75,8 @@ class Verdict(NamedTuple):
     p_value : float
         Of a moderated t test of the logarithms of these ratios, that refining does not help.
     ratio_to_all : float
-        The same to the misfit after matching by all features, those that judge among them.
+        The same to the misfit after matching by all features, those that judge among them; NaN if
+        nobody asked for that.
     misfit : float
         Median share of the pattern's energy that is that misfit after matching by all features.
     """
@@ -86,18 +87,23 @@ class Verdict(NamedTuple):
     misfit: float = np.nan
 
     @property
+    def may_help(self):
+        """Whether refining helps beyond doubt those who match by the features shown."""
+        return self.p_value < _DOUBT
+
+    @property
     def helps(self):
-        """Whether refining helps beyond doubt, and is not worse than the sight of all features."""
-        return self.p_value < _DOUBT and self.ratio_to_all < _SIGHT
+        """Whether it does, and is not worse than the sight of all features."""
+        return self.may_help and self.ratio_to_all < _SIGHT
 
     @classmethod
     def of(cls, misfits, energy):
         """The verdict on misfits (3, n_sequences, 2), as of a trial of a pattern of this energy.
 
-        Matched by all features, by those shown, and refined.
+        Matched by all features, which may be NaN, by those shown, and refined.
         """
         misfit = float(np.median(misfits[0].sum(axis=1)) / energy)
-        known = (misfits > 0).all(axis=0)
+        known = ~(misfits <= 0).any(axis=0)
         if not known.any():
             return cls(misfit=misfit)
         by_all, by_shown, refined = misfits[:, known]
@@ -162,19 +168,27 @@ class RefinementTrial(RefinedWarper):
         return cls(**vars(warper), noise_width=noise_width, hands=hands, blind=blind)
 
     def misfits(self, positions, rows):
-        """Misfits of every hand (3, n_sequences, 2), for `Verdict.of`."""
+        """Misfits of every hand, by the features shown and refined: (2, n_sequences, 2)."""
         positions = positions[rows].astype(np.float64, copy=False)
-        postures = positions[:, :: self.matcher.features.subframes]
         base, moving = self.postures(positions)
         reach = self.matcher.trellis.reach
-        by_all = self.voted(positions)[1]
-        out = np.empty((3, len(positions), 2))
-        for i, (held, shown) in enumerate((self.hands, self.hands[::-1])):
+        out = np.empty((2, len(positions), 2))
+        for i, shown in enumerate(self.hands[::-1]):
             by_shown = self.blind[i].voted(positions[:, :, shown])[1]
             curves = base[:, shown], moving[:, :, shown]
             refined = refine_warps(*curves, by_shown, reach, self.noise_width, _STEPS)
-            for j, times in enumerate((by_all, by_shown, refined)):
-                matched = match_postures(postures[:, :, held], times)
-                # Judged by postures as they are: smoothing them blurs what noise tells of time.
-                out[j, :, i] = slow_energy(self.pattern[:, held], matched)
+            for j, times in enumerate((by_shown, refined)):
+                out[j, :, i] = self._misfits_of_hand(i, positions, times)
         return out
+
+    def misfits_by_all(self, positions, rows):
+        """The same by all features: (1, n_sequences, 2)."""
+        positions = positions[rows].astype(np.float64, copy=False)
+        times = self.voted(positions)[1]
+        return np.stack([self._misfits_of_hand(i, positions, times) for i in (0, 1)], axis=1)[None]
+
+    def _misfits_of_hand(self, i, positions, times):
+        # Judged by postures as they are: smoothing them blurs what noise tells of time.
+        held = self.hands[i]
+        postures = positions[:, :: self.matcher.features.subframes, held]
+        return slow_energy(self.pattern[:, held], match_postures(postures, times))

@@ -153,12 +153,12 @@ class DenseSynchronizer(DenseSteps):
         Indices of the performances that vote.
     misfit_ : float
         Median share of the pattern's variance that matched postures leave, smoothed so that
-        noise hardly counts; NaN unless ``refine="auto"`` had to find out.
+        noise hardly counts; NaN unless ``refine="auto"`` finds that refining may help.
     refinement_ : Bunch
         What was found out by ``refine="auto"``, on features that had no part in the warps:
         ``ratio``, their misfit after refining by the other features to that after matching by the
         others alone; ``p_value``, of a t test that refining does not help; ``ratio_to_all``, to
-        the misfit after matching by all features. NaN where nothing can tell.
+        the misfit after matching by all features, if that is still asked. NaN where nothing tells.
     refines_ : bool
         Whether warps are refined.
     training_ : Bunch

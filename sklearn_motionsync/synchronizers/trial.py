@@ -43,7 +43,15 @@ def try_refinement(warper, source, scaled, shared, some, settings, **portions):
     source, width = warper.positions([source]), choose_smoothing(scaled[some])
     portion = warper, source, positions, hands, width
     (trial,) = run(partial(RefinementTrial.of, **settings), [portion])
-    how = {"name": "trying to refine", "found": (shared, some), **portions}
-    results = in_portions(trial, "misfits", positions, **how)
-    energy = np.square(trial.pattern - trial.pattern.mean(axis=0)).sum()
-    return Verdict.of(np.concatenate(results, axis=1), energy or 1.0)
+    energy = np.square(trial.pattern - trial.pattern.mean(axis=0)).sum() or 1.0
+
+    def misfits(method, name):
+        how = {"name": name, "found": (shared, some), **portions}
+        return np.concatenate(in_portions(trial, method, positions, **how), axis=1)
+
+    tried = misfits("misfits", "trying to refine")
+    verdict = Verdict.of(np.concatenate([np.full_like(tried[:1], np.nan), tried]), energy)
+    if not verdict.may_help:
+        return verdict
+    by_all = misfits("misfits_by_all", "matching without refining")
+    return Verdict.of(np.concatenate([by_all, tried]), energy)
