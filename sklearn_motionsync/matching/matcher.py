@@ -134,7 +134,7 @@ class Features(NamedTuple):
             return None
         if self.metric is None:
             return plain
-        return Features(*plain[:-1], self.metric.part(self.unit.holders[columns], compared))
+        return plain._replace(metric=self.metric.part(self.unit.holders[columns], compared))
 
     def positions(self, arrays, n_frames):
         """Performances at every position of the clock (Eq. 7), in the unit."""

@@ -14,6 +14,8 @@ __all__ = ["compare_in_portions", "in_portions", "shared_training_set", "warp_in
 # Sizes of a portion of warping: worth sending away, and small enough to be shared out.
 PORTION_CELLS = 50_000_000
 _PORTION_SEQUENCES = 256
+# So many times as long a portion may get for features that need not be made again.
+_LONGEST = 4
 # Up to this share of a training set the pattern and the exemplars are worth sending after it.
 _LARGEST_SHARE = 0.4
 
@@ -54,7 +56,8 @@ class _TrainingSet:
             return [tiles[batch] for batch in even_slices(len(tiles), size)]
         along, batches, last = _along(bases, moving), [], None
         for tile in sorted(tiles, key=lambda t: (t[along].start, t[1 - along].start)):
-            if not batches or (len(batches[-1]) >= size and tile[along].start != last):
+            count, goes_on = len(batches[-1]) if batches else 0, tile[along].start == last
+            if not batches or count >= (_LONGEST * size if goes_on else size):
                 batches.append([])
             batches[-1].append(tile)
             last = tile[along].start
