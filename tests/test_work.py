@@ -74,7 +74,7 @@ def test_equal_bits_whatever_the_blas_threads(walks, reference):
 
 def test_all_matching_runs_on_one_blas_thread(walks, monkeypatch):
     """Also what is not worth sharing out: its bits must not depend on the cores there are."""
-    seen, method = [], {name: getattr(Trellis, name) for name in ("distances", "paths")}
+    seen, method = [], {name: getattr(Trellis, name) for name in ("distances", "paths_and_costs")}
 
     def watched(name):
         def call(self, *args):
@@ -88,7 +88,7 @@ def test_all_matching_runs_on_one_blas_thread(walks, monkeypatch):
         monkeypatch.setattr(Trellis, name, watched(name))
     with threadpoolctl.threadpool_limits(limits=2):
         DenseSynchronizer().fit(walks[:20]).transform(walks[:3])
-    assert {name for name, _ in seen} == {"distances", "paths"}
+    assert {name for name, _ in seen} == {"distances", "paths_and_costs"}
     assert all(threads == {1} for _, threads in seen)
 
 

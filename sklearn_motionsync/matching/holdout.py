@@ -178,16 +178,16 @@ class RefinementTrial(RefinedWarper):
             curves = base[:, shown], moving[:, :, shown]
             refined = refine_warps(*curves, by_shown, reach, self.noise_width, _STEPS)
             for j, times in enumerate((by_shown, refined)):
-                out[j, :, i] = self._misfits_of_hand(i, positions, times)
+                out[j, :, i] = self._of_hand(i, positions, times)
         return out
 
     def misfits_by_all(self, positions, rows):
         """The same by all features: (1, n_sequences, 2)."""
         positions = positions[rows].astype(np.float64, copy=False)
         times = self.voted(positions)[1]
-        return np.stack([self._misfits_of_hand(i, positions, times) for i in (0, 1)], axis=1)[None]
+        return np.stack([self._of_hand(i, positions, times) for i in (0, 1)], axis=1)[None]
 
-    def _misfits_of_hand(self, i, positions, times):
+    def _of_hand(self, i, positions, times):
         # Judged by postures as they are: smoothing them blurs what noise tells of time.
         held = self.hands[i]
         postures = positions[:, :: self.matcher.features.subframes, held]

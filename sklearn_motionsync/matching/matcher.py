@@ -134,7 +134,8 @@ class Features(NamedTuple):
             return None
         if self.metric is None:
             return plain
-        return plain._replace(metric=self.metric.part(self.unit.holders[columns], compared))
+        metric = self.metric.part(self.unit.holders[columns], compared)
+        return Features(plain.cost, plain.subframes, plain.velocity_smoothing, plain.unit, metric)
 
     def positions(self, arrays, n_frames):
         """Performances at every position of the clock (Eq. 7), in the unit."""
