@@ -184,6 +184,17 @@ def pair(peers):
         rounds=21,
         against="`transform`, defaults",
     )
+    wide = Trellis(step_table("velocity", 4), 0.01, 40)
+    compare(
+        "Forty to a fitted pattern of 100 x 16, and the share of the trellis",
+        {
+            "its trellis, the paper's settings": lambda: timed(lambda: trellis.paths(X[:1], X)),
+            "`transform` of 40, the paper's settings": lambda: timed(lambda: paper.transform(X)),
+            "its trellis, defaults: nine bases": lambda: timed(lambda: wide.paths(X[:9], X)),
+            "`transform` of 40, defaults": lambda: timed(lambda: ours.transform(X)),
+        },
+        rounds=21,
+    )
     compare(
         "One pair, fdasrsf",
         {

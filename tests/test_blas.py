@@ -85,7 +85,7 @@ def test_fits_and_transforms_in_several_threads_leave_nothing_behind(found, monk
     sync = DenseSynchronizer(n_jobs=2).fit(X)
     assert blas_threads() == found
     # All are inside at once, and who came first goes first.
-    inside, paths, order = threading.Barrier(4), Trellis.paths, []
+    inside, paths, order = threading.Barrier(4), Trellis.paths_and_costs, []
 
     def together(self, *args):
         order.append(threading.current_thread())
@@ -93,7 +93,7 @@ def test_fits_and_transforms_in_several_threads_leave_nothing_behind(found, monk
         time.sleep(0.05 * order.index(threading.current_thread()))
         return paths(self, *args)
 
-    monkeypatch.setattr(Trellis, "paths", together)
+    monkeypatch.setattr(Trellis, "paths_and_costs", together)
     threads = [threading.Thread(target=sync.transform, args=(X[:2],)) for _ in range(4)]
     for thread in threads:
         thread.start()

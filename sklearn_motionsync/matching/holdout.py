@@ -28,8 +28,6 @@ _DOUBT = 0.003
 _PRIOR = 2, 0.1
 # Warps matched by all features have seen the noise of those that judge: what that may be worth.
 _SIGHT = 1.2
-# Steps of refining that show whether it helps.
-_STEPS = 14
 
 
 def deal_features(on_clock):
@@ -176,7 +174,7 @@ class RefinementTrial(RefinedWarper):
         for i, shown in enumerate(self.hands[::-1]):
             by_shown = self.blind[i].voted(positions[:, :, shown])[1]
             curves = base[:, shown], moving[:, :, shown]
-            refined = refine_warps(*curves, by_shown, reach, self.noise_width, _STEPS)
+            refined = refine_warps(*curves, by_shown, reach, self.noise_width)
             for j, times in enumerate((by_shown, refined)):
                 out[j, :, i] = self._of_hand(i, positions, times)
         return out

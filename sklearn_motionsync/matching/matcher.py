@@ -83,6 +83,11 @@ class Features(NamedTuple):
             return n_sequences, n_positions, self.subframes
         return n_sequences, self.frames, 1
 
+    def at_pace(self, subframes, smoothing=None):
+        """The same of so many positions a frame, under this smoothing or its own."""
+        smoothing = self.velocity_smoothing if smoothing is None else smoothing
+        return self._replace(subframes=subframes, velocity_smoothing=smoothing)
+
     def plain(self):
         """The same without the metric."""
         return self._replace(metric=None)
@@ -105,7 +110,7 @@ class Features(NamedTuple):
         settings["max_rate"] = min(settings["max_rate"], len(some) - 1)
 
         def match(compared):
-            matcher = Matcher.of(self._replace(subframes=1), compared, **settings)
+            matcher = Matcher.of(self.at_pace(1), compared, **settings)
             return matcher.all_voted(compared, consensus, warp_smoothing)
 
         positions, velocity = positions[:, some], velocity[:, some]

@@ -85,7 +85,7 @@ class Metric(NamedTuple):
 
 def energy_shares(velocity):
     """The share of every feature in the energy of velocities."""
-    energy = np.square(velocity).sum(axis=(0, 1))
+    energy = np.square(velocity).sum(axis=(0, 1), dtype=np.float64)
     return energy / energy.sum()
 
 

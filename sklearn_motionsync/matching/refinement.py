@@ -82,7 +82,7 @@ def slow_energy(base, matched):
     return np.square(smooth(residuals, sigma)).sum(axis=(1, 2))
 
 
-def refine_warps(base, moving, times, reach, noise_width=0.0, iterations=_ITERATIONS):
+def refine_warps(base, moving, times, reach, noise_width=0.0):
     """Gauss-Newton steps along the tangent that bring matched postures together.
 
     Each step solves for the whole warp at once::
@@ -104,8 +104,6 @@ def refine_warps(base, moving, times, reach, noise_width=0.0, iterations=_ITERAT
         Largest offset, in frames.
     noise_width : float, default=0.0
         How wide the postures were smoothed, in frames.
-    iterations : int, default=20
-        Most steps.
 
     Returns
     -------
@@ -123,7 +121,7 @@ def refine_warps(base, moving, times, reach, noise_width=0.0, iterations=_ITERAT
     independent = independent_frames(n_frames, noise_width)
     refined = times.astype(np.float64)
     active = np.arange(len(moving))
-    for _ in range(iterations):
+    for _ in range(_ITERATIONS):
         values, tangents = _evaluate(splines, active, refined[active])
         fitted, gain = _fit_gain(base, values)
         slope, residual = gain * tangents, base - fitted

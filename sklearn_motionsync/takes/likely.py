@@ -6,7 +6,6 @@ what is another movement look like it, and windows that begin too early or late 
 
 import numpy as np
 
-from ..matching.matcher import Features
 from ..matching.metric import without_mean
 from ..matching.warps import even_slices, normalise
 from ..model.likeness import as_codes, learn_border
@@ -106,10 +105,9 @@ class Unlikeness:
 
     def _set_clock(self, features, n_frames):
         """Positions of windows, and features of these that are as by the frame of the clock."""
-        cost, subframes, smoothing, unit, metric = features
-        self._n_positions = min((n_frames - 1) * subframes + 1, _MOST_POSITIONS)
+        self._n_positions = min((n_frames - 1) * features.subframes + 1, _MOST_POSITIONS)
         by_frame = (self._n_positions - 1) / (n_frames - 1)
-        self._features = Features(cost, by_frame, smoothing, unit, metric)
+        self._features = features.at_pace(by_frame)
 
     def _chance(self):
         """How unlike movements by chance are, all but the most alike."""

@@ -54,16 +54,15 @@ class Proposer(NamedTuple):
     def of(cls, synchronizer, shortest, longest):
         """The proposer of the pattern of a synchronizer, for windows of so many frames."""
         n_frames = min(synchronizer.n_frames_, _CLOCK)
-        cost, _, smoothing, unit, metric = synchronizer.training_.features
+        features = synchronizer.training_.features.at_pace(1)
         pattern = synchronizer.pattern_.astype(np.float64)
-        features = Features(cost, 1, smoothing, unit, metric)
         base = features(features.positions([pattern], n_frames))
         how = {"max_offset": _SHARE, "max_rate": _MAX_RATE, "free": True}
         mu = _SMOOTHNESS * float(np.square(base).sum()) / n_frames
-        trellis = Trellis.on_clock(cost, n_frames, mu, **how)
+        trellis = Trellis.on_clock(features.cost, n_frames, mu, **how)
         # The filter of velocities is as wide in a portion as in the pattern.
-        smoothing *= (n_frames - 1) / (n_frames - 1 + 2 * trellis.width)
-        features = Features(cost, 1, smoothing, unit, metric)
+        share = (n_frames - 1) / (n_frames - 1 + 2 * trellis.width)
+        features = features.at_pace(1, share * features.velocity_smoothing)
         return cls(features, base, trellis, scales(shortest, longest), shortest, longest)
 
     def __call__(self, take):

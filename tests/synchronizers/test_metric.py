@@ -53,7 +53,8 @@ def test_energy_is_that_of_plain_velocities(trials):
     energy = np.array([DenseSynchronizer(60).fit(x).metric_.energy for x in (trials[0], X)])
     assert energy.shape == (2, 3)
     grown = energy[0] * [1, 4, 9]
-    np.testing.assert_allclose(energy[1], grown / grown.sum())
+    # It is learnt in single precision.
+    np.testing.assert_allclose(energy[1], grown / grown.sum(), rtol=1e-6)
 
 
 def test_performances_that_are_equal_teach_to_compare_them(trials):
