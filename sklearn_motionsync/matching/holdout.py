@@ -170,14 +170,25 @@ class RefinementTrial(RefinedWarper):
         positions = positions[rows].astype(np.float64, copy=False)
         base, moving = self.postures(positions)
         reach = self.matcher.trellis.reach
-        out = np.empty((2, len(positions), 2))
+        # Both hands are refined together, filled up with features that do not move.
+        n, width = len(positions), max(map(len, self.hands))
+        bases, curves = (
+            np.zeros((2, *base.shape[:1], width)),
+            np.zeros((2, *moving.shape[:2], width)),
+        )
+        by_shown = np.empty((2, *moving.shape[:2]))
         for i, shown in enumerate(self.hands[::-1]):
-            by_shown = self.blind[i].voted(positions[:, :, shown])[1]
-            curves = base[:, shown], moving[:, :, shown]
-            refined = refine_warps(*curves, by_shown, reach, self.noise_width)
-            for j, times in enumerate((by_shown, refined)):
-                out[j, :, i] = self._of_hand(i, positions, times)
-        return out
+            by_shown[i] = self.blind[i].voted(positions[:, :, shown])[1]
+            bases[i, :, : len(shown)], curves[i, :, :, : len(shown)] = (
+                base[:, shown],
+                moving[:, :, shown],
+            )
+        together = np.repeat(bases, n, axis=0), np.concatenate(curves), np.concatenate(by_shown)
+        refined = refine_warps(*together, reach, self.noise_width).reshape(by_shown.shape)
+        found = [
+            [self._of_hand(i, positions, times[i]) for i in (0, 1)] for times in (by_shown, refined)
+        ]
+        return np.array(found).swapaxes(1, 2)
 
     def misfits_by_all(self, positions, rows):
         """The same by all features: (1, n_sequences, 2)."""

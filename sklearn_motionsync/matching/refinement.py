@@ -77,7 +77,7 @@ def slow_energy(base, matched):
     The energy of the residuals, after fitting a gain and an offset to every feature and smoothing:
     noise is mostly gone.
     """
-    residuals = base - _fit_gain(base, matched)[0]
+    residuals = base - _fit_gain(base[np.newaxis], matched)[0]
     sigma = max(SMOOTHING * (len(base) - 1), _LEAST_SIGMA)
     return np.square(smooth(residuals, sigma)).sum(axis=(1, 2))
 
@@ -96,7 +96,8 @@ def refine_warps(base, moving, times, reach, noise_width=0.0):
 
     Parameters
     ----------
-    base : ndarray, shape (P, n_features)
+    base : ndarray, shape (P, n_features) or (n_sequences, P, n_features)
+        One for all, or one for each. Features that are 0 have no say.
     moving : ndarray, shape (n_sequences, P, n_features)
     times : ndarray, shape (n_sequences, P)
         Warps to begin with.
@@ -109,12 +110,12 @@ def refine_warps(base, moving, times, reach, noise_width=0.0):
     -------
     ndarray, shape (n_sequences, P)
     """
-    n_frames = len(base)
+    n_frames = times.shape[1]
     if n_frames < 5:
         return times
-    frames = np.arange(n_frames)
+    base, frames = base if base.ndim == 3 else base[np.newaxis], np.arange(n_frames)
     low, high = np.maximum(frames - reach, 0), np.minimum(frames + reach, n_frames - 1)
-    energy = np.square(base - base.mean(axis=0)).sum()
+    energy = np.square(base - base.mean(axis=1, keepdims=True)).sum(axis=(1, 2))
     rounding = np.square(16 * np.finfo(base.dtype).eps) * energy / n_frames
     splines = CubicSpline(frames, moving, axis=1).c.astype(moving.dtype, copy=False)
     splines = np.ascontiguousarray(splines.transpose(2, 1, 0, 3))
@@ -122,16 +123,17 @@ def refine_warps(base, moving, times, reach, noise_width=0.0):
     refined = times.astype(np.float64)
     active = np.arange(len(moving))
     for _ in range(_ITERATIONS):
+        own = slice(None) if len(base) == 1 else active
         values, tangents = _evaluate(splines, active, refined[active])
-        fitted, gain = _fit_gain(base, values)
-        slope, residual = gain * tangents, base - fitted
+        fitted, gain = _fit_gain(base[own], values)
+        slope, residual = gain * tangents, base[own] - fitted
         noise = typical_energy(residual, independent) / n_frames
-        pull = np.square(slope).sum(axis=2)[:, 1:-1]
-        going = (noise > rounding) & pull.any(axis=1)
+        pull = np.vecdot(slope, slope)[:, 1:-1]
+        going = (noise > rounding[own]) & pull.any(axis=1)
         active, noise, pull = active[going], noise[going], pull[going]
         if len(active) == 0:
             break
-        push = (slope[going] * residual[going]).sum(axis=2)[:, 1:-1]
+        push = np.vecdot(slope, residual)[going, 1:-1]
         stiffness = np.maximum(noise * (n_frames / _RATE_CHANGE) ** 2, 1e-9 * pull.mean(axis=1))
         steps = _solve(refined[active, 1:-1], pull, push, stiffness)
         tau = refined[active]
@@ -203,15 +205,16 @@ def _gaussian(sigma):
 def _fit_gain(base, matched):
     """``g * matched + o``, and ``g``: least squares, gains drawn a little towards 1.
 
-    ``matched`` is (n_sequences, P, n_features), ``g`` (n_sequences, 1, n_features).
+    Base and ``matched`` are (n_sequences, P, n_features), ``g`` (n_sequences, 1, n_features).
     """
-    x, y = base - base.mean(axis=0), matched - matched.mean(axis=1, keepdims=True)
+    middle = base.mean(axis=1, keepdims=True)
+    x, y = base - middle, matched - matched.mean(axis=1, keepdims=True)
     energy = np.square(y).sum(axis=1, keepdims=True)
     ridge = _RIDGE * typical_energy(y)[:, np.newaxis, np.newaxis]
     # Nothing moves: any gain fits.
     ridge[ridge == 0] = 1
     gain = ((x * y).sum(axis=1, keepdims=True) + ridge) / (energy + ridge)
-    return gain * y + base.mean(axis=0), gain
+    return gain * y + middle, gain
 
 
 def curvature(n_frames):
