@@ -36,7 +36,7 @@ def _read(estimator, source, on_rows):
     start, part, size = 0, [], 0
     for i in range(len(source)):
         part.append(source[i])
-        size += int(np.prod(np.shape(part[-1]))) * _DOUBLE
+        size += _count(part[-1]) * _DOUBLE
         if size < _BYTES and len(part) < MANY and i + 1 < len(source):
             continue
         if dtype is None:
@@ -44,6 +44,14 @@ def _read(estimator, source, on_rows):
         how = {"on_rows": on_rows, "numbers": range(start, i + 1), "dtype": dtype}
         yield check_performances(estimator, part, reset=False, level="sequence", **how)
         start, part, size = i + 1, [], 0
+
+
+def _count(x):
+    """How many numbers; none of what is no array, and will be refused."""
+    try:
+        return int(np.prod(np.shape(x)))
+    except ValueError:
+        return 0
 
 
 def _dtype_of_maps(source):

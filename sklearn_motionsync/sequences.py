@@ -40,6 +40,7 @@ __all__ = [
     "as_source",
     "check_members",
     "count_of",
+    "gives_rows",
     "taken",
     "to_frame",
 ]
@@ -158,15 +159,28 @@ def as_source(X):
         return X if isinstance(X, np.memmap) and X.ndim == 3 else None
     if isinstance(X, (list, tuple)):
         return X if len(X) and all(isinstance(x, np.memmap) and x.ndim == 2 for x in X) else None
-    other = isinstance(X, (Mapping, set, frozenset, str, bytes, pd.DataFrame)) or issparse(X)
     # A matrix, or a column of objects, is what it says it is.
-    other = other or (hasattr(X, "__array__") and getattr(X, "ndim", 0) != 3)
-    if other or not (hasattr(X, "__len__") and hasattr(X, "__getitem__")):
-        return None
-    if isinstance(as_pandas(X), pd.DataFrame):
+    if not _has_items(X) or (hasattr(X, "__array__") and getattr(X, "ndim", 0) != 3):
         return None
     first = as_pandas(X[0]) if len(X) else None
     return _Source(X, first) if first is None or _depth(first) >= 2 else None
+
+
+def gives_rows(X):
+    """Whether what is no list and no array gives the rows of a matrix by index."""
+    if not _has_items(X):
+        return False
+    if hasattr(X, "__array__"):
+        return getattr(X, "ndim", 0) == 2
+    return len(X) > 0 and _depth(X[0]) == 1
+
+
+def _has_items(X):
+    """Whether an object gives something by index, and is not of a kind that has other items."""
+    other = isinstance(X, (Mapping, set, frozenset, str, bytes, pd.DataFrame)) or issparse(X)
+    if other or not (hasattr(X, "__len__") and hasattr(X, "__getitem__")):
+        return False
+    return not isinstance(as_pandas(X), pd.DataFrame)
 
 
 class _Source:

@@ -7,7 +7,7 @@ import pandas as pd
 from scipy.special import betaincinv
 from sklearn.utils import check_random_state
 
-from ..sequences import as_collection, as_source, count_of, taken
+from ..sequences import as_collection, as_source, count_of, gives_rows, taken
 from ..tables import as_pandas
 
 __all__ = ["draw", "typical_share"]
@@ -53,14 +53,14 @@ def draw(X, size, pattern, random_state):
 
 
 def _by_index(X):
-    """Performances of a kind that gives them by index; None of what has to be refused."""
+    """Performances, or rows, of a kind that gives them by index; None of what has to be refused."""
     source = as_source(X)
     if source is not None:
         return source
     if isinstance(X, pd.DataFrame):
         return X if X.index.nlevels == 1 else as_collection(X)
     known = isinstance(X, (list, tuple)) or (isinstance(X, np.ndarray) and X.ndim > 0)
-    return X if known else None
+    return X if known or gives_rows(X) else None
 
 
 def typical_share(in_doubt, n, population):

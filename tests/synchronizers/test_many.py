@@ -45,6 +45,19 @@ class Files:
         return self.performances[i]
 
 
+class Rows(Files):
+    """A matrix on disk, such as that of HDF5."""
+
+    ndim = 2
+
+    @property
+    def shape(self):
+        return self.performances.shape
+
+    def __array__(self, dtype=None, copy=None):
+        raise AssertionError("All of it is read.")
+
+
 X = walks(16, 20)
 KINDS = {
     "double": X,
@@ -152,6 +165,7 @@ BAD = {
     "width": (X[11][:, :2], "has 2 features a frame"),
     "unit": (1e40 * X[11], "more than 1e\\+30 times as large"),
     "text": ([["a"] * 3] * 9, "is not a numeric array"),
+    "ragged": ([[1.0, 2.0, 3.0], [1.0, 2.0]], "is not a numeric array"),
 }
 
 
@@ -227,9 +241,10 @@ def test_kinds_of_samples():
         np.testing.assert_array_equal(sync.sample_, expected.sample_)
     rows = X[:, :, 0]
     expected = DenseSynchronizer(max_fit=9).fit(rows)
-    for given in (pd.DataFrame(rows), rows.tolist()):
+    for given in (pd.DataFrame(rows), rows.tolist(), Files(rows), Rows(rows)):
         sync = DenseSynchronizer(max_fit=9).fit(given)
         assert sync.pattern_.tobytes() == expected.pattern_.tobytes()
+        np.testing.assert_array_equal(sync.sample_, expected.sample_)
     whole = DenseSynchronizer(max_fit=16).fit(X)
     assert whole.pattern_.tobytes() == DenseSynchronizer().fit(X).pattern_.tobytes()
     assert whole.typical_share_ == 0
