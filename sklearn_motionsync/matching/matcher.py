@@ -37,7 +37,9 @@ class Features(NamedTuple):
     metric : Metric or None
         Learnt of velocities and postures.
     frames : int, default=None
-        At so many frames alone, evenly spaced, and in single precision.
+        At so many frames alone, evenly spaced.
+    single : bool, default=False
+        In single precision, whatever that of the postures.
     """
 
     cost: str
@@ -46,16 +48,17 @@ class Features(NamedTuple):
     unit: Unit
     metric: Metric | None = None
     frames: int | None = None
+    single: bool = False
 
     def __call__(self, positions):
         """Features, at every position, of postures in the unit: (n_sequences, Q, n_compared)."""
         features = self._of_cost(positions)
         if self.metric is not None:
             features = self.metric(features, positions)
-        if self.frames is None:
-            return features
-        some = np.round(np.linspace(0, features.shape[1] - 1, self.frames)).astype(np.intp)
-        return features[:, some].astype(np.float32)
+        if self.frames is not None:
+            some = np.round(np.linspace(0, features.shape[1] - 1, self.frames)).astype(np.intp)
+            features = features[:, some]
+        return features.astype(np.float32, copy=False) if self.single else features
 
     def _of_cost(self, positions):
         return cost_features(positions, self.cost, self.subframes, self.velocity_smoothing)
@@ -66,15 +69,19 @@ class Features(NamedTuple):
         return COSTS[self.cost].degree if self.metric is None else 0
 
     def for_search(self, n_frames, max_offset):
-        """The same as a training set is searched by: at fewer frames, if a metric is learnt.
+        """The same as a training set is searched by: at fewer frames, in single precision.
 
-        Who is typical is known from as many as the smoothing of velocities leaves independent, and
-        the band needs.
+        If a metric is learnt: who is typical is known from as many as the smoothing of velocities
+        leaves independent, and the band needs.
         """
         finest = min(self.velocity_smoothing, max_offset / _REACH)
         if self.metric is None or n_frames * finest < _WORTH:
             return self
-        return self._replace(frames=1 + math.ceil(1 / finest))
+        return self._replace(frames=1 + math.ceil(1 / finest), single=True)
+
+    def in_full(self):
+        """The same in the precision of the postures."""
+        return self._replace(single=False)
 
     def shape(self, positions):
         """How many performances and positions are compared, and how many of these are a frame."""

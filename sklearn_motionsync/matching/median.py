@@ -26,6 +26,8 @@ __all__ = [
     "sum_all",
 ]
 
+# What rounding may be of the smallest global distance.
+_SHARP = 0.01
 # Sequences that are looked at together.
 _AT_ONCE = 256
 # References of the first round: enough for a paired t test of anybody against the leader, and to
@@ -73,6 +75,10 @@ class Median(NamedTuple):
         """Nobody asked which of n performances is the median."""
         nothing = np.full(n, np.nan)
         return cls(None, nothing, nothing, False, n_matches, n, np.nan)
+
+    def is_blurred(self, rounding):
+        """Whether rounding is as large as what tells the typical ones apart."""
+        return bool(rounding > _SHARP * self.estimates.min())
 
     @property
     def achieved(self):

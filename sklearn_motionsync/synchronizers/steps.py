@@ -63,18 +63,14 @@ class DenseSteps(LongWorkMixin, Synchronizer):
             settings = self._settings()
             searched = features.for_search(self.n_frames_, settings["max_offset"])
             compared = Compared(searched, positions)
-            energy, shape = compared.energy(), searched.shape(positions)
-            searcher = Matcher.of_energy(searched, shape, energy, **settings)
+            warn_of_one_feature(self, performances, compared)
+            searcher, shared, median = self._search(searched, compared, positions, progress)
             matcher = searcher.at_all_frames(features, self.n_frames_, **settings)
             self.training_.features = features
-            warn_of_one_feature(self, performances, compared)
             self.mu_ = float(features.back(matcher.trellis.mu))
-            shared = shared_training_set(searcher, positions, compared)
-            rounding = rounding_of(compared.dtype, energy)
-            median = self._choose_median(shared, len(positions), rounding, progress)
             source = self._set_pattern(training, median, features.degree)
             # Sums over fewer frames, as if over all.
-            self.global_distances_ *= self.n_frames_ / ((shape[1] - 1) // shape[2] + 1)
+            self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
             warper = self._choose_exemplars(training, matcher, source, median.estimates)
             warper = self._decide_on_refinement(training, warper, source, progress, shared)
             self._warper = warper
@@ -85,6 +81,20 @@ class DenseSteps(LongWorkMixin, Synchronizer):
             return training.scaled
         performances = training.performances
         return training.unit.fill(normalise(performances, self.n_frames_, self.subframes))
+
+    def _search(self, features, compared, positions, progress):
+        """The matcher that searches, what portions share of the training set, and the median."""
+        energy, shape = compared.energy(), features.shape(positions)
+        searcher = Matcher.of_energy(features, shape, energy, **self._settings())
+        shared = shared_training_set(searcher, positions, compared)
+        rounding = rounding_of(compared.dtype, energy)
+        median = self._choose_median(shared, len(positions), rounding, progress)
+        rounds = features.single and positions.dtype != compared.dtype
+        if not rounds or not median.is_blurred(rounding):
+            return searcher, shared, median
+        # Trials that are equal but for next to nothing: single precision does not tell them apart.
+        features = features.in_full()
+        return self._search(features, Compared(features, positions), positions, progress)
 
     def _choose_median(self, shared, n, rounding, progress):
         """The median (Eq. 19), by all matches or some; without it, what exemplars are chosen by."""

@@ -214,3 +214,17 @@ def test_a_metric_of_other_movements_is_no_metric_of_people(standing_up):
         landed = [np.interp(moments[0], np.arange(P), tau) for tau in s.match(X[1:]).times]
         errors.append(np.abs(landed - moments[1:]).mean())
     assert errors[0] < 0.7 * errors[1]
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-6])
+def test_trials_that_hardly_differ_are_told_apart(noise):
+    """The steadiest of ten is the median, also where single precision sees no difference."""
+    t, rng = np.linspace(0, 1, 80), np.random.default_rng(0)
+    source = np.column_stack([np.cos(4 * t), np.sin(4 * t), t**2])
+    noises = noise * (1 + (3 * np.arange(10) + 2) % 10)
+    X = [source + sigma * rng.standard_normal(source.shape) for sigma in noises]
+    sync = DenseSynchronizer(refine=False).fit(X)
+    assert sync.certified_
+    assert sync.pattern_index_ == noises.argmin() == 6
+    exact = sync.match(X).distances.sum()
+    assert sync.global_distances_[6] == pytest.approx(exact, rel=0.2)
