@@ -121,15 +121,21 @@ class DenseSynchronizer(DenseSteps):
     n_frames_ : int
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
-        ``C_n`` of Eq. 19 where it is exact: for every performance after an exhaustive search, for
-        the best few after a sampled one; NaN for the others, and if nobody needed them.
+        ``C_n`` of Eq. 19 of those who met all: of every performance after an exhaustive search, of
+        the best few after a sampled one; NaN for the others, and if nobody needed them. With a
+        learnt metric the search compares, where ``P`` is 1.5 times as many or more, at as many
+        frames as the smoothing of velocities leaves independent (51 by default; more for a
+        narrow band), in single precision if that tells the typical ones apart; sums are scaled
+        to ``P``. Sums of the ``distances`` of `match`, at all frames, are within 12 % of them on
+        ten actions of people, and smallest for the same performance; the precision makes 2e-7.
     certified_ : bool
-        Whether the pattern is the median of Eq. 19: known from all matches, or because paired
-        tests, which err with a probability of 1 % all together, rejected every other performance.
-        False if the pattern was given, or a search has spent its 150 matches a performance. After
-        a fit to a sample: whether nobody else of the sample may be more typical of all.
+        Whether the pattern is the median of Eq. 19, as the search compares: known from all matches,
+        or because paired tests, which err with a probability of 1 % all together, rejected every
+        other performance. False if the pattern was given, or a search has spent its 150 matches a
+        performance. After a fit to a sample: whether nobody else of the sample may be more typical
+        of all.
     n_matches_ : int
-        Matches made to choose the pattern and the exemplars.
+        Matches by which the pattern and the exemplars were chosen.
     search_ : Bunch
         ``n_matches``, ``certified``, as above; ``in_doubt``, how many others no test rejected;
         ``excess``: with a probability of 99 % the pattern's ``C_n`` is at most ``1 + excess``
@@ -141,14 +147,16 @@ class DenseSynchronizer(DenseSteps):
         At most this share of all performances is more typical than the pattern: has a smaller
         global distance. 0 if that is the certified median of all. After a fit to a sample it holds
         with a probability of 95 % (beside the 1 % of the search), if the sample stands for all:
-        with 500 that leave no doubt it is 0.006. NaN if the pattern was given.
+        with 500 that leave no doubt it is 0.006. Distances are those of this fit, in the metric
+        of the sample. NaN if the pattern was given.
     metric_ : Bunch or None
         What was learnt: ``share``, the part of every feature in what is compared, about 0 for
         noise; ``energy``, its part in the plain velocities, which would be compared without a
         metric, above 0.95 of one of several a warning; ``performances``, the indices of those it
-        was learnt from. None if none was learnt.
+        was learnt from. It is learnt in single precision. None if none was learnt.
     mu_ : float
-        The absolute weight of the changes of pace.
+        The absolute weight of the changes of pace, by the frames that the search compares: within
+        1 % of that by all.
     exemplars_ : ndarray of int
         Indices of the performances that vote.
     misfit_ : float
