@@ -135,7 +135,7 @@ def as_collection(X):
             f"{ACCEPTED}, got dict. Use list(X.values()); or, of tables, pd.concat(X, "
             f"names={list(INDEX_NAMES)}), which keeps what they are called."
         )
-    if isinstance(X, (set, frozenset, str, bytes)) or hasattr(X, "__next__"):
+    if isinstance(X, (set, frozenset, str, bytes)) or _has_no_order(X):
         raise ValueError(f"{ACCEPTED}, got {type(X).__name__}. Use list(...) of the arrays.")
     if isinstance(X, np.ndarray):
         if X.ndim == 3:
@@ -173,6 +173,14 @@ def gives_rows(X):
     if hasattr(X, "__array__"):
         return getattr(X, "ndim", 0) == 2
     return len(X) > 0 and _depth(X[0]) == 1
+
+
+def _has_no_order(X):
+    """Whether an object has items, but does not give them by number, or not how many there are."""
+    if isinstance(X, pd.Series):
+        return X.dtype == object and any(_depth(x) >= 2 for x in X)
+    has = [hasattr(X, name) for name in ("__iter__", "__len__", "__getitem__")]
+    return not hasattr(X, "__array__") and any(has) and not all(has[1:])
 
 
 def _has_items(X):

@@ -134,3 +134,12 @@ def test_a_performance_has_frames_and_features(shape):
 def test_rows_of_several_lengths_are_no_performances(rows):
     with pytest.raises(ValueError, match="Performance 0 has 2 values in one dimension and others"):
         to_frame(rows)
+
+
+@pytest.mark.parametrize("kind", ["dict_values", "map", "set", "Series"])
+def test_what_gives_nothing_by_number_is_to_be_a_list(kind):
+    X = {k: np.zeros((5, 2)) for k in "abc"}
+    given = {"dict_values": X.values(), "map": map(X.get, X), "set": set(X), "Series": pd.Series(X)}
+    for fit in (DenseSynchronizer().fit, DenseSynchronizer(max_fit=2).fit):
+        with pytest.raises(ValueError, match=rf"got {kind}. Use list\(...\) of the arrays"):
+            fit(given[kind])
