@@ -156,7 +156,8 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Memory maps, and what gives performances by index, are read in parts, once each.
+            Memory maps, and what gives performances by index, are read in parts, once each; rows of
+            a matrix are taken into memory.
 
         Returns
         -------

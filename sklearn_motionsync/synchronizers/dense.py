@@ -125,9 +125,10 @@ class DenseSynchronizer(DenseSteps):
         the best few after a sampled one; NaN for the others, and if nobody needed them. With a
         learnt metric the search compares, where ``P`` is 1.5 times as many or more, at as many
         frames as the smoothing of velocities leaves independent (51 by default; more for a
-        narrow band), in single precision if that tells the typical ones apart; sums are scaled
-        to ``P``. Sums of the ``distances`` of `match`, at all frames, are within 12 % of them on
-        ten actions of people, and smallest for the same performance; the precision makes 2e-7.
+        narrow band), in single precision if that tells the typical ones apart, or the data have
+        no other; sums are scaled to ``P``. Sums of the ``distances`` of `match`, at all frames, are
+        within 12 % of them on ten actions of people, and smallest for the same performance; the
+        precision makes 2e-7.
     certified_ : bool
         Whether the pattern is the median of Eq. 19, as the search compares: known from all matches,
         or because paired tests, which err with a probability of 1 % all together, rejected every
