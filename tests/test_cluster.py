@@ -278,6 +278,15 @@ def test_files_that_they_do_not_see(client, files, expected, capsys):
     assert_warped(files[2], expected)
 
 
+def test_what_cannot_be_read_is_named_after_those_before_it(client, files, expected, capsys):
+    """Portions are read ahead: what is wrong with a later one is not an earlier one's fault."""
+    (files[1] / "4.npy").write_bytes((files[1] / "3.npy").read_bytes()[:500])
+    asked = [*map(str, files), "--scheduler", client.scheduler.address]
+    assert re.match(r"\S*4\.npy: It cannot be read, is it whole", stream_dask.main(asked))
+    assert capsys.readouterr().out.split("\n")[3:] == ["3.npy: done", ""]
+    assert_warped(files[2], expected)
+
+
 def test_a_worker_that_is_killed_changes_no_bit(client, fitted, portions_of_walks, expected):
     stream_dask.give(client, fitted)
     pids = client.run(os.getpid)

@@ -151,6 +151,47 @@ def test_a_portion_that_is_refused_does_not_stop_the_others(files, capsys):
     assert sorted(results(files[2])) == ["a.npy", "c.npy", "d.npy"]
 
 
+def test_a_portion_that_cannot_be_read_does_not_either(files):
+    whole = (files[1] / "a.npz").read_bytes()
+    broken = {
+        "b.npy": (files[1] / "b.npy").read_bytes()[:300],
+        "e.npz": whole[:-30],
+        "f.npy": b"",
+        "g.npz": whole[:90] + b"12345678" + whole[98:],
+    }
+    for name, content in broken.items():
+        (files[1] / name).write_bytes(content)
+    told = {source.name: wrong for source, wrong in stream_files.stream(*files)}
+    assert {name for name, wrong in told.items() if wrong} == set(broken)
+    assert all("It cannot be read, is it whole? " in told[name] for name in broken)
+    assert sorted(results(files[2])) == ["a.npy", "c.npy", "d.npy"]
+
+
+def test_what_was_asked_wrongly_leaves_the_folder_free(files):
+    """No results are there: the next command may be about another model, or method."""
+    model, walks, out = files
+    whole = model.with_name("model.joblib")
+    with pytest.raises(ValueError, match="ends in ActionModel and has no transform: .* --method"):
+        next(stream_files.stream(whole, walks, out))
+    with pytest.raises(ValueError, match="no portions"):
+        next(stream_files.stream(whole, walks.with_name("wakls"), out))
+    assert not out.exists()
+    # A model that was not fitted yet is told by the portions.
+    joblib.dump(DenseSynchronizer(), model)
+    assert "not fitted yet" in next(stream_files.stream(*files))[1]
+    assert [wrong for _, wrong in stream_files.stream(whole, walks, out, "match")] == [None] * 4
+    with pytest.raises(ValueError, match="results of another model and another method"):
+        next(stream_files.stream(*files))
+
+
+def test_results_do_not_go_among_the_portions(files):
+    model, walks, _ = files
+    before = sorted(walks.iterdir())
+    with pytest.raises(ValueError, match="Results among the portions .* give another folder"):
+        next(stream_files.stream(model, walks, walks / ".." / walks.name))
+    assert sorted(walks.iterdir()) == before
+
+
 def test_results_of_two_models_are_not_mixed(files, fitted):
     assert len(list(stream_files.stream(*files))) == 4
     with pytest.raises(ValueError, match=r"results of another method \(made_by.json\)"):
