@@ -40,8 +40,18 @@ def give(client, model, name="model"):
 
 
 def on_worker(performances, method="transform", model="model"):
-    """What the model that a worker was given under this name says of performances."""
-    return stream_files.answer(get_worker().plugins[model].model, method, performances)
+    """What the model that a worker was given under this name says of performances.
+
+    Partitions of bags may be iterators, and of those that are filtered some may be empty.
+    """
+    fitted = get_worker().plugins.get(model)
+    if fitted is None:
+        raise ValueError(f"The workers were given no {model!r}: give(client, fitted, {model!r}).")
+    if hasattr(performances, "__next__"):
+        performances = list(performances)
+    if isinstance(performances, list) and not performances:
+        return []
+    return stream_files.answer(fitted.model, method, performances)
 
 
 def stream(client, portions, method="transform", model="model"):

@@ -171,7 +171,7 @@ def test_what_was_asked_wrongly_leaves_the_folder_free(files):
     """No results are there: the next command may be about another model, or method."""
     model, walks, out = files
     whole = model.with_name("model.joblib")
-    with pytest.raises(ValueError, match="ends in ActionModel and has no transform: .* --method"):
+    with pytest.raises(ValueError, match=r"ends in ActionModel and has no transform: .* --method"):
         next(stream_files.stream(whole, walks, out))
     with pytest.raises(ValueError, match="no portions"):
         next(stream_files.stream(whole, walks.with_name("wakls"), out))
@@ -187,7 +187,7 @@ def test_what_was_asked_wrongly_leaves_the_folder_free(files):
 def test_results_do_not_go_among_the_portions(files):
     model, walks, _ = files
     before = sorted(walks.iterdir())
-    with pytest.raises(ValueError, match="Results among the portions .* give another folder"):
+    with pytest.raises(ValueError, match=r"Results among the portions .* give another folder"):
         next(stream_files.stream(model, walks, walks / ".." / walks.name))
     assert sorted(walks.iterdir()) == before
 
