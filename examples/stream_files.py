@@ -29,10 +29,11 @@ from pathlib import Path
 
 import joblib
 import numpy as np
+import pandas as pd
 import scipy
 import sklearn
 import sklearn_motionsync
-from sklearn_motionsync import Match
+from sklearn_motionsync import Match, to_sequences
 
 METHODS = ("transform", "match", "score_samples")
 
@@ -93,7 +94,20 @@ def answer(model, method, performances):
         if method == "match":
             match = Match.from_estimator(model, performances)
             return {"times": match.times, "distances": match.distances}
-        return np.asarray(getattr(model, method)(performances))
+        return as_array(getattr(model, method)(performances))
+
+
+def as_array(found):
+    """Answers as one array, also if the model gives tables (``set_output``)."""
+    if isinstance(found, pd.DataFrame):
+        many = found.index.nlevels > 1
+        found = [x.to_numpy() for x in to_sequences(found)] if many else found.to_numpy()
+    if isinstance(found, list) and len({len(x) for x in found}) > 1:
+        raise ValueError(
+            "What the model makes of performances has different lengths: give one that has a "
+            "synchronizer."
+        )
+    return np.asarray(found)
 
 
 def check(model, method):

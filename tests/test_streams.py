@@ -102,6 +102,22 @@ def test_match_and_score_samples(files, fitted):
         assert scores.tobytes() == fitted.score_samples(portion).tobytes()
 
 
+def test_tables_become_arrays(files):
+    """Of a model that gives tables: one array (n_performances, P, n_features), as without them."""
+    sync = DenseSynchronizer(n_frames=40).fit(walks(6, 0))
+    joblib.dump(sync, files[0])
+    assert [wrong for _, wrong in stream_files.stream(*files)] == [None] * 4
+    plain = results(files[2])
+    joblib.dump(sync.set_output(transform="pandas"), files[0])
+    tables = files[2].with_name("tables")
+    assert [wrong for _, wrong in stream_files.stream(*files[:2], tables)] == [None] * 4
+    assert {name: (x.shape, x.dtype, x.tobytes()) for name, x in results(tables).items()} == {
+        name: (x.shape, x.dtype, x.tobytes()) for name, x in plain.items()
+    }
+    with pytest.raises(ValueError, match=r"different lengths: give one that has a synchronizer"):
+        stream_files.answer(ASpace(2).fit(walks(6, 0)), "transform", walks(6, 0))
+
+
 # Killed when the third result is written, but has no name yet.
 KILLED = """
 import os, signal, sys
