@@ -3,7 +3,7 @@
     python stream_dask.py model.joblib performances/ synchronized/ --scheduler tcp://head:8786
 
 reads portions here, sends each to one worker, and writes what comes back: files, restarts and
-promises are those of ``stream_files.py``, but that it stops at a portion that the model refuses.
+promises are those of ``stream_files.py``, but that it stops at a portion that is refused.
 Use this if the workers do not see your files, and `give` and `on_worker` for bags and arrays.
 """
 
@@ -40,8 +40,18 @@ def give(client, model, name="model"):
 
 
 def on_worker(performances, method="transform", model="model"):
-    """What the model that a worker was given under this name says of performances."""
-    return stream_files.answer(get_worker().plugins[model].model, method, performances)
+    """What the model that a worker was given under this name says of performances.
+
+    Partitions of bags may be iterators, and of those that are filtered some may be empty.
+    """
+    fitted = get_worker().plugins.get(model)
+    if fitted is None:
+        raise ValueError(f"The workers were given no {model!r}: give(client, fitted, {model!r}).")
+    if hasattr(performances, "__next__"):
+        performances = list(performances)
+    if isinstance(performances, list) and not performances:
+        return []
+    return stream_files.answer(fitted.model, method, performances)
 
 
 def stream(client, portions, method="transform", model="model"):
@@ -79,21 +89,35 @@ def main(arguments=None):
     parser.add_argument("--method", choices=stream_files.METHODS, default="transform")
     parser.add_argument("--scheduler", help="address (default: a cluster on this machine)")
     given = parser.parse_args(arguments)
-    source = given.model
+    unread = []
+
+    def read(sources):
+        for source in sources:
+            try:
+                portion = stream_files.read(source)
+            except ValueError as error:
+                # Those before it are still to be answered.
+                unread.append(error)
+                return
+            yield portion
+
+    source = None
     try:
-        stream_files.claim(given.results, given.model, given.method)
         missing = list(stream_files.left(given.portions, given.results, given.method))
+        stream_files.claim(given.results, given.model, given.method)
         with Client(given.scheduler) as client:
             for module in (stream_files.__file__, __file__):
                 client.upload_file(module)
             give(client, joblib.load(given.model))
-            portions = (stream_files.read(source) for source, _ in missing)
-            answers = stream(client, portions, given.method)
+            answers = stream(client, read(source for source, _ in missing), given.method)
             for source, target in missing:
-                stream_files.write(target, next(answers))
+                answer = next(answers, None)
+                if answer is None:
+                    raise unread[0]
+                stream_files.write(target, answer)
                 print(f"{source.name}: done", flush=True)
     except ValueError as error:
-        return f"{source}: {error}"
+        return f"{source}: {error}" if source else str(error)
     return None
 
 

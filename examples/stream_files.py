@@ -9,8 +9,8 @@ the model answers goes into a file of the same name in the second: ``transform``
 
 A result gets its name when it is whole. So after Ctrl-C, or a kill, or a power cut, the same
 command goes on where it stopped; portions that are newer than their results are computed again.
-Results of another model are never mixed in. A portion that the model refuses is named, with the
-reason, and the others go on.
+Results of another model are never mixed in. A portion that cannot be read, or that the model
+refuses, is named, with the reason, and the others go on.
 
 With ``--scheduler tcp://...`` the workers of a Dask cluster do the work; they read the same files.
 """
@@ -22,15 +22,18 @@ import json
 import os
 import sys
 import uuid
+import zipfile
+import zlib
 from contextlib import ExitStack
 from pathlib import Path
 
 import joblib
 import numpy as np
+import pandas as pd
 import scipy
 import sklearn
 import sklearn_motionsync
-from sklearn_motionsync import Match
+from sklearn_motionsync import Match, to_sequences
 
 METHODS = ("transform", "match", "score_samples")
 
@@ -58,10 +61,11 @@ def stream(model, portions, results, method="transform", n_jobs=None):
     Raises
     ------
     ValueError
-        If the results are those of something else, or two portions have one name.
+        If the results are those of something else, the model has no such method, there are no
+        portions, two have one name, or results would lie among them.
     """
-    digest = claim(results, model, method)
     missing = list(left(portions, results, method))
+    digest = claim(results, model, method)
     tasks = (joblib.delayed(answer_file)(str(model), digest, method, *pair) for pair in missing)
     # One portion a task: what is killed loses no more than it has in hand.
     share_out = functools.partial(joblib.Parallel, n_jobs=n_jobs, batch_size=1)
@@ -90,7 +94,31 @@ def answer(model, method, performances):
         if method == "match":
             match = Match.from_estimator(model, performances)
             return {"times": match.times, "distances": match.distances}
-        return np.asarray(getattr(model, method)(performances))
+        return as_array(getattr(model, method)(performances))
+
+
+def as_array(found):
+    """Answers as one array, also if the model gives tables (``set_output``)."""
+    if isinstance(found, pd.DataFrame):
+        many = found.index.nlevels > 1
+        found = [x.to_numpy() for x in to_sequences(found)] if many else found.to_numpy()
+    if isinstance(found, list) and len({len(x) for x in found}) > 1:
+        raise ValueError(
+            "What the model makes of performances has different lengths: give one that has a "
+            "synchronizer."
+        )
+    return np.asarray(found)
+
+
+def check(model, method):
+    """Refuse a model that has no answer to this, before anything is begun."""
+    steps = [step for _, step in getattr(model, "steps", [])] if method == "match" else []
+    if not any(hasattr(each, method) for each in [model, *steps]):
+        last = type(getattr(model, "steps", [(None, model)])[-1][1]).__name__
+        raise ValueError(
+            f"The model ends in {last} and has no {method}: give another --method, or another part "
+            "of the pipeline, such as pipe[:-1]."
+        )
 
 
 @functools.lru_cache(maxsize=1)
@@ -101,10 +129,14 @@ def loaded(path, digest):
 
 def read(source):
     """The performances of a portion; those of an ``.npy`` stay on the disk until they are used."""
-    if Path(source).suffix == ".npy":
-        return np.load(source, mmap_mode="r")
-    with np.load(source) as archive:
-        return [archive[name] for name in archive.files]
+    try:
+        if Path(source).suffix == ".npy":
+            return np.load(source, mmap_mode="r")
+        # NumPy leaves a file open that is no archive.
+        with open(source, "rb") as file, np.load(file) as archive:
+            return [archive[name] for name in archive.files]
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise ValueError(f"It cannot be read, is it whole? {error}") from error
 
 
 def write(target, result):
@@ -126,6 +158,8 @@ def left(portions, results, method):
     sources = sorted(p for p in Path(portions).glob("*.np[yz]") if not p.name.startswith("."))
     if not sources:
         raise ValueError(f"There are no portions in {portions}: files .npy or .npz.")
+    if Path(results).resolve() == Path(portions).resolve():
+        raise ValueError(f"Results among the portions in {portions}: give another folder for them.")
     names = [source.stem for source in sources]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
@@ -140,22 +174,23 @@ def claim(results, model, method):
     """Say in the folder of results whose they are, or refuse to mix; the model's hash."""
     with open(model, "rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
+    check(loaded(str(model), digest), method)
     packages = (sklearn_motionsync, sklearn, np, scipy)
     whose = {"model": digest, "method": method}
     whose |= {package.__name__: package.__version__ for package in packages}
     note = Path(results) / "made_by.json"
-    if not note.exists():
-        note.parent.mkdir(parents=True, exist_ok=True)
-        part = note.with_suffix(".part")
-        part.write_text(json.dumps(whose, indent=1) + "\n", encoding="utf-8")
-        os.replace(part, note)
-    before = json.loads(note.read_text(encoding="utf-8"))
+    before = json.loads(note.read_text(encoding="utf-8")) if note.exists() else {}
     other = [name for name in whose if whose[name] != before.get(name)]
-    if other:
+    if before and other and any(Path(results).glob("*.np[yz]")):
         raise ValueError(
             f"{results} holds results of another {' and another '.join(other)} (made_by.json): "
             "give another folder, or empty this one."
         )
+    if other:
+        note.parent.mkdir(parents=True, exist_ok=True)
+        part = note.with_suffix(".part")
+        part.write_text(json.dumps(whose, indent=1) + "\n", encoding="utf-8")
+        os.replace(part, note)
     for part in Path(results).glob("*.part"):
         # Of a run that was killed.
         part.unlink(missing_ok=True)

@@ -235,6 +235,12 @@ def test_bags_and_arrays_of_dask(client, fitted, portions_of_walks, expected):
     bag = dask.bag.from_delayed([delayed(portion) for portion in few])
     warped = bag.map_partitions(stream_dask.on_worker, **ask).compute()
     assert np.stack(warped).tobytes() == stacked.tobytes()
+    # Of these, partitions are iterators, and one is empty.
+    some = dask.bag.from_sequence([0, 2, None], npartitions=3).filter(lambda i: i is not None)
+    asked = some.map(lambda i, walks: walks[i], few[0]).map_partitions(stream_dask.on_worker, **ask)
+    assert np.stack(asked.compute()).tobytes() == expected[0][[0, 2]].tobytes()
+    with pytest.raises(ValueError, match="The workers were given no 'wakls'"):
+        next(stream_dask.stream(client, few, model="wakls"))
     array = dask.array.concatenate([dask.array.from_array(p, chunks=p.shape) for p in few])
     known = {"dtype": array.dtype, "meta": np.empty((0, 0, 0)), "chunks": array.chunks}
     warped = array.map_blocks(stream_dask.on_worker, **ask, **known)
@@ -275,6 +281,15 @@ def test_files_that_they_do_not_see(client, files, expected, capsys):
     (files[2] / "2.npy").unlink()
     assert stream_dask.main(asked) is None
     assert capsys.readouterr().out == "2.npy: done\n"
+    assert_warped(files[2], expected)
+
+
+def test_what_cannot_be_read_is_named_after_those_before_it(client, files, expected, capsys):
+    """Portions are read ahead: what is wrong with a later one is not an earlier one's fault."""
+    (files[1] / "4.npy").write_bytes((files[1] / "3.npy").read_bytes()[:500])
+    asked = [*map(str, files), "--scheduler", client.scheduler.address]
+    assert re.match(r"\S*4\.npy: It cannot be read, is it whole", stream_dask.main(asked))
+    assert capsys.readouterr().out.split("\n")[3:] == ["3.npy: done", ""]
     assert_warped(files[2], expected)
 
 

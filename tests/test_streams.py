@@ -102,6 +102,22 @@ def test_match_and_score_samples(files, fitted):
         assert scores.tobytes() == fitted.score_samples(portion).tobytes()
 
 
+def test_tables_become_arrays(files):
+    """Of a model that gives tables: one array (n_performances, P, n_features), as without them."""
+    sync = DenseSynchronizer(n_frames=40).fit(walks(6, 0))
+    joblib.dump(sync, files[0])
+    assert [wrong for _, wrong in stream_files.stream(*files)] == [None] * 4
+    plain = results(files[2])
+    joblib.dump(sync.set_output(transform="pandas"), files[0])
+    tables = files[2].with_name("tables")
+    assert [wrong for _, wrong in stream_files.stream(*files[:2], tables)] == [None] * 4
+    assert {name: (x.shape, x.dtype, x.tobytes()) for name, x in results(tables).items()} == {
+        name: (x.shape, x.dtype, x.tobytes()) for name, x in plain.items()
+    }
+    with pytest.raises(ValueError, match=r"different lengths: give one that has a synchronizer"):
+        stream_files.answer(ASpace(2).fit(walks(6, 0)), "transform", walks(6, 0))
+
+
 # Killed when the third result is written, but has no name yet.
 KILLED = """
 import os, signal, sys
@@ -149,6 +165,47 @@ def test_a_portion_that_is_refused_does_not_stop_the_others(files, capsys):
     assert stream_files.main([str(path) for path in files]) == 1
     assert re.search(r"^b\.npy: Performance 1.*NaN", capsys.readouterr().out, re.MULTILINE)
     assert sorted(results(files[2])) == ["a.npy", "c.npy", "d.npy"]
+
+
+def test_a_portion_that_cannot_be_read_does_not_either(files):
+    whole = (files[1] / "a.npz").read_bytes()
+    broken = {
+        "b.npy": (files[1] / "b.npy").read_bytes()[:300],
+        "e.npz": whole[:-30],
+        "f.npy": b"",
+        "g.npz": whole[:90] + b"12345678" + whole[98:],
+    }
+    for name, content in broken.items():
+        (files[1] / name).write_bytes(content)
+    told = {source.name: wrong for source, wrong in stream_files.stream(*files)}
+    assert {name for name, wrong in told.items() if wrong} == set(broken)
+    assert all("It cannot be read, is it whole? " in told[name] for name in broken)
+    assert sorted(results(files[2])) == ["a.npy", "c.npy", "d.npy"]
+
+
+def test_what_was_asked_wrongly_leaves_the_folder_free(files):
+    """No results are there: the next command may be about another model, or method."""
+    model, walks, out = files
+    whole = model.with_name("model.joblib")
+    with pytest.raises(ValueError, match=r"ends in ActionModel and has no transform: .* --method"):
+        next(stream_files.stream(whole, walks, out))
+    with pytest.raises(ValueError, match="no portions"):
+        next(stream_files.stream(whole, walks.with_name("wakls"), out))
+    assert not out.exists()
+    # A model that was not fitted yet is told by the portions.
+    joblib.dump(DenseSynchronizer(), model)
+    assert "not fitted yet" in next(stream_files.stream(*files))[1]
+    assert [wrong for _, wrong in stream_files.stream(whole, walks, out, "match")] == [None] * 4
+    with pytest.raises(ValueError, match="results of another model and another method"):
+        next(stream_files.stream(*files))
+
+
+def test_results_do_not_go_among_the_portions(files):
+    model, walks, _ = files
+    before = sorted(walks.iterdir())
+    with pytest.raises(ValueError, match=r"Results among the portions .* give another folder"):
+        next(stream_files.stream(model, walks, walks / ".." / walks.name))
+    assert sorted(walks.iterdir()) == before
 
 
 def test_results_of_two_models_are_not_mixed(files, fitted):

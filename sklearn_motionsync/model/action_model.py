@@ -9,7 +9,7 @@ from sklearn.exceptions import NotFittedError
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
-from ..fitting import at_once, carried_on
+from ..fitting import at_once, carried_on, of_one_state
 from ..gate import check_squares
 from ..notebook import DocumentedMixin
 from ..performances import SequenceLevelMixin
@@ -154,7 +154,8 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
         """Learn of more performances, after those of earlier calls or of ``fit``.
 
         For more than memory holds, and for those that come in later. Of the performances themselves
-        only 64 are kept, so that a call costs the same however many came before.
+        only 64 are kept, so that a call costs the same however many came before; labels of groups
+        are kept all.
         Mean, variances, and who is kept are those of one ``fit`` on all, to the last bit,
         whatever the portions. So is the border of up to 64 in all; of more, those that came
         before are as unlike as they were to the ones that were kept when they came, or left.
@@ -179,8 +180,8 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
         ------
         ValueError
             If the performances have different lengths, or others than the earlier ones; if their
-            unit is such that variances are beyond the precision, or there is not a group for each.
-            The model is as it was then.
+            unit is such that variances are beyond the precision, or there is not a group for each;
+            if a parameter has become invalid. The model is as it was then.
 
         Examples
         --------
@@ -198,6 +199,8 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
         >>> model.n_samples_seen_
         30
         """
+        # Scikit-learn leaves this out of all calls but the first.
+        self._validate_params()
         if hasattr(self, "_seen"):
             performances, seen = self._check_clock(X), self._seen
         else:
@@ -206,8 +209,10 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
         return self
 
     @property
+    @of_one_state
     def deviations_(self):
         """Training performances that are kept, less the mean: (n_kept, P, n_features)."""
+        check_is_fitted(self)
         return self._seen.kept - self.mean_
 
     def check_performances(self, X):

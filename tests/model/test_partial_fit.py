@@ -251,11 +251,22 @@ def test_a_portion_that_is_refused_leaves_the_model_as_it_was(X, groups, message
     assert pickle.dumps(model) == before
 
 
+def test_a_parameter_that_became_invalid_is_refused():
+    """Later calls are not checked by scikit-learn: the border would be NaN, and nobody inside."""
+    model = ActionModel().partial_fit(curves(6, n_frames=10))
+    model.set_params(coverage=95)
+    with pytest.raises(ValueError, match="'coverage' parameter of ActionModel must be"):
+        model.partial_fit(curves(3, n_frames=10))
+    assert model.n_samples_seen_ == 6
+
+
 def test_a_first_portion_that_is_refused_leaves_nothing():
     model = ActionModel()
     with pytest.raises(ValueError, match="Performance 1 has 9 frames"):
         model.partial_fit([np.zeros((10, 2)), np.zeros((9, 2))])
     assert vars(model) == vars(ActionModel())
+    with pytest.raises(NotFittedError, match="ActionModel instance is not fitted yet"):
+        _ = model.deviations_
 
 
 def test_portions_from_several_threads_all_count():
