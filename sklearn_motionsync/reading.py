@@ -25,7 +25,7 @@ def parts_of_source(estimator, X, on_rows):
     on_rows : bool
         As for `check_performances`.
     """
-    source = None if isinstance(X, Performances) else as_source(X)
+    source = as_source(X)
     if source is None or len(source) == 0:
         return None
     return len(source), _read(estimator, source, on_rows)

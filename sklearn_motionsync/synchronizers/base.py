@@ -281,6 +281,8 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         return all_of(labels, levels, part.names), out
 
     def _read_in_parts(self, X):
+        if isinstance(X, Performances):
+            return None
         check_is_fitted(self)
         return parts_of_source(self, X, self._fitted_on_rows)
 
