@@ -172,17 +172,13 @@ class RefinementTrial(RefinedWarper):
         reach = self.matcher.trellis.reach
         # Both hands are refined together, filled up with features that do not move.
         n, width = len(positions), max(map(len, self.hands))
-        bases, curves = (
-            np.zeros((2, *base.shape[:1], width)),
-            np.zeros((2, *moving.shape[:2], width)),
-        )
+        bases = np.zeros((2, len(base), width))
+        curves = np.zeros((2, *moving.shape[:2], width))
         by_shown = np.empty((2, *moving.shape[:2]))
         for i, shown in enumerate(self.hands[::-1]):
             by_shown[i] = self.blind[i].voted(positions[:, :, shown])[1]
-            bases[i, :, : len(shown)], curves[i, :, :, : len(shown)] = (
-                base[:, shown],
-                moving[:, :, shown],
-            )
+            bases[i, :, : len(shown)] = base[:, shown]
+            curves[i, :, :, : len(shown)] = moving[:, :, shown]
         together = np.repeat(bases, n, axis=0), np.concatenate(curves), np.concatenate(by_shown)
         refined = refine_warps(*together, reach, self.noise_width).reshape(by_shown.shape)
         found = [

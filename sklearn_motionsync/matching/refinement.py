@@ -157,9 +157,9 @@ def _evaluate(splines, active, times):
     values += b
     tangents = a * (3 * x)
     tangents += 2 * b
-    for out, last in ((values, c), (tangents, c)):
+    for out in (values, tangents):
         out *= x
-        out += last
+        out += c
     values *= x
     values += d
     return values, tangents
