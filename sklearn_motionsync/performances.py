@@ -349,7 +349,11 @@ def _warn_of_clocks(performances, names):
     n_features = performances[0].shape[1]
     if n_features == 1 or min(map(len, performances)) < _CLOCK_FRAMES:
         return
-    ticks = np.all([_is_even(x) for x in performances], axis=0)
+    ticks = np.ones(n_features, dtype=bool)
+    for x in performances:
+        ticks &= _is_even(x)
+        if not ticks.any():
+            return
     for k in np.flatnonzero(ticks):
         name = k if names is None else repr(names[k])
         warnings.warn(

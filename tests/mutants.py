@@ -154,8 +154,8 @@ EQUIVALENT = {
         "model/manner",
         "np.square(on_clock - on_clock.mean(axis=(0, 1))) -> on_clock - on_clock.mean(axis=(0, 1))",
     ): "how little is no movement",
-    ("matching/narrow", "NARROW_CELLS = 30000"): SIZE,
-    ("matching/narrow", "_NARROW_WAYS = 1000000"): SIZE,
+    ("matching/narrow", "NARROW_BYTES = (1300000, 3000000)"): SIZE,
+    ("matching/narrow", "_MOST_BYTES = 15000000"): SIZE,
     ("matching/narrow", "_FEW_PAIRS = 4"): SIZE,
     ("matching/narrow", "pairs <= _FEW_PAIRS"): "both ways back find the same",
     ("matching/refinement", "np.arange(-reach, reach + 1) -> np.arange(-reach, reach)"): (

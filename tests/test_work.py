@@ -146,7 +146,7 @@ def test_verbose_tells_how_far_it_is(walks, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert all(line.startswith("[DenseSynchronizer] ") for line in lines)
     assert "comparing 300 with 32 performances: 100 %" in lines[0]
-    assert "trying to refine: 100 %" in lines[-2]
+    assert "trying a little to refine: 100 %" in lines[-2]
     assert "warping: 100 %" in lines[-1]
 
 

@@ -51,8 +51,8 @@ def vote(direct, to_exemplars, from_exemplars, lengths):
     ----------
     direct : ndarray, shape (n_sequences, P)
         ``tau_nm``.
-    to_exemplars : ndarray, shape (n_exemplars, P)
-        ``tau_nk``.
+    to_exemplars : ndarray, shape (n_exemplars, n_sequences or 1, P)
+        ``tau_nk``, of every sequence or of all.
     from_exemplars : ndarray, shape (n_exemplars, n_sequences, P)
         ``tau_km``.
     lengths : ndarray, shape (1 + n_exemplars, n_sequences)
@@ -62,9 +62,11 @@ def vote(direct, to_exemplars, from_exemplars, lengths):
     -------
     ndarray, shape (n_sequences, P)
     """
-    by_way = follow(from_exemplars, to_exemplars[:, np.newaxis])
+    by_way = follow(from_exemplars, to_exemplars)
     routes = np.concatenate([direct[np.newaxis], by_way])
-    typical = np.median(lengths, axis=0)
+    # The median; that of NumPy takes as long as all else here.
+    ranked, n = np.sort(lengths, axis=0), len(lengths)
+    typical = (ranked[(n - 1) // 2] + ranked[n // 2]) / 2
     typical = np.where(typical > 0, typical, 1)
     weights, out = np.exp(-_FALL * lengths / typical), np.empty_like(direct)
     for some in even_slices(len(out), max(1, _COMPARED // (len(routes) ** 2 * out.shape[1]))):

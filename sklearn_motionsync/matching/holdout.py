@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.special import stdtr
 
 from .matcher import Matcher
-from .refinement import match_postures, refine_warps, slow_energy
+from .refinement import MOST_STEPS, match_postures, refine_warps, slow_energy
 from .warper import RefinedWarper, Warper
 
 __all__ = ["RefinementTrial", "Verdict", "deal_features"]
@@ -26,6 +26,8 @@ _STILL = 1e-20
 _DOUBT = 0.003
 # Degrees of freedom, and standard deviation of the logarithms, that are taken for granted.
 _PRIOR = 2, 0.1
+# Where refining helps a few steps tell, at a tenth of this at most: docs/method.md.
+_GLIMPSE, _HOPELESS = 3, 0.05
 # Warps matched by all features have seen the noise of those that judge: what that may be worth.
 _SIGHT = 1.2
 
@@ -83,6 +85,11 @@ class Verdict(NamedTuple):
     p_value: float = np.nan
     ratio_to_all: float = np.nan
     misfit: float = np.nan
+
+    @property
+    def is_hopeless(self):
+        """Whether even a few steps of refining tell that it will not help; nothing to tell is."""
+        return not self.p_value <= _HOPELESS
 
     @property
     def may_help(self):
@@ -165,7 +172,11 @@ class RefinementTrial(RefinedWarper):
             blind.append(Warper.to_pattern(matcher, pattern, chosen, True, warper.warp_smoothing))
         return cls(**vars(warper), noise_width=noise_width, hands=hands, blind=blind)
 
-    def misfits(self, positions, rows):
+    def glimpse(self, positions, rows):
+        """As `misfits`, after a few steps of refining."""
+        return self.misfits(positions, rows, _GLIMPSE)
+
+    def misfits(self, positions, rows, steps=MOST_STEPS):
         """Misfits of every hand, by the features shown and refined: (2, n_sequences, 2)."""
         positions = positions[rows].astype(np.float64, copy=False)
         base, moving = self.postures(positions)
@@ -180,7 +191,7 @@ class RefinementTrial(RefinedWarper):
             bases[i, :, : len(shown)] = base[:, shown]
             curves[i, :, :, : len(shown)] = moving[:, :, shown]
         together = np.repeat(bases, n, axis=0), np.concatenate(curves), np.concatenate(by_shown)
-        refined = refine_warps(*together, reach, self.noise_width).reshape(by_shown.shape)
+        refined = refine_warps(*together, reach, self.noise_width, steps).reshape(by_shown.shape)
         found = [
             [self._of_hand(i, positions, times[i]) for i in (0, 1)] for times in (by_shown, refined)
         ]

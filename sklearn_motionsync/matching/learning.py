@@ -8,8 +8,8 @@ r (KISSME; Koestinger et al., 2012). That matrix, without what is negative, is t
 
 1. Without any matching, performances on the clock agree in what is large and slow. Features that
    do so beyond doubt give a first metric of velocities.
-2. By this one all ordered pairs are matched and voted on. At these times other features may turn
-   out to agree, too; they had no part in the matching. What is left out is noise.
+2. By this one all pairs are matched and voted on. At these times other features may turn out to
+   agree, too; they had no part in the matching. What is left out is noise.
 3. The differences give the metric of velocities and that of postures.
 """
 
@@ -43,7 +43,8 @@ def learn_metric(match, positions, velocity):
     Parameters
     ----------
     match : callable
-        ``match(features)``: voted times (n_sequences, n_sequences, P) of all ordered pairs.
+        ``match(features, others)``: voted times (n_sequences, n_others, P) of all sequences as
+        bases, each with others of its own, by their indices (n_sequences, n_others).
     positions, velocity : ndarray, shape (n_sequences, P, n_features)
         Postures on the clock and their velocities, in the unit.
 
@@ -60,11 +61,15 @@ def learn_metric(match, positions, velocity):
     told = told if told.any() else moves
     fast = compressed(velocity[:, :, told], _energy(velocity[:, :, told]))
     first = _square_root(metric_matrix(fast, _unmatched(fast))).astype(fast.dtype)
-    voted = match(fast @ first if first.any() else fast)
-    matched = _matched(np.concatenate([postures, velocity], axis=2), voted)
+    others = _others(len(positions))
+    voted = match(fast @ first if first.any() else fast, others)
+    matched = _matched(np.concatenate([postures, velocity], axis=2), others, voted)
     n_features = len(moves)
     there = [x[..., :n_features] for x in matched], [x[..., n_features:] for x in matched]
-    told |= moves & ~told & _believed(postures, velocity, *there)
+    rest = np.flatnonzero(moves & ~told)
+    if len(rest):
+        blocks = postures[..., rest], velocity[..., rest]
+        told[rest] = _believed(*blocks, *([x[..., rest] for x in block] for block in there))
     energy = _energy(velocity[:, :, told])
     postures, fast = postures[:, :, told], compressed(velocity[:, :, told], energy)
     of_postures, longer = _differences(postures, (x[..., told] for x in there[0]))
@@ -78,6 +83,14 @@ def learn_metric(match, positions, velocity):
     n_told = len(by_fast)
     maps = by_fast @ turn[:n_told], by_postures @ turn[n_told:]
     return Metric(np.flatnonzero(told), energy, *maps)
+
+
+def _others(n):
+    """Whom every sequence is a base for, so that of any two one is: (n, n // 2).
+
+    The other way round they would tell nearly the same. Who is opposite in a circle is both.
+    """
+    return (np.arange(n)[:, np.newaxis] + np.arange(1, n // 2 + 1)) % n
 
 
 def _energy(velocity):
@@ -98,13 +111,14 @@ def _evidence(block, matched):
     Parameters
     ----------
     block : ndarray, shape (n_sequences, P, n_features)
-    matched : list of ndarray (n_sequences - 1, P, n_features), or None
-        For every sequence, all others at its times; None: the same times for all.
+    matched : list of ndarray (n_others, P, n_features), or None
+        For every sequence, others at its times; None: all, at the same times.
 
     Two series that have nothing to do with each other, of autocorrelation r, correlate by the
     root of ``(1 + 2 sum r^2) / P``; every two performances are a pair of its own.
     """
     n_sequences, n_frames, n_features = block.shape
+    pairs = n_sequences * (n_sequences - 1)
     own = np.square(block).sum(axis=(0, 1))
     if matched is None:
         cross = np.square(block.sum(axis=0)).sum(axis=0) - own
@@ -114,12 +128,12 @@ def _evidence(block, matched):
         for base, moving in zip(block, matched, strict=True):
             cross += np.einsum("pk,mpk->k", base, moving)
             other += np.square(moving).sum(axis=(0, 1))
-        norm = np.sqrt(own * (n_sequences - 1) * other)
+        norm = np.sqrt(own * len(matched[0]) * other)
     power = _power(block).sum(axis=0)
     correlation = irfft(power, 2 * len(power) - 2, axis=0)[:n_frames]
     correlation /= np.where(own > 0, correlation[0], 1)
     width = 1 + 2 * np.square(correlation[1:]).sum(axis=0)
-    error = np.sqrt(2 * width / (n_sequences * (n_sequences - 1) * n_frames))
+    error = np.sqrt(2 * width / (pairs * n_frames))
     return cross / np.where(norm > 0, norm, 1) / error
 
 
@@ -172,27 +186,25 @@ def _unmatched(block):
     return 2 * (n_sequences * _moments(block) - outer) / (n_sequences - 1)
 
 
-def _matched(block, times):
-    """For every sequence, all others at its times: (n_sequences - 1, P, n_features) each.
+def _matched(block, others, times):
+    """For every sequence, its others at its times: (n_others, P, n_features) each.
 
     Parameters
     ----------
     block : ndarray, shape (n_sequences, P, n_features)
-    times : ndarray, shape (n_sequences, n_sequences, P)
-        ``tau`` of all ordered pairs.
+    others : ndarray of int, shape (n_sequences, n_others)
+    times : ndarray, shape (n_sequences, n_others, P)
+        ``tau``.
     """
-    out = []
-    for n, at in enumerate(times):
-        others = np.delete(np.arange(len(block)), n)
-        out.append(sample(block[others], at[others], block.shape[1]))
-    return out
+    n_frames = block.shape[1]
+    return [sample(block[some], at, n_frames) for some, at in zip(others, times, strict=True)]
 
 
 def _paced(matched, told, energy, times):
     """Yield matched velocities, compressed, with the weights of their rates."""
-    for n, velocity in enumerate(matched):
-        fast, rates = compressed(velocity[..., told], energy), np.gradient(times[n], axis=1)
-        fast *= (1 + RATE_WEIGHT * (np.delete(rates, n, axis=0) - 1))[:, :, np.newaxis]
+    for velocity, at in zip(matched, times, strict=True):
+        fast, rates = compressed(velocity[..., told], energy), np.gradient(at, axis=1)
+        fast *= (1 + RATE_WEIGHT * (rates - 1))[:, :, np.newaxis]
         yield fast
 
 
@@ -202,17 +214,20 @@ def _differences(block, matched):
     Parameters
     ----------
     block : ndarray, shape (n_sequences, P, n_features)
-    matched : iterable of ndarray (n_sequences - 1, P, n_features)
+    matched : iterable of ndarray (n_others, P, n_features)
     """
     n_frames, n_features = block.shape[1:]
-    covariance, power, count = np.zeros((n_features, n_features)), 0, 0
+    covariance, lagged, count = np.zeros((n_features, n_features)), 0, 0
     for base, moving in zip(block, matched, strict=True):
         differences = base - moving
         flat = differences.reshape(-1, n_features)
         covariance += flat.T @ flat
-        power = power + _power(differences).sum(axis=(0, 2))
         count += len(flat)
-    return covariance / count, _length(irfft(power)[: 1 + int(_LONGEST * n_frames)])
+        # Products of all frames with all: their diagonals are the autocovariances.
+        series = differences.swapaxes(0, 1).reshape(n_frames, -1)
+        lagged = lagged + series @ series.T
+    lags = range(1 + int(_LONGEST * n_frames))
+    return covariance / count, _length(np.array([np.trace(lagged, k) for k in lags]))
 
 
 def _power(block):

@@ -12,7 +12,7 @@ from .learning import learn_metric
 from .metric import Metric, energy_shares
 from .trellis import Trellis
 from .units import Unit
-from .warps import normalise
+from .warps import follow, normalise
 
 __all__ = ["Features", "Matcher"]
 
@@ -20,7 +20,12 @@ __all__ = ["Features", "Matcher"]
 LEARNING_FRAMES = 100
 # Frames in the reach of a band from which on finer ones do not matter to who is typical, and by how
 # many times fewer frames than all are worth it.
-_REACH, _WORTH = 8, 1.5
+_REACH, _WORTH = 6, 1.5
+
+
+def _spread(n, count):
+    """Indices of so many of n, evenly spaced, the first and the last among them."""
+    return np.round(np.linspace(0, n - 1, count)).astype(np.intp)
 
 
 class Features(NamedTuple):
@@ -52,13 +57,14 @@ class Features(NamedTuple):
 
     def __call__(self, positions):
         """Features, at every position, of postures in the unit: (n_sequences, Q, n_compared)."""
+        if self.single:
+            positions = positions.astype(np.float32, copy=False)
         features = self._of_cost(positions)
         if self.metric is not None:
             features = self.metric(features, positions)
         if self.frames is not None:
-            some = np.round(np.linspace(0, features.shape[1] - 1, self.frames)).astype(np.intp)
-            features = features[:, some]
-        return features.astype(np.float32, copy=False) if self.single else features
+            features = features[:, _spread(features.shape[1], self.frames)]
+        return features
 
     def _of_cost(self, positions):
         return cost_features(positions, self.cost, self.subframes, self.velocity_smoothing)
@@ -71,13 +77,20 @@ class Features(NamedTuple):
     def for_search(self, n_frames, max_offset):
         """The same as a training set is searched by: at fewer frames, in single precision.
 
-        If a metric is learnt: who is typical is known from as many as the smoothing of velocities
-        leaves independent, and the band needs.
+        If a metric is learnt.
+        """
+        enough = self._enough(n_frames, max_offset)
+        if self.metric is None or enough == n_frames:
+            return self
+        return self._replace(frames=enough, single=True)
+
+    def _enough(self, n_frames, max_offset):
+        """How many frames tell who is typical and what is noise, or all if not many fewer do.
+
+        As many as the smoothing of velocities leaves independent, and the band needs.
         """
         finest = min(self.velocity_smoothing, max_offset / _REACH)
-        if self.metric is None or n_frames * finest < _WORTH:
-            return self
-        return self._replace(frames=1 + math.ceil(1 / finest), single=True)
+        return n_frames if n_frames * finest < _WORTH else 1 + math.ceil(1 / finest)
 
     def in_full(self):
         """The same in the precision of the postures."""
@@ -106,21 +119,28 @@ class Features(NamedTuple):
         None if there is nothing to learn.
 
         At most ``LEARNING_FRAMES`` frames of each are looked at, which the smoothing of velocities,
-        a share of the clip, leaves without loss.
+        a share of the clip, leaves without loss; as many as are enough are matched.
         """
         # What rounding does to a metric is nothing beside what noise does.
         positions = positions.astype(np.float32, copy=False)
         velocity = self._of_cost(positions)
         n_frames = (positions.shape[1] - 1) // self.subframes + 1
-        some = np.linspace(0, positions.shape[1] - 1, min(n_frames, LEARNING_FRAMES))
-        some = np.round(some).astype(np.intp)
-        settings["max_rate"] = min(settings["max_rate"], len(some) - 1)
+        some = _spread(positions.shape[1], min(n_frames, LEARNING_FRAMES))
+        frames = np.arange(len(some))
+        few = _spread(len(some), self._enough(len(some), settings["max_offset"]))
+        settings["max_rate"] = min(settings["max_rate"], len(few) - 1)
 
-        def match(compared):
+        def match(compared, others):
+            compared = compared[:, few]
             matcher = Matcher.of(self.at_pace(1), compared, **settings)
-            return matcher.all_voted(compared, consensus, warp_smoothing)
+            times = matcher.voted(compared, others, consensus, warp_smoothing)
+            # From few frames to all.
+            times = np.interp(times, np.arange(len(few)), few)
+            return follow(times, np.interp(frames, few, np.arange(len(few)))[None, None])
 
-        positions, velocity = positions[:, some], velocity[:, some]
+        # Who of two is the base does not depend on the order they are given in.
+        order = np.argsort(np.einsum("npk,npk->n", velocity, velocity), kind="stable")
+        positions, velocity = (x[np.ix_(order, some)] for x in (positions, velocity))
         metric = learn_metric(match, positions, velocity)
         if metric is None:
             return None
@@ -228,17 +248,22 @@ class Matcher(NamedTuple):
         max_bytes = get_config()["working_memory"] * 2**20 // 2
         return self.trellis.paths_and_costs(bases, moving, max_bytes, coupling)
 
-    def all_voted(self, sequences, consensus, warp_smoothing):
-        """Times of all ordered pairs of sequences, at the pace of the frames, after the vote."""
+    def voted(self, sequences, others, consensus, warp_smoothing):
+        """Times of pairs of sequences, at the pace of the frames, after the vote.
+
+        Each is the base for others of its own: their indices, and their times, (n_sequences,
+        n_others) and (n_sequences, n_others, P).
+        """
         disparities, costs = self.paths_and_costs(sequences, sequences)
         times = self.times(disparities).astype(costs.dtype)
-        out, typical = np.empty_like(times), costs.sum(axis=1, dtype=np.float64)
-        for n in range(len(out)):
-            k = choose_exemplars(typical, consensus, n)
-            lengths = np.concatenate([costs[[n]], costs[n, k, np.newaxis] + costs[k]])
-            out[n] = vote(times[n], times[n, k], times[k], lengths)
-        flat = out.reshape(-1, out.shape[2])
-        return smoothed(flat, self.trellis.reach, warp_smoothing).reshape(out.shape)
+        typical = costs.sum(axis=1, dtype=np.float64)
+        chosen = [choose_exemplars(typical, consensus, n) for n in range(len(typical))]
+        # The base, the other and, (n_exemplars, n_pairs), the exemplars of every pair.
+        n, m = np.repeat(np.arange(len(others)), others.shape[1]), others.ravel()
+        k = np.stack(chosen, axis=1)[:, n]
+        lengths = np.concatenate([costs[n, m][np.newaxis], costs[n, k] + costs[k, m]])
+        out = vote(times[n, m], times[n, k], times[k, m], lengths)
+        return smoothed(out, self.trellis.reach, warp_smoothing).reshape(*others.shape, -1)
 
     def times(self, disparities):
         """``tau``, in frames, of disparities."""

@@ -107,5 +107,5 @@ def compressed(velocity, energy):
         The mean squared speed: a speed that is the root of it is halfway between linear and root.
     """
     scaled = velocity / np.sqrt(energy).astype(velocity.dtype)
-    scaled /= np.sqrt(1 + np.linalg.norm(scaled, axis=-1, keepdims=True))
+    scaled /= np.sqrt(1 + np.sqrt(np.vecdot(scaled, scaled)))[..., np.newaxis]
     return scaled

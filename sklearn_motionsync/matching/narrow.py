@@ -10,11 +10,12 @@ import math
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
-__all__ = ["NARROW_CELLS", "narrow_paths", "suits"]
+__all__ = ["NARROW_BYTES", "narrow_paths", "suits"]
 
-# Cells, for each group of steps, of a bundle that is narrow, and at most so many ways into them.
-NARROW_CELLS = 30_000
-_NARROW_WAYS = 1_000_000
+# Bytes, for each group of steps, of all ways into the cells of a bundle that is narrow: of one base
+# and of several, whose rows take longer; and at most for all groups. From docs/speed.md.
+NARROW_BYTES = 1_300_000, 3_000_000
+_MOST_BYTES = 15_000_000
 # Pairs so few that Python's steps cost less than NumPy's.
 _FEW_PAIRS = 4
 
@@ -25,7 +26,8 @@ def suits(bundle):
     n_steps = len(trellis.table.steps)
     consecutive = n_steps == trellis.table.steps.max() + 1
     cells = bundle.n_frames * (2 * trellis.width + 1) * bundle.pairs
-    few = cells <= NARROW_CELLS * len(trellis.groups) and cells * n_steps <= _NARROW_WAYS
+    room = min(NARROW_BYTES[bundle.n_bases > 1] * len(trellis.groups), _MOST_BYTES)
+    few = cells * n_steps * bundle.dtype.itemsize <= room
     return consecutive and few and not (trellis.free or trellis.running)
 
 

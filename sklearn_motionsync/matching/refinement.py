@@ -17,6 +17,7 @@ from .filters import SMOOTHING, smooth
 from .warps import follow
 
 __all__ = [
+    "MOST_STEPS",
     "choose_smoothing",
     "curvature",
     "independent_frames",
@@ -29,7 +30,7 @@ __all__ = [
 # How much a rate is expected to change over the whole clip, in units of the mean rate.
 _RATE_CHANGE = 2.0
 # Steps end when no frame moves by more than a hundredth of one.
-_ITERATIONS = 20
+MOST_STEPS = 20
 _LONGEST_STEP = 1.5
 _SHORTEST_STEP = 0.01
 # Gains are drawn towards 1 with this share of the energy of a typical feature.
@@ -82,7 +83,7 @@ def slow_energy(base, matched):
     return np.square(smooth(residuals, sigma)).sum(axis=(1, 2))
 
 
-def refine_warps(base, moving, times, reach, noise_width=0.0):
+def refine_warps(base, moving, times, reach, noise_width=0.0, steps=MOST_STEPS):
     """Gauss-Newton steps along the tangent that bring matched postures together.
 
     Each step solves for the whole warp at once::
@@ -105,6 +106,8 @@ def refine_warps(base, moving, times, reach, noise_width=0.0):
         Largest offset, in frames.
     noise_width : float, default=0.0
         How wide the postures were smoothed, in frames.
+    steps : int, default=20
+        At most so many.
 
     Returns
     -------
@@ -122,7 +125,7 @@ def refine_warps(base, moving, times, reach, noise_width=0.0):
     independent = independent_frames(n_frames, noise_width)
     refined = times.astype(np.float64)
     active = np.arange(len(moving))
-    for _ in range(_ITERATIONS):
+    for _ in range(steps):
         own = slice(None) if len(base) == 1 else active
         values, tangents = _evaluate(splines, active, refined[active])
         fitted, gain = _fit_gain(base[own], values)
@@ -135,11 +138,11 @@ def refine_warps(base, moving, times, reach, noise_width=0.0):
             break
         push = np.vecdot(slope, residual)[going, 1:-1]
         stiffness = np.maximum(noise * (n_frames / _RATE_CHANGE) ** 2, 1e-9 * pull.mean(axis=1))
-        steps = _solve(refined[active, 1:-1], pull, push, stiffness)
+        step = _solve(refined[active, 1:-1], pull, push, stiffness)
         tau = refined[active]
-        tau[:, 1:-1] += np.clip(steps, -_LONGEST_STEP, _LONGEST_STEP)
+        tau[:, 1:-1] += np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
         refined[active] = np.maximum.accumulate(np.clip(tau, low, high), axis=1)
-        active = active[np.abs(steps).max(axis=1) >= _SHORTEST_STEP]
+        active = active[np.abs(step).max(axis=1) >= _SHORTEST_STEP]
     return refined
 
 

@@ -299,17 +299,17 @@ class _Group(NamedTuple):
 
 def group_steps(table, mu, slopes):
     """Groups of steps of equal weights, and the group of every step."""
-    weights = np.column_stack([table.moving, table.inner])
-    unique, group_of_step = np.unique(weights, axis=0, return_inverse=True)
-    group_of_step = group_of_step.ravel()
+    weights = list(zip(table.moving.tolist(), table.inner.tolist(), strict=True))
+    unique = sorted(set(weights))
+    group_of_step = np.array([unique.index(pair) for pair in weights])
     groups = []
     for i, (moving, inner) in enumerate(unique):
         mine = group_of_step == i
         penalties = mu * table.penalty[mine]
         least = penalties.min()
         levels = [
-            (float(value - least), slopes[mine][penalties == value].tolist())
-            for value in np.unique(penalties)[::-1]
+            (value - float(least), slopes[mine][penalties == value].tolist())
+            for value in sorted(set(penalties.tolist()), reverse=True)
         ]
         groups.append(_Group(moving, inner, float(least), levels))
     return groups, group_of_step

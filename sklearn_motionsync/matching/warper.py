@@ -122,7 +122,7 @@ class Warper:
                 costs = np.stack([trellis.costs(x, moving, d) for x, d in pairs])
                 lengths = costs + coupling.cost(routes)
             lengths[1:] += self.to_lengths[:, np.newaxis].astype(lengths.dtype)
-            times = vote(times, self.to_exemplars, routes[1:], lengths)
+            times = vote(times, self.to_exemplars[:, np.newaxis], routes[1:], lengths)
         if coupling is None:
             times = smoothed(times, trellis.reach, self.warp_smoothing)
         else:

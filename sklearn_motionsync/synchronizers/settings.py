@@ -15,6 +15,8 @@ __all__ = ["Settings", "features_of", "learn_metric"]
 # max_offset="auto". A wide band leads paths astray until a metric is learnt; after that gestures
 # need it: docs/method.md.
 _NARROW, _WIDE = 0.25, 0.4
+# The largest offset that a metric is learnt by, of what is certain: docs/method.md.
+_CERTAIN = 0.12
 # velocity_smoothing="auto": what is noise a metric knows; without one it is smoothed away.
 _SMOOTH, _SHARP = SMOOTHING, 0.02
 # Steps that a path may take at a frame, all offsets together.
@@ -84,7 +86,7 @@ def learn_metric(synchronizer, plain, positions):
         return plain, None
     some = np.unique(np.round(np.linspace(0, n - 1, min(n, _MOST))).astype(np.intp))
     settings = vars(Settings.of(synchronizer, learnt=False))
-    settings = {**settings, "max_offset": min(settings["max_offset"], _NARROW)}
+    settings = {**settings, "max_offset": min(settings["max_offset"], _CERTAIN)}
     vote = {name: getattr(synchronizer, name) for name in ("consensus", "warp_smoothing")}
     features = features_of(synchronizer, plain.unit, learnt=True)
     (learnt,) = run(partial(features.learn, **vote, **settings), [(positions[some],)])

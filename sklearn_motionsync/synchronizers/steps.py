@@ -138,7 +138,9 @@ class DenseSteps(LongWorkMixin, Synchronizer):
             some = others[:: -(-len(others) // _TRIED) or 1]
             portions = {"n_jobs": self.n_jobs, "progress": progress}
             shown = training.scaled, shared, some
-            verdict = try_refinement(warper, source, *shown, self._settings(), **portions)
+            # Those who are shown some features match without a metric.
+            settings = vars(Settings.of(self, learnt=False))
+            verdict = try_refinement(warper, source, *shown, settings, **portions)
         names = "ratio", "p_value", "ratio_to_all"
         self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
         self.misfit_ = verdict.misfit

@@ -11,6 +11,9 @@ from .portions import in_portions
 
 __all__ = ["try_refinement"]
 
+# Fewer performances do not tell after a few steps whether refining may help.
+_SEVERAL = 3
+
 
 def try_refinement(warper, source, scaled, shared, some, settings, **portions):
     """The verdict on refining some performances of a training set.
@@ -49,8 +52,15 @@ def try_refinement(warper, source, scaled, shared, some, settings, **portions):
         how = {"name": name, "found": (shared, some), **portions}
         return np.concatenate(in_portions(trial, method, positions, **how), axis=1)
 
+    def verdict_on(tried):
+        return Verdict.of(np.concatenate([np.full_like(tried[:1], np.nan), tried]), energy)
+
+    if len(some) >= _SEVERAL:
+        verdict = verdict_on(misfits("glimpse", "trying a little to refine"))
+        if verdict.is_hopeless:
+            return verdict
     tried = misfits("misfits", "trying to refine")
-    verdict = Verdict.of(np.concatenate([np.full_like(tried[:1], np.nan), tried]), energy)
+    verdict = verdict_on(tried)
     if not verdict.may_help:
         return verdict
     by_all = misfits("misfits_by_all", "matching without refining")

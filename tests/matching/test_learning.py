@@ -1,5 +1,7 @@
 """The learnt metric, against loops over pairs and frames, and what it must and must not learn."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
@@ -44,11 +46,11 @@ def slow_matrix(block, differences):
 
 
 def slow_differences(block, times, weight, compress=lambda x: x):
-    """Of all ordered pairs of performances, at the times of the moving one."""
+    """Of all pairs of an odd number of performances, in a circle, at the times of the later one."""
     out, frames = [], np.arange(P)
     for n, base in enumerate(compress(block)):
         for m, other in enumerate(block):
-            if n != m:
+            if 0 < (m - n) % len(block) <= len(block) // 2:
                 tau = times[n, m]
                 moving = np.column_stack([np.interp(tau, frames, c) for c in other.T])
                 (moving,) = compress([moving])
@@ -74,13 +76,19 @@ def some_times(n):
     return np.array([[(P - 1) * t ** rng.uniform(0.8, 1.25) for _ in range(n)] for _ in range(n)])
 
 
+def told(times):
+    """A match that finds these times, whatever it is given."""
+    return lambda features, others: np.take_along_axis(times, others[:, :, np.newaxis], axis=1)
+
+
 def test_the_metric_equals_loops_over_pairs_and_frames(curves):
     positions, velocity = curves
     times, seen = some_times(len(positions)), []
 
-    def match(features):
+    def match(features, others):
         seen.append(features)
-        return times
+        assert sorted(map(sorted, pairs_of(others))) == sorted(map(list, combinations(range(5), 2)))
+        return told(times)(features, others)
 
     metric = learn_metric(match, positions, velocity)
     fast = slow_compressed(velocity)
@@ -100,6 +108,10 @@ def test_the_metric_equals_loops_over_pairs_and_frames(curves):
     expected = (vectors[:, -count:] * values[-count:]) @ vectors[:, -count:].T
     np.testing.assert_allclose(inner(metric(velocity, positions)), expected, atol=1e-9)
     assert metric.velocity.shape == metric.posture.shape == (3, count)
+
+
+def pairs_of(others):
+    return [(n, m) for n, some in enumerate(others.tolist()) for m in some]
 
 
 def inner(features):
@@ -132,12 +144,12 @@ def test_what_does_not_move_teaches_nothing():
 def test_columns_of_nothing_change_nothing(curves):
     positions, velocity = curves
     times = some_times(len(positions))
-    alone = learn_metric(lambda features: times, positions, velocity)
+    alone = learn_metric(told(times), positions, velocity)
 
     def padded(x):
         return np.insert(x, [1, 3, 3], 0, axis=2)
 
-    padding = learn_metric(lambda features: times, padded(positions), padded(velocity))
+    padding = learn_metric(told(times), padded(positions), padded(velocity))
     found = padding(padded(velocity), padded(positions))
     np.testing.assert_allclose(inner(found), inner(alone(velocity, positions)), atol=1e-12)
     np.testing.assert_array_equal(padding.features, [0, 2, 3])
@@ -151,9 +163,7 @@ def test_turned_features_are_compared_alike(curves):
     times = some_times(len(positions))
     turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
     one, other = (
-        learn_metric(lambda features: times, positions @ a, velocity @ a)(
-            velocity @ a, positions @ a
-        )
+        learn_metric(told(times), positions @ a, velocity @ a)(velocity @ a, positions @ a)
         for a in (np.eye(3), turn)
     )
     np.testing.assert_allclose(inner(one), inner(other), atol=1e-9)
@@ -161,7 +171,7 @@ def test_turned_features_are_compared_alike(curves):
 
 def test_shares_add_up_and_follow_what_is_compared(curves):
     positions, velocity = curves
-    metric = learn_metric(lambda features: some_times(5), positions, velocity)
+    metric = learn_metric(told(some_times(5)), positions, velocity)
     shares = metric.shares(velocity, positions)
     assert shares.sum() == pytest.approx(1)
     first = metric.velocity * [[1], [0], [0]], 0 * metric.posture
@@ -174,9 +184,9 @@ def test_noise_however_loud_is_left_out(curves):
     positions, velocity = curves
     rng, times = np.random.default_rng(0), some_times(5)
     noise = 100 * rng.standard_normal((2, 5, P, 4))
-    alone = learn_metric(lambda features: times, positions, velocity)
+    alone = learn_metric(told(times), positions, velocity)
     loud, fast = (np.concatenate(x, axis=2) for x in zip(noise, (positions, velocity), strict=True))
-    found = learn_metric(lambda features: times, loud, fast)
+    found = learn_metric(told(times), loud, fast)
     np.testing.assert_array_equal(found.features, alone.features + 4)
     np.testing.assert_allclose(found(fast, loud), alone(velocity, positions), atol=1e-9)
     np.testing.assert_array_equal(found.shares(fast, loud)[:4], 0)
@@ -195,5 +205,5 @@ def test_a_feature_that_agrees_once_matched_comes_back():
     times = 59 * np.array([[np.interp(p, q, t) for q in phases] for p in phases])
     velocity = np.gradient(x, axis=1)
     even = np.broadcast_to(np.arange(60.0), times.shape)
-    assert learn_metric(lambda features: even, x, velocity).features.tolist() == [0]
-    assert learn_metric(lambda features: times, x, velocity).features.tolist() == [0, 1]
+    assert learn_metric(told(even), x, velocity).features.tolist() == [0]
+    assert learn_metric(told(times), x, velocity).features.tolist() == [0, 1]

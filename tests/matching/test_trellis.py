@@ -57,9 +57,9 @@ CASES = [
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("whole", [False, True], ids=["reals", "ties"])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize("narrow_cells", [0, 30_000], ids=["wide", "narrow"])
-def test_equals_every_admissible_path(case, make_costs, whole, dtype, narrow_cells, monkeypatch):
-    monkeypatch.setattr(narrow, "NARROW_CELLS", narrow_cells)
+@pytest.mark.parametrize("narrow_bytes", [0, 10**6], ids=["wide", "narrow"])
+def test_equals_every_admissible_path(case, make_costs, whole, dtype, narrow_bytes, monkeypatch):
+    monkeypatch.setattr(narrow, "NARROW_BYTES", [narrow_bytes] * 2)
     n_frames, max_rate, subframes, reach, mu = case
     costs = make_costs(max_rate, subframes)
     bases, moving = draw(np.random.default_rng(n_frames), 3, n_frames, subframes, whole=whole)
@@ -123,9 +123,9 @@ def test_equal_free_ends_are_in_the_middle():
 
 @pytest.mark.parametrize("make_costs", [posture_costs, rate_weighted_costs])
 @pytest.mark.parametrize("n_bases", [1, 2])
-@pytest.mark.parametrize("narrow_cells", [0, 30_000], ids=["wide", "narrow"])
-def test_coupled_paths_equal_every_path(make_costs, n_bases, narrow_cells, monkeypatch):
-    monkeypatch.setattr(narrow, "NARROW_CELLS", narrow_cells)
+@pytest.mark.parametrize("narrow_bytes", [0, 10**6], ids=["wide", "narrow"])
+def test_coupled_paths_equal_every_path(make_costs, n_bases, narrow_bytes, monkeypatch):
+    monkeypatch.setattr(narrow, "NARROW_BYTES", [narrow_bytes] * 2)
     costs, rng = make_costs(2, 2), np.random.default_rng(0)
     bases, moving = rng.standard_normal((n_bases, 5, 2)), rng.standard_normal((3, 9, 2))
     coupling = Coupling(0.7, rng.uniform(-1, 1, (n_bases, 3, 5)))
@@ -200,7 +200,7 @@ def test_tiles_do_not_change_the_answer(n_bases, table, monkeypatch):
     monkeypatch.setattr(tiling, "TILE_BASES", 2)
     monkeypatch.setattr(tiling, "LONG_ROW", 1)
     monkeypatch.setattr(rows, "PRODUCT_ROWS", 3)
-    monkeypatch.setattr(narrow, "NARROW_CELLS", 0)
+    monkeypatch.setattr(narrow, "NARROW_BYTES", [0, 0])
     np.testing.assert_allclose(trellis.distances(bases, moving), whole, rtol=1e-12)
     np.testing.assert_array_equal(trellis.paths(bases, moving), paths)
 
@@ -210,7 +210,7 @@ def test_tiles_do_not_change_the_answer(n_bases, table, monkeypatch):
 @pytest.mark.parametrize("n_frames", [2, 16, 17, 150])
 def test_rows_that_are_not_kept_are_computed_again(n_frames, n_bases, table, monkeypatch):
     """Little memory, the same bits."""
-    monkeypatch.setattr(narrow, "NARROW_CELLS", 0)
+    monkeypatch.setattr(narrow, "NARROW_BYTES", [0, 0])
     bases, moving = draw(np.random.default_rng(3), n_bases, n_frames, table.subframes)
     trellis = Trellis(table, 0.5, min(40, n_frames - 1))
     paths = trellis.paths(bases, moving)

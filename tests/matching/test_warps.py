@@ -66,8 +66,9 @@ def test_the_vote_is_the_weighted_median_of_all_routes():
     back = np.stack([random_warps(rng, 4, 15) for _ in range(6)])
     for n_exemplars in (1, 2, 6):
         lengths = rng.uniform(1, 5, (1 + n_exemplars, 4))
-        found = vote(direct, there[:n_exemplars], back[:n_exemplars], lengths)
-        alike = vote(direct, there[:n_exemplars], back[:n_exemplars], np.ones_like(lengths))
+        routes = there[:n_exemplars, np.newaxis], back[:n_exemplars]
+        found = vote(direct, *routes, lengths)
+        alike = vote(direct, *routes, np.ones_like(lengths))
         for m in range(4):
             routes = [direct[m]]
             routes += [np.interp(there[k], frames, back[k, m]) for k in range(n_exemplars)]
@@ -79,7 +80,9 @@ def test_the_vote_is_the_weighted_median_of_all_routes():
 def test_without_any_distance_all_routes_have_the_same_say():
     rng = np.random.default_rng(0)
     direct, there, back = random_warps(rng, 1, 9), random_warps(rng, 2, 9), random_warps(rng, 2, 9)
-    alike = (vote(direct, there, back[:, np.newaxis], x * np.ones((3, 1))) for x in (0, 1))
+    alike = (
+        vote(direct, there[:, np.newaxis], back[:, np.newaxis], x * np.ones((3, 1))) for x in (0, 1)
+    )
     np.testing.assert_array_equal(*alike)
 
 
