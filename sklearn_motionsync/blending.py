@@ -123,7 +123,7 @@ def blend_performances(
     >>> pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(), DenseSynchronizer())
     >>> between = blend_performances(pipe.fit(bunch.data), bunch.data, {0: 0.5, 3: 0.5})
     >>> len(bunch.data[0]), len(between), len(bunch.data[3])
-    (101, 105, 108)
+    (101, 104, 108)
 
     The movement of the first at the pace of the fourth:
 

@@ -120,10 +120,15 @@ class SequenceLevelMixin:
         known = map(vars(self).get, ("n_features_in_", "_fitted_on_rows", "feature_names_in_"))
         if isinstance(X, Performances) and X.suits(*known):
             return X
-        check_is_fitted(self)
-        return check_performances(
-            self, X, reset=False, level="sequence", on_rows=self._fitted_on_rows
-        )
+        on_rows = self._read_rows_in_fit()
+        return check_performances(self, X, reset=False, level="sequence", on_rows=on_rows)
+
+    def _read_rows_in_fit(self):
+        """Whether it was fitted on 2-D input; an error if it was not fitted."""
+        on_rows = vars(self).get("_fitted_on_rows")
+        if on_rows is None:
+            check_is_fitted(self)
+        return on_rows
 
     def _check_training_set(self, X, numbers=None):
         """The same in ``fit``, where it is learnt what to expect; of some, with their numbers."""
@@ -179,8 +184,10 @@ def check_performances(
         )
     _check_names(estimator, sequences[0], reset)
     told = names is not None and isinstance(names[0], str)
-    first = pd.DataFrame(arrays[0], columns=names) if told else arrays[0]
-    validate_data(estimator, first, reset=reset, skip_check_array=True)
+    # Of arrays there is nothing that was not checked above, if those of fit were arrays, too.
+    if reset or told or hasattr(estimator, "feature_names_in_"):
+        first = pd.DataFrame(arrays[0], columns=names) if told else arrays[0]
+        validate_data(estimator, first, reset=reset, skip_check_array=True)
     is_array = getattr(X, "ndim", 1) == 3
     kind = "frame" if isinstance(X, pd.DataFrame) else "array" if is_array else "list"
     names = getattr(estimator, "feature_names_in_", None)

@@ -26,8 +26,8 @@ _STILL = 1e-20
 _DOUBT = 0.003
 # Degrees of freedom, and standard deviation of the logarithms, that are taken for granted.
 _PRIOR = 2, 0.1
-# Where refining helps a few steps tell, at a tenth of this at most: docs/method.md.
-_GLIMPSE, _HOPELESS = 3, 0.05
+# Where refining helps a few steps of some tell: docs/method.md.
+_GLIMPSE, _HOPELESS = 3, 0.1
 # Warps matched by all features have seen the noise of those that judge: what that may be worth.
 _SIGHT = 1.2
 

@@ -20,7 +20,7 @@ __all__ = ["Features", "Matcher"]
 LEARNING_FRAMES = 100
 # Frames in the reach of a band from which on finer ones do not matter to who is typical, and by how
 # many times fewer frames than all are worth it.
-_REACH, _WORTH = 6, 1.5
+_REACH, _WORTH = 8, 1.5
 
 
 def _spread(n, count):

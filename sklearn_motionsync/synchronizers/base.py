@@ -283,8 +283,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
     def _read_in_parts(self, X):
         if isinstance(X, Performances):
             return None
-        check_is_fitted(self)
-        return parts_of_source(self, X, self._fitted_on_rows)
+        return parts_of_source(self, X, self._read_rows_in_fit())
 
     def _match_in_parts(self, X):
         """The match of performances by ``_match``, which is given those that are read in parts."""

@@ -166,8 +166,8 @@ class DenseSynchronizer(DenseSteps):
     refinement_ : Bunch
         What was found out by ``refine="auto"``, on features that had no part in the warps:
         ``ratio``, their misfit after refining by the other features to that after matching by the
-        others alone; ``p_value``, of a t test that refining does not help; both after three steps
-        if these leave no hope; ``ratio_to_all``, to the misfit after matching by all features,
+        others alone; ``p_value``, of a t test that refining does not help; both after a first
+        look if that leaves no hope; ``ratio_to_all``, to the misfit after matching by all features,
         if that is still asked. NaN where nothing tells.
     refines_ : bool
         Whether warps are refined.

@@ -97,8 +97,8 @@ n_features_in_, feature_names_in_
     ...     last[:, k] = np.interp(t - 0.05 * np.sin(np.pi * t) ** 2, t, X[5][:, k])
     >>> lags = sync.lags([X[5], last], unit="percent")
     >>> change = lags.values[1] - lags.values[0]
-    >>> dict(zip(lags.parts, change.max(axis=1).round().tolist()))
-    {'left arm': 0.0, 'right arm': 5.0, 'left leg': 0.0, 'right leg': 0.0, 'trunk': 0.0}
+    >>> dict(zip(lags.parts, change.max(axis=1).round(1).tolist()))
+    {'left arm': 0.0, 'right arm': 5.1, 'left leg': 0.2, 'right leg': 0.8, 'trunk': 0.2}
     """
 
     _parameter_constraints: dict = {

@@ -16,7 +16,7 @@ __all__ = ["Settings", "features_of", "learn_metric"]
 # need it: docs/method.md.
 _NARROW, _WIDE = 0.25, 0.4
 # The largest offset that a metric is learnt by, of what is certain: docs/method.md.
-_CERTAIN = 0.12
+_CERTAIN = 0.2
 # velocity_smoothing="auto": what is noise a metric knows; without one it is smoothed away.
 _SMOOTH, _SHARP = SMOOTHING, 0.02
 # Steps that a path may take at a frame, all offsets together.

@@ -11,7 +11,8 @@ from .portions import in_portions
 
 __all__ = ["try_refinement"]
 
-# Fewer performances do not tell after a few steps whether refining may help.
+# Fewer performances do not tell after a few steps whether refining may help; of twice as many
+# every second one is looked at first.
 _SEVERAL = 3
 
 
@@ -48,15 +49,16 @@ def try_refinement(warper, source, scaled, shared, some, settings, **portions):
     (trial,) = run(partial(RefinementTrial.of, **settings), [portion])
     energy = np.square(trial.pattern - trial.pattern.mean(axis=0)).sum() or 1.0
 
-    def misfits(method, name):
-        how = {"name": name, "found": (shared, some), **portions}
-        return np.concatenate(in_portions(trial, method, positions, **how), axis=1)
+    def misfits(method, name, every=1):
+        how = {"name": name, "found": (shared, some[::every]), **portions}
+        return np.concatenate(in_portions(trial, method, positions[::every], **how), axis=1)
 
     def verdict_on(tried):
         return Verdict.of(np.concatenate([np.full_like(tried[:1], np.nan), tried]), energy)
 
     if len(some) >= _SEVERAL:
-        verdict = verdict_on(misfits("glimpse", "trying a little to refine"))
+        every = 1 if len(some) < 2 * _SEVERAL else 2
+        verdict = verdict_on(misfits("glimpse", "trying a little to refine", every))
         if verdict.is_hopeless:
             return verdict
     tried = misfits("misfits", "trying to refine")
