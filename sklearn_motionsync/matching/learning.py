@@ -72,8 +72,9 @@ def learn_metric(match, positions, velocity):
         told[rest] = _believed(*blocks, *([x[..., rest] for x in block] for block in there))
     energy = _energy(velocity[:, :, told])
     postures, fast = postures[:, :, told], compressed(velocity[:, :, told], energy)
-    of_postures, longer = _differences(postures, (x[..., told] for x in there[0]))
-    of_fast, alike = _differences(fast, _paced(there[1], told, energy, voted))
+    there = there if told.all() else [[x[..., told] for x in block] for block in there]
+    of_postures, longer = _differences(postures, there[0])
+    of_fast, alike = _differences(fast, _paced(there[1], energy, voted))
     by_fast = _square_root(metric_matrix(fast, of_fast))
     # Differences that stay alike for longer are fewer pieces of evidence.
     by_postures = _square_root(metric_matrix(postures, of_postures)) * np.sqrt(alike / longer)
@@ -200,11 +201,12 @@ def _matched(block, others, times):
     return [sample(block[some], at, n_frames) for some, at in zip(others, times, strict=True)]
 
 
-def _paced(matched, told, energy, times):
+def _paced(matched, energy, times):
     """Yield matched velocities, compressed, with the weights of their rates."""
-    for velocity, at in zip(matched, times, strict=True):
-        fast, rates = compressed(velocity[..., told], energy), np.gradient(at, axis=1)
-        fast *= (1 + RATE_WEIGHT * (rates - 1))[:, :, np.newaxis]
+    weights = 1 + RATE_WEIGHT * (np.gradient(times, axis=2) - 1)
+    for velocity, own in zip(matched, weights, strict=True):
+        fast = compressed(velocity, energy)
+        fast *= own[:, :, np.newaxis]
         yield fast
 
 

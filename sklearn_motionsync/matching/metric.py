@@ -53,11 +53,10 @@ class Metric(NamedTuple):
 
     def shares(self, velocity, positions):
         """The share of every feature in what is compared; that of noise is about 0."""
-        compared, parts = self(velocity, positions), self._parts(velocity, positions)
-        shares = np.zeros(positions.shape[2])
+        parts = self._parts(velocity, positions)
+        compared, shares = _flat(self.of_parts(*parts)), np.zeros(positions.shape[2])
         for part, weights in zip(parts, (self.velocity, self.posture), strict=True):
-            with_all = np.einsum("npk,npc->kc", part, compared)
-            shares[self.features] += (with_all * weights).sum(axis=1)
+            shares[self.features] += (_flat(part).T @ compared * weights).sum(axis=1)
         return shares / shares.sum()
 
     def part(self, columns, velocity):
@@ -81,6 +80,11 @@ class Metric(NamedTuple):
     def _parts(self, velocity, positions):
         fast = compressed(velocity[:, :, self.features], self.energy)
         return fast, without_mean(positions[:, :, self.features])
+
+
+def _flat(block):
+    """All frames of all sequences, one below the other."""
+    return block.reshape(-1, block.shape[2])
 
 
 def energy_shares(velocity):

@@ -1,5 +1,6 @@
 """What is compared of a training set: kept of a small one, made in portions of a large one."""
 
+import functools
 import threading
 
 import numpy as np
@@ -36,10 +37,10 @@ class Compared:
     def __len__(self):
         return len(self._positions)
 
-    @property
-    def dtype(self):
-        """Of the features."""
-        return self.of(np.arange(1)).dtype
+    @functools.cached_property
+    def like(self):
+        """An array of no performance that is of the kind of the features: (0, Q, n_compared)."""
+        return self.of(np.arange(1))[:0].copy()
 
     @property
     def kept(self):

@@ -49,7 +49,7 @@ class _TrainingSet:
         If they are not kept, those of the fewer performances are held, and a batch has all tiles of
         some of the others.
         """
-        n_compared = self._compared.of(np.arange(1)).shape[2]
+        n_compared = self._compared.like.shape[2]
         tiles = list(self.matcher.trellis.tiles(len(bases), len(moving), n_compared))
         size = size(len(tiles))
         if self._compared.is_kept:

@@ -87,9 +87,9 @@ class DenseSteps(LongWorkMixin, Synchronizer):
         energy, shape = compared.energy(), features.shape(positions)
         searcher = Matcher.of_energy(features, shape, energy, **self._settings())
         shared = shared_training_set(searcher, positions, compared)
-        rounding = rounding_of(compared.dtype, energy)
+        rounding = rounding_of(compared.like.dtype, energy)
         median = self._choose_median(shared, len(positions), rounding, progress)
-        rounds = features.single and positions.dtype != compared.dtype
+        rounds = features.single and positions.dtype != compared.like.dtype
         if not rounds or not median.is_blurred(rounding):
             return searcher, shared, median
         # Trials that are equal but for next to nothing: single precision does not tell them apart.
