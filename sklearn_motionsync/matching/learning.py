@@ -18,7 +18,6 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from .costs import RATE_WEIGHT
 from .metric import Metric, compressed, without_mean
-from .warps import sample
 
 __all__ = ["learn_metric", "metric_matrix"]
 
@@ -65,14 +64,13 @@ def learn_metric(match, positions, velocity):
     voted = match(fast @ first if first.any() else fast, others)
     matched = _matched(np.concatenate([postures, velocity], axis=2), others, voted)
     n_features = len(moves)
-    there = [x[..., :n_features] for x in matched], [x[..., n_features:] for x in matched]
+    there = matched[..., :n_features], matched[..., n_features:]
     rest = np.flatnonzero(moves & ~told)
     if len(rest):
-        blocks = postures[..., rest], velocity[..., rest]
-        told[rest] = _believed(*blocks, *([x[..., rest] for x in block] for block in there))
+        told[rest] = _believed(*(x[..., rest] for x in (postures, velocity, *there)))
     energy = _energy(velocity[:, :, told])
     postures, fast = postures[:, :, told], compressed(velocity[:, :, told], energy)
-    there = there if told.all() else [[x[..., told] for x in block] for block in there]
+    there = there if told.all() else [x[..., told] for x in there]
     of_postures, longer = _differences(postures, there[0])
     of_fast, alike = _differences(fast, _paced(there[1], energy, voted))
     by_fast = _square_root(metric_matrix(fast, of_fast))
@@ -112,7 +110,7 @@ def _evidence(block, matched):
     Parameters
     ----------
     block : ndarray, shape (n_sequences, P, n_features)
-    matched : list of ndarray (n_others, P, n_features), or None
+    matched : ndarray, shape (n_sequences, n_others, P, n_features), or None
         For every sequence, others at its times; None: all, at the same times.
 
     Two series that have nothing to do with each other, of autocorrelation r, correlate by the
@@ -125,11 +123,9 @@ def _evidence(block, matched):
         cross = np.square(block.sum(axis=0)).sum(axis=0) - own
         norm = own * (n_sequences - 1)
     else:
-        cross, other = np.zeros((2, n_features))
-        for base, moving in zip(block, matched, strict=True):
-            cross += np.einsum("pk,mpk->k", base, moving)
-            other += np.square(moving).sum(axis=(0, 1))
-        norm = np.sqrt(own * len(matched[0]) * other)
+        cross = np.einsum("npk,nmpk->k", block, matched)
+        other = np.einsum("nmpk,nmpk->k", matched, matched)
+        norm = np.sqrt(own * matched.shape[1] * other)
     power = _power(block).sum(axis=0)
     correlation = irfft(power, 2 * len(power) - 2, axis=0)[:n_frames]
     correlation /= np.where(own > 0, correlation[0], 1)
@@ -188,7 +184,7 @@ def _unmatched(block):
 
 
 def _matched(block, others, times):
-    """For every sequence, its others at its times: (n_others, P, n_features) each.
+    """For every sequence, its others at its times: (n_sequences, n_others, P, n_features).
 
     Parameters
     ----------
@@ -197,8 +193,19 @@ def _matched(block, others, times):
     times : ndarray, shape (n_sequences, n_others, P)
         ``tau``.
     """
-    n_frames = block.shape[1]
-    return [sample(block[some], at, n_frames) for some, at in zip(others, times, strict=True)]
+    n_frames, n_features = block.shape[1:]
+    left = np.clip(times.astype(np.intp), 0, n_frames - 2)
+    weights = (times - left)[..., np.newaxis]
+    left += n_frames * others[..., np.newaxis]
+    frames = block.reshape(-1, n_features)
+    out = np.empty((*times.shape, n_features), block.dtype)
+    # One at a time: what stands in between stays in the cache.
+    for at, weight, own in zip(left, weights, out, strict=True):
+        np.multiply(frames.take(at, axis=0), 1 - weight, out=own)
+        following = frames.take(at + 1, axis=0)
+        following *= weight
+        own += following
+    return out
 
 
 def _paced(matched, energy, times):
@@ -217,6 +224,7 @@ def _differences(block, matched):
     ----------
     block : ndarray, shape (n_sequences, P, n_features)
     matched : iterable of ndarray (n_others, P, n_features)
+        For every sequence.
     """
     n_frames, n_features = block.shape[1:]
     covariance, lagged, count = np.zeros((n_features, n_features)), 0, 0

@@ -44,7 +44,8 @@ def try_refinement(warper, source, scaled, shared, some, settings, **portions):
     if not hands:
         return Verdict()
     positions = shared.here.positions[some].astype(np.float64, copy=False)
-    source, width = warper.positions([source]), choose_smoothing(scaled[some])
+    every = 1 if len(some) < 2 * _SEVERAL else 2
+    source, width = warper.positions([source]), choose_smoothing(scaled[some[::every]])
     portion = warper, source, positions, hands, width
     (trial,) = run(partial(RefinementTrial.of, **settings), [portion])
     energy = np.square(trial.pattern - trial.pattern.mean(axis=0)).sum() or 1.0
@@ -57,7 +58,6 @@ def try_refinement(warper, source, scaled, shared, some, settings, **portions):
         return Verdict.of(np.concatenate([np.full_like(tried[:1], np.nan), tried]), energy)
 
     if len(some) >= _SEVERAL:
-        every = 1 if len(some) < 2 * _SEVERAL else 2
         verdict = verdict_on(misfits("glimpse", "trying a little to refine", every))
         if verdict.is_hopeless:
             return verdict
