@@ -116,7 +116,7 @@ def _evidence(block, matched):
     Two series that have nothing to do with each other, of autocorrelation r, correlate by the
     root of ``(1 + 2 sum r^2) / P``; every two performances are a pair of its own.
     """
-    n_sequences, n_frames, n_features = block.shape
+    n_sequences, n_frames = block.shape[:2]
     pairs = n_sequences * (n_sequences - 1)
     own = np.square(block).sum(axis=(0, 1))
     if matched is None:
