@@ -126,17 +126,17 @@ class Features(NamedTuple):
         velocity = self._of_cost(positions)
         n_frames = (positions.shape[1] - 1) // self.subframes + 1
         some = _spread(positions.shape[1], min(n_frames, LEARNING_FRAMES))
-        frames = np.arange(len(some))
         few = _spread(len(some), self._enough(len(some), settings["max_offset"]))
         settings["max_rate"] = min(settings["max_rate"], len(few) - 1)
+        # Where all frames lie among the few.
+        within = np.interp(np.arange(len(some)), few, np.arange(len(few)))
 
         def match(compared, others):
             compared = compared[:, few]
             matcher = Matcher.of(self.at_pace(1), compared, **settings)
             times = matcher.voted(compared, others, consensus, warp_smoothing)
-            # From few frames to all.
             times = np.interp(times, np.arange(len(few)), few)
-            return follow(times, np.interp(frames, few, np.arange(len(few)))[None, None])
+            return follow(times, within[np.newaxis, np.newaxis])
 
         # Who of two is the base does not depend on the order they are given in.
         order = np.argsort(np.einsum("npk,npk->n", velocity, velocity), kind="stable")

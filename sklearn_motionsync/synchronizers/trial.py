@@ -58,9 +58,9 @@ def try_refinement(warper, source, scaled, shared, some, settings, **portions):
         return Verdict.of(np.concatenate([np.full_like(tried[:1], np.nan), tried]), energy)
 
     if len(some) >= _SEVERAL:
-        verdict = verdict_on(misfits("glimpse", "trying a little to refine", every))
-        if verdict.is_hopeless:
-            return verdict
+        seen = verdict_on(misfits("glimpse", "trying a little to refine", every))
+        if seen.is_hopeless:
+            return seen
     tried = misfits("misfits", "trying to refine")
     verdict = verdict_on(tried)
     if not verdict.may_help:
