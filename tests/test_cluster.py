@@ -77,6 +77,15 @@ def received(client):
     return np.array(list(client.run(n_bytes).values()))
 
 
+def moved(client):
+    """Bytes of data that each worker has fetched from another one so far."""
+
+    def n_bytes(dask_worker):
+        return sum(fetched["total"] for fetched in dask_worker.transfer_incoming_log)
+
+    return np.array(list(client.run(n_bytes).values()))
+
+
 def walks(n, n_frames, n_features):
     steps = np.random.default_rng(0).standard_normal((n, n_frames, n_features))
     return np.cumsum(steps, axis=1)
@@ -153,10 +162,11 @@ def test_warping_sends_every_performance_to_one_worker(client):
     many = np.concatenate([X] * 15)
     sync = DenseSynchronizer(search="sampled").fit(X)
     expected = sync.transform(many)
-    before = received(client)
+    before = received(client) - moved(client)
     with joblib.parallel_config(backend="dask"):
         warped = sync.transform(many)
-    assert (received(client) - before).sum() <= 1.5 * many.nbytes
+    # To which worker a portion is sent is joblib's choice; if that one is busy, Dask moves it.
+    assert (received(client) - moved(client) - before).sum() <= 1.1 * many.nbytes
     assert warped.tobytes() == expected.tobytes()
 
 
