@@ -64,7 +64,7 @@ def vote(direct, to_exemplars, from_exemplars, lengths):
     """
     by_way = follow(from_exemplars, to_exemplars)
     routes = np.concatenate([direct[np.newaxis], by_way])
-    # The median; that of NumPy takes as long as all else here.
+    # The median; that of NumPy takes as long as following all routes.
     ranked, n = np.sort(lengths, axis=0), len(lengths)
     typical = (ranked[(n - 1) // 2] + ranked[n // 2]) / 2
     typical = np.where(typical > 0, typical, 1)

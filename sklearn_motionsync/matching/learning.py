@@ -18,6 +18,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from .costs import RATE_WEIGHT
 from .metric import Metric, compressed, without_mean
+from .warps import sample
 
 __all__ = ["learn_metric", "metric_matrix"]
 
@@ -194,18 +195,8 @@ def _matched(block, others, times):
         ``tau``.
     """
     n_frames, n_features = block.shape[1:]
-    left = np.clip(times.astype(np.intp), 0, n_frames - 2)
-    weights = (times - left)[..., np.newaxis]
-    left += n_frames * others[..., np.newaxis]
-    frames = block.reshape(-1, n_features)
-    out = np.empty((*times.shape, n_features), block.dtype)
-    # One at a time: what stands in between stays in the cache.
-    for at, weight, own in zip(left, weights, out, strict=True):
-        np.multiply(frames.take(at, axis=0), 1 - weight, out=own)
-        following = frames.take(at + 1, axis=0)
-        following *= weight
-        own += following
-    return out
+    matched = sample(block[others.ravel()], times.reshape(-1, n_frames), n_frames)
+    return matched.reshape(*times.shape, n_features)
 
 
 def _paced(matched, energy, times):

@@ -171,7 +171,7 @@ def squared_distances(sequences, other):
     Infinite where double precision does not reach.
     """
     exponent = max(exponent_of(sequences), exponent_of(other))
-    differences = np.ldexp(sequences, -exponent) - np.ldexp(other, -exponent)
+    differences = _scaled(sequences, -exponent) - _scaled(other, -exponent)
     squares = np.square(differences).sum(axis=(1, 2), dtype=np.float64)
     with np.errstate(over="ignore", under="ignore"):
         return np.ldexp(squares, 2 * exponent)
