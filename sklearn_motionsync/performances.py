@@ -84,7 +84,7 @@ class Performances(tuple):
         frames = [self.frames[i] for i in indices] if self.frames else []
         labels = [self.labels[i] for i in indices]
         numbers = [self.numbers[i] for i in indices]
-        some = [self[i] for i in indices]
+        some = map(super().__getitem__, indices)
         return Performances(some, kind, labels, frames, self.names, self.levels, numbers)
 
     def suits(self, n_features=None, on_rows=None, names=None):

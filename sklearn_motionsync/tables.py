@@ -156,8 +156,9 @@ def labels_of(sequences, numbers=None):
 
 def own_label(x):
     """The label that a DataFrame carries, and its level names without the last; None if none."""
-    attrs = x.attrs if isinstance(x, pd.DataFrame) else {}
-    label, levels = attrs.get(_LABEL), attrs.get(_LEVELS, INDEX_NAMES)
+    if not isinstance(x, pd.DataFrame):
+        return None, None
+    label, levels = x.attrs.get(_LABEL), x.attrs.get(_LEVELS, INDEX_NAMES)
     if label is None or not isinstance(levels, (tuple, list)):
         return None, None
     levels = tuple(levels)[:-1]

@@ -17,6 +17,8 @@ __all__ = ["Unit", "exponent_of", "squared_distances"]
 # that differ by less than this share of their energy are copies: the rest is rounding.
 _STILL = 2.0**-44
 _COPY = 2.0**-30
+# Above this the squares of all that counts are within single precision.
+_ROOTS_HOLD = 1e-15
 # Up to this exponent a power of two is a plain number in single precision.
 _PLAIN = 100
 # Numbers that are looked at together: what stands in between is no copy of a large set.
@@ -80,6 +82,17 @@ class Unit(NamedTuple):
         for rows in _portions(on_clock):
             on_clock[rows] = self(on_clock[rows])
         return on_clock
+
+    def first_beyond(self, size, arrays):
+        """The index of the first array that holds a number of this size in the unit, or None."""
+        # No number is larger than the root of all squares, if these are not below their precision.
+        roots = np.sqrt([np.vdot(x, x) for x in arrays], dtype=np.float64)
+        clear = (roots > _ROOTS_HOLD) & (self.back(roots, -1) < size)
+        for i in np.flatnonzero(~clear):
+            largest = max(arrays[i].max(), -arrays[i].min())
+            if not self.back(largest, -1) < size:
+                return int(i)
+        return None
 
     def part(self, columns):
         """That of some features alone, by their indices."""

@@ -27,7 +27,7 @@ def normalise(arrays, n_frames, subframes=1):
     ndarray, shape (n_sequences, (P - 1) * subframes + 1, n_features)
     """
     if subframes == 1 and all(len(x) == n_frames for x in arrays):
-        return np.stack(arrays)
+        return np.concatenate(arrays).reshape(len(arrays), n_frames, -1)
     times = np.arange((n_frames - 1) * subframes + 1) / subframes
     return sample(arrays, np.broadcast_to(times, (len(arrays), len(times))), n_frames)
 

@@ -320,11 +320,8 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
 
     def _check_unit(self, performances, what=None):
         """Refuse what is far beyond the training set."""
-        sizes = np.array([max(x.max(), -x.min()) for x in performances], dtype=np.float64)
-        with np.errstate(over="ignore"):
-            sizes = np.ldexp(sizes, -self._unit.exponent)
-        if not (sizes < _FAR).all():
-            i = int(np.argmin(sizes < _FAR))
+        i = self._unit.first_beyond(_FAR, performances)
+        if i is not None:
             raise ValueError(
                 f"{what or performances.called(i)} is more than {_FAR:.0e} times as large as the "
                 "training set: give it in the same unit."

@@ -140,7 +140,7 @@ def warp_in_portions(warper, arrays, *along, n_jobs, progress, name):
     times : ndarray, shape (n_sequences, P)
     """
     slices = _slices(warper, len(arrays))
-    portions = _Portions(slices, lambda rows: (*_together(arrays[rows]), *(x[rows] for x in along)))
+    portions = _Portions(slices, lambda rows: (_Arrays(arrays[rows]), *(x[rows] for x in along)))
     distances, times = np.empty(len(arrays)), np.empty((len(arrays), len(warper.pattern)))
     jobs = {"n_jobs": n_jobs, "step": progress.stage(name, len(slices))}
     results = run(_warps, portions, common=(Common(warper),), **jobs)
@@ -162,14 +162,19 @@ class _Portions:
         return map(self._make, self._slices)
 
 
-def _together(arrays):
-    """Arrays as one, which is sent as a whole, and their lengths."""
-    return np.concatenate(list(arrays)), np.array([len(x) for x in arrays])
+class _Arrays(list):
+    """Arrays that are one where they are sent."""
+
+    def __reduce__(self):
+        return _apart, (np.concatenate(self), [len(x) for x in self])
 
 
-def _warps(warper, frames, lengths, *along):
+def _apart(frames, lengths):
     ends = np.cumsum(lengths)
-    arrays = [frames[end - n : end] for end, n in zip(ends, lengths, strict=True)]
+    return [frames[end - n : end] for end, n in zip(ends, lengths, strict=True)]
+
+
+def _warps(warper, arrays, *along):
     return warper.warps(warper.positions(arrays), np.s_[:], *along)
 
 

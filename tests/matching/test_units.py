@@ -102,3 +102,21 @@ def test_squared_distances_in_any_unit(sequences):
     assert (squared_distances(1e300 * sequences, 1e300 * base) == np.inf).all()
     assert exponent_of(np.array([-5.0, 3.0])) == 3
     assert exponent_of(np.array([])) == 0
+
+
+@pytest.mark.parametrize(
+    ("dtype", "power", "beyond"),
+    [
+        *((np.float64, power, 1e30) for power in (-300, -160, -37, 0, 37, 150, 270)),
+        *((np.float32, power, 1e30) for power in (-36, -20, 0, 5)),
+        *((np.float32, power, 1e3) for power in (-34, 0, 20, 34)),
+    ],
+)
+def test_the_first_array_beyond(sequences, dtype, power, beyond):
+    unit = Unit.of((10.0**power * sequences).astype(dtype))
+    # Many numbers just below the border, of which the root of all squares is above.
+    near = np.full((50, 5), 0.999 * np.ldexp(beyond, unit.exponent), dtype)
+    still, far = np.zeros((50, 5), dtype), near.copy()
+    far[7, 3] *= -1.01
+    assert unit.first_beyond(beyond, [near, still, -near]) is None
+    assert unit.first_beyond(beyond, [near, still, far, near, far]) == 2
