@@ -83,22 +83,21 @@ def _walk(bundle, ways):
     order, (n_frames, _, n_cells) = trellis.table.steps, ways.shape
     shift = trellis.slopes * pairs
     here = trellis.width * pairs + np.arange(pairs)
-    at = np.empty((n_frames, pairs), dtype=np.intp)
-    at[-1] = here
     if pairs <= _FEW_PAIRS:
+        at = np.empty((n_frames, pairs), dtype=np.intp)
+        at[-1] = here
         for pair, cell in enumerate(here.tolist()):
             at[:-1, pair] = _walk_alone(ways, cell, order, shift, bundle.handicaps[:, pair])
     else:
-        handicaps, flat = bundle.handicaps, list(ways.reshape(n_frames, -1))
         # The cell of every entry of the step table; that of the first tells where the path is.
-        cells = here + (order * n_cells)[:, np.newaxis]
-        first = cells[0]
-        for p in range(n_frames - 1, 0, -1):
-            value = flat[p].take(cells)
+        cells = np.empty((n_frames, len(order), pairs), dtype=np.intp)
+        cells[-1] = here + (order * n_cells)[:, np.newaxis]
+        flat, handicaps, subtract = ways.reshape(n_frames, -1), bundle.handicaps, np.subtract
+        for way, there, before in zip(flat[:0:-1], cells[:0:-1], cells[-2::-1], strict=True):
+            value = way[there]
             value += handicaps
-            cells -= shift.take(value.argmin(axis=0))
-            at[p - 1] = first
-        at[:-1] -= order[0] * n_cells
+            subtract(there, shift[value.argmin(axis=0)], before)
+        at = cells[:, 0] - order[0] * n_cells
     return bundle.disparities(at // pairs - trellis.width)
 
 
