@@ -1,8 +1,10 @@
 """Gaussian filters along time, and derivatives under them."""
 
+import functools
+
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import correlate1d, gaussian_filter1d
 from sklearn import get_config
 
 __all__ = ["SMOOTHING", "smooth"]
@@ -45,8 +47,8 @@ def _smooth(on_clock, sigma, order):
             continued = np.pad(continued, [(0, 0), (beyond, beyond), (0, 0)], mode="edge")
             reach += beyond
         return _convolve(continued, sigma, order)[:, reach:-reach]
-    filtered = gaussian_filter1d(continued, sigma, axis=1, order=order, mode="nearest")
-    return filtered[:, reach:-reach]
+    kernel = _kernel(float(sigma), order)
+    return correlate1d(continued, kernel[::-1], axis=1, mode="nearest")[:, reach:-reach]
 
 
 def _margin(sigma):
@@ -54,12 +56,20 @@ def _margin(sigma):
     return int(4 * sigma + 0.5)
 
 
-def _convolve(sequences, sigma, order):
-    """The same filter by Fourier transforms, for wide ones; the margins are of no use."""
+@functools.lru_cache(maxsize=64)
+def _kernel(sigma, order):
+    """What a filter makes of an impulse: its weights, the last first."""
     margin = _margin(sigma)
     impulse = np.zeros(2 * margin + 1)
     impulse[margin] = 1
     kernel = gaussian_filter1d(impulse, sigma, order=order, mode="constant")
+    kernel.flags.writeable = False
+    return kernel
+
+
+def _convolve(sequences, sigma, order):
+    """The same filter by Fourier transforms, for wide ones; the margins are of no use."""
+    margin, kernel = _margin(sigma), _kernel(float(sigma), order)
     length = next_fast_len(sequences.shape[1] + 2 * margin, real=True)
     spectrum = rfft(kernel, length)[:, np.newaxis]
     out = np.empty_like(sequences)

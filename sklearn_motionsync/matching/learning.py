@@ -57,20 +57,21 @@ def learn_metric(match, positions, velocity):
     if len(positions) < 2 or not moves.any():
         return None
     postures = without_mean(positions)
-    told = moves & _believed(postures, velocity)
+    both = np.concatenate([postures, velocity], axis=2)
+    errors = _errors(both)
+    told = moves & _believed(_agreement(both), errors)
     told = told if told.any() else moves
     fast = compressed(velocity[:, :, told], _energy(velocity[:, :, told]))
     first = _square_root(metric_matrix(fast, _unmatched(fast))).astype(fast.dtype)
     others = _others(len(positions))
     voted = match(fast @ first if first.any() else fast, others)
-    matched = _matched(np.concatenate([postures, velocity], axis=2), others, voted)
-    n_features = len(moves)
-    there = matched[..., :n_features], matched[..., n_features:]
-    rest = np.flatnonzero(moves & ~told)
-    if len(rest):
-        told[rest] = _believed(*(x[..., rest] for x in (postures, velocity, *there)))
+    matched = _matched(both, others, voted)
+    if not told[moves].all():
+        told |= moves & _believed(_agreement(both, matched), errors)
     energy = _energy(velocity[:, :, told])
     postures, fast = postures[:, :, told], compressed(velocity[:, :, told], energy)
+    n_features = len(moves)
+    there = matched[..., :n_features], matched[..., n_features:]
     there = there if told.all() else [x[..., told] for x in there]
     of_postures, longer = _differences(postures, there[0])
     of_fast, alike = _differences(fast, _paced(there[1], energy, voted))
@@ -98,41 +99,47 @@ def _energy(velocity):
     return float(np.square(velocity).sum(axis=2).mean())
 
 
-def _believed(postures, velocity, *matched):
+def _believed(agreement, errors):
     """Whether performances agree in a feature, in posture and velocity together: (n_features,)."""
-    matched = matched or (None, None)
-    evidence = _evidence(postures, matched[0]) + _evidence(velocity, matched[1])
-    return evidence / np.sqrt(2) > _DOUBT
+    evidence = (agreement / errors).reshape(2, -1)
+    return evidence.sum(axis=0) / np.sqrt(2) > _DOUBT
 
 
-def _evidence(block, matched):
-    """Mean correlation of two performances in every feature, in its standard errors.
+def _agreement(block, matched=None):
+    """Mean correlation of two performances in every feature: (n_features,).
 
     Parameters
     ----------
     block : ndarray, shape (n_sequences, P, n_features)
-    matched : ndarray, shape (n_sequences, n_others, P, n_features), or None
+    matched : ndarray, shape (n_sequences, n_others, P, n_features), default=None
         For every sequence, others at its times; None: all, at the same times.
+    """
+    own = np.square(block).sum(axis=0).sum(axis=0)
+    if matched is None:
+        norm = own * (len(block) - 1)
+        cross = np.square(block.sum(axis=0)).sum(axis=0) - own
+    else:
+        together, squares = np.zeros(block.shape[1:]), np.zeros(block.shape[1:])
+        for base, moving in zip(block, matched, strict=True):
+            together += base * moving.sum(axis=0)
+            squares += np.square(moving).sum(axis=0)
+        norm = np.sqrt(own * matched.shape[1] * squares.sum(axis=0))
+        cross = together.sum(axis=0)
+    return cross / np.where(norm > 0, norm, 1)
+
+
+def _errors(block):
+    """Standard errors of that: (n_features,).
 
     Two series that have nothing to do with each other, of autocorrelation r, correlate by the
     root of ``(1 + 2 sum r^2) / P``; every two performances are a pair of its own.
     """
     n_sequences, n_frames = block.shape[:2]
-    pairs = n_sequences * (n_sequences - 1)
-    own = np.square(block).sum(axis=(0, 1))
-    if matched is None:
-        cross = np.square(block.sum(axis=0)).sum(axis=0) - own
-        norm = own * (n_sequences - 1)
-    else:
-        cross = np.einsum("npk,nmpk->k", block, matched)
-        other = np.einsum("nmpk,nmpk->k", matched, matched)
-        norm = np.sqrt(own * matched.shape[1] * other)
     power = _power(block).sum(axis=0)
     correlation = irfft(power, 2 * len(power) - 2, axis=0)[:n_frames]
-    correlation /= np.where(own > 0, correlation[0], 1)
+    correlation /= np.where(correlation[0] > 0, correlation[0], 1)
     width = 1 + 2 * np.square(correlation[1:]).sum(axis=0)
-    error = np.sqrt(2 * width / (pairs * n_frames))
-    return cross / np.where(norm > 0, norm, 1) / error
+    return np.sqrt(2 * width / (n_sequences * (n_sequences - 1) * n_frames))
 
 
 def metric_matrix(block, covariance):

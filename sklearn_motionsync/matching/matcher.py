@@ -171,7 +171,7 @@ class Features(NamedTuple):
 
     def positions(self, arrays, n_frames):
         """Performances at every position of the clock (Eq. 7), in the unit."""
-        return self.unit(normalise(arrays, n_frames, self.subframes))
+        return self.unit.fill(normalise(arrays, n_frames, self.subframes))
 
     def back(self, squares):
         """Squares of features in the unit of the data."""

@@ -4,6 +4,7 @@ Powers of two are taken out, which costs no bit: nothing that is computed depend
 no square is too large or too small for the precision.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -62,9 +63,9 @@ class Unit(NamedTuple):
         centre, rounding = (np.ldexp(x, size - exponent) for x in (centre, rounding))
         return cls(centre, exponent, np.where(moves, 0, rounding), copies)
 
-    def __call__(self, postures):
+    def __call__(self, postures, out=None):
         """Postures (..., n_features), centred, in this unit; what does not move is exactly 0."""
-        out = _scaled(postures, -self.exponent)
+        out = _scaled(postures, -self.exponent, out)
         out -= self.centre
         still = np.flatnonzero(self.rounding)
         if len(still):
@@ -80,18 +81,18 @@ class Unit(NamedTuple):
     def fill(self, on_clock):
         """Take sequences (n_sequences, P, n_features) over into this unit, where they are."""
         for rows in _portions(on_clock):
-            on_clock[rows] = self(on_clock[rows])
+            self(on_clock[rows], out=on_clock[rows])
         return on_clock
 
     def first_beyond(self, size, arrays):
         """The index of the first array that holds a number of this size in the unit, or None."""
-        # No number is larger than the root of all squares, if these are not below their precision.
-        roots = np.sqrt([np.vdot(x, x) for x in arrays], dtype=np.float64)
-        clear = (roots > _ROOTS_HOLD) & (self.back(roots, -1) < size)
-        for i in np.flatnonzero(~clear):
-            largest = max(arrays[i].max(), -arrays[i].min())
-            if not self.back(largest, -1) < size:
-                return int(i)
+        limit = float(self.back(size, 1))
+        for i, x in enumerate(arrays):
+            # No number is larger than the root of all squares, if these hold what counts.
+            root = math.sqrt(np.vdot(x, x))
+            near = _ROOTS_HOLD < root < limit or max(float(x.max()), -float(x.min())) < limit
+            if not near:
+                return i
         return None
 
     def part(self, columns):
@@ -119,11 +120,11 @@ class Unit(NamedTuple):
             return np.ldexp(np.asarray(values, dtype=np.float64), degree * self.exponent)
 
 
-def _scaled(values, exponent):
+def _scaled(values, exponent, out=None):
     """``values * 2 ** exponent``, to the bit; ``ldexp`` takes twenty times as long."""
     if abs(exponent) > _PLAIN:
-        return np.ldexp(values, exponent)
-    return values * values.dtype.type(2.0**exponent)
+        return np.ldexp(values, exponent, out=out)
+    return np.multiply(values, values.dtype.type(2.0**exponent), out=out)
 
 
 def _portions(on_clock):

@@ -63,7 +63,9 @@ def _sample(arrays, times, n_frames, out):
     left += np.cumsum(last + 1)[:, np.newaxis] - (last + 1)
     with np.errstate(over="ignore", invalid="ignore"):
         has_gaps = not np.isfinite(frames.sum())
-        np.multiply(frames.take(left, axis=0), 1 - weight, out=out)
+        # All are there; looking twice whether they are takes a copy.
+        frames.take(left, axis=0, out=out, mode="clip")
+        out *= 1 - weight
         left += 1
         following = frames.take(left, axis=0)
         following *= weight
