@@ -129,7 +129,7 @@ def _agreement(block, matched=None):
 
 
 def _errors(block):
-    """Standard errors of that: (n_features,).
+    """Standard errors of the agreement of series that have nothing in common: (n_features,).
 
     Two series that have nothing to do with each other, of autocorrelation r, correlate by the
     root of ``(1 + 2 sum r^2) / P``; every two performances are a pair of its own.
