@@ -51,10 +51,14 @@ def deal_features(on_clock):
     if len(moving) < 2:
         return []
     frames = frames[:, moving] / np.sqrt(energy[moving])
-    count, group_of = connected_components(np.abs(frames.T @ frames) > _SAME, directed=False)
-    if count < 2:
+    alike = np.abs(frames.T @ frames) > _SAME
+    groups = list(moving[:, np.newaxis])
+    # Mostly all say different things, which is soon seen.
+    if np.count_nonzero(alike) > len(alike):
+        count, group_of = connected_components(alike, directed=False)
+        groups = [moving[group_of == k] for k in range(count)]
+    if len(groups) < 2:
         return []
-    groups = [moving[group_of == k] for k in range(count)]
     weights = np.array([energy[group].sum() for group in groups])
     hands, loads = [[], []], np.zeros(2)
     for k in np.argsort(-weights, kind="stable"):
@@ -192,19 +196,22 @@ class RefinementTrial(RefinedWarper):
             curves[i, :, :, : len(shown)] = moving[:, :, shown]
         together = np.repeat(bases, n, axis=0), np.concatenate(curves), np.concatenate(by_shown)
         refined = refine_warps(*together, reach, self.noise_width, steps).reshape(by_shown.shape)
-        found = [
-            [self._of_hand(i, positions, times[i]) for i in (0, 1)] for times in (by_shown, refined)
-        ]
-        return np.array(found).swapaxes(1, 2)
+        return self._misfits_of(positions, np.stack([by_shown, refined]))
 
     def misfits_by_all(self, positions, rows):
         """The same by all features: (1, n_sequences, 2)."""
         positions = positions[rows].astype(np.float64, copy=False)
         times = self.voted(positions)[1]
-        return np.stack([self._of_hand(i, positions, times) for i in (0, 1)], axis=1)[None]
+        return self._misfits_of(positions, np.stack([times, times])[np.newaxis])
 
-    def _of_hand(self, i, positions, times):
-        # Judged by postures as they are: smoothing them blurs what noise tells of time.
-        held = self.hands[i]
-        postures = positions[:, :: self.matcher.features.subframes, held]
-        return slow_energy(self.pattern[:, held], match_postures(postures, times))
+    def _misfits_of(self, positions, times):
+        """Misfits of every hand at its times, (n_kinds, 2, n_sequences, P), of some kinds."""
+        n_kinds, _, n_sequences, n_frames = times.shape
+        out = np.empty((n_kinds, n_sequences, 2))
+        for i, held in enumerate(self.hands):
+            # Judged by postures as they are: smoothing them blurs what noise tells of time.
+            postures = positions[:, :: self.matcher.features.subframes, held]
+            postures = np.tile(postures, (n_kinds, 1, 1))
+            matched = match_postures(postures, times[:, i].reshape(-1, n_frames))
+            out[:, :, i] = slow_energy(self.pattern[:, held], matched).reshape(n_kinds, -1)
+        return out
