@@ -17,8 +17,6 @@ _HELP_FOR_TABLES = (
     "; give numbers. If it tells performances apart, to_sequences(df, by={0}, time=...) cuts the "
     "whole table; otherwise leave it out, x.drop(columns={0})"
 )
-# Numbers up to which linear algebra uses one thread.
-_SHORT = 10_000
 _KEPT = np.dtype(np.float64), np.dtype(np.float32)
 _SECONDS = "Give seconds as numbers, (t - t[0]) / np.timedelta64(1, 's')"
 
@@ -46,6 +44,7 @@ def as_numbers(values, what, *, dtype=None):
     ValueError
         If it is text, dates, complex, masked, ragged, or beyond double precision.
     """
+    # Nothing to refuse, and nothing to change.
     if type(values) is np.ndarray and values.dtype in _KEPT and dtype in (None, values.dtype):
         return values
     refuse(values, what)
@@ -196,8 +195,9 @@ def check_finite(array, where, names=None, frames=None, *, allow_nan=False):
         Refuse infinity only.
     """
     # A sum is not finite if a term is not; no mask is made of a sound array.
-    if _has_finite_sum(array) or np.isfinite(array).all():
-        return
+    with np.errstate(over="ignore", invalid="ignore"):
+        if math.isfinite(array.sum()) or np.isfinite(array).all():
+            return
     bad = np.isinf(array) if allow_nan else ~np.isfinite(array)
     if not bad.any():
         return
@@ -210,14 +210,6 @@ def check_finite(array, where, names=None, frames=None, *, allow_nan=False):
         f"{where} {frame}{label}, feature {feature}{name} is {kind}; the input must be finite. "
         f"{advice}, or drop the performance. (Input X contains NaN or infinity.)"
     )
-
-
-def _has_finite_sum(array):
-    if array.size < _SHORT:
-        # Of squares: it warns of nothing, and takes a third of the time.
-        return math.isfinite(np.vdot(array, array))
-    with np.errstate(over="ignore", invalid="ignore"):
-        return math.isfinite(array.sum())
 
 
 def check_squares(values, squares, what):

@@ -51,14 +51,10 @@ def deal_features(on_clock):
     if len(moving) < 2:
         return []
     frames = frames[:, moving] / np.sqrt(energy[moving])
-    alike = np.abs(frames.T @ frames) > _SAME
-    groups = list(moving[:, np.newaxis])
-    # Mostly all say different things, which is soon seen.
-    if np.count_nonzero(alike) > len(alike):
-        count, group_of = connected_components(alike, directed=False)
-        groups = [moving[group_of == k] for k in range(count)]
-    if len(groups) < 2:
+    count, group_of = connected_components(np.abs(frames.T @ frames) > _SAME, directed=False)
+    if count < 2:
         return []
+    groups = [moving[group_of == k] for k in range(count)]
     weights = np.array([energy[group].sum() for group in groups])
     hands, loads = [[], []], np.zeros(2)
     for k in np.argsort(-weights, kind="stable"):

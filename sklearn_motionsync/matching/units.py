@@ -4,7 +4,6 @@ Powers of two are taken out, which costs no bit: nothing that is computed depend
 no square is too large or too small for the precision.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +17,6 @@ __all__ = ["Unit", "exponent_of", "squared_distances"]
 # that differ by less than this share of their energy are copies: the rest is rounding.
 _STILL = 2.0**-44
 _COPY = 2.0**-30
-# Above this the squares of all that counts are within single precision.
-_ROOTS_HOLD = 1e-15
 # Up to this exponent a power of two is a plain number in single precision.
 _PLAIN = 100
 # Numbers that are looked at together: what stands in between is no copy of a large set.
@@ -87,13 +84,8 @@ class Unit(NamedTuple):
     def first_beyond(self, size, arrays):
         """The index of the first array that holds a number of this size in the unit, or None."""
         limit = float(self.back(size, 1))
-        for i, x in enumerate(arrays):
-            # No number is larger than the root of all squares, if these hold what counts.
-            root = math.sqrt(np.vdot(x, x))
-            near = _ROOTS_HOLD < root < limit or max(float(x.max()), -float(x.min())) < limit
-            if not near:
-                return i
-        return None
+        near = (float(x.max()) < limit and -float(x.min()) < limit for x in arrays)
+        return next((i for i, is_near in enumerate(near) if not is_near), None)
 
     def part(self, columns):
         """That of some features alone, by their indices."""

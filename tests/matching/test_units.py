@@ -114,7 +114,6 @@ def test_squared_distances_in_any_unit(sequences):
 )
 def test_the_first_array_beyond(sequences, dtype, power, beyond):
     unit = Unit.of((10.0**power * sequences).astype(dtype))
-    # Many numbers just below the border, of which the root of all squares is above.
     near = np.full((50, 5), 0.999 * np.ldexp(beyond, unit.exponent), dtype)
     still, far = np.zeros((50, 5), dtype), near.copy()
     far[7, 3] *= -1.01
