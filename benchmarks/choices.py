@@ -17,7 +17,8 @@ import numpy as np
 from events import EVENTS, P
 from people import figures, geometric_means, read_people
 from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.matching import costs, learning
+from sklearn_motionsync.matching import costs
+from sklearn_motionsync.matching import metric as learning
 
 CHOICES = {
     "metric": [None],

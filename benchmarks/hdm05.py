@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from sklearn_motionsync import Skeleton
-from sklearn_motionsync.datasets import read_motion
+from sklearn_motionsync.io import read_motion
 
 ACTIONS = (
     "depositFloorR",

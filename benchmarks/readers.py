@@ -19,7 +19,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from sklearn_motionsync.datasets import read_motion
+from sklearn_motionsync.io import read_motion
 
 # -- the plain parsers ------------------------------------------------------------------
 

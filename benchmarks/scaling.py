@@ -71,9 +71,9 @@ MANY = """
 sync = DenseSynchronizer(max_fit=500, **settings).fit(X)
 forget_peak()
 before, start = peak(), time.process_time()
-at_once = 1000 if mode == "maps" else n
-for first in range(0, n, at_once):
-    sync.transform(X if at_once == n else X[first : first + at_once])
+atomic_fit = 1000 if mode == "maps" else n
+for first in range(0, n, atomic_fit):
+    sync.transform(X if atomic_fit == n else X[first : first + atomic_fit])
 seconds = time.process_time() - start
 print(f"{seconds:.0f} s | {1e3 * seconds / n:.2f} ms | {(peak() - before) / 2**20:.0f} MB |")
 """

@@ -31,7 +31,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.costs import step_table
-from sklearn_motionsync.matching.factors import Bases
+from sklearn_motionsync.matching.rows import Bases
 from sklearn_motionsync.matching.trellis import Trellis
 
 HERE = Path(__file__).resolve().parent

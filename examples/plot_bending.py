@@ -23,16 +23,14 @@ from sklearn.model_selection import LeaveOneGroupOut
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
-    ActionModelDisplay,
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
     KeyframeSynchronizer,
     LinearSynchronizer,
-    SkeletonDisplay,
-    SynchronizationDisplay,
 )
 from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.display import ActionModelDisplay, SkeletonDisplay, SynchronizationDisplay
 from sklearn_motionsync.metrics import keyframe_error, sobolev_least_squares
 
 parser = argparse.ArgumentParser(

@@ -14,10 +14,10 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     Match,
-    SkeletonDisplay,
     blend_performances,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import SkeletonDisplay
 
 bunch = make_bending(8, style=2, random_state=11)
 pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(0.95), DenseSynchronizer())

@@ -13,15 +13,9 @@ import matplotlib.pyplot as plt
 import pandas as pd
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import (
-    DenseSynchronizer,
-    FrameWise,
-    Match,
-    SynchronizationDisplay,
-    to_frame,
-    to_sequences,
-)
+from sklearn_motionsync import DenseSynchronizer, FrameWise, Match, to_frame, to_sequences
 from sklearn_motionsync.datasets import make_gait
+from sklearn_motionsync.display import SynchronizationDisplay
 
 # %%
 # The file

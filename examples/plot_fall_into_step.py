@@ -8,14 +8,9 @@ for whom.
 
 import matplotlib.pyplot as plt
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-    SkeletonDisplay,
-    SynchronizationDisplay,
-)
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import SkeletonDisplay, SynchronizationDisplay
 
 bunch = make_bending(12, random_state=5)
 pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(0.95), DenseSynchronizer()).fit(

@@ -15,10 +15,10 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    SearchDisplay,
     find_performances,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import SearchDisplay
 
 # %%
 # What to look for

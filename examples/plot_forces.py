@@ -14,7 +14,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import spm1d
-from sklearn_motionsync import DenseSynchronizer, SynchronizationDisplay
+from sklearn_motionsync import DenseSynchronizer
+from sklearn_motionsync.display import SynchronizationDisplay
 
 folder = Path(spm1d.__file__).parent / "data" / "datafiles"
 person = 3

@@ -13,14 +13,15 @@ import pandas as pd
 from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import (
     ActionModel,
-    ActionModelDisplay,
     DenseSynchronizer,
     FrameWise,
     KeyframeSynchronizer,
     LinearSynchronizer,
     find_departures,
 )
-from sklearn_motionsync.datasets import cut_at_events, make_gait
+from sklearn_motionsync.datasets import make_gait
+from sklearn_motionsync.display import ActionModelDisplay
+from sklearn_motionsync.io import cut_at_events
 
 gait = make_gait(12, n_cycles=4, takes=True, random_state=0)
 

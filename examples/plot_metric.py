@@ -10,8 +10,9 @@ action, and weighs them by that. `MetricDisplay` shows what it made of each.
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync import DenseSynchronizer, DirectionCosines, MetricDisplay
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import MetricDisplay
 from sklearn_motionsync.metrics import group_timing_error
 
 bunch = make_bending(12, random_state=2)

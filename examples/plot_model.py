@@ -14,14 +14,13 @@ from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionDetector,
     ActionModel,
-    ActionModelDisplay,
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    SkeletonDisplay,
     find_departures,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import ActionModelDisplay, SkeletonDisplay
 
 bunch = make_bending(24, random_state=0)
 steps = DirectionCosines(bunch.skeleton), ASpace(0.95), DenseSynchronizer(100), ActionModel()

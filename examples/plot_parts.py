@@ -10,8 +10,9 @@ the trunk is late now and then, in whoever it is.
 """
 
 import numpy as np
-from sklearn_motionsync import DirectionCosines, LagDisplay, PartSynchronizer
+from sklearn_motionsync import DirectionCosines, PartSynchronizer
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import LagDisplay
 
 bunch = make_bending(16, n_frames=60, random_state=0)
 postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)

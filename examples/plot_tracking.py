@@ -9,8 +9,9 @@ limbs do. Here the truth is known.
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sklearn_motionsync import DirectionCosines, MotionTracker, TrackingDisplay
+from sklearn_motionsync import DirectionCosines, MotionTracker
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import TrackingDisplay
 
 RATE, NOISE = 30, 0.05
 known = make_bending(16, n_frames=80, n_actors=8, style=2, frame_rate=RATE, random_state=0)

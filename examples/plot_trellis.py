@@ -9,8 +9,9 @@ whose rate stays within bounds; that path is the warp.
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, TrellisDisplay
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import TrellisDisplay
 
 bunch = make_bending(12, random_state=2)
 postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)

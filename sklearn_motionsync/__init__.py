@@ -12,35 +12,25 @@
 [1, 1, -1]
 """
 
-from . import datasets, display, metrics
-from .aspace import ASpace
-from .blending import blend_performances
+from . import datasets, display, io, metrics
 from .body.direction_cosines import DirectionCosines
 from .body.joint_positions import JointPositions
 from .body.mirror import mirror
 from .body.skeleton import Skeleton
-from .display import (
-    ActionModelDisplay,
-    CycleDisplay,
-    LagDisplay,
-    MetricDisplay,
-    PhaseDisplay,
-    SearchDisplay,
-    SkeletonDisplay,
-    SynchronizationDisplay,
-    TrackingDisplay,
-    TrellisDisplay,
-)
-from .framewise import FrameWise
-from .live.online import OnlineSynchronizer
-from .live.stream import LivePhase
-from .long_tables import to_sequences
+from .inputs.collections import to_frame
+from .inputs.long_tables import to_sequences
 from .model.action_model import ActionModel
 from .model.departures import find_departures
 from .model.detector import ActionDetector
+from .online.stream import LivePhase
+from .online.synchronizer import OnlineSynchronizer
+from .online.tracker import MotionTracker, Track
 from .recognition import ActionClassifier, synchronization_distances
-from .sequences import to_frame
+from .segmentation.cycles import CycleSegmenter
+from .segmentation.search import find_performances
+from .segmentation.self_correlation import self_correlation
 from .synchronizers.base import Synchronizer
+from .synchronizers.blending import blend_performances
 from .synchronizers.dense import DenseSynchronizer
 from .synchronizers.keyframes import KeyframeSynchronizer
 from .synchronizers.lags import Lags
@@ -48,51 +38,37 @@ from .synchronizers.linear import LinearSynchronizer
 from .synchronizers.match import Match
 from .synchronizers.parts import PartSynchronizer
 from .synchronizers.timing import TimingChannel
-from .takes.cycles import CycleSegmenter
-from .takes.search import find_performances
-from .takes.self_correlation import self_correlation
-from .tracking.track import Track
-from .tracking.tracker import MotionTracker
-
-__version__ = "0.1.0.dev0"
+from .transformers.aspace import ASpace
+from .transformers.framewise import FrameWise
 
 __all__ = [
     "ASpace",
     "ActionClassifier",
     "ActionDetector",
     "ActionModel",
-    "ActionModelDisplay",
-    "CycleDisplay",
     "CycleSegmenter",
     "DenseSynchronizer",
     "DirectionCosines",
     "FrameWise",
     "JointPositions",
     "KeyframeSynchronizer",
-    "LagDisplay",
     "Lags",
     "LinearSynchronizer",
     "LivePhase",
     "Match",
-    "MetricDisplay",
     "MotionTracker",
     "OnlineSynchronizer",
     "PartSynchronizer",
-    "PhaseDisplay",
-    "SearchDisplay",
     "Skeleton",
-    "SkeletonDisplay",
-    "SynchronizationDisplay",
     "Synchronizer",
     "TimingChannel",
     "Track",
-    "TrackingDisplay",
-    "TrellisDisplay",
     "blend_performances",
     "datasets",
     "display",
     "find_departures",
     "find_performances",
+    "io",
     "metrics",
     "mirror",
     "self_correlation",
@@ -100,3 +76,17 @@ __all__ = [
     "to_frame",
     "to_sequences",
 ]
+
+# The displays are named in ``display``; they can be imported from here, too.
+from .display import ActionModelDisplay as ActionModelDisplay
+from .display import CycleDisplay as CycleDisplay
+from .display import LagDisplay as LagDisplay
+from .display import MetricDisplay as MetricDisplay
+from .display import PhaseDisplay as PhaseDisplay
+from .display import SearchDisplay as SearchDisplay
+from .display import SkeletonDisplay as SkeletonDisplay
+from .display import SynchronizationDisplay as SynchronizationDisplay
+from .display import TrackingDisplay as TrackingDisplay
+from .display import TrellisDisplay as TrellisDisplay
+
+__version__ = "0.1.0.dev0"

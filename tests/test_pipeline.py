@@ -13,19 +13,21 @@ from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn_motionsync import (
     ActionModel,
-    ActionModelDisplay,
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
     KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
+)
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import (
+    ActionModelDisplay,
     MetricDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
     TrellisDisplay,
 )
-from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "plot_bending.py"

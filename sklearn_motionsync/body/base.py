@@ -6,9 +6,9 @@ import numpy as np
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
-from ..fitting import at_once, of_one_state
-from ..notebook import DocumentedMixin
-from ..performances import check_performances, restore
+from ..inputs.validation import check_performances, restore
+from ..utils.atomic import atomic_fit, snapshot
+from ..utils.doc_links import DocumentedMixin
 from .axes import heading
 from .columns import AXES, check_columns
 from .formats import LANDMARKS
@@ -97,9 +97,9 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
     # What the contract asks of the input: "allow-nan" of who takes hidden joints.
     _finite = True
 
-    fit_transform = at_once(TransformerMixin.fit_transform)
+    fit_transform = atomic_fit(TransformerMixin.fit_transform)
 
-    @of_one_state
+    @snapshot
     def transform(self, X):
         """Features of joint positions.
 

@@ -4,7 +4,7 @@ import numpy as np
 from sklearn.base import _fit_context
 from sklearn.utils._param_validation import StrOptions
 
-from ..fitting import at_once
+from ..utils.atomic import atomic_fit
 from .axes import turned
 from .base import PositionsTransformer
 from .columns import AXES
@@ -92,7 +92,7 @@ class JointPositions(PositionsTransformer):
         self.skeleton = skeleton
         self.reference = reference
 
-    @at_once
+    @atomic_fit
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X, y=None):
         """Check the performances; nothing is learnt but the number and the names of the columns.

@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pandas as pd
 
-from ..gate import as_numbers
-from ..sequences import as_collection
-from ..tables import as_pandas
+from ..inputs.collections import as_collection
+from ..inputs.numbers import as_numbers
+from ..inputs.tables import as_pandas
 from .axes import heading
 from .columns import check_columns
 from .formats import LANDMARKS, SIDES

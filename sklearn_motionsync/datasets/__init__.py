@@ -1,22 +1,14 @@
-"""Performances to begin with: synthetic ones with known truth, archives and files of real ones."""
+"""Performances to begin with: synthetic ones with known truth, and archives of real ones."""
 
-from ._archive import load_performances
-from ._bending import make_bending
-from ._cmu import fetch_cmu
-from ._events import cut_at_events
-from ._gait import make_gait
-from ._gaps import fill_gaps, find_gaps
-from ._motion import read_motion
-from ._poses import from_poses
+# The readers are in ``io``; they can be imported from here, too.
+from ..io import cut_at_events as cut_at_events
+from ..io import fill_gaps as fill_gaps
+from ..io import find_gaps as find_gaps
+from ..io import from_poses as from_poses
+from ..io import read_motion as read_motion
+from .archive import load_performances
+from .bending import make_bending
+from .cmu import fetch_cmu
+from .gait import make_gait
 
-__all__ = [
-    "cut_at_events",
-    "fetch_cmu",
-    "fill_gaps",
-    "find_gaps",
-    "from_poses",
-    "load_performances",
-    "make_bending",
-    "make_gait",
-    "read_motion",
-]
+__all__ = ["fetch_cmu", "load_performances", "make_bending", "make_gait"]

@@ -6,7 +6,7 @@ from ..body.axes import heading
 from ..body.columns import check_columns
 from ..body.limbs import unit
 from ..body.upright import y_up
-from ..gate import as_numbers, names_of
+from ..inputs.numbers import as_numbers, names_of
 from .given import mean_of_seen
 
 __all__ = [

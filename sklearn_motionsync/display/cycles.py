@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from ..body.checks import is_whole
+from ..body.columns import is_whole
 from ..body.formats import SIDES
-from ..features import choose_features
-from ..takes.compared import names_of_compared, start_curves
-from ..takes.cycles import CycleSegmenter, examined, taken
-from ..takes.self_correlation import asked_of
+from ..inputs.features import choose_features
+from ..segmentation.cycles import CycleSegmenter, examined, names_of_compared, start_curves, taken
+from ..segmentation.self_correlation import asked_of
 from .drawing import COLORS, panels
 from .given import as_drawn, as_index, is_number
 from .time_axis import TimeAxis
@@ -47,7 +46,8 @@ class CycleDisplay:
 
     Examples
     --------
-    >>> from sklearn_motionsync import CycleDisplay, CycleSegmenter
+    >>> from sklearn_motionsync import CycleSegmenter
+    >>> from sklearn_motionsync.display import CycleDisplay
     >>> from sklearn_motionsync.datasets import make_gait
     >>> bunch = make_gait(3, n_cycles=4, takes=True, random_state=0)
     >>> segmenter = CycleSegmenter(start=0).fit(bunch.data)

@@ -6,10 +6,10 @@ from numbers import Real
 import numpy as np
 import pandas as pd
 
-from ..body.checks import is_whole
+from ..body.columns import is_whole
 from ..body.skeleton import Skeleton
-from ..gate import as_numbers
-from ..sequences import as_collection
+from ..inputs.collections import as_collection
+from ..inputs.numbers import as_numbers
 
 __all__ = [
     "as_behind",

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..pipelines import reach_synchronizer
 from ..synchronizers.lags import Lags
 from ..synchronizers.parts import PartSynchronizer
+from ..utils.pipelines import reach_synchronizer
 from .drawing import COLORS, curves, front_line, legend_above, panels
 from .time_axis import TimeAxis
 
@@ -43,7 +43,8 @@ class LagDisplay:
 
     Examples
     --------
-    >>> from sklearn_motionsync import DirectionCosines, LagDisplay, PartSynchronizer
+    >>> from sklearn_motionsync import DirectionCosines, PartSynchronizer
+    >>> from sklearn_motionsync.display import LagDisplay
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch = make_bending(6, n_frames=50, random_state=0)
     >>> X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)

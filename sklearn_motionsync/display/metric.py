@@ -3,10 +3,10 @@
 import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
-from ..body.checks import is_whole
-from ..features import choose_features, names_of
-from ..pipelines import find_step
+from ..body.columns import is_whole
+from ..inputs.features import choose_features, names_of
 from ..synchronizers.dense import DenseSynchronizer
+from ..utils.pipelines import find_step
 from .drawing import COLORS, panels
 from .given import as_drawn, as_names
 
@@ -45,7 +45,8 @@ class MetricDisplay:
     Most of all that moves is a column of noise, and it is hardly listened to.
 
     >>> import numpy as np
-    >>> from sklearn_motionsync import DenseSynchronizer, DirectionCosines, MetricDisplay
+    >>> from sklearn_motionsync import DenseSynchronizer, DirectionCosines
+    >>> from sklearn_motionsync.display import MetricDisplay
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch, rng = make_bending(6, random_state=0), np.random.default_rng(0)
     >>> X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)

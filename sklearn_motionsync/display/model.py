@@ -1,11 +1,23 @@
 """ActionModelDisplay: the mean of a learnt action, a band about it, who leaves it (Fig. 3d)."""
 
-from ..features import choose_features
+from typing import NamedTuple
+
+import numpy as np
+from sklearn.base import clone
+
+from ..inputs.features import choose_features
 from ..model.views import view_of
-from .by_group import Groups, bands_of_groups
-from .drawing import legend_above, panels
+from .drawing import (
+    COLORS,
+    curves,
+    front_line,
+    group_colors,
+    group_lines,
+    legend_above,
+    panels,
+    parts_outside,
+)
 from .given import as_drawn, as_names, is_number
-from .layers import count_outside, layers_of
 from .time_axis import TimeAxis, lengths_of
 
 __all__ = ["ActionModelDisplay"]
@@ -74,7 +86,7 @@ class ActionModelDisplay:
     --------
     >>> from sklearn.pipeline import make_pipeline
     >>> from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
-    >>> from sklearn_motionsync import ActionModelDisplay
+    >>> from sklearn_motionsync.display import ActionModelDisplay
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch = make_bending(6, random_state=0)
     >>> steps = DirectionCosines(bunch.skeleton), ASpace(), DenseSynchronizer(50), ActionModel()
@@ -329,3 +341,211 @@ def _bounds(view, band):
     factor = view.model.simultaneous_factor()
     mean, reach = view.model.mean_, factor * view.predicted
     return mean - reach, mean + reach, factor
+
+
+# -- what `ActionModelDisplay` draws over each other: one model, or that of every group --
+
+# Of the largest bound, how much beyond it is rounding, in units of the last place.
+_ROUNDING = 64
+
+
+class Layer(NamedTuple):
+    """A mean, a band about it and the performances behind, of all or of one group.
+
+    Attributes
+    ----------
+    mean, lower, upper : ndarray, shape (P, n_shown)
+        Bounds are NaN without a band.
+    performances : ndarray (n, P, n_shown), or None
+    group : str or None
+    color, line : str
+        Of the mean.
+    """
+
+    mean: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    performances: np.ndarray | None
+    group: str | None = None
+    color: str = COLORS["mean"]
+    line: str = "-"
+
+    @property
+    def has_band(self):
+        return not np.isnan(self.lower).all()
+
+    @property
+    def just_outside(self):
+        """The bounds, so much farther out that rounding does not count."""
+        largest = [np.nanmax(np.abs(b), axis=0, initial=0) for b in (self.lower, self.upper)]
+        eps = np.finfo(np.result_type(self.mean, np.float32)).eps
+        margin = _ROUNDING * eps * np.maximum(*largest)
+        return self.lower - margin, self.upper + margin
+
+    def draw_band(self, axis, clock, i):
+        """The band of feature i, in grey or pale in the colour of the group."""
+        lower, upper = self.lower[:, i], self.upper[:, i]
+        color, edge, alpha = COLORS["envelope"], COLORS["pattern"], 0.35
+        if self.group is not None:
+            color, edge, alpha = self.color, self.color, 0.16
+        band = axis.fill_between(clock, lower, upper, color=color, alpha=alpha, linewidth=0)
+        for bound in (lower, upper):
+            axis.plot(clock, bound, color=edge, linewidth=0.9)
+        return band
+
+    def draw_performances(self, axis, clock, i):
+        behind = self.performances[:, :, i]
+        color = COLORS["performance"] if self.group is None else self.color
+        style = {"linewidths": 0.7, "linestyles": "dashed", "alpha": 0.55, "colors": color}
+        return curves(axis, [clock] * len(behind), behind, **style)
+
+    def draw_departures(self, axis, time_axis, i):
+        """Those parts of performances that are outside the band."""
+        bounds = (bound[:, i] for bound in self.just_outside)
+        xs, ys = parts_outside(self.performances[:, :, i], *bounds)
+        style = {"colors": COLORS["departure"], "linewidths": 1.4, "zorder": 3}
+        return curves(axis, time_axis.of_clock(xs), ys, **style)
+
+    def draw_mean(self, axis, clock, i):
+        style = {"color": self.color, "linewidth": 2, "linestyle": self.line}
+        if self.group is not None:
+            return front_line(axis, clock, self.mean[:, i], **style)
+        (line,) = axis.plot(clock, self.mean[:, i], **style)
+        return line
+
+
+def layers_of(mean, lower, upper, performances, groups):
+    """The layers of a display.
+
+    Parameters
+    ----------
+    mean, lower, upper : ndarray, shape (P, n_shown), or (n_groups, P, n_shown)
+    performances : ndarray (n_sequences, P, n_shown), or None
+    groups : Groups or None
+
+    Returns
+    -------
+    list of Layer
+    """
+    if groups is None:
+        return [Layer(mean, lower, upper, performances)]
+    _, color_of = group_colors(groups.labels, len(groups.labels))
+    lines = group_lines(len(color_of))
+    return [
+        Layer(
+            mean[k],
+            lower[k],
+            upper[k],
+            performances[groups.members(name)],
+            name,
+            color_of[name],
+            lines[k],
+        )
+        for k, name in enumerate(groups.names)
+    ]
+
+
+def count_outside(layers):
+    """How many performances leave the band of their layer in a feature that is shown."""
+    count = 0
+    for layer in layers:
+        if layer.has_band:
+            lower, upper = layer.just_outside
+            outside = (layer.performances < lower) | (layer.performances > upper)
+            count += int(outside.any(axis=(1, 2)).sum())
+    return count
+
+
+# -- bands of groups of people: a model of each group, on the one clock that all share ---
+
+
+class Groups:
+    """Which performances are in which group, and who gave them.
+
+    Parameters
+    ----------
+    groups : sequence of length n_sequences
+    people : sequence of length n_sequences, or None
+    n_sequences : int
+
+    Attributes
+    ----------
+    labels : list of str
+        The group of every performance.
+    names : list of str
+        The groups, in the order in which they come.
+    people : list of str or None
+    """
+
+    def __init__(self, groups, people, n_sequences):
+        self.labels = as_names(groups, n_sequences, "groups", "performances")
+        self.names = list(dict.fromkeys(self.labels))
+        self.people = None
+        if people is not None:
+            self.people = as_names(people, n_sequences, "people", "performances")
+
+    def members(self, name):
+        """The indices of the performances of a group."""
+        return np.flatnonzero(np.array(self.labels) == name)
+
+    def people_of(self, name):
+        """Who gave the performances of a group, one each; by default as many people."""
+        members = self.members(name)
+        return members if self.people is None else np.array(self.people)[members]
+
+    def describe(self, name, has_band):
+        """A line for the legend: how many performances of how many people, and if none is known."""
+        count, people = len(self.members(name)), len(set(self.people_of(name)))
+        text = f"{name}: {count} performance{'s' * (count != 1)}"
+        if self.people is not None:
+            text += f" of {people} {'person' if people == 1 else 'people'}"
+        return text if has_band else f"{text}, no band"
+
+
+class Bands(NamedTuple):
+    """Means and bounds of groups, NaN where there is no band.
+
+    Attributes
+    ----------
+    mean, lower, upper : ndarray, shape (n_groups, P, n_features)
+    """
+
+    mean: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+
+def bands_of_groups(model, performances, groups, band):
+    """The mean and the band of every group, by a model of its performances alone.
+
+    A single performance has no band. Neither has a single person, unless the band is that of
+    points: nothing tells how others would differ.
+
+    Parameters
+    ----------
+    model : ActionModel
+        Its clones are fitted.
+    performances : ndarray, shape (n_sequences, P, n_features)
+        Synchronised to one pattern.
+    groups : Groups
+    band : {"points", "performances", "mean"}
+
+    Returns
+    -------
+    Bands
+    """
+    means, bounds = [], []
+    for name in groups.names:
+        some, people = performances[groups.members(name)], groups.people_of(name)
+        means.append(some.mean(axis=0))
+        known = len(some) if band == "points" else len(set(people))
+        if known < 2:
+            bounds.append(np.full((2, *some.shape[1:]), np.nan))
+            continue
+        own = clone(model).fit(some, groups=None if band == "points" else people)
+        if band == "mean":
+            # The same picture every time.
+            bounds.append(own.mean_envelope(random_state=0))
+        else:
+            bounds.append(own.envelope(simultaneous=band == "performances"))
+    return Bands(np.stack(means), *np.stack(bounds, axis=1))

@@ -7,14 +7,14 @@ import numpy as np
 from sklearn.pipeline import FeatureUnion
 from sklearn.utils.validation import check_is_fitted
 
-from ..aspace import ASpace
 from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
+from ..inputs.validation import name_performance
 from ..model.action_model import ActionModel
 from ..model.classes import models_of_classes
 from ..model.views import view_of
-from ..performances import name_performance
-from ..pipelines import (
+from ..transformers.aspace import ASpace
+from ..utils.pipelines import (
     find_step,
     find_synchronizer,
     flat_steps,

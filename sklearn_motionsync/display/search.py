@@ -3,10 +3,10 @@
 import numpy as np
 import pandas as pd
 
-from ..performances import read_collection
-from ..sequences import as_collection
-from ..tables import labels_of
-from ..takes.search import find_performances
+from ..inputs.collections import as_collection
+from ..inputs.tables import labels_of
+from ..inputs.validation import read_collection
+from ..segmentation.search import find_performances
 from .drawing import COLORS, panels
 
 __all__ = ["SearchDisplay"]
@@ -42,7 +42,7 @@ class SearchDisplay:
     Examples
     --------
     >>> import numpy as np
-    >>> from sklearn_motionsync import SearchDisplay
+    >>> from sklearn_motionsync.display import SearchDisplay
     >>> t = np.linspace(0, 1, 40)
     >>> wave = np.column_stack([np.sin(6 * t), np.sin(9 * t)])
     >>> take = np.zeros((120, 2))

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from ..inputs.tables import labels_of
 from ..synchronizers.match import as_match
-from ..tables import labels_of
 from .animation import playable
 from .bodies import (
     bodies_of_postures,
@@ -92,7 +92,7 @@ class SkeletonDisplay(PipelineFigures):
 
     Examples
     --------
-    >>> from sklearn_motionsync import SkeletonDisplay
+    >>> from sklearn_motionsync.display import SkeletonDisplay
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch = make_bending(3, random_state=0)
     >>> display = SkeletonDisplay.from_positions(bunch.data[0], bunch.skeleton, frames=5)

@@ -2,20 +2,12 @@
 
 import numpy as np
 
-from ..features import choose_features, names_of
-from ..gate import check_names
-from ..performances import read_collection
-from ..pipelines import index_of_pattern, reach_synchronizer
+from ..inputs.features import choose_features, names_of
+from ..inputs.numbers import check_names
+from ..inputs.validation import read_collection
 from ..synchronizers.match import as_match
-from .drawing import (
-    COLORS,
-    curves,
-    front_line,
-    group_colors,
-    group_lines,
-    legend_above,
-    panels,
-)
+from ..utils.pipelines import index_of_pattern, reach_synchronizer
+from .drawing import COLORS, curves, front_line, group_colors, group_lines, legend_above, panels
 from .given import as_drawn, as_names, mean_of_seen
 from .time_axis import TimeAxis
 
@@ -70,7 +62,7 @@ class SynchronizationDisplay:
     --------
     >>> from sklearn.pipeline import make_pipeline
     >>> from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
-    >>> from sklearn_motionsync import SynchronizationDisplay
+    >>> from sklearn_motionsync.display import SynchronizationDisplay
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch = make_bending(6, random_state=0)
     >>> pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(), DenseSynchronizer(50))

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..sequences import as_collection
-from ..synchronizers.clock import as_frame_rate, as_unit
+from ..inputs.collections import as_collection
+from ..synchronizers.match import as_frame_rate, as_unit
 
 __all__ = ["TimeAxis", "lengths_of"]
 

@@ -5,16 +5,15 @@ from textwrap import fill
 
 import numpy as np
 
-from ..body.checks import is_whole
+from ..body.columns import is_whole
 from ..body.direction_cosines import DirectionCosines
-from ..features import choose_features
-from ..features import names_of as names_of_features
-from ..tracking.track import Track
-from ..tracking.tracker import MotionTracker
+from ..inputs.features import choose_features
+from ..inputs.features import names_of as names_of_features
+from ..online.tracker import MotionTracker, Track
 from .departing import bones_of, limb_of
 from .drawing import COLORS, legend_above, panels
 from .given import as_drawn, as_frames, as_index, as_names
-from .live_given import from_zero, one_each, taken, times_of
+from .live import from_zero, one_each, taken, times_of
 from .stick_figures import SkeletonDisplay
 
 __all__ = ["TrackingDisplay"]
@@ -70,7 +69,8 @@ class TrackingDisplay:
     Examples
     --------
     >>> import numpy as np
-    >>> from sklearn_motionsync import LinearSynchronizer, MotionTracker, TrackingDisplay
+    >>> from sklearn_motionsync import LinearSynchronizer, MotionTracker
+    >>> from sklearn_motionsync.display import TrackingDisplay
     >>> t = np.linspace(0, 6, 60)
     >>> X = [np.column_stack([size * np.cos(t), size * np.sin(t)]) for size in (0.9, 1, 1.1, 1.2)]
     >>> tracker = MotionTracker(LinearSynchronizer(), noise=0.02, random_state=0).fit(X[1:])

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..pipelines import index_of_pattern, reach_synchronizer
 from ..synchronizers.dense import DenseSynchronizer
+from ..utils.pipelines import index_of_pattern, reach_synchronizer
 from .drawing import COLORS, panels
 from .given import as_drawn, as_names
 
@@ -41,7 +41,8 @@ class TrellisDisplay:
 
     Examples
     --------
-    >>> from sklearn_motionsync import DenseSynchronizer, DirectionCosines, TrellisDisplay
+    >>> from sklearn_motionsync import DenseSynchronizer, DirectionCosines
+    >>> from sklearn_motionsync.display import TrellisDisplay
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch = make_bending(6, random_state=0)
     >>> X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)

@@ -8,8 +8,7 @@ products have one size, and blocks that are not full are filled up with zeros.
 import numpy as np
 
 from .costs import COSTS, cost_features
-from .factors import Bases, right_factor
-from .rows import Bundle
+from .rows import Bases, Bundle, right_factor
 from .trellis import Trellis
 from .units import exponent_of
 

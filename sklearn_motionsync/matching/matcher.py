@@ -8,8 +8,7 @@ from sklearn import get_config
 
 from .consensus import choose_exemplars, smoothed, vote
 from .costs import COSTS, cost_features
-from .learning import learn_metric
-from .metric import Metric, energy_shares
+from .metric import Metric, energy_shares, learn_metric
 from .trellis import Trellis
 from .units import Unit
 from .warps import follow, normalise

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .consensus import smoothed, vote
-from .factors import Bases
 from .filters import smooth
 from .matcher import Matcher
 from .refinement import refine_warps
+from .rows import Bases
 
 __all__ = ["RefinedWarper", "Warper"]
 

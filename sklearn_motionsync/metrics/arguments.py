@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..gate import as_numbers, check_finite
+from ..inputs.collections import as_collection
+from ..inputs.numbers import as_numbers, check_finite
 from ..matching.units import exponent_of
-from ..sequences import as_collection
 
 __all__ = [
     "Movements",

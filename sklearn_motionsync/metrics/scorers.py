@@ -10,7 +10,7 @@ from sklearn.utils import check_random_state
 from sklearn.utils.metadata_routing import MetadataRequest
 
 from ..matching.warps import normalise
-from ..pipelines import reach_synchronizer, taken_by
+from ..utils.pipelines import reach_synchronizer, taken_by
 from .spread import least_squares, pairwise_correlation, sobolev_least_squares
 
 __all__ = ["FeatureHoldoutScorer", "SpreadScorer"]

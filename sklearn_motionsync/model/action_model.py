@@ -1,25 +1,338 @@
 """The action model: mean performance, variance at every posture, envelope (section 4)."""
 
 from dataclasses import replace
-from numbers import Real
+from numbers import Integral, Real
 
 import numpy as np
 from sklearn.base import BaseEstimator, _fit_context
 from sklearn.exceptions import NotFittedError
+from sklearn.utils import check_consistent_length, check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
-from ..fitting import at_once, carried_on, of_one_state
-from ..gate import check_squares
-from ..notebook import DocumentedMixin
-from ..performances import SequenceLevelMixin
-from .envelope import EnvelopeMixin
-from .judging import JudgingMixin
-from .likeness import Logs, Neighbours, as_codes
-from .stream import Stream
-from .variation import predictive_variance
+from ..inputs.numbers import as_numbers, check_finite, check_names, check_squares
+from ..inputs.validation import SequenceLevelMixin, names_of_input
+from ..utils.atomic import atomic_fit, atomic_partial_fit, snapshot
+from ..utils.doc_links import DocumentedMixin
+from .sampling import sample_performances, sample_postures
+from .similarity import Logs, Neighbours, as_codes, portions
+from .stream import PerformanceStream
+from .variation import mean_band, predictive_variance, simultaneous_factor
 
 __all__ = ["ActionModel"]
+
+# -- what a model of an action says of whole performances: how dense they are, and if they are it
+
+
+class JudgingMixin:
+    """What a model of an action says of performances: their density, and whether they are it."""
+
+    @snapshot
+    def score_samples(self, X):
+        """Log-density of performances: independent normal distributions at every posture.
+
+        It tells which of two models fits a performance better; it is not what ``predict`` asks,
+        as doing nothing is dense.
+
+        Parameters
+        ----------
+        X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
+            Synchronised performances.
+
+        Returns
+        -------
+        ndarray, shape (n_sequences,)
+        """
+        performances, std = self.check_performances(X), self._std()
+        # What is too far away for any number has the density 0.
+        with np.errstate(over="ignore"):
+            squares = [
+                np.square((some - self.mean_) / std).sum(axis=(1, 2))
+                for _, some in portions(performances)
+            ]
+        return self._log_density(np.concatenate(squares))
+
+    @snapshot
+    def score(self, X, y=None, sample_weight=None):
+        """Mean log-density of performances.
+
+        Parameters
+        ----------
+        X : as for ``score_samples``
+        y : ignored
+        sample_weight : array-like, shape (n_sequences,), default=None
+            How much each performance counts; by default all alike.
+
+        Returns
+        -------
+        float
+        """
+        densities = self.score_samples(X)
+        if sample_weight is not None:
+            check_consistent_length(densities, sample_weight)
+        return float(np.average(densities, weights=sample_weight))
+
+    @snapshot
+    def dissimilarity(self, X):
+        """How unlike performances are to the most similar training performances.
+
+        Parameters
+        ----------
+        X : as for ``score_samples``
+
+        Returns
+        -------
+        ndarray, shape (n_sequences,)
+            0 equal, 1 as unlike as standing still.
+        """
+        performances = self.check_performances(X)
+        return self._neighbours.dissimilarity(performances)
+
+    @snapshot
+    def threshold_at(self, coverage):
+        """The border of another coverage.
+
+        Parameters
+        ----------
+        coverage : float
+            Share of performances of people not seen to be accepted, between 0 and 1.
+
+        Returns
+        -------
+        float
+            ``threshold_`` for the ``coverage`` of the model.
+
+        Raises
+        ------
+        ValueError
+            If it is no share.
+        """
+        self._check_learnt()
+        if not (isinstance(coverage, Real) and 0 < coverage < 1):
+            raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
+        return self._neighbours.border(self._unlike, coverage)
+
+    @snapshot
+    def decision_function(self, X):
+        """How far inside the border performances are: ``threshold_`` less their dissimilarity.
+
+        Parameters
+        ----------
+        X : as for ``score_samples``
+
+        Returns
+        -------
+        ndarray, shape (n_sequences,)
+            Negative outside.
+        """
+        found = self.dissimilarity(X)
+        return self.threshold_ - found
+
+    @snapshot
+    def predict(self, X):
+        """Whether performances are the action: at most as unlike as people are expected to be.
+
+        Parameters
+        ----------
+        X : as for ``score_samples``
+
+        Returns
+        -------
+        ndarray of int, shape (n_sequences,)
+            1 inside, -1 outside.
+        """
+        return np.where(self.decision_function(X) >= 0, 1, -1)
+
+    def _std(self):
+        return np.sqrt(np.maximum(self.variance_, self._floor))
+
+    def _log_density(self, squares):
+        """Log-density of performances with these sums of squared standard deviations."""
+        log_std = np.log(self._std()).sum(dtype=np.float64)
+        return -0.5 * squares - log_std - 0.5 * self.mean_.size * np.log(2 * np.pi)
+
+
+# -- what postures are possible at a frame of the action, and new ones (Fig. 3d, Fig. 4) -
+
+
+class EnvelopeMixin:
+    """What a model of an action says of postures: those it accepts, bounds for them, samples."""
+
+    @snapshot
+    def accepts(self, postures, frame):
+        """Whether postures lie inside the envelope at a frame.
+
+        For the pruning of a tracker, which asks for postures that are possible at this instant. It
+        does not tell whether a performance is the action: ``predict`` does.
+
+        Parameters
+        ----------
+        postures : array-like, shape (n_postures, n_features)
+        frame : int
+            Frame of the model, 0 to P - 1.
+
+        Returns
+        -------
+        ndarray of bool, shape (n_postures,)
+        """
+        self._check_learnt()
+        frame = self._check_frame(frame)
+        check_names(postures, names_of_input(self), "postures")
+        postures = as_numbers(postures, "postures", dtype=self.mean_.dtype)
+        width = self.mean_.shape[1]
+        if postures.ndim != 2 or postures.shape[1] != width:
+            raise ValueError(
+                f"postures must have shape (n_postures, {width}), got {postures.shape}. Give one "
+                "posture as [posture]."
+            )
+        check_finite(postures, "postures, row", names_of_input(self))
+        mean, reach = self.mean_[frame], self.n_std * np.sqrt(self.variance_[frame])
+        return ((postures >= mean - reach) & (postures <= mean + reach)).all(axis=1)
+
+    @snapshot
+    def envelope(self, simultaneous=False):
+        """A band about the mean performance, for postures or for whole performances.
+
+        Parameters
+        ----------
+        simultaneous : bool, default=False
+            False: ``n_std`` standard deviations of the training performances on both sides. At 3
+            it holds nearly all *postures* of people, but few whole performances: those leave it
+            somewhere. True: it holds ``coverage`` of the *whole performances* of new people, at
+            all frames and in all features: `simultaneous_factor` predicted standard deviations.
+
+        Returns
+        -------
+        lower, upper : ndarray, shape (P, n_features)
+
+        See Also
+        --------
+        mean_envelope : Holds the mean, not performances.
+        """
+        self._check_learnt()
+        if simultaneous:
+            reach = self.simultaneous_factor() * np.sqrt(self.predictive_variance_)
+        else:
+            reach = self.n_std * np.sqrt(self.variance_)
+        return self.mean_ - reach, self.mean_ + reach
+
+    @snapshot
+    def mean_envelope(self, random_state=None):
+        """A band that holds the mean of all people at all frames and in all features.
+
+        With probability ``coverage``, by a bootstrap over groups: what is to be expected
+        of the mean if other people had been recorded, as many with as many performances. Of more
+        than 64 performances it is the band of those that are kept, wider than need be.
+
+        Parameters
+        ----------
+        random_state : int, RandomState instance or None, default=None
+
+        Returns
+        -------
+        lower, upper : ndarray, shape (P, n_features)
+        """
+        self._check_learnt()
+        reach = mean_band(self._known(), self.groups_, self.coverage, random_state)
+        reach = reach.astype(self.mean_.dtype)
+        return self.mean_ - reach, self.mean_ + reach
+
+    @snapshot
+    def simultaneous_factor(self):
+        """How many predicted standard deviations the performances of new people stay within.
+
+        Whole performances, at all frames and in all features, with probability ``coverage``:
+        learnt by leaving out group by group, of the largest deviation of each performance.
+
+        Returns
+        -------
+        float
+        """
+        self._check_learnt()
+        return simultaneous_factor(self._known(), self.groups_, self.coverage)
+
+    @snapshot
+    def standard_scores(self, X):
+        """How far performances are from the mean, in standard deviations predicted for new people.
+
+        Parameters
+        ----------
+        X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
+            Synchronised performances.
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P, n_features)
+            Negative below the mean; the root of ``predictive_variance_`` is 1.
+
+        See Also
+        --------
+        find_departures : Where they are large, as a table.
+        """
+        performances = np.stack(self.check_performances(X))
+        # What is too far away for any number is infinitely far.
+        with np.errstate(over="ignore"):
+            return (performances - self.mean_) / np.sqrt(self.predictive_variance_)
+
+    @snapshot
+    def sample(self, n=1, frame=None, random_state=None):
+        """Draw accepted postures at a frame (Fig. 4), or whole performances.
+
+        Both are drawn about those of training performances chosen at random, with mean, variance
+        and covariance of all: what belongs together stays together, and styles stay apart.
+        Postures are cut off at the envelope. Performances are inside for ``predict``; one that
+        would fall outside is drawn in to its training performance. Features of theirs that are
+        directions, such as those of `DirectionCosines`, are mixed on the sphere and keep the
+        length 1. Dimensions of an `ASpace` are no directions: limbs drawn there get their length
+        from ``inverse_transform`` of the cosines.
+
+        Parameters
+        ----------
+        n : int, default=1
+            How many.
+        frame : int, default=None
+            Frame of the model, 0 to P - 1; None for whole performances.
+        random_state : int, RandomState instance or None, default=None
+
+        Returns
+        -------
+        ndarray, shape (n, n_features) or (n, P, n_features)
+            (n, P) for whole performances of a model fitted on 2-D input.
+
+        See Also
+        --------
+        blend_performances : Mixtures of one's own, in timing too.
+        """
+        self._check_learnt()
+        if not isinstance(n, Integral) or n < 1:
+            raise ValueError(f"n must be a whole number of samples, at least 1; got {n!r}.")
+        random_state = check_random_state(random_state)
+        if frame is not None:
+            frame = self._check_frame(frame)
+            of_frame = self.mean_[frame], self.variance_[frame], self.deviations_[:, frame]
+            return sample_postures(*of_frame, n, self.n_std, random_state)
+        samples = sample_performances(
+            self.mean_,
+            self.variance_,
+            self.deviations_,
+            n,
+            self._neighbours.dissimilarity,
+            self.threshold_,
+            random_state,
+        )
+        return samples[:, :, 0] if self._fitted_on_rows else samples
+
+    def _known(self):
+        """The training performances that are kept."""
+        return self._seen.kept.astype(np.float64)
+
+    def _check_frame(self, frame):
+        if not isinstance(frame, Integral) or not 0 <= frame < self.n_frames_:
+            raise ValueError(
+                f"frame must be a whole number from 0 to {self.n_frames_ - 1}, got {frame!r}."
+            )
+        return int(frame)
+
 
 # Smallest variance of a density, as a share of the variance of all the data: a feature
 # in which nobody differed is not infinitely improbable to differ.
@@ -114,7 +427,7 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
         self.n_std = n_std
         self.coverage = coverage
 
-    @at_once
+    @atomic_fit
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X, y=None, groups=None):
         """Learn the mean performance, the variances, and how unlike people may be.
@@ -145,10 +458,10 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
                 "A model of how performances vary needs at least 2 performances, got n_samples = 1."
             )
         as_codes(groups, len(performances))
-        self._learn(performances, groups, Stream())
+        self._learn(performances, groups, PerformanceStream())
         return self
 
-    @carried_on
+    @atomic_partial_fit
     @_fit_context(prefer_skip_nested_validation=True)
     def partial_fit(self, X, y=None, groups=None):
         """Learn of more performances, after those of earlier calls or of ``fit``.
@@ -204,12 +517,12 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
         if hasattr(self, "_seen"):
             performances, seen = self._check_clock(X), self._seen
         else:
-            performances, seen = _alike(self._check_training_set(X)), Stream()
+            performances, seen = _alike(self._check_training_set(X)), PerformanceStream()
         self._learn(performances, groups, seen)
         return self
 
     @property
-    @of_one_state
+    @snapshot
     def deviations_(self):
         """Training performances that are kept, less the mean: (n_kept, P, n_features)."""
         check_is_fitted(self)

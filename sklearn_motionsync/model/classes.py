@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from sklearn.pipeline import Pipeline
 
-from ..performances import labels_as_given
-from ..pipelines import find_classifier, transform_through
-from ..sequences import as_collection
+from ..inputs.collections import as_collection
+from ..inputs.validation import labels_as_given
+from ..utils.pipelines import find_classifier, transform_through
 
 __all__ = ["ClassModel", "models_of_classes"]
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..features import choose_features
+from ..inputs.features import choose_features
 from .classes import models_of_classes
 from .views import view_of
 

@@ -10,10 +10,11 @@ from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.metadata_routing import MetadataRouter, MethodMapping
 from sklearn.utils.validation import check_is_fitted
 
-from ..fitting import at_once, of_one_state
-from ..notebook import DocumentedMixin
-from ..performances import labels_as_given
-from ..pipelines import (
+from ..inputs.tables import index_of
+from ..inputs.validation import labels_as_given
+from ..utils.atomic import atomic_fit, snapshot
+from ..utils.doc_links import DocumentedMixin
+from ..utils.pipelines import (
     MissingMetadata,
     find_step,
     find_synchronizer,
@@ -22,12 +23,11 @@ from ..pipelines import (
     steps_to_fit,
     taken_by,
 )
-from ..tables import index_of
 from .action_model import ActionModel
-from .likeness import as_codes
-from .manner import Course, Usual, energies
+from .similarity import Logs, Neighbours, as_codes, learn_reach
+from .stream import spread_out
 
-__all__ = ["ActionDetector"]
+__all__ = ["ActionDetector", "energies"]
 
 # What is said of a performance that is too low, or too high.
 _REASONS = {
@@ -120,7 +120,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         self.coverage = coverage
         self.duration = duration
 
-    @at_once
+    @atomic_fit
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X, y=None, groups=None, **params):
         """Fit the pipeline, and learn what else people differ in.
@@ -162,7 +162,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
                 setattr(self, name, getattr(self.estimator_, name))
         return self
 
-    @of_one_state
+    @snapshot
     def predict(self, X, **params):
         """Whether performances are the action.
 
@@ -179,7 +179,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         """
         return np.where(self._worst(X, params, "predict") <= 1, 1, -1)
 
-    @of_one_state
+    @snapshot
     def decision_function(self, X, **params):
         """How far within its border the question is that a performance answers worst.
 
@@ -194,7 +194,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         """
         return 1 - self._worst(X, params, "decision_function")
 
-    @of_one_state
+    @snapshot
     def score_samples(self, X, **params):
         """How well performances answer the question that they answer worst.
 
@@ -209,7 +209,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         """
         return -self._worst(X, params, "score_samples")
 
-    @of_one_state
+    @snapshot
     def report(self, X, **params):
         """What is said of performances, question by question.
 
@@ -275,7 +275,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         energy, self._floor = energies(on_clock)
         coverage = 1 - (1 - self.coverage) / (4 if self.duration else 3)
         _, model = find_step(self.estimator_, ActionModel)
-        course = Course(on_clock, codes, coverage)
+        course = UnalignedDissimilarity(on_clock, codes, coverage)
         self._questions = {"course": course}
         self.borders_ = {
             "movement": (0.0, model.threshold_at(coverage)),
@@ -283,7 +283,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         }
         values = {"duration": _durations(performances)} if self.duration else {}
         for name, some in (values | {"energy": energy}).items():
-            self._questions[name] = usual = Usual(some, codes, coverage)
+            self._questions[name] = usual = LogPredictionInterval(some, codes, coverage)
             self.borders_[name] = usual.lower, usual.upper
         self.offset_ = -1.0
 
@@ -332,3 +332,105 @@ def _reason(row):
         # Then its course is another one, too, which says nothing more.
         reasons.pop("course", None)
     return ", ".join(reasons.values())
+
+
+# -- how a performance was recorded, which synchronisation hides: its course, duration and energy
+
+# Energies below this share of all are rounding, or none.
+_LEAST = 1e-9
+
+
+class UnalignedDissimilarity:
+    """How unlike performances are to those that were learnt, each in units of the border.
+
+    Parameters
+    ----------
+    performances : sequence of ndarray (P, n_features)
+        On one clock.
+    groups : ndarray of int (n_sequences,)
+    coverage : float
+        Share of new performances below 1.
+
+    Attributes
+    ----------
+    border : float
+        The dissimilarity that is 1.
+    """
+
+    def __init__(self, performances, groups, coverage):
+        kept = spread_out(groups)
+        known = np.stack([performances[i] for i in kept]).astype(np.float64)
+        self._neighbours = Neighbours(known, groups[kept])
+        unlike = Logs.of(self._neighbours.dissimilarity(performances, groups))
+        self.border = self._neighbours.border(unlike, coverage)
+
+    def __call__(self, performances):
+        return self._neighbours.dissimilarity(performances) / self.border
+
+
+class LogPredictionInterval:
+    """How far numbers above 0 are from what is usual, in units of what is allowed.
+
+    Everything is said of logarithms: twice is as far as half. What is usual is the mean; how far
+    people may be from it is learnt from each performance and the mean of the other groups.
+
+    Parameters
+    ----------
+    values : ndarray (n_sequences,)
+        Above 0.
+    groups : ndarray of int (n_sequences,)
+        From 0, at least two different ones.
+    coverage : float
+        Share of new values between -1 and 1.
+
+    Attributes
+    ----------
+    lower, upper : float
+        The values that are -1 and 1.
+    """
+
+    def __init__(self, values, groups, coverage):
+        logs = np.log(values)
+        self._mean = float(logs.mean())
+        apart, n = logs - _mean_of_others(logs, groups), len(logs)
+        # That the mean of the others is uncertain is in them, and must not be counted twice.
+        self._reach = learn_reach(apart * np.sqrt((n - 1) / (n + 1)), (1 + coverage) / 2)
+        with np.errstate(over="ignore"):
+            ends = np.exp([self._mean - self._reach, self._mean + self._reach])
+        self.lower, self.upper = map(float, ends)
+
+    def __call__(self, values):
+        return (np.log(values) - self._mean) / self._reach
+
+
+def energies(on_clock, floor=None):
+    """The mean squared distance of the postures of performances from their own mean posture.
+
+    Parameters
+    ----------
+    on_clock : ndarray (n_sequences, P, n_features)
+    floor : float, default=None
+        What standing still counts as; by default a tiny share of how much the postures of all
+        performances differ.
+
+    Returns
+    -------
+    ndarray (n_sequences,)
+        Above 0; infinite beyond any number.
+    floor : float
+    """
+    on_clock = np.asarray(on_clock, dtype=np.float64)
+    with np.errstate(over="ignore"):
+        squares = np.square(on_clock - on_clock.mean(axis=1, keepdims=True))
+        energy = squares.reshape(len(on_clock), -1).sum(axis=1) / on_clock.shape[1]
+    if floor is None:
+        about = np.square(on_clock - on_clock.mean(axis=(0, 1))).sum(axis=2).mean()
+        rounding = np.square(64 * np.finfo(float).eps * np.abs(on_clock).max())
+        floor = max(_LEAST * about, rounding * on_clock.shape[2], np.finfo(float).tiny)
+    return np.maximum(energy, floor), float(floor)
+
+
+def _mean_of_others(values, groups):
+    """For each value, the mean of those of other groups."""
+    total, count = np.bincount(groups, weights=values), np.bincount(groups)
+    return (values.sum() - total[groups]) / (len(values) - count[groups])

@@ -4,9 +4,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .likeness import Logs, check_labels, portions
+from .similarity import Logs, check_labels, portions
 
-__all__ = ["Stream", "spread_out"]
+__all__ = ["PerformanceStream", "spread_out"]
 
 # Most performances that others are compared with: predicting takes time and memory in proportion.
 _MOST_KEPT = 64
@@ -17,7 +17,7 @@ _LATER = np.uint64(1 << 63)
 
 
 @dataclass(frozen=True, eq=False)
-class Stream:
+class PerformanceStream:
     """Performances that came: mean and variance of all, and some of them.
 
     Nothing but ``gone`` depends on the portions in which they came, to the last bit; nor does who

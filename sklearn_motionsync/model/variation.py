@@ -7,7 +7,7 @@ people. Functions of plain arrays; features may have different units.
 import numpy as np
 from sklearn.utils import check_random_state
 
-from .likeness import learn_reach, power_of_two
+from .similarity import learn_reach, power_of_two
 
 __all__ = ["mean_band", "predictive_variance", "simultaneous_factor"]
 

@@ -7,11 +7,18 @@ from sklearn.base import clone
 from sklearn.pipeline import Pipeline
 from sklearn.utils.validation import check_is_fitted
 
-from ..aspace import ASpace
-from ..features import as_features, names_of
-from ..performances import check_performances, labels_as_given
-from ..pipelines import asking, find_step, flat_steps, how_to_give, taken_by, transform_through
-from ..sequences import as_collection
+from ..inputs.collections import as_collection
+from ..inputs.features import as_features, names_of
+from ..inputs.validation import check_performances, labels_as_given
+from ..transformers.aspace import ASpace
+from ..utils.pipelines import (
+    asking,
+    find_step,
+    flat_steps,
+    how_to_give,
+    taken_by,
+    transform_through,
+)
 from .action_model import ActionModel
 
 __all__ = ["View", "view_of"]

@@ -1,26 +1,30 @@
 """ActionClassifier: which of several actions a performance is, and whether it is any of them."""
 
+import warnings
 from functools import partial
 from numbers import Integral, Real
 
 import numpy as np
+import pandas as pd
 from scipy.special import softmax
 from sklearn.base import BaseEstimator, ClassifierMixin, _fit_context
+from sklearn.pipeline import Pipeline
+from sklearn.utils import assert_all_finite, check_consistent_length, column_or_1d
 from sklearn.utils._param_validation import Interval, StrOptions
+from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted
 
-from ..fitting import at_once, of_one_state
+from ..inputs.validation import SequenceLevelMixin
 from ..matching.comparison import Comparison
 from ..matching.costs import COSTS
-from ..model.likeness import as_codes
-from ..notebook import DocumentedMixin
-from ..performances import SequenceLevelMixin
-from ..work import LongWorkMixin, run
+from ..model.action_model import ActionModel
+from ..model.similarity import as_codes
+from ..synchronizers.dense import DenseSynchronizer
+from ..utils.atomic import atomic_fit, snapshot
+from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin, run
 from .distances import SETTINGS
-from .kernel import MotionKernel
-from .labels import check_labels, label_of_unknown
-from .models import as_given, learn_model
-from .regression import deal, decide, learn, threshold
+from .kernel import MotionKernel, deal, decide, learn, threshold
 
 __all__ = ["ActionClassifier"]
 
@@ -168,7 +172,7 @@ class ActionClassifier(
         self.n_jobs = n_jobs
         self.verbose = verbose
 
-    @at_once
+    @atomic_fit
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X, y, groups=None):
         """Learn the classes.
@@ -207,7 +211,7 @@ class ActionClassifier(
         self._training = [np.array(x) for x in performances], codes, people
         return self
 
-    @of_one_state
+    @snapshot
     def predict(self, X):
         """The class of each performance.
 
@@ -233,7 +237,7 @@ class ActionClassifier(
             labels,
         )
 
-    @of_one_state
+    @snapshot
     def predict_proba(self, X):
         """The probability of each class, given that a performance is one of them.
 
@@ -249,7 +253,7 @@ class ActionClassifier(
         decisions = self._decide(X)
         return softmax(self.temperature_ * decisions, axis=1)
 
-    @of_one_state
+    @snapshot
     def decision_function(self, X):
         """How much each class speaks for itself.
 
@@ -265,7 +269,7 @@ class ActionClassifier(
         decisions = self._decide(X)
         return decisions if len(self.classes_) > 2 else decisions[:, 1] - decisions[:, 0]
 
-    @of_one_state
+    @snapshot
     def score_samples(self, X):
         """How much performances are like any class: the largest decision value.
 
@@ -280,7 +284,7 @@ class ActionClassifier(
         """
         return self._decide(X).max(axis=1)
 
-    @of_one_state
+    @snapshot
     def novelty_scores(self, X):
         """How little performances are like any class: ``score_samples``, negated.
 
@@ -295,7 +299,7 @@ class ActionClassifier(
         """
         return -self.score_samples(X)
 
-    @of_one_state
+    @snapshot
     def threshold_at(self, coverage):
         """What ``reject_below`` must be to keep a share of performances of the known actions.
 
@@ -319,7 +323,7 @@ class ActionClassifier(
             raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
         return threshold(self.held_out_, coverage)
 
-    @of_one_state
+    @snapshot
     def model_of(self, label):
         """What performances of a class have in common: a pipeline, fitted on them now.
 
@@ -387,3 +391,104 @@ class ActionClassifier(
         with self._progress(fits=False) as progress:
             kernel = self._kernel(performances, n_jobs=self.n_jobs, progress=progress)
         return decide(kernel, *self._regression)
+
+
+# -- what performances of a class have in common, for those who ask why ------------------
+
+
+def learn_model(performances, groups, n_frames, n_jobs):
+    """A synchronizer and a model of performances that belong together.
+
+    Parameters
+    ----------
+    performances : list of arrays or tables, or 2-D array
+        At least two.
+    groups : ndarray of int, shape (n_sequences,), or None
+        How they differ is only learnt of several groups.
+    n_frames : int
+        Of their clock.
+    n_jobs : int or None
+
+    Returns
+    -------
+    Pipeline
+        Fitted.
+    """
+    if groups is not None and len(np.unique(groups)) < 2:
+        groups = None
+    synchronizer, model = DenseSynchronizer(n_frames, n_jobs=n_jobs), ActionModel()
+    with warnings.catch_warnings():
+        # One class may move one feature only; units are a matter of all classes.
+        warnings.filterwarnings("ignore", ".* of the energy that is compared", UserWarning)
+        synchronized = synchronizer.fit_transform(performances)
+    model.fit(synchronized, groups=groups)
+    return Pipeline([("densesynchronizer", synchronizer), ("actionmodel", model)])
+
+
+def as_given(arrays, on_rows, names):
+    """Performances as they were given, for estimators that have not seen any."""
+    if on_rows:
+        return np.stack([x[:, 0] for x in arrays])
+    return arrays if names is None else [pd.DataFrame(x, columns=names) for x in arrays]
+
+
+# -- labels of classes: whole numbers for the learning, and one for what is none of them -
+
+
+def check_labels(name, performances, y):
+    """The classes, and the class of every performance as a whole number from 0.
+
+    Parameters
+    ----------
+    name : str
+        Of the classifier, for messages.
+    performances : sequence
+    y : array-like, shape (n_sequences,)
+
+    Returns
+    -------
+    classes : ndarray, shape (n_classes,)
+    codes : ndarray of int, shape (n_sequences,)
+    """
+    if y is None:
+        raise ValueError(f"{name} requires y to be passed, but the target y is None.")
+    y = column_or_1d(y, warn=True)
+    check_consistent_length(performances, y)
+    assert_all_finite(y, input_name="y")
+    if (without := pd.isna(y)).any():
+        raise ValueError(f"y has no label for performance {int(without.argmax())}.")
+    check_classification_targets(y)
+    classes, codes = np.unique(y, return_inverse=True)
+    if len(classes) < 2:
+        raise ValueError(
+            f"{name} needs performances of at least 2 classes, got one class: "
+            f"{classes.tolist()[0]!r}. Whether performances are one action is what an "
+            "ActionDetector learns."
+        )
+    return classes, codes
+
+
+def label_of_unknown(label, classes):
+    """What performances are called that are none of the classes: of the same type as these.
+
+    Parameters
+    ----------
+    label : str, number or None
+        None is "unknown", or -1 among numbers.
+    classes : ndarray, shape (n_classes,)
+    """
+    kind = classes.dtype.kind
+    is_text = kind in "US" or (kind == "O" and isinstance(classes[0], str))
+    if label is None:
+        label = "unknown" if is_text else -1
+    if label in classes.tolist():
+        raise ValueError(
+            f"unknown_label={label!r} is one of the classes: choose another label for those that "
+            "are rejected."
+        )
+    if is_text != isinstance(label, str):
+        raise ValueError(
+            f"unknown_label={label!r} must be {'text' if is_text else 'a number'}, like the "
+            f"classes {classes.tolist()}."
+        )
+    return np.array(label, dtype=object) if kind == "O" else label

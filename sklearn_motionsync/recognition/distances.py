@@ -7,12 +7,12 @@ import numpy as np
 from sklearn.base import BaseEstimator
 from sklearn.utils._param_validation import Interval, Options, StrOptions
 
+from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..matching.comparison import BLOCK, Comparison
 from ..matching.costs import COSTS
 from ..matching.units import exponent_of
 from ..matching.warps import normalise
-from ..performances import SequenceLevelMixin, check_performances
-from ..work import Common, Progress, run
+from ..utils.parallel import Common, Progress, run
 
 __all__ = ["SETTINGS", "distances_of", "on_clock", "synchronization_distances"]
 

@@ -9,16 +9,22 @@ from sklearn.utils import Bunch
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..fitting import at_once, of_one_state
-from ..gate import as_numbers, check_finite, check_names
+from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.validation import (
+    Performances,
+    SequenceLevelMixin,
+    all_of,
+    names_of_input,
+    parts_of_source,
+    restore,
+)
 from ..matching.filters import SMOOTHING
 from ..matching.matcher import Features
 from ..matching.median import Median, median_of
 from ..matching.units import Unit
 from ..matching.warps import normalise
-from ..notebook import DocumentedMixin
-from ..performances import Performances, SequenceLevelMixin, names_of_input, restore
-from ..reading import all_of, parts_of_source
+from ..utils.atomic import atomic_fit, snapshot
+from ..utils.doc_links import DocumentedMixin
 from .match import Match, check_answer
 
 __all__ = ["Synchronizer", "TrainingSet"]
@@ -124,7 +130,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         self.n_frames = n_frames
         self.pattern = pattern
 
-    @at_once
+    @atomic_fit
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X, y=None):
         """Choose the pattern, the performance whose clock all others will follow.
@@ -148,7 +154,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         self._number_as_given()
         return self
 
-    fit_transform = at_once(TransformerMixin.fit_transform)
+    fit_transform = atomic_fit(TransformerMixin.fit_transform)
 
     def transform(self, X):
         """Warp performances onto the clock of the pattern (Eq. 18).
@@ -187,7 +193,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
             "returns a Match."
         )
 
-    @of_one_state
+    @snapshot
     def normalize(self, X):
         """Normalise performances linearly to the clock of the pattern, without matching (Eq. 7).
 
@@ -250,7 +256,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         training = self._set_clock(performances)
         self._set_pattern(training, self._plain_median(training.scaled))
 
-    @of_one_state
+    @snapshot
     def _warp(self, X, **params):
         # What comes along with the performances comes for all of them at once.
         read = None if params else self._read_in_parts(X)

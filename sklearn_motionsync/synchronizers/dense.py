@@ -1,18 +1,170 @@
 """DenseSynchronizer: dense matching to the median performance (Eqs. 7-19)."""
 
+import warnings
+from dataclasses import dataclass
+from functools import partial
 from numbers import Integral, Real
 
-from sklearn.utils import Bunch
+import numpy as np
+from sklearn.utils import Bunch, check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
 
-from ..fitting import of_one_state
+from ..inputs.validation import names_of_input
+from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
+from ..matching.filters import SMOOTHING
+from ..matching.matcher import Features, Matcher
+from ..matching.median import Median, estimate_distances, rounding_of, search_median, sum_all
+from ..matching.refinement import choose_smoothing
+from ..matching.refinement_test import RefinementTrial, Verdict, deal_features
+from ..matching.warper import RefinedWarper, Warper
+from ..matching.warps import even_slices, normalise
+from ..utils.atomic import snapshot
+from ..utils.parallel import LongWorkMixin, run
 from .base import Synchronizer
 from .match import Match
-from .portions import warp_in_portions
-from .steps import DenseSteps
+from .portions import (
+    Compared,
+    compare_in_portions,
+    in_portions,
+    shared_training_set,
+    warp_in_portions,
+)
+from .subsample import draw, typical_share
 
 __all__ = ["DenseSynchronizer"]
+
+# -- steps of a dense fit: clock, metric, median, exemplars, refinement, one after the other
+
+# Up to so many performances all pairs are compared: see docs/scaling.md.
+_EXHAUSTIVE = 100
+
+# Whether refining helps is tried on at most so many performances.
+_TRIED = 12
+
+
+class DenseSteps(LongWorkMixin, Synchronizer):
+    """How a `DenseSynchronizer` learns; the parameters are its own."""
+
+    def _check_training_set(self, X):
+        some, sample, population = draw(X, self.max_fit, self.pattern, self.random_state)
+        numbers = None if sample is None else sample.tolist()
+        performances = super()._check_training_set(some, numbers)
+        n = len(performances)
+        self.sample_ = np.arange(n) if sample is None else sample
+        self._population = n if sample is None else population
+        return performances
+
+    def _number_as_given(self):
+        sample, distances = self.sample_, np.full(self._population, np.nan)
+        distances[sample] = self.global_distances_
+        self.global_distances_, self.exemplars_ = distances, sample[self.exemplars_]
+        if self.pattern_index_ is not None:
+            self.pattern_index_ = int(sample[self.pattern_index_])
+        if self.metric_ is not None:
+            self.metric_.performances = sample[self.metric_.performances]
+
+    def _learn(self, performances):
+        with self._progress(fits=True) as progress:
+            training = self._set_clock(performances)
+            learns = self.metric == "learned" and self.cost == "velocity" and self.consensus > 0
+            Settings.of(self, learns).check(self.n_frames_, self.subframes)
+            positions, self.metric_ = self._positions(training), None
+            features = features_of(self, training.unit, learnt=False)
+            if learns:
+                features, self.metric_ = learn_metric(self, features, positions)
+            settings = self._settings()
+            searched = features.for_search(self.n_frames_, settings["max_offset"])
+            compared = Compared(searched, positions)
+            warn_of_one_feature(self, performances, compared)
+            searcher, shared, median = self._search(searched, compared, positions, progress)
+            matcher = searcher.at_all_frames(features, self.n_frames_, **settings)
+            self.training_.features = features
+            self.mu_ = float(features.back(matcher.trellis.mu))
+            source = self._set_pattern(training, median, features.degree)
+            # Sums over fewer frames, as if over all.
+            self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
+            warper = self._choose_exemplars(training, matcher, source, median.estimates)
+            warper = self._decide_on_refinement(training, warper, source, progress, shared)
+            self._warper = warper
+
+    def _positions(self, training):
+        """Performances of the training set at every sub-position of the clock, in the unit."""
+        if self.subframes == 1:
+            return training.scaled
+        performances = training.performances
+        return training.unit.fill(normalise(performances, self.n_frames_, self.subframes))
+
+    def _search(self, features, compared, positions, progress):
+        """The matcher that searches, what portions share of the training set, and the median."""
+        energy, shape = compared.energy(), features.shape(positions)
+        searcher = Matcher.of_energy(features, shape, energy, **self._settings())
+        shared = shared_training_set(searcher, positions, compared)
+        rounding = rounding_of(compared.like.dtype, energy)
+        median = self._choose_median(shared, len(positions), rounding, progress)
+        rounds = features.single and positions.dtype != compared.like.dtype
+        if not rounds or not median.is_blurred(rounding):
+            return searcher, shared, median
+        # Trials that are equal but for next to nothing: single precision does not tell them apart.
+        features = features.in_full()
+        return self._search(features, Compared(features, positions), positions, progress)
+
+    def _choose_median(self, shared, n, rounding, progress):
+        """The median (Eq. 19), by all matches or some; without it, what exemplars are chosen by."""
+        wanted, population = self._wants_median, self._population
+        compare = partial(compare_in_portions, shared, n_jobs=self.n_jobs, progress=progress)
+        if not wanted and (self.consensus == 0 or n <= self.consensus):
+            # None of them, or all, are exemplars.
+            median = Median.unknown(n)
+        elif self.search == "exhaustive" or (self.search == "auto" and n <= _EXHAUSTIVE):
+            median = sum_all(compare, n, rounding, population)
+        elif wanted:
+            random_state = check_random_state(self.random_state)
+            median = search_median(compare, n, rounding, random_state, population)
+        else:
+            median = estimate_distances(compare, n, check_random_state(self.random_state))
+        known = median if wanted else Median.unknown(n, median.n_matches)
+        self.n_matches_, self.certified_ = known.n_matches, known.certified
+        self.search_ = Bunch(**known.achieved)
+        self.typical_share_ = typical_share(known.in_doubt, n, population) if wanted else np.nan
+        return median
+
+    def _choose_exemplars(self, training, matcher, source, estimates):
+        """The exemplars, and the warper to the pattern by way of them."""
+        self.exemplars_ = np.empty(0, dtype=np.intp)
+        if self.consensus > 0:
+            self.exemplars_ = choose_exemplars(estimates, self.consensus, self.pattern_index_)
+        chosen = [source, *(training.performances[k] for k in self.exemplars_)]
+        # In double precision, as all that is warped.
+        chosen = [x.astype(np.float64, copy=False) for x in chosen]
+        positions = matcher.features.positions(chosen, self.n_frames_)
+        pattern = positions[0, :: self.subframes]
+        portion = matcher, pattern, positions, self.consensus > 0, self.warp_smoothing
+        (warper,) = run(Warper.to_pattern, [portion])
+        return warper
+
+    def _decide_on_refinement(self, training, warper, source, progress, shared):
+        """Whether warps are refined by postures, and the warper that does so or does not."""
+        verdict = Verdict()
+        if self.refine == "auto" and self.consensus > 0:
+            others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
+            some = others[:: -(-len(others) // _TRIED) or 1]
+            portions = {"n_jobs": self.n_jobs, "progress": progress}
+            shown = training.scaled, shared, some
+            # Those who are shown some features match without a metric.
+            settings = vars(Settings.of(self, learnt=False))
+            verdict = try_refinement(warper, source, *shown, settings, **portions)
+        names = "ratio", "p_value", "ratio_to_all"
+        self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
+        self.misfit_ = verdict.misfit
+        self.refines_ = bool(verdict.helps if self.refine == "auto" else self.refine)
+        if not self.refines_:
+            return warper
+        return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.scaled))
+
+    def _settings(self):
+        """What a `Matcher` learns with."""
+        return vars(Settings.of(self, self.metric_ is not None))
 
 
 class DenseSynchronizer(DenseSteps):
@@ -268,7 +420,7 @@ class DenseSynchronizer(DenseSteps):
         self.n_jobs = n_jobs
         self.verbose = verbose
 
-    @of_one_state
+    @snapshot
     def match(self, X):
         return self._match_in_parts(X)
 
@@ -280,7 +432,7 @@ class DenseSynchronizer(DenseSteps):
             distances, times = warp_in_portions(warper, performances, **portions)
         return Match(times, warper.matcher.features.back(distances))
 
-    @of_one_state
+    @snapshot
     def disparity_space(self, X, performance=0):
         """The disparity space of the pattern and one performance, and the path through it (Fig. 2).
 
@@ -315,3 +467,229 @@ class DenseSynchronizer(DenseSteps):
         frames, offsets, costs, path = warper.disparity_space(positions)
         costs = warper.matcher.features.back(costs)
         return Bunch(frames=frames, offsets=offsets, costs=costs, path=path)
+
+
+# -- settings: what a matcher is made with, and the metric that is learnt before it ------
+
+# max_offset="auto". A wide band leads paths astray until a metric is learnt; after that gestures
+# need it: docs/method.md.
+_NARROW, _WIDE = 0.25, 0.4
+# The largest offset that a metric is learnt by, of what is certain: docs/method.md.
+_CERTAIN = 0.2
+# velocity_smoothing="auto": what is noise a metric knows; without one it is smoothed away.
+_SMOOTH, _SHARP = SMOOTHING, 0.02
+# Steps that a path may take at a frame, all offsets together.
+_MOST_WAYS = 1e9
+# Of how many performances a metric is learnt, at least and at most. Two have no route but the
+# direct one: what they disagree in cannot be told from a wrong path.
+_FEWEST, _MOST = 3, 20
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What `Matcher.learn` takes besides the performances."""
+
+    smoothness: float
+    max_offset: float
+    max_rate: float
+
+    @classmethod
+    def of(cls, synchronizer, learnt):
+        """Those of a synchronizer, with a metric or without."""
+        max_offset = synchronizer.max_offset
+        if max_offset == "auto":
+            max_offset = _WIDE if learnt else _NARROW
+        return cls(synchronizer.smoothness, max_offset, synchronizer.max_rate)
+
+    def check(self, n_frames, subframes):
+        """Say what a trellis asks for before it takes for ever."""
+        steps = min(self.max_rate, n_frames - 1) * subframes + 1
+        ways = steps * (2 * self.max_offset * n_frames * subframes + 1)
+        if ways > _MOST_WAYS:
+            raise ValueError(
+                f"subframes = {subframes}, max_rate = {self.max_rate} and max_offset = "
+                f"{self.max_offset} on {n_frames} frames ask for {ways:.0e} steps of a path "
+                f"at every frame of every pair; {_MOST_WAYS:.0e} is the limit. Use fewer "
+                "subframes, a smaller rate or offset."
+            )
+
+
+def features_of(synchronizer, unit, learnt):
+    """What a synchronizer compares, to be learnt with a metric or without one."""
+    smoothing = synchronizer.velocity_smoothing
+    if smoothing == "auto":
+        smoothing = _SHARP if learnt else _SMOOTH
+    return Features(synchronizer.cost, synchronizer.subframes, smoothing, unit)
+
+
+def learn_metric(synchronizer, plain, positions):
+    """What is compared, with the metric of a training set, learnt of evenly spaced ones of many.
+
+    Parameters
+    ----------
+    synchronizer : DenseSynchronizer
+    plain : Features
+        What is compared without a metric.
+    positions : ndarray, shape (n_sequences, Q, n_features)
+        The performances at all positions, in the unit.
+
+    Returns
+    -------
+    features : Features
+        Those without a metric if there is nothing to learn.
+    learnt : Bunch or None
+        ``metric_`` of the synchronizer.
+    """
+    n = len(positions)
+    if n < _FEWEST:
+        return plain, None
+    some = np.unique(np.round(np.linspace(0, n - 1, min(n, _MOST))).astype(np.intp))
+    settings = vars(Settings.of(synchronizer, learnt=False))
+    settings = {**settings, "max_offset": min(settings["max_offset"], _CERTAIN)}
+    vote = {name: getattr(synchronizer, name) for name in ("consensus", "warp_smoothing")}
+    features = features_of(synchronizer, plain.unit, learnt=True)
+    (learnt,) = run(partial(features.learn, **vote, **settings), [(positions[some],)])
+    if learnt is None:
+        return plain, None
+    features, share, energy = learnt
+    return features, Bunch(share=share, energy=energy, performances=some)
+
+
+# -- whether refining helps: tried on some of a training set, before a synchronizer does it
+
+# Fewer performances do not tell after a few steps whether refining may help; of twice as many
+# every second one is looked at first.
+_SEVERAL = 3
+
+
+def try_refinement(warper, source, scaled, shared, some, settings, **portions):
+    """The verdict on refining some performances of a training set.
+
+    Parameters
+    ----------
+    warper : Warper
+    source : ndarray, shape (n_frames, n_features)
+        The pattern at its own pace.
+    scaled : ndarray, shape (n_sequences, P, n_features)
+        The training set, in the unit.
+    shared : Common
+        The `shared_training_set`.
+    some : ndarray of int
+        Indices of those to try it on.
+    settings : dict
+        As `Matcher.learn` takes them.
+    **portions : dict
+        ``n_jobs`` and ``progress``.
+
+    Returns
+    -------
+    Verdict
+        Without any figure if nothing can be told.
+    """
+    hands = deal_features(scaled[some]) if len(some) else []
+    if not hands:
+        return Verdict()
+    positions = shared.here.positions[some].astype(np.float64, copy=False)
+    every = 1 if len(some) < 2 * _SEVERAL else 2
+    source, width = warper.positions([source]), choose_smoothing(scaled[some[::every]])
+    portion = warper, source, positions, hands, width
+    (trial,) = run(partial(RefinementTrial.of, **settings), [portion])
+    energy = np.square(trial.pattern - trial.pattern.mean(axis=0)).sum() or 1.0
+
+    def misfits(method, name, every=1):
+        how = {"name": name, "found": (shared, some[::every]), **portions}
+        return np.concatenate(in_portions(trial, method, positions[::every], **how), axis=1)
+
+    def verdict_on(tried):
+        return Verdict.of(np.concatenate([np.full_like(tried[:1], np.nan), tried]), energy)
+
+    if len(some) >= _SEVERAL:
+        seen = verdict_on(misfits("glimpse", "trying a little to refine", every))
+        if seen.is_hopeless:
+            return seen
+    tried = misfits("misfits", "trying to refine")
+    verdict = verdict_on(tried)
+    if not verdict.may_help:
+        return verdict
+    by_all = misfits("misfits_by_all", "matching without refining")
+    return Verdict.of(np.concatenate([by_all, tried]), energy)
+
+
+# -- balance: whether one of several features drowns the others in what is compared ------
+
+# Of 112 sets of features of people, one action each, the largest share of velocities is 0.93:
+# positions, direction cosines, and their first components, two or more (HDM05, UTKinect).
+_DROWNS = 0.95
+# A feature with less of the energy does not move, but for rounding.
+_STILL = 1e-24
+# Correlations of principal components are not larger by rounding.
+_UNCORRELATED = 1e-5
+# Performances that are looked at together.
+AT_ONCE = 256
+
+
+def warn_of_one_feature(synchronizer, performances, compared):
+    """Say if one of several features has nearly all of the energy, as other units have.
+
+    Parameters
+    ----------
+    synchronizer : DenseSynchronizer
+        Its metric is learnt.
+    performances : sequence of ndarray (n_frames_i, n_features)
+    compared : Compared
+        What is compared of them without a metric; not looked at with one.
+    """
+    metric, names = synchronizer.metric_, names_of_input(synchronizer)
+    shares = metric.energy if metric else _shares(compared, synchronizer.cost)
+    if shares.max() <= _DROWNS or (shares > _STILL).sum() < 2:
+        return
+    if _are_principal_components(performances):
+        return
+    k = int(shares.argmax())
+    name = k if names is None else repr(names[k])
+    warnings.warn(
+        f"Feature {name} holds {100 * shares[k]:.4g} % of the energy that is compared: of "
+        f"{len(shares)} features the others hardly count. If units differ, scale them: "
+        "make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer()). If it alone shall tell "
+        "the moments, leave the others out, and warp them by Match.warp.",
+        UserWarning,
+        stacklevel=2,
+    )
+
+
+def _shares(compared, cost):
+    """The share of every feature in what is compared without a metric."""
+    sums = [_sums(x) for x in compared.portions()]
+    if cost == "posture":
+        # Where all of them are makes no difference.
+        centre = sum(total for total, _, _ in sums) / sum(count for _, _, count in sums)
+        sums = [_sums(x - centre.astype(x.dtype)) for x in compared.portions()]
+    energy = sum(squares for _, squares, _ in sums)
+    return energy / (energy.sum() or 1.0)
+
+
+def _sums(features):
+    """Of every feature its sum and that of its squares, and how many frames there are."""
+    squares = np.einsum("npk,npk->k", features, features, dtype=np.float64)
+    return features.sum(axis=(0, 1), dtype=np.float64), squares, features[:, :, 0].size
+
+
+def _are_principal_components(performances):
+    """Whether features are uncorrelated, the largest first, as those of an aSpace are.
+
+    They have one unit, and the first has most of the variance by construction.
+    """
+    largest = max(float(np.abs(x).max()) for x in performances) or 1.0
+    # About a posture that is near, so that no digits are lost.
+    origin = performances[0].mean(axis=0, dtype=np.float64) / largest
+    total, products, count = 0, 0, 0
+    for rows in even_slices(len(performances), AT_ONCE):
+        frames = np.concatenate(list(performances[rows])).astype(np.float64) / largest
+        frames -= origin
+        total, products = total + frames.sum(axis=0), products + frames.T @ frames
+        count += len(frames)
+    covariance = products - np.outer(total, total) / count
+    variance = np.diag(covariance)
+    bound = _UNCORRELATED * np.sqrt(np.outer(variance, variance))
+    others = np.abs(covariance - np.diag(variance))
+    return bool((others <= bound).all() and (np.diff(variance) <= 0).all())

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
-from .table import table_of_timing
+from .match import table_of_timing
 
 __all__ = ["Lags"]
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..fitting import of_one_state
 from ..matching.units import squared_distances
 from ..matching.warps import even_slices
+from ..utils.atomic import snapshot
 from .base import Synchronizer
 from .match import Match
 
@@ -57,7 +57,7 @@ class LinearSynchronizer(Synchronizer):
     [0.0, 1.0, 2.0, 3.0, 4.0]
     """
 
-    @of_one_state
+    @snapshot
     def match(self, X):
         return self._match_in_parts(X)
 

@@ -3,15 +3,23 @@
 from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
 
-from ..gate import as_numbers
+from ..inputs.collections import as_collection, to_frame
+from ..inputs.numbers import as_numbers
+from ..inputs.validation import read_collection
 from ..matching.warps import sample
-from ..performances import read_collection
-from ..pipelines import reach_synchronizer
-from .clock import as_frame_rate, as_unit
-from .table import table_of_timing
+from ..utils.pipelines import reach_synchronizer
 
-__all__ = ["Match", "as_match", "check_answer"]
+__all__ = [
+    "UNITS",
+    "Match",
+    "as_frame_rate",
+    "as_match",
+    "as_unit",
+    "check_answer",
+    "table_of_timing",
+]
 
 # Rounding may take times back by this share of the clock.
 _ROUNDING = 1e-9
@@ -390,3 +398,65 @@ def _lengths(X):
     if is_plain and all(np.ndim(n) == 0 for n in X):
         return as_numbers(X, "The lengths", dtype=np.float64)
     return np.array([len(x) for x in read_collection(X)[0]], dtype=np.float64)
+
+
+# -- the timing of performances as a table, which calls them as they came in -------------
+
+
+def table_of_timing(columns, X, labels):
+    """Columns over performance and frame of the pattern.
+
+    Parameters
+    ----------
+    columns : dict of ndarray, shape (n_sequences, P)
+        By name.
+    X : performances, how many frames each has, or None
+        Who may know what performances are called.
+    labels : sequence of length n_sequences, Index, or None
+
+    Returns
+    -------
+    DataFrame
+    """
+    tables = [
+        pd.DataFrame(np.column_stack(of_one), columns=list(columns))
+        for of_one in zip(*columns.values(), strict=True)
+    ]
+    return to_frame(tables, performances=_labels_of(X) if labels is None else labels)
+
+
+def _labels_of(X):
+    """What performances are called, or tables which may know it; None if nobody does."""
+    if isinstance(X, pd.Series):
+        is_numbered = isinstance(X.index, pd.RangeIndex) or not X.index.is_unique
+        return None if is_numbered else X.index
+    if X is None or (not hasattr(X, "columns") and all(np.ndim(n) == 0 for n in X)):
+        return None
+    sequences = as_collection(X)
+    are_tables = sequences and all(isinstance(x, pd.DataFrame) for x in sequences)
+    return sequences if are_tables else None
+
+
+# -- units of time that the clock of the pattern is told in, and frame rates -------------
+
+UNITS = ("frames", "percent", "seconds")
+
+
+def as_unit(unit):
+    """A unit of time by its name."""
+    if not (isinstance(unit, str) and unit in UNITS):
+        raise ValueError(f"unit must be one of {list(UNITS)}, got {unit!r}.")
+    return unit
+
+
+def as_frame_rate(frame_rate):
+    """Frames a second: one number above 0, or one a performance."""
+    rate = as_numbers(frame_rate, "frame_rate")
+    sound = (rate > 0) & np.isfinite(rate)
+    if rate.ndim > 1 or not sound.all():
+        which = f" for performance {int(np.argmin(sound))}" if rate.ndim == 1 else ""
+        raise ValueError(
+            f"frame_rate must be one number above 0, or one a performance, got {frame_rate!r}"
+            f"{which}."
+        )
+    return rate

@@ -2,20 +2,25 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from numbers import Real
 
 import numpy as np
+import pandas as pd
 from sklearn.utils._param_validation import Interval
 
-from ..fitting import of_one_state
-from ..matching.parts import PartWarper
-from ..matching.warps import normalise
-from ..performances import names_of_input
-from ..work import run
+from ..body.parts import parts_of_names, parts_of_postures
+from ..inputs.features import choose_features
+from ..inputs.validation import names_of_input
+from ..matching.matcher import Matcher
+from ..matching.rows import Coupling
+from ..matching.warper import Warper
+from ..matching.warps import follow, normalise
+from ..utils.atomic import snapshot
+from ..utils.parallel import run
 from .dense import DenseSynchronizer
 from .lags import Lags
 from .match import Match
-from .naming import choose_parts, people_of
 from .portions import warp_in_portions
 
 __all__ = ["PartSynchronizer"]
@@ -175,7 +180,7 @@ n_features_in_, feature_names_in_
             out[:, :, columns] = match.warp([x[:, columns] for x in performances])
         return out
 
-    @of_one_state
+    @snapshot
     def match_parts(self, X):
         """Match every part of performances to that of the pattern.
 
@@ -192,7 +197,7 @@ n_features_in_, feature_names_in_
         performances = self.check_performances(X)
         return self._match_parts(performances, self.match(performances), "part")
 
-    @of_one_state
+    @snapshot
     def lags(self, X, groups=None, *, against="rest", unit="frames", frame_rate=None):
         """How much later than the rest of the body each part is, at every frame of the pattern.
 
@@ -302,3 +307,165 @@ def _warps_of_bodies(warper, chosen):
     times = warper.warps(warper.matcher.features.unit(chosen), np.s_[:])[1]
     times[0] = np.arange(times.shape[1])
     return times
+
+
+# -- which features are a part of the body, and who performs: what users call by name ----
+
+# What a part is compared with cannot be its name.
+_TAKEN = ("rest", "body")
+
+
+def choose_parts(parts, performances, names):
+    """Indices of the features of every part, by its name.
+
+    Parameters
+    ----------
+    parts : mapping of str to features, or None
+        As a user gave them; None for those that the names, or the postures, tell.
+    performances : Performances
+    names : sequence or None
+        Of their features.
+    """
+    if parts is None:
+        found = parts_of_postures(performances) if names is None else parts_of_names(names)
+        return {name: np.array(features) for name, features in found.items()}
+    width = performances[0].shape[1]
+    names = [f"x{i}" for i in range(width)] if names is None else [*names]
+    chosen, owner = {}, {}
+    for part, features in parts.items():
+        if not isinstance(part, str) or part in _TAKEN:
+            raise ValueError(
+                f"A part must have a name, and not {' or '.join(map(repr, _TAKEN))}; got {part!r}."
+            )
+        try:
+            indices = choose_features([] if features is None else features, names)
+        except ValueError as error:
+            raise ValueError(f"Part {part!r}: {error}") from None
+        for k in indices:
+            if k in owner:
+                raise ValueError(
+                    f"Feature {names[k]!r} is in part {owner[k]!r} and again in {part!r}: it can "
+                    "be warped once only. Give it to one of them, once."
+                )
+            owner[k] = part
+        chosen[part] = np.array(indices, dtype=np.intp)
+    return chosen
+
+
+def people_of(groups, n_sequences):
+    """The person of every performance counted from 0, and what they are called; None for none."""
+    if groups is None:
+        return None, None
+    given = (
+        groups if isinstance(groups, (pd.Series, pd.Index)) else np.asarray(groups, dtype=object)
+    )
+    if given.ndim != 1 or len(given) != n_sequences:
+        raise ValueError(
+            f"groups must be one for each of the {n_sequences} performances, got shape "
+            f"{np.shape(given)}."
+        )
+    codes, people = pd.factorize(given)
+    if (codes < 0).any():
+        i = int(np.argmin(codes))
+        raise ValueError(
+            f"Performance {i}: its group is missing, {list(given)[i]!r}. Say whose it is, or leave "
+            "it out."
+        )
+    return codes, list(people)
+
+
+# -- parts: some features of the body alone, with warps of their own that are drawn to the body's
+
+# So strong a coupling leaves a part nothing; a stronger one is beyond numbers.
+_RIGID = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class PartWarper(Warper):
+    """Warps some features to the same pattern, by way of the same exemplars, as the whole body.
+
+    Attributes
+    ----------
+    columns : ndarray of int
+        The features.
+    weight : float
+        Of the coupling, in squared features of a frame by the square of a frame.
+    back : ndarray, shape (1 + n_exemplars, P)
+        The body's warps of the bases, inverted: what frame of the pattern their frames meet.
+    """
+
+    columns: np.ndarray
+    weight: float
+    back: np.ndarray
+
+    @classmethod
+    def of(cls, columns, body, times, on_clock, chosen, coupling, settings):
+        """The warper of a part; None if the part does not move.
+
+        Parameters
+        ----------
+        columns : ndarray of int
+            Features of the part.
+        body : Warper
+            Of the whole body.
+        times : ndarray, shape (1 + n_exemplars, P)
+            The body's warps of the pattern and its exemplars.
+        on_clock, chosen : ndarray, shape (n_sequences, Q, n_features)
+            The training set, and the pattern and its exemplars in double precision: whole, at all
+            positions, not in the unit.
+        coupling : float
+            ``lambda``, in mean squared features of the part, by the square of a per cent of the
+            clock.
+        settings : dict
+            As `Matcher.learn` takes them.
+        """
+        features = body.matcher.features.part(columns, on_clock)
+        if features is None:
+            return None
+        positions = features.unit(on_clock[:, :, columns])
+        matcher, compared = Matcher.learn(features, positions, **settings)
+        n_frames = len(body.pattern)
+        energy = np.square(compared).sum(axis=2, dtype=np.float64).mean()
+        weight = float(min(coupling, _RIGID) * energy * (100 / (n_frames - 1)) ** 2)
+        frames = np.arange(n_frames)
+        own = features.unit(chosen[:, :, columns])
+        return cls.to_pattern(
+            matcher,
+            own[0, :: features.subframes],
+            own,
+            body.votes,
+            body.warp_smoothing,
+            Coupling(weight, times[np.newaxis, 1:] - frames) if weight else None,
+            columns=columns,
+            weight=weight,
+            back=np.stack([np.interp(frames, t, frames) for t in times]),
+        )
+
+    def positions(self, arrays):
+        """Whole performances at all positions, in double precision, not in the unit."""
+        arrays = [x.astype(np.float64, copy=False) for x in arrays]
+        return normalise(arrays, len(self.pattern), self.matcher.features.subframes)
+
+    def warps(self, positions, rows, body):
+        """Distances of the direct paths to the pattern, and times ``tau``, of some performances.
+
+        Parameters
+        ----------
+        positions : ndarray, shape (n_sequences, Q, n_features)
+            Whole performances at all positions, in double precision, not in the unit.
+        rows : slice
+        body : ndarray, shape (n_sequences, P)
+            The warps of their bodies.
+        """
+        own = self.matcher.features.unit(positions[rows][:, :, self.columns])
+        return self.voted(own, self._coupling(body[rows]))
+
+    def _coupling(self, body):
+        """What draws the paths from all bases: from the pattern to the body's warp, and from an
+        exemplar to the body's warp from there.
+        """
+        if not self.weight:
+            return None
+        at = np.broadcast_to(self.back[:, np.newaxis], (len(self.back), *body.shape))
+        from_bases = follow(np.broadcast_to(body, at.shape), at)
+        return Coupling(self.weight, from_bases - np.arange(body.shape[1]))

@@ -14,12 +14,11 @@ from sklearn.utils.metadata_routing import (
 )
 from sklearn.utils.validation import check_is_fitted
 
-from ..fitting import at_once, of_one_state
-from ..notebook import DocumentedMixin
-from ..performances import restore
+from ..inputs.validation import restore
+from ..utils.atomic import atomic_fit, snapshot
+from ..utils.doc_links import DocumentedMixin
 from .base import Synchronizer
-from .clock import UNITS
-from .match import check_answer
+from .match import UNITS, check_answer
 
 __all__ = ["TimingChannel"]
 
@@ -100,7 +99,7 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         self.unit = unit
         self.frame_rate = frame_rate
 
-    @at_once
+    @atomic_fit
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X, y=None, **params):
         """Fit a clone of the synchronizer.
@@ -135,7 +134,7 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         self._fitted_on_rows = self.synchronizer_.check_performances(X).kind == "rows"
         return self
 
-    @at_once
+    @atomic_fit
     def fit_transform(self, X, y=None, **params):
         """Fit, and transform the same performances.
 
@@ -155,7 +154,7 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         to_fit = {name: params[name] for name in params if name in fits or name not in warps}
         return self.fit(X, y, **to_fit).transform(X, **{name: params[name] for name in warps})
 
-    @of_one_state
+    @snapshot
     def transform(self, X, **params):
         """Warp performances onto the clock of the pattern, and append the channel.
 

@@ -10,7 +10,8 @@ import pytest
 from made_bodies import columns_of, moved, standing, turned
 from sklearn import clone
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
-from sklearn_motionsync.datasets import load_performances, make_bending, read_motion
+from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.io import read_motion
 
 PAPER = Skeleton.paper()
 LEGS = ["pelvis", *(f"{s}_{j}" for s in ("left", "right") for j in ("hip", "knee", "ankle"))]

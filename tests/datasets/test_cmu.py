@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import Skeleton
-from sklearn_motionsync.datasets import fetch_cmu, read_motion
+from sklearn_motionsync.datasets import fetch_cmu
+from sklearn_motionsync.io import read_motion
 
 BONE = "begin\nname {}\ndirection 0 {} 0\nlength 1\naxis 0 0 0 XYZ\n{}end\n"
 AMC = b"1\nroot 0 1 0 0 0 0\nhead 0\n2\nroot 0 2 0 0 0 0\nhead 5\n"

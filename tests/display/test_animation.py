@@ -6,7 +6,7 @@ import warnings
 
 import matplotlib.pyplot as plt
 import pytest
-from sklearn_motionsync import SkeletonDisplay
+from sklearn_motionsync.display import SkeletonDisplay
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,9 @@ from sklearn_motionsync import (
     DirectionCosines,
     JointPositions,
     Skeleton,
-    SkeletonDisplay,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import SkeletonDisplay
 
 PAPER = Skeleton.paper()
 BUNCH = make_bending(6, n_frames=40, random_state=1)

@@ -3,8 +3,9 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from sklearn_motionsync import CycleDisplay, CycleSegmenter, self_correlation
+from sklearn_motionsync import CycleSegmenter, self_correlation
 from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.display import CycleDisplay
 
 GAIT = make_gait(2, 4, takes=True, random_state=0)
 HIP = 0

@@ -16,11 +16,11 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     Match,
     Skeleton,
-    SkeletonDisplay,
     find_departures,
 )
 from sklearn_motionsync.body.limbs import LIMBS
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import SkeletonDisplay
 from sklearn_motionsync.display.departing import strip_of
 
 PAPER = Skeleton.paper()

@@ -12,16 +12,14 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 from sklearn_motionsync import (
     ActionModel,
-    ActionModelDisplay,
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
-    SynchronizationDisplay,
-    TrellisDisplay,
     to_frame,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay, TrellisDisplay
 from sklearn_motionsync.display.drawing import pyplot
 
 

@@ -7,18 +7,20 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 from sklearn_motionsync import (
     ActionModel,
-    ActionModelDisplay,
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
-    MetricDisplay,
     Skeleton,
+)
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import (
+    ActionModelDisplay,
+    MetricDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
     TrellisDisplay,
 )
-from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display.drawing import panels
 
 PAPER = Skeleton.paper()

@@ -5,15 +5,9 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import (
-    ActionModel,
-    ActionModelDisplay,
-    ASpace,
-    DenseSynchronizer,
-    DirectionCosines,
-    SynchronizationDisplay,
-)
+from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay
 from sklearn_motionsync.display.drawing import group_colors
 
 GROUPS = ["young", "old", "young", "old", "young", "old", "young", "old", "one"]

@@ -4,8 +4,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import DirectionCosines, LagDisplay, Lags, PartSynchronizer
+from sklearn_motionsync import DirectionCosines, Lags, PartSynchronizer
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import LagDisplay
 
 N_FRAMES = 21
 

@@ -6,8 +6,9 @@ import pandas as pd
 import pytest
 from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, MetricDisplay
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import MetricDisplay
 from sklearn_motionsync.display.drawing import COLORS
 
 BUNCH = make_bending(6, n_frames=60, random_state=1)

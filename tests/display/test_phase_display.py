@@ -12,9 +12,9 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     LivePhase,
     OnlineSynchronizer,
-    PhaseDisplay,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import PhaseDisplay
 
 BUNCH = make_bending(8, n_frames=60, n_actors=2, random_state=0)
 COSINES = DirectionCosines(BUNCH.skeleton).fit(BUNCH.data[:6])

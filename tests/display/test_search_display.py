@@ -4,7 +4,8 @@ import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import SearchDisplay, find_performances, to_sequences
+from sklearn_motionsync import find_performances, to_sequences
+from sklearn_motionsync.display import SearchDisplay
 
 matplotlib.use("Agg")
 

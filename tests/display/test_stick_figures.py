@@ -13,11 +13,10 @@ from sklearn_motionsync import (
     DirectionCosines,
     LinearSynchronizer,
     Skeleton,
-    SkeletonDisplay,
     to_frame,
 )
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.display import stick_figures
+from sklearn_motionsync.display import SkeletonDisplay, stick_figures
 from sklearn_motionsync.display.animation import playable
 
 

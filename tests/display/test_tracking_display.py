@@ -5,14 +5,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.exceptions import NotFittedError
-from sklearn_motionsync import (
-    DirectionCosines,
-    LinearSynchronizer,
-    MotionTracker,
-    Track,
-    TrackingDisplay,
-)
+from sklearn_motionsync import DirectionCosines, LinearSynchronizer, MotionTracker, Track
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import TrackingDisplay
 
 BUNCH = make_bending(5, n_frames=24, random_state=0)
 COSINES = DirectionCosines(BUNCH.skeleton).fit(BUNCH.data)

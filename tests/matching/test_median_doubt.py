@@ -5,8 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.matching.median import Median, search_median, sum_all
-from sklearn_motionsync.matching.paired import PairedTests
+from sklearn_motionsync.matching.median import Median, PairedTests, search_median, sum_all
 
 BUDGET = 150
 

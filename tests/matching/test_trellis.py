@@ -4,7 +4,8 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from sklearn_motionsync.matching import narrow, rows
+from sklearn_motionsync.matching import rows
+from sklearn_motionsync.matching import trellis as narrow
 from sklearn_motionsync.matching import trellis as tiling
 from sklearn_motionsync.matching.costs import StepTable, step_table
 from sklearn_motionsync.matching.rows import Coupling

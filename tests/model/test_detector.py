@@ -25,7 +25,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.metrics import SpreadScorer
-from sklearn_motionsync.model.manner import Usual, energies
+from sklearn_motionsync.model.detector import LogPredictionInterval, energies
 
 QUESTIONS = ["movement", "course", "duration", "energy"]
 
@@ -153,7 +153,7 @@ def test_people_who_differ_leave_more_open():
     rng = np.random.default_rng(0)
     groups = np.arange(24) // 6
     values = np.exp(np.repeat([-0.4, -0.1, 0.2, 0.3], 6) + 0.01 * rng.standard_normal(24))
-    apart, together = (Usual(values, g, 0.95) for g in (groups, np.arange(24)))
+    apart, together = (LogPredictionInterval(values, g, 0.95) for g in (groups, np.arange(24)))
     assert apart.upper / apart.lower > 1.3 * together.upper / together.lower
     np.testing.assert_allclose(apart([apart.lower, apart.upper]), [-1, 1])
 
@@ -164,7 +164,7 @@ def test_what_is_usual_holds_the_share_it_says(coverage):
     held = []
     for _ in range(300):
         logs = np.sqrt(0.07) * rng.standard_normal(120)
-        usual = Usual(np.exp(logs[:20]), np.arange(20), coverage)
+        usual = LogPredictionInterval(np.exp(logs[:20]), np.arange(20), coverage)
         held.append(np.mean(np.abs(usual(np.exp(logs[20:]))) <= 1))
     assert abs(np.mean(held) - coverage) < 0.01
 

@@ -16,7 +16,7 @@ from sklearn.exceptions import NotFittedError
 from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import ActionModel, find_departures, to_frame
 from sklearn_motionsync.model.stream import spread_out
-from test_likeness import curves, slow_border, slow_dissimilarity, slow_ratio
+from test_similarity import curves, slow_border, slow_dissimilarity, slow_ratio
 
 few = settings(max_examples=12, deadline=None, derandomize=True, database=None)
 

@@ -11,8 +11,7 @@ from sklearn_motionsync import (
     DirectionCosines,
     Skeleton,
 )
-from sklearn_motionsync.model.charts import directions_in
-from sklearn_motionsync.model.sampling import sample_performances, sample_postures
+from sklearn_motionsync.model.sampling import directions_in, sample_performances, sample_postures
 
 
 def moments(X):

@@ -28,13 +28,13 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    SkeletonDisplay,
     find_departures,
     synchronization_distances,
     to_frame,
 )
 from sklearn_motionsync.datasets import load_performances, make_bending
-from sklearn_motionsync.recognition.regression import KernelRegression, deal, decide
+from sklearn_motionsync.display import SkeletonDisplay
+from sklearn_motionsync.recognition.kernel import KernelRegression, deal, decide
 
 KINDS = ("wave", "rise", "turn")
 

@@ -17,11 +17,9 @@ from sklearn_motionsync import (
     DirectionCosines,
     LinearSynchronizer,
     Match,
-    SkeletonDisplay,
-    SynchronizationDisplay,
     Synchronizer,
-    TrellisDisplay,
 )
+from sklearn_motionsync.display import SkeletonDisplay, SynchronizationDisplay, TrellisDisplay
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
 
 from shift_synchronizer import ShiftSynchronizer

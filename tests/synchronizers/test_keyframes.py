@@ -14,8 +14,8 @@ from sklearn_motionsync import (
     LinearSynchronizer,
 )
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.matching.keyframes import curvature_keyframes
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error
+from sklearn_motionsync.synchronizers.keyframes import curvature_keyframes
 
 from oracle import slow_filter
 

@@ -15,11 +15,11 @@ from sklearn_motionsync import (
     KeyframeSynchronizer,
     LinearSynchronizer,
     PartSynchronizer,
-    reading,
     to_frame,
 )
-from sklearn_motionsync.synchronizers import compared
-from sklearn_motionsync.synchronizers.drawing import typical_share
+from sklearn_motionsync.inputs import validation as reading
+from sklearn_motionsync.synchronizers import portions as compared
+from sklearn_motionsync.synchronizers.subsample import typical_share
 
 from shift_synchronizer import ShiftSynchronizer
 

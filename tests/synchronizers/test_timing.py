@@ -11,21 +11,23 @@ from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionDetector,
     ActionModel,
-    ActionModelDisplay,
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
     KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
-    SkeletonDisplay,
-    SynchronizationDisplay,
     TimingChannel,
-    TrellisDisplay,
     find_departures,
     to_frame,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import (
+    ActionModelDisplay,
+    SkeletonDisplay,
+    SynchronizationDisplay,
+    TrellisDisplay,
+)
 from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer
 
 

@@ -1,0 +1,234 @@
+"""The motion capture database of Carnegie Mellon University, clip by clip."""
+
+import hashlib
+import re
+import time
+from collections.abc import Mapping
+from numbers import Integral, Real
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from sklearn.utils import Bunch
+
+from ..body.skeleton import Skeleton
+from ..io.motion import read_motion
+
+_FRAME_RATE = 120.0
+_LONGEST_DELAY = 3600
+_DESCR = """\
+CMU Graphics Lab Motion Capture Database, mocap.cs.cmu.edu: optical motion capture of a
+person ("subject") in many takes ("trials"), as Acclaim ASF/AMC files, 120 frames a second.
+Positions are in metres, the y axis is up, a joint is the far end of the bone of its name.
+
+Terms, in the words of the site: "This dataset of motions is free for all uses." and "This
+data is free for use in research projects. You may include this data in commercially-sold
+products, but you may not resell this data directly, even in converted form."
+
+Acknowledgement asked for: "The data used in this project was obtained from mocap.cs.cmu.edu.
+The database was created with funding from NSF EIA-0196217."
+"""
+
+
+def fetch_cmu(
+    subject,
+    trials,
+    *,
+    data_home=None,
+    download_if_missing=True,
+    url="http://mocap.cs.cmu.edu/subjects",
+    sha256=None,
+    n_retries=3,
+    delay=1.0,
+):
+    """Load trials of one subject of the CMU motion capture database, downloading what lacks.
+
+    Parameters
+    ----------
+    subject : int or str
+        Number of the subject, such as 2 or "02".
+    trials : int, str, or list of them
+        Numbers of the trials.
+    data_home : str or path-like, default=None
+        Files are kept in ``cmu_mocap/<subject>`` of this folder, by default scikit-learn's
+        (see `sklearn.datasets.get_data_home`).
+    download_if_missing : bool, default=True
+        If False, a file that is not there is an error.
+    url : str, default="http://mocap.cs.cmu.edu/subjects"
+        Where the folders of the subjects are.
+    sha256 : mapping of str to str, default=None
+        Checksums of files by name, such as ``{"02.asf": "..."}``. A file of another checksum is
+        downloaded again, and refused if that does not help.
+    n_retries : int, default=3
+        How often a download is tried again after the network failed; 0 for not at all.
+    delay : float, default=1.0
+        Seconds between these, up to an hour.
+
+    Returns
+    -------
+    Bunch
+        data : list of DataFrame (n_frames_i, 3 * n_joints)
+            Joint positions in metres, as `read_motion` gives them.
+        subject : str
+            Number of the subject, in two digits.
+        take : ndarray of str (n_trials,)
+            Numbers of the trials, in two digits.
+        joints : list of str
+            Names of the joints.
+        skeleton : Skeleton or None
+            None if the names of the joints do not tell which of them are the body's.
+        frame_rate : ndarray (n_trials,)
+            120 frames a second.
+        units : str
+            "m".
+        filenames : list of str
+            Paths of the AMC files.
+        DESCR : str
+            Terms of use, and the acknowledgement that the site asks for.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the site has no such subject or trial.
+    OSError
+        If a file is neither there nor can be downloaded, or has another checksum.
+    ValueError
+        If a parameter makes no sense, or a file cannot be read. What was just downloaded and
+        cannot be read is removed again.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync.datasets import fetch_cmu
+    >>> walks = fetch_cmu(2, [1, 2])  # doctest: +SKIP
+    >>> walks.data[0].shape  # doctest: +SKIP
+    (343, 93)
+    """
+    from sklearn.datasets import get_data_home
+
+    _check_download(download_if_missing, url, sha256, n_retries, delay)
+    subject = _two_digits(subject, "subject")
+    many = isinstance(trials, list | tuple | range | np.ndarray)
+    takes = [_two_digits(trial, "trials") for trial in (trials if many else [trials])]
+    if not takes:
+        raise ValueError("trials must be one number or several, got none.")
+    folder = Path(get_data_home(data_home)) / "cmu_mocap" / subject
+    names = [f"{subject}.asf", *(f"{subject}_{take}.amc" for take in takes)]
+    known = sha256 or {}
+    new = []
+    for name in dict.fromkeys(names):
+        if _is_whole(folder / name, known.get(name)):
+            continue
+        address = f"{url.rstrip('/')}/{subject}/{name}"
+        if not download_if_missing:
+            raise OSError(_missing(folder / name, address, "download_if_missing is False"))
+        _download(address, folder / name, known.get(name), n_retries, delay)
+        new.append(folder / name)
+    files = [folder / name for name in names]
+    data = _read(files[0], files[1:], new)
+    joints = data[0].attrs["joints"]
+    try:
+        skeleton = Skeleton.from_names(joints, data[0].attrs["parents"])
+    except ValueError:
+        skeleton = None
+    return Bunch(
+        data=data,
+        subject=subject,
+        take=np.array(takes),
+        joints=joints,
+        skeleton=skeleton,
+        frame_rate=np.full(len(takes), _FRAME_RATE),
+        units="m",
+        filenames=[str(file) for file in files[1:]],
+        DESCR=_DESCR,
+    )
+
+
+def _check_download(download_if_missing, url, sha256, n_retries, delay):
+    if not isinstance(download_if_missing, bool | np.bool_):
+        raise ValueError(f"download_if_missing must be True or False, got {download_if_missing!r}.")
+    if not isinstance(url, str) or not re.fullmatch(r"[a-z]+://\S+", url):
+        raise ValueError(f"url must be an address, such as 'http://host/folder', got {url!r}.")
+    whole = isinstance(n_retries, Integral) and not isinstance(n_retries, bool)
+    if not whole or n_retries < 0:
+        raise ValueError(f"n_retries must be a whole number, 0 or more, got {n_retries!r}.")
+    number = isinstance(delay, Real) and not isinstance(delay, bool)
+    if not number or not 0 <= delay <= _LONGEST_DELAY:
+        raise ValueError(f"delay must be seconds, from 0 to {_LONGEST_DELAY}, got {delay!r}.")
+    if sha256 is not None and not isinstance(sha256, Mapping):
+        raise ValueError(
+            'sha256 must be checksums by the names of files, such as {"02.asf": "..."}, got '
+            f"{sha256!r}."
+        )
+    for name, known in (sha256 or {}).items():
+        if not isinstance(known, str) or not re.fullmatch("[0-9a-fA-F]{64}", known):
+            raise ValueError(f"sha256 of {name!r} must be 64 hexadecimal digits, got {known!r}.")
+
+
+def _two_digits(number, name):
+    text = str(number)
+    # The number becomes part of a path, so it must be a number.
+    if not (text.isascii() and text.isdigit() and len(text) <= 4 and int(text)):
+        raise ValueError(f"{name} must be numbers from 1, such as 2 or '02', got {number!r}.")
+    return f"{int(text):02d}"
+
+
+def _is_whole(path, sha256):
+    if not path.is_file():
+        return False
+    return sha256 is None or hashlib.sha256(path.read_bytes()).hexdigest() == sha256.lower()
+
+
+def _missing(path, address, reason):
+    return (
+        f"{path.name} is not in {path.parent} and could not be had from {address}: {reason}. "
+        "Download it by hand into that folder, or give another url=."
+    )
+
+
+def _download(address, path, sha256, n_retries, delay):
+    """Fetch one file. It only gets its name when it is whole and has the right checksum."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(prefix="download_", dir=path.parent) as folder:
+        fetched = _try(address, Path(folder) / path.name, path, n_retries, delay)
+        if not _is_whole(fetched, sha256):
+            found = hashlib.sha256(fetched.read_bytes()).hexdigest()
+            raise OSError(
+                f"{path.name} from {address} has the checksum {found}, not {sha256}; it was not "
+                "kept. Correct sha256=, or give another url=."
+            )
+        fetched.replace(path)
+
+
+def _try(address, fetched, path, n_retries, delay):
+    """Try again here: fetch_file would ask again for what does not exist, and warn each time."""
+    from http.client import HTTPException
+    from urllib.error import HTTPError
+
+    from sklearn.datasets import fetch_file
+
+    for left in range(n_retries, -1, -1):
+        try:
+            return fetch_file(address, fetched.parent, fetched.name, n_retries=0)
+        except (OSError, HTTPException) as error:
+            if isinstance(error, HTTPError):
+                error.close()
+                if error.code in (404, 410):
+                    raise FileNotFoundError(
+                        f"There is no {path.name} at {address} (HTTP {error.code}); that subject "
+                        "or trial does not exist there. Look for its number on the site, or give "
+                        "another url=."
+                    ) from error
+            if not left:
+                reason = str(error) or repr(error)
+                raise OSError(_missing(path, address, reason)) from error
+        time.sleep(delay)
+
+
+def _read(asf, files, new):
+    try:
+        return [read_motion(file, asf=asf, frame_rate=_FRAME_RATE) for file in files]
+    except ValueError as error:
+        for path in new:
+            path.unlink()
+        advice = "What was downloaded was removed." if new else "Delete that file to get it anew."
+        raise ValueError(f"{error} {advice}") from error

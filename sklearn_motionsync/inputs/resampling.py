@@ -1,0 +1,280 @@
+"""The times of frames: as numbers, in order, without gaps, and evenly spaced or made so."""
+
+import datetime
+import re
+import warnings
+from numbers import Real
+
+import numpy as np
+import pandas as pd
+
+from .numbers import as_numbers
+
+__all__ = [
+    "COMMA",
+    "as_times",
+    "check_settings",
+    "even_grid",
+    "facts_at",
+    "gaps_of",
+    "has_comma",
+    "interpolated",
+    "round_up",
+    "warn_of_uneven",
+]
+
+# What to do with numbers that are text for their comma.
+COMMA = "has decimal commas, such as {!r}, and is text so: pd.read_csv(path, sep=';', decimal=',')."
+# Steps of time this much longer than the usual one are gaps.
+_GAP = 1.9
+# Times this share of a step from even ones are even.
+_EVEN = 1e-6
+# So many times the recorded frames are a mistake in the unit.
+_MOST = 100
+
+
+def as_times(values, what, column):
+    """Times as numbers: dates are seconds from the first of them, durations are seconds.
+
+    Parameters
+    ----------
+    values : Series or Index
+    what, column : str
+        What to call them in messages, and in code.
+
+    Returns
+    -------
+    ndarray of float64, shape (n_frames,)
+    """
+    series = pd.Series(values).infer_objects()
+    if isinstance(series.dtype, pd.PeriodDtype):
+        series = series.dt.to_timestamp()
+    if series.dtype.kind == "M":
+        series = series - series.min()
+    if series.dtype.kind == "m":
+        return series.dt.total_seconds().to_numpy(dtype=np.float64)
+    texts = [v for v in series if isinstance(v, str)] if series.dtype.kind in "OSUT" else []
+    name = f"df[{column!r}]"
+    if series.dtype.kind == "O" and any(isinstance(v, datetime.time) for v in series):
+        raise ValueError(
+            f"{what} is of the clock (datetime.time). Convert it: {name} = "
+            f"pd.to_timedelta({name}.astype(str))."
+        )
+    if texts:
+        if has_comma(texts[0]):
+            raise ValueError(f"{what} {COMMA.format(texts[0])}")
+        raise ValueError(
+            f"{what} is text, such as {texts[0][:40]!r}. Convert it: {name} = "
+            f"pd.to_datetime({name}) for dates, pd.to_timedelta for durations, pd.to_numeric for "
+            "numbers."
+        )
+    return as_numbers(series, what, dtype=np.float64)
+
+
+def has_comma(text):
+    """Whether text is a number with a decimal comma."""
+    return re.fullmatch(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*", text) is not None
+
+
+def check_settings(frame_rate, max_gap, time):
+    """Refuse what is no rate or no gap, or comes without times."""
+    for name, value in (("frame_rate", frame_rate), ("max_gap", max_gap)):
+        if value is None:
+            continue
+        is_number = isinstance(value, Real) and not isinstance(value, bool)
+        if not is_number or not 0 < value < np.inf:
+            raise ValueError(f"{name} must be a number above 0, in units of time; got {value!r}.")
+        if time is None:
+            raise ValueError(
+                f"{name}={value!r} goes with time=: say which column tells the time, as in "
+                f"to_sequences(df, by=[...], time='time', {name}={value!r})."
+            )
+
+
+def gaps_of(times, max_gap=None):
+    """Where times that increase leap: pairs (from, to), and the usual step."""
+    steps = np.diff(times)
+    if len(steps) < 2:
+        return [], float(steps.sum())
+    usual = float(np.median(steps))
+    longest = max(_GAP * usual, (max_gap or 0) * (1 + _EVEN))
+    return [(times[i], times[i + 1]) for i in np.flatnonzero(steps > longest)], usual
+
+
+def round_up(size):
+    """A number of four digits that is not less."""
+    scale = 10.0 ** (3 - int(np.floor(np.log10(size))))
+    return float(f"{np.ceil(size * scale - _EVEN) / scale:.10g}")
+
+
+def even_grid(times, frame_rate, what):
+    """The even times that replace those of a performance; None if they are even themselves.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n_frames,)
+        They increase.
+    frame_rate : float or None
+        Frames in a unit of time; by default as near to the median step as it takes to keep the
+        first and the last frame.
+    what : str
+        What to call the performance.
+    """
+    if len(times) < 2:
+        return None
+    duration, n_steps = times[-1] - times[0], len(times) - 1
+    slack = _slack(times)
+    keeps_rate = frame_rate is None or abs(duration - n_steps / frame_rate) <= slack
+    if keeps_rate and _is_even(times, slack):
+        return None
+    if frame_rate is None:
+        n_steps = round(duration / float(np.median(np.diff(times))))
+    else:
+        # Rounding of the times is no reason to lose the last frame.
+        n_steps = int((duration + slack) * frame_rate)
+    if not 1 <= n_steps <= _MOST * len(times):
+        asked = "max_gap" if frame_rate is None else f"frame_rate={frame_rate:g}"
+        raise ValueError(
+            f"{what} has {len(times)} frames from {times[0]:.10g} to {times[-1]:.10g}, of which "
+            f"{asked} would make {n_steps + 1}: give it in units of the time column."
+        )
+    if frame_rate is None:
+        return np.linspace(times[0], times[-1], n_steps + 1)
+    return np.minimum(times[0] + np.arange(n_steps + 1) / frame_rate, times[-1])
+
+
+def warn_of_uneven(sequences):
+    """Tell of performances cut out by an index whose last level is a time that is not even.
+
+    Whole numbers are frames, whichever of them there are.
+
+    Parameters
+    ----------
+    sequences : list of DataFrame
+        As `tables.cut` gives them.
+    """
+    for x in sequences:
+        if x.index.dtype.kind not in "fmM" or len(x) < 2:
+            continue
+        label, name = x.attrs["performance"], x.index.name
+        times = as_times(x.index, f"The time of performance {label!r}", name)
+        if not np.isfinite(times).all() or _is_even(times, _slack(times)):
+            continue
+        steps = np.diff(times)
+        worst, what = steps.argmax(), "frame" if name is None else name
+        warnings.warn(
+            f"The times of performance {label!r}, level {what!r} of the index, are not even: from "
+            f"{times[worst]:.10g} to {times[worst + 1]:.10g} it is {steps[worst]:.4g}, mostly "
+            f"{np.median(steps):.4g}. Frames count as evenly spaced: to_sequences(df, "
+            f"time={what!r}) makes them so.",
+            UserWarning,
+            stacklevel=3,
+        )
+        return
+
+
+def interpolated(column, times, grid):
+    """A feature at other times, on straight lines; what is next to NaN is NaN."""
+    dtype = column.dtype if column.dtype.kind == "f" else np.float64
+    return np.interp(grid, times, column).astype(dtype, copy=False)
+
+
+def facts_at(attrs, rows, n_rows, times=None, grid=None):
+    """What a recording says of its clock, of the frames that a performance has now.
+
+    Parameters
+    ----------
+    attrs : dict
+        Of the table, as `io.read_motion` gives it.
+    rows : ndarray of int
+        Which of the ``n_rows`` of the table are in the performance, in its order.
+    times : ndarray, default=None
+        Of these rows, in any unit.
+    grid : ndarray, default=None
+        The even times that were put in their place.
+
+    Returns
+    -------
+    dict
+        Without what is not known any more.
+    """
+    facts = dict(attrs)
+    seconds, rate = facts.pop("times", None), facts.get("frame_rate")
+    events = facts.pop("events", None)
+    if rows[0]:
+        facts.pop("first_frame", None)
+        if rate and "first_time" in facts:
+            facts["first_time"] += rows[0] / rate
+    if seconds is not None and len(seconds) == n_rows:
+        seconds = np.asarray(seconds, dtype=np.float64)[rows]
+        facts |= _clock_of(seconds if grid is None else np.interp(grid, times, seconds))
+    elif rate and grid is not None:
+        facts["frame_rate"] = _digits(rate * np.median(np.diff(times)) / (grid[1] - grid[0]))
+    if isinstance(events, (list, tuple)) and (np.diff(rows) > 0).all():
+        n_frames = len(rows if grid is None else grid)
+        moved = [_moved(event, rows, times, grid) for event in events]
+        whole = len(rows) == n_rows
+        facts["events"] = [
+            event
+            for event in moved
+            if whole or event.get("frame") is None or 0 <= event["frame"] <= n_frames - 1
+        ]
+    return facts
+
+
+def _clock_of(seconds):
+    """Even times are a frame rate."""
+    clock = {"first_time": float(seconds[0])}
+    if len(seconds) > 1 and _is_even(seconds, _slack(seconds)):
+        rate = (len(seconds) - 1) / (seconds[-1] - seconds[0])
+        return clock | {"frame_rate": _digits(rate)}
+    return clock | {"times": seconds.tolist()}
+
+
+def _digits(rate):
+    return float(f"{rate:.9g}")
+
+
+def _moved(event, rows, times, grid):
+    """An event at its place in other frames."""
+    if not isinstance(event, dict) or event.get("frame") is None:
+        return event
+    own = np.arange(len(rows))
+    place = _on_line(event["frame"], rows, own)
+    if grid is not None:
+        place = _on_line(_on_line(place, own, times), grid, np.arange(len(grid)))
+    return event | {"frame": round(float(place), 5)}
+
+
+def _on_line(x, xs, ys):
+    """Between points that increase on straight lines, beyond them at the mean pace."""
+    if xs[0] <= x <= xs[-1]:
+        return np.interp(x, xs, ys)
+    end = 0 if x < xs[0] else -1
+    return ys[end] + (x - xs[end]) * (ys[-1] - ys[0]) / max(xs[-1] - xs[0], 1e-300)
+
+
+def _slack(times):
+    """How far rounding may have moved times: in memory, or to the digits they are written with."""
+    step = (times[-1] - times[0]) / (len(times) - 1)
+    slack = max(_EVEN * step, 8 * np.spacing(np.abs(times).max()))
+    single = times.astype(np.float32)
+    if (single == times).all():
+        slack = max(slack, 2 * float(np.spacing(np.abs(single).max())))
+    for digits in range(-9, 10):
+        quantum = 10.0**-digits
+        # A third: 30 frames a second with two digits.
+        if quantum > step / 3:
+            continue
+        ticks = (times - times[0]) / quantum
+        if np.abs(ticks - np.round(ticks)).max() < 1e-3:
+            return max(slack, quantum)
+    return slack
+
+
+def _is_even(times, slack):
+    """Whether even times, rounded like these, would be these."""
+    frames = np.arange(len(times)) - (len(times) - 1) / 2
+    slope = frames @ times / max(frames @ frames, 1e-300)
+    # Rounding moves a time by half a digit up or down.
+    return np.ptp(times - slope * frames) < 0.999 * slack

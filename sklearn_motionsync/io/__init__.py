@@ -1,0 +1,8 @@
+"""Files of motion, and what belongs to them: gaps, events, key-points."""
+
+from .events import cut_at_events
+from .gaps import fill_gaps, find_gaps
+from .motion import read_motion
+from .poses import from_poses
+
+__all__ = ["cut_at_events", "fill_gaps", "find_gaps", "from_poses", "read_motion"]

@@ -1,1 +1,0 @@
-"""Live: performances that are still running, frame by frame."""

@@ -1,0 +1,1 @@
+"""Long recordings cut into performances: cycles, and where an action happens."""

@@ -1,1 +1,0 @@
-"""From long takes to performances: cycles, and where an action happens."""

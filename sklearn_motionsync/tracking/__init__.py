@@ -1,1 +1,0 @@
-"""Tracking: the body behind observations with gaps and noise, by the model of an action."""

@@ -1,0 +1,1 @@
+"""Transformers of postures, frame by frame."""

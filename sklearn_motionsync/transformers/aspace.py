@@ -1,0 +1,196 @@
+"""aSpace: the principal components of the postures of an action (Eqs. 3-5)."""
+
+from numbers import Integral
+
+import numpy as np
+from sklearn.base import (
+    BaseEstimator,
+    ClassNamePrefixFeaturesOutMixin,
+    TransformerMixin,
+    _fit_context,
+)
+from sklearn.decomposition import PCA
+from sklearn.utils._param_validation import Interval, RealNotInt
+from sklearn.utils.validation import check_is_fitted
+
+from ..inputs.numbers import check_squares
+from ..inputs.validation import check_performances, check_transformed, restore
+from ..utils.atomic import atomic_fit, snapshot
+from ..utils.doc_links import DocumentedMixin
+
+__all__ = ["ASpace"]
+
+
+class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
+    """The space of an action: principal components of all its postures.
+
+    1. Pool the postures of all performances and diagonalise their covariance (Eq. 3).
+    2. Keep the first ``b`` eigenvectors, the fewest that hold the asked share of the
+       variance (Eq. 4).
+    3. Project postures onto them (Eq. 5).
+
+    Parameters
+    ----------
+    n_components : float or int, default=0.95
+        A float in (0, 1]: the share of the variance to keep. An int: ``b`` itself.
+
+    Attributes
+    ----------
+    components_ : ndarray, shape (b, n_features)
+        The eigenvectors, as rows.
+    mean_ : ndarray, shape (n_features,)
+        The mean posture.
+    explained_variance_ : ndarray, shape (b,)
+        The eigenvalues, the variances along the components.
+    explained_variance_ratio_ : ndarray, shape (b,)
+        Their shares of the whole variance (0 where all postures are the same).
+    n_components_ : int
+        ``b``.
+    residual_variance_ : float
+        ``eps_b`` of Eq. 4: the variance left out, the sum of the other eigenvalues.
+    left_out_variance_ : ndarray, shape (n_features,)
+        The same of every parameter of a posture by itself; their sum is ``eps_b``.
+    n_features_in_ : int
+        Parameters of a posture.
+    feature_names_in_ : ndarray of str
+        Names of the columns; only if the input had names.
+
+    See Also
+    --------
+    DirectionCosines : The postures.
+    DenseSynchronizer : What puts the projected performances on one clock.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn_motionsync import ASpace
+    >>> t = np.linspace(0, 1, 50)
+    >>> performances = [np.column_stack([x, 2 * x, 0 * x]) for x in (t, t**2)]
+    >>> aspace = ASpace(0.95).fit(performances)
+    >>> aspace.n_components_
+    1
+    >>> [x.shape for x in aspace.transform(performances)]
+    [(50, 1), (50, 1)]
+    """
+
+    _parameter_constraints: dict = {
+        "n_components": [
+            Interval(Integral, 1, None, closed="left"),
+            Interval(RealNotInt, 0, 1, closed="right"),
+        ],
+    }
+
+    def __init__(self, n_components=0.95):
+        self.n_components = n_components
+
+    @atomic_fit
+    @_fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X, y=None):
+        """Find the components.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances, or postures in rows.
+        y : ignored
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        ValueError
+            If there are fewer than two postures, or fewer than ``n_components`` postures or
+            features, or their unit is such that variances are beyond the precision.
+        """
+        arrays = check_performances(self, X, reset=True, level="posture")
+        postures = np.concatenate(arrays) if len(arrays) > 1 else arrays[0]
+        if len(postures) < 2:
+            raise ValueError(
+                "ASpace needs at least 2 postures to see how they vary, got n_samples=1."
+            )
+        most = min(postures.shape)
+        if isinstance(self.n_components, Integral) and self.n_components > most:
+            raise ValueError(
+                f"n_components={self.n_components} is more than the {len(postures)} postures of "
+                f"{postures.shape[1]} features can span; use at most {most}, or a share of the "
+                "variance such as 0.95."
+            )
+        # In units of a power of two no square is out of range, and no bit is lost.
+        exponent = int(np.frexp(np.abs(postures).max())[1])
+        with np.errstate(invalid="ignore"):  # no variance at all: 0 / 0 in shares not used
+            pca = PCA().set_output(transform="default").fit(np.ldexp(postures, -exponent))
+        with np.errstate(over="ignore"):
+            variance = np.ldexp(pca.explained_variance_, 2 * exponent)
+        check_squares(postures, variance[0], "variances")
+        b = self._count(variance)
+        self.components_ = np.ascontiguousarray(pca.components_[:b])
+        self.mean_ = np.ldexp(pca.mean_, exponent)
+        self.explained_variance_ = variance[:b]
+        whole = variance.sum()
+        self.explained_variance_ratio_ = (
+            variance[:b] / whole if whole > 0 else np.zeros_like(variance[:b])
+        )
+        self.residual_variance_ = float(variance[b:].sum())
+        self.left_out_variance_ = variance[b:] @ np.square(pca.components_[b:])
+        self.n_components_ = b
+        return self
+
+    fit_transform = atomic_fit(TransformerMixin.fit_transform)
+
+    @snapshot
+    def transform(self, X):
+        """Project postures into the aSpace (Eq. 5).
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+
+        Returns
+        -------
+        The kind that was given, with ``b`` features
+        """
+        check_is_fitted(self)
+        performances = check_performances(self, X, reset=False, level="posture")
+        components = self.components_.T
+        arrays = [((a - self.mean_) @ components).astype(a.dtype, copy=False) for a in performances]
+        return restore(self, performances, arrays)
+
+    @snapshot
+    def inverse_transform(self, X):
+        """Postures of points of the aSpace; exact where nothing was left out.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, b), 3-D array, or 2-D array
+
+        Returns
+        -------
+        The kind that was given, with ``n_features`` features
+        """
+        check_is_fitted(self)
+        performances = check_transformed(self, X, self.get_feature_names_out())
+        arrays = [
+            (a @ self.components_ + self.mean_).astype(a.dtype, copy=False) for a in performances
+        ]
+        names = getattr(self, "feature_names_in_", range(self.n_features_in_))
+        return restore(self, performances, arrays, columns=names)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.three_d_array = True
+        tags.transformer_tags.preserves_dtype = ["float64", "float32"]
+        return tags
+
+    @property
+    def _n_features_out(self):
+        return self.n_components_
+
+    def _count(self, variance):
+        """The smallest number of eigenvalues that reach the asked share (Eq. 4)."""
+        if isinstance(self.n_components, Integral):
+            return int(self.n_components)
+        share = np.cumsum(variance)
+        reached = share >= self.n_components * share[-1]
+        return int(np.argmax(reached)) + 1

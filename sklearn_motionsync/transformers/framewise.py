@@ -1,0 +1,267 @@
+"""FrameWise: any transformer of rows, applied to the frames of performances."""
+
+import numpy as np
+import pandas as pd
+from scipy.sparse import issparse
+from sklearn.base import BaseEstimator, TransformerMixin, _fit_context, clone
+from sklearn.compose import ColumnTransformer
+from sklearn.pipeline import FeatureUnion, Pipeline
+from sklearn.utils import get_tags
+from sklearn.utils._param_validation import HasMethods
+from sklearn.utils.metaestimators import available_if
+from sklearn.utils.validation import check_is_fitted
+
+from ..inputs.numbers import as_numbers, names_of
+from ..inputs.validation import check_performances, check_transformed, restore
+from ..utils.atomic import atomic_fit, snapshot
+from ..utils.doc_links import DocumentedMixin
+
+__all__ = ["FrameWise"]
+
+
+def _goes_back(self):
+    """Whether the transformer has a way back; in a fit it is tried, as some have it in part."""
+    return vars(self).get("_inverts", hasattr(self.transformer, "inverse_transform"))
+
+
+class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
+    """Apply a transformer of rows, such as ``StandardScaler``, to the frames of performances.
+
+    It is fitted on the frames of all performances pooled, and transforms each performance by
+    itself. So features of different units are scaled by one number for all performances, not each
+    performance by its own, which would take out what people differ in.
+
+    Parameters
+    ----------
+    transformer : transformer of scikit-learn
+        It takes a row a frame and gives one a frame: scalers, imputers, ``PCA``,
+        ``VarianceThreshold``, a pipeline of such. It is cloned. Frames have no ``y``.
+
+    Attributes
+    ----------
+    transformer_ : transformer
+        Fitted on the pooled frames.
+    n_features_in_ : int
+        Features of a frame.
+    feature_names_in_ : ndarray of str
+        Names of the columns; only if the input had names.
+
+    See Also
+    --------
+    ASpace : Principal components of postures, with what a model needs to take them back.
+
+    Notes
+    -----
+    A gap (NaN) is let through if the transformer takes it, as imputers and scalers do; infinity is
+    not. A pipeline takes what its first step takes, a union what all its parts take; a
+    ``ColumnTransformer`` and a ``FunctionTransformer`` take any.
+
+    Examples
+    --------
+    Degrees and newtons, which would count a hundred times as much:
+
+    >>> import numpy as np
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from sklearn.preprocessing import StandardScaler
+    >>> from sklearn_motionsync import DenseSynchronizer, FrameWise
+    >>> t = np.linspace(0, 1, 50)
+    >>> X = [np.column_stack([9 * np.sin(5 * x), 900 * np.cos(4 * x)]) for x in (t, t**1.2)]
+    >>> scaled = FrameWise(StandardScaler()).fit_transform(X)
+    >>> np.concatenate(scaled).std(axis=0).round(3).tolist()
+    [1.0, 1.0]
+    >>> pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(n_frames=40))
+    >>> pipe.fit_transform(X).shape
+    (2, 40, 2)
+    """
+
+    _parameter_constraints: dict = {"transformer": [HasMethods(["fit", "transform"])]}
+
+    def __init__(self, transformer):
+        self.transformer = transformer
+
+    @atomic_fit
+    @_fit_context(prefer_skip_nested_validation=False)
+    def fit(self, X, y=None):
+        """Fit a clone of the transformer on all frames.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances, or postures in rows.
+        y : ignored
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        ValueError
+            If the input breaks the contract, or the transformer needs a ``y``, or gives something
+            else than a row of numbers a frame.
+        """
+        performances = check_performances(
+            self, X, reset=True, level="posture", finite=self._finite()
+        )
+        self.transformer_ = clone(self.transformer)
+        pooled = self._named(np.concatenate(performances))
+        try:
+            self.transformer_.fit(pooled)
+        except (TypeError, ValueError) as error:
+            if "requires y" in str(error) or "argument: 'y'" in str(error):
+                raise ValueError(
+                    f"{self._name} needs a y, and frames have none. Use a transformer that does "
+                    "without, such as FrameWise(VarianceThreshold()), or select columns by name: "
+                    "[x[['knee', 'hip']] for x in X]."
+                ) from error
+            raise
+        rows = self.transformer_.transform(self._named(performances[0]))
+        # FunctionTransformer names columns by the table that it gives only.
+        self._names_out = names_of(rows)
+        rows = self._as_rows(rows, performances, 0)
+        self._n_features_out, self._inverts = rows.shape[1], _inverts(self.transformer_, rows[:1])
+        return self
+
+    fit_transform = atomic_fit(TransformerMixin.fit_transform)
+
+    @snapshot
+    def transform(self, X):
+        """Transform the frames of performances.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+
+        Returns
+        -------
+        The kind that was given, with the features of the transformer
+        """
+        check_is_fitted(self)
+        performances = check_performances(
+            self, X, reset=False, level="posture", finite=self._finite()
+        )
+        arrays = [self._transformed(performances, i) for i in range(len(performances))]
+        return restore(self, performances, arrays)
+
+    @available_if(_goes_back)
+    @snapshot
+    def inverse_transform(self, X):
+        """Take transformed frames back; only if the transformer can.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features_out), 3-D array, or 2-D array
+
+        Returns
+        -------
+        The kind that was given, with the features before the transformer
+        """
+        check_is_fitted(self)
+        names = self.get_feature_names_out()
+        performances = check_transformed(self, X, names, finite=self._finite())
+        arrays = [
+            self._as_rows(self.transformer_.inverse_transform(x.copy()), performances, i)
+            for i, x in enumerate(performances)
+        ]
+        columns = getattr(self, "feature_names_in_", range(self.n_features_in_))
+        return restore(self, performances, arrays, columns=columns)
+
+    def get_feature_names_out(self, input_features=None):
+        """Names of the features that the transformer gives.
+
+        Parameters
+        ----------
+        input_features : array-like of str, default=None
+            Names of the features before it; by default those seen in ``fit``, or x0, x1, ...
+
+        Returns
+        -------
+        ndarray of str
+            Those that the transformer gives, or the table it makes; framewise0, framewise1, ... if
+            there are none.
+        """
+        check_is_fitted(self)
+        if hasattr(self.transformer_, "get_feature_names_out"):
+            if input_features is None:
+                input_features = getattr(self, "feature_names_in_", None)
+            names = self.transformer_.get_feature_names_out(input_features)
+        elif self._names_out is not None and isinstance(self._names_out[0], str):
+            names = self._names_out
+        else:
+            names = [f"framewise{k}" for k in range(self._n_features_out)]
+        return np.asarray(names, dtype=object)
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.input_tags.three_d_array = True
+        if not hasattr(self.transformer, "__sklearn_tags__"):
+            return tags
+        inner = get_tags(self.transformer)
+        tags.input_tags.allow_nan = self._finite() == "allow-nan"
+        tags.input_tags.positive_only = inner.input_tags.positive_only
+        tags.non_deterministic = inner.non_deterministic
+        if inner.transformer_tags is not None:
+            tags.transformer_tags.preserves_dtype = list(inner.transformer_tags.preserves_dtype)
+        return tags
+
+    # -- frames to the transformer, and back ------------------------------------------------
+
+    @property
+    def _name(self):
+        return type(self.transformer).__name__
+
+    def _finite(self):
+        """What the contract asks of the input: NaN goes to whoever takes it."""
+        return "allow-nan" if _takes_gaps(self.transformer) else True
+
+    def _named(self, frames):
+        """Frames of its own for the transformer, which may write to them, with their names."""
+        names = getattr(self, "feature_names_in_", None)
+        frames = frames.copy()
+        # Row by row in memory with names, too: sums do not depend on them.
+        return frames if names is None else pd.DataFrame(frames, columns=names, copy=False)
+
+    def _transformed(self, performances, i):
+        rows = self.transformer_.transform(self._named(performances[i]))
+        return self._as_rows(rows, performances, i)
+
+    def _as_rows(self, rows, performances, i):
+        """What the transformer gave for a performance, if it is a row of numbers a frame."""
+        what, n_frames = performances.called(i), len(performances[i])
+        if issparse(rows):
+            raise TypeError(
+                f"{self._name} gives a sparse matrix, and frames are arrays: let it give arrays, "
+                "as by sparse_output=False, or sparse_threshold=0 of a ColumnTransformer."
+            )
+        rows = as_numbers(rows, f"{what}, transformed by {self._name},")
+        if rows.ndim != 2 or len(rows) != n_frames:
+            raise ValueError(
+                f"{what} has {n_frames} frames, of which {self._name} made the shape {rows.shape}: "
+                "in FrameWise a transformer gives one row a frame. What changes the number of "
+                "frames is applied before, [change(x) for x in X]."
+            )
+        return np.ascontiguousarray(rows)
+
+
+def _takes_gaps(transformer):
+    """Whether a transformer takes NaN, as do those that hand columns or frames on unseen."""
+    if isinstance(transformer, Pipeline):
+        steps = [step for _, step in transformer.steps if step not in (None, "passthrough")]
+        return bool(steps) and _takes_gaps(steps[0])
+    if isinstance(transformer, FeatureUnion):
+        parts = [part for _, part in transformer.transformer_list if part != "drop"]
+        return all(part == "passthrough" or _takes_gaps(part) for part in parts)
+    if not hasattr(transformer, "__sklearn_tags__"):
+        return False
+    tags = get_tags(transformer)
+    looks_away = tags.no_validation or isinstance(transformer, ColumnTransformer)
+    return tags.input_tags.allow_nan or looks_away
+
+
+def _inverts(transformer, rows):
+    """Whether a fitted transformer takes rows back."""
+    try:
+        transformer.inverse_transform(rows.copy())
+    except (AttributeError, NotImplementedError, TypeError, ValueError):
+        return False
+    return True

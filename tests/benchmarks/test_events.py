@@ -1,0 +1,114 @@
+"""The events of the benchmarks: curves whose moments are known, and clips that are counted."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+PATH = Path(__file__).resolve().parents[2] / "benchmarks" / "events.py"
+SPEC = importlib.util.spec_from_file_location("events", PATH)
+events = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(events)
+
+T = np.linspace(0, 1, 101)
+
+
+def bump(at, width=0.08, height=1.0):
+    return height * np.exp(-(((T - at) / width) ** 2))
+
+
+def ramp(at):
+    return 1 / (1 + np.exp(-40 * (T - at)))
+
+
+@pytest.mark.parametrize(
+    ("curve", "kind", "at"),
+    [
+        (bump(0.3), "max", 0.3),
+        (5 - 3 * bump(0.314), "min", 0.314),
+        (bump(0.3) + bump(0.8, height=0.5), "max", 0.3),
+        (bump(0.3) + bump(0.34, 0.01, 0.3), "max", 0.34),
+        (ramp(0.426), "rise", 0.426),
+        (7 - 2 * ramp(0.426), "fall", 0.426),
+        (ramp(0.3) - ramp(0.7), "rise", 0.3),
+        (ramp(0.3) - ramp(0.7), "fall", 0.7),
+    ],
+)
+def test_a_moment_is_found_between_frames(curve, kind, at):
+    assert events.moment(curve, kind) == pytest.approx(at, abs=0.004)
+
+
+@pytest.mark.parametrize(
+    ("curve", "kind"),
+    [
+        (np.clip(bump(0.5, 0.3), 0, 0.6), "max"),  # a plateau
+        (bump(0.2) + bump(0.8, height=0.9), "max"),  # two rivals
+        (-bump(0.2) - bump(0.8, height=0.9), "min"),
+        (bump(0.02), "max"),  # at the end of the clip
+        (T, "min"),
+        (bump(0.5) + bump(1.0, 0.05, 0.9), "max"),  # the end is a rival
+        (bump(0.2) + bump(0.8), "rise"),  # twice
+        (bump(0.2) + bump(0.8), "fall"),
+        (1 - T, "rise"),  # never
+    ],
+)
+def test_an_ambiguous_moment_is_refused(curve, kind):
+    assert np.isnan(events.moment(curve, kind))
+
+
+def test_turning_points_are_all_of_them_or_none():
+    wave = np.sin(2 * np.pi * 1.5 * T) + 0.05 * np.sin(2 * np.pi * 20 * T)
+    found = events.turning_points(wave, "max min max")
+    np.testing.assert_allclose(found, [1 / 6, 1 / 2, 5 / 6], atol=0.03)
+    for other in ("max min", "min max min", "max min max min"):
+        assert np.isnan(events.turning_points(wave, other)).all()
+
+
+def test_clips_that_hardly_show_the_event_are_left_out():
+    event = events.Event("", "", "", "", "max")
+    found = events.find([bump(0.3), bump(0.5), 0.2 * bump(0.7)], event, smoothing=0.01)
+    np.testing.assert_allclose(found, [29.7, 49.5, np.nan], atol=0.1)
+
+
+def test_a_step_is_measured_along_where_the_hips_face():
+    # Who faces +x has the left hip at -z; the same body turned to -z has it at -x.
+    ahead = np.array([[0.3, 0, 0], [-0.2, 0.5, 0.4]])
+    turn = np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]])
+    for rotation in (np.eye(3), turn):
+        parts = {
+            "left hip": [0, 1, -0.1] @ rotation,
+            "right hip": [0, 1, 0.1] @ rotation,
+            "left ankle": np.zeros((2, 3)),
+            "right ankle": ahead @ rotation,
+        }
+        parts = {name: np.broadcast_to(at, (2, 3)) for name, at in parts.items()}
+        np.testing.assert_allclose(events.body_curve(parts, "step"), [0.3, -0.2], atol=1e-9)
+
+
+# Clips of the action, and those that show each of its events, in the order of EVENTS.
+CLIPS = {
+    "depositFloorR": (24, [17, 24, 24]),
+    "elbowToKnee1RepsLelbowStart": (25, [23, 18]),
+    "grabHighR": (23, [23, 23]),
+    "hopBothLegs1hops": (33, [32, 32, 32, 32]),
+    "jogLeftCircle4StepsRstart": (14, [13, 13, 13, 13]),
+    "sneak2StepsLStart": (13, [13, 13]),
+    "pickUp": (20, [19, 19]),
+    "sitDown": (20, [20, 20]),
+    "standUp": (20, [20, 20, 19]),
+    "throw": (17, [10]),
+    "push": (14, [11, 14]),
+    "pull": (19, [16]),
+    "walk": (13, [13, 13, 13]),
+}
+
+
+def test_as_many_real_clips_show_the_events_as_were_measured(real_data):
+    found = {}
+    for action in events.read_actions(real_data):
+        assert len(action.actors) == len(action.data)
+        shown = [int(np.isfinite(at).sum()) for at in action.moments.values()]
+        found[action.name] = len(action.data), shown
+    assert found == CLIPS
+    assert sum(bool(event.peers) for event in events.EVENTS) == 16

@@ -1,0 +1,417 @@
+"""The journeys of docs/howto/journeys.md: from files to what is saved, in ten lines at most."""
+
+import re
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from sklearn_motionsync import Match
+from sklearn_motionsync.datasets import make_bending
+
+from motion_files import c3d, texts, trc
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "howto" / "journeys.md").read_text("utf-8")
+BLOCK = re.compile(r"^```python\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
+SECTIONS = {part.split("\n")[0]: BLOCK.findall(part) for part in PAGE.split("\n## ")[1:]}
+BLOCKS = [(title, k) for title, blocks in SECTIONS.items() for k in range(len(blocks))]
+TRIALS = [("ann", 1), ("ann", 2), ("ben", 1), ("ben", 2), ("cas", 1)]
+
+
+def test_there_are_ten_journeys():
+    assert (
+        sum(bool(blocks) for blocks in SECTIONS.values()) == 11
+    )  # landmarks in space, in pictures
+    assert PAGE.count("```python") == len(BLOCKS) == 13
+    assert list(SECTIONS)[-1] == "What is refused"
+
+
+@pytest.mark.parametrize(("title", "k"), BLOCKS)
+def test_a_journey_is_short_and_asks_for_nothing_private(title, k):
+    code = SECTIONS[title][k]
+    lines = [line for line in code.split("\n") if line.strip()]
+    assert len(lines) <= 10
+    assert max(map(len, lines)) <= 100
+    assert not re.search(r"(?<![\w\"'^\]|])_\w|\._|reshape|newaxis|transpose|swapaxes|\.T\b", code)
+
+
+def go(title, folder, monkeypatch, k=0):
+    """Run a block in the folder of its files; what it leaves in memory."""
+    monkeypatch.chdir(folder)
+    left = {}
+    exec(SECTIONS[title][k], left)
+    return left
+
+
+# -- what is in the files: written here, known here ----------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def curves():
+    """Hip and knee of each trial, at a pace and of a length of its own."""
+    rng = np.random.default_rng(0)
+    found = {}
+    for key, n_frames in zip(TRIALS, (80, 95, 102, 88, 91), strict=True):
+        t = np.linspace(0, 1, n_frames) ** rng.uniform(0.8, 1.25)
+        bend = rng.normal(60, 4) * np.exp(-(((t - 0.6) / 0.12) ** 2))
+        found[key] = pd.DataFrame({"hip": 30 * np.cos(2 * np.pi * t), "knee": bend}).round(6)
+    return found
+
+
+@pytest.fixture(scope="module")
+def bodies():
+    """Positions (n_frames, n_joints, 3) in metres, y up, of four bends; and names of the joints."""
+    bunch = make_bending(4, n_frames=60, random_state=0)
+    positions = [x.reshape(len(x), -1, 3).round(6) for x in bunch.data]
+    return positions, list(bunch.skeleton.joints), list(bunch.skeleton.parents)
+
+
+def long_table(curves):
+    parts = []
+    for (subject, trial), x in curves.items():
+        time = np.arange(len(x)) / 100
+        parts.append(x.assign(subject=subject, trial=trial, time=time))
+    return pd.concat(parts).sample(frac=1, random_state=0)
+
+
+def shin_up(x, joints):
+    """How much the left shin points up: a cosine, whichever way the body is turned."""
+    knee, ankle = (x[:, joints.index(f"left_{name}")] for name in ("knee", "ankle"))
+    shin = ankle - knee
+    return shin[:, 1] / np.linalg.norm(shin, axis=1)
+
+
+def check_saved(saved, originals, match):
+    """Every column of a table against straight lines between the frames that were written.
+
+    Parameters
+    ----------
+    saved : DataFrame, indexed by labels and the frame of the clock
+    originals : dict of label to DataFrame
+        In the order in which they were synchronised.
+    match : Match
+    """
+    keys = list(range(saved.index.nlevels - 1))
+    parts = {label: x.droplevel(keys) for label, x in saved.groupby(level=keys, sort=False)}
+    parts = {label if len(keys) > 1 else label[0]: x for label, x in parts.items()}
+    assert list(parts) == list(originals)
+    n_frames = match.times.shape[1]
+    for tau, (label, x) in zip(match.times, originals.items(), strict=True):
+        mine = parts[label]
+        assert mine.index.tolist() == list(range(n_frames))
+        frames = tau * (len(x) - 1) / (n_frames - 1)
+        for name in x.columns:
+            expected = np.interp(frames, np.arange(len(x)), x[name])
+            np.testing.assert_allclose(mine[name], expected, atol=2e-4)
+    assert match.offsets.any()
+
+
+def check_picture(path):
+    pixels = plt.imread(path)
+    assert min(pixels.shape[:2]) > 150
+    assert len({tuple(pixel) for row in pixels[::5].tolist() for pixel in row}) > 20
+
+
+# -- tables ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("title", ["A long table", "polars"])
+def test_long_table(title, curves, tmp_path, monkeypatch):
+    table = long_table(curves)
+    table.to_csv(tmp_path / "trials.csv", index=False)
+    left = go(title, tmp_path, monkeypatch)
+    saved = pd.read_csv("same_clock.csv", index_col=["subject", "trial", "frame"])
+    assert list(saved.columns) == ["hip", "knee"]
+    found = {key: curves[key] for key in table[["subject", "trial"]].itertuples(index=False)}
+    found = {tuple(key): x for key, x in found.items()}
+    check_saved(saved, found, left["synchronizer"].match(left["trials"]))
+
+
+def test_wide_table_of_one_feature(curves, tmp_path, monkeypatch):
+    rows = {}
+    for (subject, trial), x in curves.items():
+        at = np.linspace(0, len(x) - 1, 101)
+        rows[f"{subject}_{trial}"] = np.interp(at, np.arange(len(x)), x["knee"]).round(6)
+    wide = pd.DataFrame.from_dict(rows, orient="index")
+    wide.to_csv(tmp_path / "knee.csv", index_label="trial")
+    left = go("A wide table", tmp_path, monkeypatch)
+    saved = pd.read_csv("same_clock.csv", index_col="trial")
+    match = left["synchronizer"].match(left["curves"])
+    assert saved.shape == match.times.shape
+    assert match.offsets.any()
+    for tau, (name, row) in zip(match.times, rows.items(), strict=True):
+        frames = tau * 100 / (saved.shape[1] - 1)
+        np.testing.assert_allclose(
+            saved.loc[name], np.interp(frames, np.arange(101), row), atol=1e-6
+        )
+
+
+def test_wide_table_of_several_features(curves, tmp_path, monkeypatch):
+    rows = []
+    for (subject, trial), x in curves.items():
+        cells = {f"{name}_{p}": v for name in x for p, v in enumerate(x[name], 1)}
+        rows.append({"subject": subject, "trial": trial} | cells)
+    pd.DataFrame(rows).to_csv(tmp_path / "trials.csv", index=False)
+    left = go("A wide table", tmp_path, monkeypatch, 1)
+    saved = pd.read_csv("same_clock.csv", index_col=["subject", "trial", "frame"])
+    check_saved(saved, curves, left["synchronizer"].match(left["trials"]))
+
+
+def test_wide_table_of_a_column_a_trial(curves, tmp_path, monkeypatch):
+    knees = {f"{subject}_{trial}": x["knee"] for (subject, trial), x in curves.items()}
+    columns = pd.DataFrame(knees)
+    columns.insert(0, "time", np.arange(len(columns)) / 100)
+    columns.to_csv(tmp_path / "columns.csv", index=False)
+    left = go("A wide table", tmp_path, monkeypatch, 2)
+    saved = pd.read_csv("same_clock.csv", index_col=["trial", "frame"])
+    originals = {name: knee.to_frame("knee") for name, knee in knees.items()}
+    check_saved(saved, originals, left["synchronizer"].match(left["trials"]))
+
+
+def test_a_folder_of_csv_files(curves, tmp_path, monkeypatch):
+    (tmp_path / "trials").mkdir()
+    for (subject, trial), x in curves.items():
+        timed = x.assign(time=np.arange(len(x)) / 100)
+        timed.to_csv(tmp_path / "trials" / f"{subject}_{trial}.csv", index=False)
+    left = go("A folder of CSV files", tmp_path, monkeypatch)
+    names = [f"{subject}_{trial}" for subject, trial in TRIALS]
+    timing = pd.read_csv("timing.csv", index_col=["trial", "frame"])
+    match = left["synchronizer"].match(left["trials"])
+    assert list(timing.index.unique("trial")) == names
+    n_frames = match.times.shape[1]
+    for tau, name in zip(match.times, names, strict=True):
+        p = np.arange(n_frames)
+        np.testing.assert_allclose(timing.loc[name, "time"], 100 * tau / (n_frames - 1))
+        np.testing.assert_allclose(timing.loc[name, "offset"], 100 * (tau - p) / (n_frames - 1))
+    check_picture("trials.png")
+    display = left["display"]
+    assert len(display.axes_) == 5  # before and after of two features, and the warps
+    assert [len(lines.get_segments()) for lines in display.before_ + display.after_] == [5] * 4
+    assert display.axes_[-1].get_xlabel().startswith("%")
+
+
+# -- files of motion capture ----------------------------------------------------------------------
+
+
+def bvh(x, joints, parents):
+    """A hierarchy in which every joint has its own place, relative to its parent."""
+    lines, order = ["HIERARCHY"], []
+
+    def put(joint):
+        order.append(joint)
+        lines.extend([f"{'ROOT' if parents[joint] < 0 else 'JOINT'} {joints[joint]}", "{"])
+        lines.append("OFFSET 0 0 0 CHANNELS 3 Xposition Yposition Zposition")
+        children = [child for child, parent in enumerate(parents) if parent == joint]
+        for child in children:
+            put(child)
+        lines.append("}" if children else "End Site { OFFSET 0 0 0 } }")
+
+    put(parents.index(-1))
+    local = [x[:, j] - (x[:, parents[j]] if parents[j] >= 0 else 0) for j in order]
+    lines += ["MOTION", f"Frames: {len(x)}", "Frame Time: 0.02"]
+    lines += [" ".join(f"{v:.7f}" for v in row) for row in np.hstack(local)]
+    return "\n".join(lines) + "\n"
+
+
+MARKERS = {
+    "left_hip": "LASI", "right_hip": "RASI", "left_knee": "LKNE", "right_knee": "RKNE",
+    "left_ankle": "LANK", "right_ankle": "RANK", "left_shoulder": "LSHO", "right_shoulder": "RSHO",
+}  # fmt: skip
+
+
+def markers(x, joints):
+    """Plug-in Gait's, in millimetres, z up."""
+    turned = 1000 * np.stack([x[..., 0], -x[..., 2], x[..., 1]], axis=-1)
+    places = turned[:, [joints.index(name) for name in MARKERS]]
+    return c3d(places, changes={"LABELS": texts(*MARKERS.values())})
+
+
+def write_takes(folder, ending, bodies):
+    positions, joints, parents = bodies
+    folder.mkdir()
+    for i, x in enumerate(positions):
+        content = {
+            "bvh": lambda x: bvh(x, joints, parents).encode(),
+            "trc": lambda x: trc(x, joints, units="m").encode(),
+            "c3d": lambda x: markers(x, joints),
+        }[ending](x)
+        (folder / f"take{i}.{ending}").write_bytes(content)
+
+
+def shins(bodies):
+    positions, joints, _ = bodies
+    return {
+        f"take{i}": pd.DataFrame({"left_leg_y": shin_up(x, joints)})
+        for i, x in enumerate(positions)
+    }
+
+
+@pytest.mark.parametrize(
+    ("title", "ending", "name"),
+    [
+        ("Markers of C3D files", "c3d", "walks"),
+        ("BVH", "bvh", "bends"),
+        ("TRC", "trc", "bends"),
+    ],
+)
+def test_files_of_motion_capture(title, ending, name, bodies, tmp_path, monkeypatch):
+    write_takes(tmp_path / name, ending, bodies)
+    left = go(title, tmp_path, monkeypatch)
+    saved = pd.read_csv(f"{name}.csv", index_col=["recording", "frame"])
+    assert saved.shape[1] == (37 if ending != "c3d" else 22)  # of the arms there is nothing
+    match = Match.from_estimator(left["pipe"], left[name])
+    check_saved(saved, shins(bodies), match)
+    if ending == "trc":
+        timing = pd.read_csv("timing.csv", index_col=["recording", "frame"])
+        lasting = [(len(x) - 1) / 50 for x in bodies[0]]
+        assert timing["time"].groupby("recording").max().tolist() == pytest.approx(lasting)
+    else:
+        check_picture(f"{name}.png")
+        assert len(plt.gcf().axes) == 2
+
+
+@pytest.mark.filterwarnings("ignore:.*positions are missing:UserWarning")
+def test_real_markers(real_data, tmp_path, monkeypatch):
+    """Clusters of markers, whose names say nothing: what stands for what is given."""
+    landmarks = {
+        f"{side}_{joint}": (f"{side[0].upper()}{name}1", f"{side[0].upper()}{name}2")
+        for side in ("left", "right")
+        for joint, name in (("hip", "TH"), ("knee", "SK"), ("ankle", "FT"))
+    }
+    code = SECTIONS["Markers of C3D files"][0]
+    for old, new in (
+        ("walks[0])", f"walks[0], landmarks={landmarks})"),
+        ('Path("walks")', repr(real_data / "original_files" / "c3d").replace("PosixPath", "Path")),
+        ("max_gap=10) for", "max_gap=20).dropna() for"),
+    ):
+        assert code.count(old) == 1
+        code = code.replace(old, new)
+    monkeypatch.chdir(tmp_path)
+    exec(code, left := {})
+    saved = pd.read_csv("walks.csv", index_col=["recording", "frame"])
+    names = [f"Eb015{machine}" for machine in ("pi", "pr", "si", "sr", "vi", "vr")]
+    assert list(saved.index.unique("recording")) == names
+    for name in names:  # one walk, as six machines write it
+        np.testing.assert_allclose(saved.loc[name], saved.loc[names[0]], atol=1e-3)
+    assert len(left["walks"]) == 6
+    check_picture("walks.png")
+
+
+def test_angles_and_events(curves, tmp_path, monkeypatch):
+    """Two strides a file, one behind the other, from heel strike to heel strike."""
+    folder = tmp_path / "gait"
+    folder.mkdir()
+    strides = {}
+    for number, (a, b) in enumerate([TRIALS[:2], TRIALS[2:4]]):
+        parts = [curves[key].to_numpy() for key in (a, b)]
+        strikes = np.cumsum([9, len(parts[0]) - 1, len(parts[1]) - 1])
+        track = np.vstack([np.zeros((9, 2)), parts[0][:-1], parts[1], np.zeros((7, 2))])
+        for k in (0, 1):
+            rows = track[strikes[k] : strikes[k + 1] + 1]
+            angles = pd.DataFrame(rows, columns=["LHipAngles_x", "LKneeAngles_x"])
+            strides[f"walk{number}", k] = angles
+        points = np.zeros((len(track), 3, 3))
+        points[:, 1, 0], points[:, 2, 0] = track.T
+        points[:, 0] = 1
+        times = np.column_stack([np.zeros(3), strikes / 50]).ravel()
+        events = {
+            "USED": (2, [], np.array([3], "<u2").tobytes()),
+            "LABELS": texts(*["Foot Strike"] * 3),
+            "CONTEXTS": texts(*["Left"] * 3),
+            "TIMES": (4, [2, 3], times.astype("<f4").tobytes()),
+        }
+        changes = {
+            "LABELS": texts("SACR", "LHipAngles", "LKneeAngles"),
+            "ANGLES": texts("LHipAngles", "LKneeAngles"),
+            "ANGLE_UNITS": texts("deg"),
+        }
+        made = c3d(points, changes=changes, others={"EVENT": events})
+        (folder / f"walk{number}.c3d").write_bytes(made)
+    left = go("Angles and events of C3D files", tmp_path, monkeypatch)
+    saved = pd.read_csv("strides.csv", index_col=["recording", "part", "frame"])
+    check_saved(saved, strides, left["synchronizer"].match(left["strides"]))
+    check_picture("strides.png")
+    assert [len(lines.get_segments()) for lines in left["display"].after_] == [4] * 4
+
+
+# -- key-points -----------------------------------------------------------------------------------
+
+
+def landmarks_of_a_video(x, joints, size):
+    """MediaPipe's names, y downwards and z away from the camera."""
+    pairs = ["shoulder", "elbow", "wrist", "pinky", "index", "thumb"]
+    pairs += ["hip", "knee", "ankle", "heel", "foot_index"]
+    eyes = [f"{side}_eye{part}" for side in ("left", "right") for part in ("_inner", "", "_outer")]
+    names = ["nose", *eyes, "left_ear", "right_ear", "mouth_left", "mouth_right"]
+    names += [f"{side}_{part}" for part in pairs for side in ("left", "right")]
+    assert len(names) == 33
+    instead = dict.fromkeys(("pinky", "index", "thumb"), "wrist")
+    instead |= dict.fromkeys(("heel", "foot_index"), "ankle")
+    columns = {"time": (np.arange(len(x)) / 30).round(4)}
+    for name in names:
+        side, _, part = name.partition("_")
+        joint = f"{side}_{instead.get(part, part)}"
+        place = x[:, joints.index(joint if joint in joints else "head")] * size * [1, -1, -1]
+        columns |= {f"{name}_{axis}": place[:, k] for k, axis in enumerate("xyz")}
+        columns[f"{name}_visibility"] = 0.9
+    return pd.DataFrame(columns)
+
+
+@pytest.mark.parametrize("n_dims", [3, 2])
+def test_landmarks_of_a_video(n_dims, bodies, tmp_path, monkeypatch):
+    positions, joints, _ = bodies
+    (tmp_path / "poses").mkdir()
+    for i, x in enumerate(positions):
+        table = landmarks_of_a_video(x, joints, 1 if n_dims == 3 else 400)
+        if n_dims == 2:
+            table = table[[name for name in table if not name.endswith("_z")]]
+        table.to_csv(tmp_path / "poses" / f"take{i}.csv", index=False)
+    where = "in space" if n_dims == 3 else "in the picture"
+    left = go(f"Landmarks of a video, {where}", tmp_path, monkeypatch)
+    assert left["pipe"][0].skeleton.up == "-y"
+    assert left["pipe"][0].skeleton.n_dims == n_dims
+    match = Match.from_estimator(left["pipe"], left["poses"])
+    if n_dims == 3:
+        check_picture("poses.png")
+        assert len(plt.gcf().axes) == 2
+        saved = left["pipe"].set_output(transform="pandas").fit_transform(left["poses"])
+    else:
+        saved = pd.read_csv("poses.csv", index_col=["trial", "frame"])
+        flat = [x * [1, 1, 0] for x in positions]
+        bodies = flat, joints, None
+    assert saved.shape[1] == 1 + 12 * n_dims
+    check_saved(saved, shins(bodies), match)
+
+
+def test_an_xarray_dataset(bodies, tmp_path, monkeypatch):
+    """Two individuals a file, with a gap where nobody was sure."""
+    positions, joints, _ = bodies
+    names = ["head", "left_wrist", "right_wrist"]
+    (tmp_path / "poses").mkdir()
+    originals = {}
+    for number in (0, 1):
+        pair = [x[:57, [joints.index(name) for name in names], :2] for x in positions[:2]]
+        pair = pair if number == 0 else [x[::-1] for x in pair]
+        confidence = np.ones((57, 3, 2))
+        confidence[20:23, 1, 0] = 0.1
+        for who, x in zip(("ann", "bob"), pair, strict=True):
+            columns = [f"{name}_{axis}" for name in names for axis in "xy"]
+            originals[f"film{number}", who] = pd.DataFrame(x.reshape(57, -1), columns=columns)
+        position = np.stack(pair, axis=-1).swapaxes(1, 2).copy()
+        position[20:23, :, 1, 0] = 1e3
+        dims = ("time", "space", "keypoints", "individuals")
+        coords = {"time": np.arange(57) / 30, "space": ["x", "y"], "keypoints": names}
+        xr.Dataset(
+            {"position": (dims, position), "confidence": ((dims[0], *dims[2:]), confidence)},
+            coords | {"individuals": ["ann", "bob"]},
+            {"fps": 30.0, "time_unit": "seconds"},
+        ).to_netcdf(tmp_path / "poses" / f"film{number}.nc", engine="scipy")
+    left = go("An xarray dataset", tmp_path, monkeypatch)
+    saved = pd.read_csv("poses.csv", index_col=["recording", "individual", "frame"])
+    assert list(saved.columns) == columns
+    doubtful = ["left_wrist_x", "left_wrist_y"]
+    sure = {label: x.drop(columns=doubtful) for label, x in originals.items()}
+    check_saved(saved, sure, left["synchronizer"].match(left["trials"]))
+    assert saved[doubtful].abs().max().max() < 3  # metres, and not the 1000 of a wrong guess

@@ -1,0 +1,363 @@
+"""Damage files of motion capture and archives in many ways, and see that reading stays safe.
+
+    python tests/datasets/fuzz_readers.py FOLDER --seconds 600 [--seed 0] [--workers 2]
+    python tests/datasets/fuzz_readers.py archives --seconds 600
+
+FOLDER holds original files, to which small ones made here are added; ``archives`` are made here.
+A damaged file must be read, to finite numbers (or NaN for a marker that was not seen), or
+be refused with a ValueError that names the file. Anything else is a failure: another error, a
+warning, more than 1 GB, more than 10 seconds. Failures are printed with the number of their
+case, and their files are kept; ``--case N`` runs that case alone.
+"""
+
+import argparse
+import collections
+import json
+import multiprocessing
+import random
+import re
+import signal
+import struct
+import tempfile
+import time
+import traceback
+import warnings
+from pathlib import Path
+
+import numpy as np
+from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.io import find_gaps, read_motion
+
+from damaged_archives import ARCHIVE, make_archives
+from motion_files import c3d, everything, opensim
+
+LIMIT_SECONDS = 10
+LIMIT_BYTES = 2**30
+NUMBERS = (
+    *(b"0 -1 1 2 7 65535 65536 -32768 2147483648 99999999 9999999999999999999999".split()),
+    *(b"1e30 -1e200 1e308 1e999 -1e999 nan inf -inf 0x10 1_0 1e-320 . - e +".split()),
+    b"9" * 5000,
+)
+WORDS = (
+    *(b"HIERARCHY ROOT JOINT End Site OFFSET CHANNELS MOTION { } Frames: Frame Time:".split()),
+    *(b"Xposition Zrotation :units :root :bonedata :hierarchy begin end name root".split()),
+    *(b"direction length axis dof rx tx order lfemur :DEGREES :RADIANS # ( )".split()),
+    *(b"PathFileType DataRate NumFrames NumMarkers Units Frame# Time X1 Y2 Z time".split()),
+    *(b"endheader nRows=7 nColumns=9 inDegrees=yes DataType=Vec3 1,2,3 , \t \t\t\t".split(b" ")),
+)
+# Where the file itself says that there is no number.
+WITH_GAPS = ("c3d", "trc", "mot", "sto")
+
+
+def load_originals(folder):
+    """A list of {name: bytes}: what one call reads. Texts also come cut to a few frames."""
+    if str(folder) == "archives":
+        return [{"a.npz": content} for content in make_archives()]
+    originals = [{"a.c3d": c3d(**everything(machine))} for machine in (84, 85, 86)]
+    originals += opensim()
+    files = sorted(path for path in Path(folder).rglob("*") if path.is_file())
+    for path in files:
+        content = path.read_bytes()
+        kind = path.suffix.lower()
+        if kind == ".c3d":
+            originals.append({"a.c3d": content})
+        elif kind == ".bvh":
+            originals += [{"a.bvh": content}, {"a.bvh": shorten_bvh(content)}]
+        elif kind == ".amc":
+            skeleton = max(
+                (p for p in files if p.suffix.lower() == ".asf" and path.stem.startswith(p.stem)),
+                key=lambda p: len(p.stem),
+            ).read_bytes()
+            short = re.split(rb"(?m)^6\s*$", content)[0]
+            originals += [{"a.amc": text, "a.asf": skeleton} for text in (content, short, short)]
+    return originals
+
+
+def shorten_bvh(content):
+    lines = content.split(b"\n")
+    start = next(i for i, line in enumerate(lines) if line.startswith(b"Frame Time"))
+    lines[start - 1] = b"Frames: 4"
+    return b"\n".join(lines[: start + 5]) + b"\n"
+
+
+# -- damage -----------------------------------------------------------------------------
+
+
+def place(rng, data):
+    """A place in the file, in every second case near its beginning, where headers are."""
+    return rng.randrange(min(len(data), 6000) if rng.random() < 0.5 else len(data))
+
+
+def chunk(rng, data):
+    start = place(rng, data)
+    return start, start + rng.choice((1, 2, 4, 16, 100, 512, 5000))
+
+
+def flip_bits(rng, data):
+    data = bytearray(data)
+    for _ in range(rng.choice((1, 1, 3, 20))):
+        data[place(rng, data)] ^= 1 << rng.randrange(8)
+    return bytes(data)
+
+
+def overwrite(rng, data):
+    start, stop = chunk(rng, data)
+    byte = rng.choice((b"\0", b"\xff", b" ", b"\n", b"\r", b"9", b"-", rng.randbytes(1)))
+    n = min(stop, len(data)) - start
+    return data[:start] + (byte * n if rng.random() < 0.7 else rng.randbytes(n)) + data[stop:]
+
+
+def truncate(rng, data):
+    return data[: place(rng, data)]
+
+
+def delete(rng, data):
+    start, stop = chunk(rng, data)
+    return data[:start] + data[stop:]
+
+
+def duplicate(rng, data):
+    start, stop = chunk(rng, data)
+    return data[:stop] + data[start:stop] * rng.choice((1, 1, 5, 100)) + data[stop:]
+
+
+def move(rng, data):
+    start, stop = chunk(rng, data)
+    rest = data[:start] + data[stop:]
+    to = place(rng, rest) if rest else 0
+    return rest[:to] + data[start:stop] + rest[to:]
+
+
+def set_integer(rng, data):
+    at = rng.choice((rng.randrange(24), rng.randrange(512, 4000), place(rng, data)))
+    value = rng.choice((0, 1, 2, 255, 256, 0x7FFF, 0x8000, 0xFFFE, 0xFFFF, rng.randrange(65536)))
+    packed = struct.pack(rng.choice("<>") + "H", value)
+    return data[:at] + packed + data[at + 2 :]
+
+
+def set_float(rng, data):
+    at = rng.choice((12, 20, rng.randrange(512, 4000), place(rng, data)))
+    value = rng.choice((0.0, -0.0, -1.0, 1e38, -1e38, 1e-40, float("nan"), float("inf")))
+    return data[:at] + struct.pack(rng.choice("<>") + "f", value) + data[at + 4 :]
+
+
+def split_words(data):
+    return re.split(rb"(\s+)", data)
+
+
+def set_number(rng, data):
+    start = place(rng, data)
+    words = split_words(data[start : start + 3000])
+    numbers = [i for i, word in enumerate(words) if re.fullmatch(rb"[-+.\de]+", word)]
+    for i in rng.sample(numbers, min(len(numbers), rng.choice((1, 1, 3)))):
+        words[i] = rng.choice(NUMBERS)
+    return data[:start] + b"".join(words) + data[start + 3000 :]
+
+
+def set_word(rng, data):
+    start = place(rng, data)
+    words = split_words(data[start : start + 3000])
+    for _ in range(rng.choice((1, 1, 4))):
+        words[rng.randrange((len(words) + 1) // 2) * 2] = rng.choice(WORDS)
+    return data[:start] + b"".join(words) + data[start + 3000 :]
+
+
+def swap_lines(rng, data):
+    lines = data.split(b"\n")
+    top = min(len(lines), 400 if rng.random() < 0.7 else len(lines))
+    for _ in range(rng.choice((1, 1, 5))):
+        i, j = rng.randrange(top), rng.randrange(top)
+        lines[i], lines[j] = lines[j], lines[i]
+    return b"\n".join(lines)
+
+
+def explode(rng, data):
+    """Very many joints, bones, words or frames."""
+    n = rng.choice((100, 3000, 20000))
+    joint = b"JOINT a { OFFSET 0 1 0 CHANNELS 0 "
+    bones = b"".join(
+        b"begin\nname b%d\ndirection 0 1 0\nlength 1\n%send\n"
+        % (i, b"dof rx\n" if rng.random() < 0.1 else b"")
+        for i in range(n // 10)
+    )
+    chain = b"".join(b"b%d b%d\n" % (i, i + 1) for i in range(n // 10 - 1))
+    bush = b"root " + b" ".join(b"b%d" % i for i in range(n // 10)) + b"\n"
+    if b":bonedata" in data:
+        data = data.replace(b":hierarchy", bones + b":hierarchy")
+        tree = rng.choice((bush, b"root b0\n" + chain, b"b%d b0\n" % (n // 10 - 1) + chain))
+        return re.sub(rb"(:hierarchy\s+begin\s*\n)", lambda match: match.group() + tree, data)
+    if b"HIERARCHY" in data:
+        tree = rng.choice((joint * n + b"} " * n, (joint + b"}\n") * n, joint * n, b"{" * n))
+        data = data.replace(b"JOINT", tree + b"JOINT", 1)
+    rows = rng.choice((b"", b"0\n", b"1\nroot 0 0 0 0 0 0\n", b" ", b"9" * 50))
+    return data + rows * n
+
+
+BINARY = (flip_bits, overwrite, truncate, delete, duplicate, move, set_integer, set_float)
+TEXT = (flip_bits, overwrite, truncate, delete, duplicate, move, explode)
+TEXT += (set_number, set_number, set_word, set_word, swap_lines)
+
+
+def damaged(originals, seed, number):
+    """The files of one case, the same for the same numbers."""
+    rng = random.Random(f"{seed} {number}")
+    files = dict(rng.choice(originals))
+    for _ in range(rng.choice((1, 1, 1, 2, 4))):
+        name = rng.choice(list(files))
+        if files[name]:
+            damages = {"a.c3d": BINARY, "a.npz": BINARY[:6] + ARCHIVE}.get(name, TEXT)
+            files[name] = rng.choice(damages)(rng, files[name])
+    return files
+
+
+# -- judgement --------------------------------------------------------------------------
+
+
+def run_case(files, folder):
+    """ "read", "ValueError", or what went wrong."""
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    path = folder / next(iter(files))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            for message in ("(positions|values) are missing", "times are uneven", "by its times"):
+                warnings.filterwarnings("ignore", message=rf"a\.\w+: .*{message}")
+            results = read_all(path, folder)
+    except ValueError as error:
+        message = str(error)
+        if type(error) is ValueError and message.startswith(str(folder)) and len(message) < 700:
+            return "ValueError"
+        return "a bad message\n" + traceback.format_exc()
+    except BaseException:  # whatever it is, it is what this script looks for
+        return "another error\n" + traceback.format_exc()
+    try:
+        return next(filter(None, map(problem_of, results)), "read")
+    except Exception:
+        return "a result that cannot be judged\n" + traceback.format_exc()
+
+
+def read_all(path, folder):
+    """DataFrames, or the arrays of an archive."""
+    if path.suffix == ".npz":
+        bunch = load_performances(path)
+        parents = bunch.skeleton.parents if bunch.skeleton else ()
+        assert len(bunch.data) == len(bunch.target) == len(bunch.frame_rate)
+        assert all(-1 <= p < len(bunch.joints) for p in parents)
+        return bunch.data
+    if path.suffix != ".c3d":
+        return [read_motion(path, asf=folder / "a.asf" if path.suffix == ".amc" else None)]
+    df = None
+    try:
+        df = read_motion(path)
+        groups = list(df.attrs["groups"])
+        results = [df, read_motion(path, max_gap=5)]
+    except ValueError as error:
+        groups = re.findall(r"'(\w+)' \(\d+\)", str(error)) if "there are no" in str(error) else []
+        if not groups:
+            raise
+        results = []
+    for group in groups:
+        # One group may be damaged where the others are not.
+        try:
+            results.append(read_motion(path, group=group))
+        except ValueError as error:
+            if not re.search("there are no|ANALOG:", str(error)):
+                raise
+    return results
+
+
+def problem_of(result):
+    """What is wrong with a result, or None."""
+    if isinstance(result, np.ndarray):
+        good = result.ndim == 2 and len(result) >= 2 and result.shape[1] % 3 == 0
+        return None if good and np.isfinite(result).all() else f"a bad result {result.shape}"
+    values, attrs = result.to_numpy(), result.attrs
+    known = np.isfinite(values) | (np.isnan(values) & (attrs["format"] in WITH_GAPS))
+    if not known.all() or values.dtype != np.float64 or not result.columns.is_unique:
+        return f"a bad result {result.shape} {values.dtype}"
+    if result.empty:
+        return "an empty result"
+    json.dumps(attrs, allow_nan=False)
+    if "joints" in attrs and find_gaps(result).empty != (not np.isnan(values).any()):
+        return "gaps that do not fit"
+    return None
+
+
+def work(originals, seed, first, step, deadline, current, queue):
+    import resource  # not on Windows, where the tests import this file all the same
+
+    # What the imports took is not the files' fault.
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    limit = pages * resource.getpagesize() + LIMIT_BYTES
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    with tempfile.TemporaryDirectory() as folder:
+        number = first
+        while time.time() < deadline:
+            current.value = number
+            files = damaged(originals, seed, number)
+            signal.alarm(LIMIT_SECONDS)  # the process dies of it, wherever it hangs
+            start = time.time()
+            outcome = run_case(files, Path(folder))
+            signal.alarm(0)
+            queue.put((number, outcome, time.time() - start))
+            number += step
+
+
+def start_worker(args, originals, first, deadline, queue):
+    current = multiprocessing.Value("q", first)
+    process = multiprocessing.Process(
+        target=work, args=(originals, args.seed, first, args.workers, deadline, current, queue)
+    )
+    process.start()
+    return process, current
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder")
+    parser.add_argument("--seconds", type=float, default=600)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--case", type=int)
+    args = parser.parse_args()
+    originals = load_originals(args.folder)
+    kept = Path(tempfile.mkdtemp(prefix="fuzz_"))
+    if args.case is not None:
+        print(kept, run_case(damaged(originals, args.seed, args.case), kept))
+        return
+    queue, counts, slowest = multiprocessing.Queue(), collections.Counter(), (0.0, -1)
+    deadline = time.time() + args.seconds
+    workers = [start_worker(args, originals, i, deadline, queue) for i in range(args.workers)]
+    while workers or not queue.empty():
+        while not queue.empty():
+            number, outcome, seconds = queue.get()
+            slowest = max(slowest, (seconds, number))
+            if outcome in ("read", "ValueError"):
+                counts[outcome] += 1
+            else:
+                report(args, originals, kept, number, outcome, counts)
+        for worker in [w for w in workers if not w[0].is_alive()]:
+            workers.remove(worker)
+            process, current = worker
+            if process.exitcode:
+                outcome = f"the process ended with {process.exitcode} (-14: time)"
+                report(args, originals, kept, current.value, outcome, counts)
+                first = current.value + args.workers
+                workers.append(start_worker(args, originals, first, deadline, queue))
+        time.sleep(0.05)
+    print(f"seed {args.seed}: {dict(counts)}; slowest {slowest[0]:.2f} s (case {slowest[1]})")
+    raise SystemExit(bool(counts["failure"]))
+
+
+def report(args, originals, kept, number, outcome, counts):
+    counts["failure"] += 1
+    folder = kept / str(number)
+    folder.mkdir()
+    for name, content in damaged(originals, args.seed, number).items():
+        (folder / name).write_bytes(content)
+    print(f"seed {args.seed} case {number}, kept in {folder}: {outcome}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,263 @@
+"""Reading BVH: against plain matrices, by hand, and where the file is wrong."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn_motionsync import Skeleton
+from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.io import read_motion
+
+from motion_files import body, bvh_oracle, joint, put
+
+
+@pytest.mark.parametrize("order", ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"])
+def test_bvh_against_the_oracle(tmp_path, order):
+    df = read_motion(put(tmp_path, body(order)))
+    expected = bvh_oracle(body(order))
+    assert df.attrs["joints"] == ["hips", "spine", "neck", "neck_end", "leg", "foot"]
+    assert df.attrs["parents"] == [-1, 0, 1, 2, 0, 4]
+    for name in df.attrs["joints"]:
+        np.testing.assert_allclose(joint(df, name), expected[name], atol=1e-10)
+
+
+def test_bvh_by_hand(tmp_path):
+    """A position channel takes the place of OFFSET; the first rotation is the outermost."""
+    text = (
+        "HIERARCHY ROOT a { OFFSET 9 9 9 CHANNELS 2 Zposition Xposition JOINT b { OFFSET 1 0 0 "
+        "CHANNELS 3 Zrotation Yposition Xrotation End Site { OFFSET 0 2 0 } } }\n"
+        "MOTION\nFrames: 1\nFrame Time: 1\n4 5 90 7 90\n"
+    )
+    df = read_motion(put(tmp_path, text))
+    np.testing.assert_allclose(joint(df, "a"), [[5, 9, 4]])
+    np.testing.assert_allclose(joint(df, "b"), [[6, 16, 4]])
+    # About its own X first y turns to z, which stays when all turns about Z.
+    np.testing.assert_allclose(joint(df, "b_end"), [[6, 16, 6]], atol=1e-12)
+
+
+def test_what_a_frame_says_of_itself(tmp_path):
+    df = read_motion(put(tmp_path, body()))
+    assert df.shape == (3, 18)
+    assert set(df.dtypes) == {np.dtype(float)}
+    assert df.index.equals(pd.RangeIndex(3))
+    assert df.index.name == "frame"
+    facts = {k: v for k, v in df.attrs.items() if k not in ("joints", "parents")}
+    kind = {"format": "bvh", "units": None, "up": "y", "kind": "joints"}
+    name = {"performance": "a", "levels": ["recording", "frame"]}
+    assert facts == kind | {"frame_rate": 50.0} | name
+    assert json.loads(json.dumps(df.attrs)) == df.attrs
+    assert read_motion(tmp_path / "a.bvh", frame_rate=25).attrs["frame_rate"] == 25.0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace("\n", "\r"),
+        lambda text: text.replace("\n", "\n\n"),
+        lambda text: text.replace("\n  ", " ").replace("OFFSET", "offset"),
+        lambda text: text.replace("rotation", "ROTATION").replace("\n  {", "{"),
+        lambda text: text.replace("Frames: 3", "frames:3"),
+    ],
+)
+def test_bvh_as_programs_write_it(tmp_path, change):
+    expected = read_motion(put(tmp_path, body()))
+    pd.testing.assert_frame_equal(read_motion(put(tmp_path, change(body()), "b.BVH")), expected)
+
+
+def test_names_are_made_unique(tmp_path):
+    text = body().replace("JOINT spine", "JOINT left arm").replace("JOINT leg", "JOINT left arm")
+    text = text.replace("JOINT foot", "JOINT left arm_2").replace("JOINT neck", "JOINT f\xfc\xdf")
+    df = read_motion(put(tmp_path, text))
+    names = ["hips", "left arm", "f\xfc\xdf", "f\xfc\xdf_end", "left arm_3", "left arm_2"]
+    assert df.attrs["joints"] == names
+    assert df.columns.is_unique
+
+
+@pytest.mark.parametrize("deep", [True, False])
+def test_very_many_joints(tmp_path, deep):
+    n = 6000
+    head = "HIERARCHY\nROOT a { OFFSET 0 0 0 CHANNELS 1 Xposition\n"
+    one = "JOINT a { OFFSET 0 1 0 "
+    inner = one * n + "} " * n if deep else (one + "} ") * n
+    text = head + inner + "}\nMOTION\nFrames: 2\nFrame Time: 1\n0\n1\n"
+    df = read_motion(put(tmp_path, text))
+    assert df.iloc[1, -3:].tolist() == [1, n if deep else 1, 0]
+
+
+def test_many_joints_that_turn(tmp_path):
+    """A chain that bends to half a circle, in more frames than are placed at once."""
+    n, n_frames = 600, 2000
+    joint = "JOINT a { OFFSET 0 1 0 CHANNELS 1 Zrotation "
+    text = (
+        f"HIERARCHY\nROOT a {{ OFFSET 0 0 0 {joint * n + '} ' * n}}}\nMOTION\nFrames: {n_frames}\n"
+    )
+    turns = np.linspace(0, 180 / n, n_frames).round(6)
+    text += "Frame Time: 1\n" + "".join(f"{turn} " * n + "\n" for turn in turns)
+    df = read_motion(put(tmp_path, text))
+    angles = np.radians(turns)[:, None] * np.arange(n)
+    expected = np.column_stack([-np.sin(angles).sum(axis=1), np.cos(angles).sum(axis=1)])
+    np.testing.assert_allclose(df.iloc[:, -3:-1], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_any_tree_against_the_oracle(tmp_path, seed):
+    """Channels in any number and order, not the same in joints of one level; several roots."""
+    rng = np.random.default_rng(seed)
+    names = [axis + kind for axis in "XYZ" for kind in ("position", "rotation")]
+    n_channels = 0
+
+    def one(word, depth):
+        nonlocal n_channels
+        channels = rng.permutation(names)[: rng.integers(7)]
+        n_channels += len(channels)
+        offset = " ".join(map(str, rng.uniform(-9, 9, 3).round(2)))
+        inner = [one("JOINT", depth + 1) for _ in range(rng.integers(4) if depth < 5 else 0)]
+        inner = inner or ["End Site {\nOFFSET 1 2 3\n}"] * rng.integers(2)
+        head = f"{word} j{rng.integers(10**9)} {{\nOFFSET {offset}"
+        return "\n".join([head, f"CHANNELS {len(channels)} {' '.join(channels)}", *inner, "}"])
+
+    roots = [one("ROOT", 0) for _ in range(3)]
+    numbers = rng.uniform(-400, 400, (4, n_channels)).round(3)
+    rows = [" ".join(map(str, row)) for row in numbers]
+    text = "\n".join(["HIERARCHY", *roots, "MOTION", "Frames: 4", "Frame Time: 1", *rows])
+    df = read_motion(put(tmp_path, text))
+    expected = bvh_oracle(text)
+    assert n_channels > 20
+    assert set(df.attrs["joints"]) == set(expected)
+    for name, track in expected.items():
+        np.testing.assert_allclose(joint(df, name), track, atol=1e-9)
+
+
+def test_a_frame_does_not_depend_on_those_around(tmp_path, benchmark):
+    benchmark("readers").write_bvh(tmp_path / "long.bvh", 3000)
+    df = read_motion(tmp_path / "long.bvh")
+    head, motion = (tmp_path / "long.bvh").read_text().split("Frames: 3000\n")
+    rows = motion.splitlines()
+    for first, n in ((0, 1), (1234, 7), (2990, 10)):
+        few = [f"Frames: {n}", rows[0], *rows[1 + first : 1 + first + n]]
+        some = read_motion(put(tmp_path, head + "\n".join(few)))
+        np.testing.assert_array_equal(some, df.iloc[first : first + n])
+
+
+def moves(rows):
+    """A file of one joint that moves, with rows of text."""
+    return small("3 Xposition Yposition Zposition", f"Frames: {len(rows)}\nFrame Time: 1\n") + (
+        "\n".join(rows)
+    )
+
+
+def test_numbers_are_read_to_the_last_digit(tmp_path):
+    rng = np.random.default_rng(0)
+    formats = ["%r", "%.6f", "%.17g", "%.25g", "%e", "%+.3E", "%d"]
+    values = rng.uniform(-1, 1, 3000) * 10.0 ** rng.integers(-40, 41, 3000)
+    words = [formats[i % 7] % float(value) for i, value in enumerate(values)]
+    words[:6] = ["+5", ".5", "5.", "-.5e-3", "1e-400", "-0"]
+    df = read_motion(put(tmp_path, moves([" ".join(words[i : i + 3]) for i in range(0, 3000, 3)])))
+    assert df.to_numpy().ravel().tolist() == list(map(float, words))
+
+
+@pytest.mark.parametrize("blank", ["  ", " \t", "\t", "\f", "\v"])
+def test_blanks_of_any_kind(tmp_path, blank):
+    rows = [f"{blank}1{blank}2 3{blank}", blank, "", f"4 5{blank}6{blank} "]
+    text = moves(rows).replace("Frames: 4", "Frames: 2")
+    assert read_motion(put(tmp_path, text)).to_numpy().tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+@pytest.mark.parametrize(
+    "word", ["1e", "1e+", "+-1", "1.2.3", ".", "-", "e5", "1-2", "1_0", "0x1", "1,5", "inf", "\xb2"]
+)
+def test_words_that_are_no_numbers(tmp_path, word):
+    with pytest.raises(ValueError, match=r"line 11: a frame .* needs finite numbers, got "):
+        read_motion(put(tmp_path, moves(["1 2 3", f"1 {word} 3", "1 2 3"])))
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("1 1e 3", "needs finite numbers, got '1e'"),
+        ("1 1e999 3", "needs finite numbers, got '1e999'"),
+        ("1 2", "needs 3 numbers, got 2 \\('1 2'\\)"),
+        ("1 2 3 4 5 6", "needs 3 numbers, got 6"),
+        ('1 2 "3"', "needs finite numbers"),
+    ],
+)
+def test_errors_far_into_a_file(tmp_path, row, message):
+    rows = ["123.456789 -123.456789 0.123456"] * 80_000
+    rows[5] = ""
+    rows[70_000] = row
+    with pytest.raises(ValueError, match=rf"a\.bvh, line 70010: a frame .* {message}"):
+        read_motion(put(tmp_path, moves(rows)))
+
+
+def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame Time: 1\n1 2 3\n"):
+    return f"HIERARCHY\nROOT a\n{{\nOFFSET 0 0 0\nCHANNELS {channels}\n}}\nMOTION\n{motion}"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"line 0: the file ends where ROOT, .* should follow; it is not complete"),
+        ("\x00\xff", "line 1: expected ROOT, .* got "),
+        (small()[:30], "line 4: the file ends where a number of OFFSET"),
+        (small().replace("OFFSET 0 0 0\n", ""), "line 5: joint 'a' ends without an OFFSET"),
+        (small().replace("0 0 0", "0 x 0"), "line 4: OFFSET needs finite numbers, got 'x'"),
+        (small().replace("0 0 0", "0 1_0 0"), "OFFSET needs finite numbers, got '1_0'"),
+        (small().replace("ROOT a", "ROOT"), "line 3: expected the joint's name"),
+        (small().replace("ROOT a\n{", "ROOT a"), "line 3: expected a joint's name and {, got 'OFF"),
+        (small().replace("ROOT", "JOINT"), "'JOINT' stands where it cannot"),
+        (small().replace("}\n", ""), "MOTION begins, but 1 joints are open"),
+        ("MOTION\n", "at least one ROOT"),
+        (small("7 Xrotation"), "CHANNELS needs a number from 0 to 6, got '7'"),
+        (small("2 Xrotation Xrotation"), "as many different names"),
+        (small("1 Wrotation"), "got 'WROTATION'"),
+        (small("0"), "no joint has CHANNELS"),
+        (small().replace("}", "End Site { OFFSET 0 0 0 CHANNELS 1 Xrotation } }"), "End Site has"),
+        (small(motion=""), "line 7: expected 'Frames: <number>', got ''"),
+        (small(motion="Frames: -1\n"), "Frames: needs a whole number above 0, got '-1'"),
+        (small(motion="Frames: 1\nFrame Time: 0\n1 2 3"), "Frame Time: needs seconds above 0"),
+        (small(motion="Frames: 1\nFrame Time: inf\n1 2 3"), "Frame Time: needs finite numbers"),
+        (small(motion="Frames: 9999999999\nFrame Time: 1\n1 2 3\n"), "but only 6 bytes follow"),
+        (small(motion="Frames: 2\nFrame Time: 1\n1.00 2.00 3.00\n"), "2, but 1 frames follow"),
+        (small(motion="Frames: 1\nFrame Time: 1\n1 2 3\n4 5 6\n"), "1, but 2 frames follow"),
+        (small(motion="Frames: 1\nFrame Time: 1\n1 2 \n"), r"line 10: a frame .* needs 3 numbers"),
+        (small(motion="Frames: 1\nFrame Time: 1\n1 nan 3\n"), "finite numbers, got 'nan'"),
+        (small(motion="Frames: 1\nFrame Time: 1\n1 1e999 3\n"), "finite numbers, got '1e999'"),
+    ],
+)
+def test_bad_bvh(tmp_path, text, message):
+    with pytest.raises(ValueError, match=rf"a\.bvh, {message}|a\.bvh, line \d+: .*{message}"):
+        read_motion(put(tmp_path, text))
+
+
+def test_positions_out_of_this_world(tmp_path):
+    text = body().replace("OFFSET 0 3 1", "OFFSET 0 1e308 1e308")
+    text = text.replace("OFFSET 1 5 -2", "OFFSET 1e308 1e308 1e308")
+    with pytest.raises(ValueError, match="infinitely far away in frame 1; offsets, lengths"):
+        read_motion(put(tmp_path, text))
+
+
+def test_a_small_file_of_a_huge_result(tmp_path):
+    joints = "JOINT a { OFFSET 0 0 0 }\n" * 2000
+    text = f"HIERARCHY\nROOT a {{ OFFSET 0 0 0 CHANNELS 1 Xposition\n{joints}}}\nMOTION\n"
+    text += "Frames: 4000\nFrame Time: 1\n" + "0\n" * 4000
+    with pytest.raises(ValueError, match=r"4000 frames of 2001 joints would take 183 MB, from a"):
+        read_motion(put(tmp_path, text))
+
+
+def test_real_bvh(real_data):
+    path = real_data / "original_files" / "bvh" / "007_01.bvh"
+    df = read_motion(path)
+    assert df.shape == (157, 3 * 142)
+    assert df.attrs["frame_rate"] == pytest.approx(60, rel=1e-4)
+    lines = path.read_text().split("\n")
+    start = next(i for i, line in enumerate(lines) if line.startswith("Frames"))
+    few = [*lines[:start], "Frames: 3", lines[start + 1], *lines[start + 2 : start + 5]]
+    for name, track in bvh_oracle("\n".join(few)).items():
+        np.testing.assert_allclose(joint(df, name)[:3], track, atol=1e-9)
+    archive = load_performances(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
+    columns = [f"{j}_{axis}" for j in archive.joints for axis in "xyz"]
+    np.testing.assert_allclose(df[columns], archive.data[0], atol=1e-4)
+    assert Skeleton.from_frame(df[columns]) == archive.skeleton
+    assert Skeleton.from_frame(df).landmarks["left_knee"] == "CC_Base_L_Calf"

@@ -1,0 +1,181 @@
+"""Performances of a recording, cut at its events."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn_motionsync import KeyframeSynchronizer, to_frame
+from sklearn_motionsync.io import cut_at_events, read_motion
+
+from motion_files import c3d, everything, put, texts
+
+STRIKE, OFF, LEFT = "Foot Strike", "Foot Off", ("Foot Strike", "Left")
+
+
+def recording(*events, n_frames=200, **attrs):
+    """A row is its own number; events are (label, context, frame)."""
+    df = pd.DataFrame({"row": np.arange(float(n_frames))})
+    keys = "label", "context", "frame"
+    df.attrs = {"events": [dict(zip(keys, event, strict=True)) for event in events]} | attrs
+    return df
+
+
+WALK = (
+    (STRIKE, "Left", -20.0),
+    (OFF, "Right", -5.0),
+    (STRIKE, "Right", 5.5),
+    (STRIKE, "Left", 20.4),
+    (OFF, "Right", 31.25),
+    (STRIKE, "Right", 55.0),
+    (OFF, "Left", 66.0),
+    (STRIKE, "Left", 90.5),
+    (STRIKE, "Right", 131.0),
+    (STRIKE, "Left", 160.6),
+    (STRIKE, "Right", 200.0),
+    ("General", None, 250.0),
+)
+
+
+def rows(parts):
+    assert all(x.attrs["rows"] == [x["row"].iloc[0], x["row"].iloc[-1]] for x in parts)
+    return [x.attrs["rows"] for x in parts]
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "expected"),
+    [
+        (LEFT, None, [[20, 91], [91, 161]]),
+        (("foot strike ", "LEFT"), None, [[20, 91], [91, 161]]),
+        (list(LEFT), LEFT, [[20, 91], [91, 161]]),
+        ((STRIKE, "Right"), None, [[6, 55], [55, 131]]),
+        (STRIKE, None, [[6, 20], [20, 55], [55, 91], [91, 131], [131, 161]]),
+        # A left foot that never goes off again is no stance.
+        (LEFT, (OFF, "Left"), [[20, 66]]),
+        (LEFT, (STRIKE, "Right"), [[20, 55], [91, 131]]),
+        (OFF, STRIKE, [[31, 55], [66, 91]]),
+        ((OFF, "Left"), None, []),
+        (LEFT, "General", []),
+    ],
+)
+def test_where_performances_begin_and_end(start, stop, expected):
+    assert rows(cut_at_events(recording(*WALK), start, stop)) == expected
+    assert rows(cut_at_events(recording(*WALK[::-1]), start, stop)) == expected
+
+
+def test_what_a_performance_knows():
+    df = recording(*WALK, frame_rate=50.0, kind="markers", first_frame=101)
+    before = df.copy()
+    first, second = cut_at_events(df, LEFT)
+    pd.testing.assert_frame_equal(df, before)
+    assert df.attrs == before.attrs
+    assert first.index.equals(pd.RangeIndex(72))
+    assert first.index.name == "frame"
+    events = [(e["label"], e["context"], e["frame"]) for e in first.attrs["events"]]
+    assert events == [(OFF, "Right", 11.25), (STRIKE, "Right", 35.0), (OFF, "Left", 46.0)]
+    assert [x.attrs["first_frame"] for x in (first, second)] == [121, 192]
+    assert (first.attrs["frame_rate"], first.attrs["kind"]) == (50.0, "markers")
+    first.attrs["events"][0]["frame"] = 99
+    assert df.attrs == before.attrs
+    # Events on the border are no key-frames.
+    (short,) = cut_at_events(recording(("a", None, 3), ("b", None, 3), ("a", None, 9)), "a")
+    assert short.attrs["events"] == []
+
+
+def test_times_go_along():
+    times = np.linspace(0, 1, 200) ** 2
+    uneven = cut_at_events(recording(*WALK, times=times.tolist(), frame_rate=None), LEFT)[1]
+    assert uneven.attrs["times"] == times[91:162].tolist()
+    assert uneven.attrs["first_time"] == times[91]
+    even = cut_at_events(recording(*WALK, first_time=2.0, frame_rate=100.0), LEFT)[1]
+    assert even.attrs["first_time"] == pytest.approx(2.91)
+
+
+def test_labels():
+    def labels(parts):
+        return [(x.attrs["performance"], x.attrs["levels"]) for x in parts]
+
+    plain = cut_at_events(recording(*WALK), LEFT)
+    assert labels(plain) == [(i, ("performance", "frame")) for i in range(2)]
+    named = cut_at_events(recording(*WALK), LEFT, performance="walk")
+    assert labels(named) == [(("walk", i), ("recording", "part", "frame")) for i in range(2)]
+    told = recording(*WALK, performance=("ann", 3), levels=("subject", "trial", "frame"))
+    levels = ("subject", "trial", "part", "frame")
+    assert labels(cut_at_events(told, LEFT)) == [(("ann", 3, i), levels) for i in range(2)]
+    again = cut_at_events(cut_at_events(told, LEFT)[0], OFF)
+    assert labels(again) == [(("ann", 3, 0, 0), ("subject", "trial", "part", "part_4", "frame"))]
+    pair = cut_at_events(recording(*WALK), LEFT, performance=("ann", 3))
+    assert pair[0].attrs["levels"] == ("recording_0", "recording_1", "part", "frame")
+    assert len(to_frame(named)) == 72 + 71
+
+
+def test_an_event_that_is_marked_twice():
+    """Twice in a row of the recording is once."""
+    events = ("a", None, 9.0), ("a", None, 9.3), ("a", None, 30.0), ("a", None, 29.8)
+    assert rows(cut_at_events(recording(*events), "a")) == [[9, 30]]
+
+
+def test_events_are_keyframes_of_what_lies_between_them():
+    parts = cut_at_events(recording(*WALK), STRIKE)
+    with_off = [x for x in parts if any(e["label"] == OFF for e in x.attrs["events"])]
+    keyframes = [[e["frame"] for e in x.attrs["events"]] for x in with_off]
+    sync = KeyframeSynchronizer(n_frames=30).fit(with_off, keyframes=keyframes)
+    assert sync.transform(with_off, keyframes=keyframes).shape == (2, 30, 1)
+
+
+@pytest.mark.parametrize(
+    ("df", "start", "stop", "message"),
+    [
+        (recording(), "a", None, r"has no events; attrs\['events'\] must be a list of dicts"),
+        (pd.DataFrame({"a": [1.0, 2.0]}), "a", None, "This recording has no events"),
+        (recording(*WALK), "Heel", None, r"no event 'Heel' for start; there are \('Foot Str"),
+        (
+            recording(*WALK),
+            LEFT,
+            (OFF, "Both"),
+            r"no event \('Foot Off', 'Both'\) for stop; .*'Gen",
+        ),
+        (recording(*WALK), LEFT, OFF[:4], r"\('Foot Strike', 'Left'\) \(4\), .*'General' \(1\)"),
+        (recording(*WALK), 3, None, "start must be the label of an event, or a pair .*, got 3"),
+        (recording(*WALK), LEFT, (1, 2), r"stop must be the label .*, got \(1, 2\)"),
+        (recording(*WALK), (), None, r"start must be the label .*, got \(\)"),
+        (recording(("a", None, None)), "a", None, "have no frames, as its file has no frame rate"),
+        (recording(("a", None, "7")), "a", None, "must be a list of dicts .*, got {'label': 'a'"),
+        (recording((1, None, 7)), "a", None, "must be a list of dicts"),
+        (pd.Series([1.0]), "a", None, "must be a DataFrame, as read_motion gives, got Series"),
+    ],
+)
+def test_what_cannot_be_cut(df, start, stop, message):
+    with pytest.raises(ValueError, match=message):
+        cut_at_events(df, start, stop)
+
+
+@pytest.mark.parametrize("group", ["markers", "analog"])
+def test_groups_of_a_file_are_cut_at_the_same_events(tmp_path, group):
+    content = everything()
+    content["others"]["EVENT"] |= {
+        "LABELS": texts("Strike", "Off", "Strike"),
+        "CONTEXTS": texts("Left", "Left", "Left"),
+        "TIMES": (4, [2, 3], np.array([0, 2.108, 0, 2.3, 0, 2.512], "<f4").tobytes()),
+    }
+    path = put(tmp_path, c3d(**content), "a.c3d")
+    df = read_motion(path, group=group, max_gap=9 if group == "markers" else 0)
+    (part,) = cut_at_events(df, "Strike")
+    k = 2 if group == "analog" else 1
+    bounds = [np.floor((t * 50 - 100) * k + 0.5) for t in (2.108, 2.512)]
+    assert part.attrs["rows"] == bounds
+    assert part.attrs["first_frame"] == 101 + bounds[0] // k
+    assert [e["frame"] for e in part.attrs["events"]] == [15 * k - bounds[0]]
+    np.testing.assert_array_equal(part, df.iloc[int(bounds[0]) : int(bounds[1]) + 1])
+
+
+def test_a_real_recording(real_data):
+    path = real_data / "original_files" / "c3d" / "Eb015pr.c3d"
+    with pytest.warns(UserWarning, match="11 touch an end"):
+        df = read_motion(path, max_gap=20)
+    (stance,) = cut_at_events(df, "RHS", "RTO")
+    assert stance.attrs["rows"] == [270, 366]
+    assert stance.attrs["first_frame"] == 271
+    assert cut_at_events(df, "RHS") == []
+    with pytest.raises(ValueError, match=r"there are 'RIC' \(1\), 'RHS' \(1\), 'RTO' \(1\)"):
+        cut_at_events(df, "LHS")
+    (forces,) = cut_at_events(read_motion(path, group="analog"), "RHS", "RTO")
+    assert forces.attrs["rows"] == [1080, 1464]

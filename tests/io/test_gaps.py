@@ -1,0 +1,118 @@
+"""Gaps of markers: found, filled, told."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn_motionsync.io import fill_gaps, find_gaps
+
+
+def with_gaps():
+    t = np.arange(60.0)
+    df = pd.DataFrame({f"{j}_{a}": np.sin(t / 9 + i) for i, j in enumerate("abc") for a in "xyz"})
+    df.attrs = {"kind": "markers"}
+    df.loc[10:14, ["a_x", "a_y", "a_z"]] = np.nan
+    df.loc[30:30, "a_y"] = np.nan
+    df.loc[0:3, "c_z"] = np.nan
+    df.loc[50:59, "c_x"] = np.nan
+    df.index = pd.Index(np.arange(60) + 100, name="frame")
+    return df
+
+
+def test_find_gaps():
+    expected = [["a", 10, 14, 5, True], ["a", 30, 30, 1, True]]
+    expected += [["c", 0, 3, 4, False], ["c", 50, 59, 10, False]]
+    gaps = find_gaps(with_gaps())
+    assert gaps.to_numpy().tolist() == expected
+    assert list(gaps.columns) == ["joint", "first", "last", "n_frames", "inside"]
+    assert find_gaps(with_gaps().dropna()).empty
+
+
+def test_fill_gaps():
+    df, before = with_gaps(), with_gaps()
+    filled = fill_gaps(df, np.int64(4))
+    pd.testing.assert_frame_equal(df, before)
+    assert filled.attrs == df.attrs
+    assert find_gaps(filled)["first"].tolist() == [10, 0, 50]
+    known = df.notna().to_numpy()
+    np.testing.assert_array_equal(filled.to_numpy()[known], df.to_numpy()[known])
+    all_filled = fill_gaps(df, 100)
+    assert find_gaps(all_filled)["inside"].tolist() == [False, False]
+    error = all_filled["a_x"].to_numpy() - np.sin(np.arange(60) / 9)
+    assert np.abs(error).max() < 6e-3
+    pd.testing.assert_frame_equal(fill_gaps(df, 0), df)
+
+
+def test_gaps_between_two_frames_and_of_nothing():
+    df = pd.DataFrame({f"a_{axis}": [0.0, np.nan, np.nan, 3.0] for axis in "xyz"})
+    np.testing.assert_allclose(fill_gaps(df, 2)["a_z"], [0, 1, 2, 3])
+    df[:] = np.nan
+    assert fill_gaps(df, 9).isna().all(axis=None)
+    assert find_gaps(df).to_numpy().tolist() == [["a", 0, 3, 4, False]]
+
+
+def test_columns_that_are_no_joints():
+    for columns in (["a_x"], ["a_y", "a_x"], ["a_x", "b_y"], ["a_x", "a_z", "a_y"], []):
+        with pytest.raises(ValueError, match="columns must be <joint>_x, <joint>_y, <joint>_z"):
+            find_gaps(pd.DataFrame(0.0, index=range(2), columns=columns))
+
+
+def test_keypoints_in_the_plane():
+    plane = with_gaps().drop(columns=["a_z", "b_z", "c_z"])
+    gaps = find_gaps(plane)
+    assert gaps["joint"].tolist() == ["a", "a", "c"]
+    assert gaps["first"].tolist() == [10, 30, 50]
+    in_space = fill_gaps(with_gaps(), 9)
+    np.testing.assert_array_equal(fill_gaps(plane, 9)[["a_x", "a_y"]], in_space[["a_x", "a_y"]])
+
+
+def test_a_joint_that_comes_twice():
+    """Each is filled by itself."""
+    df = with_gaps()
+    twice = pd.concat([df, df * 2], axis=1)
+    expected = pd.concat([fill_gaps(df, 9), fill_gaps(df * 2, 9)], axis=1)
+    pd.testing.assert_frame_equal(fill_gaps(twice, 9), expected)
+    assert find_gaps(twice)["joint"].tolist() == ["a", "a", "c", "c"] * 2
+
+
+def test_missing_values_of_other_kinds():
+    df = with_gaps()
+    for other in (df.convert_dtypes(), df.astype(object).where(df.notna(), None)):
+        pd.testing.assert_frame_equal(find_gaps(other), find_gaps(df))
+        pd.testing.assert_frame_equal(fill_gaps(other, 9), fill_gaps(df, 9))
+
+
+def one_changed(value):
+    df = with_gaps().astype(object)
+    df.iloc[7, 4] = value
+    return df
+
+
+@pytest.mark.parametrize(
+    ("df", "message"),
+    [
+        (np.zeros((5, 3)), r"must be a DataFrame, as read_motion gives, got ndarray; .*columns=sk"),
+        ([[0.0, 1.0, 2.0]], "must be a DataFrame, as read_motion gives, got list"),
+        (None, "got NoneType"),
+        (with_gaps()["a_x"], "got Series"),
+        (one_changed(np.inf).astype(float), r"Frame 7, column 'b_y' is infinite; .*df\.replace"),
+        (one_changed(-np.inf), "Frame 7, column 'b_y' is infinite"),
+        (one_changed("far"), "Column 'b_y' must hold numbers, got object; convert it"),
+        (one_changed(1j), "Column 'b_y' must hold numbers"),
+        (with_gaps().astype(complex), "Column 'a_x' must hold numbers, got complex128"),
+        (with_gaps().astype("M8[ns]"), "Column 'a_x' must hold numbers, got datetime64"),
+        (pd.concat({"p": with_gaps(), "q": with_gaps()}), "of one performance, got a table of 2"),
+    ],
+)
+def test_what_is_no_recording(df, message):
+    with pytest.raises(ValueError, match=message):
+        find_gaps(df)
+    with pytest.raises(ValueError, match=message):
+        fill_gaps(df, 3)
+
+
+def test_a_table_performance_by_performance():
+    """As the message says."""
+    table = pd.concat({"p": with_gaps(), "q": with_gaps() * 2})
+    filled = table.groupby(level=0, group_keys=False).apply(fill_gaps, max_gap=9)
+    np.testing.assert_array_equal(filled.loc["q"], fill_gaps(with_gaps() * 2, 9))
+    pd.testing.assert_frame_equal(fill_gaps(table.loc[["p"]], 9), filled.loc[["p"]])

@@ -1,0 +1,212 @@
+"""Poses of labelled arrays, such as movement's Datasets."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from sklearn_motionsync import LinearSynchronizer, to_frame
+from sklearn_motionsync.io import fill_gaps, find_gaps, from_poses
+
+DIMS = ("time", "space", "keypoint", "individual")
+OLD = {"keypoint": "keypoints", "individual": "individuals"}
+POSITIONS = np.random.default_rng(0).normal(size=(40, 2, 3, 2))
+CONFIDENCE = np.random.default_rng(1).uniform(size=(40, 3, 2))
+
+
+def poses(positions=POSITIONS, fps=50.0, unit="seconds", times=None, **attrs):
+    n_frames, n_dims = positions.shape[:2]
+    if times is None:
+        times = np.arange(n_frames) / (fps if unit == "seconds" else 1)
+    coords = {"space": list("xyz"[:n_dims]), "keypoint": ["hip", "left knee", "toe"]}
+    coords |= {"time": times, "individual": ["ann", "bob"]}
+    variables = {"position": (DIMS, positions), "confidence": ((DIMS[0], *DIMS[2:]), CONFIDENCE)}
+    attrs = {"fps": fps, "time_unit": unit, "ds_type": "poses", "source_software": "SLEAP"} | attrs
+    return xr.Dataset(variables, coords, {k: v for k, v in attrs.items() if v is not None})
+
+
+def test_what_is_made():
+    ann, bob = from_poses(poses())
+    for i, df in enumerate((ann, bob)):
+        expected = POSITIONS[:, :, :, i].swapaxes(1, 2).reshape(40, 6)
+        np.testing.assert_array_equal(df, expected)
+        assert df.index.equals(pd.RangeIndex(40))
+        assert df.index.name == "frame"
+    joints = ["hip", "left knee", "toe"]
+    assert list(ann.columns) == [f"{joint}_{axis}" for joint in joints for axis in "xy"]
+    facts = {"format": "poses", "frame_rate": 50.0, "units": None, "up": "-y", "kind": "keypoints"}
+    facts |= {"joints": joints, "parents": [-1] * 3, "first_time": 0.0}
+    assert ann.attrs == facts | {"performance": "ann", "levels": ("individual", "frame")}
+    assert bob.attrs["performance"] == "bob"
+    json.dumps(ann.attrs)
+    _, bob = from_poses(poses(), performance="trial1")
+    assert bob.attrs["performance"] == ("trial1", "bob")
+    assert bob.attrs["levels"] == ("recording", "individual", "frame")
+    assert LinearSynchronizer(n_frames=9).fit_transform([ann, bob]).shape == (2, 9, 6)
+    assert len(to_frame([ann, bob])) == 80
+
+
+def test_in_space():
+    positions = np.random.default_rng(0).normal(size=(40, 3, 3, 2))
+    ann = from_poses(poses(positions))[0]
+    np.testing.assert_array_equal(ann, positions[..., 0].swapaxes(1, 2).reshape(40, 9))
+    assert list(ann.columns[:4]) == ["hip_x", "hip_y", "hip_z", "left knee_x"]
+    assert ann.attrs["up"] is None
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda ds: ds.rename(OLD),
+        lambda ds: ds.transpose("individual", "space", "time", "keypoint"),
+        lambda ds: ds.transpose("keypoint", "time", "individual", "space").rename(OLD),
+        lambda ds: ds.isel(space=[1, 0]),
+        lambda ds: ds.drop_vars("space"),
+        lambda ds: ds.drop_vars("confidence"),
+        lambda ds: ds.position.assign_attrs(ds.attrs),
+        # As read again from a NetCDF file.
+        lambda ds: ds.assign_attrs(fps=np.int64(50)),
+        lambda ds: ds.assign_coords(time=pd.to_timedelta(ds.time.values, unit="s")),
+        # A DataArray does not know its Dataset's facts: the times tell.
+        lambda ds: ds.position,
+    ],
+)
+def test_poses_of_any_kind(change):
+    for df, expected in zip(from_poses(change(poses())), from_poses(poses()), strict=True):
+        pd.testing.assert_frame_equal(df, expected)
+        assert df.attrs == expected.attrs
+
+
+def test_one_individual_and_one_keypoint():
+    expected = from_poses(poses())[1]
+    for ds in (poses().sel(individual="bob"), poses().rename(OLD).sel(individuals="bob")):
+        (bob,) = from_poses(ds, min_confidence=0)
+        pd.testing.assert_frame_equal(bob, expected)
+        assert bob.attrs["performance"] == "bob"
+    (knee,) = from_poses(poses().sel(individual="bob", keypoint="left knee"))
+    pd.testing.assert_frame_equal(knee, expected[["left knee_x", "left knee_y"]])
+    nameless = from_poses(poses().drop_vars(["individual", "keypoint"]))
+    assert [df.attrs["performance"] for df in nameless] == ["individual_0", "individual_1"]
+    assert nameless[0].attrs["joints"] == ["keypoint_0", "keypoint_1", "keypoint_2"]
+
+
+@pytest.mark.parametrize(
+    "order", [("time", "keypoint", "individual"), ("individual", "time", "keypoint")]
+)
+def test_low_confidence(order):
+    ds = poses()
+    ds["confidence"] = ds.confidence.transpose(*order)
+    ds["confidence"][{"time": 7}] = np.nan  # not known
+    before = ds.copy(deep=True)
+    least = 0.4
+    for i, df in enumerate(from_poses(ds, min_confidence=least)):
+        doubtful = CONFIDENCE[:, :, i] < least
+        doubtful[7] = False
+        assert doubtful.any()
+        np.testing.assert_array_equal(df.isna(), np.repeat(doubtful, 2, axis=1))
+        assert find_gaps(df)["n_frames"].sum() == doubtful.sum()
+        filled = from_poses(ds, min_confidence=least, max_gap=3)[i]
+        pd.testing.assert_frame_equal(filled, fill_gaps(df, 3))
+        assert filled.attrs == df.attrs
+    xr.testing.assert_identical(ds, before)
+    assert not from_poses(ds)[0].isna().any(axis=None)
+
+
+# -- the clock --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("ds", "rate"),
+    [
+        (poses(), 50),
+        (poses(fps=None, unit="frames"), None),
+        (poses(fps=30, unit="frames"), 30),
+        (poses(fps=None, unit=None, times=np.arange(40.0)), None),
+        (poses(fps=None, unit=None, times=np.arange(40) / 25), 25),
+        (poses(fps=30, unit=None, times=np.arange(40)), 30),
+        # Every second frame was taken, and the attrs say what was before.
+        (poses().isel(time=slice(0, None, 2)), 25),
+        (poses(fps=30, unit="frames").isel(time=slice(1, None, 3)), 10),
+        (poses(fps=float("nan"), unit="frames"), None),
+        (poses(fps=30, unit="frames").assign_attrs(fps="30"), 30),
+        (poses(fps=30, unit="frames").assign_attrs(fps=" 29.97 "), 29.97),
+        (poses(fps=30, unit="frames").assign_attrs(fps="not known"), None),
+        (poses().drop_vars("time"), 50),
+        (poses().isel(time=[3]), 50),
+    ],
+)
+def test_frame_rates(ds, rate):
+    df = from_poses(ds)[0]
+    assert df.attrs["frame_rate"] == (rate if rate is None else pytest.approx(rate))
+    assert "times" not in df.attrs
+    assert from_poses(ds, frame_rate=12)[0].attrs["frame_rate"] == 12.0
+
+
+@pytest.mark.parametrize(
+    ("fps", "unit", "words"), [(50.0, "seconds", "s"), (None, "frames", "frames")]
+)
+def test_uneven_times(fps, unit, words):
+    ds = poses(fps=fps, unit=unit).isel(time=[*range(20), *range(25, 40)])
+    with pytest.warns(UserWarning, match=rf"The poses: its times are uneven, .* {words}, but"):
+        ann, bob = from_poses(ds)
+    assert ann.attrs["frame_rate"] is None
+    assert bob.attrs["times"] == ds.time.values.tolist()
+    assert from_poses(ds, frame_rate=50)[0].attrs["frame_rate"] == 50
+
+
+def test_without_xarray():
+    """Whatever has dims, coords, values and attrs will do."""
+    coords = {"space": np.array(["x", "y"]), "keypoints": np.array(["a", "a", "b"])}
+    coords = {name: SimpleNamespace(values=values) for name, values in coords.items()}
+    dims = tuple(OLD.get(name, name) for name in DIMS)
+    df = from_poses(SimpleNamespace(dims=dims, coords=coords, values=POSITIONS, attrs={}))[1]
+    assert df.attrs["joints"] == ["a", "a_2", "b"]
+    assert df.attrs["performance"] == "individual_1"
+
+
+@pytest.mark.parametrize(
+    ("ds", "params", "message"),
+    [
+        (POSITIONS, {}, "needs an xarray Dataset or DataArray .*, got ndarray"),
+        (from_poses(poses())[0], {}, "got DataFrame"),
+        (None, {}, "got NoneType"),
+        (poses().drop_vars("position"), {}, r"the variable 'position', got \['confidence'\]"),
+        (
+            poses().rename(time="frame"),
+            {},
+            r"dimensions .*, got also \['frame'\]; .*ds\.isel\(frame",
+        ),
+        (poses().isel(time=0, drop=True), {}, "needs the dimension 'time'"),
+        (poses().isel(space=0, drop=True), {}, "needs the dimension 'space'"),
+        (poses().expand_dims(view=["a", "b"]), {}, r"got also \['view'\]; select one of each"),
+        (poses().isel(space=[0]), {}, r"'space' must hold 'x', 'y' and perhaps 'z', got \['x'\]"),
+        (poses().assign_coords(space=["rho", "phi"]), {}, r"got \['rho', 'phi'\]"),
+        (poses().isel(time=slice(0)), {}, r"position of poses is empty: {'time': 0"),
+        (poses().isel(time=slice(None, None, -1)), {}, r"must increase; sort them by ds\.sortby"),
+        (poses(times=np.array(list("ab" * 20))), {}, "times of poses must be numbers, got <U1"),
+        (poses(unit="ms"), {}, "must be seconds or frames, but .* is 'ms'"),
+        (poses().astype(str), {}, "The position of poses must be numbers, got <U"),
+        (
+            poses().drop_vars("confidence"),
+            {"min_confidence": 0.5},
+            "'confidence', and there is none",
+        ),
+        (
+            poses().position,
+            {"min_confidence": 0.5},
+            "needs a Dataset with the variable 'confidence'",
+        ),
+        (
+            poses(),
+            {"min_confidence": "high"},
+            "min_confidence must be a number such as 0.6, got 'h",
+        ),
+        (poses(), {"frame_rate": 0}, "frame_rate must be frames a second, above 0, got 0"),
+        (poses(), {"max_gap": -1}, "max_gap must be a whole number of frames"),
+    ],
+)
+def test_what_are_no_poses(ds, params, message):
+    with pytest.raises(ValueError, match=message):
+        from_poses(ds, **params)

@@ -1,0 +1,152 @@
+"""The self-correlation: by its formula, on takes of known period, and on people."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.ndimage import gaussian_filter1d
+from sklearn_motionsync import Skeleton, self_correlation, to_frame
+from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.segmentation.self_correlation import correlate, reason_of
+
+
+def waves(n_frames, period, n_features=4, seed=0):
+    rng = np.random.default_rng(seed)
+    t = np.arange(n_frames)[:, np.newaxis] / period
+    return sum(
+        rng.normal(size=n_features) / k * np.sin(2 * np.pi * (k * t + rng.uniform(size=n_features)))
+        for k in (1, 2, 3)
+    )
+
+
+def by_the_formula(x, lag):
+    a, b = x[: len(x) - lag], x[lag:]
+    a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+    return (a * b).sum() / np.sqrt((a * a).sum() * (b * b).sum())
+
+
+def test_it_is_its_formula():
+    """Of slow waves, which the smoothing hardly changes."""
+    t = np.arange(150)[:, np.newaxis] / 37.3
+    x = np.sin(2 * np.pi * t + np.arange(3))
+    found = self_correlation(x)
+    assert len(found.correlation) == 0.7 * 150 + 1
+    velocity = np.gradient(x, axis=0)
+    for lag in (0, 1, 17, 37, 60, 104):
+        assert found.posture[lag] == pytest.approx(by_the_formula(x, lag), abs=0.01)
+        assert found.velocity[lag] == pytest.approx(by_the_formula(velocity, lag), abs=0.04)
+    np.testing.assert_array_equal(found.correlation, (found.posture + found.velocity) / 2)
+
+
+@pytest.mark.parametrize("period", [9.6, 37.3, 250.0])
+@pytest.mark.parametrize("n_cycles", [1.65, 2.3, 12.0, 40.0])
+def test_the_period_of_waves(period, n_cycles):
+    found = self_correlation(waves(round(n_cycles * period), period))
+    assert found.period == pytest.approx(period, rel=0.02)
+    assert found.n_cycles == pytest.approx(n_cycles, rel=0.03)
+    assert found.strength > 0.9
+
+
+def test_neither_unit_nor_offset_nor_precision_matter():
+    x = waves(200, 41)
+    expected = self_correlation(x)
+    for other in (1e-200 * x, 1e200 * x, x + 1e6, x.astype(np.float32), pd.DataFrame(x)):
+        found = self_correlation(other)
+        assert found.period == pytest.approx(expected.period, rel=1e-4)
+        assert found.strength == pytest.approx(expected.strength, rel=1e-4)
+
+
+def test_noise_is_no_cycle_and_hides_none():
+    x, noise = waves(400, 80), np.random.default_rng(1).normal(size=(400, 4))
+    assert self_correlation(noise).strength < 0.3
+    found = self_correlation(x + 0.3 * x.std() * noise)
+    assert found.period == pytest.approx(80, rel=0.03)
+    assert found.strength > 0.6
+    drift = gaussian_filter1d(np.random.default_rng(2).normal(size=(400, 4)), 60, axis=0)
+    assert self_correlation(drift / drift.std() + 0.05 * noise).strength < 0.3
+
+
+@pytest.mark.parametrize(("size", "lost"), [(0.3, 0.02), (0.6, 0.07)])
+def test_white_noise_takes_little_off_the_strength(size, lost):
+    """Of what repeats, but not quite."""
+    rng = np.random.default_rng(4)
+    path = gaussian_filter1d(rng.normal(size=(320, 4)), 12, axis=0)
+    x = waves(320, 80)
+    x = x / x.std() + 0.8 * path / path.std()
+    expected = self_correlation(x)
+    found = self_correlation(x + size * x.std() * rng.normal(size=x.shape))
+    assert 0.6 < expected.strength < 0.8
+    assert found.strength == pytest.approx(expected.strength, abs=lost)
+    assert found.period == pytest.approx(expected.period, rel=0.02)
+
+
+def test_slow_changes_of_pace_do_not_matter():
+    t = np.linspace(0, 1, 600)
+    angle = 24 * np.pi * (t + 0.05 * np.sin(np.pi * t))  # cycles of 0.86 to 1.19 of the mean
+    found = self_correlation(np.column_stack([np.sin(angle), np.cos(angle), np.cos(2 * angle)]))
+    assert found.strength > 0.5
+    assert found.n_cycles == pytest.approx(12, rel=0.05)
+
+
+@pytest.mark.parametrize("n_frames", [2, 3, 4, 7])
+def test_what_does_not_move_or_hardly_lasts_has_no_period(n_frames):
+    for x in (np.zeros((n_frames, 2)), np.full((n_frames, 1), 1e9), waves(n_frames, 50)):
+        found = self_correlation(x)
+        assert np.isnan(found.period)
+        assert (found.strength, found.n_cycles, len(found.peaks)) == (0, 0, 0)
+        assert np.isfinite(found.correlation).all()
+
+
+def test_positions_are_compared_by_their_directions():
+    """A bend that is walked twice, to and fro, and far away."""
+    bunch = make_bending(1, random_state=0)
+    (bend,) = bunch.data
+    once = self_correlation(bend, bunch.skeleton)
+    assert once.strength < 0.3
+    twice = np.concatenate([bend, bend[1:]])
+    path = np.linspace(0, 50, len(twice))[:, np.newaxis] * np.tile([1, 0, 1], 15)
+    found = self_correlation(twice + path, bunch.skeleton)
+    assert found.period == pytest.approx(len(bend) - 1, rel=0.03)
+
+
+def test_takes_of_gait():
+    bunch = make_gait(6, 5, takes=True, random_state=0)
+    for x, keyframes in zip(bunch.data, bunch.keyframes, strict=True):
+        found = self_correlation(x)
+        assert found.period == pytest.approx((keyframes[-1] - keyframes[0]) / 5, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("take", "message"),
+    [
+        (np.zeros(5), r"shape \(5,\)"),
+        (np.zeros((1, 3)), "at least 2 frames"),
+        (np.full((9, 2), np.nan), "NaN"),
+        (np.zeros((2, 9, 2)), "Give one take, .* got 2 performances"),
+        ([np.zeros((9, 2)), np.zeros((7, 2))], "got 2 performances; CycleSegmenter"),
+        (to_frame([np.zeros((9, 2)), np.ones((7, 2))]), "got 2 performances"),
+        ([["a"], ["b"]], "numeric"),
+    ],
+)
+def test_what_is_no_take_is_refused(take, message):
+    with pytest.raises(ValueError, match=message):
+        self_correlation(take)
+    with pytest.raises(ValueError, match="15 joints need 45"):
+        self_correlation(np.zeros((9, 3)), Skeleton.paper())
+
+
+def test_chance_is_not_cyclic():
+    """Noise in few features is like itself by chance, so more is asked of them."""
+    rng = np.random.default_rng(0)
+    for n_features in (1, 2, 4):
+        takes = [rng.standard_normal((200, n_features)) for _ in range(40)]
+        reasons = [reason_of(correlate(x), 0.4) for x in takes]
+        assert reasons.count("") <= 1, n_features
+    t = 2 * np.pi * np.arange(300)[:, np.newaxis] / 90
+    one = np.sin(t) + 0.3 * rng.standard_normal(t.shape)
+    assert reason_of(correlate(one), 0.4) == ""
+
+
+def test_breadth():
+    found = correlate(np.eye(8)[np.arange(160) // 5 % 8])
+    assert 5 < found.breadth <= 7
+    assert correlate(np.sin(np.arange(100.0))[:, np.newaxis]).breadth == pytest.approx(1)

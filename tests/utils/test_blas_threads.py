@@ -1,0 +1,336 @@
+"""One thread for the linear algebra of a portion, and the process left as it was found."""
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+import types
+import warnings
+
+import numpy as np
+import pytest
+import threadpoolctl
+from sklearn_motionsync import DenseSynchronizer
+from sklearn_motionsync.matching.trellis import Trellis
+from sklearn_motionsync.utils import threads as blas
+from sklearn_motionsync.utils.parallel import run
+from sklearn_motionsync.utils.threads import Limit, on_one_thread
+
+
+def blas_threads():
+    pools = threadpoolctl.threadpool_info()
+    return {p["filepath"]: p["num_threads"] for p in pools if p["user_api"] == "blas"}
+
+
+def in_thread(function, *arguments):
+    """Threadpoolctl lets one living thread alone set OpenBLAS: here one that is soon gone."""
+    thread = threading.Thread(target=function, args=arguments)
+    thread.start()
+    thread.join()
+
+
+@pytest.fixture(autouse=True)
+def found():
+    """Two threads, also where there is one core only."""
+    before = min(blas_threads().values())
+
+    in_thread(threadpoolctl.threadpool_limits, 2, "blas")
+    threads = blas_threads()
+    assert set(threads.values()) == {2}
+    yield threads
+    in_thread(threadpoolctl.threadpool_limits, before, "blas")
+
+
+class Visitor(threading.Thread):
+    """A thread that stays in a portion until it is let out."""
+
+    def __init__(self):
+        super().__init__()
+        self.inside, self.out = threading.Event(), threading.Event()
+        self.start()
+        assert self.inside.wait(10)
+
+    def run(self):
+        on_one_thread(self.stay)
+
+    def stay(self):
+        self.inside.set()
+        self.out.wait(10)
+
+    def let_out(self):
+        self.out.set()
+        self.join()
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
+def test_the_last_one_out_restores(found, order):
+    visitors = [Visitor() for _ in range(3)]
+    for i in order:
+        assert set(blas_threads().values()) == {1}
+        visitors[i].let_out()
+    assert blas_threads() == found
+
+
+def test_visits_are_nested(found):
+    inner = []
+    on_one_thread(lambda: inner.append(on_one_thread(blas_threads)) or inner.append(blas_threads()))
+    assert [set(threads.values()) for threads in inner] == [{1}, {1}]
+    assert blas_threads() == found
+
+
+def test_fits_and_transforms_in_several_threads_leave_nothing_behind(found, monkeypatch):
+    rng = np.random.default_rng(0)
+    X = np.cumsum(rng.standard_normal((40, 40, 3)), axis=1)
+    sync = DenseSynchronizer(n_jobs=2).fit(X)
+    assert blas_threads() == found
+    # All are inside at once, and who came first goes first.
+    inside, paths, order = threading.Barrier(4), Trellis.paths_and_costs, []
+
+    def together(self, *args):
+        order.append(threading.current_thread())
+        inside.wait(10)
+        time.sleep(0.05 * order.index(threading.current_thread()))
+        return paths(self, *args)
+
+    monkeypatch.setattr(Trellis, "paths_and_costs", together)
+    threads = [threading.Thread(target=sync.transform, args=(X[:2],)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(order) == 4
+    assert blas_threads() == found
+
+
+def test_portions_of_threads_run_on_one_thread_whatever_the_user_has_set(found):
+    """Of OpenBLAS threadpoolctl lets the user's thread alone change the setting."""
+    with threadpoolctl.threadpool_limits(limits=3, user_api="blas"):
+        seen = []
+        in_thread(on_one_thread, lambda: seen.append(blas_threads()))
+        seen += run(blas_threads, [()] * 6, n_jobs=2, prefer="threads")
+        assert set(blas_threads().values()) == {3}
+    assert {n for threads in seen for n in threads.values()} == {1}
+    assert blas_threads() == found
+
+
+def test_what_others_have_set_meanwhile_stays(found):
+    in_thread(on_one_thread, threadpoolctl.threadpool_limits, 3, "blas")
+    assert set(blas_threads().values()) == {3}
+    # Somebody who came before and goes before restores what was there before both.
+    entered, leave = threading.Event(), threading.Event()
+
+    def somebody():
+        with threadpoolctl.threadpool_limits(limits=1, user_api="blas"):
+            entered.set()
+            leave.wait(10)
+
+    other = threading.Thread(target=somebody)
+    other.start()
+    assert entered.wait(10)
+    visitor = Visitor()
+    leave.set()
+    other.join()
+    visitor.let_out()
+    assert set(blas_threads().values()) == {3}
+
+
+def test_others_can_set_it_afterwards(found):
+    """No thread is left as the one that threadpoolctl obeys."""
+    on_one_thread(int)
+    in_thread(threadpoolctl.threadpool_limits, 3, "blas")
+    assert set(blas_threads().values()) == {3}
+
+
+# -- interruption -----------------------------------------------------------------------------
+
+
+# One that comes while an object is being disposed of is ignored by Python.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="signals of POSIX")
+@pytest.mark.parametrize("others", [False, True])
+def test_ctrl_c_at_any_moment(found, others):
+    """Most of these come while somebody enters or leaves, some of them half-way."""
+    pools = threadpoolctl.ThreadpoolController().select(user_api="blas")
+    visitor, inside = (Visitor(), 1) if others else (None, 2)
+    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    interrupted = 0
+    try:
+        for i in range(1000):
+            try:
+                signal.setitimer(signal.ITIMER_REAL, 1e-5 + 1e-7 * i)
+                for _ in range(1000):
+                    on_one_thread(int)
+            except KeyboardInterrupt:
+                interrupted += 1
+            assert {pool["num_threads"] for pool in pools.info()} == {inside}
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert interrupted > 900
+    if others:
+        visitor.let_out()
+    assert blas_threads() == found
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+def test_an_interrupted_portion(found, n_jobs, error):
+    """The thread that is still at work in another portion is waited for."""
+    at_work = threading.Event()
+
+    def portion(i):
+        if i == 0:
+            if n_jobs == 2:
+                assert at_work.wait(10)
+            raise error
+        at_work.set()
+        time.sleep(0.3)
+
+    with pytest.raises(error):
+        list(run(portion, [(i,) for i in range(5)], n_jobs=n_jobs, prefer="threads"))
+    assert blas_threads() == found
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_ctrl_c_while_threads_are_at_work(found):
+    def portion(i):
+        if i == 1:
+            os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.2)
+
+    # What runs in the background of a shell is deaf to it, unless it listens.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            list(run(portion, [(i,) for i in range(20)], n_jobs=2, prefer="threads"))
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert blas_threads() == found
+
+
+# joblib tells how many portions are dropped.
+@pytest.mark.filterwarnings("ignore:.*tasks:UserWarning")
+@pytest.mark.parametrize("n_jobs", [1, 2])
+@pytest.mark.parametrize("leave", ["close", "__del__"])
+def test_a_generator_left_half_way(found, n_jobs, leave):
+    begun = []
+    portions = [(0,), *[(0.2,)] * 20]
+    work = {"n_jobs": n_jobs, "prefer": "threads"}
+    results = run(lambda t: begun.append(t) or time.sleep(t), portions, **work)
+    next(results)
+    if leave == "close":
+        results.close()
+    else:
+        del results
+    assert blas_threads() == found
+    assert len(begun) < 10
+
+
+# -- forks, and libraries of other kinds ------------------------------------------------------
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks")
+def test_a_child_does_not_inherit_the_limit(found):
+    visitor, forking = Visitor(), multiprocessing.get_context("fork")
+    answer = forking.Queue()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = forking.Process(target=answer_of_child, args=(answer,))
+        child.start()
+    assert answer.get(timeout=20) == [{2}, {1}, {2}]
+    child.join()
+    assert set(blas_threads().values()) == {1}
+    visitor.let_out()
+    assert blas_threads() == found
+
+
+def answer_of_child(answer):
+    threads = blas_threads(), on_one_thread(blas_threads), blas_threads()
+    answer.put([set(t.values()) for t in threads])
+
+
+class Library:
+    """A library as threadpoolctl shows it."""
+
+    user_api, filepath, threading_layer = "blas", "libwhatever.so", "pthreads"
+
+    def __init__(self):
+        self.num_threads, self.calls = 4, []
+
+    def set_num_threads(self, n):
+        self.calls.append(n)
+        self.num_threads = n
+
+
+class LibraryOnOpenMP(threading.local, Library):
+    """Its setting is a thread's own."""
+
+    threading_layer = "openmp"
+
+
+def test_a_lock_held_by_another_thread_is_not_inherited():
+    entered, go_on = threading.Event(), threading.Event()
+
+    class Slow(Library):
+        def set_num_threads(self, n):
+            super().set_num_threads(n)
+            if threading.current_thread() is not threading.main_thread():
+                entered.set()
+                go_on.wait(10)
+
+    limit = Limit(Slow())
+    thread = threading.Thread(target=limit.enter, args=("visitor",), daemon=True)
+    thread.start()
+    assert entered.wait(10)
+    began = time.perf_counter()
+    limit.after_fork()
+    limit.enter("child")
+    limit.leave("child")
+    assert time.perf_counter() - began < 5
+    go_on.set()
+    thread.join()
+
+
+def test_settings_of_each_thread():
+    library = LibraryOnOpenMP()
+    limit, seen = Limit(library), []
+
+    def visit():
+        limit.enter("other")
+        seen.append(library.num_threads)
+        limit.leave("other")
+        seen.append(library.num_threads)
+
+    limit.enter("first")
+    thread = threading.Thread(target=visit)
+    thread.start()
+    thread.join()
+    assert seen == [1, 4]
+    assert library.num_threads == 1
+    limit.leave("first")
+    assert library.num_threads == 4
+
+
+def test_one_who_is_not_inside_changes_nothing():
+    library = Library()
+    limit = Limit(library)
+    limit.leave("nobody")
+    assert library.calls == []
+    limit.enter("somebody")
+    limit.leave("nobody")
+    assert library.num_threads == 1
+    limit.leave("somebody")
+    limit.leave("somebody")
+    assert library.calls == [1, 4]
+
+
+def test_a_library_loaded_meanwhile(monkeypatch):
+    library = Library()
+    on_one_thread(int)
+    known = types.SimpleNamespace(lib_controllers=[library])
+    monkeypatch.setattr(blas, "ThreadpoolController", lambda: known)
+    monkeypatch.setitem(sys.modules, "brings_another_blas", types.ModuleType("another"))
+    assert on_one_thread(lambda: library.num_threads) == 1
+    assert library.num_threads == 4

@@ -1,0 +1,257 @@
+"""Work shared out: equal bits everywhere, progress, and interruption."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+import warnings
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pytest
+import sklearn
+import sklearn_motionsync
+import threadpoolctl
+from sklearn.exceptions import NotFittedError
+from sklearn.utils.validation import check_is_fitted
+from sklearn_motionsync import DenseSynchronizer
+from sklearn_motionsync.matching.refinement_test import RefinementTrial
+from sklearn_motionsync.matching.trellis import Trellis
+from sklearn_motionsync.utils.parallel import Common, Progress, run
+
+SETTINGS = {
+    "paper": {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0},
+    "defaults": {},
+    "refined": {"refine": True, "subframes": 2, "consensus": 3},
+}
+
+
+@pytest.fixture(scope="module")
+def walks():
+    """So many that fitting samples and warping takes several portions."""
+    rng = np.random.default_rng(0)
+    return [np.cumsum(rng.standard_normal((n, 5)), axis=0) for n in rng.integers(30, 40, size=300)]
+
+
+def bits(sync, X):
+    """All that fitting and warping give, byte for byte."""
+    match = sync.match(X)
+    results = [sync.global_distances_, sync.pattern_, sync.exemplars_, sync.transform(X), *match]
+    return [np.asarray(result).tobytes() for result in results]
+
+
+@pytest.fixture(scope="module", params=SETTINGS)
+def reference(request, walks):
+    settings = SETTINGS[request.param]
+    return settings, bits(DenseSynchronizer(**settings).fit(walks), walks)
+
+
+@pytest.mark.parametrize(("n_jobs", "backend"), [(2, None), (3, "threading"), (2, "loky")])
+def test_equal_bits_for_any_jobs_and_backend(walks, reference, n_jobs, backend):
+    settings, expected = reference
+    context = {} if backend is None else {"backend": backend}
+    with joblib.parallel_config(**context):
+        sync = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(walks)
+        assert bits(sync, walks) == expected
+
+
+@pytest.mark.parametrize("working_memory", [0, 0.3, 1])
+def test_equal_bits_with_little_memory(walks, reference, working_memory):
+    settings, expected = reference
+    with sklearn.config_context(working_memory=working_memory):
+        assert bits(DenseSynchronizer(**settings).fit(walks), walks) == expected
+
+
+def test_equal_bits_whatever_the_blas_threads(walks, reference):
+    settings, expected = reference
+    for limits in (1, 2):
+        with threadpoolctl.threadpool_limits(limits=limits):
+            assert bits(DenseSynchronizer(**settings).fit(walks), walks) == expected
+
+
+def test_all_matching_runs_on_one_blas_thread(walks, monkeypatch):
+    """Also what is not worth sharing out: its bits must not depend on the cores there are."""
+    seen, method = [], {name: getattr(Trellis, name) for name in ("distances", "paths_and_costs")}
+
+    def watched(name):
+        def call(self, *args):
+            pools = threadpoolctl.threadpool_info()
+            seen.append((name, {p["num_threads"] for p in pools if p["user_api"] == "blas"}))
+            return method[name](self, *args)
+
+        return call
+
+    for name in method:
+        monkeypatch.setattr(Trellis, name, watched(name))
+    with threadpoolctl.threadpool_limits(limits=2):
+        DenseSynchronizer().fit(walks[:20]).transform(walks[:3])
+    assert {name for name, _ in seen} == {"distances", "paths_and_costs"}
+    assert all(threads == {1} for _, threads in seen)
+
+
+# -- the workshop itself ------------------------------------------------------------------
+
+
+def square(x):
+    return x * x
+
+
+@pytest.mark.parametrize("n_jobs", [None, 1, 2])
+@pytest.mark.parametrize("n_portions", [0, 1, 5])
+def test_run_keeps_the_order_and_counts(n_jobs, n_portions):
+    steps = []
+    portions = [(i,) for i in range(n_portions)]
+    results = run(square, portions, n_jobs=n_jobs, prefer="threads", step=lambda: steps.append(1))
+    assert list(results) == [i * i for i in range(n_portions)]
+    assert len(steps) == n_portions
+
+
+def test_threads_leave_the_filters_of_warnings_alone():
+    before = [*warnings.filters]
+    for _ in range(5):
+        list(run(time.sleep, [(1e-3 * (i % 3),) for i in range(20)], n_jobs=2, prefer="threads"))
+    assert warnings.filters == before
+
+
+def test_the_configuration_of_scikit_learn_reaches_every_portion():
+    with sklearn.config_context(working_memory=77):
+        seen = list(run(sklearn.get_config, [()] * 5, n_jobs=2, prefer="threads"))
+    assert {config["working_memory"] for config in seen} == {77}
+
+
+def test_what_portions_share_comes_first():
+    common = Common("a", "of a cluster only"), Common("b")
+    for n_jobs in (1, 2):
+        assert list(run("{}{}{}".format, [(1,), (2,)], common=common, n_jobs=n_jobs)) == [
+            "ab1",
+            "ab2",
+        ]
+
+
+def test_backends_that_give_no_results_one_by_one():
+    with joblib.parallel_config(backend="multiprocessing"):
+        assert list(run(square, [(1,), (2,), (3,)], n_jobs=2)) == [1, 4, 9]
+
+
+# -- progress -------------------------------------------------------------------------------
+
+
+def test_verbose_tells_how_far_it_is(walks, capsys):
+    DenseSynchronizer().fit(walks).transform(walks)
+    assert capsys.readouterr().out == ""
+    DenseSynchronizer(verbose=1).fit(walks).transform(walks)
+    lines = capsys.readouterr().out.splitlines()
+    assert all(line.startswith("[DenseSynchronizer] ") for line in lines)
+    assert "comparing 300 with 32 performances: 100 %" in lines[0]
+    assert "trying a little to refine: 100 %" in lines[-2]
+    assert "warping: 100 %" in lines[-1]
+
+
+def test_verbose_prints_at_most_a_line_a_second(capsys, monkeypatch):
+    clock = iter(np.arange(0, 100, 0.3))
+    monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
+    with Progress(DenseSynchronizer(), verbose=1) as progress:
+        step = progress.stage("stage", 10)
+        for _ in range(10):
+            step()
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split("%")[0].split(":")[1].strip() for line in lines] == ["40", "80", "100"]
+
+
+def test_callbacks_of_scikit_learn_see_every_portion(walks):
+    pytest.importorskip("sklearn.callback", reason="callbacks came with scikit-learn 1.9")
+
+    class Recorder:
+        def __init__(self):
+            self.open, self.seen = [], []
+
+        def setup(self, estimator, context):
+            self.seen.append("setup")
+
+        def on_fit_task_begin(self, estimator, context):
+            self.open.append(context.task_name)
+
+        def on_fit_task_end(self, estimator, context):
+            assert self.open.pop() == context.task_name
+            self.seen.append(context.task_name)
+
+        def teardown(self, estimator, context):
+            self.seen.append("teardown")
+
+    recorder = Recorder()
+    sync = DenseSynchronizer().set_callbacks(recorder).fit(walks)
+    assert recorder.seen[0] == "setup"
+    assert recorder.seen[-2:] == ["fit", "teardown"]
+    assert "comparing 300 with 32 performances" in recorder.seen
+    assert recorder.seen.count("portion") >= 3
+    assert recorder.open == []
+    seen = len(recorder.seen)
+    sync.transform(walks[:2])
+    assert len(recorder.seen) == seen
+
+
+# -- interruption -----------------------------------------------------------------------------
+
+
+def test_an_interrupted_fit_leaves_no_half_fitted_estimator(walks, monkeypatch):
+    sync = DenseSynchronizer().fit(walks[:20])
+    calls = []
+
+    def interrupted(self, *args):
+        calls.append(1)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(RefinementTrial, "misfits", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        sync.fit(walks)
+    assert calls
+    with pytest.raises(NotFittedError):
+        check_is_fitted(sync)
+    monkeypatch.undo()
+    assert sync.fit(walks[:20]).n_frames_ > 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_ctrl_c_leaves_at_once(n_jobs):
+    """Hours of work, interrupted after a moment."""
+    # Whoever runs the tests in the background may have it ignored.
+    script = f"""
+        import signal
+        import numpy as np
+        from sklearn.exceptions import NotFittedError
+        from sklearn_motionsync import DenseSynchronizer
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        X = np.random.default_rng(0).standard_normal((3000, 200, 8))
+        sync = DenseSynchronizer(search="exhaustive", n_jobs={n_jobs})
+        try:
+            print("begin", flush=True)
+            sync.fit(X)
+        except KeyboardInterrupt:
+            try:
+                sync.transform(X[:1])
+            except NotFittedError:
+                print("unfitted", flush=True)
+    """
+    root = Path(sklearn_motionsync.__file__).parents[1]
+    process = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(script)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(root)},
+    )
+    try:
+        assert process.stdout.readline() == "begin\n"
+        time.sleep(1.5)
+        process.send_signal(signal.SIGINT)
+        interrupted = time.perf_counter()
+        assert process.stdout.readline() == "unfitted\n"
+        assert process.wait(timeout=10) == 0
+        assert time.perf_counter() - interrupted < 5
+    finally:
+        process.kill()
+        process.stdout.close()
+        process.wait()

@@ -1,0 +1,153 @@
+"""Pipelines that begin with a union of views: what goes along with performances, and figures."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from sklearn import clone, config_context
+from sklearn.pipeline import make_pipeline, make_union
+from sklearn_motionsync import (
+    ActionDetector,
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    JointPositions,
+    KeyframeSynchronizer,
+    LinearSynchronizer,
+    Match,
+    find_departures,
+)
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import SkeletonDisplay, SynchronizationDisplay
+from sklearn_motionsync.metrics import SpreadScorer
+
+BUNCH = make_bending(7, n_frames=40, random_state=2)
+K = list(BUNCH.keyframes)
+COSINES = DirectionCosines(BUNCH.skeleton)
+POSITIONS = JointPositions(BUNCH.skeleton)
+
+
+@pytest.fixture(autouse=True)
+def no_figures():
+    yield
+    plt.close("all")
+
+
+def union_of(*views):
+    return make_union(*views).set_output(transform="pandas")
+
+
+BOTH = union_of(COSINES, POSITIONS)
+# The same union, as it may stand in a pipeline.
+UNIONS = {
+    "first": BOTH,
+    "nested": make_pipeline(BOTH),
+    "of pipelines": union_of(make_pipeline(COSINES), make_pipeline("passthrough", POSITIONS)),
+    "of unions": union_of(union_of(COSINES), POSITIONS),
+}
+
+
+@pytest.fixture(params=UNIONS)
+def union(request):
+    return clone(UNIONS[request.param])
+
+
+# -- what goes along with performances ------------------------------------------------------
+
+
+@pytest.mark.parametrize("routing", [False, True])
+def test_key_frames_go_past_a_union(union, routing):
+    sync = KeyframeSynchronizer(30)
+    pipe = make_pipeline(union, sync).fit(BUNCH.data, keyframesynchronizer__keyframes=K)
+    points = union.fit_transform(BUNCH.data)
+    expected = KeyframeSynchronizer(30).fit(points, keyframes=K).match(points, keyframes=K)
+    with config_context(enable_metadata_routing=routing):
+        match = Match.from_estimator(pipe, BUNCH.data, keyframes=K)
+        display = SynchronizationDisplay.from_estimator(pipe, BUNCH.data, keyframes=K)
+        score = SpreadScorer()(pipe, BUNCH.data, keyframes=K)
+    for times in (match.times, display.times):
+        np.testing.assert_array_equal(times, expected.times)
+    assert score == SpreadScorer()(pipe[-1], points, keyframes=K)
+
+
+def test_a_detector_of_a_union_with_key_frames(union):
+    steps = KeyframeSynchronizer(30), ActionModel()
+    detector = ActionDetector(make_pipeline(union, *steps))
+    detector.fit(BUNCH.data, keyframesynchronizer__keyframes=K)
+    plain = ActionDetector(make_pipeline(*steps))
+    points = union.fit_transform(BUNCH.data)
+    plain.fit(points, keyframesynchronizer__keyframes=K)
+    np.testing.assert_array_equal(
+        detector.score_samples(BUNCH.data, keyframes=K), plain.score_samples(points, keyframes=K)
+    )
+
+
+def test_what_nobody_takes_is_told_of_a_union(union):
+    pipe = make_pipeline(union, DenseSynchronizer(20)).fit(BUNCH.data)
+    with pytest.raises(TypeError, match=r"got 'keyframes', .* not taken by FeatureUnion\.tr"):
+        Match.from_estimator(pipe, BUNCH.data, keyframes=K)
+
+
+# -- figures --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("view", [POSITIONS, *UNIONS.values()])
+def test_people_of_any_view_fall_into_step(view):
+    """Their joints are drawn as they were recorded, so any view tells the skeleton."""
+    pipe = make_pipeline(view, LinearSynchronizer(20)).fit(BUNCH.data)
+    shown = SkeletonDisplay.from_estimator(pipe, BUNCH.data, performances=[1, 0])
+    plain = make_pipeline(COSINES, LinearSynchronizer(20)).fit(BUNCH.data)
+    expected = SkeletonDisplay.from_estimator(plain, BUNCH.data, performances=[1, 0])
+    for bodies, right in zip(shown.scenes, expected.scenes, strict=True):
+        for one, other in zip(bodies, right, strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("reduced", [False, True])
+def test_limbs_of_a_union_that_depart(union, reduced):
+    """A raised arm, among the cosines of a model that sees positions too."""
+    odd = BUNCH.data[0].reshape(-1, 15, 3).copy()
+    wrist, elbow, shoulder = (BUNCH.skeleton.index_of(f"left_{j}") for j in
+                              ("wrist", "elbow", "shoulder"))  # fmt: skip
+    odd[:, elbow] = odd[:, shoulder] + [0.0, 0.3, 0.0]
+    odd[:, wrist] = odd[:, elbow] + [0.0, 0.25, 0.0]
+    X = [BUNCH.data[0], odd.reshape(len(odd), -1)]
+    pipe, plain = (
+        make_pipeline(
+            view, ASpace(0.95) if reduced else "passthrough", LinearSynchronizer(20), ActionModel()
+        ).fit(BUNCH.data)
+        for view in (union, clone(COSINES))
+    )
+    good, bad = (SkeletonDisplay.from_departures(pipe, X, performance=i) for i in (0, 1))
+    assert "is accepted" in good.heading
+    assert not any(good.marked)
+    assert "not accepted" in bad.heading
+    arms = {(shoulder, elbow), (elbow, wrist)}
+    assert all(arms & set(bones) for bones in bad.marked)
+    # The figures are those of the body, not of whatever stands in the first columns.
+    expected = SkeletonDisplay.from_departures(plain, X, performance=1, frames=[3, 12])
+    shown = SkeletonDisplay.from_departures(pipe, X, performance=1, frames=[3, 12])
+    np.testing.assert_allclose(shown.scenes[1][0], expected.scenes[1][0], atol=1e-9)
+
+
+@pytest.mark.parametrize("reduced", [False, True])
+def test_departures_of_both_views_have_their_names(reduced):
+    steps = [ASpace(0.95)] if reduced else []
+    pipe = make_pipeline(clone(BOTH), *steps, LinearSynchronizer(20), ActionModel())
+    still = np.repeat(BUNCH.data[0][:1], 40, axis=0)
+    table = find_departures(pipe.fit(BUNCH.data), [still])
+    names = set(pipe[0].get_feature_names_out())
+    assert len(names) == 79
+    for view in ("directioncosines__", "jointpositions__"):
+        assert any(name.startswith(view) for name in set(table["feature"]) & names)
+
+
+def test_figures_that_a_union_cannot_give(union):
+    steps = LinearSynchronizer(20), ActionModel()
+    with pytest.raises(ValueError, match="need steps with inverse_transform before"):
+        SkeletonDisplay.from_model(make_pipeline(union, *steps).fit(BUNCH.data))
+    two = union_of(COSINES, DirectionCosines(BUNCH.skeleton, "world"))
+    for view in (POSITIONS, two):
+        pipe = make_pipeline(view, *steps).fit(BUNCH.data)
+        with pytest.raises(ValueError, match="Limbs that depart need a pipeline of DirectionCos"):
+            SkeletonDisplay.from_departures(pipe, BUNCH.data)
