@@ -1,77 +1,55 @@
-"""What every public estimator owes its users, whatever it computes."""
+"""The contract of every public estimator: input, output, errors, storage."""
 
+import io
 import pickle
 
+import joblib
 import numpy as np
 import pandas as pd
 import pytest
+import skops.io
 from sklearn import clone, config_context
-from sklearn.decomposition import PCA
 from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
 from sklearn.utils import estimator_checks
 from sklearn.utils.estimator_checks import parametrize_with_checks
 from sklearn_motionsync import (
     ActionClassifier,
-    ActionDetector,
     ActionModel,
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    FrameWise,
     JointPositions,
-    KeyframeSynchronizer,
     LinearSynchronizer,
-    MotionTracker,
-    OnlineSynchronizer,
-    PartSynchronizer,
     Skeleton,
-    TimingChannel,
     to_frame,
     to_sequences,
 )
 
+from estimators import (
+    BODY,
+    ESTIMATORS,
+    EVERY,
+    INSTANCES,
+    NAMES,
+    SEQUENCE_LEVEL,
+    SYNCHRONIZERS,
+    TRANSFORMERS,
+    WIDTH,
+    all_of,
+    by_name,
+    data_for,
+    make_performances,
+    outputs,
+    public_estimators,
+)
 from shift_synchronizer import ShiftSynchronizer
 
-N_JOINTS = 15
-WIDTH = 3 * N_JOINTS
-
-# Its interface is checked: what takes its time is that of DenseSynchronizer.
-PART = PartSynchronizer({"first": [0]}, n_frames=30, metric=None, consensus=1, refine=False)
-
-SYNCHRONIZERS = [
-    LinearSynchronizer(),
-    KeyframeSynchronizer(),
-    DenseSynchronizer(),
-    PART,
-    ShiftSynchronizer(),
-]
-
-
-class InTurns(ActionClassifier):
-    """Two classes in turn, where the tests of collections give no labels."""
-
-    def fit(self, X, y=None):
-        if y is None:
-            n = X.index.levshape[0] if isinstance(X, pd.DataFrame) else len(list(X))
-            y = np.arange(n) % 2
-        return super().fit(X, y)
-
-
-# Within others a synchronizer that learns and tries nothing: it has the same interface.
-QUICK = DenseSynchronizer(metric=None, refine=False)
-DETECTOR = ActionDetector(make_pipeline(QUICK, ActionModel()))
-CLASSIFIER = InTurns(n_frames=8)
-CHANNELS = [TimingChannel(LinearSynchronizer()), TimingChannel(QUICK, "log_rate")]
-ONLINE = OnlineSynchronizer(LinearSynchronizer())
-TRACKER = MotionTracker(LinearSynchronizer(), n_particles=10, random_state=0)
-LIVE = [ONLINE, TRACKER]
-ROW_ESTIMATORS = [ASpace(), *SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR, *LIVE]
-BODY_ESTIMATORS = [DirectionCosines(Skeleton.paper()), JointPositions(Skeleton.paper())]
-# Those of other transformers are in tests/test_framewise.py.
-FRAMEWISE = FrameWise(PCA(2))
-ESTIMATORS = [*BODY_ESTIMATORS, *ROW_ESTIMATORS, FRAMEWISE, CLASSIFIER]
-TRANSFORMERS = [e for e in ESTIMATORS if hasattr(e, "transform")]
+# One cost: the interface is that of all three, which take three times as long.
+WITH_ONE_COST = ActionClassifier(costs=["posture"], n_frames=4)
+# FrameWise is as wide as its transformer: tests/transformers/test_framewise.py checks several.
+OTHERWISE = [*BODY, *all_of("FrameWise", "ActionClassifier")]
+ROW_ESTIMATORS = [e for e in ESTIMATORS if e not in OTHERWISE] + [WITH_ONE_COST]
 
 EXTRA_CHECKS = [
     "check_dataframe_column_names_consistency",
@@ -86,15 +64,12 @@ EXTRA_CHECKS = [
 ]
 
 
-def by_name(value):
-    return type(value).__name__ if hasattr(value, "get_params") else None
+def test_every_public_estimator_is_in_the_contract():
+    missing = public_estimators() - set(INSTANCES)
+    assert not missing, f"give each an instance in INSTANCES of tests/estimators.py: {missing}"
 
 
-# One cost: what is checked is the interface, and all three take three times as long.
-WITH_ONE_COST = ActionClassifier(costs=["posture"], n_frames=4)
-
-
-@parametrize_with_checks([*ROW_ESTIMATORS, WITH_ONE_COST])
+@parametrize_with_checks(ROW_ESTIMATORS)
 def test_scikit_learn_checks(estimator, check):
     check(estimator)
 
@@ -106,7 +81,7 @@ def test_scikit_learn_checks(estimator, check):
     ("estimator", "name"),
     [
         (estimator, name)
-        for estimator in (*ROW_ESTIMATORS, WITH_ONE_COST)
+        for estimator in ROW_ESTIMATORS
         for name in EXTRA_CHECKS
         if hasattr(estimator, "transform") or "transform" not in name
     ],
@@ -125,14 +100,6 @@ def performances():
     return make_performances(6)
 
 
-def make_performances(n, n_frames=30):
-    rng = np.random.RandomState(0)
-    t = np.linspace(0, 1, n_frames)[:, np.newaxis]
-    base = rng.uniform(-1, 1, (1, WIDTH)) + np.sin(2 * t + rng.uniform(0, 6, (1, WIDTH)))
-    return [base + 0.1 * rng.standard_normal(base.shape) for _ in range(n)]
-
-
-NAMES = Skeleton.paper().column_names
 KINDS = {
     "list": list,
     "tuple": tuple,
@@ -159,29 +126,6 @@ def read_only(x):
     return x
 
 
-def outputs(estimator, X):
-    """Everything a fitted estimator says of performances, as a list of plain arrays."""
-    answers = []
-    if hasattr(estimator, "transform"):
-        answers += [np.asarray(x) for x in estimator.transform(X)]
-    if hasattr(estimator, "match"):
-        answers += list(estimator.match(X))
-    if hasattr(estimator, "follow"):
-        answers += list(zip(*estimator.follow(X), strict=True))
-    if hasattr(estimator, "track"):
-        # It takes gaps and single frames, too, which performances have not.
-        tracks = estimator.track([x[::4] for x in estimator.check_performances(X)])
-        answers += [np.stack([track.postures for track in tracks])]
-    if hasattr(estimator, "score_samples"):
-        answers += [estimator.score_samples(X), estimator.decision_function(X)]
-        answers += [estimator.predict(X)]
-    if hasattr(estimator, "predict_proba"):
-        answers += [estimator.predict_proba(X), estimator.novelty_scores(X), estimator.predict(X)]
-    elif hasattr(estimator, "score"):
-        answers += [np.array(estimator.score(X))]
-    return answers
-
-
 def assert_same(answers, expected):
     assert len(answers) == len(expected)
     for a, b in zip(answers, expected, strict=True):
@@ -203,7 +147,7 @@ def fit_once(performances):
 
 @pytest.fixture(scope="module")
 def expected_of(fit_once, performances):
-    """Everything that each estimator says of the performances that it was fitted on."""
+    """All results of each estimator for the performances that it was fitted on."""
     known = {}
 
     def expected(estimator):
@@ -228,12 +172,11 @@ def test_every_kind_of_collection_gives_equal_results(estimator, kind, performan
         assert list(fitted.feature_names_in_) == NAMES
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_input_is_never_written_to(estimator, performances):
-    given = [x.copy() for x in performances]
-    fitted = clone(estimator).fit(given)
-    outputs(fitted, given)
-    for x, y in zip(given, performances, strict=True):
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_input_is_never_written_to(estimator):
+    X, expected = data_for(estimator), data_for(estimator)
+    outputs(clone(estimator).fit(X), X)
+    for x, y in zip(X, expected, strict=True):
         np.testing.assert_array_equal(x, y)
 
 
@@ -244,20 +187,52 @@ def test_output_is_not_a_view_of_the_input(estimator, performances, fit_once):
             assert not any(np.shares_memory(out, x) for x in performances)
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_answers_leave_the_estimator_as_it_was(estimator, performances, fit_once):
-    fitted = fit_once(estimator)
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_methods_do_not_change_a_fitted_estimator(estimator):
+    X = data_for(estimator)
+    fitted = clone(estimator).fit(X)
     before = pickle.dumps(fitted.__dict__)
-    outputs(fitted, performances[:3])
+    outputs(fitted, X)
     assert pickle.dumps(fitted.__dict__) == before
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_pickle_clone_and_refit(estimator, performances, fit_once, expected_of):
-    fitted, expected = fit_once(estimator), expected_of(estimator)
-    assert_same(outputs(pickle.loads(pickle.dumps(fitted)), performances), expected)
-    fitted = clone(fitted).fit(performances[::-1])
-    assert_same(outputs(fitted.fit(performances), performances), expected)
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_a_clone_and_a_refit_give_equal_results(estimator):
+    X = data_for(estimator)
+    fitted = clone(estimator).fit(X)
+    expected = outputs(fitted, X)
+    fitted = clone(fitted).fit(X[::-1])
+    assert_same(outputs(fitted.fit(X), X), expected)
+
+
+def through_joblib(estimator):
+    file = io.BytesIO()
+    joblib.dump(estimator, file)
+    file.seek(0)
+    return joblib.load(file)
+
+
+def through_skops(estimator):
+    data = skops.io.dumps(estimator)
+    types = skops.io.get_untrusted_types(data=data)
+    ours = ("sklearn_motionsync.", "estimators.", "shift_synchronizer.", "sklearn.", "collections.")
+    assert all(name.startswith(ours) for name in types)
+    return skops.io.loads(data, trusted=types)
+
+
+STORAGE = {
+    "pickle": lambda estimator: pickle.loads(pickle.dumps(estimator)),
+    "joblib": through_joblib,
+    "skops": through_skops,
+}
+
+
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+@pytest.mark.parametrize("storage", STORAGE)
+def test_a_stored_estimator_gives_equal_results(estimator, storage):
+    X = data_for(estimator)
+    fitted = clone(estimator).fit(X)
+    assert_same(outputs(STORAGE[storage](fitted), X), outputs(fitted, X))
 
 
 @pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
@@ -268,7 +243,7 @@ def test_fit_transform_is_fit_then_transform(estimator, performances, fit_once):
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
 def test_subsets_and_order_do_not_matter(estimator, performances, fit_once, expected_of):
-    """What is said of a performance depends on no other performance."""
+    """The results of a performance depend on no other performance."""
     fitted, whole = fit_once(estimator), expected_of(estimator)
     last = outputs(fitted, performances[-1:])
     backwards = outputs(fitted, performances[::-1])
@@ -303,7 +278,7 @@ def test_posture_level_gives_the_kind_back(estimator, performances, fit_once):
         for estimator in ESTIMATORS
         for given in ("float32", "float64", "float16", "int32", "bool")
         # Coordinates that are 0 or 1 make limbs without length.
-        if not (given == "bool" and estimator in BODY_ESTIMATORS)
+        if not (given == "bool" and estimator in BODY)
     ],
     ids=by_name,
 )
@@ -390,7 +365,7 @@ def test_pandas_output_keeps_the_labels(performances):
     assert list(out.loc["b"].index) == list(range(20))
 
 
-@pytest.mark.parametrize("estimator", BODY_ESTIMATORS, ids=by_name)
+@pytest.mark.parametrize("estimator", BODY, ids=by_name)
 def test_pandas_through_a_pipeline(estimator, performances):
     pipe = make_pipeline(clone(estimator), ASpace(), DenseSynchronizer(), ActionModel())
     plain = clone(pipe).fit(performances).score_samples(performances)
@@ -497,13 +472,10 @@ def test_names_must_be_those_of_fit(estimator, performances):
         outputs(fitted, [x[NAMES[::-1]] for x in frames])
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_unfitted(estimator, performances):
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_methods_refuse_an_unfitted_estimator(estimator):
     with pytest.raises(NotFittedError):
-        outputs(clone(estimator), performances)
-
-
-SEQUENCE_LEVEL = [*SYNCHRONIZERS, *CHANNELS, ActionModel(), DETECTOR, CLASSIFIER, *LIVE]
+        outputs(clone(estimator), data_for(estimator))
 
 
 @pytest.mark.parametrize("estimator", SEQUENCE_LEVEL, ids=by_name)
@@ -562,7 +534,7 @@ def test_bodies_on_rows(kind, reference, width, performances):
         estimator.transform(X[:, :-1])
 
 
-@pytest.mark.parametrize("estimator", BODY_ESTIMATORS, ids=by_name)
+@pytest.mark.parametrize("estimator", BODY, ids=by_name)
 @pytest.mark.parametrize(
     "params", [{"reference": "sideways"}, {"reference": None}, {"skeleton": "acclaim"}]
 )

@@ -34,7 +34,8 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.display import SkeletonDisplay
 
-from test_contract import EXTRA_CHECKS, by_name
+from estimators import by_name
+from test_contract import EXTRA_CHECKS
 
 CHECKED = [
     FrameWise(transformer)

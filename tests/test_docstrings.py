@@ -1,0 +1,80 @@
+"""Docstrings of public objects: every parameter, with the default of the signature."""
+
+import inspect
+import re
+
+import pytest
+import sklearn_motionsync
+from sklearn_motionsync import datasets, display, io, metrics
+
+ROOMS = (sklearn_motionsync, datasets, display, io, metrics)
+OBJECTS = {
+    name: getattr(room, name)
+    for room in ROOMS
+    for name in room.__all__
+    if not inspect.ismodule(getattr(room, name))
+}
+# Given to every estimator by scikit-learn.
+INHERITED = re.compile("_|set_|get_params$|get_metadata_routing$")
+
+
+def callables():
+    """Public functions, classes and methods of our own, by their dotted names."""
+    for name, each in OBJECTS.items():
+        yield name, each
+        if inspect.isclass(each):
+            for method in dir(each):
+                found = getattr(each, method)
+                own = str(getattr(found, "__module__", "")).startswith("sklearn_motionsync")
+                if inspect.isroutine(found) and own and not INHERITED.match(method):
+                    yield f"{name}.{method}", found
+
+
+CALLABLES = dict(callables())
+
+
+def described(docstring):
+    """The parameters of a docstring, and what stands behind the colon of each."""
+    section = re.search(r"^Parameters\n-+\n(.*?)(\n\n\w[\w ]*\n-+\n|\Z)", docstring, re.S | re.M)
+    found = re.findall(
+        r"^(\**\w[\w, *]*) : ((?:.|\n(?= {8}))*)", section[1] if section else "", re.M
+    )
+    return {
+        name.strip("* "): " ".join(kind.split())
+        for names, kind in found
+        for name in names.split(",")
+    }
+
+
+def parameters(each):
+    known = inspect.signature(each).parameters.values()
+    return {p.name: p for p in known if p.name not in ("self", "cls")}
+
+
+@pytest.mark.parametrize("name", CALLABLES)
+def test_every_parameter_is_documented(name):
+    each = CALLABLES[name]
+    docstring = inspect.getdoc(each) or ""
+    assert docstring, f"{name} has no docstring"
+    if inspect.isclass(each) and issubclass(each, tuple):
+        return  # a result: its fields are attributes
+    assert list(described(docstring)) == list(parameters(each))
+
+
+@pytest.mark.parametrize("name", CALLABLES)
+def test_defaults_are_those_of_the_signature(name):
+    each = CALLABLES[name]
+    said = described(inspect.getdoc(each) or "")
+    for key, parameter in parameters(each).items():
+        default = re.search(r"default=(.+)$", said.get(key, ""))
+        if parameter.default is parameter.empty or parameter.kind is parameter.VAR_KEYWORD:
+            assert default is None, f"{name}: {key} has no default, the docstring says {default[1]}"
+        elif said.get(key, "").strip() not in ("ignored", "Ignored"):
+            assert default, f"{name}: the docstring of {key} says no default={parameter.default!r}"
+            value = default[1].strip("`").rstrip(".")
+            assert value.replace("'", '"') == repr(parameter.default).replace("'", '"'), name
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_every_public_object_has_an_example(name):
+    assert ">>> " in inspect.getdoc(OBJECTS[name])
