@@ -47,6 +47,10 @@ autosummary_generate = True
 autosummary_imported_members = True
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
+# With -W a public object without these is an error: parameters (PR) and returns (RT) described.
+numpydoc_validation_checks = {"GL08", "PR01", "PR02", "PR03", "PR07", "PR10", "RT03"}
+# Methods of scikit-learn.
+numpydoc_validation_exclude = {r"\.set_\w+$", r"\.get_(params|metadata_routing)$"}
 numpydoc_xref_param_type = True
 numpydoc_xref_ignore = "all"
 numpydoc_xref_aliases = {
@@ -60,7 +64,7 @@ toc_object_entries_show_parents = "hide"
 
 def _classes():
     """Every public class by its full name."""
-    for module in (sklearn_motionsync, sklearn_motionsync.metrics):
+    for module in (sklearn_motionsync, sklearn_motionsync.display, sklearn_motionsync.metrics):
         for name in module.__all__:
             if inspect.isclass(getattr(module, name)):
                 yield f"{module.__name__}.{name}", getattr(module, name)
