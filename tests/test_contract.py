@@ -87,7 +87,7 @@ def test_scikit_learn_checks(estimator, check):
     ],
     ids=by_name,
 )
-def test_scikit_learn_checks_outside_the_list(estimator, name):
+def test_scikit_learn_checks_that_are_not_in_the_automatic_list(estimator, name):
     getattr(estimator_checks, name)(type(estimator).__name__, clone(estimator))
 
 
@@ -257,7 +257,7 @@ def test_subsets_and_order_do_not_matter(estimator, performances, fit_once, expe
 
 
 @pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
-def test_posture_level_gives_the_kind_back(estimator, performances, fit_once):
+def test_transform_returns_the_kind_of_its_input(estimator, performances, fit_once):
     fitted = fit_once(estimator)
     out = fitted.transform(np.stack(performances))
     assert isinstance(out, np.ndarray)
@@ -282,7 +282,7 @@ def test_posture_level_gives_the_kind_back(estimator, performances, fit_once):
     ],
     ids=by_name,
 )
-def test_dtype(estimator, given, performances):
+def test_float32_is_kept_and_other_types_become_float64(estimator, given, performances):
     used = "float32" if given == "float32" else "float64"
     X = [x > 0 if given == "bool" else (100 * x).astype(given) for x in performances]
     fitted = clone(estimator).fit(X)
@@ -300,7 +300,7 @@ def test_dtype(estimator, given, performances):
 
 @pytest.mark.parametrize("estimator", SYNCHRONIZERS, ids=by_name)
 @pytest.mark.parametrize("pattern", ["median", 0, 3])
-def test_the_pattern_matches_itself(estimator, pattern, performances, request):
+def test_pattern_matches_itself_by_the_identity(estimator, pattern, performances, request):
     """Frame by frame: synthetic ones, those that never move, and people."""
     still = [np.full((12, 2), k) for k in range(5)]
     people = request.getfixturevalue("bends").data[::3] if pattern == "median" else []
@@ -344,7 +344,7 @@ def test_pandas_output_keeps_what_levels_are_called(performances):
         assert pandas.fit_transform(frames).index.names == ["trial", last]
 
 
-def test_the_way_back_takes_its_own_output(performances):
+def test_inverse_transform_takes_pandas_output(performances):
     """Warnings are errors here."""
     for estimator in (ASpace(2), DirectionCosines(Skeleton.paper())):
         fitted = clone(estimator).fit(performances)
@@ -421,7 +421,7 @@ BAD = {
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
 @pytest.mark.parametrize("fault", BAD)
 @pytest.mark.parametrize("when", ["fit", "after"])
-def test_a_bad_performance_is_named(estimator, fault, when, performances, fit_once):
+def test_bad_performance_is_refused_by_its_index(estimator, fault, when, performances, fit_once):
     change, message = BAD[fault]
     bad = with_bad(performances, 4, change)
     if when == "fit":
@@ -452,20 +452,20 @@ def test_a_bad_performance_is_named(estimator, fault, when, performances, fit_on
     ],
     ids=lambda value: value if isinstance(value, str) else type(value).__name__,
 )
-def test_what_is_no_collection_is_refused(estimator, X, message):
+def test_other_kinds_of_input_are_refused(estimator, X, message):
     with pytest.raises(ValueError, match=message):
         clone(estimator).fit(X)
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_width_must_be_that_of_fit(estimator, performances, fit_once):
+def test_wrong_width_is_refused(estimator, performances, fit_once):
     fitted = fit_once(estimator)
     with pytest.raises(ValueError, match=r"Performance 0 has 42 features a frame.*expecting 45"):
         outputs(fitted, [x[:, 3:] for x in performances])
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_names_must_be_those_of_fit(estimator, performances):
+def test_other_feature_names_are_refused(estimator, performances):
     frames = KINDS["frames"](performances)
     fitted = clone(estimator).fit(frames)
     with pytest.raises(ValueError, match="feature names should match"):
@@ -509,7 +509,7 @@ def test_rows_are_univariate_sequences(estimator, performances):
         *((JointPositions, reference, 42) for reference in ("heading", "world")),
     ],
 )
-def test_bodies_on_rows(kind, reference, width, performances):
+def test_body_estimators_follow_scikit_learn_on_rows(kind, reference, width, performances):
     X = performances[0]
     estimator = kind(Skeleton.paper(), reference)
     params = estimator.get_params()
@@ -538,12 +538,12 @@ def test_bodies_on_rows(kind, reference, width, performances):
 @pytest.mark.parametrize(
     "params", [{"reference": "sideways"}, {"reference": None}, {"skeleton": "acclaim"}]
 )
-def test_parameters_of_bodies_are_validated(estimator, params, performances):
+def test_body_estimators_validate_parameters(estimator, params, performances):
     estimator = clone(estimator).set_params(**params)
     with pytest.raises(ValueError, match=f"The '{next(iter(params))}' parameter"):
         estimator.fit(performances)
 
 
-def test_positions_know_no_parent_limbs(performances):
+def test_joint_positions_refuse_the_parent_reference(performances):
     with pytest.raises(ValueError, match=r"The 'reference' parameter"):
         JointPositions(Skeleton.paper(), "parent").fit(performances)

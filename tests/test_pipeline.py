@@ -82,7 +82,7 @@ def test_grid_search(people):
     assert search.predict(people.data[:3]).shape == (3,)
 
 
-def test_dense_beats_linear_on_actors_not_seen(bends):
+def test_dense_beats_linear_on_held_out_actors(bends):
     """Synchronised performances of new people are more probable under the model."""
 
     def score(synchronizer):
@@ -93,7 +93,7 @@ def test_dense_beats_linear_on_actors_not_seen(bends):
     assert score(DenseSynchronizer(60)) > score(LinearSynchronizer(60))
 
 
-def test_a_model_tells_another_action(bends, real_data):
+def test_model_scores_another_action_lower(bends, real_data):
     from sklearn_motionsync.datasets import load_performances
 
     bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
@@ -155,7 +155,7 @@ def said_of(pipe, X):
 
 
 @pytest.mark.parametrize("name", NESTINGS)
-def test_a_synchronizer_is_found_at_any_depth(name, few, flat, no_figures):
+def test_synchronizer_is_found_in_nested_pipelines(name, few, flat, no_figures):
     pipe = flat[0]
     if name != "flat":
         pipe = nestings(few.skeleton, DenseSynchronizer(40))[name].fit(few.data)
@@ -169,7 +169,7 @@ def test_a_synchronizer_is_found_at_any_depth(name, few, flat, no_figures):
     assert len(SkeletonDisplay.from_model(pipe, n_samples=2).axes_) == 4
 
 
-def test_what_is_not_in_nested_pipelines(few):
+def test_absent_step_of_a_nested_pipeline_is_refused(few):
     pipe = make_pipeline(make_pipeline(DirectionCosines(few.skeleton), ASpace(4)), ActionModel())
     message = r"no synchronizer in Pipeline; its steps are \['DirectionCosines', 'ASpace', 'Action"
     with pytest.raises(ValueError, match=message):
@@ -206,7 +206,7 @@ OF_PIPELINES = {
 
 @pytest.mark.parametrize("nested", [False, True])
 @pytest.mark.parametrize("routing", [False, True])
-def test_key_frames_are_shown_and_scored(nested, routing, few, no_figures):
+def test_displays_and_scorers_take_key_frames(nested, routing, few, no_figures):
     pipe, K = make_marked(few, nested=nested), list(few.keyframes)
     points = make_pipeline(DirectionCosines(few.skeleton), ASpace(4)).fit_transform(few.data)
     sync = KeyframeSynchronizer(40).fit(points, keyframes=K)
@@ -226,7 +226,7 @@ def test_key_frames_are_shown_and_scored(nested, routing, few, no_figures):
 
 @pytest.mark.parametrize("nested", [False, True])
 @pytest.mark.parametrize("name", OF_PIPELINES)
-def test_everybody_says_how_to_give_key_frames(name, nested, few):
+def test_every_caller_says_how_to_give_key_frames(name, nested, few):
     call = OF_PIPELINES[name]
     caller = name if name.endswith("()") else f"{name}.from_estimator"
     with pytest.raises(ValueError, match="fitted with key-frames") as error:
@@ -235,7 +235,7 @@ def test_everybody_says_how_to_give_key_frames(name, nested, few):
 
 
 @pytest.mark.parametrize("name", [*OF_PIPELINES, "TrellisDisplay"])
-def test_what_nobody_takes(name, few):
+def test_unknown_parameter_is_refused(name, few):
     call = {**OF_PIPELINES, "TrellisDisplay": TrellisDisplay.from_estimator}[name]
     pipe = make_pipe(few.skeleton).fit(few.data)
     with pytest.raises(TypeError, match=f"{name}.* got 'keyframes', .*DenseSynchronizer"):
@@ -244,18 +244,18 @@ def test_what_nobody_takes(name, few):
         call(pipe, few.data, feature="aspace0")
 
 
-def test_nothing_given_is_nothing_to_take(few):
+def test_none_is_accepted_for_any_parameter(few):
     pipe = make_pipe(few.skeleton).fit(few.data)
     score = SpreadScorer()(pipe, few.data, keyframes=None)
     assert score == SpreadScorer()(pipe, few.data)
 
 
-def test_a_model_alone_has_no_performances_to_go_with_key_frames(few):
+def test_model_without_a_synchronizer_refuses_key_frames(few):
     with pytest.raises(TypeError, match="keyframes along with performances X only"):
         ActionModelDisplay.from_estimator(make_marked(few, nested=False), keyframes=few.keyframes)
 
 
-def test_key_frames_for_a_step_before_the_synchronizer(few, no_figures):
+def test_key_frames_reach_a_step_before_the_synchronizer(few, no_figures):
     """Dense matching of what coincides in its key-frames already."""
     K = few.keyframes
     points = make_pipeline(DirectionCosines(few.skeleton), ASpace(4)).fit_transform(few.data)
@@ -299,7 +299,7 @@ def assert_figures(folder):
         (["--output", str(EXAMPLE)], "--output must be a folder"),
     ],
 )
-def test_what_the_example_cannot_do_it_says_in_a_line(monkeypatch, capsys, arguments, message):
+def test_example_reports_bad_arguments_in_one_line(monkeypatch, capsys, arguments, message):
     monkeypatch.setattr(sys, "argv", [str(EXAMPLE), *arguments])
     with pytest.raises(SystemExit) as end:
         runpy.run_path(str(EXAMPLE), run_name="__main__")
@@ -311,7 +311,7 @@ def test_what_the_example_cannot_do_it_says_in_a_line(monkeypatch, capsys, argum
     assert message in err
 
 
-def test_the_example_in_a_notebook_has_no_arguments(monkeypatch, capsys, tmp_path):
+def test_example_ignores_notebook_arguments(monkeypatch, capsys, tmp_path):
     """Those of the kernel are not for it."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["ipykernel_launcher.py", "-f", "kernel.json"])
@@ -346,7 +346,7 @@ def test_example_on_real_people(monkeypatch, capsys, tmp_path, real_data):
     assert_figures(tmp_path)
 
 
-def test_example_says_which_actions_there_are(monkeypatch, capsys, real_data):
+def test_example_lists_the_known_actions(monkeypatch, capsys, real_data):
     path = real_data / "hdm05" / "hdm05_positions.npz"
     with pytest.raises(SystemExit, match="depositFloorR"):
         run_example(monkeypatch, capsys, "--data", path)

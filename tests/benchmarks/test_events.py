@@ -35,7 +35,7 @@ def ramp(at):
         (ramp(0.3) - ramp(0.7), "fall", 0.7),
     ],
 )
-def test_a_moment_is_found_between_frames(curve, kind, at):
+def test_event_time_is_interpolated_between_frames(curve, kind, at):
     assert events.moment(curve, kind) == pytest.approx(at, abs=0.004)
 
 
@@ -53,11 +53,11 @@ def test_a_moment_is_found_between_frames(curve, kind, at):
         (1 - T, "rise"),  # never
     ],
 )
-def test_an_ambiguous_moment_is_refused(curve, kind):
+def test_ambiguous_event_is_refused(curve, kind):
     assert np.isnan(events.moment(curve, kind))
 
 
-def test_turning_points_are_all_of_them_or_none():
+def test_turning_points_are_complete_or_missing():
     wave = np.sin(2 * np.pi * 1.5 * T) + 0.05 * np.sin(2 * np.pi * 20 * T)
     found = events.turning_points(wave, "max min max")
     np.testing.assert_allclose(found, [1 / 6, 1 / 2, 5 / 6], atol=0.03)
@@ -65,13 +65,13 @@ def test_turning_points_are_all_of_them_or_none():
         assert np.isnan(events.turning_points(wave, other)).all()
 
 
-def test_clips_that_hardly_show_the_event_are_left_out():
+def test_clips_with_a_weak_event_are_left_out():
     event = events.Event("", "", "", "", "max")
     found = events.find([bump(0.3), bump(0.5), 0.2 * bump(0.7)], event, smoothing=0.01)
     np.testing.assert_allclose(found, [29.7, 49.5, np.nan], atol=0.1)
 
 
-def test_a_step_is_measured_along_where_the_hips_face():
+def test_step_length_is_measured_along_the_heading():
     # Who faces +x has the left hip at -z; the same body turned to -z has it at -x.
     ahead = np.array([[0.3, 0, 0], [-0.2, 0.5, 0.4]])
     turn = np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]])
@@ -104,7 +104,7 @@ CLIPS = {
 }
 
 
-def test_as_many_real_clips_show_the_events_as_were_measured(real_data):
+def test_number_of_real_events_is_the_documented_one(real_data):
     found = {}
     for action in events.read_actions(real_data):
         assert len(action.actors) == len(action.data)

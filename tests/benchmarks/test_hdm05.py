@@ -19,7 +19,7 @@ def make(hdm05, monkeypatch, *args):
     hdm05.main()
 
 
-def test_clips_are_those_of_the_archive(hdm05, real_data, tmp_path, monkeypatch, capsys):
+def test_converted_clips_equal_the_archive(hdm05, real_data, tmp_path, monkeypatch, capsys):
     output = tmp_path / "new" / "hdm05_positions.npz"
     make(hdm05, monkeypatch, real_data / "original_files", output)
     assert "3 clips, " in capsys.readouterr().out
@@ -46,7 +46,7 @@ def test_clips_are_those_of_the_archive(hdm05, real_data, tmp_path, monkeypatch,
     assert len(load_performances(output).data) == 3
 
 
-def test_every_clip_of_the_archive_would_be_taken(hdm05, real_data, tmp_path):
+def test_every_archived_clip_is_selected(hdm05, real_data, tmp_path):
     """And in its order."""
     with np.load(real_data / "hdm05" / "hdm05_positions.npz") as file:
         sources = file["source"].tolist()
@@ -60,7 +60,7 @@ def test_every_clip_of_the_archive_would_be_taken(hdm05, real_data, tmp_path):
     assert [path.name for path, _ in hdm05.find_clips(tmp_path)] == sources
 
 
-def test_what_is_not_there(hdm05, tmp_path, monkeypatch):
+def test_missing_files_are_refused(hdm05, tmp_path, monkeypatch):
     with pytest.raises(
         SystemExit, match=re.escape(f"below {tmp_path}; download them as docs/bench")
     ):

@@ -26,7 +26,7 @@ def known(peers):
     return peers.Known(mean, mean, 199.0)
 
 
-def test_a_warp_read_the_other_way_round_is_in_the_middle_of_where_it_stays(people):
+def test_inverse_of_a_warp_takes_the_middle_of_a_pause(people):
     times = np.array([0, 0, 1, 3, 3, 3, 4, 6, 7, 7.0])
     found = people.phase_of(times, np.array([0, 0.5, 2, 3, 5, 7]))
     np.testing.assert_allclose(found, [0.5, 1.5, 2.5, 4, 6.5, 8.5])
@@ -34,13 +34,13 @@ def test_a_warp_read_the_other_way_round_is_in_the_middle_of_where_it_stays(peop
     np.testing.assert_allclose(people.truth_of(linear, 199), np.arange(199) / 2)
 
 
-def test_ticks_are_frames_of_the_pattern_at_the_mean_pace(known):
+def test_ticks_are_pattern_frames_at_the_mean_pace(known):
     np.testing.assert_allclose(known.ticks(curve(np.arange(199) / 2)), known.mean, atol=1e-12)
     # Between two ticks the phase goes on; and it stays within the clock.
     np.testing.assert_allclose(known.at_frames([0, 3, 99], 7), [0, 0.5, 3, 3.5, 99, 99, 99])
 
 
-def test_every_follower_finds_a_clip_that_is_the_mean(peers, known):
+def test_every_method_tracks_the_mean_clip(peers, known):
     clip = curve(np.arange(199) / 2)
     for name, follow in peers.PEERS.items():
         phases = follow(known, clip)
@@ -50,7 +50,7 @@ def test_every_follower_finds_a_clip_that_is_the_mean(peers, known):
         assert np.median(late) < (4 if "central" in name else 1), name
 
 
-def test_followers_see_nothing_of_what_is_to_come(peers, known):
+def test_methods_are_causal(peers, known):
     clip = curve(np.linspace(0, 99, 150))
     for name in set(peers.PEERS) - {"linear, duration known"}:
         whole = peers.PEERS[name](known, clip)
@@ -59,7 +59,7 @@ def test_followers_see_nothing_of_what_is_to_come(peers, known):
             np.testing.assert_array_equal(part, whole[:n_frames], err_msg=name)
 
 
-def test_rows_end_where_the_cheapest_of_all_paths_ends(peers, monkeypatch):
+def test_trellis_rows_end_at_the_cheapest_path(peers, monkeypatch):
     monkeypatch.setattr(peers, "SUBFRAMES", 1)
     monkeypatch.setattr(peers, "MAX_RATE", 2)
     rng = np.random.default_rng(0)
@@ -89,7 +89,7 @@ def path_costs(costs):
     return total
 
 
-def test_open_end_dtw_is_the_best_cell_of_each_row(peers, known):
+def test_open_end_dtw_equals_the_row_minimum(peers, known):
     clip = curve(np.linspace(0, 90, 170)) + 0.05 * np.random.default_rng(0).standard_normal(
         (170, 3)
     )
@@ -101,7 +101,7 @@ def test_open_end_dtw_is_the_best_cell_of_each_row(peers, known):
     np.testing.assert_array_equal(found[:: round(known.tick)], expected)
 
 
-def test_dixon_with_a_window_of_everything_goes_on_both_ways(peers, known):
+def test_dixon_with_full_window_equals_dtw(peers, known):
     clip = curve(np.linspace(0, 99, 199))
     costs = cdist(known.ticks(clip), known.mean)
     warping = peers.Dixon(costs, window=len(costs), max_run=3)

@@ -26,7 +26,7 @@ def model(benchmark):
 
 @pytest.fixture(scope="module")
 def clips(negatives):
-    """Nine bends of three people, who each do three of them the other way round as well."""
+    """Nine bends of three people, three each, and the same backwards."""
     clips = negatives.as_clips("few", make_bending(9, n_actors=3, n_frames=40, random_state=0))
     postures = clips.postures + [x[::-1] for x in clips.postures]
     return negatives.Clips(
@@ -48,13 +48,13 @@ X = np.array([[0.0, 1], [2, 3], [4, 5], [6, 7], [13, 14]])
         ("backwards", [[13, 14], [6, 7], [4, 5], [2, 3], [0, 1]]),
     ],
 )
-def test_right_performances_are_spoilt(negatives, kind, expected):
+def test_faults_are_put_into_correct_performances(negatives, kind, expected):
     given = X.copy()
     np.testing.assert_allclose(negatives.SPOILT[kind](given), expected)
     np.testing.assert_array_equal(given, X)
 
 
-def test_who_is_tried_had_no_part_in_what_is_learnt(negatives, clips):
+def test_tested_subjects_are_not_in_the_training_set(negatives, clips):
     assert clips.folds() == [(a, k) for a in ("bending", "rising") for k in clips.actors[:3]]
     held = clips.actors[0]
     fold = negatives.hold_out(clips, "bending", held)
@@ -66,7 +66,7 @@ def test_who_is_tried_had_no_part_in_what_is_learnt(negatives, clips):
     # The other action of the same person is in the same space, there the right one backwards.
     for right, wrong in zip(fold.raw["own"], fold.raw["other actions"], strict=True):
         np.testing.assert_allclose(wrong, right[::-1])
-    # Changing who is held out changes nothing that is learnt.
+    # Changing the held-out subjects changes nothing that is learnt.
     changed = [x + (clips.actors[i] == held) for i, x in enumerate(clips.postures)]
     changed = negatives.Clips(clips.name, changed, clips.actions, clips.actors)
     again = negatives.hold_out(changed, "bending", held)
@@ -74,13 +74,13 @@ def test_who_is_tried_had_no_part_in_what_is_learnt(negatives, clips):
     assert np.abs(again.raw["own"][0] - fold.raw["own"][0]).max() > 0.1
 
 
-def test_a_kind_that_nobody_shows_is_left_out(negatives):
+def test_absent_kind_of_fault_is_left_out(negatives):
     clips = negatives.as_clips("few", make_bending(4, n_actors=2, n_frames=30, random_state=0))
     fold = negatives.hold_out(clips, *clips.folds()[0])
     assert negatives.OTHERS not in fold.synchronised
 
 
-def test_a_few_training_performances_are_of_two_people_at_least(negatives, clips):
+def test_small_training_set_has_at_least_two_subjects(negatives, clips):
     rng = np.random.default_rng(0)
     held = clips.actors[0]
     for _ in range(10):
@@ -91,7 +91,7 @@ def test_a_few_training_performances_are_of_two_people_at_least(negatives, clips
     assert negatives.hold_out_few(clips, "bending", held, 7, rng) is None
 
 
-def test_the_border_of_others_is_that_of_a_new_value(judges):
+def test_prediction_limit_covers_a_new_value(judges):
     rng = np.random.default_rng(0)
     for n in (5, 20):
         values = np.exp(rng.standard_normal((2000, n + 1)))
@@ -99,13 +99,13 @@ def test_the_border_of_others_is_that_of_a_new_value(judges):
         assert np.mean(inside) == pytest.approx(judges.COVERAGE, abs=0.015)
 
 
-def test_unlikeness_is_0_of_the_same_1_of_who_stands_still_and_2_of_the_opposite(model):
+def test_dissimilarity_of_same_still_and_opposite_is_0_1_2(model):
     x = np.sin(np.linspace(0, 7, 50))[:, np.newaxis]
     for y, expected in ((x + 3, 0), (0 * x, 1), (-x, 2)):
         assert model.unlikeness(x, y) == pytest.approx(expected, abs=1e-12)
 
 
-def test_figures_are_means_over_actions(model):
+def test_summary_figures_are_means_over_actions(model):
     actions = {
         "a": {"own": np.array([1.0, 2, -1, 3]), "backwards": np.array([-2.0, 1.5])},
         "b": {"own": np.array([1.0])},
@@ -118,7 +118,7 @@ def test_figures_are_means_over_actions(model):
     assert model.areas(actions, "backwards") == [6 / 8, 1 / 2]
 
 
-def test_a_body_alone_is_as_high_above_the_floor_as_among_others(model, bending):
+def test_pelvis_height_does_not_depend_on_other_performances(model, bending):
     space = make_pipeline(DirectionCosines(bending.skeleton), ASpace()).fit(bending.data)
     mean = LinearSynchronizer(60).fit_transform(space.transform(bending.data)).mean(axis=0)
     together = model.above_floor(space, mean, mean)
@@ -151,7 +151,7 @@ def test_all_tables_of_a_tiny_set(model, judges, clips, capsys, monkeypatch):
     assert {label.split(",")[0] for label in verdicts} >= {"LOF", "OneClassSVM", "IsolationForest"}
 
 
-def test_as_many_real_clips_are_held_out_as_were_measured(negatives, real_data):
+def test_number_of_held_out_clips_is_the_documented_one(negatives, real_data):
     found = {c.name: (len(c.postures), len(c.folds())) for c in negatives.read_clips(real_data)}
     assert found == {
         "HDM05": (132, 24),

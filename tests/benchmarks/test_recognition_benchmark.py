@@ -25,7 +25,7 @@ def recognizers(benchmark):
 
 @pytest.fixture(scope="module")
 def bunch():
-    """Three people, who each bend twice, get up from either, and do that backwards."""
+    """Three people: each bends twice, gets up twice, and does both backwards."""
     bunch = make_bending(6, n_actors=3, n_frames=24, random_state=0)
     rising = [x[len(x) // 2 :] for x in bunch.data]
     bunch.data = bunch.data + rising + [x[::-1] for x in rising]
@@ -55,7 +55,7 @@ class Nearest:
 # -- folds ------------------------------------------------------------------------------
 
 
-def test_published_halves_share_nobody(recognition, tmp_path):
+def test_published_splits_are_disjoint(recognition, tmp_path):
     path = tmp_path / "splits.json"
     path.write_text(json.dumps({"train_actors": [[2, 10]], "test_actors": [[1, 3]]}))
     actors = np.array(["s01", "s02", "s10", "s03", "s01"])
@@ -63,7 +63,7 @@ def test_published_halves_share_nobody(recognition, tmp_path):
     assert (train.tolist(), test.tolist()) == ([1, 2], [0, 3, 4])
 
 
-def test_published_halves_of_real_people(recognition, real_data):
+def test_published_splits_match_the_archive(recognition, real_data):
     archive = np.load(real_data / "utkinect" / "utkinect_positions.npz")
     actors = archive["actor"]
     path = real_data / "utkinect" / "utkinect_splits.json"
@@ -75,7 +75,7 @@ def test_published_halves_of_real_people(recognition, real_data):
         assert len(set(actors[train])) == len(set(actors[test])) == 5
 
 
-def test_an_actor_is_left_out_or_alone(recognition):
+def test_leave_one_actor_out_splits(recognition):
     actors = np.array(["b", "a", "b", "c"])
     left_out = [
         (train.tolist(), test.tolist()) for train, test in recognition.actors_left_out(actors)
@@ -88,7 +88,7 @@ def test_an_actor_is_left_out_or_alone(recognition):
 # -- figures ----------------------------------------------------------------------------
 
 
-def test_calibration_error_by_hand(recognition):
+def test_calibration_error_equals_hand_computation(recognition):
     right = np.array([True, False, True, True, False])
     confidence = np.array([0.95, 0.95, 0.65, 0.65, 0.3])
     # Two bins of two are 0.45 and 0.35 off, one of one 0.3; 1 belongs to the last bin.
@@ -98,14 +98,14 @@ def test_calibration_error_by_hand(recognition):
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1, 1e4])
-def test_the_temperature_makes_probabilities_of_shares(recognizers, unit):
+def test_temperature_recovers_probabilities(recognizers, unit):
     # Two classes, scores that differ by 1, the larger right in 9 of 10: the odds are 9.
     scores = unit * np.tile([0.0, 1.0], (10, 1))
     slope = recognizers.slope_of(scores + 5 * unit, np.repeat([0, 1], [1, 9]))
     assert slope * unit == pytest.approx(np.log(9), rel=1e-3)
 
 
-def test_people_are_left_out_together_for_the_temperature(recognizers, recordings):
+def test_temperature_is_fitted_on_held_out_subjects(recognizers, recordings):
     decide = Nearest(np.arange(18.0), recordings.actions)
     one = recognizers.Scored(recordings, decide)
     train, test = np.flatnonzero(recordings.actors != "s02"), np.array([1, 4, 7, 10])
@@ -121,7 +121,7 @@ def test_people_are_left_out_together_for_the_temperature(recognizers, recording
     np.testing.assert_array_equal(predicted, classes[probabilities.argmax(axis=1)])
 
 
-def test_what_only_the_one_left_out_does_is_thought_of_last(recognizers, recordings):
+def test_class_of_the_held_out_subject_alone_ranks_last(recognizers, recordings):
     actions = np.where(np.arange(18) == 0, "alone", recordings.actions)
     strange = recognizers.Recordings("few", recordings.views, actions, recordings.actors)
     one = recognizers.Scored(strange, Nearest(np.arange(18.0), strange.actions))
@@ -130,7 +130,7 @@ def test_what_only_the_one_left_out_does_is_thought_of_last(recognizers, recordi
     assert np.isfinite(probabilities).all()
 
 
-def test_the_area_of_an_action_that_was_not_learnt(recognition, recognizers, recordings):
+def test_auc_of_an_unknown_action(recognition, recognizers, recordings):
     values = np.array([0.0, 0, 0, 0, 0, 0, 9, 9, 9, 9, 9, 9])
     decide = Nearest(values, recordings.actions)
     one, (train, test) = (
@@ -146,7 +146,7 @@ def test_the_area_of_an_action_that_was_not_learnt(recognition, recognizers, rec
 # -- recognizers ------------------------------------------------------------------------
 
 
-def test_amplitudes_of_waves(recognizers):
+def test_fourier_amplitudes_of_sine_waves(recognizers):
     t = np.arange(40) / 40
     X = (3 + 2 * np.cos(2 * np.pi * 4 * t))[np.newaxis, :, np.newaxis]
     found = recognizers.fourier_pyramid(X, n_levels=2, n_frequencies=5)[0]
@@ -154,13 +154,13 @@ def test_amplitudes_of_waves(recognizers):
     np.testing.assert_allclose(found, [3, 0, 0, 0, 1] + 2 * [3, 0, 1, 0, 0], atol=1e-12)
 
 
-def test_kernels_know_the_training_set_only(recognizers):
+def test_kernels_use_the_training_set_only(recognizers):
     D = np.array([[0.0, 2, 4, 9], [2, 0, 6, 9], [4, 6, 0, 9], [9, 9, 9, 0]])
     K = recognizers.mean_kernel([D, 2 * D], np.arange(3))
     np.testing.assert_allclose(K, np.exp(-D / 4))
 
 
-def test_ours_is_the_pipeline_of_the_manual(recognizers, bunch, recordings):
+def test_benchmarked_pipeline_is_that_of_the_manual(recognizers, bunch, recordings):
     train, test = np.flatnonzero(bunch.actor != "s03"), np.flatnonzero(bunch.actor == "s03")
     views = make_union(DirectionCosines(bunch.skeleton), JointPositions(bunch.skeleton))
     pipe = make_pipeline(views.set_output(transform="pandas"), ActionClassifier())
@@ -175,7 +175,7 @@ def test_ours_is_the_pipeline_of_the_manual(recognizers, bunch, recordings):
 # -- tables -----------------------------------------------------------------------------
 
 
-def test_all_tables_of_a_tiny_set_without_other_packages(
+def test_all_tables_of_a_tiny_set_without_peers(
     recognition, recognizers, recordings, capsys, monkeypatch
 ):
     hasty = partial(ActionClassifier, ["posture"], n_frames=12)

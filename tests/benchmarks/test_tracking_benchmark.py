@@ -45,7 +45,7 @@ def case(request, trackers):
     return model, rng.standard_normal((6, 2)), rng.standard_normal((4, 2))
 
 
-def test_filter_and_smoother_are_the_joint_gaussian_conditioned(trackers, case):
+def test_filter_and_smoother_equal_conditioning_of_the_joint_gaussian(trackers, case):
     model, y, _ = case
     y[0, 1] = y[2] = y[4, 0] = np.nan
     found = trackers.kalman(model, y, 0.3, smooth=True)
@@ -60,7 +60,7 @@ def test_filter_and_smoother_are_the_joint_gaussian_conditioned(trackers, case):
     assert found.smoothed == pytest.approx(expected.reshape(6, 2), abs=1e-7)
 
 
-def test_likelihood_is_that_of_the_joint_gaussian(trackers, case):
+def test_likelihood_equals_that_of_the_joint_gaussian(trackers, case):
     model, *takes = case
     expected = 0
     for y in takes:
@@ -70,7 +70,7 @@ def test_likelihood_is_that_of_the_joint_gaussian(trackers, case):
     assert trackers.log_likelihood(model, takes, 0.3) == pytest.approx(expected, rel=1e-9)
 
 
-def test_imputation_is_the_posture_conditioned(trackers):
+def test_imputation_equals_conditioning_of_the_posture(trackers):
     rng = np.random.default_rng(0)
     takes = [rng.standard_normal((50, 3)) @ rng.standard_normal((3, 3))]
     y = rng.standard_normal((4, 3))
@@ -80,7 +80,7 @@ def test_imputation_is_the_posture_conditioned(trackers):
     assert trackers.imputation(takes, [y], 0.3)[0] == pytest.approx(np.array(expected))
 
 
-def test_particles_follow_a_posture_that_is_hidden_in_part(trackers):
+def test_particles_track_a_partly_hidden_posture(trackers):
     rng = np.random.default_rng(0)
     phases = np.linspace(0, np.pi, 60)
     warped = np.stack([np.sin(phases), np.cos(phases), np.sin(phases)], axis=1)
@@ -100,7 +100,7 @@ def hidden(benchmark):
 
 
 @pytest.mark.parametrize(("n_frames", "gap"), [(70, 30), (31, 10)])
-def test_hidden_are_six_limbs_or_everything_for_a_second_and_never_the_ends(hidden, n_frames, gap):
+def test_hidden_intervals_last_a_second_and_avoid_both_ends(hidden, n_frames, gap):
     takes, rng = [np.zeros((n_frames, 37))] * 40, np.random.default_rng(0)
     half, all_of, some = (np.array(hidden.hide(takes, kind, rng)) for kind in hidden.KINDS)
     for masks in (half, some):
@@ -116,7 +116,7 @@ def test_hidden_are_six_limbs_or_everything_for_a_second_and_never_the_ends(hidd
         assert not times[:, [0, -1]].any()
 
 
-def test_an_angle_is_of_hidden_limbs_and_of_directions_however_long(hidden):
+def test_angle_error_uses_hidden_limbs_and_ignores_length(hidden):
     truth, estimate, mask = np.zeros((2, 37)), np.zeros((2, 37)), np.zeros((2, 37), dtype=bool)
     truth[:, 1::3], estimate[:, 1::3] = 1, 7
     # A quarter turn of the second limb in the first frame; of the third, in the second, unseen.
@@ -125,6 +125,6 @@ def test_an_angle_is_of_hidden_limbs_and_of_directions_however_long(hidden):
     assert hidden.angles(estimate, truth, mask) == pytest.approx(45, abs=1e-3)
 
 
-def test_the_phase_of_a_path_is_in_the_middle_of_where_it_stands_still(hidden):
+def test_phase_of_a_path_is_the_middle_of_a_pause(hidden):
     times = np.array([0, 1, 1, 1, 4.0])
     assert hidden.phases_of(times, 5) == pytest.approx([0, 2, 2 + 2 / 3, 2 + 4 / 3, 4])

@@ -20,7 +20,7 @@ BLOCKS = [(title, k) for title, blocks in SECTIONS.items() for k in range(len(bl
 TRIALS = [("ann", 1), ("ann", 2), ("ben", 1), ("ben", 2), ("cas", 1)]
 
 
-def test_there_are_ten_journeys():
+def test_journeys_page_has_ten_sections():
     assert (
         sum(bool(blocks) for blocks in SECTIONS.values()) == 11
     )  # landmarks in space, in pictures
@@ -29,7 +29,7 @@ def test_there_are_ten_journeys():
 
 
 @pytest.mark.parametrize(("title", "k"), BLOCKS)
-def test_a_journey_is_short_and_asks_for_nothing_private(title, k):
+def test_journey_is_short_and_uses_public_names(title, k):
     code = SECTIONS[title][k]
     lines = [line for line in code.split("\n") if line.strip()]
     assert len(lines) <= 10
@@ -386,7 +386,7 @@ def test_landmarks_of_a_video(n_dims, bodies, tmp_path, monkeypatch):
 
 
 def test_an_xarray_dataset(bodies, tmp_path, monkeypatch):
-    """Two individuals a file, with a gap where nobody was sure."""
+    """Two individuals a file, with a gap where confidence is low."""
     positions, joints, _ = bodies
     names = ["head", "left_wrist", "right_wrist"]
     (tmp_path / "poses").mkdir()
@@ -396,9 +396,9 @@ def test_an_xarray_dataset(bodies, tmp_path, monkeypatch):
         pair = pair if number == 0 else [x[::-1] for x in pair]
         confidence = np.ones((57, 3, 2))
         confidence[20:23, 1, 0] = 0.1
-        for who, x in zip(("ann", "bob"), pair, strict=True):
+        for name, x in zip(("ann", "bob"), pair, strict=True):
             columns = [f"{name}_{axis}" for name in names for axis in "xy"]
-            originals[f"film{number}", who] = pd.DataFrame(x.reshape(57, -1), columns=columns)
+            originals[f"film{number}", name] = pd.DataFrame(x.reshape(57, -1), columns=columns)
         position = np.stack(pair, axis=-1).swapaxes(1, 2).copy()
         position[20:23, :, 1, 0] = 1e3
         dims = ("time", "space", "keypoints", "individuals")

@@ -37,18 +37,18 @@ ESTIMATORS = [
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=lambda e: type(e).__name__)
-def test_diagrams_link_to_the_manual(estimator):
+def test_html_diagram_links_to_the_manual(estimator):
     page = f"{DOCUMENTATION}/reference/sklearn_motionsync.{type(estimator).__name__}.html"
     assert f'href="{page}' in estimator_html_repr(estimator)
 
 
-def test_the_diagram_of_a_pipeline_links_every_step():
+def test_html_diagram_of_a_pipeline_links_every_step():
     html = estimator_html_repr(make_pipeline(*ESTIMATORS[:0:-1], ESTIMATORS[0]))
     pages = set(re.findall(rf"{DOCUMENTATION}/reference/sklearn_motionsync\.(\w+)\.html", html))
     assert pages == {type(estimator).__name__ for estimator in ESTIMATORS}
 
 
-def test_reprs_are_short():
+def test_repr_is_short():
     bunch = make_bending(5, n_frames=20, random_state=0)
     for skeleton in (Skeleton.paper(), Skeleton.acclaim(), Skeleton.kinect(), bunch.skeleton):
         assert len(repr(DirectionCosines(skeleton))) < 80
@@ -90,7 +90,7 @@ def notebook(tmp_path_factory):
     ]
 
 
-def test_the_notebook_runs_and_shows_what_it_shows(notebook):
+def test_notebook_outputs_equal_the_stored_ones(notebook):
     for kept, now in zip(*notebook, strict=True):
         assert kept["source"] == now["source"]
         kinds = [
@@ -101,7 +101,7 @@ def test_the_notebook_runs_and_shows_what_it_shows(notebook):
         assert errors == []
 
 
-def test_the_notebook_puts_trials_on_one_clock(notebook):
+def test_notebook_synchronises_trials(notebook):
     (table,) = (
         "".join(output["data"]["text/plain"])
         for cell in notebook[1]

@@ -49,7 +49,7 @@ def paste(blocks, folder):
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_all_of_the_page_is_found(name):
+def test_every_block_of_the_tutorial_is_parsed(name):
     page, blocks = PAGES[name], BLOCKS[name]
     assert len(blocks) == page.count("```{plot}") > 5
     assert sum(printed is not None for _, printed in blocks) == page.count("```text")
@@ -58,14 +58,14 @@ def test_all_of_the_page_is_found(name):
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_the_blocks_can_be_pasted(sessions, name):
+def test_tutorial_blocks_run_in_order(sessions, name):
     outputs, complaints = sessions[name]
     assert re.sub(r">>> |\.\.\. |\n", "", complaints) == ""
     assert len(outputs) == len(BLOCKS[name]) + 1
 
 
 @pytest.mark.parametrize(("name", "number"), NUMBERED)
-def test_a_block_prints_what_the_page_says(sessions, name, number):
+def test_tutorial_block_prints_the_documented_output(sessions, name, number):
     printed, expected = sessions[name][0][number], BLOCKS[name][number][1]
     if expected is None:  # what is left is the figure, by its short name
         assert re.fullmatch(r"(\w+Display\(.*\)\n)?", printed), printed
@@ -73,7 +73,7 @@ def test_a_block_prints_what_the_page_says(sessions, name, number):
         assert doctest.OutputChecker().check_output(expected, printed, FLAGS), printed
 
 
-def test_what_is_installed_is_what_can_be_had():
+def test_tutorial_installs_the_declared_extras():
     """No index has the package: it is installed from a checkout."""
     pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
     pages += sorted((ROOT / "examples").glob("*.*"))

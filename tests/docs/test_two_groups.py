@@ -32,7 +32,7 @@ def hotelling(fields, in_second):
 
 
 @pytest.mark.parametrize("n_channels", [1, 3])
-def test_the_p_value_is_that_of_the_largest_t2(groups, n_channels):
+def test_p_value_equals_that_of_the_largest_t2(groups, n_channels):
     rng = np.random.default_rng(0)
     in_second = np.arange(9) % 2 == 1
     fields = rng.standard_normal((9, 6, n_channels)).cumsum(axis=1)
@@ -48,7 +48,7 @@ def test_the_p_value_is_that_of_the_largest_t2(groups, n_channels):
     assert groups.p_value(mixed, in_second, 200, 5) == expected
 
 
-def test_where_nothing_varies_nothing_is_compared(groups):
+def test_constant_frames_are_not_tested(groups):
     rng = np.random.default_rng(0)
     in_second = np.arange(12) % 2 == 1
     fields = rng.standard_normal((12, 5, 2))
@@ -65,7 +65,7 @@ def test_where_nothing_varies_nothing_is_compared(groups):
     assert groups.p_value(fields, in_second, 100) >= min(both)
 
 
-def test_nothing_is_found_at_the_stated_level(groups):
+def test_false_positive_rate_is_the_nominal_level(groups):
     rng = np.random.default_rng(0)
     in_second = np.arange(10) % 2 == 1
     p = [
@@ -76,7 +76,7 @@ def test_nothing_is_found_at_the_stated_level(groups):
     assert lowest <= np.sum(np.array(p) <= 0.05) <= highest
 
 
-def test_cycles_of_one_person_are_one_sample(groups):
+def test_cycles_of_one_person_count_as_one_sample(groups):
     bunch = make_gait(4, 3, random_state=0)
     lengths = np.array([float(len(x)) for x in bunch.data])
     np.testing.assert_allclose(
@@ -98,7 +98,7 @@ def shares_found(groups, seeds, **params):
     return {t: [np.mean([p[t, c] <= 0.05 for p in all_p]) for c in SHOWN] for t in groups.TESTS}
 
 
-def test_timing_is_found_by_the_offset_and_missed_by_linear_normalisation(groups):
+def test_timing_difference_is_significant_in_offsets_only_after_matching(groups):
     found = shares_found(groups, range(3000, 3006), timing=3)
     hip = {test: share[0] for test, share in found.items()}
     assert hip[groups.JOINT] >= 0.75
@@ -107,7 +107,7 @@ def test_timing_is_found_by_the_offset_and_missed_by_linear_normalisation(groups
     assert hip[groups.CURVE] <= 0.25
 
 
-def test_shape_is_found_by_the_curve_and_not_by_the_offset(groups):
+def test_shape_difference_is_significant_in_curves_and_not_in_offsets(groups):
     found = shares_found(groups, range(3000, 3006), amplitude=12)
     hip, knee = ({test: share[i] for test, share in found.items()} for i in range(2))
     assert knee[groups.JOINT] >= 0.75
@@ -116,12 +116,12 @@ def test_shape_is_found_by_the_curve_and_not_by_the_offset(groups):
     assert hip[groups.JOINT] <= 0.25
 
 
-def test_where_nothing_differs_nothing_is_found(groups):
+def test_equal_groups_are_not_significant(groups):
     found = shares_found(groups, range(3000, 3006))
     assert max(max(share) for share in found.values()) <= 0.25
 
 
-def test_the_tables_of_one_seed(groups, monkeypatch, capsys):
+def test_tables_of_one_seed_have_the_stated_rows(groups, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["groups.py", "1"])
     monkeypatch.setattr(groups, "PEOPLE", 4)
     monkeypatch.setattr(groups, "DIFFERENCES", {"nothing": {}, "timing": {"timing": 3}})

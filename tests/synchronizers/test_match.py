@@ -42,7 +42,7 @@ def test_other_recordings_at_another_rate(matched):
         np.testing.assert_allclose(out, expected, atol=1e-12)
 
 
-def test_dtype(matched):
+def test_float32_is_kept_and_other_types_become_float64(matched):
     points, _, match = matched
     assert match.warp([x.astype(np.float32) for x in points]).dtype == np.float32
     mixed = [points[0].astype(np.float32), *points[1:]]

@@ -58,7 +58,7 @@ def test_scikit_learn_checks(estimator, check):
 @pytest.mark.filterwarnings("ignore:X has feature names, but:UserWarning")
 @pytest.mark.parametrize("estimator", CHECKED[:2], ids=by_name)
 @pytest.mark.parametrize("name", EXTRA_CHECKS)
-def test_scikit_learn_checks_outside_the_list(estimator, name):
+def test_scikit_learn_checks_that_are_not_in_the_automatic_list(estimator, name):
     getattr(estimator_checks, name)("FrameWise", clone(estimator))
 
 

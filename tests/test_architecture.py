@@ -1,4 +1,4 @@
-"""The house: which rooms there are, who may look into which, and what is public."""
+"""The architecture: subpackages and their imports, names, and what is public."""
 
 import ast
 import graphlib
@@ -12,7 +12,7 @@ from sklearn_motionsync import datasets, display, io, metrics
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "sklearn_motionsync"
 
-# From the ground up: a room imports from itself and from the floors below.
+# Lowest first: a subpackage imports from itself and from the floors below.
 FLOORS = [
     {"inputs", "matching", "utils"},
     {"body", "metrics", "transformers"},
@@ -37,7 +37,7 @@ def read(path):
 
 
 def name_of(path):
-    """sklearn_motionsync/matching/rows.py: matching.rows."""
+    """The name of a module below the package: ``matching.rows``."""
     parts = path.relative_to(PACKAGE).with_suffix("").parts
     return ".".join(part for part in parts if part != "__init__")
 
@@ -46,7 +46,7 @@ MODULES = {name_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
 
 
 def imports(name):
-    """What a module takes from other modules of the package, and from scikit-learn."""
+    """Modules of the package, and names of scikit-learn, that a module imports."""
     inside, outside = set(), set()
     base = name.split(".") if MODULES[name].name == "__init__.py" else name.split(".")[:-1]
     for node in ast.walk(read(MODULES[name])):
@@ -80,14 +80,14 @@ def test_imports_run_in_no_circle():
     list(graphlib.TopologicalSorter({name: imports(name)[0] for name in MODULES}).static_order())
 
 
-def test_the_matching_knows_nothing_of_scikit_learn():
+def test_matching_imports_numpy_and_scipy_only():
     taken = {name: imports(name) for name in MODULES if name.split(".")[0] == "matching"}
     assert set().union(*(outside for _, outside in taken.values())) == {"get_config"}
     for inside, _ in taken.values():
         assert {module.split(".")[0] for module in inside} <= {"matching"}
 
 
-def test_every_module_says_what_it_holds():
+def test_every_module_has_a_docstring():
     for name, path in MODULES.items():
         first = (ast.get_docstring(read(path)) or "").split("\n")[0]
         assert re.fullmatch(r"[A-Za-z].{20,}[.:]", first), f"{name}: {first!r}"
@@ -98,11 +98,22 @@ def test_no_module_is_longer_than_750_lines():
     assert {name: n for name, n in lengths.items() if n > 750} == {}
 
 
-def test_no_class_name_stands_in_two_modules():
-    classes = [
-        n.name for p in MODULES.values() for n in read(p).body if isinstance(n, ast.ClassDef)
+def test_no_class_or_function_name_stands_in_two_modules():
+    nodes = [node for path in MODULES.values() for node in read(path).body]
+    names = [n.name for n in nodes if isinstance(n, (ast.ClassDef, ast.FunctionDef))]
+    public = [name for name in names if not name.startswith("_")]
+    assert sorted(name for name in set(public) if public.count(name) > 1) == []
+
+
+def test_arrays_are_not_spoken_of_as_people():
+    words = re.compile(r"\b(who|whoever|nobody|somebody|everybody)\b", re.IGNORECASE)
+    found = [
+        f"{name}:{i}: {line.strip()}"
+        for name, path in MODULES.items()
+        for i, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if words.search(line)
     ]
-    assert sorted(n for n in set(classes) if classes.count(n) > 1) == []
+    assert found == []
 
 
 def _is_own(node):
@@ -132,7 +143,7 @@ def private_accesses(path):
                 yield f"{path.relative_to(ROOT)}:{node.lineno}: {name}"
 
 
-def test_nobody_looks_into_private_matters_of_others():
+def test_no_private_name_is_used_outside_its_module():
     found = []
     for folder in ("sklearn_motionsync", "tests", "benchmarks", "docs", "examples"):
         for path in (ROOT / folder).rglob("*.py"):
@@ -142,7 +153,7 @@ def test_nobody_looks_into_private_matters_of_others():
     assert found == []
 
 
-def test_the_reference_is_what_is_public():
+def test_reference_lists_the_public_names():
     text = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
     listed = set()
     for block in re.findall(r"```\{eval-rst\}\n(.*?)```", text, re.DOTALL):
@@ -155,6 +166,6 @@ def test_the_reference_is_what_is_public():
 
 
 @pytest.mark.parametrize("module", [sklearn_motionsync, datasets, display, io, metrics])
-def test_what_is_public_is_there(module):
+def test_public_names_exist(module):
     assert len(set(module.__all__)) == len(module.__all__)
     assert all(hasattr(module, name) for name in module.__all__)

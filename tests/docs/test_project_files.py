@@ -35,17 +35,17 @@ def floors():
         ('spm1d>=0.4; python_version < "3.14"', 'spm1d==0.4.* ; python_version < "3.14"'),
     ],
 )
-def test_a_floor_is_the_oldest_version_that_is_allowed(floors, requirement, pin):
+def test_floor_is_the_oldest_allowed_version(floors, requirement, pin):
     assert floors.pin(requirement) == pin
 
 
 @pytest.mark.parametrize("requirement", ["numpy", "numpy<3", "numpy==2.0"])
-def test_a_requirement_without_a_floor_is_refused(floors, requirement):
+def test_requirement_without_a_floor_is_refused(floors, requirement):
     with pytest.raises(ValueError, match=re.escape(repr(requirement)) + ".*>="):
         floors.pin(requirement)
 
 
-def test_whatever_is_installed_for_the_tests_has_a_floor(floors):
+def test_every_test_requirement_has_a_floor(floors):
     names = {line.split("==")[0] for line in floors.constraints(ROOT / "pyproject.toml")}
     assert {"numpy", "scipy", "scikit-learn", "pandas", "matplotlib", "pytest"} <= names
     asked = PROJECT["dependencies"] + [
@@ -55,7 +55,7 @@ def test_whatever_is_installed_for_the_tests_has_a_floor(floors):
     assert names - others == {re.match(r"[\w.-]+", each)[0] for each in asked}
 
 
-def test_the_pythons_that_are_named_are_those_that_are_tested():
+def test_python_classifiers_equal_the_tested_versions():
     named = re.findall(r"Python :: (3\.\d+)", "\n".join(PROJECT["classifiers"]))
     jobs = load(".github/workflows/tests.yml")["jobs"]
     assert jobs["tests"]["strategy"]["matrix"]["python"] == named
@@ -64,7 +64,7 @@ def test_the_pythons_that_are_named_are_those_that_are_tested():
     assert setup["with"]["python-version"] == named[0]
 
 
-def test_the_citation_has_what_its_format_asks_for():
+def test_citation_file_is_valid():
     citation = load("CITATION.cff")
     assert {"cff-version", "message", "title", "authors"} <= set(citation)
     assert citation["license"] == PROJECT["license"]
@@ -74,7 +74,7 @@ def test_the_citation_has_what_its_format_asks_for():
         assert {"type", "title", "authors"} <= set(reference)
 
 
-def test_addresses_of_the_project_are_pages_of_its_manual():
+def test_project_urls_are_pages_of_the_manual():
     start = PROJECT["urls"]["Documentation"]
     for address in PROJECT["urls"].values():
         assert address.startswith(start)
@@ -82,14 +82,14 @@ def test_addresses_of_the_project_are_pages_of_its_manual():
         assert (ROOT / "docs" / page.replace(".html", ".md")).is_file()
 
 
-def test_publishing_needs_no_secret():
+def test_publish_workflow_needs_no_secret():
     text = (ROOT / ".github" / "workflows" / "publish.yml").read_text(encoding="utf-8")
     publish = yaml.safe_load(text)["jobs"]["publish"]
     assert publish["permissions"] == {"id-token": "write"}
     assert not re.search(r"secrets\.|password|token:(?! write)", text)
 
 
-def test_templates_ask_for_what_is_needed():
+def test_issue_templates_ask_for_version_and_code():
     folder = ROOT / ".github" / "ISSUE_TEMPLATE"
     for path in sorted(folder.glob("*.yml")):
         form = load(path)
@@ -102,7 +102,7 @@ def test_templates_ask_for_what_is_needed():
     assert names == {"bug", "config", "data", "idea"}
 
 
-def test_the_source_distribution_is_told_of_every_folder():
+def test_manifest_includes_every_folder():
     manifest = (ROOT / "MANIFEST.in").read_text(encoding="utf-8")
     for folder in ("tests", "docs", "examples", "benchmarks", ".ci", ".github"):
         assert f"graft {folder}\n" in manifest
