@@ -20,7 +20,15 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
-from .numbers import as_numbers, check_finite, names_of
+from .numbers import (
+    FLOATS,
+    LARGEST,
+    SMALLEST,
+    as_numbers,
+    check_finite,
+    names_of,
+    refuse_magnitude,
+)
 from .resampling import warn_of_uneven
 from .tables import (
     INDEX_NAMES,
@@ -36,6 +44,7 @@ from .tables import (
 __all__ = [
     "ACCEPTED",
     "NOT_ONE",
+    "Performances",
     "as_collection",
     "as_source",
     "check_members",
@@ -98,8 +107,8 @@ def to_frame(sequences, *, performances=None, columns=None):
     sequences = as_collection(sequences)
     if sequences is None:
         raise ValueError(NOT_ONE)
-    arrays, names = check_members(sequences, finite=False)
-    labels, levels = labels_of(sequences)
+    arrays = check_members(sequences, finite=False)
+    labels, levels, names = arrays.labels, arrays.levels, arrays.names
     if performances is not None:
         labels, outer = labels_given(performances)
         levels = (*outer, levels[-1])
@@ -113,7 +122,7 @@ def to_frame(sequences, *, performances=None, columns=None):
         raise ValueError(
             f"columns must name the {arrays[0].shape[1]} features, one each; got {len(columns)}."
         )
-    return stack_frame(arrays, labels, frame_labels(sequences), columns, levels)
+    return stack_frame(arrays, labels, arrays.frames, columns, levels)
 
 
 # -- how the kinds are told apart ---------------------------------------------------
@@ -144,6 +153,9 @@ def as_collection(X):
             raise ValueError(f"{ACCEPTED}, got an array of shape {X.shape}.")
         X = list(X) if X.dtype == object and X.ndim == 1 else None
     if isinstance(X, (list, tuple)):
+        plain = set(map(type, X)) == {np.ndarray}
+        if plain and max([x.ndim for x in X]) >= 2:
+            return list(X)
         items = [as_pandas(x) for x in X]
         return items if len(items) == 0 or _holds_matrices(items) else None
     source = as_source(X)
@@ -246,63 +258,137 @@ def _depth(item):
 # -- checks -------------------------------------------------------------------------
 
 
-def check_members(sequences, *, finite=True, numbers=None, dtype=None):
-    """Arrays of one dtype, and the column names they share (None without names).
+class Performances(tuple):
+    """Checked performances: arrays of one dtype, and what it takes to give the same kind back.
+
+    The arrays are views of the input where its dtype allows: never write to them.
+
+    Attributes
+    ----------
+    kind : {"rows", "array", "list", "frame"}
+        2-D, 3-D, list, MultiIndex frame.
+    labels : list
+        Of the performances; tuples where several levels name them.
+    frames : list
+        Labels of the frames of each performance of a table; empty where they are numbered.
+    names : sequence of str or None
+        Names of the features; after `check_performances` ``feature_names_in_`` of the estimator.
+    levels : tuple of str
+        Names of the levels of an index; the last is that of the frames.
+    numbers : sequence of int
+        The index of each in all that was given.
+    """
+
+    def __new__(cls, arrays, kind, labels, frames=(), names=None, levels=INDEX_NAMES, numbers=None):
+        self = super().__new__(cls, arrays)
+        self.kind, self.labels, self.frames, self.names = kind, labels, frames, names
+        self.levels = levels
+        self.numbers = range(len(self)) if numbers is None else numbers
+        return self
+
+    def __getitem__(self, index):
+        if isinstance(index, slice):
+            return self.take(range(len(self))[index])
+        return super().__getitem__(index)
+
+    def called(self, i):
+        """What to call one of them in messages."""
+        return name_performance(self.numbers[i], self.labels[i])
+
+    def take(self, indices):
+        """Some of them: rows, or a list."""
+        kind = "rows" if self.kind == "rows" else "list"
+        frames = [self.frames[i] for i in indices] if self.frames else []
+        labels = [self.labels[i] for i in indices]
+        numbers = [self.numbers[i] for i in indices]
+        some = map(super().__getitem__, indices)
+        return Performances(some, kind, labels, frames, self.names, self.levels, numbers)
+
+
+def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=None):
+    """Check the performances of a collection in one pass.
 
     Parameters
     ----------
     sequences : list
     finite : {True, False, "allow-nan"}, default=True
-        As in scikit-learn.
+        As in scikit-learn. False: their magnitude is free, too.
+    training : bool, default=True
+        Whether to refuse a set all of whose values are tiny; large ones always are.
     numbers : sequence of int, default=None
-        What number each has in all that was given; by default 0, 1, ...
+        The index of each in all that was given; by default 0, 1, ...
     dtype : dtype, default=None
         Of those before: by default single precision if all of these are.
+
+    Returns
+    -------
+    Performances
+        Of the kind "list", with the names of the columns (None without names).
     """
     if len(sequences) == 0:
         raise ValueError(f"Found 0 performances (n_samples=0), at least 1 is needed. {ACCEPTED}.")
-    labels, _ = labels_of(sequences, numbers)
     numbers = range(len(sequences)) if numbers is None else numbers
-    called = [name_performance(i, label) for i, label in zip(numbers, labels, strict=True)]
-    arrays = [_as_matrix(what, x) for what, x in zip(called, sequences, strict=True)]
-    names, width = names_of(sequences[0]), arrays[0].shape[1]
-    for what, x, array in zip(called, sequences, arrays, strict=True):
+    labels, levels, frames, names = list(numbers), INDEX_NAMES, [], None
+    tables = any([issubclass(kind, pd.DataFrame) for kind in set(map(type, sequences))])
+    if tables:
+        labels, levels = labels_of(sequences, numbers)
+        frames, names = frame_labels(sequences), names_of(sequences[0])
+    arrays, width, largest, holder = [], None, 0.0, 0
+    for i, x in enumerate(sequences):
+        # Nothing is called for a plain array but NumPy itself.
+        if type(x) is np.ndarray and x.dtype in FLOATS:
+            array = x
+        else:
+            array = as_numbers(x, name_performance(numbers[i], labels[i]))
+        if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] < 1:
+            _refuse_shape(array, name_performance(numbers[i], labels[i]))
+        if width is None:
+            width = array.shape[1]
         if array.shape[1] != width:
             raise ValueError(
-                f"{what} has {array.shape[1]} features a frame, performance {numbers[0]} has "
-                f"{width}. All performances need the same features in the same order."
+                f"{name_performance(numbers[i], labels[i])} has {array.shape[1]} features a frame, "
+                f"performance {numbers[0]} has {width}. All performances need the same features "
+                "in the same order."
             )
-        if names_of(x) != names:
+        if tables and names_of(x) != names:
             raise ValueError(
-                f"{what} has the columns {names_of(x)}, performance {numbers[0]} has {names}. "
-                "All performances need the same columns in the same order."
+                f"{name_performance(numbers[i], labels[i])} has the columns {names_of(x)}, "
+                f"performance {numbers[0]} has {names}. All performances need the same columns in "
+                "the same order."
             )
         if dtype == np.float32 and array.dtype != dtype:
             raise ValueError(
-                f"{what} is {array.dtype}, and those before are float32: what is read in parts "
-                "has the precision of the first. Give all as x.astype(np.float32)."
+                f"{name_performance(numbers[i], labels[i])} is {array.dtype}, and those before are "
+                "float32: what is read in parts has the precision of the first. Give all as "
+                "x.astype(np.float32)."
             )
         if finite:
-            frames = x.index if isinstance(x, pd.DataFrame) else None
-            check_finite(array, f"{what}, frame", names, frames, allow_nan=finite == "allow-nan")
+            high, low = array.max(), -array.min()
+            peak = high if high > low else low
+            if not peak <= LARGEST:
+                what = f"{name_performance(numbers[i], labels[i])}, frame"
+                own = frames[i] if tables else None
+                check_finite(array, what, names, own, allow_nan=finite == "allow-nan")
+                peak = np.fmax.reduce(np.abs(array), axis=None, initial=0)
+            if peak > largest:
+                largest, holder = peak, i
+        arrays.append(array)
+    if largest > LARGEST or (training and 0 < largest < SMALLEST):
+        refuse_magnitude(largest, name_performance(numbers[holder], labels[holder]))
     if dtype is None:
-        single = all(a.dtype == np.float32 for a in arrays)
-        dtype = np.float32 if single else np.float64
+        dtype = np.float32 if {a.dtype for a in arrays} == {np.dtype(np.float32)} else np.float64
     # Row by row in memory, so that no result depends on the layout of the input.
-    return [np.ascontiguousarray(a, dtype=dtype) for a in arrays], names
+    arrays = [np.ascontiguousarray(a, dtype=dtype) for a in arrays]
+    return Performances(arrays, "list", labels, frames, names, levels, numbers)
 
 
-def _as_matrix(what, x):
-    """One performance as a float array (n_frames, n_features) of at least 2 frames."""
-    array = as_numbers(x, what)
+def _refuse_shape(array, what):
     if array.ndim != 2:
         raise ValueError(
             f"{what} has shape {array.shape}, expected (n_frames, n_features). Give a "
             "univariate performance as a column, x[:, np.newaxis]."
         )
-    if array.shape[0] < 2 or array.shape[1] < 1:
-        raise ValueError(
-            f"{what} has shape {array.shape}; a performance needs at least 2 frames and "
-            "1 feature. Drop it from the list."
-        )
-    return array
+    raise ValueError(
+        f"{what} has shape {array.shape}; a performance needs at least 2 frames and "
+        "1 feature. Drop it from the list."
+    )

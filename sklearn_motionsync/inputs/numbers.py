@@ -8,7 +8,17 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
-__all__ = ["as_numbers", "check_finite", "check_names", "check_squares", "names_of", "refuse"]
+__all__ = [
+    "FLOATS",
+    "LARGEST",
+    "SMALLEST",
+    "as_numbers",
+    "check_finite",
+    "check_names",
+    "names_of",
+    "refuse",
+    "refuse_magnitude",
+]
 
 _TIMES = (np.datetime64, np.timedelta64, datetime.date, datetime.time, datetime.timedelta)
 _FILES = {"amc", "bvh", "c3d", "csv", "json", "npy", "npz", "parquet", "txt", "xlsx"}
@@ -17,7 +27,11 @@ _HELP_FOR_TABLES = (
     "; give numbers. If it tells performances apart, to_sequences(df, by={0}, time=...) cuts the "
     "whole table; otherwise leave it out, x.drop(columns={0})"
 )
-_KEPT = np.dtype(np.float64), np.dtype(np.float32)
+# The precisions that stay.
+FLOATS = np.dtype(np.float64), np.dtype(np.float32)
+# The largest magnitude of a set of performances lies between, in whichever unit: a micrometre is
+# 1e-6 m, a kilonewton 1e3 N. Squares and fourth powers are far from the ends of single precision.
+SMALLEST, LARGEST = 1e-9, 1e9
 _SECONDS = "Give seconds as numbers, (t - t[0]) / np.timedelta64(1, 's')"
 
 
@@ -45,7 +59,7 @@ def as_numbers(values, what, *, dtype=None):
         If it is text, dates, complex, masked, ragged, or beyond double precision.
     """
     # Nothing to refuse, and nothing to change.
-    if type(values) is np.ndarray and values.dtype in _KEPT and dtype in (None, values.dtype):
+    if type(values) is np.ndarray and values.dtype in FLOATS and dtype in (None, values.dtype):
         return values
     refuse(values, what)
     array = _as_array(values, what)
@@ -212,29 +226,19 @@ def check_finite(array, where, names=None, frames=None, *, allow_nan=False):
     )
 
 
-def check_squares(values, squares, what):
-    """Refuse data whose squares are beyond the range of their precision.
+def refuse_magnitude(largest, what):
+    """Refuse performances in a unit in which no movement is measured.
 
     Parameters
     ----------
-    values : ndarray
-        The data.
-    squares : float
-        Their variance, or the largest of several.
+    largest : float
+        The largest absolute value of all of them, beyond ``LARGEST`` or below ``SMALLEST``.
     what : str
-        What they are squared for.
+        Where it stands, such as "Performance 3".
     """
-    spread = np.ptp(values.astype(np.longdouble).reshape(-1, values.shape[-1]), axis=0).max()
-    info = np.finfo(values.dtype)
-    largest = np.abs(values).max()
-    # Below this share of the values differences are rounding, and a variance of 0 is right.
-    tells = spread > 64 * info.eps * largest
-    if np.isfinite(squares) and (squares >= info.tiny or not tells):
-        return
-    precision = " or float64" if info.dtype == np.float32 else ""
     raise ValueError(
-        f"The data differ by {float(spread):.2g}, so that their {what} are beyond {info.dtype}: "
-        f"use another unit{precision}."
+        f"{what} holds the largest magnitude of all, {largest:.3g}. It must be between "
+        f"{SMALLEST:g} and {LARGEST:g} unless all values are 0: give the data in another unit."
     )
 
 

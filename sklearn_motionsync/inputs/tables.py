@@ -224,8 +224,12 @@ def index_of(labels, names):
 
 
 def stack_frame(arrays, labels, frames, columns, levels=INDEX_NAMES):
-    """Arrays below each other under an index of performance, of one level or more, and frame."""
+    """Arrays below each other under an index of performance, of one level or more, and frame.
+
+    Without ``frames`` they are numbered.
+    """
     counts = [len(a) for a in arrays]
+    frames = frames or [range(n) for n in counts]
     keys = index_of(labels, levels[:-1]).repeat(counts)
     index = pd.MultiIndex.from_arrays(
         [

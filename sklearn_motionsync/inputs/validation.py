@@ -9,13 +9,28 @@ from sklearn.base import BaseEstimator
 from sklearn.utils._set_output import _get_output_config
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from .collections import ACCEPTED, NOT_ONE, as_collection, as_source, check_members
-from .numbers import as_numbers, check_finite, check_names, names_of, refuse
+from .collections import (
+    ACCEPTED,
+    NOT_ONE,
+    Performances,
+    as_collection,
+    as_source,
+    check_members,
+)
+from .numbers import (
+    LARGEST,
+    SMALLEST,
+    as_numbers,
+    check_finite,
+    check_names,
+    names_of,
+    refuse,
+    refuse_magnitude,
+)
 from .tables import (
     INDEX_NAMES,
     as_pandas,
     call_to_unfold,
-    frame_labels,
     labels_of,
     name_performance,
     stack_frame,
@@ -41,60 +56,6 @@ _NAMES = "_names_in"
 _CLOCK_FRAMES = 8
 
 
-class Performances(tuple):
-    """Checked performances: their arrays, and what it takes to give the same kind back.
-
-    Whoever checked them takes them as they are. The arrays are views of the input where its dtype
-    allows: never write to them.
-
-    Attributes
-    ----------
-    kind : {"rows", "array", "list", "frame"}
-        2-D, 3-D, list, MultiIndex frame.
-    labels : list
-        Of the performances; tuples where several levels name them.
-    frames : list
-        Labels of the frames of each performance; empty for univariate rows.
-    names : ndarray of str or None
-        ``feature_names_in_`` of the estimator that checked them.
-    levels : tuple of str
-        Names of the levels of an index; the last is that of the frames.
-    numbers : sequence of int
-        What number each has in all that was given.
-    """
-
-    def __new__(cls, arrays, kind, labels, frames, names=None, levels=INDEX_NAMES, numbers=None):
-        self = super().__new__(cls, arrays)
-        self.kind, self.labels, self.frames, self.names = kind, labels, frames, names
-        self.levels = levels
-        self.numbers = range(len(self)) if numbers is None else numbers
-        return self
-
-    def __getitem__(self, index):
-        if isinstance(index, slice):
-            return self.take(range(len(self))[index])
-        return super().__getitem__(index)
-
-    def called(self, i):
-        """What to call one of them in messages."""
-        return name_performance(self.numbers[i], self.labels[i])
-
-    def take(self, indices):
-        """Some of them: rows, or a list."""
-        kind = "rows" if self.kind == "rows" else "list"
-        frames = [self.frames[i] for i in indices] if self.frames else []
-        labels = [self.labels[i] for i in indices]
-        numbers = [self.numbers[i] for i in indices]
-        some = map(super().__getitem__, indices)
-        return Performances(some, kind, labels, frames, self.names, self.levels, numbers)
-
-    def suits(self, n_features=None, on_rows=None, names=None):
-        """Whether an estimator that was fitted on such input would take them."""
-        is_rows = self.kind == "rows"
-        fits = is_rows is on_rows and self.names is names and len(self) > 0
-        return fits and self[0].shape[not is_rows] == n_features
-
-
 class SequenceLevelMixin:
     """What estimators share whose samples are whole performances: how they take input."""
 
@@ -118,10 +79,11 @@ class SequenceLevelMixin:
             If the input breaks the contract, or differs from that of ``fit`` in kind, width or
             names.
         """
-        known = map(vars(self).get, ("n_features_in_", "_fitted_on_rows", "feature_names_in_"))
-        if isinstance(X, Performances) and X.suits(*known):
-            return X
         on_rows = self._read_rows_in_fit()
+        if isinstance(X, Performances) and (X.kind == "rows") is on_rows and len(X):
+            same = X.names is getattr(self, "feature_names_in_", None)
+            if same and X[0].shape[not on_rows] == self.n_features_in_:
+                return X
         return check_performances(self, X, reset=False, level="sequence", on_rows=on_rows)
 
     def _read_rows_in_fit(self):
@@ -176,11 +138,12 @@ def check_performances(
             f"{estimator.n_features_in_}) and got a collection of performances. Give it 2-D "
             "input, or fit it on a collection."
         )
-    arrays, names = check_members(sequences, finite=finite, numbers=numbers, dtype=dtype)
+    arrays = check_members(sequences, finite=finite, training=reset, numbers=numbers, dtype=dtype)
+    names = arrays.names
     if not reset and arrays[0].shape[1] != estimator.n_features_in_:
-        first = 0 if numbers is None else numbers[0]
+        width = arrays[0].shape[1]
         raise ValueError(
-            f"Performance {first} has {arrays[0].shape[1]} features a frame, but {name} is "
+            f"Performance {arrays.numbers[0]} has {width} features a frame, but {name} is "
             f"expecting {estimator.n_features_in_} features as input."
         )
     _check_names(estimator, sequences[0], reset)
@@ -189,11 +152,12 @@ def check_performances(
     if reset or told or hasattr(estimator, "feature_names_in_"):
         first = pd.DataFrame(arrays[0], columns=names) if told else arrays[0]
         validate_data(estimator, first, reset=reset, skip_check_array=True)
-    is_array = getattr(X, "ndim", 1) == 3
-    kind = "frame" if isinstance(X, pd.DataFrame) else "array" if is_array else "list"
-    names = getattr(estimator, "feature_names_in_", None)
-    labels, levels = labels_of(sequences, numbers)
-    return Performances(arrays, kind, labels, frame_labels(sequences), names, levels, numbers)
+    if getattr(X, "ndim", 1) == 3:
+        arrays.kind = "array"
+    elif isinstance(X, pd.DataFrame):
+        arrays.kind = "frame"
+    arrays.names = getattr(estimator, "feature_names_in_", None)
+    return arrays
 
 
 def names_of_input(estimator):
@@ -274,7 +238,8 @@ def read_collection(X):
     sequences = as_collection(X)
     if sequences is None:
         raise ValueError(NOT_ONE)
-    return check_members(sequences, finite=False)
+    arrays = check_members(sequences, finite=False)
+    return list(arrays), arrays.names
 
 
 def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
@@ -303,9 +268,13 @@ def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
     names = getattr(estimator, "feature_names_in_", None)
     called = index if index is not None else numbers
     check_finite(X, "Row", names, called, allow_nan=finite == "allow-nan")
+    size = np.fmax.reduce(np.abs(X), axis=1, initial=0)
+    if size.max() > LARGEST or (reset and 0 < size.max() < SMALLEST):
+        row = int(size.argmax())
+        refuse_magnitude(size.max(), f"Row {row if numbers is None else numbers[row]}")
     if level == "posture":
         levels = INDEX_NAMES[0], getattr(index, "name", None) or INDEX_NAMES[1]
-        return Performances([X], "rows", [0], [range(len(X))], levels=levels)
+        return Performances([X], "rows", [0], levels=levels)
     if X.shape[1] < 2:
         raise ValueError(
             "Each row of a 2-D input is one univariate sequence and needs at least 2 frames, got "
@@ -313,7 +282,7 @@ def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
         )
     rows = [row[:, np.newaxis] for row in X]
     labels = list(range(len(X)) if numbers is None else numbers)
-    return Performances(rows, "rows", labels, [], names, numbers=numbers)
+    return Performances(rows, "rows", labels, names=names, numbers=numbers)
 
 
 def _refuse_long_table(name, df):
@@ -374,7 +343,6 @@ def _warn_of_clocks(performances, names):
 
 def _is_even(x):
     """Which features rise on a straight line, but for rounding to half a step: (n_features,)."""
-    x = np.ldexp(x, -int(np.frexp(np.abs(x).max())[1]))
     step = (x[-1] - x[0]) / (len(x) - 1)
     line = x[0] + step * np.arange(len(x))[:, np.newaxis]
     return (
@@ -452,4 +420,4 @@ def all_of(labels, levels, names):
     """
     if len(levels) > 1 or len(set(labels)) < len(labels):
         labels, levels = list(range(len(labels))), {INDEX_NAMES}
-    return Performances((), "list", labels, [], names, *levels)
+    return Performances((), "list", labels, names=names, levels=levels.pop())

@@ -13,7 +13,6 @@ from sklearn.decomposition import PCA
 from sklearn.utils._param_validation import Interval, RealNotInt
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.numbers import check_squares
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
@@ -102,7 +101,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         ------
         ValueError
             If there are fewer than two postures, or fewer than ``n_components`` postures or
-            features, or their unit is such that variances are beyond the precision.
+            features.
         """
         arrays = check_performances(self, X, reset=True, level="posture")
         postures = np.concatenate(arrays) if len(arrays) > 1 else arrays[0]
@@ -117,16 +116,12 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
                 f"{postures.shape[1]} features can span; use at most {most}, or a share of the "
                 "variance such as 0.95."
             )
-        # In units of a power of two no square is out of range, and no bit is lost.
-        exponent = int(np.frexp(np.abs(postures).max())[1])
         with np.errstate(invalid="ignore"):  # no variance at all: 0 / 0 in shares not used
-            pca = PCA().set_output(transform="default").fit(np.ldexp(postures, -exponent))
-        with np.errstate(over="ignore"):
-            variance = np.ldexp(pca.explained_variance_, 2 * exponent)
-        check_squares(postures, variance[0], "variances")
+            pca = PCA().set_output(transform="default").fit(postures)
+        variance = pca.explained_variance_
         b = self._count(variance)
         self.components_ = np.ascontiguousarray(pca.components_[:b])
-        self.mean_ = np.ldexp(pca.mean_, exponent)
+        self.mean_ = pca.mean_
         self.explained_variance_ = variance[:b]
         whole = variance.sum()
         self.explained_variance_ratio_ = (
