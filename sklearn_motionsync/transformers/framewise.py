@@ -11,7 +11,7 @@ from sklearn.utils._param_validation import HasMethods
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.numbers import as_numbers, names_of
+from ..inputs.numbers import as_numbers, column_names
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
@@ -117,7 +117,7 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
             raise
         rows = self.transformer_.transform(self._named(performances[0]))
         # FunctionTransformer names columns by the table that it gives only.
-        self._names_out = names_of(rows)
+        self._names_out = column_names(rows)
         rows = self._as_rows(rows, performances, 0)
         self._n_features_out, self._inverts = rows.shape[1], _inverts(self.transformer_, rows[:1])
         return self
