@@ -19,23 +19,9 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
-from .numbers import (
-    FLOATS,
-    LARGEST,
-    as_numbers,
-    check_finite,
-    check_magnitude,
-    column_names,
-)
+from .numbers import FLOATS, LARGEST, as_numbers, check_finite, check_magnitude, column_names
 from .resampling import warn_of_uneven
-from .tables import (
-    INDEX_NAMES,
-    as_pandas,
-    frame_labels,
-    labels_of,
-    name_performance,
-    split_table,
-)
+from .tables import INDEX_NAMES, as_pandas, labels_of, name_performance, split_table
 
 __all__ = [
     "ACCEPTED",
@@ -93,10 +79,10 @@ class Performances(tuple):
         if isinstance(indices, slice):
             indices = range(len(self))[indices]
         kind = "rows" if self.kind == "rows" else "list"
-        arrays, labels, numbers = (
-            [values[i] for i in indices] for values in (self, self.labels, self.numbers)
+        arrays, labels, numbers, frames = (
+            [values[i] for i in indices] if values else ()
+            for values in (self, self.labels, self.numbers, self.frames)
         )
-        frames = [self.frames[i] for i in indices] if self.frames else []
         return Performances(arrays, kind, labels, frames, self.names, self.levels, numbers)
 
 
@@ -127,7 +113,8 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
     tables = any([issubclass(kind, pd.DataFrame) for kind in set(map(type, sequences))])
     if tables:
         labels, levels = labels_of(sequences, numbers)
-        frames, names = frame_labels(sequences), column_names(sequences[0])
+        names = column_names(sequences[0])
+        frames = [x.index if isinstance(x, pd.DataFrame) else range(len(x)) for x in sequences]
     arrays, largest, holder = [], 0.0, 0
 
     def what():

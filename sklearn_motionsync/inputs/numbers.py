@@ -228,9 +228,8 @@ def check_names(x, expected, what):
     names = column_names(x)
     if names is None or expected is None or names == list(expected):
         return
-    same = sorted(map(str, names)) == sorted(map(str, expected))
     raise ValueError(
         f"{what} has the columns {names[:8]}, expected are {list(expected)[:8]}. The feature names "
-        "should match those that were passed during fit"
-        + (", in the same order: select them by df[names]." if same else ".")
+        "should match those that were passed during fit, in the same order: select them by "
+        "df[names]."
     )

@@ -15,8 +15,6 @@ __all__ = [
     "ROW",
     "SPLIT",
     "as_pandas",
-    "frame_labels",
-    "frame_name",
     "full_names",
     "index_of",
     "label_of_part",
@@ -48,10 +46,7 @@ SPLIT = (
 def split_table(df):
     """The performances of a table whose index names performance and frame."""
     if df.index.nlevels < 2:
-        raise ValueError(
-            "to_sequences needs a DataFrame whose index has the levels (performance, frame), or "
-            f"more that name the performance, got an index of {df.index.nlevels} level(s). {SPLIT}"
-        )
+        raise ValueError(f"An index of 1 level(s) does not name performance and frame. {SPLIT}")
     keys, frames = df.index.droplevel(-1), df.index.get_level_values(-1)
     levels = full_names(df.index.names)
     if levels[0] in _TIMES and levels[-1] not in (*_TIMES, ROW):
@@ -129,7 +124,8 @@ def labels_of(sequences, numbers=None):
     Those that a list carries, if it does so throughout and they differ; otherwise their numbers,
     0, 1, ... by default.
     """
-    frame = frame_name(sequences) or FRAME
+    frames = {x.index.name if isinstance(x, pd.DataFrame) else None for x in sequences}
+    frame = (frames.pop() if len(frames) == 1 else None) or FRAME
     found = [own_label(x) for x in sequences]
     labels = [label for label, _ in found]
     names = {levels for _, levels in found}
@@ -187,17 +183,6 @@ def labels_given(performances):
         labels, levels = labels_of(labels)
         return labels, levels[:-1]
     return labels, (PERFORMANCE,)
-
-
-def frame_labels(sequences):
-    """Labels of the frames of each performance: its index, or their numbers."""
-    return [x.index if isinstance(x, pd.DataFrame) else range(len(x)) for x in sequences]
-
-
-def frame_name(sequences):
-    """The name of the frames' level that DataFrames share; None without one."""
-    names = {x.index.name if isinstance(x, pd.DataFrame) else None for x in sequences}
-    return names.pop() if len(names) == 1 else None
 
 
 def index_of(labels, names):

@@ -9,14 +9,7 @@ from sklearn.base import BaseEstimator
 from sklearn.utils._set_output import _get_output_config
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from .collections import (
-    ACCEPTED,
-    NOT_ONE,
-    Performances,
-    as_collection,
-    as_source,
-    check_members,
-)
+from .collections import ACCEPTED, NOT_ONE, Performances, as_collection, as_source, check_members
 from .numbers import (
     FLOATS,
     as_numbers,
@@ -26,18 +19,9 @@ from .numbers import (
     column_names,
     refuse_non_numeric,
 )
-from .tables import (
-    FRAME,
-    INDEX_NAMES,
-    PERFORMANCE,
-    SPLIT,
-    as_pandas,
-    labels_of,
-    stack_frame,
-)
+from .tables import FRAME, INDEX_NAMES, PERFORMANCE, SPLIT, as_pandas, labels_of, stack_frame
 
 __all__ = [
-    "Performances",
     "SequenceLevelMixin",
     "check_performances",
     "check_transformed",
@@ -296,12 +280,15 @@ def _warn_of_clocks(performances, names):
     n_features = performances[0].shape[1]
     if n_features == 1 or min(map(len, performances)) < _CLOCK_FRAMES:
         return
-    ticks = np.ones(n_features, dtype=bool)
+    clocks = np.ones(n_features, dtype=bool)
     for x in performances:
-        ticks &= _increases_evenly(x)
-        if not ticks.any():
+        step = (x[-1] - x[0]) / (len(x) - 1)
+        line = x[0] + step * np.arange(len(x))[:, np.newaxis]
+        # On a straight line, within half a step: times are rounded.
+        clocks &= (np.diff(x, axis=0) > 0).all(axis=0) & (np.abs(x - line) <= step / 2).all(axis=0)
+        if not clocks.any():
             return
-    for k in np.flatnonzero(ticks):
+    for k in np.flatnonzero(clocks):
         name = k if names is None else repr(names[k])
         warnings.warn(
             f"Feature {name} increases evenly in every performance: it is a clock, not a movement, "
@@ -309,17 +296,6 @@ def _warn_of_clocks(performances, names):
             UserWarning,
             stacklevel=2,
         )
-
-
-def _increases_evenly(x):
-    """Which features increase on a straight line, within half a step: (n_features,)."""
-    step = (x[-1] - x[0]) / (len(x) - 1)
-    line = x[0] + step * np.arange(len(x))[:, np.newaxis]
-    return (
-        (step > 0)
-        & (np.diff(x, axis=0) > 0).all(axis=0)
-        & (np.abs(x - line) <= step / 2).all(axis=0)
-    )
 
 
 # -- performances that are read in parts, so that few are in memory at a time ---------------

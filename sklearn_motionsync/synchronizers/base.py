@@ -9,9 +9,9 @@ from sklearn.utils import Bunch
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.collections import Performances
 from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.validation import (
-    Performances,
     SequenceLevelMixin,
     labels_of_parts,
     names_of_input,
