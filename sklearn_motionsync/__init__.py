@@ -17,8 +17,7 @@ from .body.direction_cosines import DirectionCosines
 from .body.joint_positions import JointPositions
 from .body.mirror import mirror
 from .body.skeleton import Skeleton
-from .inputs.collections import to_frame
-from .inputs.long_tables import to_sequences
+from .inputs.long_tables import to_frame, to_sequences
 from .model.action_model import ActionModel
 from .model.departures import find_departures
 from .model.detector import ActionDetector

@@ -401,8 +401,8 @@ def put(value):
 BAD = {
     "NaN": (put(np.nan), r"Performance 4, frame 3, feature 2 is NaN"),
     "infinity": (put(np.inf), r"Performance 4, frame 3, feature 2 is infinity"),
-    "empty": (lambda x: x[:0], r"Performance 4 has shape \(0, 45\); .* at least 2 frames"),
-    "one frame": (lambda x: x[:1], r"Performance 4 has shape \(1, 45\); .* at least 2 frames"),
+    "empty": (lambda x: x[:0], r"Performance 4 has shape \(0, 45\), .* at least 2 frames"),
+    "one frame": (lambda x: x[:1], r"Performance 4 has shape \(1, 45\), .* at least 2 frames"),
     "no features": (lambda x: x[:, :0], r"Performance 4 has (shape|0 features)"),
     "wrong width": (lambda x: x[:, 1:], r"Performance 4 has 44 features .* performance 0 has 45"),
     "one dimension": (lambda x: x[:, 0], r"Performance 4 has shape \(30,\), expected \(n_frames"),

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Set
 from numbers import Integral, Real
 
-from ..inputs.numbers import names_of
+from ..inputs.numbers import column_names
 from .formats import LANDMARKS
 
 __all__ = [
@@ -60,7 +60,7 @@ def check_columns(x, skeleton, what):
     """
     expected = skeleton.column_names
     place_of = {name: place for place, name in enumerate(expected)}
-    for place, name in enumerate(names_of(x) or ()):
+    for place, name in enumerate(column_names(x) or ()):
         if place_of.get(name, place) != place:
             raise ValueError(
                 f"{what}: column {place} is {name!r}, where the skeleton has "

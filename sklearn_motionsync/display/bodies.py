@@ -6,7 +6,7 @@ from ..body.axes import heading
 from ..body.columns import check_columns
 from ..body.limbs import unit
 from ..body.upright import y_up
-from ..inputs.numbers import as_numbers, names_of
+from ..inputs.numbers import as_numbers, column_names
 from .given import mean_of_seen
 
 __all__ = [
@@ -39,7 +39,7 @@ def upright(x, skeleton, i):
     if skeleton is not None:
         check_columns(x, skeleton, what)
         n_dims, n_joints = skeleton.n_dims, len(skeleton.joints)
-    names = names_of(x) or ()
+    names = column_names(x) or ()
     x = as_numbers(x, what, dtype=np.float64)
     if skeleton is None:
         width = x.shape[-1] if x.ndim > 0 else 0

@@ -11,8 +11,7 @@ from sklearn.utils.validation import check_is_fitted
 from ..body.columns import is_whole
 from ..body.direction_cosines import DirectionCosines
 from ..inputs.collections import as_collection
-from ..inputs.features import choose_features
-from ..inputs.features import names_of as names_of_features
+from ..inputs.features import choose_features, names_of_features
 from ..inputs.tables import labels_of
 from ..online.stream import LivePhase
 from ..online.synchronizer import OnlineSynchronizer

@@ -4,7 +4,7 @@ import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
 from ..body.columns import is_whole
-from ..inputs.features import choose_features, names_of
+from ..inputs.features import choose_features, names_of_features
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import find_step
 from .drawing import COLORS, panels
@@ -100,7 +100,7 @@ class MetricDisplay:
         metric = synchronizer.metric_
         if metric is None:
             raise ValueError(_why_none(synchronizer))
-        names = names_of(before, synchronizer, len(metric.share))
+        names = names_of_features(before, synchronizer, len(metric.share))
         shares = np.column_stack([metric.share, metric.energy])
         if features is None:
             names, shares = _largest(names, shares)

@@ -9,7 +9,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
-from ..inputs.validation import name_performance
+from ..inputs.tables import name_performance
 from ..model.action_model import ActionModel
 from ..model.classes import models_of_classes
 from ..model.views import view_of

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..inputs.features import choose_features, names_of
+from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import check_names
 from ..inputs.validation import read_collection
 from ..synchronizers.match import as_match
@@ -151,7 +151,7 @@ class SynchronizationDisplay:
         """
         reached = reach_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
         before, synchronizer, performances = reached[:3]
-        names = names_of(before, synchronizer, performances[0].shape[1])
+        names = names_of_features(before, synchronizer, performances[0].shape[1])
         chosen = choose_features(features, names)
         match, shown = reached.match(), [x[:, chosen] for x in performances]
         display = cls(

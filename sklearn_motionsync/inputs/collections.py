@@ -1,16 +1,15 @@
-"""The one input contract: what a set of performances is, and nothing else.
+"""The input contract: what a set of performances is.
 
-A set of performances is a plain list of 2-D arrays ``(n_frames_i, n_features)``. A
-3-D array, a 1-D object array, a list of DataFrames (of pandas or polars) and a DataFrame
-indexed by performance, in one level or more, and frame are the same thing. A 2-D array is
-read by rows: postures for the posture-level estimators, univariate sequences for the
-sequence-level ones.
+A set of performances is a list of 2-D arrays ``(n_frames_i, n_features)``. A 3-D array, a 1-D
+object array, a list of DataFrames (of pandas or polars) and a DataFrame indexed by performance, in
+one level or more, and frame are the same thing. A 2-D array is read by rows: postures for the
+posture-level estimators, univariate sequences for the sequence-level ones.
 
 Any other sequence that gives performances by index, ``len(X)`` and ``X[i]``, such as one that opens
 a file for each, or a 3-D data set on disk, is a list of them, too: each is read once, one after the
 other. Synchronizers read it, and memory maps, in parts when they transform and match, and only what
-they need for a fit to a sample (``max_fit``); everybody else takes it into memory. The first
-performance that is read in parts tells the precision of all: beside single precision, double
+they need for a fit to a sample (``max_fit``); other estimators read it into memory. The first
+performance that is read in parts sets the precision of all: after single precision, double
 precision is refused.
 """
 
@@ -20,29 +19,20 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
-from .numbers import as_numbers, check_finite, names_of
+from .numbers import FLOATS, LARGEST, as_numbers, check_finite, check_magnitude, column_names
 from .resampling import warn_of_uneven
-from .tables import (
-    INDEX_NAMES,
-    as_pandas,
-    cut,
-    frame_labels,
-    labels_given,
-    labels_of,
-    name_performance,
-    stack_frame,
-)
+from .tables import INDEX_NAMES, as_pandas, labels_of, name_performance, split_table
 
 __all__ = [
     "ACCEPTED",
     "NOT_ONE",
+    "Performances",
     "as_collection",
     "as_source",
     "check_members",
     "count_of",
     "gives_rows",
-    "taken",
-    "to_frame",
+    "select",
 ]
 
 ACCEPTED = (
@@ -52,71 +42,129 @@ ACCEPTED = (
 NOT_ONE = f"{ACCEPTED}; got a single 2-D input. Wrap one performance as [X]."
 
 
-def to_frame(sequences, *, performances=None, columns=None):
-    """Turn performances into one frame that is indexed by performance and frame.
+class Performances(tuple):
+    """Checked performances: arrays of one dtype, and what it takes to give the same kind back.
+
+    The arrays are views of the input where its dtype allows: never write to them.
+
+    Attributes
+    ----------
+    kind : {"rows", "array", "list", "frame"}
+        2-D, 3-D, list, MultiIndex frame.
+    labels : list
+        Of the performances; tuples where several levels name them.
+    frames : list
+        Labels of the frames of each performance of a table; empty where they are numbered.
+    names : sequence of str or None
+        Names of the features; after `check_performances` ``feature_names_in_`` of the estimator.
+    levels : tuple of str
+        Names of the levels of an index; the last is that of the frames.
+    numbers : sequence of int
+        The index of each in all that was given.
+    """
+
+    def __new__(cls, arrays, kind, labels, frames=(), names=None, levels=INDEX_NAMES, numbers=None):
+        self = super().__new__(cls, arrays)
+        self.kind, self.labels, self.frames, self.names = kind, labels, frames, names
+        self.levels = levels
+        self.numbers = range(len(self)) if numbers is None else numbers
+        return self
+
+    def called(self, i):
+        """The name of one of them in messages."""
+        return name_performance(self.numbers[i], self.labels[i])
+
+    def take(self, indices):
+        """Some of them, by a slice or a sequence of indices: rows, or a list."""
+        if isinstance(indices, slice):
+            indices = range(len(self))[indices]
+        kind = "rows" if self.kind == "rows" else "list"
+        arrays, labels, numbers, frames = (
+            [values[i] for i in indices] if values else ()
+            for values in (self, self.labels, self.numbers, self.frames)
+        )
+        return Performances(arrays, kind, labels, frames, self.names, self.levels, numbers)
+
+
+def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=None):
+    """Check the performances of a collection in one pass.
 
     Parameters
     ----------
-    sequences : list of 2-D arrays or DataFrames, or 3-D array
-        Performances ``(n_frames_i, n_features)``.
-    performances : sequence of length n_sequences, default=None
-        Labels, or an index of one level or several, whose names are taken; or the DataFrames of
-        `to_sequences`, whose labels and names are. By default those that the sequences have from
-        there, or 0, 1, ...
-    columns : sequence of str, default=None
-        Names of the features; by default those of the DataFrames, or 0, 1, ...
+    sequences : list
+    finite : {True, False, "allow-nan"}, default=True
+        As in scikit-learn. False: their magnitude is free, too.
+    training : bool, default=True
+        Whether to refuse a set all of whose values are tiny; large ones always are.
+    numbers : sequence of int, default=None
+        The index of each in all that was given; by default 0, 1, ...
+    dtype : dtype, default=None
+        Of those before: by default single precision if all of these are.
 
     Returns
     -------
-    DataFrame
-        The concatenated performances. The index levels are ``performance`` and ``frame``, or what
-        they are called in the table that labels and frames come from.
-
-    Raises
-    ------
-    ValueError
-        If the performances do not agree in width or names, or a label is missing or
-        given twice.
-
-    See Also
-    --------
-    to_sequences : The way back.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import pandas as pd
-    >>> from sklearn_motionsync import to_frame
-    >>> X = [np.zeros((2, 1)), np.ones((3, 1))]
-    >>> df = to_frame(X, columns=["knee"])
-    >>> df.loc[1, "knee"].tolist()
-    [1.0, 1.0, 1.0]
-    >>> labels = pd.MultiIndex.from_tuples([("ann", 1), ("ann", 2)], names=["who", "trial"])
-    >>> to_frame(X, performances=labels, columns=["knee"]).loc["ann"].loc[2].shape
-    (3, 1)
+    Performances
+        Of the kind "list", with the names of the columns (None without names).
     """
-    sequences = as_collection(sequences)
-    if sequences is None:
-        raise ValueError(NOT_ONE)
-    arrays, names = check_members(sequences, finite=False)
-    labels, levels = labels_of(sequences)
-    if performances is not None:
-        labels, outer = labels_given(performances)
-        levels = (*outer, levels[-1])
-    if len(labels) != len(arrays) or len(set(labels)) != len(labels):
-        raise ValueError(
-            f"performances must be {len(arrays)} different labels, one a performance, "
-            f"got {len(labels)} of which {len(set(labels))} differ."
-        )
-    columns = names if columns is None else list(columns)
-    if columns is not None and len(columns) != arrays[0].shape[1]:
-        raise ValueError(
-            f"columns must name the {arrays[0].shape[1]} features, one each; got {len(columns)}."
-        )
-    return stack_frame(arrays, labels, frame_labels(sequences), columns, levels)
+    if len(sequences) == 0:
+        raise ValueError(f"Found 0 performances (n_samples=0), at least 1 is needed. {ACCEPTED}.")
+    numbers = range(len(sequences)) if numbers is None else numbers
+    labels, levels, frames, names = list(numbers), INDEX_NAMES, [], None
+    tables = any([issubclass(kind, pd.DataFrame) for kind in set(map(type, sequences))])
+    if tables:
+        labels, levels = labels_of(sequences, numbers)
+        names = column_names(sequences[0])
+        frames = [x.index if isinstance(x, pd.DataFrame) else range(len(x)) for x in sequences]
+    arrays, largest, holder = [], 0.0, 0
+
+    def what():
+        return name_performance(numbers[i], labels[i])
+
+    for i, x in enumerate(sequences):
+        # For a plain array nothing but NumPy itself is called.
+        plain = type(x) is np.ndarray and x.dtype in FLOATS
+        array = x if plain else as_numbers(x, what())
+        if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] < 1:
+            raise ValueError(
+                f"{what()} has shape {array.shape}, expected (n_frames, n_features) with at least "
+                "2 frames and 1 feature. Give a univariate performance as a column, "
+                "x[:, np.newaxis]."
+            )
+        arrays.append(array)
+        if array.shape[1] != arrays[0].shape[1]:
+            raise ValueError(
+                f"{what()} has {array.shape[1]} features a frame, performance {numbers[0]} has "
+                f"{arrays[0].shape[1]}. All performances need the same features in the same order."
+            )
+        if tables and column_names(x) != names:
+            raise ValueError(
+                f"{what()} has the columns {column_names(x)}, performance {numbers[0]} has "
+                f"{names}. All performances need the same columns in the same order."
+            )
+        if dtype == np.float32 and array.dtype != dtype:
+            raise ValueError(
+                f"{what()} is {array.dtype}, and those before are float32: what is read in parts "
+                "has the precision of the first. Give all as x.astype(np.float32)."
+            )
+        if not finite:
+            continue
+        high, low = array.max(), -array.min()
+        peak = high if high > low else low
+        if not peak <= LARGEST:
+            own = frames[i] if tables else None
+            check_finite(array, f"{what()}, frame", names, own, allow_nan=finite == "allow-nan")
+            peak = np.fmax.reduce(np.abs(array), axis=None, initial=0)
+        if peak > largest:
+            largest, holder = peak, i
+    check_magnitude(largest, name_performance(numbers[holder], labels[holder]), training=training)
+    if dtype is None:
+        dtype = np.float32 if {a.dtype for a in arrays} == {np.dtype(np.float32)} else np.float64
+    # Row by row in memory, so that no result depends on the layout of the input.
+    arrays = [np.ascontiguousarray(a, dtype=dtype) for a in arrays]
+    return Performances(arrays, "list", labels, frames, names, levels, numbers)
 
 
-# -- how the kinds are told apart ---------------------------------------------------
+# -- kinds of collections -----------------------------------------------------------
 
 
 def as_collection(X):
@@ -125,41 +173,60 @@ def as_collection(X):
     if isinstance(X, pd.DataFrame):
         if X.index.nlevels < 2:
             return None
-        sequences = cut(X)
+        sequences = split_table(X)
         warn_of_uneven(sequences)
         return sequences
-    if issparse(X):
-        return None
-    if isinstance(X, dict):
-        raise ValueError(
-            f"{ACCEPTED}, got dict. Use list(X.values()); or, of tables, pd.concat(X, "
-            f"names={list(INDEX_NAMES)}), which keeps what they are called."
-        )
-    if isinstance(X, (set, frozenset, str, bytes)) or _has_no_order(X):
-        raise ValueError(f"{ACCEPTED}, got {type(X).__name__}. Use list(...) of the arrays.")
     if isinstance(X, np.ndarray):
         if X.ndim == 3:
             return list(X)
         if X.ndim > 3:
             raise ValueError(f"{ACCEPTED}, got an array of shape {X.shape}.")
-        X = list(X) if X.dtype == object and X.ndim == 1 else None
+        return _members(list(X)) if X.dtype == object and X.ndim == 1 else None
     if isinstance(X, (list, tuple)):
-        items = [as_pandas(x) for x in X]
-        return items if len(items) == 0 or _holds_matrices(items) else None
+        return _members(X)
+    if issparse(X):
+        return None
+    if isinstance(X, (dict, set, frozenset, str, bytes)) or _has_no_order(X):
+        raise ValueError(
+            f"{ACCEPTED}, got {type(X).__name__}. Give a list of the arrays; of tables, "
+            f"pd.concat(tables, names={list(INDEX_NAMES)})."
+        )
     source = as_source(X)
     return None if source is None else [source[i] for i in range(len(source))]
 
 
-def as_source(X):
-    """What is better read in parts: given by index, or memory maps; None for all else.
+def _members(X):
+    """The performances of a list; None for the rows of a matrix."""
+    if set(map(type, X)) == {np.ndarray} and max([x.ndim for x in X]) >= 2:
+        return list(X)
+    items = [as_pandas(x) for x in X]
+    depths = [_depth(item) for item in items]
+    if not items or max(depths) >= 2:
+        return items
+    if len({len(item) for item, depth in zip(items, depths, strict=True) if depth == 1}) > 1:
+        raise ValueError(
+            f"{ACCEPTED}. Performance 0 has {len(items[0])} values in one dimension and others "
+            "have other lengths: give univariate performances as columns, x[:, np.newaxis]."
+        )
+    return None
 
-    It is looked at for no longer than it takes to tell.
-    """
+
+def _depth(item):
+    if hasattr(item, "ndim"):
+        return item.ndim
+    if isinstance(item, (list, tuple)):
+        return 1 + max((_depth(inner) for inner in item), default=0)
+    return np.ndim(item) if hasattr(item, "__array__") else 0
+
+
+def as_source(X):
+    """A collection to be read in parts: one given by index, or memory maps; None for all else."""
     if isinstance(X, np.ndarray):
         return X if isinstance(X, np.memmap) and X.ndim == 3 else None
     if isinstance(X, (list, tuple)):
-        return X if len(X) and all(isinstance(x, np.memmap) and x.ndim == 2 for x in X) else None
-    # A matrix, or a column of objects, is what it says it is.
+        maps = set(map(type, X)) == {np.memmap} and all([x.ndim == 2 for x in X])
+        return X if maps else None
+    # An array-like of other dimensions is no collection.
     if not _has_items(X) or (hasattr(X, "__array__") and getattr(X, "ndim", 0) != 3):
         return None
     first = as_pandas(X[0]) if len(X) else None
@@ -176,7 +243,7 @@ def gives_rows(X):
 
 
 def _has_no_order(X):
-    """Whether an object has items, but does not give them by number, or not how many there are."""
+    """Whether an object has items, but gives neither their number nor an item by its number."""
     if isinstance(X, pd.Series):
         return X.dtype == object and any(_depth(x) >= 2 for x in X)
     has = [hasattr(X, name) for name in ("__iter__", "__len__", "__getitem__")]
@@ -208,101 +275,14 @@ class _Source:
 
 
 def count_of(X):
-    """How many performances there are, or rows."""
+    """The number of performances, or of rows."""
     return X.shape[0] if hasattr(X, "shape") else len(X)
 
 
-def taken(X, indices):
+def select(X, indices):
     """Some performances, or rows, by their indices; nothing else is read."""
     if isinstance(X, np.ndarray):
         return X[indices]
     if isinstance(X, pd.DataFrame):
         return X.iloc[indices]
     return [X[int(i)] for i in indices]
-
-
-def _holds_matrices(items):
-    """Whether a list holds performances rather than the rows of a matrix."""
-    depths = [_depth(item) for item in items]
-    if max(depths, default=0) >= 2:
-        return True
-    lengths = {len(item) for item, depth in zip(items, depths, strict=True) if depth == 1}
-    if len(lengths) > 1:
-        raise ValueError(
-            f"{ACCEPTED}. Performance 0 has {len(items[0])} values in one dimension and others "
-            "have other lengths: give univariate performances as columns, x[:, np.newaxis]."
-        )
-    return False
-
-
-def _depth(item):
-    if hasattr(item, "ndim"):
-        return item.ndim
-    if isinstance(item, (list, tuple)):
-        return 1 + max((_depth(inner) for inner in item), default=0)
-    return np.ndim(item) if hasattr(item, "__array__") else 0
-
-
-# -- checks -------------------------------------------------------------------------
-
-
-def check_members(sequences, *, finite=True, numbers=None, dtype=None):
-    """Arrays of one dtype, and the column names they share (None without names).
-
-    Parameters
-    ----------
-    sequences : list
-    finite : {True, False, "allow-nan"}, default=True
-        As in scikit-learn.
-    numbers : sequence of int, default=None
-        What number each has in all that was given; by default 0, 1, ...
-    dtype : dtype, default=None
-        Of those before: by default single precision if all of these are.
-    """
-    if len(sequences) == 0:
-        raise ValueError(f"Found 0 performances (n_samples=0), at least 1 is needed. {ACCEPTED}.")
-    labels, _ = labels_of(sequences, numbers)
-    numbers = range(len(sequences)) if numbers is None else numbers
-    called = [name_performance(i, label) for i, label in zip(numbers, labels, strict=True)]
-    arrays = [_as_matrix(what, x) for what, x in zip(called, sequences, strict=True)]
-    names, width = names_of(sequences[0]), arrays[0].shape[1]
-    for what, x, array in zip(called, sequences, arrays, strict=True):
-        if array.shape[1] != width:
-            raise ValueError(
-                f"{what} has {array.shape[1]} features a frame, performance {numbers[0]} has "
-                f"{width}. All performances need the same features in the same order."
-            )
-        if names_of(x) != names:
-            raise ValueError(
-                f"{what} has the columns {names_of(x)}, performance {numbers[0]} has {names}. "
-                "All performances need the same columns in the same order."
-            )
-        if dtype == np.float32 and array.dtype != dtype:
-            raise ValueError(
-                f"{what} is {array.dtype}, and those before are float32: what is read in parts "
-                "has the precision of the first. Give all as x.astype(np.float32)."
-            )
-        if finite:
-            frames = x.index if isinstance(x, pd.DataFrame) else None
-            check_finite(array, f"{what}, frame", names, frames, allow_nan=finite == "allow-nan")
-    if dtype is None:
-        single = all(a.dtype == np.float32 for a in arrays)
-        dtype = np.float32 if single else np.float64
-    # Row by row in memory, so that no result depends on the layout of the input.
-    return [np.ascontiguousarray(a, dtype=dtype) for a in arrays], names
-
-
-def _as_matrix(what, x):
-    """One performance as a float array (n_frames, n_features) of at least 2 frames."""
-    array = as_numbers(x, what)
-    if array.ndim != 2:
-        raise ValueError(
-            f"{what} has shape {array.shape}, expected (n_frames, n_features). Give a "
-            "univariate performance as a column, x[:, np.newaxis]."
-        )
-    if array.shape[0] < 2 or array.shape[1] < 1:
-        raise ValueError(
-            f"{what} has shape {array.shape}; a performance needs at least 2 frames and "
-            "1 feature. Drop it from the list."
-        )
-    return array

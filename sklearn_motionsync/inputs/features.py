@@ -2,7 +2,7 @@
 
 from numbers import Integral
 
-__all__ = ["as_features", "choose_features", "names_of"]
+__all__ = ["as_features", "choose_features", "names_of_features"]
 
 # Features shown when none are named.
 _FEW = 4
@@ -40,7 +40,7 @@ def as_features(features):
     return [features] if single or getattr(features, "ndim", 1) == 0 else list(features)
 
 
-def names_of(before, step, width):
+def names_of_features(before, step, width):
     """Names of the ``width`` features that reach a step of a pipeline, after those before it."""
     names = getattr(step, "feature_names_in_", None)
     if names is None and before is not None:

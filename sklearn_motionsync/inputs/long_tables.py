@@ -1,42 +1,40 @@
-"""Long tables: one row a frame, cut into performances by columns, in order of an even time."""
+"""Tables of frames to performances, in order of an even time, and back."""
 
-from typing import NamedTuple
+from numbers import Real
 
 import numpy as np
 import pandas as pd
 
-from .numbers import as_numbers
+from .collections import NOT_ONE, as_collection, check_members
+from .numbers import refuse_non_numeric
 from .resampling import (
-    COMMA,
-    as_times,
-    check_settings,
+    attrs_of_rows,
     even_grid,
-    facts_at,
-    gaps_of,
-    has_comma,
-    interpolated,
-    round_up,
+    find_time_gaps,
+    interpolate,
+    times_as_numbers,
     warn_of_uneven,
 )
 from .tables import (
+    FRAME,
     INDEX_NAMES,
+    PERFORMANCE,
     ROW,
+    SPLIT,
     as_pandas,
-    call_to_unfold,
-    called,
-    cut,
     full_names,
+    labelled,
+    labels_given,
     own_label,
-    parts_of,
+    rows_of_labels,
+    split_table,
+    stack_frame,
 )
 
-__all__ = ["to_sequences"]
-
-# Gaps, and performances with any, named in a message.
-_SHOWN = 3
+__all__ = ["to_frame", "to_sequences"]
 
 
-def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap=None):
+def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
     """Turn a table of frames into a list of performances.
 
     Do this *before* cross-validation: scikit-learn would split the table by row.
@@ -57,7 +55,7 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap=None):
         order. By default rows are frames in the order they come in.
     frame_rate : float, default=None
         Frames in a unit of ``time`` that performances shall have. By default each keeps its own.
-    max_gap : float, default=None
+    max_gap_time : float, default=None
         Longest step of ``time``, in its unit, that is bridged by a straight line. By default
         steps above 1.9 times the median step are errors.
 
@@ -115,104 +113,149 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap=None):
     if not isinstance(df, pd.DataFrame):
         raise ValueError(
             f"to_sequences needs a DataFrame of pandas or polars, got {type(df).__name__}. Several "
-            f"tables make one: pd.concat({{'ann': ann, 'bob': bob}}, names={list(INDEX_NAMES)}). "
-            "An array makes one by pd.DataFrame(x, columns=[...]); arrays that are performances "
-            "already need no table."
+            f"tables make one: pd.concat(tables, names={list(INDEX_NAMES)}); arrays that are "
+            "performances already need no table."
         )
-    check_settings(frame_rate, max_gap, time)
+    for name, value in (("frame_rate", frame_rate), ("max_gap_time", max_gap_time)):
+        if value is None:
+            continue
+        is_number = isinstance(value, Real) and not isinstance(value, bool)
+        if not is_number or not 0 < value < np.inf:
+            raise ValueError(f"{name} must be a number above 0, in units of time; got {value!r}.")
+        if time is None:
+            raise ValueError(f"{name}={value!r} needs time=, the column of the times.")
     if by is None and time is None:
-        sequences = cut(df)
+        sequences = split_table(df)
         warn_of_uneven(sequences)
         return sequences
     if df.index.nlevels > 1:
         df = df.rename_axis(index=full_names(df.index.names))
-    return _cut_by_columns(df, _Request(by, time, frame_rate, max_gap))
-
-
-class _Request(NamedTuple):
-    """What is asked for."""
-
-    by: object
-    time: object
-    frame_rate: float | None
-    max_gap: float | None
-
-    def keys(self, df):
-        """The columns or levels that name the performance."""
-        if self.by is not None:
-            is_list = isinstance(self.by, (list, tuple, pd.Index, np.ndarray))
-            return list(self.by) if is_list else [self.by]
-        levels = list(df.index.names)
-        if self.time not in levels and (len(levels) > 1 or df.index.is_unique):
-            # The time takes the place of what numbers the frames.
-            levels = levels[:-1]
-        return [level for level in levels if level is not None and level != self.time]
-
-    def call(self, **other):
-        """The call to make."""
-        settings = {**self._asdict(), **other}
-        given = [f"{name}={value!r}" for name, value in settings.items() if value is not None]
-        return f"to_sequences(df, {', '.join(given)})"
-
-
-def _cut_by_columns(df, request):
-    keys, time = request.keys(df), request.time
-    flat = _flat(df, keys, request)
-    if not len(flat):
-        raise ValueError("The table has no rows, so there are no performances in it.")
+    keys = _keys(df, by, time)
+    flat = _levels_as_columns(df, keys, [] if time is None else [time])
     features = flat.drop(columns=[*keys, *([] if time is None else [time])])
-    _check_features(features, keys, request)
-    names = keys or [INDEX_NAMES[0]]
+    refuse_non_numeric(features, "The table")
+    names = keys or [PERFORMANCE]
     if len(keys) > 1:
         index = pd.MultiIndex.from_frame(flat[keys])
     else:
         index = pd.Index(flat[keys[0]] if keys else np.zeros(len(flat), dtype=int))
-    labels, parts = parts_of(index, names)
+    labels, parts = rows_of_labels(index, names)
     if keys and len(flat) == len(labels):
-        _refuse_wide(df, keys)
+        raise ValueError(
+            f"{keys} give {len(flat)} performances of one row each, and a performance has 2 frames "
+            "or more, one below the other. Name in by= the columns of the performance only, and "
+            "the time in time=: to_sequences(df, by=..., time=...)."
+        )
     if not keys and own_label(df)[0] is not None:
         label, names = own_label(df)
         labels = [label]
     if time is None:
-        name = ROW if INDEX_NAMES[1] in names else None
-        numbered = [_indexed(features, rows, pd.RangeIndex(len(rows), name=name)) for rows in parts]
-        levels = (*names, name or INDEX_NAMES[1])
-        return [
-            called(x, label, levels, facts_at(df.attrs, rows, len(df)))
-            for x, rows, label in zip(numbered, parts, labels, strict=True)
-        ]
+        level = ROW if FRAME in names else None
+        sequences = []
+        for rows, label in zip(parts, labels, strict=True):
+            x = _rows(features, rows, pd.RangeIndex(len(rows), name=level))
+            attrs = attrs_of_rows(df.attrs, rows, len(df))
+            sequences.append(labelled(x, label, (*names, level or FRAME), attrs))
+        return sequences
     clock = flat[time]
     if isinstance(clock.dtype, np.dtype) and clock.dtype.kind in "fiu":
         clock = clock.to_numpy(dtype=np.float64)
-    timed = [
-        _in_order(clock, rows, label, keys, request)
-        for rows, label in zip(parts, labels, strict=True)
-    ]
-    _check_gaps([times for times, _ in timed], labels, request)
+    timed = [_in_order(clock, *part, time) for part in zip(parts, labels, strict=True)]
+    _check_gaps([times for times, _ in timed], labels, max_gap_time)
     sequences = []
     for (times, rows), label in zip(timed, labels, strict=True):
-        grid = even_grid(times, request.frame_rate, f"Performance {label!r}")
-        index = pd.Index(times if grid is None else grid, name=time)
-        x = _indexed(features, rows, index if grid is None else None)
+        grid = even_grid(times, frame_rate, f"Performance {label!r}")
+        x = _rows(features, rows, pd.Index(times, name=time))
         if grid is not None:
-            x = _resampled(x, times, grid, label).set_axis(index)
-        facts = facts_at(df.attrs, rows, len(df), times, grid)
-        sequences.append(called(x, label, (*names, time), facts, resampled=grid is not None))
+            columns = {k: interpolate(x.iloc[:, k], times, grid) for k in range(x.shape[1])}
+            index = pd.Index(grid, name=time)
+            x = pd.DataFrame(columns, index=index).set_axis(x.columns, axis=1)
+        attrs = attrs_of_rows(df.attrs, rows, len(df), times, grid)
+        sequences.append(labelled(x, label, (*names, time), attrs, resampled=grid is not None))
     return sequences
 
 
-def _indexed(features, rows, index=None):
-    """Rows of a table, a copy, under an index of their own."""
-    x = features.iloc[rows]
-    if index is not None:
-        # In place: set_axis would copy everything once more.
-        x.index = index
-    return x
+def to_frame(sequences, *, performances=None, columns=None):
+    """Turn performances into one frame that is indexed by performance and frame.
+
+    Parameters
+    ----------
+    sequences : list of 2-D arrays or DataFrames, or 3-D array
+        Performances ``(n_frames_i, n_features)``.
+    performances : sequence of length n_sequences, default=None
+        Labels, or an index of one level or several, whose names are taken; or the DataFrames of
+        `to_sequences`, whose labels and names are. By default those that the sequences have from
+        there, or 0, 1, ...
+    columns : sequence of str, default=None
+        Names of the features; by default those of the DataFrames, or 0, 1, ...
+
+    Returns
+    -------
+    DataFrame
+        The concatenated performances. The index levels are ``performance`` and ``frame``, or what
+        they are called in the table that labels and frames come from.
+
+    Raises
+    ------
+    ValueError
+        If the performances do not agree in width or names, or a label is missing or
+        given twice.
+
+    See Also
+    --------
+    to_sequences : The way back.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pandas as pd
+    >>> from sklearn_motionsync import to_frame
+    >>> X = [np.zeros((2, 1)), np.ones((3, 1))]
+    >>> df = to_frame(X, columns=["knee"])
+    >>> df.loc[1, "knee"].tolist()
+    [1.0, 1.0, 1.0]
+    >>> labels = pd.MultiIndex.from_tuples([("ann", 1), ("ann", 2)], names=["subject", "trial"])
+    >>> to_frame(X, performances=labels, columns=["knee"]).loc["ann"].loc[2].shape
+    (3, 1)
+    """
+    sequences = as_collection(sequences)
+    if sequences is None:
+        raise ValueError(NOT_ONE)
+    arrays = check_members(sequences, finite=False)
+    labels, levels, names = arrays.labels, arrays.levels, arrays.names
+    if performances is not None:
+        labels, outer = labels_given(performances)
+        levels = (*outer, levels[-1])
+    if len(labels) != len(arrays) or len(set(labels)) != len(labels):
+        raise ValueError(
+            f"performances must be {len(arrays)} different labels, one a performance, "
+            f"got {len(labels)} of which {len(set(labels))} differ."
+        )
+    columns = names if columns is None else list(columns)
+    if columns is not None and len(columns) != arrays[0].shape[1]:
+        raise ValueError(
+            f"columns must name the {arrays[0].shape[1]} features, one each; got {len(columns)}."
+        )
+    return stack_frame(arrays, labels, arrays.frames, columns, levels)
 
 
-def _flat(df, keys, request):
-    """The table with the levels that are asked for as columns."""
-    named = [*keys, *([] if request.time is None else [request.time])]
+# -- steps of to_sequences ------------------------------------------------------------------
+
+
+def _keys(df, by, time):
+    """The columns or levels that name the performance."""
+    if by is not None:
+        return list(by) if isinstance(by, (list, tuple, pd.Index, np.ndarray)) else [by]
+    levels = list(df.index.names)
+    if time not in levels and (len(levels) > 1 or df.index.is_unique):
+        # The time takes the place of the numbers of frames.
+        levels = levels[:-1]
+    return [level for level in levels if level is not None and level != time]
+
+
+def _levels_as_columns(df, keys, times):
+    """The table with the levels of the index that are named as columns."""
+    named = [*keys, *times]
     levels = [name for name in df.index.names if name in named and name not in df.columns]
     flat = df
     if levels:
@@ -221,119 +264,67 @@ def _flat(df, keys, request):
         flat = pd.concat([own, df.reset_index(drop=True)], axis=1)
     columns = list(flat.columns)
     missing = [key for key in named if key not in columns]
-    if missing or (request.by is not None and not keys):
+    if missing or not named:
         known = [name for name in df.index.names if name is not None]
         raise ValueError(
             f"There is no column or index level {missing}; there are the columns "
-            f"{list(df.columns)[:20]} and the levels {known}. Say which of them name the "
-            "performance and the time: to_sequences(df, by=[...], time=...)."
+            f"{list(df.columns)[:20]} and the levels {known}. {SPLIT}"
         )
     if len(set(named)) < len(named) or any(columns.count(key) > 1 for key in named):
         raise ValueError(
-            f"by={request.by!r} and time={request.time!r} must be different columns, each of "
-            f"which comes once; there are {columns[:20]}."
+            f"by={keys!r} and time= must be different columns, each of which comes once; there "
+            f"are {columns[:20]}."
         )
+    if not len(flat):
+        raise ValueError("The table has no rows, so there are no performances in it.")
     return flat
 
 
-def _refuse_wide(df, keys):
-    """Say what to do with performances of one row each."""
-    call = call_to_unfold(df.columns, [key for key in keys if key not in df.columns])
-    how = (
-        f"is the table wide, frames side by side in columns? Then {call}."
-        if call
-        else ("name fewer columns, that tell performances apart and not frames; the time is time=.")
-    )
-    raise ValueError(
-        f"{keys} tell {len(df)} performances of one row each apart, and a performance has 2 "
-        f"frames or more: {how}"
-    )
-
-
-def _check_features(features, keys, request):
-    """What is no number is no feature, and mostly a key that was forgotten."""
-    for name, column in features.items():
-        drop = f"df.drop(columns=[{name!r}])"
-        if column.dtype.kind in "Mm":
-            raise ValueError(
-                f"Column {name!r} holds dates or durations ({column.dtype}), which are no feature. "
-                f"Say {request.call(time=name)}, or drop it: {drop}."
-            )
-        texts = [v for v in column if isinstance(v, str)] if column.dtype.kind in "OSUT" else []
-        if texts and has_comma(texts[0]):
-            raise ValueError(f"Column {name!r} {COMMA.format(texts[0])}")
-        told = pd.Series(texts, dtype=object)
-        odd = told[pd.to_numeric(told, errors="coerce").isna()].tolist()
-        if 0 < len(odd) < column.notna().sum():
-            raise ValueError(
-                f"Column {name!r} holds text among its numbers, such as {odd[0][:40]!r}. If that "
-                f"stands for gaps, df[{name!r}] = pd.to_numeric(df[{name!r}], errors='coerce') "
-                "makes them NaN; if it is a row of units, pd.read_csv(path, skiprows=[1]) leaves "
-                f"it out; if the column tells performances apart, say "
-                f"{request.call(by=[*keys, name])}; otherwise drop it: {drop}."
-            )
-        if texts:
-            raise ValueError(
-                f"Column {name!r} holds text, such as {texts[0][:40]!r}, which is no feature. If "
-                f"it tells performances apart, say {request.call(by=[*keys, name])}; otherwise "
-                f"drop it: {drop}."
-            )
-
-
-def _in_order(column, rows, label, keys, request):
+def _in_order(column, rows, label, name):
     """Times of a performance, increasing, and its rows in this order."""
     what = f"The time of performance {label!r}"
     if isinstance(column, np.ndarray):
         times = column[rows]
     else:
-        times = as_times(column.iloc[rows], what, request.time)
+        times = times_as_numbers(column.iloc[rows], what)
     if not np.isfinite(times).all():
         row = rows[np.argmin(np.isfinite(times))]
         raise ValueError(
             f"{what} is missing (NaN) or infinite in row {row}. Drop such rows: "
-            f"df.dropna(subset=[{request.time!r}])."
+            f"df.dropna(subset=[{name!r}])."
         )
     order = np.argsort(times, kind="stable")
     times = times[order]
     twice = times[:-1][np.diff(times) == 0]
     if len(twice):
-        which = f"{twice[0]:.10g}" + (f" and {len(twice) - 1} more" if len(twice) > 1 else "")
         raise ValueError(
-            f"Times of performance {label!r} come twice: {which}. If its rows are of several "
-            "performances, name the columns that tell them apart: "
-            f"{request.call(by=[*keys, '...'])}; otherwise drop what is double: "
-            f"df.drop_duplicates({[*keys, request.time]!r})."
+            f"Times of performance {label!r} come twice, {len(twice)} of them, the first is "
+            f"{twice[0]:.10g}. Name in by= all columns that tell performances apart, or drop the "
+            "doubles by df.drop_duplicates."
         )
     return times, rows[order]
 
 
-def _check_gaps(timed, labels, request):
+def _check_gaps(timed, labels, max_gap_time):
     """Refuse gaps in time: frames count as evenly spaced."""
-    found, longest = [], 0.0
-    for times, label in zip(timed, labels, strict=True):
-        gaps, usual = gaps_of(times, request.max_gap)
-        if not gaps:
-            continue
-        longest = max([longest, *(end - start for start, end in gaps)])
-        where = ", ".join(f"from {start:.10g} to {end:.10g}" for start, end in gaps[:_SHOWN])
-        more = f" and {len(gaps) - _SHOWN} more" if len(gaps) > _SHOWN else ""
-        found.append(
-            f"Performance {label!r} has {'a gap' if len(gaps) == 1 else 'gaps'} {where}{more}, "
-            f"where frames are {usual:.4g} apart."
-        )
-    if found:
-        if len(found) > _SHOWN:
-            found = [*found[:_SHOWN], f"And {len(found) - _SHOWN} more."]
+    gaps = [
+        (*gap, label)
+        for times, label in zip(timed, labels, strict=True)
+        for gap in find_time_gaps(times, max_gap_time)
+    ]
+    if gaps:
+        start, end, step, label = max(gaps, key=lambda gap: gap[1] - gap[0])
         raise ValueError(
-            f"{' '.join(found)} Frames count as evenly spaced: bridge gaps by straight lines, "
-            f"{request.call(max_gap=round_up(longest))}, or leave such performances out."
+            f"Performance {label!r} has a gap from {start:.10g} to {end:.10g}, where frames are "
+            f"{step:.4g} apart, the longest of {len(gaps)} in all performances. Frames count as "
+            "evenly spaced: bridge gaps by straight lines with max_gap_time="
+            f"{end - start:.7g}, or leave such performances out."
         )
 
 
-def _resampled(x, times, grid, label):
-    """All features of a performance at other times."""
-    columns = {
-        k: interpolated(as_numbers(x.iloc[:, k], f"Performance {label!r}"), times, grid)
-        for k in range(x.shape[1])
-    }
-    return pd.DataFrame(columns, index=range(len(grid))).set_axis(x.columns, axis=1)
+def _rows(features, rows, index):
+    """Rows of a table, a copy, under an index of their own."""
+    x = features.iloc[rows]
+    # In place: set_axis would copy everything once more.
+    x.index = index
+    return x

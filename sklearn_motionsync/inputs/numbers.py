@@ -1,4 +1,4 @@
-"""The one gate: whatever comes in from outside becomes numbers here, or is refused."""
+"""Array-likes become arrays of floats here; text, dates, masked and complex values are refused."""
 
 import datetime
 import math
@@ -8,27 +8,40 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
-__all__ = ["as_numbers", "check_finite", "check_names", "check_squares", "names_of", "refuse"]
+__all__ = [
+    "FLOATS",
+    "LARGEST",
+    "as_numbers",
+    "check_finite",
+    "check_magnitude",
+    "check_names",
+    "column_names",
+    "refuse_non_numeric",
+]
+
+# The precisions that are kept.
+FLOATS = np.dtype(np.float64), np.dtype(np.float32)
+# Limits of the largest magnitude of a set of performances. In any unit of motion capture data lie
+# far within; squares and fourth powers of such numbers neither overflow nor vanish.
+_SMALLEST, LARGEST = 1e-9, 1e9
 
 _TIMES = (np.datetime64, np.timedelta64, datetime.date, datetime.time, datetime.timedelta)
-_FILES = {"amc", "bvh", "c3d", "csv", "json", "npy", "npz", "parquet", "txt", "xlsx"}
-_HELP = "; give numbers"
-_HELP_FOR_TABLES = (
-    "; give numbers. If it tells performances apart, to_sequences(df, by={0}, time=...) cuts the "
-    "whole table; otherwise leave it out, x.drop(columns={0})"
-)
-_KEPT = np.dtype(np.float64), np.dtype(np.float32)
 _SECONDS = "Give seconds as numbers, (t - t[0]) / np.timedelta64(1, 's')"
+_TEXT = (
+    "Give numbers: read_motion(path) or pd.read_csv(path, decimal=',') reads files, "
+    "to_sequences(df, by=..., time=...) takes columns that name the performance or the time, and "
+    "pd.to_numeric(column, errors='coerce') makes other text NaN"
+)
 
 
 def as_numbers(values, what, *, dtype=None):
-    """An array of real numbers of whatever was given, in single or double precision.
+    """Convert an array-like to an array of real numbers in single or double precision.
 
     Parameters
     ----------
     values : array-like, DataFrame or Series
     what : str
-        What to call it in messages, with a capital letter.
+        Its name in messages, with a capital letter.
     dtype : dtype, default=None
         By default float32 stays, and everything else becomes float64.
 
@@ -42,28 +55,47 @@ def as_numbers(values, what, *, dtype=None):
     TypeError
         If it is sparse.
     ValueError
-        If it is text, dates, complex, masked, ragged, or beyond double precision.
+        If it is text, dates, complex, masked or ragged.
     """
-    # Nothing to refuse, and nothing to change.
-    if type(values) is np.ndarray and values.dtype in _KEPT and dtype in (None, values.dtype):
+    if type(values) is np.ndarray and values.dtype in FLOATS and dtype in (None, values.dtype):
         return values
-    refuse(values, what)
-    array = _as_array(values, what)
-    if array.dtype.kind == "O":
-        array = _from_objects(array, values, what)
-    elif array.dtype.kind == "c":
+    refuse_non_numeric(values, what)
+    try:
+        is_pandas = isinstance(values, (pd.DataFrame, pd.Series))
+        array = _array_of_pandas(values) if is_pandas else np.asarray(values)
+        if array.dtype.kind == "O":
+            array = np.where(pd.isna(array), np.nan, array).astype(np.float64)
+    except (OverflowError, TypeError, ValueError) as error:
+        raise ValueError(_not_numeric(values, what, str(error))) from error
+    if array.dtype.kind == "c":
         raise ValueError(
             f"{what}: complex data are not supported (Complex data not supported). Give the real "
             "and the imaginary part as two features."
         )
-    elif array.dtype.kind not in "fbiu":
+    if array.dtype.kind not in "fbiu":
         raise ValueError(_not_numeric(values, what, f"it has the dtype {array.dtype}"))
-    keeps = array.dtype == np.float32 and dtype is None
-    return array if keeps else _cast(array, dtype or np.float64, what)
+    if array.dtype == np.float32 and dtype is None:
+        return array
+    # What is beyond the precision becomes infinite, which is refused later.
+    with np.errstate(over="ignore"):
+        return array.astype(dtype or np.float64, copy=False)
 
 
-def refuse(values, what):
-    """Refuse what would become numbers without being any: masked values, text, dates; and sparse.
+def _array_of_pandas(values):
+    """The array of a table or column; missing values of pandas' own types become NaN."""
+    dtypes = {values.dtype} if isinstance(values, pd.Series) else set(values.dtypes)
+    kinds = {dtype.kind for dtype in dtypes}
+    # Categories are objects, too.
+    if kinds & set("OSUT"):
+        return values.to_numpy(dtype=object)
+    if "c" in kinds or (len(dtypes) == 1 and isinstance(next(iter(dtypes)), np.dtype)):
+        # No copy where there is one block of memory.
+        return values.to_numpy()
+    return values.to_numpy(dtype=np.float64, na_value=np.nan)
+
+
+def refuse_non_numeric(values, what):
+    """Refuse sparse matrices, and what NumPy would convert silently: masked values, text, dates.
 
     Parameters and errors are those of `as_numbers`.
     """
@@ -74,74 +106,13 @@ def refuse(values, what):
             f"{what} has masked values: interpolate the gaps, or drop what has them; "
             "x.filled(np.nan) makes them NaN."
         )
-    if isinstance(values, (pd.DataFrame, pd.Series)):
-        _refuse_columns(values, what)
+    if isinstance(values, pd.Series):
+        _refuse_column(values, what)
+    elif isinstance(values, pd.DataFrame):
+        for name, column in values.items():
+            _refuse_column(column, f"{what}, column {name!r},")
     else:
         _refuse_items(values, what)
-
-
-def _refuse_columns(table, what):
-    for column in [table] if isinstance(table, pd.Series) else [c for _, c in table.items()]:
-        which = f"{what}, column {column.name!r}," if column.name is not None else what
-        if column.dtype.kind in "Mm" or isinstance(column.dtype, pd.PeriodDtype):
-            raise ValueError(f"{which} holds dates or durations. {_SECONDS}.")
-        if column.dtype.kind in "OSUT":
-            help_ = _HELP if isinstance(table, pd.Series) else _HELP_FOR_TABLES
-            _refuse_items(column.to_numpy(dtype=object), which, help_.format([column.name]))
-
-
-def _refuse_items(values, what, help_=_HELP):
-    """The same for arrays, and for lists in lists."""
-    if isinstance(values, np.ndarray):
-        kind = values.dtype.kind
-        if kind in "Mm":
-            raise ValueError(f"{what} holds dates or durations ({values.dtype}). {_SECONDS}.")
-        if kind not in "OSU":
-            return
-        values = values.ravel().tolist() if kind != "O" else values.flat
-    elif not isinstance(values, (list, tuple)):
-        values = [values]
-    for value in values:
-        if isinstance(value, (str, bytes, os.PathLike)):
-            raise ValueError(_not_numeric(value, what, _advice(value, help_)))
-        if isinstance(value, _TIMES):
-            kind = type(value).__name__
-            raise ValueError(f"{what} holds dates or durations ({kind}). {_SECONDS}.")
-        if isinstance(value, (list, tuple, np.ndarray)):
-            _refuse_items(value, what, help_)
-
-
-def _advice(text, advice):
-    ending = str(text).rpartition(".")[2].lower()
-    if isinstance(text, os.PathLike) or ending in _FILES:
-        advice = "; read the files first, by read_motion(path), pandas.read_csv(path) or the like"
-    return f"{str(text)[:60]!r}{advice}"
-
-
-def _as_array(values, what):
-    if isinstance(values, (pd.DataFrame, pd.Series)):
-        return _from_pandas(values, what)
-    try:
-        return np.asarray(values)
-    except (TypeError, ValueError) as error:
-        raise ValueError(_not_numeric(values, what, str(error))) from error
-
-
-def _from_pandas(values, what):
-    """The array of a table; missing values of pandas' own types become NaN."""
-    dtypes = {values.dtype} if isinstance(values, pd.Series) else set(values.dtypes)
-    kinds = {dtype.kind for dtype in dtypes}
-    # Categories are objects, too.
-    if kinds & set("OSUT"):
-        return values.to_numpy(dtype=object)
-    if "c" in kinds or (len(dtypes) == 1 and isinstance(next(iter(dtypes)), np.dtype)):
-        # No copy where there is one block of memory.
-        return values.to_numpy()
-    return _double(values)
-
-
-def _double(values):
-    return values.to_numpy(dtype=np.float64, na_value=np.nan)
 
 
 def _is_masked(values):
@@ -153,28 +124,32 @@ def _is_masked(values):
     return isinstance(values, (list, tuple)) and any(map(_is_masked, values))
 
 
-def _from_objects(array, values, what):
-    """Numbers of an array of Python objects."""
-    try:
-        return np.where(pd.isna(array), np.nan, array).astype(np.float64)
-    except OverflowError as error:
-        raise ValueError(_beyond(what)) from error
-    except (TypeError, ValueError) as error:
-        raise ValueError(_not_numeric(values, what, str(error))) from error
+def _refuse_column(column, what):
+    if column.dtype.kind in "Mm" or isinstance(column.dtype, pd.PeriodDtype):
+        raise ValueError(f"{what} holds dates or durations. {_SECONDS}.")
+    if column.dtype.kind in "OSUT":
+        _refuse_items(column.to_numpy(dtype=object), what)
 
 
-def _cast(array, dtype, what):
-    with np.errstate(over="ignore"):
-        out = array.astype(dtype, copy=False)
-    if array.dtype.kind == "f" and array.dtype.itemsize > out.dtype.itemsize:
-        lost = np.isinf(out) & np.isfinite(array)
-        if lost.any():
-            raise ValueError(_beyond(what, out.dtype))
-    return out
-
-
-def _beyond(what, dtype="double precision"):
-    return f"{what} has numbers too large for {dtype}: use a larger unit."
+def _refuse_items(values, what):
+    """Refuse text and dates in arrays, and in lists of lists."""
+    if isinstance(values, np.ndarray):
+        kind = values.dtype.kind
+        if kind in "Mm":
+            raise ValueError(f"{what} holds dates or durations ({values.dtype}). {_SECONDS}.")
+        if kind not in "OSU":
+            return
+        values = values.ravel().tolist() if kind != "O" else values.flat
+    elif not isinstance(values, (list, tuple)):
+        values = [values]
+    for value in values:
+        if isinstance(value, (str, bytes, os.PathLike)):
+            raise ValueError(_not_numeric(value, what, f"{str(value)[:60]!r}. {_TEXT}"))
+        if isinstance(value, _TIMES):
+            kind = type(value).__name__
+            raise ValueError(f"{what} holds dates or durations ({kind}). {_SECONDS}.")
+        if isinstance(value, (list, tuple, np.ndarray)):
+            _refuse_items(value, what)
 
 
 def _not_numeric(values, what, reason):
@@ -212,72 +187,49 @@ def check_finite(array, where, names=None, frames=None, *, allow_nan=False):
     )
 
 
-def check_squares(values, squares, what):
-    """Refuse data whose squares are beyond the range of their precision.
+def check_magnitude(largest, what, *, training):
+    """Refuse performances in a unit in which no movement is measured.
 
     Parameters
     ----------
-    values : ndarray
-        The data.
-    squares : float
-        Their variance, or the largest of several.
+    largest : float
+        The largest absolute value of all of them.
     what : str
-        What they are squared for.
+        The performance that holds it, such as "Performance 3".
+    training : bool
+        Whether they are a whole training set: a smaller set may hold tiny values only.
     """
-    spread = np.ptp(values.astype(np.longdouble).reshape(-1, values.shape[-1]), axis=0).max()
-    info = np.finfo(values.dtype)
-    largest = np.abs(values).max()
-    # Below this share of the values differences are rounding, and a variance of 0 is right.
-    tells = spread > 64 * info.eps * largest
-    if np.isfinite(squares) and (squares >= info.tiny or not tells):
-        return
-    precision = " or float64" if info.dtype == np.float32 else ""
-    raise ValueError(
-        f"The data differ by {float(spread):.2g}, so that their {what} are beyond {info.dtype}: "
-        f"use another unit{precision}."
-    )
+    if largest > LARGEST or (training and 0 < largest < _SMALLEST):
+        raise ValueError(
+            f"{what} holds the largest magnitude of all, {largest:.3g}. It must be between "
+            f"{_SMALLEST:g} and {LARGEST:g} unless all values are 0: give the data in another unit."
+        )
 
 
-def names_of(x):
-    """The names of the columns of a table, of any type; None if they are only counted.
-
-    Raises
-    ------
-    ValueError
-        If only some names are text.
-    """
+def column_names(x):
+    """The names of the columns of a table, of any type; None if they are only numbered."""
     columns = getattr(x, "columns", None)
     if columns is None or callable(columns):
         return None
     names = list(columns)
-    if names == list(range(len(names))) and not any(isinstance(c, bool) for c in names):
-        return None
-    texts = {isinstance(name, str) for name in names}
-    if len(texts) > 1:
-        raise ValueError(
-            f"The columns {names[:6]} are named by text and by other things: scikit-learn knows "
-            "columns by text only. Use df.columns = df.columns.astype(str)."
-        )
-    return names
+    return None if names == list(range(len(names))) else names
 
 
 def check_names(x, expected, what):
-    """Refuse a table whose columns are named otherwise, or stand in another order, than expected.
+    """Refuse a table whose columns have other names, or another order, than expected.
 
     Parameters
     ----------
-    x : anything
-        What has no names is fine.
+    x : table, or an array-like without names, which passes
     expected : array-like or None
         None: no names are known.
     what : str
     """
-    names = names_of(x)
+    names = column_names(x)
     if names is None or expected is None or names == list(expected):
         return
-    same = sorted(map(str, names)) == sorted(map(str, expected))
     raise ValueError(
         f"{what} has the columns {names[:8]}, expected are {list(expected)[:8]}. The feature names "
-        "should match those that were passed during fit"
-        + (", in the same order: select them by df[names]." if same else ".")
+        "should match those that were passed during fit, in the same order: select them by "
+        "df[names]."
     )

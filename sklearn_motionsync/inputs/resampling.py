@@ -1,9 +1,6 @@
 """The times of frames: as numbers, in order, without gaps, and evenly spaced or made so."""
 
-import datetime
-import re
 import warnings
-from numbers import Real
 
 import numpy as np
 import pandas as pd
@@ -11,21 +8,15 @@ import pandas as pd
 from .numbers import as_numbers
 
 __all__ = [
-    "COMMA",
-    "as_times",
-    "check_settings",
+    "attrs_of_rows",
     "even_grid",
-    "facts_at",
-    "gaps_of",
-    "has_comma",
-    "interpolated",
-    "round_up",
+    "find_time_gaps",
+    "interpolate",
+    "times_as_numbers",
     "warn_of_uneven",
 ]
 
-# What to do with numbers that are text for their comma.
-COMMA = "has decimal commas, such as {!r}, and is text so: pd.read_csv(path, sep=';', decimal=',')."
-# Steps of time this much longer than the usual one are gaps.
+# Steps of time longer than so many median steps are gaps.
 _GAP = 1.9
 # Times this share of a step from even ones are even.
 _EVEN = 1e-6
@@ -33,14 +24,14 @@ _EVEN = 1e-6
 _MOST = 100
 
 
-def as_times(values, what, column):
+def times_as_numbers(values, what):
     """Times as numbers: dates are seconds from the first of them, durations are seconds.
 
     Parameters
     ----------
     values : Series or Index
-    what, column : str
-        What to call them in messages, and in code.
+    what : str
+        Their name in messages.
 
     Returns
     -------
@@ -54,57 +45,22 @@ def as_times(values, what, column):
     if series.dtype.kind == "m":
         return series.dt.total_seconds().to_numpy(dtype=np.float64)
     texts = [v for v in series if isinstance(v, str)] if series.dtype.kind in "OSUT" else []
-    name = f"df[{column!r}]"
-    if series.dtype.kind == "O" and any(isinstance(v, datetime.time) for v in series):
-        raise ValueError(
-            f"{what} is of the clock (datetime.time). Convert it: {name} = "
-            f"pd.to_timedelta({name}.astype(str))."
-        )
     if texts:
-        if has_comma(texts[0]):
-            raise ValueError(f"{what} {COMMA.format(texts[0])}")
         raise ValueError(
-            f"{what} is text, such as {texts[0][:40]!r}. Convert it: {name} = "
-            f"pd.to_datetime({name}) for dates, pd.to_timedelta for durations, pd.to_numeric for "
-            "numbers."
+            f"{what} is text, such as {texts[0][:40]!r}. Convert it by pd.to_datetime, "
+            "pd.to_timedelta or pd.to_numeric."
         )
     return as_numbers(series, what, dtype=np.float64)
 
 
-def has_comma(text):
-    """Whether text is a number with a decimal comma."""
-    return re.fullmatch(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*", text) is not None
-
-
-def check_settings(frame_rate, max_gap, time):
-    """Refuse what is no rate or no gap, or comes without times."""
-    for name, value in (("frame_rate", frame_rate), ("max_gap", max_gap)):
-        if value is None:
-            continue
-        is_number = isinstance(value, Real) and not isinstance(value, bool)
-        if not is_number or not 0 < value < np.inf:
-            raise ValueError(f"{name} must be a number above 0, in units of time; got {value!r}.")
-        if time is None:
-            raise ValueError(
-                f"{name}={value!r} goes with time=: say which column tells the time, as in "
-                f"to_sequences(df, by=[...], time='time', {name}={value!r})."
-            )
-
-
-def gaps_of(times, max_gap=None):
-    """Where times that increase leap: pairs (from, to), and the usual step."""
+def find_time_gaps(times, max_gap_time=None):
+    """Gaps in times that increase: triples of start, end, and the median step."""
     steps = np.diff(times)
     if len(steps) < 2:
-        return [], float(steps.sum())
-    usual = float(np.median(steps))
-    longest = max(_GAP * usual, (max_gap or 0) * (1 + _EVEN))
-    return [(times[i], times[i + 1]) for i in np.flatnonzero(steps > longest)], usual
-
-
-def round_up(size):
-    """A number of four digits that is not less."""
-    scale = 10.0 ** (3 - int(np.floor(np.log10(size))))
-    return float(f"{np.ceil(size * scale - _EVEN) / scale:.10g}")
+        return []
+    step = float(np.median(steps))
+    longest = max(_GAP * step, (max_gap_time or 0) * (1 + _EVEN))
+    return [(times[i], times[i + 1], step) for i in np.flatnonzero(steps > longest)]
 
 
 def even_grid(times, frame_rate, what):
@@ -118,7 +74,7 @@ def even_grid(times, frame_rate, what):
         Frames in a unit of time; by default as near to the median step as it takes to keep the
         first and the last frame.
     what : str
-        What to call the performance.
+        The name of the performance in messages.
     """
     if len(times) < 2:
         return None
@@ -133,7 +89,7 @@ def even_grid(times, frame_rate, what):
         # Rounding of the times is no reason to lose the last frame.
         n_steps = int((duration + slack) * frame_rate)
     if not 1 <= n_steps <= _MOST * len(times):
-        asked = "max_gap" if frame_rate is None else f"frame_rate={frame_rate:g}"
+        asked = "max_gap_time" if frame_rate is None else f"frame_rate={frame_rate:g}"
         raise ValueError(
             f"{what} has {len(times)} frames from {times[0]:.10g} to {times[-1]:.10g}, of which "
             f"{asked} would make {n_steps + 1}: give it in units of the time column."
@@ -144,20 +100,20 @@ def even_grid(times, frame_rate, what):
 
 
 def warn_of_uneven(sequences):
-    """Tell of performances cut out by an index whose last level is a time that is not even.
+    """Warn of performances whose index is a time that is not even.
 
-    Whole numbers are frames, whichever of them there are.
+    Whole numbers are numbers of frames, some of which may be missing.
 
     Parameters
     ----------
     sequences : list of DataFrame
-        As `tables.cut` gives them.
+        As `split_table` gives them.
     """
     for x in sequences:
         if x.index.dtype.kind not in "fmM" or len(x) < 2:
             continue
         label, name = x.attrs["performance"], x.index.name
-        times = as_times(x.index, f"The time of performance {label!r}", name)
+        times = times_as_numbers(x.index, f"The time of performance {label!r}")
         if not np.isfinite(times).all() or _is_even(times, _slack(times)):
             continue
         steps = np.diff(times)
@@ -173,14 +129,14 @@ def warn_of_uneven(sequences):
         return
 
 
-def interpolated(column, times, grid):
-    """A feature at other times, on straight lines; what is next to NaN is NaN."""
-    dtype = column.dtype if column.dtype.kind == "f" else np.float64
-    return np.interp(grid, times, column).astype(dtype, copy=False)
+def interpolate(column, times, grid):
+    """A feature at other times, on straight lines; NaN beside NaN."""
+    column = as_numbers(column, f"Column {column.name!r}")
+    return np.interp(grid, times, column).astype(column.dtype, copy=False)
 
 
-def facts_at(attrs, rows, n_rows, times=None, grid=None):
-    """What a recording says of its clock, of the frames that a performance has now.
+def attrs_of_rows(attrs, rows, n_rows, times=None, grid=None):
+    """The ``attrs`` of a recording, its clock and events moved to the frames of a performance.
 
     Parameters
     ----------
@@ -191,12 +147,11 @@ def facts_at(attrs, rows, n_rows, times=None, grid=None):
     times : ndarray, default=None
         Of these rows, in any unit.
     grid : ndarray, default=None
-        The even times that were put in their place.
+        The even times that replace them.
 
     Returns
     -------
     dict
-        Without what is not known any more.
     """
     facts = dict(attrs)
     seconds, rate = facts.pop("times", None), facts.get("frame_rate")
@@ -209,10 +164,10 @@ def facts_at(attrs, rows, n_rows, times=None, grid=None):
         seconds = np.asarray(seconds, dtype=np.float64)[rows]
         facts |= _clock_of(seconds if grid is None else np.interp(grid, times, seconds))
     elif rate and grid is not None:
-        facts["frame_rate"] = _digits(rate * np.median(np.diff(times)) / (grid[1] - grid[0]))
+        facts["frame_rate"] = _rounded(rate * np.median(np.diff(times)) / (grid[1] - grid[0]))
     if isinstance(events, (list, tuple)) and (np.diff(rows) > 0).all():
         n_frames = len(rows if grid is None else grid)
-        moved = [_moved(event, rows, times, grid) for event in events]
+        moved = [_move_event(event, rows, times, grid) for event in events]
         whole = len(rows) == n_rows
         facts["events"] = [
             event
@@ -223,20 +178,20 @@ def facts_at(attrs, rows, n_rows, times=None, grid=None):
 
 
 def _clock_of(seconds):
-    """Even times are a frame rate."""
+    """The frame rate of even times, or the times."""
     clock = {"first_time": float(seconds[0])}
     if len(seconds) > 1 and _is_even(seconds, _slack(seconds)):
         rate = (len(seconds) - 1) / (seconds[-1] - seconds[0])
-        return clock | {"frame_rate": _digits(rate)}
+        return clock | {"frame_rate": _rounded(rate)}
     return clock | {"times": seconds.tolist()}
 
 
-def _digits(rate):
+def _rounded(rate):
     return float(f"{rate:.9g}")
 
 
-def _moved(event, rows, times, grid):
-    """An event at its place in other frames."""
+def _move_event(event, rows, times, grid):
+    """An event at its frame in the performance."""
     if not isinstance(event, dict) or event.get("frame") is None:
         return event
     own = np.arange(len(rows))
@@ -247,7 +202,7 @@ def _moved(event, rows, times, grid):
 
 
 def _on_line(x, xs, ys):
-    """Between points that increase on straight lines, beyond them at the mean pace."""
+    """Interpolate between points that increase, and extrapolate at their mean slope."""
     if xs[0] <= x <= xs[-1]:
         return np.interp(x, xs, ys)
     end = 0 if x < xs[0] else -1
@@ -255,7 +210,7 @@ def _on_line(x, xs, ys):
 
 
 def _slack(times):
-    """How far rounding may have moved times: in memory, or to the digits they are written with."""
+    """How far rounding may have moved times, in memory or to the digits of a file."""
     step = (times[-1] - times[0]) / (len(times) - 1)
     slack = max(_EVEN * step, 8 * np.spacing(np.abs(times).max()))
     single = times.astype(np.float32)

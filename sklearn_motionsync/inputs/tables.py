@@ -1,13 +1,9 @@
-"""Tables of frames: cut into performances that know what they are called, and put together again.
+"""Tables of frames are split into performances that carry their labels, and put together again.
 
 The index of a table has two or more levels: the last is the frame, those before it together name
-the performance. Every performance that is cut out carries its label and the names of the levels in
-``attrs``, so that lists keep them, however they are sliced.
+the performance. Every performance that is split off carries its label and the names of the levels
+in ``attrs``, so that lists keep them, however they are sliced.
 """
-
-import re
-import warnings
-from collections import Counter
 
 import numpy as np
 import pandas as pd
@@ -17,99 +13,81 @@ __all__ = [
     "FRAME",
     "INDEX_NAMES",
     "ROW",
+    "SPLIT",
     "as_pandas",
-    "call_to_unfold",
-    "called",
-    "cut",
-    "frame_labels",
-    "frame_name",
     "full_names",
     "index_of",
     "label_of_part",
+    "labelled",
     "labels_given",
     "labels_of",
     "name_performance",
     "own_label",
-    "parts_of",
+    "rows_of_labels",
+    "split_table",
     "stack_frame",
 ]
 
-INDEX_NAMES = ("performance", "frame")
-# What numbers the rows where "frame" tells performances apart.
+# Names of the levels of an index; the last is that of the frames.
+INDEX_NAMES = PERFORMANCE, FRAME = "performance", "frame"
+# The level of the frames where "frame" names performances.
 ROW = "row"
-# The innermost level of an index.
-FRAME = INDEX_NAMES[1]
-# Where a DataFrame keeps what it is called.
+# Keys of ``attrs``.
 _LABEL, _LEVELS = "performance", "levels"
-# What no performance is called by.
+# Names of levels of frames.
 _TIMES = ("frame", "time")
-# So many times as many numbered columns as frames are rather frames themselves.
-_MANY = 5
+# What to do with a table that does not tell its performances apart.
+SPLIT = (
+    "Name the columns or levels of the performance and of the time: "
+    "to_sequences(df, by=..., time=...)."
+)
 
 
-def cut(df):
+def split_table(df):
     """The performances of a table whose index names performance and frame."""
     if df.index.nlevels < 2:
-        raise ValueError(
-            "to_sequences needs a DataFrame whose index has the levels (performance, frame), or "
-            f"more that name the performance, got an index of {df.index.nlevels} level(s). Say "
-            "which columns name the performance and the time: to_sequences(df, by=['subject', "
-            "'trial'], time='time'), or build the index with "
-            "df.set_index(['performance', 'frame'])."
-        )
+        raise ValueError(f"An index of 1 level(s) does not name performance and frame. {SPLIT}")
     keys, frames = df.index.droplevel(-1), df.index.get_level_values(-1)
     levels = full_names(df.index.names)
-    labels, parts = parts_of(keys, list(levels[:-1]), "df.reset_index()")
-    _check_order(levels)
-    _check_wide(df, levels, parts)
-    if len(df) == len(labels) > 1 and len(levels) > 2:
+    if levels[0] in _TIMES and levels[-1] not in (*_TIMES, ROW):
         raise ValueError(
-            f"An index of {len(levels)} levels names the performance by {list(levels[:-1])} and "
-            f"the frame by {levels[-1]!r}: so each of the {len(labels)} performances has one "
-            "frame. Say which columns or levels are which: to_sequences(df, "
-            f"by={list(levels[:-2])!r}, time={levels[-2]!r}), or drop a level: "
-            f"df.droplevel({levels[-1]!r})."
+            f"An index of the levels {list(levels)} has the frame in its last level, and "
+            f"{levels[0]!r} is its first. {SPLIT}"
         )
+    labels, parts = rows_of_labels(keys, list(levels[:-1]))
     sequences = []
     for label, rows in zip(labels, parts, strict=True):
         own = frames[rows]
         if not own.is_monotonic_increasing or not own.is_unique:
             raise ValueError(
-                f"The frames of performance {label!r} do not increase. Sort the frame with "
-                "df.sort_index() and drop the frames that come twice; or say which level is the "
-                f"time, to_sequences(df, time={levels[-1]!r}), which puts them in order."
+                f"The frames of performance {label!r} do not increase. Drop the frames that come "
+                f"twice and sort the table by df.sort_index(), or by its time: {SPLIT}"
             )
-        sequences.append(called(df.iloc[rows].set_axis(own), label, levels, df.attrs))
+        sequences.append(labelled(df.iloc[rows].set_axis(own), label, levels, df.attrs))
     return sequences
 
 
-def _check_order(levels):
-    """Refuse an index whose first level tells frames, as ``pd.wide_to_long`` may make one."""
-    if levels[0] in _TIMES and levels[-1] not in (*_TIMES, ROW):
-        raise ValueError(
-            f"An index of the levels {list(levels)} names the performance by {levels[0]!r} and the "
-            f"frame by {levels[-1]!r}, and it is rather the other way round. Say which is which: "
-            f"to_sequences(df, by={list(levels[1:])!r}, time={levels[0]!r})."
-        )
+def rows_of_labels(keys, names):
+    """Labels in order of first appearance, and the rows of each."""
+    for k, name in enumerate(names):
+        missing = np.flatnonzero(pd.isna(keys.get_level_values(k)))
+        if len(missing):
+            raise ValueError(
+                f"{name!r} is missing (NaN) in {len(missing)} of {len(keys)} rows, the first is "
+                f"row {missing[0]}. Drop these rows or fill them in: every row needs the name of "
+                "its performance."
+            )
+    codes, labels = pd.factorize(keys)
+    order = np.argsort(codes, kind="stable")
+    ends = np.searchsorted(codes[order], np.arange(1, len(labels)))
+    return [_plain(label) for label in labels], np.split(order, ends) if len(labels) else []
 
 
-def _check_wide(df, levels, parts):
-    """Tell a table of trials in rows, whose last key would be taken for the frame."""
-    longest = max(map(len, parts), default=0)
-    numbers, _ = numbered_columns(df.columns) if longest < df.shape[1] else ({}, [])
-    n_frames = min(numbers.values(), default=0)
-    if n_frames < _MANY * max(longest, 2):
-        return
-    call = call_to_unfold(df.columns, list(levels))
-    if call is None:
-        return
-    warnings.warn(
-        f"A table of {len(df)} rows is read as {len(parts)} performances of {longest} frames or "
-        f"less, by its index {list(levels)}, the last of which is the frame. But its columns are "
-        f"numbered, up to {n_frames} of a kind: if they are the frames, make it long, {call}.",
-        UserWarning,
-        stacklevel=2,
-    )
+def _plain(label):
+    """A label without NumPy's types, whose representation says what they are."""
+    if isinstance(label, tuple):
+        return tuple(map(_plain, label))
+    return label.item() if isinstance(label, np.generic) else label
 
 
 def as_pandas(table):
@@ -130,11 +108,11 @@ def as_pandas(table):
     return pd.DataFrame({name: table[name].to_numpy() for name in table.columns})
 
 
-# -- what performances are called --------------------------------------------------------
+# -- labels of performances -----------------------------------------------------------------
 
 
 def name_performance(i, label):
-    """What to call a performance in messages and figures."""
+    """The name of a performance in messages and figures."""
     if isinstance(label, tuple):
         return f"Performance {i} {label!r}"
     return f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
@@ -146,13 +124,14 @@ def labels_of(sequences, numbers=None):
     Those that a list carries, if it does so throughout and they differ; otherwise their numbers,
     0, 1, ... by default.
     """
-    frame = frame_name(sequences) or INDEX_NAMES[1]
+    frames = {x.index.name if isinstance(x, pd.DataFrame) else None for x in sequences}
+    frame = (frames.pop() if len(frames) == 1 else None) or FRAME
     found = [own_label(x) for x in sequences]
     labels = [label for label, _ in found]
     names = {levels for _, levels in found}
     if len(names) == 1 and None not in names and len(set(labels)) == len(labels):
         return labels, (*names.pop(), frame)
-    return list(range(len(sequences)) if numbers is None else numbers), (INDEX_NAMES[0], frame)
+    return list(range(len(sequences)) if numbers is None else numbers), (PERFORMANCE, frame)
 
 
 def own_label(x):
@@ -190,7 +169,7 @@ def label_of_part(whole, part, level, levels=()):
 
 
 def labels_given(performances):
-    """Labels that somebody gave, of performances that have them or by themselves, and level names.
+    """Labels, and the names of their levels, from labels or from performances that carry them.
 
     Parameters
     ----------
@@ -203,17 +182,7 @@ def labels_given(performances):
     if labels and all(isinstance(x, pd.DataFrame) for x in labels):
         labels, levels = labels_of(labels)
         return labels, levels[:-1]
-    return labels, INDEX_NAMES[:1]
-
-
-def frame_labels(sequences):
-    return [x.index if isinstance(x, pd.DataFrame) else range(len(x)) for x in sequences]
-
-
-def frame_name(sequences):
-    """What frames of DataFrames are called; None if they are not called anything."""
-    names = {x.index.name if isinstance(x, pd.DataFrame) else None for x in sequences}
-    return names.pop() if len(names) == 1 else None
+    return labels, (PERFORMANCE,)
 
 
 def index_of(labels, names):
@@ -224,8 +193,12 @@ def index_of(labels, names):
 
 
 def stack_frame(arrays, labels, frames, columns, levels=INDEX_NAMES):
-    """Arrays below each other under an index of performance, of one level or more, and frame."""
+    """Arrays below each other under an index of performance, of one level or more, and frame.
+
+    Without ``frames`` they are numbered.
+    """
     counts = [len(a) for a in arrays]
+    frames = frames or [range(n) for n in counts]
     keys = index_of(labels, levels[:-1]).repeat(counts)
     index = pd.MultiIndex.from_arrays(
         [
@@ -237,91 +210,14 @@ def stack_frame(arrays, labels, frames, columns, levels=INDEX_NAMES):
     return pd.DataFrame(np.concatenate(list(arrays)), index=index, columns=columns)
 
 
-def called(x, label, levels, attrs, **more):
+def labelled(x, label, levels, attrs, **more):
+    """A performance with its label and the names of its levels in ``attrs``, beside other facts."""
     x.attrs = {**attrs, _LABEL: label, _LEVELS: tuple(levels), **more}
     return x
 
 
 def full_names(names):
     """Names for the levels that have none."""
-    usual = [INDEX_NAMES[0]] if len(names) == 2 else [f"level_{k}" for k in range(len(names) - 1)]
-    usual.append(INDEX_NAMES[1])
-    return tuple(other if name is None else name for name, other in zip(names, usual, strict=True))
-
-
-# -- how they are cut out -----------------------------------------------------------------
-
-
-def parts_of(keys, names, table="df"):
-    """Labels in order of first appearance, and the rows of each."""
-    for k, name in enumerate(names):
-        missing = np.flatnonzero(pd.isna(keys.get_level_values(k)))
-        if len(missing):
-            raise ValueError(
-                f"{name!r} is missing (NaN) in {len(missing)} of {len(keys)} rows, the first is "
-                f"row {missing[0]}, which so belong to no performance. Drop them, "
-                f"{table}.dropna(subset=[{name!r}]), or fill them in."
-            )
-    codes, labels = pd.factorize(keys)
-    order = np.argsort(codes, kind="stable")
-    ends = np.searchsorted(codes[order], np.arange(1, len(labels)))
-    return [_plain(label) for label in labels], np.split(order, ends) if len(labels) else []
-
-
-def _plain(label):
-    """A label without NumPy's types, whose representation says what they are."""
-    if isinstance(label, tuple):
-        return tuple(map(_plain, label))
-    return label.item() if isinstance(label, np.generic) else label
-
-
-# -- wide tables: one row a performance, frames side by side in columns. Told, not read --
-
-# What tells rows apart that no column does.
-_KEY = "performance"
-
-
-def numbered_columns(columns):
-    """Which columns are numbered, such as ``knee_1``, ``knee_2``, ...
-
-    Returns
-    -------
-    numbers : dict of (str, str) to int
-        How many there are of each name and what is between name and number; two at least.
-    others : list
-        All other columns.
-    """
-    parts = {name: re.fullmatch(r"(.*?)([_\-. ]?)\d+", str(name)) for name in columns}
-    counts = Counter(part.groups() for part in parts.values() if part)
-    numbers = {key: count for key, count in counts.items() if count > 1}
-    return numbers, [
-        name for name in columns if not parts[name] or parts[name].groups() not in numbers
-    ]
-
-
-def call_to_unfold(columns, levels=()):
-    """The call that makes a long table of one whose frames lie side by side in columns.
-
-    Parameters
-    ----------
-    columns : Index
-    levels : list of str
-        Levels of the index that name the performance, beside columns that are not numbered.
-
-    Returns
-    -------
-    str or None
-        None if no columns are numbered, or not alike.
-    """
-    numbers, others = numbered_columns(columns)
-    names, between = [name for name, _ in numbers], {sep for _, sep in numbers}
-    if len(between) != 1 or ("" in names and len(names) > 1):
-        return None
-    keys, table = [*levels, *others], "df.reset_index()" if levels else "df"
-    if not keys:
-        keys, table = [_KEY], f"df.reset_index(names={_KEY!r})"
-    if names == [""]:
-        long = f"{table}.melt({keys}, var_name='frame', value_name='x').astype({{'frame': float}})"
-        return f"to_sequences({long}.dropna(), by={keys}, time='frame')"
-    long = f"pd.wide_to_long({table}, {names}, i={keys}, j='frame', sep={between.pop()!r})"
-    return f"to_sequences({long}.dropna(), time='frame')"
+    default = [PERFORMANCE] if len(names) == 2 else [f"level_{k}" for k in range(len(names) - 1)]
+    default.append(FRAME)
+    return tuple(d if name is None else name for name, d in zip(names, default, strict=True))

@@ -1,4 +1,4 @@
-"""How estimators take performances, and give the same kind back: checked once, by one contract."""
+"""Input checks of estimators, and outputs of the same kind as the input."""
 
 import re
 import warnings
@@ -9,26 +9,24 @@ from sklearn.base import BaseEstimator
 from sklearn.utils._set_output import _get_output_config
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from .collections import ACCEPTED, NOT_ONE, as_collection, as_source, check_members
-from .numbers import as_numbers, check_finite, check_names, names_of, refuse
-from .tables import (
-    INDEX_NAMES,
-    as_pandas,
-    call_to_unfold,
-    frame_labels,
-    labels_of,
-    name_performance,
-    stack_frame,
+from .collections import ACCEPTED, NOT_ONE, Performances, as_collection, as_source, check_members
+from .numbers import (
+    FLOATS,
+    as_numbers,
+    check_finite,
+    check_magnitude,
+    check_names,
+    column_names,
+    refuse_non_numeric,
 )
+from .tables import FRAME, INDEX_NAMES, PERFORMANCE, SPLIT, as_pandas, labels_of, stack_frame
 
 __all__ = [
-    "Performances",
     "SequenceLevelMixin",
-    "all_of",
     "check_performances",
     "check_transformed",
-    "labels_as_given",
-    "name_performance",
+    "labels_of_input",
+    "labels_of_parts",
     "names_of_input",
     "parts_of_source",
     "read_collection",
@@ -37,66 +35,12 @@ __all__ = [
 
 # Attribute of estimators: ``feature_names_in_``, but of any type.
 _NAMES = "_names_in"
-# Frames from which on a straight line is no accident.
+# A straight line over so many frames is no accident.
 _CLOCK_FRAMES = 8
 
 
-class Performances(tuple):
-    """Checked performances: their arrays, and what it takes to give the same kind back.
-
-    Whoever checked them takes them as they are. The arrays are views of the input where its dtype
-    allows: never write to them.
-
-    Attributes
-    ----------
-    kind : {"rows", "array", "list", "frame"}
-        2-D, 3-D, list, MultiIndex frame.
-    labels : list
-        Of the performances; tuples where several levels name them.
-    frames : list
-        Labels of the frames of each performance; empty for univariate rows.
-    names : ndarray of str or None
-        ``feature_names_in_`` of the estimator that checked them.
-    levels : tuple of str
-        Names of the levels of an index; the last is that of the frames.
-    numbers : sequence of int
-        What number each has in all that was given.
-    """
-
-    def __new__(cls, arrays, kind, labels, frames, names=None, levels=INDEX_NAMES, numbers=None):
-        self = super().__new__(cls, arrays)
-        self.kind, self.labels, self.frames, self.names = kind, labels, frames, names
-        self.levels = levels
-        self.numbers = range(len(self)) if numbers is None else numbers
-        return self
-
-    def __getitem__(self, index):
-        if isinstance(index, slice):
-            return self.take(range(len(self))[index])
-        return super().__getitem__(index)
-
-    def called(self, i):
-        """What to call one of them in messages."""
-        return name_performance(self.numbers[i], self.labels[i])
-
-    def take(self, indices):
-        """Some of them: rows, or a list."""
-        kind = "rows" if self.kind == "rows" else "list"
-        frames = [self.frames[i] for i in indices] if self.frames else []
-        labels = [self.labels[i] for i in indices]
-        numbers = [self.numbers[i] for i in indices]
-        some = map(super().__getitem__, indices)
-        return Performances(some, kind, labels, frames, self.names, self.levels, numbers)
-
-    def suits(self, n_features=None, on_rows=None, names=None):
-        """Whether an estimator that was fitted on such input would take them."""
-        is_rows = self.kind == "rows"
-        fits = is_rows is on_rows and self.names is names and len(self) > 0
-        return fits and self[0].shape[not is_rows] == n_features
-
-
 class SequenceLevelMixin:
-    """What estimators share whose samples are whole performances: how they take input."""
+    """Input checks of estimators whose samples are whole performances."""
 
     def check_performances(self, X):
         """Check performances against the input contract, and against those of ``fit``.
@@ -118,10 +62,11 @@ class SequenceLevelMixin:
             If the input breaks the contract, or differs from that of ``fit`` in kind, width or
             names.
         """
-        known = map(vars(self).get, ("n_features_in_", "_fitted_on_rows", "feature_names_in_"))
-        if isinstance(X, Performances) and X.suits(*known):
-            return X
         on_rows = self._read_rows_in_fit()
+        if isinstance(X, Performances) and (X.kind == "rows") is on_rows and len(X):
+            same = X.names is getattr(self, "feature_names_in_", None)
+            if same and X[0].shape[not on_rows] == self.n_features_in_:
+                return X
         return check_performances(self, X, reset=False, level="sequence", on_rows=on_rows)
 
     def _read_rows_in_fit(self):
@@ -132,7 +77,7 @@ class SequenceLevelMixin:
         return on_rows
 
     def _check_training_set(self, X, numbers=None):
-        """The same in ``fit``, where it is learnt what to expect; of some, with their numbers."""
+        """Check the input of ``fit``: all performances, or some with their numbers."""
         performances = check_performances(self, X, reset=True, level="sequence", numbers=numbers)
         self._fitted_on_rows = performances.kind == "rows"
         if not self._fitted_on_rows:
@@ -176,35 +121,36 @@ def check_performances(
             f"{estimator.n_features_in_}) and got a collection of performances. Give it 2-D "
             "input, or fit it on a collection."
         )
-    arrays, names = check_members(sequences, finite=finite, numbers=numbers, dtype=dtype)
-    if not reset and arrays[0].shape[1] != estimator.n_features_in_:
-        first = 0 if numbers is None else numbers[0]
+    out = check_members(sequences, finite=finite, training=reset, numbers=numbers, dtype=dtype)
+    width = out[0].shape[1]
+    if not reset and width != estimator.n_features_in_:
         raise ValueError(
-            f"Performance {first} has {arrays[0].shape[1]} features a frame, but {name} is "
+            f"Performance {out.numbers[0]} has {width} features a frame, but {name} is "
             f"expecting {estimator.n_features_in_} features as input."
         )
     _check_names(estimator, sequences[0], reset)
-    told = names is not None and isinstance(names[0], str)
-    # Of arrays there is nothing that was not checked above, if those of fit were arrays, too.
-    if reset or told or hasattr(estimator, "feature_names_in_"):
-        first = pd.DataFrame(arrays[0], columns=names) if told else arrays[0]
+    named = out.names is not None and any([isinstance(name, str) for name in out.names])
+    # Arrays were checked above, all but those given after a fit on tables.
+    if reset or named or hasattr(estimator, "feature_names_in_"):
+        first = pd.DataFrame(out[0], columns=out.names) if named else out[0]
         validate_data(estimator, first, reset=reset, skip_check_array=True)
-    is_array = getattr(X, "ndim", 1) == 3
-    kind = "frame" if isinstance(X, pd.DataFrame) else "array" if is_array else "list"
-    names = getattr(estimator, "feature_names_in_", None)
-    labels, levels = labels_of(sequences, numbers)
-    return Performances(arrays, kind, labels, frame_labels(sequences), names, levels, numbers)
+    if getattr(X, "ndim", 1) == 3:
+        out.kind = "array"
+    elif isinstance(X, pd.DataFrame):
+        out.kind = "frame"
+    out.names = getattr(estimator, "feature_names_in_", None)
+    return out
 
 
 def names_of_input(estimator):
-    """The names of the features that an estimator was fitted on, of any type; None without any."""
+    """Names of the features that an estimator was fitted on, of any type; None without any."""
     return vars(estimator).get(_NAMES)
 
 
 def _check_names(estimator, x, reset):
-    """Names of any type are kept to, as scikit-learn keeps to those that are text."""
+    """Hold names of any type against those of fit, as scikit-learn does with text."""
     if reset:
-        vars(estimator)[_NAMES] = names_of(x)
+        vars(estimator)[_NAMES] = column_names(x)
     else:
         check_names(x, names_of_input(estimator), "The input")
 
@@ -215,7 +161,7 @@ def check_transformed(estimator, X, names, *, finite=True):
     space.n_features_in_ = len(names)
     sequences = as_collection(X)
     some = X if sequences is None else next(iter(sequences), None)
-    named = names_of(some)
+    named = column_names(some)
     if named is not None and isinstance(named[0], str):
         space.feature_names_in_ = np.asarray(names, dtype=object)
     return check_performances(space, X, reset=False, level="posture", finite=finite)
@@ -233,7 +179,7 @@ def restore(estimator, performances, arrays, *, frames=None, columns=None):
     if container == "pandas":
         own, levels = performances.frames, performances.levels
         if frames is not None:
-            own, levels = [frames] * len(arrays), (*levels[:-1], INDEX_NAMES[1])
+            own, levels = [frames] * len(arrays), (*levels[:-1], FRAME)
         columns = estimator.get_feature_names_out() if columns is None else columns
         return stack_frame(arrays, performances.labels, own, columns, levels)
     if container != "default":
@@ -246,14 +192,14 @@ def restore(estimator, performances, arrays, *, frames=None, columns=None):
     return arrays
 
 
-def labels_as_given(X, reached):
-    """Labels and level names of performances as a user gave them.
+def labels_of_input(X, reached):
+    """Labels and level names of the input of a pipeline.
 
     Parameters
     ----------
-    X : performances, as the first step of a pipeline takes them
+    X : performances, the input of the first step of a pipeline
     reached : Performances
-        What reaches a later step, maybe without labels.
+        The input of a later step, maybe without labels.
     """
     known = isinstance(X, Performances) or as_source(X) is not None
     sequences = None if known else as_collection(X)
@@ -274,7 +220,8 @@ def read_collection(X):
     sequences = as_collection(X)
     if sequences is None:
         raise ValueError(NOT_ONE)
-    return check_members(sequences, finite=False)
+    arrays = check_members(sequences, finite=False)
+    return list(arrays), arrays.names
 
 
 def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
@@ -286,83 +233,62 @@ def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
         )
     if reset and level == "sequence" and isinstance(as_pandas(X), pd.DataFrame):
         _refuse_long_table(type(estimator).__name__, as_pandas(X))
-    refuse(X, "The input")
+    refuse_non_numeric(X, "The input")
     index = X.index if isinstance(X, pd.DataFrame) else None
-    source, X = (
-        X,
-        validate_data(
-            estimator,
-            X,
-            reset=reset,
-            dtype=[np.float64, np.float32],
-            order="C",
-            ensure_all_finite=False,
-        ),
+    out = validate_data(
+        estimator, X, reset=reset, dtype=list(FLOATS), order="C", ensure_all_finite=False
     )
-    _check_names(estimator, source, reset)
+    _check_names(estimator, X, reset)
     names = getattr(estimator, "feature_names_in_", None)
-    called = index if index is not None else numbers
-    check_finite(X, "Row", names, called, allow_nan=finite == "allow-nan")
+    labels = index if index is not None else numbers
+    check_finite(out, "Row", names, labels, allow_nan=finite == "allow-nan")
+    size = np.fmax.reduce(np.abs(out), axis=1, initial=0)
+    row = int(size.argmax())
+    row_name = f"Row {row if numbers is None else numbers[row]}"
+    check_magnitude(size[row], row_name, training=reset)
     if level == "posture":
-        levels = INDEX_NAMES[0], getattr(index, "name", None) or INDEX_NAMES[1]
-        return Performances([X], "rows", [0], [range(len(X))], levels=levels)
-    if X.shape[1] < 2:
+        levels = PERFORMANCE, getattr(index, "name", None) or FRAME
+        return Performances([out], "rows", [0], levels=levels)
+    if out.shape[1] < 2:
         raise ValueError(
             "Each row of a 2-D input is one univariate sequence and needs at least 2 frames, got "
-            f"n_features = {X.shape[1]}. For performances of several features use a list."
+            f"n_features = {out.shape[1]}. For performances of several features use a list."
         )
-    rows = [row[:, np.newaxis] for row in X]
-    labels = list(range(len(X)) if numbers is None else numbers)
-    return Performances(rows, "rows", labels, [], names, numbers=numbers)
+    rows = [row[:, np.newaxis] for row in out]
+    labels = list(range(len(out)) if numbers is None else numbers)
+    return Performances(rows, "rows", labels, names=names, numbers=numbers)
 
 
 def _refuse_long_table(name, df):
-    """Named columns are features, and rows frames, unless the names only number the frames."""
-    texts = [c for c in df.columns if isinstance(c, str)]
-    counts = not texts or _are_numbered(list(df.columns))
-    if df.index.nlevels == 1 and counts and not _tells_time(df.index):
-        return
-    shown = ", ".join(map(repr, df.columns[:4])) + (", ..." if df.shape[1] > 4 else "")
-    levels = "index does" if df.index.nlevels == 1 else f"index of {df.index.nlevels} levels does"
-    unfold = call_to_unfold(df.columns, list(df.index.names) if df.index.nlevels > 1 else [])
-    wide = "" if unfold is None else f"If columns are frames, make it long: {unfold}. "
-    raise ValueError(
-        f"{name} got a table of {len(df)} rows with the columns {shown}, whose {levels} not tell "
-        "performances apart. If its rows are frames, say which columns name the performance and "
-        "the time: to_sequences(df, by=[...], time=...), or index it by (performance, frame). "
-        f"{wide}If every row is one univariate performance, give df.to_numpy(); if every column is "
-        "one, df.T.to_numpy()."
-    )
-
-
-def _tells_time(index):
-    """Whether an index increases in fractions, dates or durations, as the time of frames does."""
-    if not index.is_monotonic_increasing or not index.is_unique:
-        return False
-    return index.dtype.kind in "mM" or (index.dtype.kind == "f" and bool((index % 1 != 0).any()))
-
-
-def _are_numbered(names):
-    """Whether names are one text with a number that goes up by one."""
-    parts = [re.fullmatch(r"(.*?)(\d+)", name) if isinstance(name, str) else None for name in names]
-    if not all(parts):
-        return False
-    numbers = [int(part[2]) for part in parts]
-    together = numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-    return together and len({part[1] for part in parts}) == 1
+    """Refuse a table of frames. One whose columns are numbered may hold univariate rows."""
+    index, texts = df.index, [c for c in df.columns if isinstance(c, str)]
+    stems = {re.sub(r"\d+$", "", text) for text in texts}
+    numbered = len(stems) == (len(texts) > 0) and stems.isdisjoint(texts)
+    dates = index.dtype.kind in "mM"
+    fractions = index.dtype.kind == "f" and (index % 1 != 0).any()
+    timed = (dates or fractions) and index.is_monotonic_increasing and index.is_unique
+    if not numbered or timed:
+        raise ValueError(
+            f"{name} got a table of {len(df)} rows with the columns {list(df.columns[:4])}, whose "
+            f"index does not tell performances apart. {SPLIT} If every row is one univariate "
+            "performance, give df.to_numpy(); if every column is one, df.T.to_numpy()."
+        )
 
 
 def _warn_of_clocks(performances, names):
-    """Say if a feature of several only tells the time."""
+    """Warn of a feature, one of several, that only counts the time."""
     n_features = performances[0].shape[1]
     if n_features == 1 or min(map(len, performances)) < _CLOCK_FRAMES:
         return
-    ticks = np.ones(n_features, dtype=bool)
+    clocks = np.ones(n_features, dtype=bool)
     for x in performances:
-        ticks &= _is_even(x)
-        if not ticks.any():
+        step = (x[-1] - x[0]) / (len(x) - 1)
+        line = x[0] + step * np.arange(len(x))[:, np.newaxis]
+        # On a straight line, within half a step: times are rounded.
+        clocks &= (np.diff(x, axis=0) > 0).all(axis=0) & (np.abs(x - line) <= step / 2).all(axis=0)
+        if not clocks.any():
             return
-    for k in np.flatnonzero(ticks):
+    for k in np.flatnonzero(clocks):
         name = k if names is None else repr(names[k])
         warnings.warn(
             f"Feature {name} increases evenly in every performance: it is a clock, not a movement, "
@@ -372,19 +298,7 @@ def _warn_of_clocks(performances, names):
         )
 
 
-def _is_even(x):
-    """Which features rise on a straight line, but for rounding to half a step: (n_features,)."""
-    x = np.ldexp(x, -int(np.frexp(np.abs(x).max())[1]))
-    step = (x[-1] - x[0]) / (len(x) - 1)
-    line = x[0] + step * np.arange(len(x))[:, np.newaxis]
-    return (
-        (step > 0)
-        & (np.diff(x, axis=0) > 0).all(axis=0)
-        & (np.abs(x - line) <= step / 2).all(axis=0)
-    )
-
-
-# -- performances that are read in parts, each checked once, so that few are in memory at a time
+# -- performances that are read in parts, so that few are in memory at a time ---------------
 
 # Bytes of a number, at most.
 _DOUBLE = 8
@@ -413,7 +327,7 @@ def _read(estimator, source, on_rows):
     start, part, size = 0, [], 0
     for i in range(len(source)):
         part.append(source[i])
-        size += _count(part[-1]) * _DOUBLE
+        size += getattr(part[-1], "size", 0) * _DOUBLE
         if size < _BYTES and len(part) < MANY and i + 1 < len(source):
             continue
         if dtype is None:
@@ -423,16 +337,8 @@ def _read(estimator, source, on_rows):
         start, part, size = i + 1, [], 0
 
 
-def _count(x):
-    """How many numbers; none of what is no array, and will be refused."""
-    try:
-        return int(np.prod(np.shape(x)))
-    except ValueError:
-        return 0
-
-
 def _dtype_of_maps(source):
-    """The precision of memory maps, which tell it unread; None of what has to be read."""
+    """The precision of memory maps, known before they are read; None of all else."""
     kinds = {getattr(x, "dtype", None) for x in source} if isinstance(source, (list, tuple)) else ()
     kinds = {source.dtype} if isinstance(source, np.memmap) else kinds
     if not kinds:
@@ -440,8 +346,8 @@ def _dtype_of_maps(source):
     return np.dtype(np.float32 if kinds == {np.dtype(np.float32)} else np.float64)
 
 
-def all_of(labels, levels, names):
-    """What is known of performances that were read in parts: their labels, if they differ.
+def labels_of_parts(labels, levels, names):
+    """The labels of performances that were read in parts, if they differ, without the arrays.
 
     Parameters
     ----------
@@ -452,4 +358,4 @@ def all_of(labels, levels, names):
     """
     if len(levels) > 1 or len(set(labels)) < len(labels):
         labels, levels = list(range(len(labels))), {INDEX_NAMES}
-    return Performances((), "list", labels, [], names, *levels)
+    return Performances((), "list", labels, names=names, levels=levels.pop())

@@ -10,7 +10,7 @@ from sklearn.utils import check_consistent_length, check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.numbers import as_numbers, check_finite, check_names, check_squares
+from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..utils.atomic import atomic_fit, atomic_partial_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
@@ -448,9 +448,8 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
         Raises
         ------
         ValueError
-            If the performances have different lengths, or there is only one, or their unit is such
-            that variances are beyond the precision; if all are of one group, or there is not a
-            group for each performance.
+            If the performances have different lengths, or there is only one; if all are of one
+            group, or there is not a group for each performance.
         """
         performances = _alike(self._check_training_set(X))
         if len(performances) < 2:
@@ -492,9 +491,8 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
         Raises
         ------
         ValueError
-            If the performances have different lengths, or others than the earlier ones; if their
-            unit is such that variances are beyond the precision, or there is not a group for each;
-            if a parameter has become invalid. The model is as it was then.
+            If the performances have different lengths, or others than the earlier ones; if there is
+            not a group for each; if a parameter has become invalid. The model is as it was then.
 
         Examples
         --------
@@ -559,13 +557,10 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
         """Learn of performances that came after others."""
         seen, codes, stay = before.after(performances, groups)
         self.n_samples_seen_, self.n_frames_ = seen.n, len(seen.origin)
-        with np.errstate(over="ignore", invalid="ignore"):
-            self.mean_, self.variance_, spread = (
-                np.asarray(x, dtype=seen.kept.dtype)
-                for x in (seen.mean, seen.variance, seen.spread)
-            )
+        self.mean_, self.variance_, spread = (
+            np.asarray(x, dtype=seen.kept.dtype) for x in (seen.mean, seen.variance, seen.spread)
+        )
         spread = float(spread)
-        check_squares(np.stack(seen.bounds), spread, "variances")
         self._floor = _VARIANCE_FLOOR * (spread if spread > 0 else 1.0)
         self.groups_, self._seen = seen.groups, seen
         if seen.n_groups < 2:

@@ -6,7 +6,7 @@ import numpy as np
 from sklearn.pipeline import Pipeline
 
 from ..inputs.collections import as_collection
-from ..inputs.validation import labels_as_given
+from ..inputs.validation import labels_of_input
 from ..utils.pipelines import find_classifier, transform_through
 
 __all__ = ["ClassModel", "models_of_classes"]
@@ -65,7 +65,7 @@ def models_of_classes(estimator, X, params, caller, only=None):
         chosen = chosen[[only(len(performances))]]
     collection = as_collection(X)
     columns = classifier.predict_proba(performances.take(chosen)).argmax(axis=1)
-    models, called = [], labels_as_given(X, performances)[0]
+    models, called = [], labels_of_input(X, performances)[0]
     for column in dict.fromkeys(columns.tolist()):
         indices, label = chosen[columns == column], classifier.classes_[column]
         steps = [] if before is None else before.steps

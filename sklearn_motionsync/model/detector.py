@@ -11,7 +11,7 @@ from sklearn.utils.metadata_routing import MetadataRouter, MethodMapping
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.tables import index_of
-from ..inputs.validation import labels_as_given
+from ..inputs.validation import labels_of_input
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.pipelines import (
@@ -226,7 +226,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
             such as "too long, too weak"; it is empty if it is accepted.
         """
         table, performances = self._ask(X, params, "report")
-        labels, levels = labels_as_given(X, performances)
+        labels, levels = labels_of_input(X, performances)
         table = pd.DataFrame(table, index=index_of(labels, levels[:-1]))
         table["reason"] = [_reason(row) for row in table.to_dict("records")]
         return table

@@ -8,8 +8,8 @@ from sklearn.pipeline import Pipeline
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
-from ..inputs.features import as_features, names_of
-from ..inputs.validation import check_performances, labels_as_given
+from ..inputs.features import as_features, names_of_features
+from ..inputs.validation import check_performances, labels_of_input
 from ..transformers.aspace import ASpace
 from ..utils.pipelines import (
     asking,
@@ -103,7 +103,7 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
     """
     before, model = find_step(estimator, ActionModel)
     check_is_fitted(model, "threshold_")
-    names, params = names_of(before, model, model.mean_.shape[1]), params or {}
+    names, params = names_of_features(before, model, model.mean_.shape[1]), params or {}
     asked = any(isinstance(f, str) and f not in names for f in as_features(features))
     way = None
     if before is not None and (asked or postures):
@@ -115,12 +115,12 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
         else:
             synchronised, whole = way.follow(X, params, caller)
             given = model.check_performances(synchronised)
-        points, labels = np.stack(given), labels_as_given(X, given)[0]
+        points, labels = np.stack(given), labels_of_input(X, given)[0]
     if way is None:
         nothing = np.zeros(len(names))
         return View(model, names, points, points, labels, model, given, nothing)
     beside = names[len(way.aspace.components_) :]
-    names = [*names_of(way.before, way.aspace, way.aspace.n_features_in_), *beside]
+    names = [*names_of_features(way.before, way.aspace, way.aspace.n_features_in_), *beside]
     seen = None if points is None else way.back(points)
     left_out = np.append(_NEWCOMER * way.aspace.left_out_variance_, np.zeros(len(beside)))
     return View(_seen(model, way.back), names, seen, whole, labels, model, given, left_out)

@@ -11,7 +11,7 @@ from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
-from ..inputs.numbers import as_numbers, check_finite, check_names, check_squares
+from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.tables import as_pandas, labels_of, name_performance
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
@@ -184,7 +184,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         ------
         ValueError
             If the input breaks the contract, there is only one performance, or not one group for
-            each; or their unit is such that variances are beyond the precision.
+            each.
         """
         performances = self._check_training_set(X)
         n = len(performances)
@@ -203,8 +203,6 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         self.n_frames_, self.duration_ = int(sync.n_frames_), float(lengths.mean())
         clock = Clock(self.n_frames_ - 1.0, self.duration_ - 1.0)
         rates = clock.duration / (lengths[:, np.newaxis] - 1) / match.rates
-        with np.errstate(over="ignore", invalid="ignore"):
-            check_squares(warped, float(warped.var(axis=(0, 1)).max()), "variances")
         codes, settings = _as_codes(groups, n), (self.noise, self.tempering, self.n_particles)
         known = warped.astype(np.float64), rates, codes, clock
         self._model = on_one_thread(learn, *known, *settings)

@@ -14,7 +14,7 @@ from ..body.formats import SIDES
 from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
 from ..inputs.collections import as_collection
-from ..inputs.features import choose_features, names_of
+from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import as_numbers
 from ..inputs.tables import as_pandas
 from ..inputs.validation import check_performances
@@ -408,7 +408,7 @@ def names_of_compared(segmenter):
     """Names of these features."""
     if segmenter.skeleton is not None:
         return list(DirectionCosines(segmenter.skeleton).get_feature_names_out())
-    return names_of(None, segmenter, segmenter.n_features_in_)
+    return names_of_features(None, segmenter, segmenter.n_features_in_)
 
 
 def start_curves(segmenter, X, features):

@@ -135,7 +135,7 @@ def self_correlation(take, skeleton=None):
             f"Give one take, (n_frames, n_features), got {len(several)} performances; "
             "CycleSegmenter().report(X) tells of several."
         )
-    (array,), _ = check_members([take])
+    (array,) = check_members([take])
     if skeleton is not None:
         (array,) = DirectionCosines(skeleton).fit_transform([take])
     return correlate(np.asarray(array))

@@ -9,11 +9,11 @@ from sklearn.utils import Bunch
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.collections import Performances
 from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.validation import (
-    Performances,
     SequenceLevelMixin,
-    all_of,
+    labels_of_parts,
     names_of_input,
     parts_of_source,
     restore,
@@ -284,7 +284,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
             labels += part.labels
             levels.add(part.levels)
             out[start : len(labels)] = warped
-        return all_of(labels, levels, part.names), out
+        return labels_of_parts(labels, levels, part.names), out
 
     def _read_in_parts(self, X):
         if isinstance(X, Performances):

@@ -163,8 +163,7 @@ def _read(X, takes_rows):
         if X.ndim != 2 or not takes_rows:
             raise ValueError(NOT_ONE)
         sequences = [x[:, np.newaxis] for x in X]
-    arrays, _ = check_members(sequences)
-    return sequences, arrays, is_rows
+    return sequences, check_members(sequences), is_rows
 
 
 def _skeleton_of(estimator, skeleton):

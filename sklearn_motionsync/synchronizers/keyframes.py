@@ -174,7 +174,7 @@ class KeyframeSynchronizer(Synchronizer):
             knots = self._given_knots(performances, keyframes, len(self.keyframes_))
         distances, times = np.empty(len(performances)), []
         for rows in even_slices(len(performances), _AT_ONCE):
-            some = performances[rows]
+            some = performances.take(rows)
             own = self._found_knots(some) if keyframes is None else knots[rows]
             times.append(self._between(self.keyframes_, own))
             synchronised = sample(some, times[-1], self.n_frames_)

@@ -64,7 +64,7 @@ class LinearSynchronizer(Synchronizer):
     def _match(self, performances):
         distances = np.empty(len(performances))
         for rows in even_slices(len(performances), _AT_ONCE):
-            on_clock = self.normalize(performances[rows])
+            on_clock = self.normalize(performances.take(rows))
             distances[rows] = squared_distances(on_clock, self.pattern_)
         clock = np.arange(self.n_frames_, dtype=np.float64)
         return Match(np.tile(clock, (len(performances), 1)), distances)

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from ..inputs.collections import as_collection, to_frame
+from ..inputs.collections import as_collection
+from ..inputs.long_tables import to_frame
 from ..inputs.numbers import as_numbers
 from ..inputs.validation import read_collection
 from ..matching.warps import sample

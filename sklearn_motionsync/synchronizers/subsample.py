@@ -7,7 +7,7 @@ import pandas as pd
 from scipy.special import betaincinv
 from sklearn.utils import check_random_state
 
-from ..inputs.collections import as_collection, as_source, count_of, gives_rows, taken
+from ..inputs.collections import as_collection, as_source, count_of, gives_rows, select
 from ..inputs.tables import as_pandas
 
 __all__ = ["draw", "typical_share"]
@@ -49,7 +49,7 @@ def draw(X, size, pattern, random_state):
     if is_index:
         drawn = np.concatenate([[pattern], drawn[drawn != pattern]])
     sample = np.sort(drawn[:size])
-    return taken(given, sample), sample, population
+    return select(given, sample), sample, population
 
 
 def _by_index(X):

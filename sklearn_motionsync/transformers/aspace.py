@@ -13,7 +13,6 @@ from sklearn.decomposition import PCA
 from sklearn.utils._param_validation import Interval, RealNotInt
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.numbers import check_squares
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
@@ -25,8 +24,8 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     """The space of an action: principal components of all its postures.
 
     1. Pool the postures of all performances and diagonalise their covariance (Eq. 3).
-    2. Keep the first ``b`` eigenvectors, the fewest that hold the asked share of the
-       variance (Eq. 4).
+    2. Keep the first ``b`` eigenvectors, the fewest that reach the share of the variance to be
+       kept (Eq. 4).
     3. Project postures onto them (Eq. 5).
 
     Parameters
@@ -49,16 +48,16 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     residual_variance_ : float
         ``eps_b`` of Eq. 4: the variance left out, the sum of the other eigenvalues.
     left_out_variance_ : ndarray, shape (n_features,)
-        The same of every parameter of a posture by itself; their sum is ``eps_b``.
+        The variance left out of each feature; the sum is ``eps_b``.
     n_features_in_ : int
-        Parameters of a posture.
+        Features of a posture.
     feature_names_in_ : ndarray of str
         Names of the columns; only if the input had names.
 
     See Also
     --------
-    DirectionCosines : The postures.
-    DenseSynchronizer : What puts the projected performances on one clock.
+    DirectionCosines : Postures from joint positions.
+    DenseSynchronizer : Synchronises the projected performances.
 
     Examples
     --------
@@ -93,23 +92,23 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Performances, or postures in rows.
         y : ignored
+            Present for API consistency.
 
         Returns
         -------
-        self
+        ASpace
+            The fitted estimator.
 
         Raises
         ------
         ValueError
             If there are fewer than two postures, or fewer than ``n_components`` postures or
-            features, or their unit is such that variances are beyond the precision.
+            features.
         """
         arrays = check_performances(self, X, reset=True, level="posture")
-        postures = np.concatenate(arrays) if len(arrays) > 1 else arrays[0]
+        postures = np.concatenate(arrays)
         if len(postures) < 2:
-            raise ValueError(
-                "ASpace needs at least 2 postures to see how they vary, got n_samples=1."
-            )
+            raise ValueError("ASpace needs at least 2 postures, got n_samples=1.")
         most = min(postures.shape)
         if isinstance(self.n_components, Integral) and self.n_components > most:
             raise ValueError(
@@ -117,21 +116,14 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
                 f"{postures.shape[1]} features can span; use at most {most}, or a share of the "
                 "variance such as 0.95."
             )
-        # In units of a power of two no square is out of range, and no bit is lost.
-        exponent = int(np.frexp(np.abs(postures).max())[1])
-        with np.errstate(invalid="ignore"):  # no variance at all: 0 / 0 in shares not used
-            pca = PCA().set_output(transform="default").fit(np.ldexp(postures, -exponent))
-        with np.errstate(over="ignore"):
-            variance = np.ldexp(pca.explained_variance_, 2 * exponent)
-        check_squares(postures, variance[0], "variances")
+        with np.errstate(invalid="ignore"):  # of postures all equal: PCA divides 0 by 0
+            pca = PCA().set_output(transform="default").fit(postures)
+        variance = pca.explained_variance_
         b = self._count(variance)
         self.components_ = np.ascontiguousarray(pca.components_[:b])
-        self.mean_ = np.ldexp(pca.mean_, exponent)
+        self.mean_ = pca.mean_
         self.explained_variance_ = variance[:b]
-        whole = variance.sum()
-        self.explained_variance_ratio_ = (
-            variance[:b] / whole if whole > 0 else np.zeros_like(variance[:b])
-        )
+        self.explained_variance_ratio_ = variance[:b] / (variance.sum() or 1.0)
         self.residual_variance_ = float(variance[b:].sum())
         self.left_out_variance_ = variance[b:] @ np.square(pca.components_[b:])
         self.n_components_ = b
@@ -146,10 +138,13 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances, or postures in rows.
 
         Returns
         -------
-        The kind that was given, with ``b`` features
+        list of ndarray (n_frames_i, b), or ndarray
+            Points of the aSpace, of the same kind as ``X``; a ``(performance, frame)`` frame under
+            ``set_output(transform="pandas")``.
         """
         check_is_fitted(self)
         performances = check_performances(self, X, reset=False, level="posture")
@@ -159,15 +154,17 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
 
     @snapshot
     def inverse_transform(self, X):
-        """Postures of points of the aSpace; exact where nothing was left out.
+        """Reconstruct postures from points of the aSpace; exact if all components were kept.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, b), 3-D array, or 2-D array
+            Points of the aSpace.
 
         Returns
         -------
-        The kind that was given, with ``n_features`` features
+        list of ndarray (n_frames_i, n_features), or ndarray
+            Postures, of the same kind as ``X``.
         """
         check_is_fitted(self)
         performances = check_transformed(self, X, self.get_feature_names_out())
@@ -188,7 +185,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         return self.n_components_
 
     def _count(self, variance):
-        """The smallest number of eigenvalues that reach the asked share (Eq. 4)."""
+        """The smallest number of eigenvalues that reach the share to be kept (Eq. 4)."""
         if isinstance(self.n_components, Integral):
             return int(self.n_components)
         share = np.cumsum(variance)

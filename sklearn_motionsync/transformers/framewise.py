@@ -11,7 +11,7 @@ from sklearn.utils._param_validation import HasMethods
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.numbers import as_numbers, names_of
+from ..inputs.numbers import as_numbers, column_names
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
@@ -20,16 +20,15 @@ __all__ = ["FrameWise"]
 
 
 def _goes_back(self):
-    """Whether the transformer has a way back; in a fit it is tried, as some have it in part."""
+    """Whether the transformer inverts; fit tries, as some do so with some settings only."""
     return vars(self).get("_inverts", hasattr(self.transformer, "inverse_transform"))
 
 
 class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
     """Apply a transformer of rows, such as ``StandardScaler``, to the frames of performances.
 
-    It is fitted on the frames of all performances pooled, and transforms each performance by
-    itself. So features of different units are scaled by one number for all performances, not each
-    performance by its own, which would take out what people differ in.
+    The transformer is fitted on the pooled frames of all performances. A scaler therefore scales a
+    feature by one number for all performances, and the differences between subjects remain.
 
     Parameters
     ----------
@@ -48,13 +47,13 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
 
     See Also
     --------
-    ASpace : Principal components of postures, with what a model needs to take them back.
+    ASpace : Principal components of postures.
 
     Notes
     -----
-    A gap (NaN) is let through if the transformer takes it, as imputers and scalers do; infinity is
-    not. A pipeline takes what its first step takes, a union what all its parts take; a
-    ``ColumnTransformer`` and a ``FunctionTransformer`` take any.
+    A gap (NaN) is accepted if the transformer accepts it, as imputers and scalers do; infinity is
+    refused. A pipeline accepts what its first step accepts, a union what all its parts accept; a
+    ``ColumnTransformer`` and a ``FunctionTransformer`` accept any.
 
     Examples
     --------
@@ -89,35 +88,27 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Performances, or postures in rows.
         y : ignored
+            Present for API consistency.
 
         Returns
         -------
-        self
+        FrameWise
+            The fitted estimator.
 
         Raises
         ------
         ValueError
-            If the input breaks the contract, or the transformer needs a ``y``, or gives something
-            else than a row of numbers a frame.
+            If the input breaks the contract, the transformer needs a ``y``, or its output is not a
+            row of numbers a frame.
         """
         performances = check_performances(
             self, X, reset=True, level="posture", finite=self._finite()
         )
         self.transformer_ = clone(self.transformer)
-        pooled = self._named(np.concatenate(performances))
-        try:
-            self.transformer_.fit(pooled)
-        except (TypeError, ValueError) as error:
-            if "requires y" in str(error) or "argument: 'y'" in str(error):
-                raise ValueError(
-                    f"{self._name} needs a y, and frames have none. Use a transformer that does "
-                    "without, such as FrameWise(VarianceThreshold()), or select columns by name: "
-                    "[x[['knee', 'hip']] for x in X]."
-                ) from error
-            raise
+        self.transformer_.fit(self._named(np.concatenate(performances)))
         rows = self.transformer_.transform(self._named(performances[0]))
-        # FunctionTransformer names columns by the table that it gives only.
-        self._names_out = names_of(rows)
+        # The names of FunctionTransformer are those of the table that it returns.
+        self._names_out = column_names(rows)
         rows = self._as_rows(rows, performances, 0)
         self._n_features_out, self._inverts = rows.shape[1], _inverts(self.transformer_, rows[:1])
         return self
@@ -131,30 +122,38 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances, or postures in rows.
 
         Returns
         -------
-        The kind that was given, with the features of the transformer
+        list of ndarray (n_frames_i, n_features_out), or ndarray
+            Transformed frames, of the same kind as ``X``; a ``(performance, frame)`` frame under
+            ``set_output(transform="pandas")``.
         """
         check_is_fitted(self)
         performances = check_performances(
             self, X, reset=False, level="posture", finite=self._finite()
         )
-        arrays = [self._transformed(performances, i) for i in range(len(performances))]
+        arrays = [
+            self._as_rows(self.transformer_.transform(self._named(x)), performances, i)
+            for i, x in enumerate(performances)
+        ]
         return restore(self, performances, arrays)
 
     @available_if(_goes_back)
     @snapshot
     def inverse_transform(self, X):
-        """Take transformed frames back; only if the transformer can.
+        """Invert the transform of frames, if the transformer can.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features_out), 3-D array, or 2-D array
+            Transformed frames.
 
         Returns
         -------
-        The kind that was given, with the features before the transformer
+        list of ndarray (n_frames_i, n_features), or ndarray
+            Frames with the features before the transformer, of the same kind as ``X``.
         """
         check_is_fitted(self)
         names = self.get_feature_names_out()
@@ -211,22 +210,18 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
         return type(self.transformer).__name__
 
     def _finite(self):
-        """What the contract asks of the input: NaN goes to whoever takes it."""
+        """What the input must be: NaN is allowed if the transformer accepts it."""
         return "allow-nan" if _takes_gaps(self.transformer) else True
 
     def _named(self, frames):
-        """Frames of its own for the transformer, which may write to them, with their names."""
+        """A copy of frames with their names: a transformer may write to it."""
         names = getattr(self, "feature_names_in_", None)
         frames = frames.copy()
         # Row by row in memory with names, too: sums do not depend on them.
         return frames if names is None else pd.DataFrame(frames, columns=names, copy=False)
 
-    def _transformed(self, performances, i):
-        rows = self.transformer_.transform(self._named(performances[i]))
-        return self._as_rows(rows, performances, i)
-
     def _as_rows(self, rows, performances, i):
-        """What the transformer gave for a performance, if it is a row of numbers a frame."""
+        """The output of the transformer for a performance, checked: a row of numbers a frame."""
         what, n_frames = performances.called(i), len(performances[i])
         if issparse(rows):
             raise TypeError(
@@ -244,7 +239,7 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
 
 
 def _takes_gaps(transformer):
-    """Whether a transformer takes NaN, as do those that hand columns or frames on unseen."""
+    """Whether a transformer accepts NaN, or passes its input on without a check."""
     if isinstance(transformer, Pipeline):
         steps = [step for _, step in transformer.steps if step not in (None, "passthrough")]
         return bool(steps) and _takes_gaps(steps[0])
@@ -254,12 +249,12 @@ def _takes_gaps(transformer):
     if not hasattr(transformer, "__sklearn_tags__"):
         return False
     tags = get_tags(transformer)
-    looks_away = tags.no_validation or isinstance(transformer, ColumnTransformer)
-    return tags.input_tags.allow_nan or looks_away
+    unchecked = tags.no_validation or isinstance(transformer, ColumnTransformer)
+    return tags.input_tags.allow_nan or unchecked
 
 
 def _inverts(transformer, rows):
-    """Whether a fitted transformer takes rows back."""
+    """Whether a fitted transformer inverts rows."""
     try:
         transformer.inverse_transform(rows.copy())
     except (AttributeError, NotImplementedError, TypeError, ValueError):

@@ -163,7 +163,7 @@ def test_tables_come_out_as_from_a_list():
 BAD = {
     "gap": (np.where(np.arange(20)[:, None] == 5, np.nan, X[11]), "frame 5, feature 0 is NaN"),
     "width": (X[11][:, :2], "has 2 features a frame"),
-    "unit": (1e40 * X[11], "more than 1e\\+30 times as large"),
+    "unit": (1e40 * X[11], "e\\+40.*give the data in another unit"),
     "text": ([["a"] * 3] * 9, "is not a numeric array"),
     "ragged": ([[1.0, 2.0, 3.0], [1.0, 2.0]], "is not a numeric array"),
 }
