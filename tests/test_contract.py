@@ -167,7 +167,7 @@ def outputs(estimator, X):
     if hasattr(estimator, "match"):
         answers += list(estimator.match(X))
     if hasattr(estimator, "follow"):
-        answers += list(zip(*estimator.follow(X), strict=True))
+        answers += list(zip(*estimator.track(X), strict=True))
     if hasattr(estimator, "track"):
         # It takes gaps and single frames, too, which performances have not.
         tracks = estimator.track([x[::4] for x in estimator.check_performances(X)])

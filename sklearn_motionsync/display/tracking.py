@@ -9,7 +9,8 @@ from ..body.columns import is_whole
 from ..body.direction_cosines import DirectionCosines
 from ..inputs.features import choose_features
 from ..inputs.features import names_of as names_of_features
-from ..online.tracker import MotionTracker, Track
+from ..online.particle_filter import Track
+from ..online.tracker import MotionTracker
 from .departing import bones_of, limb_of
 from .drawing import COLORS, legend_above, panels
 from .given import as_drawn, as_frames, as_index, as_names

@@ -1,4 +1,4 @@
-"""The filter and the smoother against Gaussian processes written out naively, at known phases."""
+"""Filter and smoother against the formulas of Gaussian processes, at known phases."""
 
 import numpy as np
 import pytest
@@ -8,28 +8,28 @@ from sklearn_motionsync import LinearSynchronizer, MotionTracker
 
 @pytest.fixture(scope="module")
 def fitted():
-    """With one particle the phases that it says are those that it followed."""
+    """With one particle, whose phases are those of the track."""
     rng = np.random.default_rng(0)
     t = np.linspace(0, 1, 25)[:, np.newaxis]
     training = [np.sin(4 * t + rng.uniform(0, 1, 3)) * rng.uniform(0.7, 1.3, 3) for _ in range(6)]
     return MotionTracker(LinearSynchronizer(), 1, noise=0.1, random_state=1).fit(training)
 
 
-def body_of(tracker, times, rng):
-    """A body that departs from the mean as the model says, at the phases of the one particle."""
+def sample_body(tracker, times, rng):
+    """A body drawn from the model, at the phases of the one particle."""
     phases = tracker.track(np.full((len(times), 3), np.nan), times=times).phases
     mean = [np.interp(phases, np.arange(len(m)), m) for m in tracker.mean_.T]
-    covariance = covariance_of(tracker, times, times)
+    covariance = matern_covariance(tracker, times, times)
     drawn = multivariate_normal.rvs(cov=covariance, random_state=rng)
     return np.column_stack(mean) + drawn.reshape(len(times), 3)
 
 
 @pytest.fixture(scope="module")
 def seen(fitted):
-    """Observations at uneven times, of which nothing is lost, nor over."""
+    """Observations at uneven times, before the end of the movement."""
     rng = np.random.default_rng(1)
     times = np.cumsum(rng.uniform(0.5, 1.5, 14))
-    return body_of(fitted, times, rng) + 0.1 * rng.standard_normal((14, 3)), times
+    return sample_body(fitted, times, rng) + 0.1 * rng.standard_normal((14, 3)), times
 
 
 def with_gaps(values):
@@ -39,21 +39,21 @@ def with_gaps(values):
     return values
 
 
-def covariance_of(tracker, before, after):
-    """Matern-3/2 of elapsed time, times the covariance of the features: by its formula."""
+def matern_covariance(tracker, before, after):
+    """Matern-3/2 of elapsed time, times the covariance of the features."""
     scaled = np.sqrt(3) * np.abs(before[:, None] - after) / tracker.length_scale_
     return np.kron((1 + scaled) * np.exp(-scaled), tracker.covariance_)
 
 
 def posterior(tracker, phases, values, times, matrix, offset, frame, upto):
-    """Of the posture at a frame, given the observations up to another: one big normal."""
+    """Mean and covariance at a frame, given the observations up to another: one normal."""
     frames = np.arange(len(tracker.mean_))
     mean = np.column_stack([np.interp(phases, frames, m) for m in tracker.mean_.T])
     here = ~np.isnan(values[: upto + 1]).ravel()
     whole = np.kron(np.eye(upto + 1), matrix)[here]
-    among = whole @ covariance_of(tracker, times[: upto + 1], times[: upto + 1]) @ whole.T
+    among = whole @ matern_covariance(tracker, times[: upto + 1], times[: upto + 1]) @ whole.T
     among += tracker.noise**2 * np.eye(len(whole))
-    across = covariance_of(tracker, times[[frame]], times[: upto + 1]) @ whole.T
+    across = matern_covariance(tracker, times[[frame]], times[: upto + 1]) @ whole.T
     expected = (mean[: upto + 1] @ matrix.T + offset).ravel()[here]
     off = values[: upto + 1].ravel()[here] - expected
     gain = across @ np.linalg.inv(among)
@@ -65,38 +65,37 @@ PROJECTION = np.array([[1.0, 0.2, 0.0], [0.0, -1.0, 0.5]]), np.array([0.3, -1.0]
 
 @pytest.mark.parametrize("projection", [None, PROJECTION])
 @pytest.mark.parametrize("method", ["track", "smooth"])
-def test_postures_at_known_phases(fitted, seen, method, projection):
+def test_postures_equal_gaussian_process_posterior(fitted, seen, method, projection):
     values, times = seen
     matrix, offset = (np.eye(3), np.zeros(3)) if projection is None else projection
     values = with_gaps(values @ matrix.T + offset)
-    answer = getattr(fitted, method)(values, times=times, projection=projection)
-    assert answer.phases[-1] < fitted.n_frames_ - 1
-    assert not answer.lost.any()
+    track = getattr(fitted, method)(values, times=times, projection=projection)
+    assert track.phases[-1] < fitted.n_frames_ - 1
+    assert not track.lost.any()
     for i in range(len(times)):
         upto = i if method == "track" else len(times) - 1
-        given = fitted, answer.phases, values, times, matrix, offset
+        given = fitted, track.phases, values, times, matrix, offset
         mean, covariance = posterior(*given, i, upto)
-        np.testing.assert_allclose(answer.postures[i], mean, rtol=0, atol=1e-9)
-        np.testing.assert_allclose(answer.covariances[i], covariance, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(track.postures[i], mean, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(track.covariances[i], covariance, rtol=0, atol=1e-9)
 
 
-def test_smoothing_a_long_take(fitted):
-    """Of more frames than its way back keeps at once."""
+def test_smooth_of_several_blocks_equals_posterior(fitted):
     rng = np.random.default_rng(5)
     times = np.cumsum(rng.uniform(0.03, 0.07, 230))
     blind = fitted.track(np.full((230, 3), np.nan), times=times)
     values = with_gaps(blind.postures + 0.1 * rng.standard_normal((230, 3)))
     values[95:105] = np.nan
-    answer = fitted.smooth(values, times=times)
-    given = fitted, answer.phases, values, times, np.eye(3), np.zeros(3)
+    track = fitted.smooth(values, times=times)
+    given = fitted, track.phases, values, times, np.eye(3), np.zeros(3)
     for i in (0, 99, 100, 199, 229):
         mean, covariance = posterior(*given, i, 229)
-        np.testing.assert_allclose(answer.postures[i], mean, rtol=0, atol=1e-9)
-        np.testing.assert_allclose(answer.covariances[i], covariance, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(track.postures[i], mean, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(track.covariances[i], covariance, rtol=0, atol=1e-9)
 
 
 def dense_filter(tracker, phases, values, times):
-    """A Kalman filter as in textbooks: number by number, its noise integrated over time."""
+    """A textbook Kalman filter: number by number, its noise integrated over time."""
     decay, width = np.sqrt(3) / tracker.length_scale_, values.shape[1]
     drift = np.array([[0.0, 1.0], [-(decay**2), -2 * decay]])
     state, out = np.zeros(2 * width), []
@@ -128,7 +127,7 @@ def _exponential(matrix):
     return np.exp(value) * (np.eye(2) + matrix - value * np.eye(2))
 
 
-def test_the_filter_is_a_kalman_filter_at_fixed_phase(fitted, seen):
+def test_track_equals_textbook_kalman_filter(fitted, seen):
     values, times = with_gaps(seen[0]), seen[1]
     track = fitted.track(values, times=times)
     assert not track.lost.any()
@@ -138,25 +137,24 @@ def test_the_filter_is_a_kalman_filter_at_fixed_phase(fitted, seen):
         np.testing.assert_allclose(covariance, spread, rtol=0, atol=1e-9)
 
 
-def test_many_particles_are_a_mixture(fitted, seen):
-    """What they are together lies between what any of them says, and is wider."""
+def test_spread_of_rates_widens_covariances(fitted, seen):
     values, times = seen
     X = fitted.mean_ + np.linspace(-0.2, 0.2, 4)[:, np.newaxis, np.newaxis]
     many = MotionTracker(LinearSynchronizer(), 200, noise=0.1, random_state=0).fit(X)
     paced = [x[:: 1 + i % 2] for i, x in enumerate(X)]
     uneven = MotionTracker(LinearSynchronizer(25), 200, noise=0.1, random_state=0).fit(paced)
     blind = np.full_like(values, np.nan)
-    # Without a spread of rates all that begin at the first frame stay together.
+    # Without a spread of rates particles that begin at the first frame stay together.
     assert many.rate_spread_ == 0 < uneven.rate_spread_
     variances = [np.trace(t.track(blind, times=times).covariances[-1]) for t in (many, uneven)]
     assert variances[1] > variances[0]
 
 
-def test_covariances_hold_what_they_promise(fitted):
-    """Of bodies of the model itself the squared distances are those of chi square."""
+def test_squared_distances_in_covariances_are_chi_square(fitted):
+    """Of bodies drawn from the model."""
     rng, times, distances = np.random.default_rng(2), np.arange(15.0), []
     for _ in range(20):
-        body = body_of(fitted, times, rng)
+        body = sample_body(fitted, times, rng)
         values = body + 0.1 * rng.standard_normal(body.shape)
         values[4:9, 1:] = np.nan
         for track in (fitted.track(values), fitted.smooth(values)):
