@@ -7,23 +7,13 @@ import numpy as np
 from ..matching.warps import at_times
 from .state_space import (
     CausalSlopes,
-    KalmanUpdate,
     exponential_average,
     kalman_update,
     squared_norms,
     whitening_matrix,
 )
 
-__all__ = [
-    "ParticleFilter",
-    "Particles",
-    "Track",
-    "filter_take",
-    "smooth_take",
-    "stack_frames",
-    "systematic_resampling",
-    "weighted_median",
-]
+__all__ = ["ParticleFilter", "Track", "filter_take", "smooth_take", "stack_frames"]
 
 # Particles are resampled when their effective size is below this share of them.
 _MIN_EFFECTIVE = 0.5
@@ -77,11 +67,9 @@ class Track(NamedTuple):
     lost: np.ndarray
 
     def __repr__(self):
-        postures = np.atleast_2d(self.postures)
-        n_lost = int(np.count_nonzero(self.lost))
-        return (
-            f"Track({len(postures)} frames of {postures.shape[1]} features, {n_lost} of them lost)"
-        )
+        n_frames, n_features = np.size(self.lost), self.postures.shape[-1]
+        n_lost = np.count_nonzero(self.lost)
+        return f"Track({n_frames} frames of {n_features} features, {n_lost} of them lost)"
 
 
 def stack_frames(frames, dtype):
@@ -202,9 +190,8 @@ class ParticleFilter:
         """Resample the particles if need be, and let a time pass."""
         model, particles = self.model, self.particles
         if particles.effective_size < _MIN_EFFECTIVE * model.n_particles:
-            indices = systematic_resampling(
-                particles.weights, self.rng.random(), len(self.means[0])
-            )
+            weights, n = particles.weights, model.n_particles
+            indices = systematic_resampling(weights, self.rng.random(), n)
             particles = Particles.uniform(particles.phases[indices], particles.log_rates[indices])
             self.means = self.means[:, indices]
             self.slopes.resample(indices)
@@ -369,18 +356,6 @@ class HistoryFrame(NamedTuple):
     lost: bool
 
 
-class FilteredFrame(NamedTuple):
-    """A frame of the Kalman filter along known phases.
-
-    Postures are (n_paths, n_features); ``columns`` are those of the state covariance that belong to
-    the values, (2 n_features, n_features); the update is None without observations.
-    """
-
-    postures: np.ndarray
-    columns: np.ndarray
-    update: KalmanUpdate | None
-
-
 def smooth_take(model, seed, values, times, matrix):
     """The smoothed frames of a take, each given all observations.
 
@@ -452,16 +427,18 @@ def _smooth_paths(model, history, paths, matrix):
     for block, state in zip(blocks[::-1], states[::-1], strict=True):
         filtered, _ = _filter_paths(model, history[block], paths[block], matrix, state)
         frames = zip(history[block], paths[block], filtered, strict=True)
-        for past, path, frame in reversed(list(frames)):
-            out.append(_smooth_frame(model, past, path, frame, later))
-            later = _adjoint_step(model, past, frame, later)
+        for past, path, (postures, columns, update) in reversed(list(frames)):
+            out.append(_smooth_frame(model, past, path, postures, columns, later))
+            later = _adjoint_step(model, past, update, later)
     return out[::-1]
 
 
 def _filter_paths(model, history, paths, matrix, state):
     """The Kalman filter along all paths, on from a state.
 
-    Returns a list of `FilteredFrame`, and the state after them: means and covariance.
+    Returns a list of filtered frames, and the state after them: means and covariance. A filtered
+    frame has the postures (n_paths, n_features), the columns of the state covariance that belong to
+    the values, (2 n_features, n_features), and the `KalmanUpdate`, None without observations.
     """
     width, filtered = model.mean.shape[1], []
     for past, path in zip(history, paths, strict=True):
@@ -477,18 +454,17 @@ def _filter_paths(model, history, paths, matrix, state):
             innovations = past.values[seen] - (expected + means[0]) @ rows.T
             covariance, update = kalman_update(covariance, rows, innovations, model.noise)
             means = means + update.corrections
-        filtered.append(FilteredFrame(expected + means[0], covariance[:, :width].copy(), update))
+        filtered.append((expected + means[0], covariance[:, :width].copy(), update))
         state = means, covariance
     return filtered, state
 
 
-def _smooth_frame(model, past, path, frame, later):
+def _smooth_frame(model, past, path, postures, columns, later):
     """The `Track` of a frame: a filtered frame, and what later observations add.
 
     ``later`` is the adjoint (n_paths, 2 n_features) and the information (2 n_features,) * 2 of the
     states at the frame; None without later observations.
     """
-    postures, columns = frame.postures, frame.columns
     covariance = columns[: columns.shape[1]]
     if later is not None:
         adjoint, information = later
@@ -504,13 +480,13 @@ def _smooth_frame(model, past, path, frame, later):
     )
 
 
-def _adjoint_step(model, past, frame, later):
+def _adjoint_step(model, past, update, later):
     """Adjoint and information of the states at the frame before."""
     if past.initial:
         return None
-    (n, width), update = frame.postures.shape, frame.update
+    width = model.mean.shape[1]
     if later is None:
-        later = np.zeros((n, 2 * width)), np.zeros((2 * width, 2 * width))
+        later = np.zeros((_N_PATHS, 2 * width)), np.zeros((2 * width, 2 * width))
     adjoint, information = later
     if update is not None:
         rows, rest = update.obs_rows, np.eye(2 * width)

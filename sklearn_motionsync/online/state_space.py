@@ -172,10 +172,6 @@ class MaternProcess(NamedTuple):
         return cls(covariance, _HALF / (lag * step))
 
     @property
-    def length_scale(self):
-        return float(np.sqrt(3) / self.decay)
-
-    @property
     def stationary(self):
         """The prior covariance of the states, (2 n_features, 2 n_features)."""
         return np.kron(np.diag([1.0, self.decay**2]), self.covariance)
@@ -412,15 +408,11 @@ class CausalSlopes:
     """
 
     def __init__(self, n, width, window):
-        self.window = window
+        self.width, self.window = width, window
         # Sums of weights, and of their squares, times the age to the power 0, 1, 2.
         self.ages, self.squares = np.zeros((3, width)), np.zeros((3, width))
         # Sums of weighted values times the age to the power 0, 1.
         self.values = np.zeros((2, n, width))
-
-    @property
-    def width(self):
-        return self.ages.shape[1]
 
     def advance(self, dt):
         """Let a time pass."""

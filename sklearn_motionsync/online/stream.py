@@ -4,20 +4,12 @@ from collections import deque
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from ..inputs.numbers import as_numbers
+from ..inputs.numbers import as_numbers, check_names
 from ..matching.causal import CausalDerivative, CausalTrellis
 
-__all__ = [
-    "LivePhase",
-    "Session",
-    "Streams",
-    "check_times",
-    "phase_probabilities",
-    "stack_phases",
-    "time_left",
-    "times_of_each",
-]
+__all__ = ["LivePhase", "Session", "Streams", "check_frame", "check_times", "time_left"]
 
 # Shares of the clock: the window of rate and cost, and how near a phase counts as right.
 _WINDOW, _TOLERANCE = 0.1, 0.05
@@ -73,6 +65,8 @@ class Session:
     time : float
         Of the last frame.
     n_streams : int
+    history : deque of LivePhase
+        The phases of the last 100,000 frames.
     """
 
     def __init__(self, reference, frame, time):
@@ -83,12 +77,7 @@ class Session:
         self._resampler = Resampler(reference.step, reference.n_frames, frames, time)
         # NaN: the stream begins with the next frame.
         self._start = np.full(len(frames), np.nan)
-        self._history = deque(maxlen=_HISTORY_LENGTH)
-
-    @property
-    def history(self):
-        """The phases of all frames: `LivePhase` of arrays."""
-        return stack_phases(self._history)
+        self.history = deque(maxlen=_HISTORY_LENGTH)
 
     def restart(self, stream):
         """Begin another performance of one stream with the next frame."""
@@ -110,7 +99,7 @@ class Session:
         found = self._streams.estimate(self._resampler.elapsed)
         if frame.ndim == 1:
             found = LivePhase(*(float(values[0]) for values in found))
-        self._history.append(found)
+        self.history.append(found)
         # The history has arrays of its own.
         return found if frame.ndim == 1 else LivePhase(*map(np.copy, found))
 
@@ -118,7 +107,7 @@ class Session:
         """Frames of the training performances until the end of each stream."""
         begun = ~np.isnan(self._start)
         elapsed = np.where(begun, self.time - self._start, 0)
-        share = np.where(begun, self._history[-1].phase, 0) / (self._reference.n_frames - 1)
+        share = np.where(begun, self.history[-1].phase, 0) / (self._reference.n_frames - 1)
         left = time_left(share, elapsed, self._reference.duration)
         return left if len(self._shape) == 2 else float(left[0])
 
@@ -141,7 +130,7 @@ class Streams:
 
     def __init__(self, reference, n_streams, n_features):
         self.reference = reference
-        self.trellis = CausalTrellis(reference.trellis, reference.features.moving, n_streams)
+        self.trellis = CausalTrellis(reference.trellis, reference.moving, n_streams)
         self.mean_cost = np.zeros(n_streams)
         self._derivative = CausalDerivative(reference.width, (n_streams, n_features))
         self._window = max(2, round(_WINDOW * reference.n_frames))
@@ -149,9 +138,9 @@ class Streams:
         table = reference.trellis.table
         self._max_rate = table.steps.max() / table.subframes
         # Positions after the end of the movement have its last phase.
-        positions = np.arange(len(reference.features.moving)) / table.subframes
+        positions = np.arange(len(reference.moving)) / table.subframes
         self._phase_of_position = np.minimum(positions, reference.n_frames - 1)
-        # The phases of the last samples, in a ring buffer.
+        # The phases of the last samples, the last one last.
         self._phases = np.zeros((self._window + 1, n_streams))
         self._n_samples = np.zeros(n_streams, dtype=np.intp)
         self._path_cost, self._fully_observed = np.zeros(n_streams), np.ones(n_streams)
@@ -170,12 +159,12 @@ class Streams:
 
     def update(self, sample):
         """Take a sample (n_streams, n_features), one frame of the clock after the one before."""
-        features = self.reference.features
-        postures = features.unit(sample)
+        reference = self.reference
+        postures = reference.unit(sample)
         velocity = self._derivative.step(postures)
         # The unit makes constant features 0, observed or not.
         hidden = np.isnan(velocity) | np.isnan(sample)
-        compared, parts = features.all.compare(velocity, postures), {}
+        compared, parts = reference.features.compare(velocity, postures), {}
         observed = self._fully_observed
         if hidden.any():
             observed = 1 - hidden.mean(axis=1)
@@ -185,7 +174,7 @@ class Streams:
                 columns = tuple(np.flatnonzero(~hidden[n]).tolist())
                 by_columns.setdefault(columns, []).append(int(n))
             for columns, rows in by_columns.items():
-                part = features.subset(columns)
+                part = reference.subset(columns)
                 if part is not None:
                     part = part.compare(velocity[rows], postures[rows]), part.moving
                 parts[tuple(rows)] = part
@@ -195,7 +184,7 @@ class Streams:
     def estimate(self, elapsed):
         """Phases, rates and confidences, so many samples after the last one."""
         if self._cached is None:
-            self._cached = self._current_phases(), self._rates(), self._confidences()
+            self._cached = self._phases[-1], self._rates(), self._confidences()
         phase, rate, confidence = self._cached
         phase = np.minimum(phase + rate * elapsed, self.reference.n_frames - 1)
         return LivePhase(phase, rate, confidence)
@@ -203,9 +192,8 @@ class Streams:
     def _update_window(self, observed):
         """Phases, costs and observed shares of the window, with a sample of this observed share."""
         ends, costs = self.trellis.best()
-        self._phases[(self.trellis.n_samples - 1) % len(self._phases)] = self._phase_of_position[
-            ends
-        ]
+        now = self._phase_of_position[ends]
+        self._phases = np.concatenate([self._phases[1:], now[np.newaxis]])
         self._n_samples += 1
         weight, seen = 1 / np.minimum(self._n_samples, self._window), observed > 0
         self._observed_share += weight * (seen - self._observed_share)
@@ -214,20 +202,16 @@ class Streams:
         self.mean_cost += weight * seen * (cost - self.mean_cost)
         self._path_cost, self._cached = costs, None
 
-    def _current_phases(self):
-        return self._phases[(self.trellis.n_samples - 1) % len(self._phases)]
-
     def _rates(self):
         """Slopes of the phases over the window; before the first sample the rate is 1."""
         length = np.minimum(np.maximum(self._n_samples - 1, 0), self._window)
-        first = (self.trellis.n_samples - 1 - length) % len(self._phases)
-        moved = self._current_phases() - self._phases[first, np.arange(len(length))]
+        moved = self._phases[-1] - self._phases[-1 - length, np.arange(len(length))]
         rate = (moved + self._window - length) / self._window
         return np.minimum(np.maximum(rate, 0), self._max_rate)
 
     def _confidences(self):
         probabilities = phase_probabilities(self.trellis.costs, self.reference.temperature)
-        distances = np.abs(self._phase_of_position - self._current_phases()[:, np.newaxis])
+        distances = np.abs(self._phase_of_position - self._phases[-1][:, np.newaxis])
         mass = np.vecdot(probabilities, distances <= self._tolerance)
         excess = np.maximum(self.mean_cost / self.reference.typical_cost, 1)
         # A stream without samples is at the beginning.
@@ -322,6 +306,46 @@ def time_left(share, elapsed, duration):
     """
     by_time = np.maximum(duration - elapsed, 0)
     return (1 - share) * by_time + share * duration * (1 - share)
+
+
+def check_frame(frame, what, names, width, streams=False):
+    """The numbers of a frame, checked.
+
+    Parameters
+    ----------
+    frame : array-like, shape (n_features,), or with ``streams`` also (n_streams, n_features)
+        NaN is not seen.
+    what : str
+        What to call it in messages.
+    names : list or None
+        Names of the features that a row of a table must have.
+    width : int
+        ``n_features``.
+    streams : bool, default=False
+
+    Returns
+    -------
+    ndarray of float64
+
+    Raises
+    ------
+    ValueError
+        If it has another shape or other names, or is infinite.
+    """
+    if type(frame) is not np.ndarray or frame.dtype != np.float64:
+        # A row of a table has the names of its columns.
+        check_names(frame.to_frame().T if isinstance(frame, pd.Series) else frame, names, what)
+        frame = as_numbers(frame, what, dtype=np.float64)
+    frame = np.atleast_1d(frame)
+    if frame.ndim > 1 + streams or frame.shape[-1] != width or not frame.size:
+        more = f", or (n_streams, {width}) for performances side by side" * streams
+        raise ValueError(f"{what} must have shape ({width},){more}; got {frame.shape}.")
+    if np.isinf(frame).any():
+        raise ValueError(
+            f"{what}: feature {np.argwhere(np.isinf(frame))[0][-1]} is infinite. Give NaN for what "
+            "is not seen."
+        )
+    return frame
 
 
 def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):

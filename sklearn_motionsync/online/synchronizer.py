@@ -2,15 +2,12 @@
 
 import math
 from numbers import Real
-from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, _fit_context, clone
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.numbers import as_numbers, check_names
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
 from ..matching.causal import causal_velocity
 from ..matching.costs import COSTS, step_table
@@ -27,16 +24,14 @@ from .stream import (
     LivePhase,
     Session,
     Streams,
+    check_frame,
     check_times,
     phase_probabilities,
     stack_phases,
     times_of_each,
 )
 
-__all__ = ["LiveFeatures", "OnlineSynchronizer", "Reference"]
-
-# Positions a frame of the pattern: docs/method.md.
-_SUBFRAMES = 2
+__all__ = ["OnlineSynchronizer", "Reference"]
 
 
 class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin, BaseEstimator):
@@ -185,8 +180,13 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         self.n_frames_ = sync.n_frames_
         self.mean_ = warped.mean(axis=0)
         self.duration_ = float(np.mean([len(x) for x in performances]) - 1)
-        calibration = calibrate(self._make_reference, performances, warped, match.times)
-        self._reference = self._make_reference(self.mean_, *calibration)
+        settings = self.duration_, self.smoothness, self.velocity_smoothing, self.max_rate
+
+        def reference_of(mean, *calibration):
+            return Reference(sync.training_.features, mean, *settings, *calibration)
+
+        calibration = calibrate(reference_of, performances, warped, match.times)
+        self._reference = reference_of(self.mean_, *calibration)
         self._session = None
         return self
 
@@ -217,10 +217,11 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         """
         if "_session" not in vars(self):
             check_is_fitted(self)
-        frame, times = self._check_frame(frame), None if time is None else [time]
+        width = self.mean_.shape[1]
+        frame = check_frame(frame, "The frame", names_of_input(self), width, streams=True)
         session = self._session
         last = None if session is None else session.time
-        time = float(check_times(times, 1, self.frame_rate, "The frame", last)[0])
+        time = float(check_times(time, 1, self.frame_rate, "The frame", last)[0])
         if session is None:
             session = self._session = Session(self._reference, frame, time)
         return session.step(frame, time)
@@ -273,8 +274,9 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         Of a long stream these are the last 100,000 frames.
         """
         check_is_fitted(self)
-        empty = LivePhase(*np.empty((3, 0)))
-        return empty if self._session is None else self._session.history
+        if self._session is None:
+            return LivePhase(*np.empty((3, 0)))
+        return stack_phases(self._session.history)
 
     def track(self, X, times=None):
         """The phases of whole performances, as ``step`` estimates them frame by frame.
@@ -308,53 +310,22 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
             tracks.append(stack_phases(list(map(session.step, frames, t))))
         return tracks
 
-    def _make_reference(self, mean, *calibration):
-        """The `Reference` of a mean performance, (P, n_features)."""
-        features, last = self.synchronizer_.training_.features, self.n_frames_ - 1
-        width = self.velocity_smoothing * last
-        live_features = LiveFeatures(features, mean, _SUBFRAMES, width)
-        mu = self.smoothness * float(np.square(live_features.moving).sum(axis=1).mean())
-        # No step is longer than the pattern.
-        table = step_table(features.cost, min(self.max_rate, last), _SUBFRAMES)
-        trellis = Trellis(table, mu, last + live_features.rest, running=True)
-        step = self.duration_ / last
-        return Reference(self.n_frames_, trellis, live_features, width, step, *calibration)
-
-    def _check_frame(self, frame):
-        """The numbers of a frame, of one stream or of several."""
-        if type(frame) is not np.ndarray or frame.dtype != np.float64:
-            # A row of a table has the names of its columns.
-            row = frame.to_frame().T if isinstance(frame, pd.Series) else frame
-            check_names(row, names_of_input(self), "The frame")
-            frame = as_numbers(frame, "The frame", dtype=np.float64)
-        width = self.mean_.shape[1]
-        if frame.ndim == 0 and width == 1:
-            frame = frame[np.newaxis]
-        if frame.ndim not in (1, 2) or frame.shape[-1] != width or not frame.size:
-            raise ValueError(
-                f"A frame must have shape ({width},), or (n_streams, {width}) for several "
-                f"performances side by side; got {frame.shape}."
-            )
-        if np.isinf(frame).any():
-            raise ValueError(
-                f"Feature {np.argwhere(np.isinf(frame))[0][-1]} of the frame is infinite. Give NaN "
-                "for what is not seen."
-            )
-        return frame
-
 
 # -- the reference: what running performances are matched to -------------------------------
 
+# Positions a frame of the pattern: docs/method.md.
+_SUBFRAMES = 2
 # After the end the last posture is held for so many widths of the velocity filters, after which
 # these have forgotten the movement.
 _REST = 6
 
 
-class LiveFeatures:
-    """The features of a synchronizer, from causal velocities and postures.
+class Reference:
+    """A mean performance that running performances are matched to, and its trellis.
 
-    Velocities of both sequences have the same delay. Postures are centred at the mean posture of
-    the reference, as the mean of a running performance is not known yet.
+    The features are those of the synchronizer, from causal velocities and postures. Velocities of
+    both sequences have the same delay. Postures are centred at the mean posture of the reference,
+    as the mean of a running performance is not known yet.
 
     Parameters
     ----------
@@ -362,31 +333,60 @@ class LiveFeatures:
         Of the fitted synchronizer.
     mean : ndarray, shape (P, n_features)
         The mean performance.
-    subframes : int
-        Positions a frame of it.
-    width : float
-        Time constant of the velocity filters, in frames of the clock.
+    duration : float
+        Mean duration of the training performances, in their frames.
+    smoothness, velocity_smoothing, max_rate : float
+        As of the `OnlineSynchronizer`.
+    temperature : float, default=1.0
+        Path costs over it are negative log-probabilities of phases.
+    typical_cost : float, default=inf
+        Mean cost of a sample that half of the training performances never exceed.
 
     Attributes
     ----------
-    rest : int
-        Frames for which the last posture is held.
-    all : FeatureSubset
+    n_frames : int
+        ``P``.
+    duration : float
+        Mean duration, in frames of the training performances.
+    width : float
+        Time constant of the velocity filters, in frames of the clock.
+    step : float
+        A frame of the clock, in frames of the training performances.
+    features : FeatureSubset
         All features.
     moving : ndarray, shape (Q, n_compared)
         Those of the mean performance, with its last posture held.
+    trellis : Trellis
     """
 
-    def __init__(self, features, mean, subframes, width):
+    def __init__(
+        self,
+        features,
+        mean,
+        duration,
+        smoothness,
+        velocity_smoothing,
+        max_rate,
+        temperature=1.0,
+        typical_cost=np.inf,
+    ):
+        last = len(mean) - 1
         self.cost, self.metric, self.unit = features.cost, features.metric, features.unit
-        postures = self.unit(normalise([mean.astype(np.float64)], len(mean), subframes)[0])
+        self.n_frames, self.width, self.step = len(mean), velocity_smoothing * last, duration / last
+        self.duration = self.step * last
+        self.temperature, self.typical_cost = temperature, typical_cost
+        postures = self.unit(normalise([mean.astype(np.float64)], len(mean), _SUBFRAMES)[0])
         self.centre, self._n_positions = postures.mean(axis=0), len(postures)
-        self.rest = max(1, math.ceil(_REST * width))
-        held = np.repeat(postures[-1:], self.rest * subframes, axis=0)
+        rest = max(1, math.ceil(_REST * self.width))
+        held = np.repeat(postures[-1:], rest * _SUBFRAMES, axis=0)
         self._postures = np.concatenate([postures, held])
-        self._velocity = causal_velocity(self._postures, subframes, width)
-        self.all = self._subset(np.arange(mean.shape[1]))
-        self.moving, self._cached = self.all.moving, {}
+        self._velocity = causal_velocity(self._postures, _SUBFRAMES, self.width)
+        self.features, self._cached = self._subset(np.arange(mean.shape[1])), {}
+        self.moving = self.features.moving
+        mu = smoothness * float(np.square(self.moving).sum(axis=1).mean())
+        # No step is longer than the pattern.
+        table = step_table(self.cost, min(max_rate, last), _SUBFRAMES)
+        self.trellis = Trellis(table, mu, last + rest, running=True)
 
     def subset(self, columns):
         """The `FeatureSubset` of some columns, a tuple; None if the metric has none of these."""
@@ -414,7 +414,7 @@ class LiveFeatures:
 
 
 class FeatureSubset:
-    """Some of the features.
+    """Some of the features of a `Reference`.
 
     Attributes
     ----------
@@ -422,8 +422,8 @@ class FeatureSubset:
         Those of the mean performance.
     """
 
-    def __init__(self, features, columns, metric, velocity, postures):
-        self._cost, self._centre = features.cost, features.centre
+    def __init__(self, reference, columns, metric, velocity, postures):
+        self._cost, self._centre = reference.cost, reference.centre
         self._columns, self._metric = columns, metric
         self.moving = self.compare(velocity, postures)
 
@@ -434,40 +434,6 @@ class FeatureSubset:
         if self._metric is None:
             return COSTS[self._cost].features(postures, lambda _: velocity)
         return self._metric.of_parts(compressed(velocity, self._metric.energy), postures)
-
-
-class Reference(NamedTuple):
-    """A mean performance that running performances are matched to.
-
-    Parameters
-    ----------
-    n_frames : int
-        ``P``.
-    trellis : Trellis
-        It goes on after the end, where the last posture is held.
-    features : LiveFeatures
-    width : float
-        Time constant of the velocity filters, in frames of the clock.
-    step : float
-        A frame of the clock, in frames of the training performances.
-    temperature : float, default=1.0
-        Path costs over it are negative log-probabilities of phases.
-    typical_cost : float, default=inf
-        Mean cost of a sample that half of the training performances never exceed.
-    """
-
-    n_frames: int
-    trellis: Trellis
-    features: LiveFeatures
-    width: float
-    step: float
-    temperature: float = 1.0
-    typical_cost: float = np.inf
-
-    @property
-    def duration(self):
-        """Mean duration, in frames of the training performances."""
-        return self.step * (self.n_frames - 1)
 
 
 # -- calibration: what path costs say, learnt from the training performances ---------------
@@ -505,13 +471,13 @@ def calibrate(reference_of, performances, warped, times):
     chosen = np.unique(np.linspace(0, n - 1, _MAX_PERFORMANCES).round().astype(np.intp))
     scores, largest = np.zeros(len(_TEMPERATURES)), []
     # Of a constant mean all costs are 0, in any unit.
-    energy = float(np.square(reference_of(total / n).features.moving).sum(axis=1).mean()) or 1.0
+    energy = float(np.square(reference_of(total / n).moving).sum(axis=1).mean()) or 1.0
     if n == 1:
         return energy * _DEFAULT_TEMPERATURE, energy * _DEFAULT_COST
     for i in chosen:
         reference = reference_of((total - warped[i]) / (n - 1))
-        costs, truth, mean_costs = _match_live(reference, performances[i], times[i])
-        largest.append(np.max(mean_costs))
+        costs, truth, largest_cost = _match_live(reference, performances[i], times[i])
+        largest.append(largest_cost)
         for k, temperature in enumerate(energy * _TEMPERATURES):
             right = phase_probabilities(costs, temperature)[np.arange(len(costs)), truth]
             scores[k] += np.log(np.maximum(right, _MIN_PROBABILITY)).mean()
@@ -521,19 +487,19 @@ def calibrate(reference_of, performances, warped, times):
 
 
 def _match_live(reference, performance, times):
-    """Path costs at even moments, the positions of the synchronizer there, and mean costs."""
+    """Path costs at even moments, the true positions there, and the largest mean cost."""
     streams, duration = Streams(reference, 1, performance.shape[1]), len(performance) - 1
     moments = np.arange(0, duration * (1 + 1e-9), reference.step) / duration
     last = reference.n_frames - 1
-    costs, mean_costs, every = [], [], -(-len(moments) // _MAX_MOMENTS)
+    costs, largest, every = [], 0.0, -(-len(moments) // _MAX_MOMENTS)
     samples = sample_at([performance], moments[np.newaxis] * last, last + 1)[0]
     for k, sample in enumerate(samples):
         streams.update(sample[np.newaxis])
-        mean_costs.append(streams.mean_cost[0])
+        largest = max(largest, streams.mean_cost[0])
         if k % every == 0:
             costs.append(streams.trellis.costs[0])
     # Where tau is constant, any phase of that interval is right.
     rising = times + 1e-9 * np.arange(len(times))
     phases = np.interp(moments * last, rising, np.arange(len(times)))
     truth = np.round(phases * reference.trellis.table.subframes).astype(np.intp)
-    return np.array(costs), truth[::every], np.array(mean_costs)
+    return np.array(costs), truth[::every], largest

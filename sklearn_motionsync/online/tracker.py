@@ -20,7 +20,7 @@ from ..utils.doc_links import DocumentedMixin
 from ..utils.threads import on_one_thread
 from .particle_filter import ParticleFilter, Track, filter_take, smooth_take, stack_frames
 from .state_space import Clock, TrackerModel
-from .stream import check_times, times_of_each
+from .stream import check_frame, check_times, times_of_each
 
 __all__ = ["MotionTracker"]
 
@@ -212,7 +212,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         self._model = on_one_thread(TrackerModel.learn, *given, *settings)
         self.mean_ = self._model.mean.astype(performances[0].dtype)
         self.covariance_ = self._model.process.covariance
-        self.length_scale_ = self._model.process.length_scale
+        self.length_scale_ = float(np.sqrt(3) / self._model.process.decay)
         self.rate_spread_, self.rate_memory_ = self._model.rates
         self.surprise_limit_, self.departure_limit_ = map(float, self._model.nis_limits)
         self._seed = int(check_random_state(self.random_state).randint(2**31 - 1))
@@ -304,15 +304,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         names = names_of_input(self) if projection is None else None
         matrix, offset = check_projection(projection, self._model.mean.shape[1])
         what = "The observation"
-        if isinstance(observation, pd.Series):
-            check_names(observation.to_frame().T, names, what)
-        values = np.atleast_1d(as_numbers(observation, what, dtype=np.float64))
-        if values.shape != (len(matrix),):
-            raise ValueError(
-                f"{what} has shape {values.shape}, expected ({len(matrix)},): one number a "
-                "feature, NaN where it is not seen. For a whole take use track."
-            )
-        check_finite(values[np.newaxis], f"{what}, frame", names, allow_nan=True)
+        values = check_frame(observation, what, names, len(matrix))
         last = None if self._running is None else self._running.time
         time = float(check_times(time, 1, self.frame_rate, what, last)[0])
         if self._running is None:
@@ -332,7 +324,10 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         sequences = as_collection(X)
         single = sequences is None and not self._fitted_on_rows
         if sequences is None:
-            sequences = [as_pandas(X)] if single else _takes_of_rows(X)
+            X = as_pandas(X)
+            if not single:
+                X = list(as_numbers(X, "The input", dtype=np.float64)[..., np.newaxis])
+            sequences = [X] if single else X
         if len(sequences) == 0:
             raise ValueError("Found 0 takes, at least 1 is needed.")
         labels = ["The take"]
@@ -377,51 +372,28 @@ def check_projection(projection, n_features):
     """
     if projection is None:
         return np.eye(n_features), np.zeros(n_features)
-    pair = projection if isinstance(projection, tuple) else (projection, None)
-    if len(pair) != 2:
+    pair = projection if isinstance(projection, tuple) else (projection,)
+    pair = [as_numbers(part, "The projection", dtype=np.float64) for part in pair]
+    shapes, n = [part.shape for part in pair], len(np.atleast_1d(pair[0]))
+    if n == 0 or shapes not in ([(n, n_features)], [(n, n_features), (n,)]):
         raise ValueError(
-            "projection must be a matrix (n_observed, n_features), or the pair (matrix, offset); "
-            f"got a tuple of {len(pair)}."
+            f"projection must be a matrix (n_observed, {n_features}), or the pair (matrix, offset) "
+            f"with an offset (n_observed,); got the shapes {shapes}."
         )
-    matrix = as_numbers(pair[0], "The projection", dtype=np.float64)
-    if matrix.ndim != 2 or matrix.shape[1] != n_features or len(matrix) == 0:
-        raise ValueError(
-            f"projection must be a matrix of shape (n_observed, {n_features}), as postures have "
-            f"{n_features} features, or the tuple (matrix, offset); got shape {matrix.shape}."
-        )
-    offset = np.zeros(len(matrix)) if pair[1] is None else pair[1]
-    offset = as_numbers(offset, "The offset", dtype=np.float64)
-    if offset.shape != (len(matrix),):
-        raise ValueError(
-            f"The offset of a projection must have shape ({len(matrix)},), one number a row of the "
-            f"matrix; got {offset.shape}."
-        )
+    matrix, offset = pair if len(pair) == 2 else (pair[0], np.zeros(n))
     check_finite(np.column_stack([matrix, offset]), "The projection, row")
     return matrix, offset
-
-
-def _takes_of_rows(X):
-    rows = as_numbers(as_pandas(X), "The input", dtype=np.float64)
-    if rows.ndim != 2:
-        raise ValueError(
-            f"Expected 2D array, one take a row, as in fit; got an array of shape {rows.shape}."
-        )
-    return list(rows[:, :, np.newaxis])
 
 
 def _check_take(x, what, names, width):
     """The numbers of a take, (n_frames, width)."""
     check_names(x, names, what)
     values = as_numbers(x, what, dtype=np.float64)
-    if values.ndim != 2 or len(values) == 0:
+    if values.ndim != 2 or values.shape[1] != width or len(values) == 0:
         raise ValueError(
             f"{what} has shape {values.shape}, expected (n_frames, {width}) with at least 1 frame. "
-            "Reshape your data: a single feature is a column, x[:, np.newaxis]."
-        )
-    if values.shape[1] != width:
-        raise ValueError(
-            f"{what} has {values.shape[1]} features a frame, expected are {width}. Features that "
-            "are not seen are NaN; other measurements of the body need a projection."
+            "Features that are not seen are NaN; other measurements of the body need a projection. "
+            "A single feature is a column: reshape your data, x[:, np.newaxis]."
         )
     frames = x.index if isinstance(x, pd.DataFrame) else None
     check_finite(values, f"{what}, frame", names, frames, allow_nan=True)

@@ -17,12 +17,10 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.causal import CausalDerivative
-from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.matcher import Features
-from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.matching.units import Unit
 from sklearn_motionsync.online.stream import Streams, check_times
-from sklearn_motionsync.online.synchronizer import LiveFeatures, Reference
+from sklearn_motionsync.online.synchronizer import Reference
 
 P = 60
 
@@ -127,14 +125,13 @@ def test_track_equals_step_and_does_not_look_ahead(fitted, live):
 def test_costs_at_the_end_equal_offline_trellis_to_the_last_bit():
     mean, x = movement(np.linspace(0, 1, P)), performance(75, 0.4, 0.05)[0]
     unit = Unit.of(mean[np.newaxis])
-    features = LiveFeatures(Features("velocity", 1, 0.03, unit), mean, 2, 1.8)
-    trellis = Trellis(step_table("velocity", 3, 2), 0.01, P - 1 + features.rest, running=True)
-    streams = Streams(Reference(P, trellis, features, 1.8, 1.0), 1, 3)
+    reference = Reference(Features("velocity", 1, 0.03, unit), mean, P - 1, 0.1, 0.03, 3)
+    streams = Streams(reference, 1, 3)
     for frame in x:
         streams.update(frame[np.newaxis])
-    derivative = CausalDerivative(1.8, (1, 3))
-    base = [features.all.compare(derivative.step(y), y)[0] for y in unit(x)[:, np.newaxis]]
-    given = np.array(base)[np.newaxis], features.moving[np.newaxis]
+    derivative, trellis = CausalDerivative(reference.width, (1, 3)), reference.trellis
+    base = [reference.features.compare(derivative.step(y), y)[0] for y in unit(x)[:, np.newaxis]]
+    given = np.array(base)[np.newaxis], reference.moving[np.newaxis]
     np.testing.assert_array_equal(streams.trellis.costs, trellis.ends(*given)[0])
     assert streams.estimate(0.0).phase[0] == min(trellis.paths(*given)[0, 0][-1] / 2, P - 1)
 
@@ -329,7 +326,7 @@ def test_refused_frame_changes_nothing(fitted, live):
     for k, frame in enumerate(x[1:], 1):
         for bad, time, message in [
             (frame[:2], None, r"must have shape \(3,\), or \(n_streams, 3\)"),
-            (np.append(frame[:2], np.inf), None, "Feature 2 of the frame is infinite"),
+            (np.append(frame[:2], np.inf), None, "The frame: feature 2 is infinite"),
             (["a", "b", "c"], None, "The frame"),
             (np.stack([frame, frame]), None, r"had the shape \(3,\), this one has \(2, 3\)"),
             (frame, k - 1.0, "time stamps must increase"),

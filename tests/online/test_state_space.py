@@ -88,7 +88,7 @@ def test_matern_process_recovers_length_scale_and_covariance():
     mixing = np.array([[1.0, 0.0], [0.8, 0.6]])
     drawn = root @ rng.standard_normal((60, 120, 2)) @ mixing.T
     process = MaternProcess.learn(drawn, 0.5)
-    assert abs(process.length_scale - 8) < 1.5
+    assert abs(np.sqrt(3) / process.decay - 8) < 1.5
     flat = drawn.reshape(-1, 2)
     moments = flat.T @ flat / len(flat)
     expected = (moments + np.diag(np.diag(moments))) / 2

@@ -230,8 +230,8 @@ INFINITE = np.where(np.arange(180).reshape(60, 3) == 11, np.inf, movement(1))
 @pytest.mark.parametrize(
     ("X", "more", "message"),
     [
-        (movement(1)[:, :2], {}, r"The take has 2 features a frame, expected are 3"),
-        ([movement(1), movement(1)[:, :2]], {}, r"Performance 1 has 2 features"),
+        (movement(1)[:, :2], {}, r"The take has shape \(60, 2\), expected \(n_frames, 3\)"),
+        ([movement(1), movement(1)[:, :2]], {}, r"Performance 1 has shape \(60, 2\)"),
         (INFINITE, {}, r"The take, frame 3, feature 2 is infinity"),
         (movement(1)[:0], {}, r"at least 1 frame"),
         (movement(1)[0], {}, r"x\[:, np.newaxis\]"),
@@ -239,9 +239,9 @@ INFINITE = np.where(np.arange(180).reshape(60, 3) == 11, np.inf, movement(1))
         (movement(1), {"times": np.r_[0:30, 20:50]}, r"The take: time stamps must increase"),
         ([movement(1)], {"times": [None, None]}, r"1 performances, but 2 sequences of times"),
         ([movement(1)], {"times": 3.0}, r"1 performances, but no sequences of times"),
-        (movement(1), {"projection": (np.eye(3),)}, r"or the pair \(matrix, offset\)"),
-        (movement(1), {"projection": np.eye(2)}, r"shape \(n_observed, 3\)"),
-        (movement(1), {"projection": (np.eye(3), [1.0])}, r"offset .* shape \(3,\)"),
+        (movement(1), {"projection": (np.eye(3),) * 3}, r"or the pair \(matrix, offset\)"),
+        (movement(1), {"projection": np.eye(2)}, r"matrix \(n_observed, 3\)"),
+        (movement(1), {"projection": (np.eye(3), [1.0])}, r"an offset \(n_observed,\)"),
         (movement(1), {"projection": np.full((1, 3), np.nan)}, "is NaN"),
     ],
 )
@@ -253,8 +253,8 @@ def test_track_refuses(tracker, X, more, message):
 @pytest.mark.parametrize(
     ("frame", "time", "message"),
     [
-        ([1.0, 2.0], None, r"shape \(2,\), expected \(3,\)"),
-        ([1.0, np.inf, 2.0], None, "infinity"),
+        ([1.0, 2.0], None, r"The observation must have shape \(3,\); got \(2,\)"),
+        ([1.0, np.inf, 2.0], None, "feature 1 is infinite"),
         ([1.0, 0.0, 0.0], 1.0, "must increase, but 1 follows 1"),
         ([1.0, 0.0, 0.0], np.nan, "finite"),
     ],
