@@ -12,10 +12,9 @@ from ..inputs.features import as_features, names_of
 from ..inputs.validation import check_performances, labels_as_given
 from ..transformers.aspace import ASpace
 from ..utils.pipelines import (
-    asking,
+    explain_missing,
     find_step,
     flat_steps,
-    how_to_give,
     taken_by,
     transform_through,
 )
@@ -155,7 +154,7 @@ class _Way(NamedTuple):
         postures = transform_through(self.before, X, params, caller, also=takers)
         whole = check_performances(self.aspace, postures, reset=False, level="posture")
         points = self.aspace.transform(postures)
-        with asking(how_to_give(caller)):
+        with explain_missing(caller):
             for step in self.after:
                 whole = step.match(points, **taken_by(step.match, params)).warp(whole)
                 points = step.transform(points, **taken_by(step.transform, params))

@@ -281,13 +281,13 @@ def test_a_lock_held_by_another_thread_is_not_inherited():
                 go_on.wait(10)
 
     limit = Limit(Slow())
-    thread = threading.Thread(target=limit.enter, args=("visitor",), daemon=True)
+    thread = threading.Thread(target=limit.acquire, args=("visitor",), daemon=True)
     thread.start()
     assert entered.wait(10)
     began = time.perf_counter()
     limit.after_fork()
-    limit.enter("child")
-    limit.leave("child")
+    limit.acquire("child")
+    limit.release("child")
     assert time.perf_counter() - began < 5
     go_on.set()
     thread.join()
@@ -298,31 +298,31 @@ def test_settings_of_each_thread():
     limit, seen = Limit(library), []
 
     def visit():
-        limit.enter("other")
+        limit.acquire("other")
         seen.append(library.num_threads)
-        limit.leave("other")
+        limit.release("other")
         seen.append(library.num_threads)
 
-    limit.enter("first")
+    limit.acquire("first")
     thread = threading.Thread(target=visit)
     thread.start()
     thread.join()
     assert seen == [1, 4]
     assert library.num_threads == 1
-    limit.leave("first")
+    limit.release("first")
     assert library.num_threads == 4
 
 
 def test_one_who_is_not_inside_changes_nothing():
     library = Library()
     limit = Limit(library)
-    limit.leave("nobody")
+    limit.release("nobody")
     assert library.calls == []
-    limit.enter("somebody")
-    limit.leave("nobody")
+    limit.acquire("somebody")
+    limit.release("nobody")
     assert library.num_threads == 1
-    limit.leave("somebody")
-    limit.leave("somebody")
+    limit.release("somebody")
+    limit.release("somebody")
     assert library.calls == [1, 4]
 
 

@@ -19,7 +19,7 @@ import sklearn_motionsync
 from dask import delayed
 from sklearn_motionsync import DenseSynchronizer
 from sklearn_motionsync.synchronizers import portions
-from sklearn_motionsync.utils.parallel import Held, Name
+from sklearn_motionsync.utils.parallel import ScatteredReference, ScatteredValue
 
 import stream_dask
 import stream_files
@@ -173,15 +173,15 @@ def test_warping_sends_every_performance_to_one_worker(client):
 def test_a_worker_that_comes_later(client):
     """It fetches what the others hold, once."""
     value = np.random.default_rng(0).standard_normal(200_000)
-    held, largest = Held(client, value), []
-    name = held.name()
-    unknown = Name(name.first, "came before it")
+    held, largest = ScatteredValue(client, value), []
+    name = held.reference()
+    unknown = ScatteredReference(name.first, "came before it")
     for worker in client.nthreads():
         task = {"workers": [worker], "pure": False}
-        largest += [client.submit(lambda n: n.value().max(), name, **task).result()]
+        largest += [client.submit(lambda n: n.load().max(), name, **task).result()]
         before = received(client)
         for _ in range(5):
-            largest += [client.submit(lambda n: n.value().max(), unknown, **task).result()]
+            largest += [client.submit(lambda n: n.load().max(), unknown, **task).result()]
         assert (received(client) - before).sum() < 1.2 * value.nbytes
     assert set(largest) == {value.max()}
 

@@ -123,7 +123,7 @@ def test_the_configuration_of_scikit_learn_reaches_every_portion():
 
 
 def test_what_portions_share_comes_first():
-    common = Common("a", "of a cluster only"), Common("b")
+    common = Common("a"), Common("b")
     for n_jobs in (1, 2):
         assert list(run("{}{}{}".format, [(1,), (2,)], common=common, n_jobs=n_jobs)) == [
             "ab1",
