@@ -12,10 +12,10 @@ from ..inputs.features import as_features, names_of
 from ..inputs.validation import check_performances, labels_as_given
 from ..transformers.aspace import ASpace
 from ..utils.pipelines import (
+    accepted_params,
     explain_missing,
     find_step,
     flat_steps,
-    taken_by,
     transform_through,
 )
 from .action_model import ActionModel
@@ -156,8 +156,8 @@ class _Way(NamedTuple):
         points = self.aspace.transform(postures)
         with explain_missing(caller):
             for step in self.after:
-                whole = step.match(points, **taken_by(step.match, params)).warp(whole)
-                points = step.transform(points, **taken_by(step.transform, params))
+                whole = step.match(points, **accepted_params(step.match, params)).warp(whole)
+                points = step.transform(points, **accepted_params(step.transform, params))
         beside = np.stack(as_collection(points))[:, :, len(self.aspace.components_) :]
         return points, np.concatenate([np.stack(whole), beside], axis=2)
 

@@ -17,7 +17,7 @@ from sklearn import config_context, get_config
 
 from .threads import on_one_thread
 
-__all__ = ["Common", "LongWorkMixin", "Progress", "on_cluster", "run"]
+__all__ = ["LongWorkMixin", "Progress", "SharedArgument", "on_cluster", "run"]
 
 try:
     from sklearn.callback import CallbackSupportMixin
@@ -43,7 +43,7 @@ def run(function, portions, *, common=(), n_jobs=None, prefer=None, step=None):
         Something that can be pickled, if there are several jobs.
     portions : list of tuples
         The arguments of each portion. Large arrays reach other processes as read-only memory maps.
-    common : tuple of Common, default=()
+    common : tuple of SharedArgument, default=()
         First arguments, which all portions share.
     n_jobs : int, default=None
         As everywhere in scikit-learn: None means 1, unless ``joblib.parallel_config`` says
@@ -69,7 +69,7 @@ def run(function, portions, *, common=(), n_jobs=None, prefer=None, step=None):
 
 
 def _results(function, portions, common, n_jobs, prefer, running):
-    values = [argument.here for argument in common]
+    values = [argument.value for argument in common]
     if len(portions) < 2 or effective_n_jobs(n_jobs) == 1:
         return (on_one_thread(function, *values, *portion) for portion in portions)
     backend, _ = get_active_backend(prefer=prefer)
@@ -128,7 +128,7 @@ class _RunningCalls:
             self._changed.wait_for(lambda: self._threads <= own)
 
 
-class Common:
+class SharedArgument:
     """An argument that all portions share; a cluster is sent it once, in however many runs.
 
     Parameters
@@ -137,17 +137,17 @@ class Common:
     """
 
     def __init__(self, value):
-        self.here = value
+        self.value = value
         self._cluster = self._sent = None
 
     def send_to(self, backend):
         """The argument of a call under a backend: on a cluster a reference to the sent value."""
         client, ray = _client_of(backend), _ray_of(backend)
         if client is None and ray is None:
-            return self.here
+            return self.value
         cluster = client if ray is None else ray
         if self._cluster is not cluster:
-            self._sent = ray.put(self.here) if ray else ScatteredValue(client, self.here)
+            self._sent = ray.put(self.value) if ray else ScatteredValue(client, self.value)
             self._cluster = cluster
         return self._sent if ray else self._sent.reference()
 

@@ -10,17 +10,17 @@ from sklearn.utils.validation import check_is_fitted
 __all__ = [
     "MissingMetadata",
     "Routed",
+    "accepted_params",
     "explain_missing",
     "find_classifier",
     "find_step",
     "find_synchronizer",
     "flat_steps",
     "index_of_pattern",
-    "parts_of",
-    "reach_synchronizer",
+    "route_to_synchronizer",
     "steps_to_fit",
-    "taken_by",
     "transform_through",
+    "union_transformers",
 ]
 
 
@@ -98,7 +98,7 @@ class Routed(NamedTuple):
             return self.synchronizer.match(self.performances, **self.params)
 
 
-def reach_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",), hint=""):
+def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",), hint=""):
     """The synchronizer of an estimator, and its input made of raw performances.
 
     Parameters
@@ -132,7 +132,7 @@ def reach_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match"
     also = [getattr(synchronizer, name) for name in uses]
     features = transform_through(before, X, params, caller, hint=hint, also=also)
     performances = synchronizer.check_performances(features)
-    accepted = taken_by(synchronizer.match, params)
+    accepted = accepted_params(synchronizer.match, params)
     return Routed(before, synchronizer, performances, accepted, caller, hint)
 
 
@@ -142,7 +142,7 @@ def transform_through(before, X, params, caller, *, hint="", also=()):
     Parameters
     ----------
     before : Pipeline or None
-    X, params, caller, hint : as for `reach_synchronizer`
+    X, params, caller, hint : as for `route_to_synchronizer`
     also : list of callable, default=()
         Methods after the last step that are given params, too.
 
@@ -152,7 +152,7 @@ def transform_through(before, X, params, caller, *, hint="", also=()):
     """
     methods = [] if before is None else [step.transform for step in flat_steps(before)]
     takers = [*methods, *also]
-    accepted = {name for method in takers for name in taken_by(method, params)}
+    accepted = {name for method in takers for name in accepted_params(method, params)}
     for name, value in params.items():
         if name not in accepted and value is not None:
             names = [f"{type(method.__self__).__name__}.{method.__name__}" for method in takers]
@@ -162,17 +162,17 @@ def transform_through(before, X, params, caller, *, hint="", also=()):
             )
     with explain_missing(caller, hint):
         for method in methods:
-            X = method(X, **taken_by(method, params))
+            X = method(X, **accepted_params(method, params))
     return X
 
 
-def taken_by(method, params):
+def accepted_params(method, params):
     """Those params that a method accepts by name, without None."""
     given = {name: value for name, value in params.items() if value is not None}
     owner = getattr(method, "__self__", None)
     if isinstance(owner, FeatureUnion):
         # By its signature it accepts any, and passes on those that its transformers accept.
-        parts = [taken_by(part.transform, given) for part in parts_of(owner)]
+        parts = [accepted_params(part.transform, given) for part in union_transformers(owner)]
         return {name: value for part in parts for name, value in part.items()}
     # A wrapper of a synchronizer passes on those that the synchronizer accepts.
     method = getattr(_unwrapped(owner), method.__name__, method)
@@ -227,12 +227,14 @@ def flat_steps(estimator):
     return [inner for _, step in _named_steps(estimator) for inner in flat_steps(step)]
 
 
-def parts_of(step):
+def union_transformers(step):
     """The transformers of a union, and of nested ones; any other step is its own only one."""
     if not isinstance(step, FeatureUnion):
         return [step]
     views = [view for _, view in step.transformer_list if view not in ("drop", "passthrough")]
-    return [each for view in views for inner in flat_steps(view) for each in parts_of(inner)]
+    return [
+        each for view in views for inner in flat_steps(view) for each in union_transformers(inner)
+    ]
 
 
 def steps_to_fit(estimator, prefix=""):

@@ -20,7 +20,7 @@ from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import DenseSynchronizer
 from sklearn_motionsync.matching.refinement_test import RefinementTrial
 from sklearn_motionsync.matching.trellis import Trellis
-from sklearn_motionsync.utils.parallel import Common, Progress, run
+from sklearn_motionsync.utils.parallel import Progress, SharedArgument, run
 
 SETTINGS = {
     "paper": {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0},
@@ -123,7 +123,7 @@ def test_the_configuration_of_scikit_learn_reaches_every_portion():
 
 
 def test_what_portions_share_comes_first():
-    common = Common("a"), Common("b")
+    common = SharedArgument("a"), SharedArgument("b")
     for n_jobs in (1, 2):
         assert list(run("{}{}{}".format, [(1,), (2,)], common=common, n_jobs=n_jobs)) == [
             "ab1",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from joblib.parallel import ParallelBackendBase, register_parallel_backend
 from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.utils.parallel import Common, run
+from sklearn_motionsync.utils.parallel import SharedArgument, run
 
 N_JOBS = 3
 
@@ -115,7 +115,7 @@ def squares(common, i):
 
 
 def test_results_come_in_order_a_few_at_a_time(ray):
-    common = Common(np.arange(20.0))
+    common = SharedArgument(np.arange(20.0))
     found = list(run(squares, [(i,) for i in range(7)], common=(common,)))
     assert found == [(i, i**2) for i in range(7)]
     assert 1 < ray.n_most <= N_JOBS
@@ -123,7 +123,7 @@ def test_results_come_in_order_a_few_at_a_time(ray):
 
 
 def test_an_error_is_the_function_s_own_and_the_rest_is_called_off(ray):
-    results = run(squares, [(i,) for i in range(5, 20)], common=(Common(np.arange(20.0)),))
+    results = run(squares, [(i,) for i in range(5, 20)], common=(SharedArgument(np.arange(20.0)),))
     assert [next(results), next(results)] == [(5, 25), (6, 36)]
     with pytest.raises(KeyError, match="seven"):
         next(results)
@@ -131,7 +131,7 @@ def test_an_error_is_the_function_s_own_and_the_rest_is_called_off(ray):
 
 
 def test_who_stops_calls_the_rest_off(ray):
-    results = run(squares, [(i,) for i in range(7)], common=(Common(np.arange(20.0)),))
+    results = run(squares, [(i,) for i in range(7)], common=(SharedArgument(np.arange(20.0)),))
     next(results)
     results.close()
     assert not ray.waiting
@@ -139,7 +139,7 @@ def test_who_stops_calls_the_rest_off(ray):
 
 def test_an_actor_asks_for_no_processors_as_it_keeps_its_own(ray):
     ray.actor = "somebody"
-    assert len(list(run(squares, [(1,), (2,)], common=(Common(np.arange(20.0)),)))) == 2
+    assert len(list(run(squares, [(1,), (2,)], common=(SharedArgument(np.arange(20.0)),)))) == 2
     assert ray.options == [{"num_cpus": 0, "resources": {"room": 1}}]
 
 
