@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..inputs.numbers import as_numbers, check_names
+from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..matching.causal import CausalDerivative, CausalTrellis
 
-__all__ = ["LivePhase", "Session", "Streams", "check_frame", "check_times", "time_left"]
+__all__ = ["LivePhase", "Session", "Streams", "check_observations", "check_times", "time_left"]
 
 # Shares of the clock: the window of rate and cost, and how near a phase counts as right.
 _WINDOW, _TOLERANCE = 0.1, 0.05
@@ -308,20 +308,21 @@ def time_left(share, elapsed, duration):
     return (1 - share) * by_time + share * duration * (1 - share)
 
 
-def check_frame(frame, what, names, width, streams=False):
-    """The numbers of a frame, checked.
+def check_observations(x, what, names, width, ndims=(1,)):
+    """The numbers of a frame or of a take, checked.
 
     Parameters
     ----------
-    frame : array-like, shape (n_features,), or with ``streams`` also (n_streams, n_features)
+    x : array-like, DataFrame or Series
         NaN is not seen.
     what : str
         What to call it in messages.
     names : list or None
-        Names of the features that a row of a table must have.
+        Names of the features that a table must have.
     width : int
-        ``n_features``.
-    streams : bool, default=False
+        Number of features.
+    ndims : tuple of int, default=(1,)
+        Accepted numbers of dimensions: 1 is a frame, 2 several frames.
 
     Returns
     -------
@@ -330,22 +331,21 @@ def check_frame(frame, what, names, width, streams=False):
     Raises
     ------
     ValueError
-        If it has another shape or other names, or is infinite.
+        If it has another shape or other names, is empty or infinite.
     """
-    if type(frame) is not np.ndarray or frame.dtype != np.float64:
-        # A row of a table has the names of its columns.
-        check_names(frame.to_frame().T if isinstance(frame, pd.Series) else frame, names, what)
-        frame = as_numbers(frame, what, dtype=np.float64)
-    frame = np.atleast_1d(frame)
-    if frame.ndim > 1 + streams or frame.shape[-1] != width or not frame.size:
-        more = f", or (n_streams, {width}) for performances side by side" * streams
-        raise ValueError(f"{what} must have shape ({width},){more}; got {frame.shape}.")
-    if np.isinf(frame).any():
+    # A row of a table has the names of its columns.
+    check_names(x.to_frame().T if isinstance(x, pd.Series) else x, names, what)
+    values = np.atleast_1d(as_numbers(x, what, dtype=np.float64))
+    if values.ndim not in ndims or values.shape[-1] != width or not values.size:
+        shapes = {1: f"({width},)", 2: f"(n, {width}) with n at least 1"}
         raise ValueError(
-            f"{what}: feature {np.argwhere(np.isinf(frame))[0][-1]} is infinite. Give NaN for what "
-            "is not seen."
+            f"{what} has shape {values.shape}, expected {' or '.join(shapes[n] for n in ndims)}. "
+            "Features that are not seen are NaN. A single feature is a column: reshape your data, "
+            "x[:, np.newaxis]."
         )
-    return frame
+    frames = x.index if isinstance(x, pd.DataFrame) else None
+    check_finite(np.atleast_2d(values), f"{what}, frame", names, frames, allow_nan=True)
+    return values
 
 
 def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):

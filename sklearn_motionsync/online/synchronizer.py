@@ -24,7 +24,7 @@ from .stream import (
     LivePhase,
     Session,
     Streams,
-    check_frame,
+    check_observations,
     check_times,
     phase_probabilities,
     stack_phases,
@@ -218,7 +218,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         if "_session" not in vars(self):
             check_is_fitted(self)
         width = self.mean_.shape[1]
-        frame = check_frame(frame, "The frame", names_of_input(self), width, streams=True)
+        frame = check_observations(frame, "The frame", names_of_input(self), width, (1, 2))
         session = self._session
         last = None if session is None else session.time
         time = float(check_times(time, 1, self.frame_rate, "The frame", last)[0])

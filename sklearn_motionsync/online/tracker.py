@@ -3,14 +3,13 @@
 from numbers import Integral, Real
 
 import numpy as np
-import pandas as pd
 from sklearn.base import BaseEstimator, _fit_context, clone
 from sklearn.utils import check_consistent_length, check_random_state
 from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
-from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.tables import as_pandas, labels_of, name_performance
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
@@ -20,7 +19,7 @@ from ..utils.doc_links import DocumentedMixin
 from ..utils.threads import on_one_thread
 from .particle_filter import ParticleFilter, Track, filter_take, smooth_take, stack_frames
 from .state_space import Clock, TrackerModel
-from .stream import check_frame, check_times, times_of_each
+from .stream import check_observations, check_times, times_of_each
 
 __all__ = ["MotionTracker"]
 
@@ -304,7 +303,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         names = names_of_input(self) if projection is None else None
         matrix, offset = check_projection(projection, self._model.mean.shape[1])
         what = "The observation"
-        values = check_frame(observation, what, names, len(matrix))
+        values = check_observations(observation, what, names, len(matrix))
         last = None if self._running is None else self._running.time
         time = float(check_times(time, 1, self.frame_rate, what, last)[0])
         if self._running is None:
@@ -336,7 +335,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         times = [times] if single else times_of_each(times, len(sequences))
         tracks = []
         for what, x, t in zip(labels, sequences, times, strict=True):
-            values = _check_take(x, what, names, len(matrix))
+            values = check_observations(x, what, names, len(matrix), (2,))
             t = check_times(t, len(values), self.frame_rate, what)
             # The matrices are small: several threads would wait for each other.
             take = values - offset, t, matrix
@@ -383,18 +382,3 @@ def check_projection(projection, n_features):
     matrix, offset = pair if len(pair) == 2 else (pair[0], np.zeros(n))
     check_finite(np.column_stack([matrix, offset]), "The projection, row")
     return matrix, offset
-
-
-def _check_take(x, what, names, width):
-    """The numbers of a take, (n_frames, width)."""
-    check_names(x, names, what)
-    values = as_numbers(x, what, dtype=np.float64)
-    if values.ndim != 2 or values.shape[1] != width or len(values) == 0:
-        raise ValueError(
-            f"{what} has shape {values.shape}, expected (n_frames, {width}) with at least 1 frame. "
-            "Features that are not seen are NaN; other measurements of the body need a projection. "
-            "A single feature is a column: reshape your data, x[:, np.newaxis]."
-        )
-    frames = x.index if isinstance(x, pd.DataFrame) else None
-    check_finite(values, f"{what}, frame", names, frames, allow_nan=True)
-    return values

@@ -325,8 +325,8 @@ def test_refused_frame_changes_nothing(fitted, live):
     assert live.step(x[0]) == expected[0]
     for k, frame in enumerate(x[1:], 1):
         for bad, time, message in [
-            (frame[:2], None, r"must have shape \(3,\), or \(n_streams, 3\)"),
-            (np.append(frame[:2], np.inf), None, "The frame: feature 2 is infinite"),
+            (frame[:2], None, r"The frame has shape \(2,\), expected \(3,\) or \(n, 3\)"),
+            (np.append(frame[:2], np.inf), None, "The frame, frame 0, feature 2 is infinity"),
             (["a", "b", "c"], None, "The frame"),
             (np.stack([frame, frame]), None, r"had the shape \(3,\), this one has \(2, 3\)"),
             (frame, k - 1.0, "time stamps must increase"),

@@ -230,10 +230,10 @@ INFINITE = np.where(np.arange(180).reshape(60, 3) == 11, np.inf, movement(1))
 @pytest.mark.parametrize(
     ("X", "more", "message"),
     [
-        (movement(1)[:, :2], {}, r"The take has shape \(60, 2\), expected \(n_frames, 3\)"),
+        (movement(1)[:, :2], {}, r"The take has shape \(60, 2\), expected \(n, 3\)"),
         ([movement(1), movement(1)[:, :2]], {}, r"Performance 1 has shape \(60, 2\)"),
         (INFINITE, {}, r"The take, frame 3, feature 2 is infinity"),
-        (movement(1)[:0], {}, r"at least 1 frame"),
+        (movement(1)[:0], {}, r"with n at least 1"),
         (movement(1)[0], {}, r"x\[:, np.newaxis\]"),
         ([], {}, "0 takes"),
         (movement(1), {"times": np.r_[0:30, 20:50]}, r"The take: time stamps must increase"),
@@ -253,8 +253,8 @@ def test_track_refuses(tracker, X, more, message):
 @pytest.mark.parametrize(
     ("frame", "time", "message"),
     [
-        ([1.0, 2.0], None, r"The observation must have shape \(3,\); got \(2,\)"),
-        ([1.0, np.inf, 2.0], None, "feature 1 is infinite"),
+        ([1.0, 2.0], None, r"The observation has shape \(2,\), expected \(3,\)"),
+        ([1.0, np.inf, 2.0], None, "feature 1 is infinity"),
         ([1.0, 0.0, 0.0], 1.0, "must increase, but 1 follows 1"),
         ([1.0, 0.0, 0.0], np.nan, "finite"),
     ],
