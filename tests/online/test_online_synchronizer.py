@@ -202,6 +202,7 @@ def test_confidence_is_low_for_other_movements(fitted):
 
 
 def test_time_left_is_weighted_mean_of_duration_and_phase(live):
+    assert live.duration_ == np.mean([50 + 5 * (i % 5) for i in range(9)]) - 1
     live.set_params(frame_rate=10)
     mean = live.duration_ / 10
     assert live.time_left() == pytest.approx(mean)
@@ -310,10 +311,6 @@ def test_max_rate_is_bounded_by_the_pattern():
     X = [performance(20, bend)[0] for bend in (0.0, 0.3)]
     a, b = (OnlineSynchronizer(DenseSynchronizer(20), max_rate=r).fit(X) for r in (19, 1e9))
     np.testing.assert_array_equal(a.track(X), b.track(X))
-
-
-def test_duration_is_mean_time_from_first_frame_to_last(fitted):
-    assert fitted.duration_ == np.mean([50 + 5 * (i % 5) for i in range(9)]) - 1
 
 
 # -- refusals -----------------------------------------------------------------------------

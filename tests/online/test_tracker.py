@@ -78,6 +78,7 @@ def test_seconds_are_frames_over_the_frame_rate(tracker, take):
     seconds, times = clone(tracker).set_params(frame_rate=30).fit(TRAINING), np.arange(60.0)
     track = tracker.track(take)
     assert_same(tracker.track(take, times=times), track)
+    assert tracker.duration_ == np.mean([54, 59, 61, 64])
     for a, b in zip(seconds.track(take, times=times / 30), track, strict=True):
         np.testing.assert_allclose(a, b, atol=1e-6)
 
@@ -153,10 +154,6 @@ def test_groups_of_similar_performances_widen_deviations(tracker):
     # A single group is as none.
     single = clone(tracker).fit(training, groups=[1] * 4)
     np.testing.assert_array_equal(single.covariance_, alone.covariance_)
-
-
-def test_duration_is_mean_time_from_first_frame_to_last(tracker):
-    assert tracker.duration_ == np.mean([54, 59, 61, 64])
 
 
 # -- missing and improbable observations --------------------------------------------------

@@ -9,11 +9,8 @@ import time
 import types
 import warnings
 
-import numpy as np
 import pytest
 import threadpoolctl
-from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.utils import threads as blas
 from sklearn_motionsync.utils.parallel import run
 from sklearn_motionsync.utils.threads import Limit, on_one_thread
@@ -77,30 +74,6 @@ def test_nested_calls_keep_one_thread(found):
     inner = []
     on_one_thread(lambda: inner.append(on_one_thread(blas_threads)) or inner.append(blas_threads()))
     assert [set(threads.values()) for threads in inner] == [{1}, {1}]
-    assert blas_threads() == found
-
-
-def test_transforms_in_several_threads_restore_threads(found, monkeypatch):
-    rng = np.random.default_rng(0)
-    X = np.cumsum(rng.standard_normal((40, 40, 3)), axis=1)
-    sync = DenseSynchronizer(n_jobs=2).fit(X)
-    assert blas_threads() == found
-    # All hold the limit at once, and the first ends first.
-    inside, paths, order = threading.Barrier(4), Trellis.paths_and_costs, []
-
-    def together(self, *args):
-        order.append(threading.current_thread())
-        inside.wait(10)
-        time.sleep(0.05 * order.index(threading.current_thread()))
-        return paths(self, *args)
-
-    monkeypatch.setattr(Trellis, "paths_and_costs", together)
-    threads = [threading.Thread(target=sync.transform, args=(X[:2],)) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(order) == 4
     assert blas_threads() == found
 
 
