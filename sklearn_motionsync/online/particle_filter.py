@@ -5,13 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..matching.warps import at_times
-from .state_space import (
-    CausalSlopes,
-    exponential_average,
-    kalman_update,
-    squared_norms,
-    whitening_matrix,
-)
+from .state_space import CausalSlopes, exponential_average, kalman_update, squared_norms, whitening
 
 __all__ = ["ParticleFilter", "Track", "filter_take", "smooth_take", "stack_frames"]
 
@@ -226,7 +220,7 @@ class ParticleFilter:
         """NIS of a posture with these residuals (n_seen,) from the mean."""
         model = self.model
         covariance = rows @ model.process.covariance @ rows.T + model.noise**2 * np.eye(len(rows))
-        whitened = whitening_matrix(covariance) @ residuals
+        whitened = whitening(covariance) @ residuals
         return self._shrink_nis(whitened @ whitened / len(rows), len(rows))
 
     def _reweight(self, known, matrix, dt):
@@ -234,7 +228,7 @@ class ParticleFilter:
         model, clock, rows = self.model, self.model.clock, matrix[known]
         slopes, noise = self.slopes.fit(known)
         covariance = rows @ model.velocities @ rows.T + np.diag(model.noise**2 * noise)
-        distances = squared_norms(slopes @ whitening_matrix(covariance).T)
+        distances = squared_norms(slopes @ whitening(covariance).T)
         # Evidence is weighted by its duration, so that the frame rate does not matter.
         share = 100 * min(dt, clock.window) / clock.duration
         self.particles = self.particles.reweight(-0.5 * share / model.tempering * distances)

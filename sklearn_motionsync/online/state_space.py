@@ -15,7 +15,7 @@ __all__ = [
     "exponential_average",
     "kalman_update",
     "squared_norms",
-    "whitening_matrix",
+    "whitening",
 ]
 
 # Window of causal velocities, as a share of the mean duration: that of the synchronizers' filter.
@@ -280,7 +280,7 @@ def _largest_nis(departures, noise, covariance, step, memory):
     """The largest average NIS of takes (n, n_frames, n_features) at their own phase, at least 1."""
     nis, largest, width = 1.0, 1.0, departures.shape[-1]
     for p, variance in enumerate(noise):
-        whiten = whitening_matrix(covariance + variance * np.eye(width))
+        whiten = whitening(covariance + variance * np.eye(width))
         # The expected effect of the noise: a fit draws no samples.
         now = squared_norms(departures[:, p] @ whiten.T) + variance * np.square(whiten).sum()
         nis = exponential_average(nis, now / width, step, memory)
@@ -369,13 +369,13 @@ def kalman_update(covariance, matrix, innovations, noise):
     innovation_covariance = matrix @ cross_covariance[:n_features]
     diagonal = np.diag_indices(n_seen)
     innovation_covariance[diagonal] = (innovation_covariance[diagonal] + noise**2) * (1 + _MARGIN)
-    whiten = whitening_matrix(innovation_covariance)
+    whiten = whitening(innovation_covariance)
     gain_rows = whiten @ cross_covariance.T
     update = KalmanUpdate(innovations @ whiten.T, gain_rows, whiten @ matrix)
     return covariance - gain_rows.T @ gain_rows, update
 
 
-def whitening_matrix(covariance):
+def whitening(covariance):
     """The inverse of the Cholesky factor of a covariance."""
     return dtrtri(np.linalg.cholesky(covariance), lower=1)[0]
 

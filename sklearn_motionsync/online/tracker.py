@@ -324,9 +324,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         single = sequences is None and not self._fitted_on_rows
         if sequences is None:
             X = as_pandas(X)
-            if not single:
-                X = list(as_numbers(X, "The input", dtype=np.float64)[..., np.newaxis])
-            sequences = [X] if single else X
+            sequences = [X] if single else list(as_numbers(X, "X", dtype=np.float64)[..., None])
         if len(sequences) == 0:
             raise ValueError("Found 0 takes, at least 1 is needed.")
         labels = ["The take"]
