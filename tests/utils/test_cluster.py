@@ -221,17 +221,17 @@ def test_stream_sends_model_once_and_portions_to_one_worker(
 
 
 def test_stream_reads_portions_as_workers_get_free(client, fitted, portions_of_walks):
-    taken = []
+    read = []
 
     def portions():
         for portion in portions_of_walks:
-            taken.append(portion)
+            read.append(portion)
             yield portion
 
     stream_dask.give(client, fitted)
     answers = stream_dask.stream(client, portions(), method="match")
     first = next(answers)
-    assert len(taken) == 2 * N_WORKERS + 1
+    assert len(read) == 2 * N_WORKERS + 1
     assert first["times"].tobytes() == fitted.match(portions_of_walks[0]).times.tobytes()
     answers.close()
 
@@ -241,19 +241,21 @@ def test_dask_bags_and_arrays_give_the_same(client, fitted, portions_of_walks, e
     stream_dask.give(client, other)
     stream_dask.give(client, fitted, name="walks")
     few, stacked = portions_of_walks[:3], np.concatenate(expected[:3])
-    ask = {"method": "transform", "model": "walks"}
+    options = {"method": "transform", "model": "walks"}
     bag = dask.bag.from_delayed([delayed(portion) for portion in few])
-    warped = bag.map_partitions(stream_dask.on_worker, **ask).compute()
+    warped = bag.map_partitions(stream_dask.on_worker, **options).compute()
     assert np.stack(warped).tobytes() == stacked.tobytes()
     # Partitions are iterators here, and one is empty.
     some = dask.bag.from_sequence([0, 2, None], npartitions=3).filter(lambda i: i is not None)
-    asked = some.map(lambda i, walks: walks[i], few[0]).map_partitions(stream_dask.on_worker, **ask)
-    assert np.stack(asked.compute()).tobytes() == expected[0][[0, 2]].tobytes()
+    mapped = some.map(lambda i, walks: walks[i], few[0]).map_partitions(
+        stream_dask.on_worker, **options
+    )
+    assert np.stack(mapped.compute()).tobytes() == expected[0][[0, 2]].tobytes()
     with pytest.raises(ValueError, match="The workers were given no 'wakls'"):
         next(stream_dask.stream(client, few, model="wakls"))
     array = dask.array.concatenate([dask.array.from_array(p, chunks=p.shape) for p in few])
     known = {"dtype": array.dtype, "meta": np.empty((0, 0, 0)), "chunks": array.chunks}
-    warped = array.map_blocks(stream_dask.on_worker, **ask, **known)
+    warped = array.map_blocks(stream_dask.on_worker, **options, **known)
     assert warped.compute().tobytes() == stacked.tobytes()
 
 
@@ -283,21 +285,21 @@ def test_files_are_read_by_workers(client, files, portions_of_walks, expected):
 
 def test_files_are_sent_by_the_script(client, files, expected, capsys):
     np.save(files[1] / "4.npy", np.full((2, 60, 8), np.nan))
-    asked = [*map(str, files), "--scheduler", client.scheduler.address]
-    assert re.match(r".*4\.npy: Performance 0.*NaN", stream_dask.main(asked), re.DOTALL)
+    arguments = [*map(str, files), "--scheduler", client.scheduler.address]
+    assert re.match(r".*4\.npy: Performance 0.*NaN", stream_dask.main(arguments), re.DOTALL)
     assert capsys.readouterr().out.split("\n")[3:] == ["3.npy: done", ""]
     assert_warped(files[2], expected)
     (files[1] / "4.npy").unlink()
     (files[2] / "2.npy").unlink()
-    assert stream_dask.main(asked) is None
+    assert stream_dask.main(arguments) is None
     assert capsys.readouterr().out == "2.npy: done\n"
     assert_warped(files[2], expected)
 
 
 def test_unreadable_file_is_named_after_results_of_earlier_ones(client, files, expected, capsys):
     (files[1] / "4.npy").write_bytes((files[1] / "3.npy").read_bytes()[:500])
-    asked = [*map(str, files), "--scheduler", client.scheduler.address]
-    assert re.match(r"\S*4\.npy: It cannot be read, is it whole", stream_dask.main(asked))
+    arguments = [*map(str, files), "--scheduler", client.scheduler.address]
+    assert re.match(r"\S*4\.npy: It cannot be read, is it whole", stream_dask.main(arguments))
     assert capsys.readouterr().out.split("\n")[3:] == ["3.npy: done", ""]
     assert_warped(files[2], expected)
 

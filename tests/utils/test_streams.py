@@ -199,8 +199,8 @@ def test_results_of_two_models_or_methods_are_not_mixed(files, fitted):
     with pytest.raises(ValueError, match=r"results of another method \(made_by.json\)"):
         next(stream_files.stream(*files, method="match"))
     joblib.dump(DenseSynchronizer(n_frames=30).fit(walks(12, 0)), files[0])
-    told = stream_files.main([str(path) for path in files])
-    assert "holds results of another model (made_by.json): give another folder" in told
+    message = stream_files.main([str(path) for path in files])
+    assert "holds results of another model (made_by.json): give another folder" in message
     note = json.loads((files[2] / "made_by.json").read_text(encoding="utf-8"))
     assert note["sklearn_motionsync"] == sklearn_motionsync.__version__
     assert_synchronized(files[2], fitted)
