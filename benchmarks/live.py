@@ -117,9 +117,9 @@ def show_no_look_ahead(folds, cuts=8):
     changed = cases = 0
     for fold in (fold for some in folds.values() for fold in some):
         clip, online = fold.clips[0], fold.online
-        whole = np.array(online.follow([clip])[0])
+        whole = np.array(online.track([clip])[0])
         parts = [
-            np.array(online.follow([clip[: end + 1]])[0])
+            np.array(online.track([clip[: end + 1]])[0])
             for end in np.unique(np.linspace(1, len(clip) - 1, cuts).astype(int))
         ]
         online.reset()
@@ -145,7 +145,7 @@ def show_speed(name, fold):
         count = n_streams or 1
         cells.append(f"step, streams: {count}: {len(clip) * count / np.median(took):,.0f}")
     begin = time.process_time()
-    online.follow(fold.clips)
+    online.track(fold.clips)
     rate = sum(map(len, fold.clips)) / (time.process_time() - begin)
     cells.append(f"follow, clips: {len(fold.clips)}: {rate:,.0f}")
     print(f"   {name}, {clip.shape[1]} features: {'; '.join(cells)} frames a second", flush=True)
@@ -186,7 +186,7 @@ def show_disturbed(name, folds):
             for clip, truth in zip(fold.clips, fold.truths, strict=True):
                 for kind, (seen, stamps, at) in disturbed(clip, rng).items():
                     times = None if stamps is None else [stamps]
-                    phase = fold.online.follow([seen], times=times)[0].phase
+                    phase = fold.online.track([seen], times=times)[0].phase
                     errors = np.abs(phase - np.interp(at, np.arange(len(truth)), truth))
                     errors = errors[at >= len(truth) / 5]
                     found.setdefault(kind, {}).setdefault(action, []).append(errors)
@@ -209,9 +209,9 @@ def show_negatives(name, folds):
         for fold in some:
             kinds = {
                 "the action": fold.live,
-                "another action": fold.online.follow(fold.wrong[::3]),
-                "standing still": fold.online.follow([x[[0] * len(x)] for x in fold.clips]),
-                "backwards": fold.online.follow([x[::-1] for x in fold.clips]),
+                "another action": fold.online.track(fold.wrong[::3]),
+                "standing still": fold.online.track([x[[0] * len(x)] for x in fold.clips]),
+                "backwards": fold.online.track([x[::-1] for x in fold.clips]),
             }
             for kind, lives in kinds.items():
                 said = [np.array(live)[[0, 2]][:, [live.phase.size // 2, -1]] for live in lives]
@@ -244,7 +244,7 @@ def show_pauses(folds):
                 for clip, truth in zip(fold.clips, fold.truths, strict=True):
                     k = round(share * (len(clip) - 1))
                     order = np.insert(np.arange(len(clip)), k, np.full(SECOND, k))
-                    errors = np.abs(fold.online.follow([clip[order]])[0].phase - truth[order])
+                    errors = np.abs(fold.online.track([clip[order]])[0].phase - truth[order])
                     after = errors[SECOND + max(k, len(clip) // 5) :]
                     for when, part in (("while", errors[k : k + SECOND]), ("after", after)):
                         found[when].setdefault(action, []).append(part)

@@ -34,7 +34,7 @@ class Fold:
     @functools.cached_property
     def live(self):
         """What is said of the clips, frame by frame: a `LivePhase` of arrays each."""
-        return self.online.follow(self.clips)
+        return self.online.track(self.clips)
 
     @property
     def phases(self):
@@ -45,7 +45,7 @@ class Fold:
         pattern = self.online.synchronizer_.pattern_index_
         sync = DenseSynchronizer(n_frames=P, pattern=pattern, **params)
         online = OnlineSynchronizer(sync).fit(self.training)
-        return [live.phase for live in online.follow(self.clips)]
+        return [live.phase for live in online.track(self.clips)]
 
     def errors(self, phases):
         """Absolute errors of the phases of all clips, each after its first fifth."""

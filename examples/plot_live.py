@@ -81,7 +81,7 @@ def afterwards(x, tau):
 
 
 end, taus = live.n_frames_ - 1, live.synchronizer_.match(strangers).times
-report("live", [said.phase for said in live.follow(strangers)])
+report("live", [said.phase for said in live.track(strangers)])
 report("known afterwards", [afterwards(x, tau) for x, tau in zip(strangers, taus, strict=True)])
 report("by the mean duration", [end * np.arange(len(x)) / live.duration_ for x in strangers])
 
@@ -123,7 +123,7 @@ others = {
     "waits for a second": np.concatenate([np.repeat(person[:1], 50, axis=0), person]),
     "does it backwards": person[::-1],
 }
-for name, said in zip(others, live.follow(list(others.values())), strict=True):
+for name, said in zip(others, live.track(list(others.values())), strict=True):
     at = np.linspace(0, len(said.phase) - 1, 5).round().astype(int)[1:]
     phases = " ".join(f"{100 * phase / end:3.0f} %" for phase in said.phase[at])
     print(f"{name:19} {phases}   confidence", " ".join(f"{c:.2f}" for c in said.confidence[at]))

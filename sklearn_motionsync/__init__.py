@@ -21,9 +21,10 @@ from .inputs.long_tables import to_frame, to_sequences
 from .model.action_model import ActionModel
 from .model.departures import find_departures
 from .model.detector import ActionDetector
+from .online.particle_filter import Track
 from .online.stream import LivePhase
 from .online.synchronizer import OnlineSynchronizer
-from .online.tracker import MotionTracker, Track
+from .online.tracker import MotionTracker
 from .recognition import ActionClassifier, synchronization_distances
 from .segmentation.cycles import CycleSegmenter
 from .segmentation.search import find_performances

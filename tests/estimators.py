@@ -128,12 +128,12 @@ def outputs(estimator, X):
         results += [np.asarray(x) for x in estimator.transform(X)]
     if hasattr(estimator, "match"):
         results += list(estimator.match(X))
-    if hasattr(estimator, "step"):
+    if isinstance(estimator, OnlineSynchronizer):
+        results += list(zip(*estimator.track(X), strict=True))
+    if isinstance(estimator, MotionTracker):
         # A tracker also takes single frames and gaps: what it is given here is checked before.
-        is_tracker = hasattr(estimator, "smooth")
-        some = [x[::4] for x in estimator.check_performances(X)] if is_tracker else X
-        tracks = (estimator.track if is_tracker else estimator.follow)(some)
-        results += [np.stack([t.postures if is_tracker else t.phase for t in tracks])]
+        tracks = estimator.track([x[::4] for x in estimator.check_performances(X)])
+        results += [np.stack([track.postures for track in tracks])]
     if hasattr(estimator, "score_samples"):
         results += [estimator.score_samples(X), estimator.decision_function(X)]
         results += [estimator.predict(X)]

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..synchronizers.lags import Lags
 from ..synchronizers.parts import PartSynchronizer
-from ..utils.pipelines import reach_synchronizer
+from ..utils.pipelines import route_to_synchronizer
 from .drawing import COLORS, curves, front_line, legend_above, panels
 from .time_axis import TimeAxis
 
@@ -97,7 +97,7 @@ class LagDisplay:
         LagDisplay
         """
         caller = f"{cls.__name__}.from_estimator"
-        reached = reach_synchronizer(estimator, X, params, caller, kind=PartSynchronizer)
+        reached = route_to_synchronizer(estimator, X, params, caller, kind=PartSynchronizer)
         how = {"against": against, "unit": unit, "frame_rate": frame_rate}
         lags = reached.synchronizer.lags(reached.performances, groups, **how)
         return cls(lags).plot(ax, colorbar=colorbar)

@@ -13,9 +13,8 @@ from ..body.direction_cosines import DirectionCosines
 from ..inputs.collections import as_collection
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.tables import labels_of
-from ..online.stream import LivePhase
+from ..online.stream import LivePhase, check_times
 from ..online.synchronizer import OnlineSynchronizer
-from ..online.times import as_stamps
 from ..utils.pipelines import find_step
 from .animation import playable
 from .drawing import legend_above, panels
@@ -180,9 +179,9 @@ class PhaseDisplay:
         ----------
         estimator : OnlineSynchronizer
             Fitted. Nothing that it follows is changed.
-        X : performances, as ``estimator.follow`` takes them; or one, array (n_frames, n_features)
+        X : performances, as ``estimator.track`` takes them; or one, array (n_frames, n_features)
         times : list of array-like (n_frames_i,), default=None
-            As ``estimator.follow`` takes them; of one performance an array.
+            As ``estimator.track`` takes them; of one performance an array.
         performances : int or list of int, default=None
             Which of them are drawn; by default the first four.
         features : int, str or list of them, default=None
@@ -203,7 +202,7 @@ class PhaseDisplay:
         Raises
         ------
         ValueError
-            As from ``estimator.follow``; or if there is no such performance, feature or frame.
+            As from ``estimator.track``; or if there is no such performance, feature or frame.
         """
         if not isinstance(estimator, OnlineSynchronizer):
             raise ValueError(
@@ -216,7 +215,7 @@ class PhaseDisplay:
         chosen = as_indices(performances, len(arrays), "performances")
         if times is not None:
             times = times_of(live, [times] if single else times, chosen, arrays, labels)
-        phases = live.follow(given(chosen), times)
+        phases = live.track(given(chosen), times)
         seen = [np.asarray(arrays[i], dtype=np.float64) for i in chosen]
         own = names_of_features(body, live, live.mean_.shape[1])
         if features is None:
@@ -366,7 +365,7 @@ def as_phases(phases, n_frames):
     if not sound or not all(isinstance(of, LivePhase) for of in listed):
         raise ValueError(
             "phases must be a LivePhase of arrays, such as live.history, or a list of them, such "
-            f"as live.follow(X) gives; got {phases!r:.80}."
+            f"as live.track(X) gives; got {phases!r:.80}."
         )
     if len(listed) == 1 and np.ndim(listed[0].phase) == 2:
         listed = [
@@ -445,7 +444,7 @@ def from_zero(times, n, i):
 
 
 def taken(live, X, what="X"):
-    """How to choose of X what ``follow`` takes, its arrays, their labels; if it is a single one."""
+    """How to choose of X what ``track`` takes, its arrays, their labels; if it is a single one."""
     check_is_fitted(live)
     collection = as_collection(X)
     if collection is not None and len(collection) == 0:
@@ -470,7 +469,7 @@ def times_of(live, times, chosen, arrays, labels, each="performances"):
     """Of those that are chosen the times, which the estimator takes."""
     listed = one_each(times, len(arrays), "times", each)
     for i in chosen:
-        as_stamps(listed[i], len(arrays[i]), live.frame_rate, f"Performance {labels[i]}")
+        check_times(listed[i], len(arrays[i]), live.frame_rate, f"Performance {labels[i]}")
     return [listed[i] for i in chosen]
 
 

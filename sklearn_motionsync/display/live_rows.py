@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..online.times import time_left
+from ..online.stream import time_left
 from .bodies import bones_by_side, limits, on_screen, place_of, with_landmarks
 from .drawing import COLORS, front_line, stage, sticks
 

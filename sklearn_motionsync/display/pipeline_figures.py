@@ -19,8 +19,8 @@ from ..utils.pipelines import (
     find_synchronizer,
     flat_steps,
     index_of_pattern,
-    parts_of,
-    reach_synchronizer,
+    route_to_synchronizer,
+    union_transformers,
 )
 from .bodies import bodies_of
 from .departing import strip_of
@@ -208,7 +208,7 @@ class PipelineFigures:
             At the beginning; see `animate`.
         """
         _, views = _before_synchronizer(estimator)
-        reached = reach_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
+        reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
         match = reached.match()
         pattern = index_of_pattern(reached.synchronizer, reached.performances)
         if performances is None:
@@ -305,7 +305,7 @@ def _before_synchronizer(estimator):
             "Stick figures need a pipeline that begins with DirectionCosines; for a synchronizer "
             "by itself use from_predictions with the joint positions."
         )
-    parts = [part for step in flat_steps(before) for part in parts_of(step)]
+    parts = [part for step in flat_steps(before) for part in union_transformers(step)]
     views = [part for part in parts if isinstance(part, PositionsTransformer)]
     if not views:
         # Which tells that there are none.

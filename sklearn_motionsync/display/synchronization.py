@@ -6,7 +6,7 @@ from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import check_names
 from ..inputs.validation import read_collection
 from ..synchronizers.match import as_match
-from ..utils.pipelines import index_of_pattern, reach_synchronizer
+from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .drawing import COLORS, curves, front_line, group_colors, group_lines, legend_above, panels
 from .given import as_drawn, as_names, mean_of_seen
 from .time_axis import TimeAxis
@@ -149,7 +149,7 @@ class SynchronizationDisplay:
         -------
         SynchronizationDisplay
         """
-        reached = reach_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
+        reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
         before, synchronizer, performances = reached[:3]
         names = names_of_features(before, synchronizer, performances[0].shape[1])
         chosen = choose_features(features, names)

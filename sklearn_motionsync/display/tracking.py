@@ -7,8 +7,15 @@ import numpy as np
 
 from ..body.columns import is_whole
 from ..body.direction_cosines import DirectionCosines
+<<<<<<< HEAD
 from ..inputs.features import choose_features, names_of_features
 from ..online.tracker import MotionTracker, Track
+=======
+from ..inputs.features import choose_features
+from ..inputs.features import names_of as names_of_features
+from ..online.particle_filter import Track
+from ..online.tracker import MotionTracker
+>>>>>>> online
 from .departing import bones_of, limb_of
 from .drawing import COLORS, legend_above, panels
 from .given import as_drawn, as_frames, as_index, as_names

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..synchronizers.dense import DenseSynchronizer
-from ..utils.pipelines import index_of_pattern, reach_synchronizer
+from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .drawing import COLORS, panels
 from .given import as_drawn, as_names
 
@@ -84,7 +84,7 @@ class TrellisDisplay:
         TrellisDisplay
         """
         caller = f"{cls.__name__}.from_estimator"
-        reached = reach_synchronizer(estimator, X, params, caller, kind=DenseSynchronizer)
+        reached = route_to_synchronizer(estimator, X, params, caller, kind=DenseSynchronizer)
         _, synchronizer, performances = reached[:3]
         space = synchronizer.disparity_space(performances, performance)
         warp = synchronizer.match(performances.take([performance])).offsets[0]

@@ -10,7 +10,7 @@ from sklearn.utils import check_random_state
 from sklearn.utils.metadata_routing import MetadataRequest
 
 from ..matching.warps import normalise
-from ..utils.pipelines import reach_synchronizer, taken_by
+from ..utils.pipelines import accepted_params, route_to_synchronizer
 from .spread import least_squares, pairwise_correlation, sobolev_least_squares
 
 __all__ = ["FeatureHoldoutScorer", "SpreadScorer"]
@@ -110,7 +110,7 @@ class _SynchronizerScorer(BaseEstimator):
             f"enable_metadata_routing=True), scoring={name}().set_score_request({{name}}=True), "
             "and params={{'{name}': [...]}} or search.fit(X, {name}=[...])"
         )
-        reached = reach_synchronizer(estimator, X, params, f"{name}()", uses=uses, hint=hint)
+        reached = route_to_synchronizer(estimator, X, params, f"{name}()", uses=uses, hint=hint)
         if len(reached.performances) < 2:
             raise ValueError(
                 f"{name} tells how much performances differ from each other, and got one alone. "
@@ -260,7 +260,7 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
         if reached.takes_params:
             # What it asks for here, its clones cannot do without.
             reached.match()
-        fitting = taken_by(synchronizer.fit, params)
+        fitting = accepted_params(synchronizer.fit, params)
         dealt = check_random_state(self.random_state).permutation(n_features)
         scores = []
         for held in np.array_split(dealt, self.n_folds):

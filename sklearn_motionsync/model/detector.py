@@ -16,12 +16,12 @@ from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.pipelines import (
     MissingMetadata,
+    accepted_params,
     find_step,
     find_synchronizer,
     flat_steps,
-    reach_synchronizer,
+    route_to_synchronizer,
     steps_to_fit,
-    taken_by,
 )
 from .action_model import ActionModel
 from .similarity import Logs, Neighbours, as_codes, learn_reach
@@ -154,8 +154,8 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         before, synchronizer = find_synchronizer(self.estimator_)
         also = {name.rpartition("__")[2]: value for name, value in params.items()}
         steps = [] if before is None else flat_steps(before)
-        also = {k: v for step in steps for k, v in taken_by(step.transform, also).items()}
-        reached = reach_synchronizer(self.estimator_, X, also, "ActionDetector.fit")
+        also = {k: v for step in steps for k, v in accepted_params(step.transform, also).items()}
+        reached = route_to_synchronizer(self.estimator_, X, also, "ActionDetector.fit")
         self._learn(reached.performances, synchronizer, groups)
         for name in ("n_features_in_", "feature_names_in_"):
             if hasattr(self.estimator_, name):
@@ -294,12 +294,14 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         check_is_fitted(self)
         caller = f"ActionDetector.{method}"
         try:
-            reached = reach_synchronizer(self.estimator_, X, params, caller, uses=("transform",))
+            reached = route_to_synchronizer(self.estimator_, X, params, caller, uses=("transform",))
             performances = reached.performances
             first = 0 if reached.before is None else len(flat_steps(reached.before))
             synchronised = performances
             for step in flat_steps(self.estimator_)[first:-1]:
-                synchronised = step.transform(synchronised, **taken_by(step.transform, params))
+                synchronised = step.transform(
+                    synchronised, **accepted_params(step.transform, params)
+                )
         except MissingMetadata as error:
             reason, name, _ = error.args
             raise MissingMetadata(reason, name, f"{caller}(X, {{name}}=[...])") from error

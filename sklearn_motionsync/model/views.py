@@ -12,11 +12,10 @@ from ..inputs.features import as_features, names_of_features
 from ..inputs.validation import check_performances, labels_of_input
 from ..transformers.aspace import ASpace
 from ..utils.pipelines import (
-    asking,
+    accepted_params,
+    explain_missing,
     find_step,
     flat_steps,
-    how_to_give,
-    taken_by,
     transform_through,
 )
 from .action_model import ActionModel
@@ -155,10 +154,10 @@ class _Way(NamedTuple):
         postures = transform_through(self.before, X, params, caller, also=takers)
         whole = check_performances(self.aspace, postures, reset=False, level="posture")
         points = self.aspace.transform(postures)
-        with asking(how_to_give(caller)):
+        with explain_missing(caller):
             for step in self.after:
-                whole = step.match(points, **taken_by(step.match, params)).warp(whole)
-                points = step.transform(points, **taken_by(step.transform, params))
+                whole = step.match(points, **accepted_params(step.match, params)).warp(whole)
+                points = step.transform(points, **accepted_params(step.transform, params))
         beside = np.stack(as_collection(points))[:, :, len(self.aspace.components_) :]
         return points, np.concatenate([np.stack(whole), beside], axis=2)
 

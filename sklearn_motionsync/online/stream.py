@@ -1,32 +1,47 @@
-"""Streams: where running performances are, by the rows of the trellis (Eqs. 16 and 17)."""
+"""Running performances, frame by frame: streams matched by rows of the trellis (Eqs. 16 and 17)."""
 
 from collections import deque
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
+from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..matching.causal import CausalDerivative, CausalTrellis
-from ..matching.trellis import Trellis
-from .features import LiveFeatures
-from .times import time_left
 
-__all__ = ["UNKNOWN", "Calibration", "Course", "LivePhase", "Session", "Stream", "gathered"]
+__all__ = ["LivePhase", "Session", "Streams", "check_observations", "check_times", "time_left"]
 
-# Shares of the clock: over which rate and likeness are told, and how near a phase counts as right.
-_RECENT, _NEAR = 0.1, 0.05
+# Shares of the clock: the window of rate and cost, and how near a phase counts as right.
+_WINDOW, _TOLERANCE = 0.1, 0.05
+# Frames that are kept in the history; a stream may run for days.
+_HISTORY_LENGTH = 100_000
+# Gaps longer than this share of the clock are not interpolated.
+_LONGEST_GAP = 0.25
+# After so many clocks without a frame a stream has forgotten what was before.
+_FORGETTING = 3
 
 
 class LivePhase(NamedTuple):
-    """Where a performance is.
+    """The phase of a running performance, its rate, and how sure it is.
 
-    Attributes
+    Parameters
     ----------
     phase : float, or ndarray
         Frame of the pattern, from 0 to P - 1.
     rate : float, or ndarray
-        Frames of the pattern in the time of one at the mean pace of the training set.
+        Pace in units of the mean pace of the training performances.
     confidence : float, or ndarray
-        From 0 to 1: how probable it is that the phase is right to a twentieth of the clock.
+        Probability, from 0 to 1, that the phase is right to a twentieth of the clock.
+
+    See Also
+    --------
+    OnlineSynchronizer : Estimates it.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync import LivePhase
+    >>> LivePhase(phase=12.5, rate=1.0, confidence=0.9).phase
+    12.5
     """
 
     phase: float | np.ndarray
@@ -34,315 +49,361 @@ class LivePhase(NamedTuple):
     confidence: float | np.ndarray
 
 
-class Calibration(NamedTuple):
-    """What the costs of paths say of performances of the action.
-
-    Attributes
-    ----------
-    temperature : float
-        Costs over it are log-probabilities of phases.
-    usual : float
-        Recent cost of a sample that half of the action never exceed.
-    """
-
-    temperature: float
-    usual: float
-
-
-UNKNOWN = Calibration(1.0, np.inf)
-
-
-class Course(NamedTuple):
-    """What running performances follow.
-
-    Attributes
-    ----------
-    n_frames : int
-        ``P``.
-    trellis : Trellis
-        It goes on after the end, where the performer rests.
-    features : LiveFeatures
-    width : float
-        Time constant of the filters, in frames of the clock.
-    step : float
-        From one frame of the clock to the next, in frames of the training performances.
-    calibration : Calibration
-    """
-
-    n_frames: int
-    trellis: Trellis
-    features: LiveFeatures
-    width: float
-    step: float
-    calibration: Calibration
-
-    @property
-    def duration(self):
-        """Of a performance at the mean pace, in frames of the training performances."""
-        return self.step * (self.n_frames - 1)
-
-
-class Stream:
-    """Performances that run, all seen at the same times.
-
-    Parameters
-    ----------
-    course : Course
-    n_streams : int
-    n_features : int
-    """
-
-    def __init__(self, course, n_streams, n_features):
-        self.course = course
-        self.running = CausalTrellis(course.trellis, course.features.moving, n_streams)
-        self.recent = np.zeros(n_streams)
-        self._ticks = Ticks(course.step, course.n_frames)
-        self._derivative = CausalDerivative(course.width, (n_streams, n_features))
-        # The phases of the last ticks, in a ring; and how many ticks streams have run.
-        self._lag = max(2, round(_RECENT * course.n_frames))
-        self._near = max(1.0, _NEAR * (course.n_frames - 1))
-        table = course.trellis.table
-        self._fastest = table.steps.max() / table.subframes
-        # Phases of positions: who rests is at the end.
-        places = np.arange(len(course.features.moving)) / table.subframes
-        self._clock = np.minimum(places, course.n_frames - 1)
-        self._phases = np.zeros((self._lag + 1, n_streams))
-        self._age = np.zeros(n_streams, dtype=np.intp)
-        self._floor, self._all_seen = np.zeros(n_streams), np.ones(n_streams)
-        # The share of the last ticks that showed anything.
-        self._awake = np.ones(n_streams)
-        # Phases, rates and confidences of the last tick, when somebody has asked.
-        self._told = None
-
-    def restart(self, stream):
-        """Let one of them begin anew with its next tick."""
-        self.running.restart(stream)
-        self._ticks.restart(stream)
-        self._derivative.restart(stream)
-        self._age[stream] = self._floor[stream] = self.recent[stream] = 0
-        self._phases[:, stream] = 0
-        self._told = None
-
-    def take(self, frames, stamp):
-        """Take the frames (n_streams, n_features) of a moment, and say where all of them are."""
-        for sample in self._ticks.take(frames, stamp):
-            self.tick(sample)
-        if self._told is None:
-            self._told = self._now(), self._rates(), self._confidence()
-        phase, rate, confidence = self._told
-        phase = np.minimum(phase + rate * self._ticks.since, self.course.n_frames - 1)
-        return LivePhase(phase, rate, confidence)
-
-    def tick(self, sample):
-        """Take the sample of a tick, in the unit of the data."""
-        features = self.course.features
-        postures = features.unit(sample)
-        velocity = self._derivative.step(postures)
-        # What does not move is 0 in the unit, seen or not.
-        hidden = np.isnan(velocity) | np.isnan(sample)
-        self._told = None
-        compared, parts, share = features(velocity, postures), None, self._all_seen
-        if hidden.any():
-            share = 1 - hidden.mean(axis=1)
-            compared[share < 1] = 0
-            parts = self._parts(~hidden, share == 1, velocity, postures)
-        self.running.advance(compared, parts)
-        self._note(share)
-
-    def _parts(self, seen, whole, velocity, postures):
-        groups = {}
-        for n in np.flatnonzero(~whole):
-            groups.setdefault(tuple(np.flatnonzero(seen[n]).tolist()), []).append(int(n))
-        return {
-            tuple(rows): self.course.features.part(columns, velocity[rows], postures[rows])
-            for columns, rows in groups.items()
-        }
-
-    def _note(self, share):
-        """Keep what rate and confidence are told from, of a tick that shows a share of features."""
-        ends, least = self.running.best()
-        self._phases[(self.running.n_samples - 1) % len(self._phases)] = self._clock[ends]
-        # Of what is seen: a hidden body is neither like nor unlike.
-        self._age += 1
-        weight, shows = 1 / np.minimum(self._age, self._lag), share > 0
-        self._awake += weight * (shows - self._awake)
-        risen = (least - self._floor) / np.where(shows, share, 1)
-        self.recent += weight * shows * (risen - self.recent)
-        self._floor = least
-
-    def _now(self):
-        return self._phases[(self.running.n_samples - 1) % len(self._phases)]
-
-    def _rates(self):
-        """Slope of the last phases; at first it is taken to be about 1."""
-        back = np.minimum(np.maximum(self._age - 1, 0), self._lag)
-        then = (self.running.n_samples - 1 - back) % len(self._phases)
-        moved = self._now() - self._phases[then, np.arange(len(back))]
-        rate = (moved + self._lag - back) / self._lag
-        return np.minimum(np.maximum(rate, 0), self._fastest)
-
-    def _confidence(self):
-        chances = self.chances(self.running.costs, self.course.calibration.temperature)
-        near = np.abs(self._clock - self._now()[:, np.newaxis]) <= self._near
-        mass = np.vecdot(chances, near)
-        unlike = np.maximum(self.recent / self.course.calibration.usual, 1)
-        # Who has not begun is at the beginning.
-        return np.where(self._age > 0, self._awake * mass / unlike**2, 1.0)
-
-    @staticmethod
-    def chances(costs, temperature):
-        """Probabilities of phases of which these are the costs: (..., Q)."""
-        weights = np.exp((costs.min(axis=-1, keepdims=True) - costs) / temperature)
-        return weights / weights.sum(axis=-1, keepdims=True)
-
-
-# -- sessions: what runs, since when, and what has been said of it -----------------------
-
-# Answers that are kept; a stream may go on for days.
-_KEPT = 100_000
-
-
 class Session:
     """Performances that run side by side, from their first frame on.
 
+    Parameters
+    ----------
+    reference : Reference
+    frame : ndarray, shape (n_features,) or (n_streams, n_features)
+        The first frame, which ``step`` still has to take.
+    time : float
+        Its time, in frames of the training performances.
+
     Attributes
     ----------
-    stamp : float or None
-        When the last frame was seen, in frames of the training performances; None before the first.
+    time : float
+        Of the last frame.
+    n_streams : int
+    history : deque of LivePhase
+        The phases of the last 100,000 frames.
     """
 
-    def __init__(self):
-        self._stream = self._shape = self.stamp = None
-        self._said, self._began = deque(maxlen=_KEPT), None
+    def __init__(self, reference, frame, time):
+        frames = np.atleast_2d(frame)
+        self.time, self.n_streams = time, len(frames)
+        self._reference, self._shape = reference, frame.shape
+        self._streams = Streams(reference, *frames.shape)
+        self._resampler = Resampler(reference.step, reference.n_frames, frames, time)
+        # NaN: the stream begins with the next frame.
+        self._start = np.full(len(frames), np.nan)
+        self.history = deque(maxlen=_HISTORY_LENGTH)
 
-    @property
-    def history(self):
-        """What was said, frame by frame: `LivePhase` of arrays."""
-        return gathered(self._said) if self._said else LivePhase(*np.empty((3, 0)))
+    def restart(self, stream):
+        """Begin another performance of one stream with the next frame."""
+        self._streams.restart(stream)
+        self._resampler.restart(stream)
+        self._start[stream] = np.nan
 
-    def reset(self, stream=None):
-        """Begin anew: all, or some streams."""
-        if stream is None:
-            self.__init__()
-            return
-        count = 0 if self._shape is None else [1, *self._shape][-2]
-        streams = np.atleast_1d(stream)
-        runs = streams.dtype.kind in "iu" and ((-count <= streams) & (streams < count)).all()
-        if not runs and len(streams):
-            raise ValueError(
-                f"stream={stream!r}, but {count} performances run: give an index of these or "
-                "several, or None for all."
-            )
-        for n in streams:
-            self._stream.restart(int(n))
-            # It begins with the next frame.
-            self._began[n] = np.nan
-
-    def step(self, course, frame, stamp):
-        """Take a frame (n_features,) or (n_streams, n_features), and say where they are."""
-        if self._shape not in (None, frame.shape):
+    def step(self, frame, time):
+        """Take a frame, and estimate the phases: a `LivePhase` of numbers, or of arrays."""
+        if self._shape != frame.shape:
             raise ValueError(
                 f"The frames before had the shape {self._shape}, this one has {frame.shape}: give "
                 "the same performances in each, NaN for what is not seen, or call reset()."
             )
-        frames = np.atleast_2d(frame)
-        if self._stream is None:
-            self._stream = Stream(course, *frames.shape)
-            self._began = np.full(len(frames), np.nan)
-        self._began = np.where(np.isnan(self._began), stamp, self._began)
-        self._shape, self.stamp = frame.shape, stamp
-        found = self._stream.take(frames, stamp)
+        self._start = np.where(np.isnan(self._start), time, self._start)
+        self.time = time
+        for sample in self._resampler.add(np.atleast_2d(frame), time):
+            self._streams.update(sample)
+        found = self._streams.estimate(self._resampler.elapsed)
         if frame.ndim == 1:
             found = LivePhase(*(float(values[0]) for values in found))
-            self._said.append(found)
-            return found
-        self._said.append(found)
-        # Who writes to the arrays does not write to what is kept.
-        return LivePhase(*map(np.copy, found))
+        self.history.append(found)
+        # The history has arrays of its own.
+        return found if frame.ndim == 1 else LivePhase(*map(np.copy, found))
 
-    def time_left(self, course):
-        """Frames of the training performances until the end, of every performance that runs."""
-        if not self._said:
-            return course.duration
-        # Who begins anew with the next frame has not begun.
-        begun = ~np.isnan(self._began)
-        elapsed = np.where(begun, self.stamp - self._began, 0)
-        share = np.where(begun, self._said[-1].phase, 0) / (course.n_frames - 1)
-        left = time_left(share, elapsed, course.duration)
+    def time_left(self):
+        """Frames of the training performances until the end of each stream."""
+        begun = ~np.isnan(self._start)
+        elapsed = np.where(begun, self.time - self._start, 0)
+        share = np.where(begun, self.history[-1].phase, 0) / (self._reference.n_frames - 1)
+        left = time_left(share, elapsed, self._reference.duration)
         return left if len(self._shape) == 2 else float(left[0])
 
 
-def gathered(said):
-    """Answers one after the other as one, of arrays."""
-    return LivePhase(*(np.array(values) for values in zip(*said, strict=True)))
+class Streams:
+    """Performances that are matched to a reference at the same samples.
+
+    Parameters
+    ----------
+    reference : Reference
+    n_streams : int
+    n_features : int
+
+    Attributes
+    ----------
+    trellis : CausalTrellis
+    mean_cost : ndarray, shape (n_streams,)
+        Of a sample, over the last tenth of the clock.
+    """
+
+    def __init__(self, reference, n_streams, n_features):
+        self.reference = reference
+        self.trellis = CausalTrellis(reference.trellis, reference.moving, n_streams)
+        self.mean_cost = np.zeros(n_streams)
+        self._derivative = CausalDerivative(reference.width, (n_streams, n_features))
+        self._window = max(2, round(_WINDOW * reference.n_frames))
+        self._tolerance = max(1.0, _TOLERANCE * (reference.n_frames - 1))
+        table = reference.trellis.table
+        self._max_rate = table.steps.max() / table.subframes
+        # Positions after the end of the movement have its last phase.
+        positions = np.arange(len(reference.moving)) / table.subframes
+        self._phase_of_position = np.minimum(positions, reference.n_frames - 1)
+        # The phases of the last samples, the last one last.
+        self._phases = np.zeros((self._window + 1, n_streams))
+        self._n_samples = np.zeros(n_streams, dtype=np.intp)
+        self._path_cost, self._fully_observed = np.zeros(n_streams), np.ones(n_streams)
+        # The share of the last samples in which anything was observed.
+        self._observed_share = np.ones(n_streams)
+        # Phases, rates and confidences, once computed, until the next sample.
+        self._cached = None
+
+    def restart(self, stream):
+        """Begin another performance of one stream with the next sample."""
+        self.trellis.restart(stream)
+        self._derivative.restart(stream)
+        self._n_samples[stream] = self._path_cost[stream] = self.mean_cost[stream] = 0
+        self._phases[:, stream] = 0
+        self._cached = None
+
+    def update(self, sample):
+        """Take a sample (n_streams, n_features), one frame of the clock after the one before."""
+        reference = self.reference
+        postures = reference.unit(sample)
+        velocity = self._derivative.step(postures)
+        # The unit makes constant features 0, observed or not.
+        hidden = np.isnan(velocity) | np.isnan(sample)
+        compared, parts = reference.features.compare(velocity, postures), {}
+        observed = self._fully_observed
+        if hidden.any():
+            observed = 1 - hidden.mean(axis=1)
+            compared[observed < 1] = 0
+            by_columns = {}
+            for n in np.flatnonzero(observed < 1):
+                columns = tuple(np.flatnonzero(~hidden[n]).tolist())
+                by_columns.setdefault(columns, []).append(int(n))
+            for columns, rows in by_columns.items():
+                part = reference.subset(columns)
+                if part is not None:
+                    part = part.compare(velocity[rows], postures[rows]), part.moving
+                parts[tuple(rows)] = part
+        self.trellis.advance(compared, parts)
+        self._update_window(observed)
+
+    def estimate(self, elapsed):
+        """Phases, rates and confidences, so many samples after the last one."""
+        if self._cached is None:
+            self._cached = self._phases[-1], self._rates(), self._confidences()
+        phase, rate, confidence = self._cached
+        phase = np.minimum(phase + rate * elapsed, self.reference.n_frames - 1)
+        return LivePhase(phase, rate, confidence)
+
+    def _update_window(self, observed):
+        """Phases, costs and observed shares of the window, with a sample of this observed share."""
+        ends, costs = self.trellis.best()
+        now = self._phase_of_position[ends]
+        self._phases = np.concatenate([self._phases[1:], now[np.newaxis]])
+        self._n_samples += 1
+        weight, seen = 1 / np.minimum(self._n_samples, self._window), observed > 0
+        self._observed_share += weight * (seen - self._observed_share)
+        # Per observed feature, so that hidden features make a stream neither like nor unlike.
+        cost = (costs - self._path_cost) / np.where(seen, observed, 1)
+        self.mean_cost += weight * seen * (cost - self.mean_cost)
+        self._path_cost, self._cached = costs, None
+
+    def _rates(self):
+        """Slopes of the phases over the window; before the first sample the rate is 1."""
+        length = np.minimum(np.maximum(self._n_samples - 1, 0), self._window)
+        moved = self._phases[-1] - self._phases[-1 - length, np.arange(len(length))]
+        rate = (moved + self._window - length) / self._window
+        return np.minimum(np.maximum(rate, 0), self._max_rate)
+
+    def _confidences(self):
+        probabilities = phase_probabilities(self.trellis.costs, self.reference.temperature)
+        distances = np.abs(self._phase_of_position - self._phases[-1][:, np.newaxis])
+        mass = np.vecdot(probabilities, distances <= self._tolerance)
+        excess = np.maximum(self.mean_cost / self.reference.typical_cost, 1)
+        # A stream without samples is at the beginning.
+        return np.where(self._n_samples > 0, self._observed_share * mass / excess**2, 1.0)
 
 
-# -- ticks: frames that come at any time, at the even times of a clock -------------------
-
-# Shares of the clock: longer gaps between frames are not bridged, and after so many clocks without
-# a frame nothing more is to be forgotten.
-_BRIDGED, _FORGOTTEN = 0.25, 3
-
-
-class Ticks:
-    """The frames of streams at even times, the first of which is that of the first frame.
+class Resampler:
+    """Interpolates the frames of streams at even times, from the first frame on.
 
     Parameters
     ----------
     step : float
-        From one tick to the next, in frames of the training performances.
+        Time between two samples, in frames of the training performances.
     n_frames : int
-        Ticks of a performance of usual duration.
+        Samples of a performance of mean duration.
+    frame : ndarray, shape (n_streams, n_features)
+        The first frame.
+    time : float
+        Its time.
 
     Attributes
     ----------
-    since : float
-        Ticks from the last one until the last frame, less than 1.
+    elapsed : float
+        Time from the last sample to the last frame, in steps, below 1.
     """
 
-    def __init__(self, step, n_frames):
+    def __init__(self, step, n_frames, frame, time):
         self._step, self._n_frames = step, n_frames
-        self._next = self._stamp = self._frame = None
-        self._begun = []
-        self.since = 0.0
+        self._next, self._time, self._frame = time, time, frame.copy()
+        self._restarted = []
+        self.elapsed = 0.0
 
     def restart(self, stream):
-        """Let one stream begin anew: there is no line to its next frame from the one before."""
-        self._begun.append(stream)
+        """Do not interpolate between the last frame of a stream and its next."""
+        self._restarted.append(stream)
 
-    def take(self, frame, stamp):
-        """Yield the frames (n_streams, n_features) of all ticks until now.
-
-        Parameters
-        ----------
-        frame : ndarray, shape (n_streams, n_features)
-        stamp : float
-        """
-        if self._stamp is None:
-            self._next, self._stamp, self._frame = stamp, stamp, frame.copy()
-        self._frame[self._begun] = frame[self._begun]
-        self._begun = []
-        gap = (stamp - self._stamp) / self._step
-        if gap > _FORGOTTEN * self._n_frames:
-            # The clock goes on at this frame.
-            yield from [np.full_like(frame, np.nan)] * (_FORGOTTEN * self._n_frames)
-            self._next = stamp
-        bridged = gap <= max(1, _BRIDGED * self._n_frames)
-        # Rounding of the times must not lose a tick.
-        while self._next <= stamp + 1e-9 * self._step:
-            yield self._at(self._next, frame, stamp, bridged)
+    def add(self, frame, time):
+        """Yield the samples (n_streams, n_features) up to a new frame of that shape."""
+        self._frame[self._restarted] = frame[self._restarted]
+        self._restarted = []
+        gap = (time - self._time) / self._step
+        if gap > _FORGETTING * self._n_frames:
+            # The samples go on at this frame.
+            yield from [np.full_like(frame, np.nan)] * (_FORGETTING * self._n_frames)
+            self._next = time
+        bridged = gap <= max(1, _LONGEST_GAP * self._n_frames)
+        # Rounding of the times loses no sample.
+        while self._next <= time + 1e-9 * self._step:
+            yield self._interpolate(self._next, frame, time, bridged)
             self._next += self._step
-        # Cameras write all their frames to the same place.
-        self._stamp, self._frame = stamp, frame.copy()
-        self.since = max(0.0, 1 - (self._next - stamp) / self._step)
+        # The caller may write all frames to the same array.
+        self._time, self._frame = time, frame.copy()
+        self.elapsed = max(0.0, 1 - (self._next - time) / self._step)
 
-    def _at(self, time, frame, stamp, bridged):
-        """Between two frames on straight lines; nothing is known where one does not see."""
-        if time >= stamp - 1e-9 * self._step:
+    def _interpolate(self, at, frame, time, bridged):
+        """Linear interpolation; NaN where either frame is, and in gaps that are not bridged."""
+        if at >= time - 1e-9 * self._step:
             return frame
-        if time <= self._stamp + 1e-9 * self._step:
+        if at <= self._time + 1e-9 * self._step:
             return self._frame
         if not bridged:
             return np.full_like(frame, np.nan)
-        share = (time - self._stamp) / (stamp - self._stamp)
+        share = (at - self._time) / (time - self._time)
         return (1 - share) * self._frame + share * frame
+
+
+def stack_phases(phases):
+    """The `LivePhase` of each frame as one of arrays."""
+    return LivePhase(*(np.array(values) for values in zip(*phases, strict=True)))
+
+
+def phase_probabilities(costs, temperature):
+    """Probabilities of phases with these path costs (..., Q): ``exp(-cost / temperature)``."""
+    weights = np.exp((costs.min(axis=-1, keepdims=True) - costs) / temperature)
+    return weights / weights.sum(axis=-1, keepdims=True)
+
+
+def time_left(share, elapsed, duration):
+    """Estimate the time until the end of a performance.
+
+    A mean of what is left of the mean duration, and of the phase at the mean pace, which has the
+    weight ``share``.
+
+    Parameters
+    ----------
+    share : ndarray
+        The phase, from 0 to 1.
+    elapsed : ndarray
+        Time since the beginning.
+    duration : float
+        Mean duration, in the same unit.
+    """
+    by_time = np.maximum(duration - elapsed, 0)
+    return (1 - share) * by_time + share * duration * (1 - share)
+
+
+def check_observations(x, what, names, width, ndims=(1,)):
+    """The numbers of a frame or of a take, checked.
+
+    Parameters
+    ----------
+    x : array-like, DataFrame or Series
+        NaN is not seen.
+    what : str
+        What to call it in messages.
+    names : list or None
+        Names of the features that a table must have.
+    width : int
+        Number of features.
+    ndims : tuple of int, default=(1,)
+        Accepted numbers of dimensions: 1 is a frame, 2 several frames.
+
+    Returns
+    -------
+    ndarray of float64
+
+    Raises
+    ------
+    ValueError
+        If it has another shape or other names, is empty or infinite.
+    """
+    # A row of a table has the names of its columns.
+    check_names(x.to_frame().T if isinstance(x, pd.Series) else x, names, what)
+    values = np.atleast_1d(as_numbers(x, what, dtype=np.float64))
+    if values.ndim not in ndims or values.shape[-1] != width or not values.size:
+        shapes = {1: f"({width},)", 2: f"(n, {width}) with n at least 1"}
+        raise ValueError(
+            f"{what} has shape {values.shape}, expected {' or '.join(shapes[n] for n in ndims)}. "
+            "Features that are not seen are NaN. A single feature is a column: reshape your data, "
+            "x[:, np.newaxis]."
+        )
+    frames = x.index if isinstance(x, pd.DataFrame) else None
+    check_finite(np.atleast_2d(values), f"{what}, frame", names, frames, allow_nan=True)
+    return values
+
+
+def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
+    """The times of frames, checked, in frames of the training performances.
+
+    Parameters
+    ----------
+    times : float, array-like of shape (n_frames,), or None
+        In seconds if there is a frame rate, else in frames of the training performances. None: one
+        frame of these follows another, the first at 0.
+    n_frames : int
+    frame_rate : float, default=None
+        Frames a second of the training performances.
+    what : str
+        What to call the sequence in messages.
+    after : float, default=None
+        Time of the frame before these, in frames of the training performances.
+
+    Returns
+    -------
+    ndarray of float64, shape (n_frames,)
+        Increasing.
+
+    Raises
+    ------
+    ValueError
+        If there is not one time a frame, or times are not finite, or do not increase.
+    """
+    if times is None:
+        return np.arange(n_frames) + (0.0 if after is None else after + 1)
+    stamps = np.atleast_1d(as_numbers(times, f"{what}: times", dtype=np.float64))
+    if stamps.shape != (n_frames,):
+        raise ValueError(
+            f"{what}: times must be one a frame, shape ({n_frames},), got {stamps.shape}."
+        )
+    finite = np.isfinite(stamps)
+    if not finite.all():
+        i = int(finite.argmin())
+        raise ValueError(f"{what}: the time of frame {i} is {stamps[i]}; times must be finite.")
+    scale = 1.0 if frame_rate is None else frame_rate
+    given = stamps if after is None else np.concatenate([[after / scale], stamps])
+    falls = np.diff(given) <= 0
+    if falls.any():
+        i = int(falls.argmax())
+        raise ValueError(
+            f"{what}: time stamps must increase, but {given[i + 1]:.10g} follows {given[i]:.10g}. "
+            "Leave out a frame that comes twice or late; begin another performance with reset()."
+        )
+    return stamps * scale
+
+
+def times_of_each(times, n):
+    """A list with the times of each of n performances, or None for each without times."""
+    if times is None:
+        return [None] * n
+    given = len(times) if np.iterable(times) else "no"
+    if given != n:
+        raise ValueError(
+            f"There are {n} performances, but {given} sequences of times: give one for each."
+        )
+    return list(times)

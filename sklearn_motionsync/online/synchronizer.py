@@ -1,52 +1,58 @@
 """OnlineSynchronizer: the phase of performances that are still running."""
 
+import math
 from numbers import Real
 
 import numpy as np
-import pandas as pd
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, _fit_context, clone
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.numbers import as_numbers, check_names
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
-from ..matching.costs import step_table
+from ..matching.causal import causal_velocity
+from ..matching.costs import COSTS, step_table
 from ..matching.filters import SMOOTHING
+from ..matching.metric import Metric, compressed
 from ..matching.trellis import Trellis
+from ..matching.warps import normalise
 from ..matching.warps import sample as sample_at
 from ..synchronizers.base import Synchronizer
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.atomic import atomic_fit
 from ..utils.doc_links import DocumentedMixin
-from .features import LiveFeatures
-from .stream import UNKNOWN, Calibration, Course, Session, Stream, gathered
-from .times import as_stamps
+from .stream import (
+    LivePhase,
+    Session,
+    Streams,
+    check_observations,
+    check_times,
+    phase_probabilities,
+    stack_phases,
+    times_of_each,
+)
 
-__all__ = ["OnlineSynchronizer"]
-
-# Positions a frame of the pattern: docs/method.md.
-_SUBFRAMES = 2
+__all__ = ["OnlineSynchronizer", "Reference"]
 
 
 class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin, BaseEstimator):
     """The phase of a performance while it runs, frame by frame, however long it will last.
 
-    The frames that have come so far are the base of the trellis, the mean of the synchronised
-    training performances is the moving sequence (Eqs. 12-17). A performance begins with frame 0 of
-    the pattern; where it is now is the best cell of the last row. A frame costs a row of the
-    trellis, whatever has been before it, and is never looked at before it is there.
+    The frames so far are the base of the trellis, and the mean of the synchronised training
+    performances is the moving sequence (Eqs. 12-17). A performance begins with frame 0 of the
+    pattern; its phase is the best cell of the last row. A frame costs one row of the trellis,
+    whatever came before it, and no phase depends on later frames.
 
     Parameters
     ----------
     synchronizer : Synchronizer, default=None
-        What the training performances are synchronised with; a clone of it is fitted. None is
+        Synchronises the training performances; a clone of it is fitted. None is
         ``DenseSynchronizer()``.
     frame_rate : float, default=None
-        Frames a second of the training performances. Time stamps are then in seconds; without it
+        Frames a second of the training performances. Times are then in seconds; without it
         in frames of the training performances.
     smoothness : float, default=0.1
-        Weight of the change of pace, ``mu``, in units of the mean squared norm of what is compared.
-    smoothing : float, default=0.03
+        Weight of the change of pace, ``mu``, in units of the mean squared norm of the features.
+    velocity_smoothing : float, default=0.03
         Time constant of the causal filter of velocities, as a share of the clock.
     max_rate : float, default=3
         Largest rate, in units of the mean pace.
@@ -54,11 +60,12 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
     Attributes
     ----------
     synchronizer_ : Synchronizer
-        Fitted.
+        The fitted synchronizer.
     mean_ : ndarray, shape (P, n_features)
         Mean of the training performances on the clock of the pattern.
     duration_ : float
-        Mean duration of them, from the first to the last frame, in their frames.
+        Mean time from the first frame of a training performance to its last, in frames: the mean
+        of ``n_frames - 1``.
     n_frames_ : int
         ``P``.
     n_features_in_ : int
@@ -68,30 +75,31 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
 
     See Also
     --------
-    MotionTracker : Postures and phase from what is seen of a body.
-    DenseSynchronizer : For performances that are over.
+    MotionTracker : Postures and phase of a body that is partly hidden.
+    DenseSynchronizer : For whole performances.
 
     Notes
     -----
-    ``step`` is the one method that changes an estimator: it holds the performances that run.
-    A copy, or what comes out of a pickle, goes on by itself from where it was.
+    ``step`` and ``reset`` change the estimator, which holds the running performances. A copy, or an
+    unpickled estimator, goes on by itself from there.
 
-    What is compared is what the synchronizer has learnt, made of causal velocities and of postures
-    less the mean posture; the filter of velocities comes late, on both sides alike. The phase may
-    go back when a frame shows that it was wrong. Nobody has to stand still before the beginning;
-    whoever does stays where the mean performance has not moved much yet. Who stays in the last
-    posture is at the end, P - 1: call ``reset`` for the next performance.
+    The features are those of the synchronizer, with its learnt metric, from causal velocities and
+    from postures less the mean posture. The velocity filters delay both sequences alike. The phase
+    may go back when later frames contradict it. No rest is needed before the beginning: a
+    performer at rest there stays in the first frames of the clock. In the last posture the phase
+    is the end, P - 1: call ``reset`` for the next performance.
 
-    The confidence is the share of probability within a twentieth of the clock of the phase, from
-    costs that are scaled so that the training performances, each followed with the mean of the
-    others, have theirs right (of a single one, what is usual among people is taken); it falls with
-    the square of what recent frames cost more than is usual among these. Another action costs more;
-    a movement that is its own reverse, such as a bend, costs no more backwards, and standing still
-    costs nothing where the mean stands still.
+    The confidence is the probability mass within a twentieth of the clock of the phase, divided by
+    the square of the recent cost in units of the typical cost, where it is above that. The
+    temperature of the probabilities and the typical cost are learnt: each training performance is
+    matched to the mean of the others. From a single performance they cannot be learnt, and are
+    the medians of 16 actions of people. Other actions cost more. A movement that is its own
+    reverse, such as a bend, costs no more backwards, and standing still costs nothing where the
+    mean stands still.
 
-    Features that are NaN are not compared; a frame of NaN, or time without frames,
-    moves the phase on at the mean pace. Between frames, movements are taken to be straight
-    for a quarter of the clock at most.
+    Features that are NaN are not compared. During frames of NaN, or time without frames,
+    the phase moves on at the mean pace. Between frames movements are interpolated linearly,
+    across gaps of a quarter of the clock at most.
 
     Examples
     --------
@@ -105,18 +113,18 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
     >>> live = OnlineSynchronizer(frame_rate=30).fit(X)
     >>> frames = features.transform(bunch.data[11:])[0]
     >>> for k, frame in enumerate(frames[: len(frames) // 2]):
-    ...     here = live.step(frame, time=k / 30)
-    >>> 0.4 < here.phase / (live.n_frames_ - 1) < 0.6
+    ...     live_phase = live.step(frame, time=k / 30)
+    >>> 0.4 < live_phase.phase / (live.n_frames_ - 1) < 0.6
     True
     >>> 1 < live.time_left() < len(frames) / 30  # seconds
     True
 
-    Somebody who only stands there does not get on:
+    In the first posture the performance does not go on:
 
     >>> live.reset()
     >>> for k in range(200):
-    ...     here = live.step(frames[0])
-    >>> here.rate
+    ...     live_phase = live.step(frames[0])
+    >>> live_phase.rate
     0.0
     """
 
@@ -124,7 +132,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         "synchronizer": [Synchronizer, None],
         "frame_rate": [Interval(Real, 0, None, closed="neither"), None],
         "smoothness": [Interval(Real, 0, None, closed="left")],
-        "smoothing": [Interval(Real, 0, 1, closed="left")],
+        "velocity_smoothing": [Interval(Real, 0, 1, closed="left")],
         "max_rate": [Interval(Real, 1, None, closed="left")],
     }
 
@@ -133,29 +141,31 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         synchronizer=None,
         frame_rate=None,
         smoothness=0.1,
-        smoothing=SMOOTHING,
+        velocity_smoothing=SMOOTHING,
         max_rate=3,
     ):
         self.synchronizer = synchronizer
         self.frame_rate = frame_rate
         self.smoothness = smoothness
-        self.smoothing = smoothing
+        self.velocity_smoothing = velocity_smoothing
         self.max_rate = max_rate
 
     @atomic_fit
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X, y=None):
-        """Learn the mean performance, its pace, and what its costs say.
+        """Learn the mean performance, its duration, and the scale of path costs.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Performances; the rows of a 2-D array are univariate ones.
-        y : ignored, but for synchronizers that use it
+        y : ignored
+            Passed to the synchronizer.
 
         Returns
         -------
-        self
+        OnlineSynchronizer
+            The fitted estimator.
 
         Raises
         ------
@@ -170,22 +180,27 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         self.n_frames_ = sync.n_frames_
         self.mean_ = warped.mean(axis=0)
         self.duration_ = float(np.mean([len(x) for x in performances]) - 1)
-        found = calibrate(self._course, performances, warped, match.times)
-        self._following = self._course(self.mean_, found)
-        self._session = Session()
+        settings = self.duration_, self.smoothness, self.velocity_smoothing, self.max_rate
+
+        def reference_of(mean, *calibration):
+            return Reference(sync.training_.features, mean, *settings, *calibration)
+
+        calibration = calibrate(reference_of, performances, warped, match.times)
+        self._reference = reference_of(self.mean_, *calibration)
+        self._session = None
         return self
 
     def step(self, frame, time=None):
-        """Take the next frame.
+        """Take the next frame, and estimate the phase.
 
         Parameters
         ----------
         frame : array-like, shape (n_features,), or (n_streams, n_features)
-            What is seen at this time, of one performance, or of several that run side by side.
-            NaN is not seen.
+            A frame of one performance, or of several that run side by side. NaN is not seen.
         time : float, default=None
-            When: seconds if there is a ``frame_rate``, else frames of the training performances;
-            from any origin. None: a frame of the training performances after the one before.
+            Time of the frame: in seconds if there is a ``frame_rate``, else in frames of the
+            training performances; from any origin. None: a frame of the training performances
+            after the one before.
 
         Returns
         -------
@@ -197,33 +212,50 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         ------
         ValueError
             If the frame is infinite, has another width or other names, there are not as many
-            streams as in the frames before, or time stands still or goes back. The performance
+            streams as in the frames before, or time does not increase. The performance
             then goes on as if the frame had not been given.
         """
         if "_session" not in vars(self):
             check_is_fitted(self)
-        frame, given = self._frame(frame), None if time is None else [time]
-        stamps = as_stamps(given, 1, self.frame_rate, "The frame", self._session.stamp)
-        return self._session.step(self._following, frame, float(stamps[0]))
+        width = self.mean_.shape[1]
+        frame = check_observations(frame, "The frame", names_of_input(self), width, (1, 2))
+        session = self._session
+        last = None if session is None else session.time
+        time = float(check_times(time, 1, self.frame_rate, "The frame", last)[0])
+        if session is None:
+            session = self._session = Session(self._reference, frame, time)
+        return session.step(frame, time)
 
     def reset(self, stream=None):
-        """Begin anew with the next frame.
+        """Begin another performance with the next frame.
 
         Parameters
         ----------
         stream : int or array-like of int, default=None
-            Of several performances those that begin anew, while the others go on. None: all of
-            them, and time begins anew, too.
+            Of several performances those that end, while the others go on. None: all of
+            them, and time begins again, too.
         """
         check_is_fitted(self)
-        self._session.reset(stream)
+        if stream is None:
+            self._session = None
+            return
+        n_streams = 0 if self._session is None else self._session.n_streams
+        streams = np.atleast_1d(stream)
+        known = streams.dtype.kind in "iu" and np.isin(streams, np.arange(-n_streams, n_streams))
+        if len(streams) and not np.all(known):
+            raise ValueError(
+                f"stream={stream!r}, but {n_streams} performances run: give an index of these or "
+                "several, or None for all."
+            )
+        for n in streams:
+            self._session.restart(int(n))
 
     def time_left(self):
-        """How long the performance will go on: a guess, without promise.
+        """Estimate the time until the performance ends.
 
-        A mean of what is left of the mean duration after the time that has passed, and of what is
-        left of the phase at the mean pace, which counts the more the farther the phase is.
-        docs/method.md has a table of how wrong it is.
+        A weighted mean of what is left of the mean duration after the elapsed time, and of what is
+        left of the phase at the mean pace; the phase, as a share of the clock, is the weight of the
+        second. docs/method.md has a table of its errors.
 
         Returns
         -------
@@ -231,27 +263,30 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
             Seconds if there is a ``frame_rate``, else frames of the training performances.
         """
         check_is_fitted(self)
-        left = self._session.time_left(self._following)
+        session = self._session
+        left = self._reference.duration if session is None else session.time_left()
         return left if self.frame_rate is None else left / self.frame_rate
 
     @property
     def history(self):
         """Phases, rates and confidences since the last ``reset`` of all: `LivePhase` of arrays.
 
-        Of a stream that goes on and on it is the last 100,000 frames.
+        Of a long stream these are the last 100,000 frames.
         """
         check_is_fitted(self)
-        return self._session.history
+        if self._session is None:
+            return LivePhase(*np.empty((3, 0)))
+        return stack_phases(self._session.history)
 
-    def follow(self, X, times=None):
-        """What ``step`` says at every frame of performances, each by itself.
+    def track(self, X, times=None):
+        """The phases of whole performances, as ``step`` estimates them frame by frame.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            NaN is not seen.
+            Performances, each independent of the others and of ``step``. NaN is not seen.
         times : list of array-like (n_frames_i,), default=None
-            As in ``step``.
+            Times of the frames of each performance, as in ``step``.
 
         Returns
         -------
@@ -267,118 +302,204 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         performances = check_performances(
             self, X, reset=False, level="sequence", on_rows=self._fitted_on_rows, finite="allow-nan"
         )
-        if times is None:
-            times = [None] * len(performances)
-        if len(times) != len(performances):
-            raise ValueError(
-                f"There are {len(performances)} performances, but times of {len(times)}: give one "
-                "list of times for each."
-            )
-        found = []
+        tracks, times = [], times_of_each(times, len(performances))
         for i, (x, t) in enumerate(zip(performances, times, strict=True)):
-            stamps = as_stamps(t, len(x), self.frame_rate, performances.called(i))
-            session, frames = Session(), zip(x.astype(np.float64), stamps, strict=True)
-            found.append(gathered([session.step(self._following, *frame) for frame in frames]))
-        return found
-
-    def _course(self, mean, calibration=UNKNOWN):
-        """What is followed with this mean."""
-        features = self.synchronizer_.training_.features
-        width = self.smoothing * (self.n_frames_ - 1)
-        compared = LiveFeatures(features, mean, _SUBFRAMES, width)
-        mu = self.smoothness * float(np.square(compared.moving).sum(axis=1).mean())
-        last = self.n_frames_ - 1
-        # No step is longer than the pattern.
-        table = step_table(features.cost, min(self.max_rate, last), _SUBFRAMES)
-        trellis = Trellis(table, mu, last + compared.rest, running=True)
-        step = self.duration_ / last
-        return Course(self.n_frames_, trellis, compared, width, step, calibration)
-
-    def _frame(self, frame):
-        """A frame as numbers, of one stream or of several."""
-        if type(frame) is not np.ndarray or frame.dtype != np.float64:
-            # A row of a table has the names of its columns.
-            row = frame.to_frame().T if isinstance(frame, pd.Series) else frame
-            check_names(row, names_of_input(self), "The frame")
-            frame = as_numbers(frame, "The frame", dtype=np.float64)
-        width = self.mean_.shape[1]
-        if frame.ndim == 0 and width == 1:
-            frame = frame[np.newaxis]
-        if frame.ndim not in (1, 2) or frame.shape[-1] != width or not frame.size:
-            raise ValueError(
-                f"A frame must have shape ({width},), or (n_streams, {width}) for several "
-                f"performances side by side; got {frame.shape}."
-            )
-        if np.isinf(frame).any():
-            raise ValueError(
-                f"Feature {np.argwhere(np.isinf(frame))[0][-1]} of the frame is infinite. Give NaN "
-                "for what is not seen."
-            )
-        return frame
+            t = check_times(t, len(x), self.frame_rate, performances.called(i))
+            frames = x.astype(np.float64)
+            session = Session(self._reference, frames[0], t[0])
+            tracks.append(stack_phases(list(map(session.step, frames, t))))
+        return tracks
 
 
-# -- what costs of running performances are worth, learnt from those of the training set -
+# -- the reference: what running performances are matched to -------------------------------
 
-# So many performances, and so many moments of each, tell enough.
-_MOST, _MOMENTS = 24, 120
-# Temperatures that are tried, in mean squared features of a sample; the least chance that counts.
-_TEMPERATURES = np.geomspace(0.01, 1e3, 41)
-_LEAST = 1e-12
-# Of one performance alone: temperature and usual cost as 16 actions of people have them, in mean
-# squared features.
-_ALONE = 0.7, 0.5
+# Positions a frame of the pattern: docs/method.md.
+_SUBFRAMES = 2
+# After the end the last posture is held for so many widths of the velocity filters, after which
+# these have forgotten the movement.
+_REST = 6
 
 
-def calibrate(course_of, performances, warped, times):
-    """The calibration of a training set.
+class Reference:
+    """A mean performance that running performances are matched to, and its trellis.
+
+    The features are those of the synchronizer, from causal velocities and postures. Velocities of
+    both sequences have the same delay. Postures are centred at the mean posture of the reference,
+    as the mean of a running performance is not known yet.
 
     Parameters
     ----------
-    course_of : callable
-        The course of a mean performance (P, n_features).
+    features : Features
+        Of the fitted synchronizer.
+    mean : ndarray, shape (P, n_features)
+        The mean performance.
+    duration : float
+        Mean duration of the training performances, in their frames.
+    smoothness, velocity_smoothing, max_rate : float
+        As of the `OnlineSynchronizer`.
+    temperature : float, default=1.0
+        Path costs over it are negative log-probabilities of phases.
+    typical_cost : float, default=inf
+        Mean cost of a sample that half of the training performances never exceed.
+
+    Attributes
+    ----------
+    n_frames : int
+        ``P``.
+    duration : float
+        Mean duration, in frames of the training performances.
+    width : float
+        Time constant of the velocity filters, in frames of the clock.
+    step : float
+        A frame of the clock, in frames of the training performances.
+    features : FeatureSubset
+        All features.
+    moving : ndarray, shape (Q, n_compared)
+        Those of the mean performance, with its last posture held.
+    trellis : Trellis
+    """
+
+    def __init__(
+        self,
+        features,
+        mean,
+        duration,
+        smoothness,
+        velocity_smoothing,
+        max_rate,
+        temperature=1.0,
+        typical_cost=np.inf,
+    ):
+        last = len(mean) - 1
+        self.cost, self.metric, self.unit = features.cost, features.metric, features.unit
+        self.n_frames, self.width, self.step = len(mean), velocity_smoothing * last, duration / last
+        self.duration = self.step * last
+        self.temperature, self.typical_cost = temperature, typical_cost
+        postures = self.unit(normalise([mean.astype(np.float64)], len(mean), _SUBFRAMES)[0])
+        self.centre, self._n_positions = postures.mean(axis=0), len(postures)
+        rest = max(1, math.ceil(_REST * self.width))
+        held = np.repeat(postures[-1:], rest * _SUBFRAMES, axis=0)
+        self._postures = np.concatenate([postures, held])
+        self._velocity = causal_velocity(self._postures, _SUBFRAMES, self.width)
+        self.features, self._cached = self._subset(np.arange(mean.shape[1])), {}
+        self.moving = self.features.moving
+        mu = smoothness * float(np.square(self.moving).sum(axis=1).mean())
+        # No step is longer than the pattern.
+        table = step_table(self.cost, min(max_rate, last), _SUBFRAMES)
+        self.trellis = Trellis(table, mu, last + rest, running=True)
+
+    def subset(self, columns):
+        """The `FeatureSubset` of some columns, a tuple; None if the metric has none of these."""
+        cached = self._cached
+        if columns not in cached:
+            # A hidden feature stays hidden for a while, and two subsets serve one that flickers.
+            # Threads share the cache, so it is replaced, never changed.
+            subset = self._subset(np.array(columns, dtype=np.intp))
+            cached = self._cached = {**dict(list(cached.items())[-1:]), columns: subset}
+        return cached[columns]
+
+    def _subset(self, columns):
+        metric = self.metric
+        if metric is not None:
+            rows = np.isin(metric.features, columns)
+            columns = metric.features[rows]
+            # The energy of the mean performance in these features.
+            velocity = self._velocity[: self._n_positions, columns]
+            energy = float(np.square(velocity).sum(axis=1).mean())
+            metric = Metric(columns, energy, metric.velocity[rows], metric.posture[rows])
+            columns = columns if energy > 0 else columns[:0]
+        if not len(columns):
+            return None
+        return FeatureSubset(self, columns, metric, self._velocity, self._postures)
+
+
+class FeatureSubset:
+    """Some of the features of a `Reference`.
+
+    Attributes
+    ----------
+    moving : ndarray, shape (Q, n_compared)
+        Those of the mean performance.
+    """
+
+    def __init__(self, reference, columns, metric, velocity, postures):
+        self._cost, self._centre = reference.cost, reference.centre
+        self._columns, self._metric = columns, metric
+        self.moving = self.compare(velocity, postures)
+
+    def compare(self, velocity, postures):
+        """Features of velocities and postures (n, n_features) in the unit of the reference."""
+        velocity = velocity[:, self._columns]
+        postures = (postures - self._centre)[:, self._columns]
+        if self._metric is None:
+            return COSTS[self._cost].features(postures, lambda _: velocity)
+        return self._metric.of_parts(compressed(velocity, self._metric.energy), postures)
+
+
+# -- calibration: what path costs say, learnt from the training performances ---------------
+
+# Performances, and moments of each, that calibration uses at most.
+_MAX_PERFORMANCES, _MAX_MOMENTS = 24, 120
+# Temperatures that are tried, in mean squared features of a sample; the smallest probability.
+_TEMPERATURES = np.geomspace(0.01, 1e3, 41)
+_MIN_PROBABILITY = 1e-12
+# For a single training performance: medians of 16 actions of people, in mean squared features.
+_DEFAULT_TEMPERATURE, _DEFAULT_COST = 0.7, 0.5
+
+
+def calibrate(reference_of, performances, warped, times):
+    """Learn the temperature and the typical cost of a `Reference`.
+
+    Each training performance is matched to the mean of the others. The temperature maximises the
+    likelihood of the phases of the synchronizer.
+
+    Parameters
+    ----------
+    reference_of : callable
+        The `Reference` of a mean performance (P, n_features).
     performances : list of ndarray (n_frames_i, n_features)
     warped : ndarray, shape (n_sequences, P, n_features)
-        Those, synchronised.
+        The synchronised performances.
     times : ndarray, shape (n_sequences, P)
         ``tau`` of each.
 
     Returns
     -------
-    Calibration
+    temperature, typical_cost : float
     """
     n, total = len(performances), warped.sum(axis=0, dtype=np.float64)
-    chosen = np.unique(np.linspace(0, n - 1, _MOST).round().astype(np.intp))
-    scores, recent = np.zeros(len(_TEMPERATURES)), []
-    # What does not move costs nothing, whatever the unit.
-    energy = float(np.square(course_of(total / n).features.moving).sum(axis=1).mean()) or 1.0
+    chosen = np.unique(np.linspace(0, n - 1, _MAX_PERFORMANCES).round().astype(np.intp))
+    scores, largest = np.zeros(len(_TEMPERATURES)), []
+    # Of a constant mean all costs are 0, in any unit.
+    energy = float(np.square(reference_of(total / n).moving).sum(axis=1).mean()) or 1.0
     if n == 1:
-        return Calibration(*(energy * share for share in _ALONE))
+        return energy * _DEFAULT_TEMPERATURE, energy * _DEFAULT_COST
     for i in chosen:
-        course = course_of((total - warped[i]) / (n - 1))
-        rows, truth, costs = _followed(course, performances[i], times[i])
-        recent.append(costs)
+        reference = reference_of((total - warped[i]) / (n - 1))
+        costs, truth, largest_cost = _match_live(reference, performances[i], times[i])
+        largest.append(largest_cost)
         for k, temperature in enumerate(energy * _TEMPERATURES):
-            right = Stream.chances(rows, temperature)[np.arange(len(rows)), truth]
-            scores[k] += np.log(np.maximum(right, _LEAST)).mean()
-    # Copies of one performance cost each other nothing, but for rounding.
-    usual = max(np.median([np.max(costs) for costs in recent]), _LEAST * energy)
-    return Calibration(float(energy * _TEMPERATURES[scores.argmax()]), float(usual))
+            right = phase_probabilities(costs, temperature)[np.arange(len(costs)), truth]
+            scores[k] += np.log(np.maximum(right, _MIN_PROBABILITY)).mean()
+    # Copies of one performance have no costs but rounding.
+    typical_cost = max(np.median(largest), _MIN_PROBABILITY * energy)
+    return float(energy * _TEMPERATURES[scores.argmax()]), float(typical_cost)
 
 
-def _followed(course, performance, times):
-    """Costs of all phases at even moments, the right phases there, and recent costs of ticks."""
-    stream, duration = Stream(course, 1, performance.shape[1]), len(performance) - 1
-    ticks = np.arange(0, duration * (1 + 1e-9), course.step)
-    share = ticks / duration
-    last = course.n_frames - 1
-    rows, recent, every = [], [], -(-len(ticks) // _MOMENTS)
-    for k, sample in enumerate(sample_at([performance], share[np.newaxis] * last, last + 1)[0]):
-        stream.tick(sample[np.newaxis])
-        recent.append(stream.recent[0])
+def _match_live(reference, performance, times):
+    """Path costs at even moments, the true positions there, and the largest mean cost."""
+    streams, duration = Streams(reference, 1, performance.shape[1]), len(performance) - 1
+    moments = np.arange(0, duration * (1 + 1e-9), reference.step) / duration
+    last = reference.n_frames - 1
+    costs, largest, every = [], 0.0, -(-len(moments) // _MAX_MOMENTS)
+    samples = sample_at([performance], moments[np.newaxis] * last, last + 1)[0]
+    for k, sample in enumerate(samples):
+        streams.update(sample[np.newaxis])
+        largest = max(largest, streams.mean_cost[0])
         if k % every == 0:
-            rows.append(stream.running.costs[0])
-    # Where tau stands still, any phase of that while is as right.
+            costs.append(streams.trellis.costs[0])
+    # Where tau is constant, any phase of that interval is right.
     rising = times + 1e-9 * np.arange(len(times))
-    phases = np.interp(share * last, rising, np.arange(len(times)))
-    truth = np.round(phases * course.trellis.table.subframes).astype(np.intp)
-    return np.array(rows), truth[::every], np.array(recent)
+    phases = np.interp(moments * last, rising, np.arange(len(times)))
+    truth = np.round(phases * reference.trellis.table.subframes).astype(np.intp)
+    return np.array(costs), truth[::every], largest

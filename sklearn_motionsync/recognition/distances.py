@@ -12,7 +12,7 @@ from ..matching.comparison import BLOCK, Comparison
 from ..matching.costs import COSTS
 from ..matching.units import exponent_of
 from ..matching.warps import normalise
-from ..utils.parallel import Common, Progress, run
+from ..utils.parallel import Progress, SharedArgument, run
 
 __all__ = ["SETTINGS", "distances_of", "on_clock", "synchronization_distances"]
 
@@ -201,7 +201,7 @@ def _ordered(comparison, bases, moving, *, n_jobs, progress, name):
     # Blocks are too small for threads, which wait for each other between them.
     jobs = {"n_jobs": n_jobs, "step": progress.stage(stage, len(portions))}
     out = np.empty((len(bases), len(moving)))
-    common = (Common((comparison, bases, moving)),)
+    common = (SharedArgument((comparison, bases, moving)),)
     for found in run(_blocks, portions, common=common, **jobs):
         for (i, j), distances in found:
             out[i, j] = distances

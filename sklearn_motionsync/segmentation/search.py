@@ -24,7 +24,7 @@ from ..model.action_model import ActionModel
 from ..model.detector import energies
 from ..model.similarity import as_codes, learn_border
 from ..synchronizers.dense import DenseSynchronizer
-from ..utils.pipelines import find_synchronizer, flat_steps, reach_synchronizer
+from ..utils.pipelines import find_synchronizer, flat_steps, route_to_synchronizer
 from .cutting import cut_takes
 
 __all__ = ["find_performances"]
@@ -219,7 +219,7 @@ def _reach(pattern, X, groups):
         synchronizer = DenseSynchronizer(min(len(pattern), _CLOCK), pattern=0).fit([pattern])
         return synchronizer, synchronizer.check_performances(X), None
     _check_synchronizer(find_synchronizer(pattern)[1])
-    reached = reach_synchronizer(pattern, X, {}, "find_performances")
+    reached = route_to_synchronizer(pattern, X, {}, "find_performances")
     return reached.synchronizer, reached.performances, _groups(pattern, reached, groups)
 
 

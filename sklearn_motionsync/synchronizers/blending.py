@@ -15,7 +15,7 @@ from ..body.skeleton import Skeleton
 from ..inputs.collections import NOT_ONE, as_collection, check_members
 from ..inputs.numbers import as_numbers, check_names
 from ..inputs.tables import FRAME, labels_of
-from ..utils.pipelines import flat_steps, parts_of, reach_synchronizer
+from ..utils.pipelines import flat_steps, route_to_synchronizer, union_transformers
 from .match import Match
 
 __all__ = ["blend_performances"]
@@ -139,7 +139,7 @@ def blend_performances(
     _check(sequences, arrays, skeleton)
     match = estimator
     if not isinstance(estimator, Match):
-        match = reach_synchronizer(estimator, X, params, "blend_performances").match()
+        match = route_to_synchronizer(estimator, X, params, "blend_performances").match()
     elif params:
         raise TypeError(f"A Match is matched already, and takes no {sorted(params)}.")
     met = match.frames(list(map(len, arrays)))
@@ -178,7 +178,7 @@ def _skeleton_of(estimator, skeleton):
     if isinstance(estimator, Match):
         return None
     for step in flat_steps(estimator):
-        for part in parts_of(step):
+        for part in union_transformers(step):
             if isinstance(part, PositionsTransformer):
                 return part.skeleton
     return None

@@ -572,7 +572,7 @@ def try_refinement(warper, source, scaled, shared, some, settings, **portions):
         The pattern at its own pace.
     scaled : ndarray, shape (n_sequences, P, n_features)
         The training set, in the unit.
-    shared : Common
+    shared : SharedArgument
         The `shared_training_set`.
     some : ndarray of int
         Indices of those to try it on.
@@ -589,7 +589,7 @@ def try_refinement(warper, source, scaled, shared, some, settings, **portions):
     hands = deal_features(scaled[some]) if len(some) else []
     if not hands:
         return Verdict()
-    positions = shared.here.positions[some].astype(np.float64, copy=False)
+    positions = shared.value.positions[some].astype(np.float64, copy=False)
     every = 1 if len(some) < 2 * _SEVERAL else 2
     source, width = warper.positions([source]), choose_smoothing(scaled[some[::every]])
     portion = warper, source, positions, hands, width

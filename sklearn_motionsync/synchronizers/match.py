@@ -10,7 +10,7 @@ from ..inputs.long_tables import to_frame
 from ..inputs.numbers import as_numbers
 from ..inputs.validation import read_collection
 from ..matching.warps import sample
-from ..utils.pipelines import reach_synchronizer
+from ..utils.pipelines import route_to_synchronizer
 
 __all__ = [
     "UNITS",
@@ -250,7 +250,7 @@ class Match:
         >>> Match.from_estimator(pipe.fit(bunch.data), bunch.data)
         Match(6 performances on 50 frames)
         """
-        return reach_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator").match()
+        return route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator").match()
 
     def warp(self, X):
         """Whatever was recorded along with the performances, on the clock of the pattern (Eq. 18).

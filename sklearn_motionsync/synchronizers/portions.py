@@ -7,7 +7,7 @@ import numpy as np
 from joblib import effective_n_jobs
 
 from ..matching.warps import even_slices
-from ..utils.parallel import Common, on_cluster, run
+from ..utils.parallel import SharedArgument, on_cluster, run
 
 __all__ = [
     "Compared",
@@ -98,7 +98,7 @@ def _along(bases, moving):
 
 def shared_training_set(matcher, positions, compared):
     """A training set as the portions of a fit share it: others are sent its positions once."""
-    return Common(_TrainingSet(matcher, positions, compared))
+    return SharedArgument(_TrainingSet(matcher, positions, compared))
 
 
 def compare_in_portions(training, bases, moving, *, n_jobs, progress):
@@ -106,7 +106,7 @@ def compare_in_portions(training, bases, moving, *, n_jobs, progress):
 
     Which tiles go together makes no difference to the results: a few portions a worker.
     """
-    here = training.here
+    here = training.value
 
     def size(n_tiles):
         cells = max(1, len(bases) * len(moving) // max(1, n_tiles))
@@ -149,7 +149,7 @@ def warp_in_portions(warper, arrays, *along, n_jobs, progress, name):
     portions = _Portions(slices, lambda rows: (_Arrays(arrays[rows]), *(x[rows] for x in along)))
     distances, times = np.empty(len(arrays)), np.empty((len(arrays), len(warper.pattern)))
     jobs = {"n_jobs": n_jobs, "step": progress.stage(name, len(slices))}
-    results = run(_warps, portions, common=(Common(warper),), **jobs)
+    results = run(_warps, portions, common=(SharedArgument(warper),), **jobs)
     for rows, (lengths, warps) in zip(slices, results, strict=True):
         distances[rows], times[rows] = lengths, warps
     return distances, times
@@ -209,12 +209,12 @@ def in_portions(warper, method, positions, *, n_jobs, progress, name, found):
     jobs = {"n_jobs": n_jobs, "step": progress.stage(name, len(slices))}
     if on_cluster():
         training, rows = found
-        if _LARGEST_SHARE * len(training.here.positions) < len(warper.bases):
+        if _LARGEST_SHARE * len(training.value.positions) < len(warper.bases):
             jobs["n_jobs"] = 1
         portions = [(method, rows[some]) for some in slices]
-        return list(run(_of_training, portions, common=(Common(warper), training), **jobs))
+        return list(run(_of_training, portions, common=(SharedArgument(warper), training), **jobs))
     portions = [(method, positions[some]) for some in slices]
-    return list(run(_of_own, portions, common=(Common(warper),), **jobs))
+    return list(run(_of_own, portions, common=(SharedArgument(warper),), **jobs))
 
 
 def _of_training(warper, training, method, rows):

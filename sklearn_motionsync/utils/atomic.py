@@ -1,24 +1,24 @@
-"""A fit is all or nothing: it works on a copy of the estimator, whose state is taken over whole."""
+"""Atomic fits: a fit works on a copy of the estimator, and its state is taken over in one step."""
 
 import functools
 import threading
 
 __all__ = ["atomic_fit", "atomic_partial_fit", "snapshot"]
 
-# Held for the moment in which an estimator takes over what was learnt.
-_TAKING_OVER = threading.Lock()
+# Held while an estimator takes over a state.
+_LOCK = threading.Lock()
 
 
 def atomic_fit(method):
-    """Decorate a ``fit`` or ``fit_transform`` so that no half of it can ever be seen.
+    """Decorate a ``fit`` or ``fit_transform``, so that other threads never see a partial state.
 
-    Several threads may fit one estimator: each call sees its own state only, and the one that ends
-    last wins. A fit that fails, or is interrupted, leaves the estimator unfitted.
+    Several threads may fit one estimator: each call has a state of its own, and the last to end
+    stays. A fit that fails, or is interrupted, leaves the estimator unfitted.
 
     Parameters
     ----------
     method : callable
-        May set attributes as it goes; of ``self`` it gets a copy that was never fitted.
+        May set attributes as it goes; its ``self`` is a copy without fitted attributes.
 
     Returns
     -------
@@ -26,36 +26,36 @@ def atomic_fit(method):
     """
 
     @functools.wraps(method)
-    def on_a_copy(self, *args, **kwargs):
+    def fit_copy(self, *args, **kwargs):
         before = vars(self)
-        blank = _unfitted(before)
-        twin = _with_state(self, dict(blank))
+        unfitted = _unfitted(before)
+        copy = _with_state(self, dict(unfitted))
         try:
-            result = method(twin, *args, **kwargs)
+            result = method(copy, *args, **kwargs)
         except BaseException:
-            # What another thread has fitted meanwhile is not ours to forget.
-            with _TAKING_OVER:
+            # A fit of another thread meanwhile stays.
+            with _LOCK:
                 if vars(self) is before:
-                    self.__dict__ = blank
+                    self.__dict__ = unfitted
             raise
-        with _TAKING_OVER:
-            _take_over(self, twin, blank)
-        return self if result is twin else result
+        with _LOCK:
+            _take_over(self, copy, unfitted)
+        return self if result is copy else result
 
-    return on_a_copy
+    return fit_copy
 
 
 def atomic_partial_fit(method):
-    """Decorate a ``partial_fit``, so that a portion is learnt whole, once, or not at all.
+    """Decorate a ``partial_fit``, so that a portion is learnt as a whole, once, or not at all.
 
-    Several threads may give portions to one estimator: one that comes second is learnt again, on
-    top of the first. A call that fails, or is interrupted, leaves the estimator as it was.
+    Several threads may give portions to one estimator: a portion that ends second is learnt again,
+    on top of the first. A call that fails, or is interrupted, leaves the estimator as it was.
 
     Parameters
     ----------
     method : callable
-        May set attributes as it goes, but never changes their values; of ``self`` it gets a copy.
-        Returns it.
+        May set attributes as it goes, but never changes their values. Its ``self`` is a copy, which
+        it returns.
 
     Returns
     -------
@@ -63,49 +63,47 @@ def atomic_partial_fit(method):
     """
 
     @functools.wraps(method)
-    def on_a_copy(self, *args, **kwargs):
+    def partial_fit_copy(self, *args, **kwargs):
         while True:
             before = vars(self)
-            blank = _unfitted(before)
-            twin = _with_state(self, dict(before))
-            method(twin, *args, **kwargs)
-            with _TAKING_OVER:
+            copy = _with_state(self, dict(before))
+            method(copy, *args, **kwargs)
+            with _LOCK:
                 if vars(self) is before:
-                    _take_over(self, twin, blank)
+                    _take_over(self, copy, _unfitted(before))
                     return self
 
-    return on_a_copy
+    return partial_fit_copy
 
 
 def snapshot(method):
-    """Decorate an answer so that it is of one fit, also if another thread fits meanwhile.
+    """Decorate a method so that all it reads is of one fit, also if another thread fits meanwhile.
 
-    It is given the estimator as it was when it was asked, and must not write to it.
+    Its ``self`` has the state at the call, and must not be written to.
     """
 
     @functools.wraps(method)
-    def of_a_snapshot(self, *args, **kwargs):
-        # A fit replaces the state, it never writes to it.
+    def call_on_snapshot(self, *args, **kwargs):
+        # A fit replaces the state, and never writes to it.
         return method(_with_state(self, vars(self)), *args, **kwargs)
 
-    return of_a_snapshot
+    return call_on_snapshot
 
 
-def _take_over(estimator, twin, blank):
-    """Replace what an estimator has learnt by what its twin has, who was blank."""
-    after = _unfitted(vars(estimator))
-    learnt = {k: v for k, v in vars(twin).items() if k not in blank or v is not blank[k]}
+def _take_over(estimator, copy, unfitted):
+    """Replace the fitted attributes of an estimator by those that a copy got since ``unfitted``."""
+    learnt = {k: v for k, v in vars(copy).items() if k not in unfitted or v is not unfitted[k]}
     learnt.pop("_learnt", None)
-    estimator.__dict__ = {**after, **learnt, "_learnt": tuple(learnt)}
+    estimator.__dict__ = {**_unfitted(vars(estimator)), **learnt, "_learnt": tuple(learnt)}
 
 
 def _with_state(estimator, state):
-    twin = object.__new__(type(estimator))
-    twin.__dict__ = state
-    return twin
+    copy = object.__new__(type(estimator))
+    copy.__dict__ = state
+    return copy
 
 
 def _unfitted(state):
-    """A copy of an estimator's state without what the last fit learnt."""
+    """A copy of an estimator's state without its fitted attributes."""
     learnt = {"_learnt", *state.get("_learnt", ())}
     return {name: value for name, value in state.items() if name not in learnt}

@@ -1,4 +1,4 @@
-"""Where the synchronizer of a pipeline is, and what reaches it: performances, and key-frames."""
+"""The synchronizer of a pipeline, and the performances and parameters that are routed to it."""
 
 import inspect
 from contextlib import contextmanager
@@ -9,45 +9,63 @@ from sklearn.utils.validation import check_is_fitted
 
 __all__ = [
     "MissingMetadata",
-    "Reached",
-    "asking",
+    "Routed",
+    "accepted_params",
+    "explain_missing",
     "find_classifier",
     "find_step",
     "find_synchronizer",
     "flat_steps",
-    "how_to_give",
     "index_of_pattern",
-    "parts_of",
-    "reach_synchronizer",
+    "route_to_synchronizer",
     "steps_to_fit",
-    "taken_by",
     "transform_through",
+    "union_transformers",
 ]
 
 
 class MissingMetadata(ValueError):
-    """A synchronizer was not given what it needs besides performances.
+    """A synchronizer needs more than performances, such as key-frames.
 
     Parameters
     ----------
     reason : str
-        What is missing, and why it is needed; it goes on with how to give it.
+        What is missing, and why it is needed; the message goes on with the usage.
     name : str
         Of the parameter.
-    how : str, default="{name}=[...]"
-        How to give it to the function that was called.
+    usage : str, default="{name}=[...]"
+        How to give the parameter to the function that was called.
     """
 
-    def __init__(self, reason, name, how="{name}=[...]"):
-        super().__init__(reason, name, how)
+    def __init__(self, reason, name, usage="{name}=[...]"):
+        super().__init__(reason, name, usage)
 
     def __str__(self):
-        reason, name, how = self.args
-        return f"{reason}, {how.format(name=name)}."
+        reason, name, usage = self.args
+        return f"{reason}, {usage.format(name=name)}."
 
 
-class Reached(NamedTuple):
-    """A fitted synchronizer, and what reaches it through the steps before.
+@contextmanager
+def explain_missing(caller, hint=""):
+    """Let a `MissingMetadata` state the usage of a caller with the arguments (estimator, X).
+
+    Parameters
+    ----------
+    caller : str
+        The function that the user called.
+    hint : str, default=""
+        Other ways to give the parameter.
+    """
+    try:
+        yield
+    except MissingMetadata as error:
+        reason, name, _ = error.args
+        usage = f"{caller}(estimator, X, {{name}}=[...]){hint}"
+        raise MissingMetadata(reason, name, usage) from error
+
+
+class Routed(NamedTuple):
+    """A fitted synchronizer, and its input through the steps before.
 
     Attributes
     ----------
@@ -57,72 +75,41 @@ class Reached(NamedTuple):
     performances : sequence of ndarray (n_frames_i, n_features)
         Checked: the methods of the synchronizer take them without checking again.
     params : dict
-        What else its ``match`` was given, such as ``keyframes``.
-    how : str
-        How to give that to the function that was called.
+        Other arguments of its ``match``, such as ``keyframes``.
+    caller, hint : str
+        As of `explain_missing`.
     """
 
     before: Pipeline | None
     synchronizer: object
     performances: tuple
     params: dict
-    how: str
+    caller: str
+    hint: str
 
     @property
     def takes_params(self):
-        """Whether its ``match`` takes more than performances."""
+        """Whether ``match`` takes more than performances."""
         return len(inspect.signature(self.synchronizer.match).parameters) > 1
 
     def match(self):
         """The performances matched to the pattern."""
-        with asking(self.how):
+        with explain_missing(self.caller, self.hint):
             return self.synchronizer.match(self.performances, **self.params)
 
 
-def find_step(estimator, kind):
-    """The steps before the first one of a kind, and that one; an estimator is its own only step.
-
-    Parameters
-    ----------
-    estimator : estimator or Pipeline
-        Pipelines within pipelines are searched, the best estimators of searches, and what detectors
-        have fitted.
-    kind : class
-
-    Returns
-    -------
-    before : Pipeline or None
-    step : estimator
-    """
-    return _first(estimator, lambda step: isinstance(step, kind), kind.__name__)
-
-
-def find_synchronizer(estimator):
-    """The same for whatever matches performances."""
-
-    def matches(step):
-        return hasattr(step, "match") and hasattr(step, "check_performances")
-
-    return _first(estimator, matches, "synchronizer")
-
-
-def find_classifier(estimator):
-    """The same for a classifier that has a model of each class; None if there is none."""
-    return _search(estimator, lambda step: hasattr(step, "model_of"))
-
-
-def reach_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",), hint=""):
-    """The synchronizer of an estimator, and what reaches it of raw performances.
+def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match",), hint=""):
+    """The synchronizer of an estimator, and its input made of raw performances.
 
     Parameters
     ----------
     estimator : synchronizer, or Pipeline with one
     X : performances, as the estimator takes them
     params : dict
-        What is given besides, by name: to ``match``, and to ``transform`` of the steps before,
-        whichever takes it. None is nothing given.
+        Other arguments by name, of ``match`` and of ``transform`` of the steps before; each method
+        is given those that it accepts. None is as not given.
     caller : str
-        Whom the user has called with (estimator, X), for messages.
+        The function that the user called with (estimator, X), for messages.
     kind : class, default=None
         Of the synchronizer; by default any.
     uses : tuple of str, default=("match",)
@@ -132,12 +119,12 @@ def reach_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match"
 
     Returns
     -------
-    Reached
+    Routed
 
     Raises
     ------
     TypeError
-        If nobody takes what was given.
+        If no method accepts one of the params.
     """
     found = find_synchronizer(estimator) if kind is None else find_step(estimator, kind)
     before, synchronizer = found
@@ -145,19 +132,19 @@ def reach_synchronizer(estimator, X, params, caller, *, kind=None, uses=("match"
     also = [getattr(synchronizer, name) for name in uses]
     features = transform_through(before, X, params, caller, hint=hint, also=also)
     performances = synchronizer.check_performances(features)
-    taken = taken_by(synchronizer.match, params)
-    return Reached(before, synchronizer, performances, taken, how_to_give(caller, hint))
+    accepted = accepted_params(synchronizer.match, params)
+    return Routed(before, synchronizer, performances, accepted, caller, hint)
 
 
 def transform_through(before, X, params, caller, *, hint="", also=()):
-    """Performances after the steps of a pipeline, each given what its ``transform`` takes.
+    """Performances after the steps of a pipeline, each given the params that it accepts.
 
     Parameters
     ----------
     before : Pipeline or None
-    X, params, caller, hint : as for `reach_synchronizer`
+    X, params, caller, hint : as for `route_to_synchronizer`
     also : list of callable, default=()
-        Who else takes params, after the last step.
+        Methods after the last step that are given params, too.
 
     Returns
     -------
@@ -165,75 +152,107 @@ def transform_through(before, X, params, caller, *, hint="", also=()):
     """
     methods = [] if before is None else [step.transform for step in flat_steps(before)]
     takers = [*methods, *also]
-    unknown = set(params).difference(*(taken_by(method, params) for method in takers))
-    for name in params:
-        if name in unknown and params[name] is not None:
-            names = [_name_of(method) for method in takers]
+    accepted = {name for method in takers for name in accepted_params(method, params)}
+    for name, value in params.items():
+        if name not in accepted and value is not None:
+            names = [f"{type(method.__self__).__name__}.{method.__name__}" for method in takers]
             raise TypeError(
                 f"{caller} got {name!r}, which is no argument of its own, and is not taken by "
                 f"{' or '.join(names) or 'a step before'}."
             )
-    with asking(how_to_give(caller, hint)):
+    with explain_missing(caller, hint):
         for method in methods:
-            X = method(X, **taken_by(method, params))
+            X = method(X, **accepted_params(method, params))
     return X
 
 
-def taken_by(method, params):
-    """Those params that a method takes by name, or all if it takes any; None is not given."""
+def accepted_params(method, params):
+    """Those params that a method accepts by name, without None."""
     given = {name: value for name, value in params.items() if value is not None}
     owner = getattr(method, "__self__", None)
     if isinstance(owner, FeatureUnion):
-        # It takes anything by its signature, and hands on what its transformers take.
-        parts = [taken_by(part.transform, given) for part in parts_of(owner)]
+        # By its signature it accepts any, and passes on those that its transformers accept.
+        parts = [accepted_params(part.transform, given) for part in union_transformers(owner)]
         return {name: value for part in parts for name, value in part.items()}
-    # Who only adds to what a synchronizer gives hands on what that takes.
-    method = getattr(_inside(owner), method.__name__, method)
-    accepted = list(inspect.signature(method).parameters.values())
+    # A wrapper of a synchronizer passes on those that the synchronizer accepts.
+    method = getattr(_unwrapped(owner), method.__name__, method)
+    # The first one is X.
+    _, *accepted = inspect.signature(method).parameters.values()
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in accepted):
         return given
-    # The first one is X.
-    names = {parameter.name for parameter in accepted[1:]}
+    names = {parameter.name for parameter in accepted}
     return {name: value for name, value in given.items() if name in names}
 
 
+def find_step(estimator, kind):
+    """The first step of a class, and the steps before; an estimator is its own only step.
+
+    Parameters
+    ----------
+    estimator : estimator or Pipeline
+        Nested pipelines are searched, the best estimators of searches, and the fitted estimators of
+        detectors.
+    kind : class
+
+    Returns
+    -------
+    before : Pipeline or None
+    step : estimator
+    """
+    return _find(estimator, lambda step: isinstance(step, kind), kind.__name__)
+
+
+def find_synchronizer(estimator):
+    """The same for a step with ``match`` and ``check_performances``."""
+
+    def matches(step):
+        return hasattr(step, "match") and hasattr(step, "check_performances")
+
+    return _find(estimator, matches, "synchronizer")
+
+
+def find_classifier(estimator):
+    """The same for a classifier that has a model of each class; None if there is none."""
+    return _search(estimator, lambda step: hasattr(step, "model_of"))
+
+
 def flat_steps(estimator):
-    """The steps of a pipeline and of those within it, in order; an estimator is its own only one.
+    """The steps of a pipeline and of nested ones, in order; an estimator is its own only step.
 
     Steps that pass everything through are left out.
     """
-    estimator = _what_was_fitted(estimator)
+    estimator = _fitted_estimator(estimator)
     if not isinstance(estimator, Pipeline):
         return [estimator]
-    steps = [step for _, step in estimator.steps if step is not None and step != "passthrough"]
-    return [inner for step in steps for inner in flat_steps(step)]
+    return [inner for _, step in _named_steps(estimator) for inner in flat_steps(step)]
 
 
-def parts_of(step):
-    """The transformers that a union puts side by side; any other step is its own only one."""
+def union_transformers(step):
+    """The transformers of a union, and of nested ones; any other step is its own only one."""
     if not isinstance(step, FeatureUnion):
         return [step]
     views = [view for _, view in step.transformer_list if view not in ("drop", "passthrough")]
-    return [part for view in views for inner in flat_steps(view) for part in parts_of(inner)]
+    return [
+        each for view in views for inner in flat_steps(view) for each in union_transformers(inner)
+    ]
 
 
 def steps_to_fit(estimator, prefix=""):
-    """The same before a fit, each with what the names of its params begin with in that fit.
-
-    Searches are looked into, not fitted.
+    """The steps of an estimator before its fit, each with the prefix of its fit params.
 
     Parameters
     ----------
     estimator : estimator, Pipeline or search
+        Of a search the estimator that it tunes.
     prefix : str, default=""
-        What the names of its own params begin with.
+        The prefix of the estimator itself.
 
     Returns
     -------
     list of (str, estimator)
     """
     if isinstance(estimator, Pipeline):
-        steps = [(name, s) for name, s in estimator.steps if s is not None and s != "passthrough"]
+        steps = _named_steps(estimator)
         return [found for name, step in steps for found in steps_to_fit(step, f"{prefix}{name}__")]
     inner = getattr(estimator, "estimator", None)
     return [(prefix, estimator)] if inner is None else steps_to_fit(inner, prefix)
@@ -248,41 +267,26 @@ def index_of_pattern(synchronizer, performances):
     return index if (same == synchronizer.pattern_).all() else None
 
 
-def how_to_give(caller, hint=""):
-    """How to give what is missing to a function that is called with (estimator, X)."""
-    return f"{caller}(estimator, X, {{name}}=[...]){hint}"
+def _named_steps(pipeline):
+    return [(name, step) for name, step in pipeline.steps if step not in (None, "passthrough")]
 
 
-@contextmanager
-def asking(how):
-    """Whoever misses something in here says how to give it to the function that was called."""
-    try:
-        yield
-    except MissingMetadata as error:
-        reason, name, _ = error.args
-        raise MissingMetadata(reason, name, how) from error
-
-
-# -- helpers ------------------------------------------------------------------------------
-
-
-def _what_was_fitted(estimator):
-    """What a search found best, or what a detector has fitted; else the estimator itself."""
+def _fitted_estimator(estimator):
+    """The best estimator of a search, the fitted one of a detector; else the estimator itself."""
     for name in ("best_estimator_", "estimator_"):
         estimator = getattr(estimator, name, estimator)
     return estimator
 
 
-def _inside(step):
-    """The synchronizer within a step that adds to what it gives, fitted if that is; or the step."""
+def _unwrapped(step):
+    """The synchronizer within a wrapper such as `TimingChannel`, fitted if that is; or the step."""
     return getattr(step, "synchronizer_", getattr(step, "synchronizer", step))
 
 
-def _first(estimator, fits, name):
+def _find(estimator, fits, name):
     found = _search(estimator, fits)
     if found is None:
-        # What a search found.
-        estimator = _what_was_fitted(estimator)
+        estimator = _fitted_estimator(estimator)
         names = [type(step).__name__ for step in flat_steps(estimator)]
         raise ValueError(
             f"There is no {name} in {type(estimator).__name__}; its steps are {names}."
@@ -292,9 +296,9 @@ def _first(estimator, fits, name):
 
 def _search(estimator, fits):
     """The steps before the first one that fits, and that one; None if there is none."""
-    estimator = _what_was_fitted(estimator)
+    estimator = _fitted_estimator(estimator)
     if not isinstance(estimator, Pipeline):
-        inner = _inside(estimator)
+        inner = _unwrapped(estimator)
         return (None, inner) if fits(inner) else None
     for i, (name, step) in enumerate(estimator.steps):
         found = _search(step, fits)
@@ -303,7 +307,3 @@ def _search(estimator, fits):
             before = estimator.steps[:i] + ([] if inner is None else [(name, inner)])
             return (Pipeline(before) if before else None), fitting
     return None
-
-
-def _name_of(method):
-    return f"{type(method.__self__).__name__}.{method.__name__}"

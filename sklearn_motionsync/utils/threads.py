@@ -1,8 +1,8 @@
-"""The linear algebra of a portion runs on one thread, and the process is left as it was found.
+"""The linear algebra of a portion runs on one thread; afterwards the process is as before.
 
 The number of threads of a BLAS library is a setting of the whole process, or, if it runs on OpenMP,
-of each thread. Whoever comes first limits it and remembers what was there; whoever goes last
-restores it, unless somebody else has changed it meanwhile.
+of each thread. The first call limits it and remembers the number before; the last call restores
+that number, unless it was changed meanwhile.
 """
 
 import functools
@@ -17,39 +17,39 @@ __all__ = ["on_one_thread"]
 
 def on_one_thread(function, *arguments):
     """``function(*arguments)``, with one thread for linear algebra."""
-    # An interruption can come between any two steps: entering may end half-way, leaving may be
-    # done twice, and neither harms.
-    visitor = object()
+    # An interruption can come between any two steps: acquiring may end half-way, and releasing
+    # twice is as once.
+    holder = object()
     try:
         for limit in _known_limits():
-            limit.enter(visitor)
+            limit.acquire(holder)
         return function(*arguments)
     finally:
         try:
-            _leave(visitor)
+            _release(holder)
         except BaseException:
-            _leave(visitor)
+            _release(holder)
             raise
 
 
-def _leave(visitor):
+def _release(holder):
     for limit in tuple(_limits.values()):
-        limit.leave(visitor)
+        limit.release(holder)
 
 
-class _Visitors:
-    """Who is inside, and the number of threads there was before: None if nobody is."""
+class _Holders:
+    """The holders of a limit, and the number of threads before the first; None without holders."""
 
     def __init__(self):
-        self.inside, self.before = set(), None
+        self.holders, self.before = set(), None
 
 
-class _VisitorsOfThread(_Visitors, threading.local):
+class _HoldersOfThread(_Holders, threading.local):
     """The same for each thread."""
 
 
 class Limit:
-    """The limit of one library: one thread while anybody is inside.
+    """One thread for a library as long as the limit has holders.
 
     Parameters
     ----------
@@ -58,62 +58,60 @@ class Limit:
 
     def __init__(self, library):
         self._library = library
-        # OpenMP keeps the number of threads for each thread that asks.
+        # OpenMP keeps a number of threads for each thread.
         of_thread = getattr(library, "threading_layer", None) == "openmp"
-        self._visitors = _VisitorsOfThread() if of_thread else _Visitors()
-        # Re-entered by a signal handler that warps, too.
+        self._state = _HoldersOfThread() if of_thread else _Holders()
+        # A signal handler may enter again.
         self._lock = threading.RLock()
 
-    def enter(self, visitor):
-        """Limit the library, if nobody has done so before."""
+    def acquire(self, holder):
+        """Add a holder; the first one limits the library."""
         with self._lock:
-            # Read before anybody is inside: what is remembered is never a limit of ours.
-            visitors, threads = self._visitors, self._library.num_threads
-            visitors.inside.add(visitor)
-            if visitors.before is None:
-                visitors.before = threads
-            if threads != 1:
+            # Read before there is a holder, so that it is never a limit of ours.
+            state, n_threads = self._state, self._library.num_threads
+            state.holders.add(holder)
+            if state.before is None:
+                state.before = n_threads
+            if n_threads != 1:
                 self._set(1)
 
-    def leave(self, visitor):
-        """Restore the library, if nobody else is inside; whoever is not inside changes nothing."""
+    def release(self, holder):
+        """Remove a holder, if it is one; without any the library is restored."""
         with self._lock:
-            visitors = self._visitors
-            visitors.inside.discard(visitor)
-            if not visitors.inside:
-                self._restore(visitors)
+            self._state.holders.discard(holder)
+            if not self._state.holders:
+                self._restore()
 
     def after_fork(self):
-        """In a child: whoever was inside is so in the parent."""
+        """Restore the library in a child process, whose parent has the holders."""
         self._lock = threading.RLock()
-        self._visitors.inside.clear()
-        self._restore(self._visitors)
+        self._state.holders.clear()
+        self._restore()
 
-    def _restore(self, visitors):
-        if visitors.before not in (None, 1) and self._library.num_threads == 1:
-            self._set(visitors.before)
-        visitors.before = None
+    def _restore(self):
+        state = self._state
+        if state.before not in (None, 1) and self._library.num_threads == 1:
+            self._set(state.before)
+        state.before = None
 
     def _set(self, n_threads):
-        # Since 3.8 threadpoolctl lets one thread alone set OpenBLAS, silently: the first to come
-        # and the last to go need not be the same.
-        clear = getattr(self._library, "clear_controlling_thread", None)
-        if clear is not None:
-            clear(force=True)
+        # Since 3.8 threadpoolctl lets one thread alone set OpenBLAS, silently: the first and the
+        # last holder may be of different threads.
+        clear = getattr(self._library, "clear_controlling_thread", lambda force: None)
+        clear(force=True)
         self._library.set_num_threads(n_threads)
-        if clear is not None:
-            clear(force=True)
+        clear(force=True)
 
 
-# The limits by their libraries' files, and of how many modules the libraries are known.
+# The limits by their libraries' files, and the number of modules when they were listed.
 _limits, _n_modules = {}, 0
 
 
 def _known_limits():
-    """The limits of all libraries, also of those that came with a module loaded since."""
+    """The limits of all libraries, also of those of modules that were loaded since."""
     global _n_modules
     if _n_modules != len(sys.modules):
-        _heed_forks()
+        _register_at_fork()
         n_modules = len(sys.modules)
         for library in ThreadpoolController().lib_controllers:
             if library.user_api == "blas":
@@ -122,12 +120,12 @@ def _known_limits():
     return tuple(_limits.values())
 
 
+@functools.cache
+def _register_at_fork():
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=_after_fork)
+
+
 def _after_fork():
     for limit in _limits.values():
         limit.after_fork()
-
-
-@functools.cache
-def _heed_forks():
-    if hasattr(os, "register_at_fork"):
-        os.register_at_fork(after_in_child=_after_fork)

@@ -37,7 +37,7 @@ def display(live):
 def test_it_draws_what_was_said(live, display):
     last = live.n_frames_ - 1
     k = list(COSINES.get_feature_names_out()).index("neck_z")
-    for row, x, said in zip(display.rows_, X[6:], live.follow(X[6:]), strict=True):
+    for row, x, said in zip(display.rows_, X[6:], live.track(X[6:]), strict=True):
         past = slice(FRAME + 1)
         times = np.arange(len(x)) / RATE
         np.testing.assert_allclose(row.phase.get_xdata(), times[past])
@@ -101,7 +101,7 @@ def test_at_other_frames_and_in_motion(live, display):
     np.testing.assert_allclose(times, [(len(x) - 1) / RATE for x in X[6:]])
     assert len(display.rows_[0].rest.get_xdata()) == 0
     assert shown is not display.rows_[0]
-    display = PhaseDisplay.from_predictions(live.follow(X[6:7]), live.n_frames_)
+    display = PhaseDisplay.from_predictions(live.track(X[6:7]), live.n_frames_)
     animation = display.animate(seconds=0.2, fps=10)
     assert animation.to_jshtml().count("data:image") == 2
     assert len(display.rows_[0].phase.get_xdata()) == len(X[6])

@@ -1,4 +1,4 @@
-"""One thread for the linear algebra of a portion, and the process left as it was found."""
+"""One thread for the linear algebra of a portion; afterwards the process is as before."""
 
 import multiprocessing
 import os
@@ -9,11 +9,8 @@ import time
 import types
 import warnings
 
-import numpy as np
 import pytest
 import threadpoolctl
-from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.utils import threads as blas
 from sklearn_motionsync.utils.parallel import run
 from sklearn_motionsync.utils.threads import Limit, on_one_thread
@@ -25,7 +22,7 @@ def blas_threads():
 
 
 def in_thread(function, *arguments):
-    """Threadpoolctl lets one living thread alone set OpenBLAS: here one that is soon gone."""
+    """In a thread that ends: threadpoolctl lets one living thread alone set OpenBLAS."""
     thread = threading.Thread(target=function, args=arguments)
     thread.start()
     thread.join()
@@ -43,69 +40,44 @@ def found():
     in_thread(threadpoolctl.threadpool_limits, before, "blas")
 
 
-class Visitor(threading.Thread):
-    """A thread that stays in a portion until it is let out."""
+class Holder(threading.Thread):
+    """A thread that stays in a portion until its end is called."""
 
     def __init__(self):
         super().__init__()
-        self.inside, self.out = threading.Event(), threading.Event()
+        self.inside, self.ended = threading.Event(), threading.Event()
         self.start()
         assert self.inside.wait(10)
 
     def run(self):
-        on_one_thread(self.stay)
+        on_one_thread(self.hold)
 
-    def stay(self):
+    def hold(self):
         self.inside.set()
-        self.out.wait(10)
+        self.ended.wait(10)
 
-    def let_out(self):
-        self.out.set()
+    def end(self):
+        self.ended.set()
         self.join()
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
-def test_the_last_one_out_restores(found, order):
-    visitors = [Visitor() for _ in range(3)]
+def test_last_holder_restores_threads(found, order):
+    holders = [Holder() for _ in range(3)]
     for i in order:
         assert set(blas_threads().values()) == {1}
-        visitors[i].let_out()
+        holders[i].end()
     assert blas_threads() == found
 
 
-def test_visits_are_nested(found):
+def test_nested_calls_keep_one_thread(found):
     inner = []
     on_one_thread(lambda: inner.append(on_one_thread(blas_threads)) or inner.append(blas_threads()))
     assert [set(threads.values()) for threads in inner] == [{1}, {1}]
     assert blas_threads() == found
 
 
-def test_fits_and_transforms_in_several_threads_leave_nothing_behind(found, monkeypatch):
-    rng = np.random.default_rng(0)
-    X = np.cumsum(rng.standard_normal((40, 40, 3)), axis=1)
-    sync = DenseSynchronizer(n_jobs=2).fit(X)
-    assert blas_threads() == found
-    # All are inside at once, and who came first goes first.
-    inside, paths, order = threading.Barrier(4), Trellis.paths_and_costs, []
-
-    def together(self, *args):
-        order.append(threading.current_thread())
-        inside.wait(10)
-        time.sleep(0.05 * order.index(threading.current_thread()))
-        return paths(self, *args)
-
-    monkeypatch.setattr(Trellis, "paths_and_costs", together)
-    threads = [threading.Thread(target=sync.transform, args=(X[:2],)) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(order) == 4
-    assert blas_threads() == found
-
-
-def test_portions_of_threads_run_on_one_thread_whatever_the_user_has_set(found):
-    """Of OpenBLAS threadpoolctl lets the user's thread alone change the setting."""
+def test_portions_run_on_one_thread_under_limits_of_the_user(found):
     with threadpoolctl.threadpool_limits(limits=3, user_api="blas"):
         seen = []
         in_thread(on_one_thread, lambda: seen.append(blas_threads()))
@@ -115,29 +87,28 @@ def test_portions_of_threads_run_on_one_thread_whatever_the_user_has_set(found):
     assert blas_threads() == found
 
 
-def test_what_others_have_set_meanwhile_stays(found):
+def test_changes_by_others_meanwhile_stay(found):
     in_thread(on_one_thread, threadpoolctl.threadpool_limits, 3, "blas")
     assert set(blas_threads().values()) == {3}
-    # Somebody who came before and goes before restores what was there before both.
+    # A limit that began before and ends before restores the number before both.
     entered, leave = threading.Event(), threading.Event()
 
-    def somebody():
+    def limit():
         with threadpoolctl.threadpool_limits(limits=1, user_api="blas"):
             entered.set()
             leave.wait(10)
 
-    other = threading.Thread(target=somebody)
+    other = threading.Thread(target=limit)
     other.start()
     assert entered.wait(10)
-    visitor = Visitor()
+    holder = Holder()
     leave.set()
     other.join()
-    visitor.let_out()
+    holder.end()
     assert set(blas_threads().values()) == {3}
 
 
-def test_others_can_set_it_afterwards(found):
-    """No thread is left as the one that threadpoolctl obeys."""
+def test_other_threads_can_set_threads_afterwards(found):
     on_one_thread(int)
     in_thread(threadpoolctl.threadpool_limits, 3, "blas")
     assert set(blas_threads().values()) == {3}
@@ -146,14 +117,14 @@ def test_others_can_set_it_afterwards(found):
 # -- interruption -----------------------------------------------------------------------------
 
 
-# One that comes while an object is being disposed of is ignored by Python.
+# Python ignores an interruption while an object is deleted.
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="signals of POSIX")
 @pytest.mark.parametrize("others", [False, True])
-def test_ctrl_c_at_any_moment(found, others):
-    """Most of these come while somebody enters or leaves, some of them half-way."""
+def test_ctrl_c_at_any_moment_restores_threads(found, others):
+    """Most interruptions come while the limit is acquired or released."""
     pools = threadpoolctl.ThreadpoolController().select(user_api="blas")
-    visitor, inside = (Visitor(), 1) if others else (None, 2)
+    holder, inside = (Holder(), 1) if others else (None, 2)
     before = signal.signal(signal.SIGALRM, signal.default_int_handler)
     interrupted = 0
     try:
@@ -170,14 +141,13 @@ def test_ctrl_c_at_any_moment(found, others):
         signal.signal(signal.SIGALRM, before)
     assert interrupted > 900
     if others:
-        visitor.let_out()
+        holder.end()
     assert blas_threads() == found
 
 
 @pytest.mark.parametrize("n_jobs", [1, 2])
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
-def test_an_interrupted_portion(found, n_jobs, error):
-    """The thread that is still at work in another portion is waited for."""
+def test_error_in_a_portion_waits_for_other_threads(found, n_jobs, error):
     at_work = threading.Event()
 
     def portion(i):
@@ -194,13 +164,13 @@ def test_an_interrupted_portion(found, n_jobs, error):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_ctrl_c_while_threads_are_at_work(found):
+def test_ctrl_c_during_portions_of_threads_restores_threads(found):
     def portion(i):
         if i == 1:
             os.kill(os.getpid(), signal.SIGINT)
         time.sleep(0.2)
 
-    # What runs in the background of a shell is deaf to it, unless it listens.
+    # In the background of a shell the signal may be ignored.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
@@ -210,11 +180,11 @@ def test_ctrl_c_while_threads_are_at_work(found):
     assert blas_threads() == found
 
 
-# joblib tells how many portions are dropped.
+# joblib warns of dropped portions.
 @pytest.mark.filterwarnings("ignore:.*tasks:UserWarning")
 @pytest.mark.parametrize("n_jobs", [1, 2])
 @pytest.mark.parametrize("leave", ["close", "__del__"])
-def test_a_generator_left_half_way(found, n_jobs, leave):
+def test_closed_generator_restores_threads(found, n_jobs, leave):
     begun = []
     portions = [(0,), *[(0.2,)] * 20]
     work = {"n_jobs": n_jobs, "prefer": "threads"}
@@ -232,8 +202,8 @@ def test_a_generator_left_half_way(found, n_jobs, leave):
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks")
-def test_a_child_does_not_inherit_the_limit(found):
-    visitor, forking = Visitor(), multiprocessing.get_context("fork")
+def test_forked_child_does_not_inherit_the_limit(found):
+    holder, forking = Holder(), multiprocessing.get_context("fork")
     answer = forking.Queue()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
@@ -242,7 +212,7 @@ def test_a_child_does_not_inherit_the_limit(found):
     assert answer.get(timeout=20) == [{2}, {1}, {2}]
     child.join()
     assert set(blas_threads().values()) == {1}
-    visitor.let_out()
+    holder.end()
     assert blas_threads() == found
 
 
@@ -252,9 +222,9 @@ def answer_of_child(answer):
 
 
 class Library:
-    """A library as threadpoolctl shows it."""
+    """A stand-in for a threadpoolctl.LibController."""
 
-    user_api, filepath, threading_layer = "blas", "libwhatever.so", "pthreads"
+    user_api, filepath, threading_layer = "blas", "libblas.so", "pthreads"
 
     def __init__(self):
         self.num_threads, self.calls = 4, []
@@ -265,12 +235,12 @@ class Library:
 
 
 class LibraryOnOpenMP(threading.local, Library):
-    """Its setting is a thread's own."""
+    """A library with a setting for each thread."""
 
     threading_layer = "openmp"
 
 
-def test_a_lock_held_by_another_thread_is_not_inherited():
+def test_after_fork_does_not_wait_for_locks_of_other_threads():
     entered, go_on = threading.Event(), threading.Event()
 
     class Slow(Library):
@@ -278,59 +248,58 @@ def test_a_lock_held_by_another_thread_is_not_inherited():
             super().set_num_threads(n)
             if threading.current_thread() is not threading.main_thread():
                 entered.set()
-                go_on.wait(10)
+                go_on.wait()
 
     limit = Limit(Slow())
-    thread = threading.Thread(target=limit.enter, args=("visitor",), daemon=True)
+    thread = threading.Thread(target=limit.acquire, args=("holder",), daemon=True)
     thread.start()
     assert entered.wait(10)
-    began = time.perf_counter()
     limit.after_fork()
-    limit.enter("child")
-    limit.leave("child")
-    assert time.perf_counter() - began < 5
+    limit.acquire("child")
+    limit.release("child")
+    assert not go_on.is_set()
     go_on.set()
     thread.join()
 
 
-def test_settings_of_each_thread():
+def test_openmp_limits_are_of_each_thread():
     library = LibraryOnOpenMP()
     limit, seen = Limit(library), []
 
     def visit():
-        limit.enter("other")
+        limit.acquire("other")
         seen.append(library.num_threads)
-        limit.leave("other")
+        limit.release("other")
         seen.append(library.num_threads)
 
-    limit.enter("first")
+    limit.acquire("first")
     thread = threading.Thread(target=visit)
     thread.start()
     thread.join()
     assert seen == [1, 4]
     assert library.num_threads == 1
-    limit.leave("first")
+    limit.release("first")
     assert library.num_threads == 4
 
 
-def test_one_who_is_not_inside_changes_nothing():
+def test_release_without_acquire_changes_nothing():
     library = Library()
     limit = Limit(library)
-    limit.leave("nobody")
+    limit.release("other")
     assert library.calls == []
-    limit.enter("somebody")
-    limit.leave("nobody")
+    limit.acquire("holder")
+    limit.release("other")
     assert library.num_threads == 1
-    limit.leave("somebody")
-    limit.leave("somebody")
+    limit.release("holder")
+    limit.release("holder")
     assert library.calls == [1, 4]
 
 
-def test_a_library_loaded_meanwhile(monkeypatch):
+def test_libraries_loaded_later_are_limited(monkeypatch):
     library = Library()
     on_one_thread(int)
     known = types.SimpleNamespace(lib_controllers=[library])
     monkeypatch.setattr(blas, "ThreadpoolController", lambda: known)
-    monkeypatch.setitem(sys.modules, "brings_another_blas", types.ModuleType("another"))
+    monkeypatch.setitem(sys.modules, "module_with_another_blas", types.ModuleType("another"))
     assert on_one_thread(lambda: library.num_threads) == 1
     assert library.num_threads == 4

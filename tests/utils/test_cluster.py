@@ -1,4 +1,4 @@
-"""A Dask cluster: the bits of a single core, and every worker is sent what it needs once."""
+"""A Dask cluster: the bits of a single core, and data are sent to every worker once."""
 
 import gc
 import os
@@ -19,7 +19,7 @@ import sklearn_motionsync
 from dask import delayed
 from sklearn_motionsync import DenseSynchronizer
 from sklearn_motionsync.synchronizers import portions
-from sklearn_motionsync.utils.parallel import Held, Name
+from sklearn_motionsync.utils.parallel import ScatteredReference, ScatteredValue
 
 import stream_dask
 import stream_files
@@ -28,7 +28,7 @@ N_WORKERS = 2
 
 
 class Counting(distributed.WorkerPlugin):
-    """Has a worker count the bytes it receives, from whomever."""
+    """Counts the bytes that a worker receives."""
 
     def setup(self, worker):
         from tornado.iostream import IOStream
@@ -56,7 +56,7 @@ def client():
     found = [str(package), str(examples), os.environ.get("PYTHONPATH", "")]
     settings = {"n_workers": N_WORKERS, "threads_per_worker": 1, "protocol": "tcp://"}
     with pytest.MonkeyPatch.context() as patch:
-        # For those, too, that come in the place of one that is killed.
+        # Also for workers that replace a killed one.
         patch.setenv("PYTHONPATH", os.pathsep.join(found))
         with (
             distributed.LocalCluster(**settings, dashboard_address=":0") as local,
@@ -86,6 +86,14 @@ def moved(client):
     return np.array(list(client.run(n_bytes).values()))
 
 
+def wait_until(condition):
+    for _ in range(600):
+        if condition():
+            return
+        time.sleep(0.1)
+    pytest.fail("waited for a minute")
+
+
 def walks(n, n_frames, n_features):
     steps = np.random.default_rng(0).standard_normal((n, n_frames, n_features))
     return np.cumsum(steps, axis=1)
@@ -96,8 +104,8 @@ def bits(sync, X):
     return [np.asarray(result).tobytes() for result in [*results, *sync.match(X[:5])]]
 
 
-# All pairs; a search in several rounds; so many portions as long takes have, whose misfits are
-# shared out, with few exemplars and with so many that sending them is not worth it.
+# All pairs; a search in several rounds; many portions, whose misfits are computed on the cluster,
+# with few exemplars, and with so many that these are not sent.
 LONG = {"refine": "auto", "search": "exhaustive"}
 FITS = {
     "all pairs": ((90, 40, 48), {"search": "exhaustive"}),
@@ -108,8 +116,7 @@ FITS = {
 
 
 @pytest.mark.parametrize("name", FITS)
-def test_a_fit_sends_the_performances_to_every_worker_once(client, name, monkeypatch):
-    """Data: the arrays that are given, which are on the clock already."""
+def test_fit_sends_performances_to_every_worker_once(client, name, monkeypatch):
     shape, settings = FITS[name]
     if "consensus" in settings:
         monkeypatch.setattr(portions, "PORTION_CELLS", 300_000)
@@ -122,21 +129,20 @@ def test_a_fit_sends_the_performances_to_every_worker_once(client, name, monkeyp
         ran_fit = {task["worker"] for task in client.get_task_stream()}
         assert bits(sync, X) == expected
     assert len(ran_fit) == N_WORKERS
-    # The counter counts: not all of them can do without the data.
+    # The data were sent at all.
     assert sent.max() > X.nbytes
     assert sent.sum() <= 1.5 * N_WORKERS * X.nbytes
 
 
 @pytest.fixture
-def no_garbage_is_collected():
+def no_garbage_collection():
     gc.disable()
     yield
     gc.enable()
 
 
-@pytest.mark.usefixtures("no_garbage_is_collected")
-def test_the_workers_work_and_keep_nothing(client):
-    """They are at something else when they are sent their copies, and forget them after the fit."""
+@pytest.mark.usefixtures("no_garbage_collection")
+def test_busy_workers_keep_no_data_after_a_fit(client):
     X = walks(60, 40, 4)
     busy = [client.submit(time.sleep, 1.5, workers=[w], pure=False) for w in client.nthreads()]
     with joblib.parallel_config(backend="dask"):
@@ -149,12 +155,8 @@ def test_the_workers_work_and_keep_nothing(client):
     def has_data(dask_worker):
         return len(dask_worker.data) > 0
 
-    # They are told when the client has forgotten, which takes a moment.
-    deadline = time.monotonic() + 60
-    while any(client.run(has_data).values()) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    if any(client.run(has_data).values()):
-        pytest.fail("the workers still hold something")
+    # The workers release data after a moment.
+    wait_until(lambda: not any(client.run(has_data).values()))
 
 
 def test_warping_sends_every_performance_to_one_worker(client):
@@ -165,23 +167,22 @@ def test_warping_sends_every_performance_to_one_worker(client):
     before = received(client) - moved(client)
     with joblib.parallel_config(backend="dask"):
         warped = sync.transform(many)
-    # To which worker a portion is sent is joblib's choice; if that one is busy, Dask moves it.
+    # joblib chooses the worker of a portion; if that one is busy, Dask moves it.
     assert (received(client) - moved(client) - before).sum() <= 1.1 * many.nbytes
     assert warped.tobytes() == expected.tobytes()
 
 
-def test_a_worker_that_comes_later(client):
-    """It fetches what the others hold, once."""
+def test_new_worker_fetches_a_scattered_value_once(client):
     value = np.random.default_rng(0).standard_normal(200_000)
-    held, largest = Held(client, value), []
-    name = held.name()
-    unknown = Name(name.first, "came before it")
+    scattered, largest = ScatteredValue(client, value), []
+    name = scattered.reference()
+    unknown = ScatteredReference(name.first, "before it joined")
     for worker in client.nthreads():
         task = {"workers": [worker], "pure": False}
-        largest += [client.submit(lambda n: n.value().max(), name, **task).result()]
+        largest += [client.submit(lambda n: n.load().max(), name, **task).result()]
         before = received(client)
         for _ in range(5):
-            largest += [client.submit(lambda n: n.value().max(), unknown, **task).result()]
+            largest += [client.submit(lambda n: n.load().max(), unknown, **task).result()]
         assert (received(client) - before).sum() < 1.2 * value.nbytes
     assert set(largest) == {value.max()}
 
@@ -191,7 +192,6 @@ def test_a_worker_that_comes_later(client):
 
 @pytest.fixture(scope="module")
 def fitted():
-    """It would share out its work, if it were asked outside of a task."""
     return DenseSynchronizer(search="sampled", n_jobs=-1).fit(walks(60, 60, 8))
 
 
@@ -205,7 +205,7 @@ def expected(fitted, portions_of_walks):
     return [stream_files.answer(fitted, "transform", each) for each in portions_of_walks]
 
 
-def test_a_stream_sends_the_model_once_and_every_portion_to_one_worker(
+def test_stream_sends_model_once_and_portions_to_one_worker(
     client, fitted, portions_of_walks, expected
 ):
     data = sum(portion.nbytes for portion in portions_of_walks)
@@ -220,40 +220,42 @@ def test_a_stream_sends_the_model_once_and_every_portion_to_one_worker(
     assert len({task["worker"] for task in tasks.data}) == N_WORKERS
 
 
-def test_a_stream_takes_portions_as_workers_get_free(client, fitted, portions_of_walks):
-    taken = []
+def test_stream_reads_portions_as_workers_get_free(client, fitted, portions_of_walks):
+    read = []
 
     def portions():
         for portion in portions_of_walks:
-            taken.append(portion)
+            read.append(portion)
             yield portion
 
     stream_dask.give(client, fitted)
     answers = stream_dask.stream(client, portions(), method="match")
     first = next(answers)
-    assert len(taken) == 2 * N_WORKERS + 1
+    assert len(read) == 2 * N_WORKERS + 1
     assert first["times"].tobytes() == fitted.match(portions_of_walks[0]).times.tobytes()
     answers.close()
 
 
-def test_bags_and_arrays_of_dask(client, fitted, portions_of_walks, expected):
+def test_dask_bags_and_arrays_give_the_same(client, fitted, portions_of_walks, expected):
     other = DenseSynchronizer(search="sampled", n_frames=50).fit(walks(60, 60, 8))
     stream_dask.give(client, other)
     stream_dask.give(client, fitted, name="walks")
     few, stacked = portions_of_walks[:3], np.concatenate(expected[:3])
-    ask = {"method": "transform", "model": "walks"}
+    options = {"method": "transform", "model": "walks"}
     bag = dask.bag.from_delayed([delayed(portion) for portion in few])
-    warped = bag.map_partitions(stream_dask.on_worker, **ask).compute()
+    warped = bag.map_partitions(stream_dask.on_worker, **options).compute()
     assert np.stack(warped).tobytes() == stacked.tobytes()
-    # Of these, partitions are iterators, and one is empty.
+    # Partitions are iterators here, and one is empty.
     some = dask.bag.from_sequence([0, 2, None], npartitions=3).filter(lambda i: i is not None)
-    asked = some.map(lambda i, walks: walks[i], few[0]).map_partitions(stream_dask.on_worker, **ask)
-    assert np.stack(asked.compute()).tobytes() == expected[0][[0, 2]].tobytes()
+    mapped = some.map(lambda i, walks: walks[i], few[0]).map_partitions(
+        stream_dask.on_worker, **options
+    )
+    assert np.stack(mapped.compute()).tobytes() == expected[0][[0, 2]].tobytes()
     with pytest.raises(ValueError, match="The workers were given no 'wakls'"):
         next(stream_dask.stream(client, few, model="wakls"))
     array = dask.array.concatenate([dask.array.from_array(p, chunks=p.shape) for p in few])
     known = {"dtype": array.dtype, "meta": np.empty((0, 0, 0)), "chunks": array.chunks}
-    warped = array.map_blocks(stream_dask.on_worker, **ask, **known)
+    warped = array.map_blocks(stream_dask.on_worker, **options, **known)
     assert warped.compute().tobytes() == stacked.tobytes()
 
 
@@ -272,7 +274,7 @@ def assert_warped(folder, expected):
         assert np.load(folder / f"{i}.npy").tobytes() == each.tobytes()
 
 
-def test_files_that_the_workers_see(client, files, portions_of_walks, expected):
+def test_files_are_read_by_workers(client, files, portions_of_walks, expected):
     before = received(client)
     with joblib.parallel_config(backend="dask"):
         assert [wrong for _, wrong in stream_files.stream(*files)] == [None] * 4
@@ -281,43 +283,37 @@ def test_files_that_the_workers_see(client, files, portions_of_walks, expected):
     assert_warped(files[2], expected)
 
 
-def test_files_that_they_do_not_see(client, files, expected, capsys):
+def test_files_are_sent_by_the_script(client, files, expected, capsys):
     np.save(files[1] / "4.npy", np.full((2, 60, 8), np.nan))
-    asked = [*map(str, files), "--scheduler", client.scheduler.address]
-    assert re.match(r".*4\.npy: Performance 0.*NaN", stream_dask.main(asked), re.DOTALL)
+    arguments = [*map(str, files), "--scheduler", client.scheduler.address]
+    assert re.match(r".*4\.npy: Performance 0.*NaN", stream_dask.main(arguments), re.DOTALL)
     assert capsys.readouterr().out.split("\n")[3:] == ["3.npy: done", ""]
     assert_warped(files[2], expected)
     (files[1] / "4.npy").unlink()
     (files[2] / "2.npy").unlink()
-    assert stream_dask.main(asked) is None
+    assert stream_dask.main(arguments) is None
     assert capsys.readouterr().out == "2.npy: done\n"
     assert_warped(files[2], expected)
 
 
-def test_what_cannot_be_read_is_named_after_those_before_it(client, files, expected, capsys):
-    """Portions are read ahead: what is wrong with a later one is not an earlier one's fault."""
+def test_unreadable_file_is_named_after_results_of_earlier_ones(client, files, expected, capsys):
     (files[1] / "4.npy").write_bytes((files[1] / "3.npy").read_bytes()[:500])
-    asked = [*map(str, files), "--scheduler", client.scheduler.address]
-    assert re.match(r"\S*4\.npy: It cannot be read, is it whole", stream_dask.main(asked))
+    arguments = [*map(str, files), "--scheduler", client.scheduler.address]
+    assert re.match(r"\S*4\.npy: It cannot be read, is it whole", stream_dask.main(arguments))
     assert capsys.readouterr().out.split("\n")[3:] == ["3.npy: done", ""]
     assert_warped(files[2], expected)
 
 
-def test_a_worker_that_is_killed_changes_no_bit(client, fitted, portions_of_walks, expected):
+def test_killed_worker_changes_no_bit(client, fitted, portions_of_walks, expected):
     stream_dask.give(client, fitted)
     pids = client.run(os.getpid)
     answers = stream_dask.stream(client, portions_of_walks)
     found = [next(answers)]
-    # At work, with another portion waiting.
     os.kill(next(iter(pids.values())), getattr(signal, "SIGKILL", signal.SIGTERM))
     found += answers
     assert [answer.tobytes() for answer in found] == [each.tobytes() for each in expected]
-    # Who comes in its place has the model, too.
-    deadline = time.monotonic() + 60
-    while len(set(client.run(os.getpid).values()) - set(pids.values())) == 0:
-        if time.monotonic() > deadline:
-            pytest.fail("no worker came in the place of the killed one")
-        time.sleep(0.1)
+    # The worker that replaces it has the model, too.
+    wait_until(lambda: set(client.run(os.getpid).values()) - set(pids.values()))
     client.wait_for_workers(N_WORKERS, timeout=60)
     for worker in client.nthreads():
         task = client.submit(

@@ -1,5 +1,6 @@
-"""Work shared out: equal bits everywhere, progress, and interruption."""
+"""Parallel work: equal bits on any workers, progress, and interruption."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -20,7 +21,7 @@ from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import DenseSynchronizer
 from sklearn_motionsync.matching.refinement_test import RefinementTrial
 from sklearn_motionsync.matching.trellis import Trellis
-from sklearn_motionsync.utils.parallel import Common, Progress, run
+from sklearn_motionsync.utils.parallel import Progress, SharedArgument, run
 
 SETTINGS = {
     "paper": {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0},
@@ -31,49 +32,45 @@ SETTINGS = {
 
 @pytest.fixture(scope="module")
 def walks():
-    """So many that fitting samples and warping takes several portions."""
+    """300 performances, whose fit and warps take several portions."""
     rng = np.random.default_rng(0)
     return [np.cumsum(rng.standard_normal((n, 5)), axis=0) for n in rng.integers(30, 40, size=300)]
 
 
-def bits(sync, X):
-    """All that fitting and warping give, byte for byte."""
-    match = sync.match(X)
-    results = [sync.global_distances_, sync.pattern_, sync.exemplars_, sync.transform(X), *match]
-    return [np.asarray(result).tobytes() for result in results]
+def bits(X, **settings):
+    """All results of a fit and of warping, byte for byte."""
+    sync = DenseSynchronizer(**settings).fit(X)
+    results = [sync.global_distances_, sync.pattern_, sync.exemplars_, sync.transform(X)]
+    return [np.asarray(result).tobytes() for result in [*results, *sync.match(X)]]
 
 
 @pytest.fixture(scope="module", params=SETTINGS)
 def reference(request, walks):
     settings = SETTINGS[request.param]
-    return settings, bits(DenseSynchronizer(**settings).fit(walks), walks)
+    return settings, bits(walks, **settings)
 
 
-@pytest.mark.parametrize(("n_jobs", "backend"), [(2, None), (3, "threading"), (2, "loky")])
-def test_equal_bits_for_any_jobs_and_backend(walks, reference, n_jobs, backend):
+CONTEXTS = {
+    "2 jobs": (2, contextlib.nullcontext),
+    "3 threads": (3, lambda: joblib.parallel_config(backend="threading")),
+    "2 processes": (2, lambda: joblib.parallel_config(backend="loky")),
+    "no memory": (None, lambda: sklearn.config_context(working_memory=0)),
+    "little memory": (None, lambda: sklearn.config_context(working_memory=0.3)),
+    "1 BLAS thread": (None, lambda: threadpoolctl.threadpool_limits(limits=1)),
+    "2 BLAS threads": (None, lambda: threadpoolctl.threadpool_limits(limits=2)),
+}
+
+
+@pytest.mark.parametrize("name", CONTEXTS)
+def test_results_are_equal_to_the_last_bit_in_any_context(walks, reference, name):
     settings, expected = reference
-    context = {} if backend is None else {"backend": backend}
-    with joblib.parallel_config(**context):
-        sync = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(walks)
-        assert bits(sync, walks) == expected
-
-
-@pytest.mark.parametrize("working_memory", [0, 0.3, 1])
-def test_equal_bits_with_little_memory(walks, reference, working_memory):
-    settings, expected = reference
-    with sklearn.config_context(working_memory=working_memory):
-        assert bits(DenseSynchronizer(**settings).fit(walks), walks) == expected
-
-
-def test_equal_bits_whatever_the_blas_threads(walks, reference):
-    settings, expected = reference
-    for limits in (1, 2):
-        with threadpoolctl.threadpool_limits(limits=limits):
-            assert bits(DenseSynchronizer(**settings).fit(walks), walks) == expected
+    n_jobs, context = CONTEXTS[name]
+    with context():
+        assert bits(walks, n_jobs=n_jobs, **settings) == expected
 
 
 def test_all_matching_runs_on_one_blas_thread(walks, monkeypatch):
-    """Also what is not worth sharing out: its bits must not depend on the cores there are."""
+    """Also in portions too small to be shared out."""
     seen, method = [], {name: getattr(Trellis, name) for name in ("distances", "paths_and_costs")}
 
     def watched(name):
@@ -92,7 +89,7 @@ def test_all_matching_runs_on_one_blas_thread(walks, monkeypatch):
     assert all(threads == {1} for _, threads in seen)
 
 
-# -- the workshop itself ------------------------------------------------------------------
+# -- run ---------------------------------------------------------------------------------
 
 
 def square(x):
@@ -101,7 +98,7 @@ def square(x):
 
 @pytest.mark.parametrize("n_jobs", [None, 1, 2])
 @pytest.mark.parametrize("n_portions", [0, 1, 5])
-def test_run_keeps_the_order_and_counts(n_jobs, n_portions):
+def test_run_keeps_order_and_calls_step(n_jobs, n_portions):
     steps = []
     portions = [(i,) for i in range(n_portions)]
     results = run(square, portions, n_jobs=n_jobs, prefer="threads", step=lambda: steps.append(1))
@@ -109,29 +106,27 @@ def test_run_keeps_the_order_and_counts(n_jobs, n_portions):
     assert len(steps) == n_portions
 
 
-def test_threads_leave_the_filters_of_warnings_alone():
+def test_run_keeps_warning_filters():
     before = [*warnings.filters]
     for _ in range(5):
         list(run(time.sleep, [(1e-3 * (i % 3),) for i in range(20)], n_jobs=2, prefer="threads"))
     assert warnings.filters == before
 
 
-def test_the_configuration_of_scikit_learn_reaches_every_portion():
+def test_run_passes_sklearn_configuration():
     with sklearn.config_context(working_memory=77):
         seen = list(run(sklearn.get_config, [()] * 5, n_jobs=2, prefer="threads"))
     assert {config["working_memory"] for config in seen} == {77}
 
 
-def test_what_portions_share_comes_first():
-    common = Common("a", "of a cluster only"), Common("b")
-    for n_jobs in (1, 2):
-        assert list(run("{}{}{}".format, [(1,), (2,)], common=common, n_jobs=n_jobs)) == [
-            "ab1",
-            "ab2",
-        ]
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_run_passes_shared_arguments_first(n_jobs):
+    common = SharedArgument("a"), SharedArgument("b")
+    found = run("{}{}{}".format, [(1,), (2,)], common=common, n_jobs=n_jobs)
+    assert list(found) == ["ab1", "ab2"]
 
 
-def test_backends_that_give_no_results_one_by_one():
+def test_run_works_with_backends_without_generators():
     with joblib.parallel_config(backend="multiprocessing"):
         assert list(run(square, [(1,), (2,), (3,)], n_jobs=2)) == [1, 4, 9]
 
@@ -139,7 +134,7 @@ def test_backends_that_give_no_results_one_by_one():
 # -- progress -------------------------------------------------------------------------------
 
 
-def test_verbose_tells_how_far_it_is(walks, capsys):
+def test_verbose_prints_the_progress_of_stages(walks, capsys):
     DenseSynchronizer().fit(walks).transform(walks)
     assert capsys.readouterr().out == ""
     DenseSynchronizer(verbose=1).fit(walks).transform(walks)
@@ -161,7 +156,7 @@ def test_verbose_prints_at_most_a_line_a_second(capsys, monkeypatch):
     assert [line.split("%")[0].split(":")[1].strip() for line in lines] == ["40", "80", "100"]
 
 
-def test_callbacks_of_scikit_learn_see_every_portion(walks):
+def test_sklearn_callbacks_are_called_for_every_portion(walks):
     pytest.importorskip("sklearn.callback", reason="callbacks came with scikit-learn 1.9")
 
     class Recorder:
@@ -196,18 +191,15 @@ def test_callbacks_of_scikit_learn_see_every_portion(walks):
 # -- interruption -----------------------------------------------------------------------------
 
 
-def test_an_interrupted_fit_leaves_no_half_fitted_estimator(walks, monkeypatch):
+def test_interrupted_fit_leaves_estimator_unfitted(walks, monkeypatch):
     sync = DenseSynchronizer().fit(walks[:20])
-    calls = []
 
     def interrupted(self, *args):
-        calls.append(1)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(RefinementTrial, "misfits", interrupted)
     with pytest.raises(KeyboardInterrupt):
         sync.fit(walks)
-    assert calls
     with pytest.raises(NotFittedError):
         check_is_fitted(sync)
     monkeypatch.undo()
@@ -216,9 +208,9 @@ def test_an_interrupted_fit_leaves_no_half_fitted_estimator(walks, monkeypatch):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("n_jobs", [1, 2])
-def test_ctrl_c_leaves_at_once(n_jobs):
+def test_ctrl_c_ends_a_long_fit(n_jobs):
     """Hours of work, interrupted after a moment."""
-    # Whoever runs the tests in the background may have it ignored.
+    # In the background of a shell the signal may be ignored.
     script = f"""
         import signal
         import numpy as np
@@ -247,10 +239,8 @@ def test_ctrl_c_leaves_at_once(n_jobs):
         assert process.stdout.readline() == "begin\n"
         time.sleep(1.5)
         process.send_signal(signal.SIGINT)
-        interrupted = time.perf_counter()
         assert process.stdout.readline() == "unfitted\n"
         assert process.wait(timeout=10) == 0
-        assert time.perf_counter() - interrupted < 5
     finally:
         process.kill()
         process.stdout.close()

@@ -1,4 +1,4 @@
-"""Tasks of Ray, by a stand-in of its own rules: results in any order, everything pickled."""
+"""Tasks of Ray, by a stand-in: results in any order, all arguments pickled."""
 
 import pickle
 import sys
@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from joblib.parallel import ParallelBackendBase, register_parallel_backend
 from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.utils.parallel import Common, run
+from sklearn_motionsync.utils.parallel import SharedArgument, run
 
 N_JOBS = 3
 
 
 class RayBackend(ParallelBackendBase):
-    """As joblib has it from Ray, as far as it is asked."""
+    """The parts of Ray's joblib backend that are used."""
 
     ray_remote_args = {"resources": {"room": 1}}
 
@@ -23,7 +23,7 @@ class RayBackend(ParallelBackendBase):
         return n_jobs
 
     def apply_async(self, func, callback=None):
-        raise AssertionError("joblib hands out nothing itself")
+        raise AssertionError("joblib itself runs no tasks")
 
     submit = apply_async
 
@@ -32,14 +32,14 @@ RayBackend.__module__ = "ray.util.joblib.ray_backend"
 
 
 class RayTaskError(Exception):
-    """What a task raised, as its ``cause``."""
+    """The exception of a task, as ``cause``."""
 
     def __init__(self, cause):
         self.cause = cause
 
 
 class Ray:
-    """What the package calls of Ray: tasks run when somebody waits, the last one first."""
+    """The functions of Ray that are used: tasks run when waited for, the last one first."""
 
     exceptions = SimpleNamespace(RayTaskError=RayTaskError)
 
@@ -114,41 +114,41 @@ def squares(common, i):
     return i, common[i] ** 2
 
 
-def test_results_come_in_order_a_few_at_a_time(ray):
-    common = Common(np.arange(20.0))
+def test_results_are_in_order_with_at_most_n_jobs_tasks(ray):
+    common = SharedArgument(np.arange(20.0))
     found = list(run(squares, [(i,) for i in range(7)], common=(common,)))
     assert found == [(i, i**2) for i in range(7)]
     assert 1 < ray.n_most <= N_JOBS
     assert ray.options == [{"resources": {"room": 1}}]
 
 
-def test_an_error_is_the_function_s_own_and_the_rest_is_called_off(ray):
-    results = run(squares, [(i,) for i in range(5, 20)], common=(Common(np.arange(20.0)),))
+def test_error_of_the_function_is_raised_and_tasks_are_cancelled(ray):
+    results = run(squares, [(i,) for i in range(5, 20)], common=(SharedArgument(np.arange(20.0)),))
     assert [next(results), next(results)] == [(5, 25), (6, 36)]
     with pytest.raises(KeyError, match="seven"):
         next(results)
     assert not ray.waiting
 
 
-def test_who_stops_calls_the_rest_off(ray):
-    results = run(squares, [(i,) for i in range(7)], common=(Common(np.arange(20.0)),))
+def test_closed_generator_cancels_tasks(ray):
+    results = run(squares, [(i,) for i in range(7)], common=(SharedArgument(np.arange(20.0)),))
     next(results)
     results.close()
     assert not ray.waiting
 
 
-def test_an_actor_asks_for_no_processors_as_it_keeps_its_own(ray):
-    ray.actor = "somebody"
-    assert len(list(run(squares, [(1,), (2,)], common=(Common(np.arange(20.0)),)))) == 2
+def test_tasks_of_an_actor_need_no_processors(ray):
+    ray.actor = "actor"
+    assert len(list(run(squares, [(1,), (2,)], common=(SharedArgument(np.arange(20.0)),)))) == 2
     assert ray.options == [{"num_cpus": 0, "resources": {"room": 1}}]
 
 
-def test_a_fit_stores_the_performances_once(ray):
+def test_fit_stores_performances_once(ray):
     X = np.cumsum(np.random.default_rng(0).standard_normal((300, 30, 6)), axis=1)
     sync = DenseSynchronizer().fit(X)
     tasks = sum(reference.startswith("task") for reference in ray.stored)
     large = [v for r, v in ray.stored.items() if r.startswith("ref") and len(v) > X.nbytes / 2]
-    # All rounds of the search share what is stored, and tasks carry indices.
+    # All rounds of the search share the stored value, and tasks carry indices.
     assert tasks > 10
     assert len(large) == 1
     with joblib.parallel_config(backend="sequential"):

@@ -1,4 +1,4 @@
-"""From files to files: every method's own results, whatever is killed on the way."""
+"""The example stream_files.py: results of every method, also after a kill."""
 
 import json
 import os
@@ -46,7 +46,7 @@ def fitted():
 
 @pytest.fixture
 def files(fitted, tmp_path):
-    """The model, the portions, and a folder for results that is not there yet."""
+    """The model, the portions, and a folder for results that does not exist yet."""
     (tmp_path / "walks").mkdir()
     joblib.dump(fitted, tmp_path / "model.joblib")
     joblib.dump(fitted[:-1], tmp_path / "synchronizer.joblib")
@@ -78,7 +78,7 @@ def assert_synchronized(folder, fitted):
         assert (got.dtype, got.tobytes()) == (expected.dtype, expected.tobytes())
 
 
-def test_portions_are_synchronized_alone_or_by_two(files, fitted):
+def test_stream_equals_transform_with_one_or_two_jobs(files, fitted):
     model, walks, out = files
     assert [wrong for _, wrong in stream_files.stream(*files)] == [None] * 4
     assert_synchronized(out, fitted)
@@ -88,7 +88,7 @@ def test_portions_are_synchronized_alone_or_by_two(files, fitted):
     assert_synchronized(out.with_name("two"), fitted)
 
 
-def test_match_and_score_samples(files, fitted):
+def test_stream_equals_match_and_score_samples(files, fitted):
     whole = files[0].with_name("model.joblib")
     assert len(list(stream_files.stream(*files, method="match"))) == 4
     scored = files[2].with_name("scored")
@@ -102,8 +102,7 @@ def test_match_and_score_samples(files, fitted):
         assert scores.tobytes() == fitted.score_samples(portion).tobytes()
 
 
-def test_tables_become_arrays(files):
-    """Of a model that gives tables: one array (n_performances, P, n_features), as without them."""
+def test_stream_stores_tables_as_arrays(files):
     sync = DenseSynchronizer(n_frames=40).fit(walks(6, 0))
     joblib.dump(sync, files[0])
     assert [wrong for _, wrong in stream_files.stream(*files)] == [None] * 4
@@ -118,7 +117,7 @@ def test_tables_become_arrays(files):
         stream_files.answer(ASpace(2).fit(walks(6, 0)), "transform", walks(6, 0))
 
 
-# Killed when the third result is written, but has no name yet.
+# Killed when the third result is written, but not renamed yet.
 KILLED = """
 import os, signal, sys
 import stream_files
@@ -137,7 +136,7 @@ list(stream_files.stream(*sys.argv[1:]))
 """
 
 
-def test_after_a_kill_it_goes_on_where_it_stopped(files, fitted):
+def test_stream_continues_after_a_kill(files, fitted):
     _, _, out = files
     assert run("-c", KILLED, *files).returncode != 0
     done = {path.name: path.stat().st_mtime_ns for path in out.glob("*.npy")}
@@ -149,7 +148,7 @@ def test_after_a_kill_it_goes_on_where_it_stopped(files, fitted):
     assert list(stream_files.stream(*files)) == []
 
 
-def test_a_portion_that_is_newer_is_computed_again(files):
+def test_newer_portions_are_computed_again(files):
     assert len(list(stream_files.stream(*files))) == 4
     source, target = files[1] / "c.npz", files[2] / "c.npy"
     np.savez(source, *walks(2, 5))
@@ -158,77 +157,56 @@ def test_a_portion_that_is_newer_is_computed_again(files):
     assert len(np.load(target)) == 2
 
 
-def test_a_portion_that_is_refused_does_not_stop_the_others(files, capsys):
+def test_refused_and_unreadable_portions_do_not_stop_others(files, capsys):
     wrong = alike(walks(3, 6), np.float64)
     wrong[1, 4, 2] = np.nan
     np.save(files[1] / "b.npy", wrong)
-    assert stream_files.main([str(path) for path in files]) == 1
-    assert re.search(r"^b\.npy: Performance 1.*NaN", capsys.readouterr().out, re.MULTILINE)
-    assert sorted(results(files[2])) == ["a.npy", "c.npy", "d.npy"]
-
-
-def test_a_portion_that_cannot_be_read_does_not_either(files):
     whole = (files[1] / "a.npz").read_bytes()
-    broken = {
-        "b.npy": (files[1] / "b.npy").read_bytes()[:300],
-        "e.npz": whole[:-30],
-        "f.npy": b"",
-        "g.npz": whole[:90] + b"12345678" + whole[98:],
-    }
+    broken = {"e.npz": whole[:-30], "f.npy": b"", "g.npz": whole[:90] + b"12345678" + whole[98:]}
     for name, content in broken.items():
         (files[1] / name).write_bytes(content)
-    told = {source.name: wrong for source, wrong in stream_files.stream(*files)}
-    assert {name for name, wrong in told.items() if wrong} == set(broken)
-    assert all("It cannot be read, is it whole? " in told[name] for name in broken)
+    assert stream_files.main([str(path) for path in files]) == 1
+    printed = capsys.readouterr().out
+    assert re.search(r"^b\.npy: Performance 1.*NaN", printed, re.MULTILINE)
+    for name in broken:
+        pattern = rf"^{re.escape(name)}: .*It cannot be read, is it whole\? "
+        assert re.search(pattern, printed, re.MULTILINE)
     assert sorted(results(files[2])) == ["a.npy", "c.npy", "d.npy"]
 
 
-def test_what_was_asked_wrongly_leaves_the_folder_free(files):
-    """No results are there: the next command may be about another model, or method."""
+def test_wrong_arguments_leave_no_folder(files):
     model, walks, out = files
     whole = model.with_name("model.joblib")
     with pytest.raises(ValueError, match=r"ends in ActionModel and has no transform: .* --method"):
         next(stream_files.stream(whole, walks, out))
-    with pytest.raises(ValueError, match="no portions"):
-        next(stream_files.stream(whole, walks.with_name("wakls"), out))
+    with pytest.raises(ValueError, match=r"no portions in .*: files \.npy or \.npz"):
+        next(stream_files.stream(whole, walks.with_name("none"), out))
+    with pytest.raises(ValueError, match=r"Results among the portions .* give another folder"):
+        next(stream_files.stream(model, walks, walks / ".." / walks.name))
     assert not out.exists()
-    # A model that was not fitted yet is told by the portions.
     joblib.dump(DenseSynchronizer(), model)
     assert "not fitted yet" in next(stream_files.stream(*files))[1]
     assert [wrong for _, wrong in stream_files.stream(whole, walks, out, "match")] == [None] * 4
     with pytest.raises(ValueError, match="results of another model and another method"):
         next(stream_files.stream(*files))
+    np.save(walks / "a.npy", PORTIONS["b.npy"])
+    with pytest.raises(ValueError, match=r"a\.npy and a\.npz would have one result"):
+        next(stream_files.stream(*files))
 
 
-def test_results_do_not_go_among_the_portions(files):
-    model, walks, _ = files
-    before = sorted(walks.iterdir())
-    with pytest.raises(ValueError, match=r"Results among the portions .* give another folder"):
-        next(stream_files.stream(model, walks, walks / ".." / walks.name))
-    assert sorted(walks.iterdir()) == before
-
-
-def test_results_of_two_models_are_not_mixed(files, fitted):
+def test_results_of_two_models_or_methods_are_not_mixed(files, fitted):
     assert len(list(stream_files.stream(*files))) == 4
     with pytest.raises(ValueError, match=r"results of another method \(made_by.json\)"):
         next(stream_files.stream(*files, method="match"))
     joblib.dump(DenseSynchronizer(n_frames=30).fit(walks(12, 0)), files[0])
-    told = stream_files.main([str(path) for path in files])
-    assert "holds results of another model (made_by.json): give another folder" in told
+    message = stream_files.main([str(path) for path in files])
+    assert "holds results of another model (made_by.json): give another folder" in message
     note = json.loads((files[2] / "made_by.json").read_text(encoding="utf-8"))
     assert note["sklearn_motionsync"] == sklearn_motionsync.__version__
     assert_synchronized(files[2], fitted)
 
 
-def test_folders_that_say_nothing_or_too_much(files):
-    with pytest.raises(ValueError, match=r"no portions in .*: files \.npy or \.npz"):
-        next(stream_files.stream(files[0], files[0].parent / "none", files[2]))
-    np.save(files[1] / "a.npy", PORTIONS["b.npy"])
-    with pytest.raises(ValueError, match=r"a\.npy and a\.npz would have one result"):
-        next(stream_files.stream(*files))
-
-
-def test_a_process_opens_the_model_once_as_memory_maps(files):
+def test_model_and_portions_are_opened_as_memory_maps(files):
     fitted = stream_files.loaded(str(files[0]), "as it is")
     assert stream_files.loaded(str(files[0]), "as it is") is fitted
     assert isinstance(fitted[-1].pattern_, np.memmap)

@@ -1,4 +1,4 @@
-"""Pipelines that begin with a union of views: what goes along with performances, and figures."""
+"""Pipelines that begin with a union of views: parameters routed past it, and figures."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -38,7 +38,7 @@ def union_of(*views):
 
 
 BOTH = union_of(COSINES, POSITIONS)
-# The same union, as it may stand in a pipeline.
+# The same union in other forms.
 UNIONS = {
     "first": BOTH,
     "nested": make_pipeline(BOTH),
@@ -52,11 +52,11 @@ def union(request):
     return clone(UNIONS[request.param])
 
 
-# -- what goes along with performances ------------------------------------------------------
+# -- parameters routed past a union ---------------------------------------------------------
 
 
 @pytest.mark.parametrize("routing", [False, True])
-def test_key_frames_go_past_a_union(union, routing):
+def test_keyframes_are_routed_past_a_union(union, routing):
     sync = KeyframeSynchronizer(30)
     pipe = make_pipeline(union, sync).fit(BUNCH.data, keyframesynchronizer__keyframes=K)
     points = union.fit_transform(BUNCH.data)
@@ -70,7 +70,7 @@ def test_key_frames_go_past_a_union(union, routing):
     assert score == SpreadScorer()(pipe[-1], points, keyframes=K)
 
 
-def test_a_detector_of_a_union_with_key_frames(union):
+def test_detector_of_a_union_takes_keyframes(union):
     steps = KeyframeSynchronizer(30), ActionModel()
     detector = ActionDetector(make_pipeline(union, *steps))
     detector.fit(BUNCH.data, keyframesynchronizer__keyframes=K)
@@ -82,7 +82,7 @@ def test_a_detector_of_a_union_with_key_frames(union):
     )
 
 
-def test_what_nobody_takes_is_told_of_a_union(union):
+def test_unknown_params_are_refused_after_a_union(union):
     pipe = make_pipeline(union, DenseSynchronizer(20)).fit(BUNCH.data)
     with pytest.raises(TypeError, match=r"got 'keyframes', .* not taken by FeatureUnion\.tr"):
         Match.from_estimator(pipe, BUNCH.data, keyframes=K)
@@ -92,8 +92,7 @@ def test_what_nobody_takes_is_told_of_a_union(union):
 
 
 @pytest.mark.parametrize("view", [POSITIONS, *UNIONS.values()])
-def test_people_of_any_view_fall_into_step(view):
-    """Their joints are drawn as they were recorded, so any view tells the skeleton."""
+def test_synchronized_bodies_are_drawn_for_any_view(view):
     pipe = make_pipeline(view, LinearSynchronizer(20)).fit(BUNCH.data)
     shown = SkeletonDisplay.from_estimator(pipe, BUNCH.data, performances=[1, 0])
     plain = make_pipeline(COSINES, LinearSynchronizer(20)).fit(BUNCH.data)
@@ -104,8 +103,7 @@ def test_people_of_any_view_fall_into_step(view):
 
 
 @pytest.mark.parametrize("reduced", [False, True])
-def test_limbs_of_a_union_that_depart(union, reduced):
-    """A raised arm, among the cosines of a model that sees positions too."""
+def test_departures_of_a_raised_arm_mark_its_limbs(union, reduced):
     odd = BUNCH.data[0].reshape(-1, 15, 3).copy()
     wrist, elbow, shoulder = (BUNCH.skeleton.index_of(f"left_{j}") for j in
                               ("wrist", "elbow", "shoulder"))  # fmt: skip
@@ -124,14 +122,13 @@ def test_limbs_of_a_union_that_depart(union, reduced):
     assert "not accepted" in bad.heading
     arms = {(shoulder, elbow), (elbow, wrist)}
     assert all(arms & set(bones) for bones in bad.marked)
-    # The figures are those of the body, not of whatever stands in the first columns.
     expected = SkeletonDisplay.from_departures(plain, X, performance=1, frames=[3, 12])
     shown = SkeletonDisplay.from_departures(pipe, X, performance=1, frames=[3, 12])
     np.testing.assert_allclose(shown.scenes[1][0], expected.scenes[1][0], atol=1e-9)
 
 
 @pytest.mark.parametrize("reduced", [False, True])
-def test_departures_of_both_views_have_their_names(reduced):
+def test_departures_have_feature_names_of_both_views(reduced):
     steps = [ASpace(0.95)] if reduced else []
     pipe = make_pipeline(clone(BOTH), *steps, LinearSynchronizer(20), ActionModel())
     still = np.repeat(BUNCH.data[0][:1], 40, axis=0)
@@ -142,7 +139,7 @@ def test_departures_of_both_views_have_their_names(reduced):
         assert any(name.startswith(view) for name in set(table["feature"]) & names)
 
 
-def test_figures_that_a_union_cannot_give(union):
+def test_figures_without_a_body_are_refused(union):
     steps = LinearSynchronizer(20), ActionModel()
     with pytest.raises(ValueError, match="need steps with inverse_transform before"):
         SkeletonDisplay.from_model(make_pipeline(union, *steps).fit(BUNCH.data))

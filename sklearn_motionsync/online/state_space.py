@@ -1,0 +1,461 @@
+"""The state-space model of a tracker: deviations from the mean, the rate, and the Kalman update."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg.lapack import dtrtri
+
+__all__ = [
+    "CausalSlopes",
+    "Clock",
+    "KalmanUpdate",
+    "MaternProcess",
+    "RateProcess",
+    "TrackerModel",
+    "exponential_average",
+    "kalman_update",
+    "squared_norms",
+    "whitening",
+]
+
+# Window of causal velocities, as a share of the mean duration: that of the synchronizers' filter.
+_WINDOW = 0.03
+# Time constant of the averages of the NIS, in windows.
+_MEMORY = 3.0
+# The limit of the NIS is so many times farther from 1 than the largest of the training set.
+_EXCESS = 2.0
+# And at least so many standard deviations of the average of a NIS.
+_CHANCE = 4.0
+# The limit of the NIS of postures is at least three standard deviations squared.
+_MIN_POSTURE_LIMIT = 9.0
+# The gate of single observations: a NIS, or so many times the largest of the training set.
+_MIN_GATE, _GATE_FACTOR = 100.0, 10.0
+# Probability of a restart at the end of the movement in a hundredth of the mean duration.
+_RESTART = 0.01
+
+
+class TrackerModel(NamedTuple):
+    """What a `MotionTracker` has learnt, and its settings.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (P, n_features)
+    process : MaternProcess
+        Of deviations from the mean.
+    rates : RateProcess
+    clock : Clock
+    velocities : ndarray, shape (n_features, n_features)
+        Covariance of the differences of causal velocities from those of the mean.
+    nis_limits : ndarray, shape (2,)
+        Averages of the normalised innovation squared (NIS) of velocities, and of postures, beyond
+        which the phase is lost; 1 is expected.
+    gate : float
+        The NIS of a single frame beyond which it is ignored.
+    noise, tempering : float
+    n_particles : int
+    """
+
+    mean: np.ndarray
+    process: "MaternProcess"
+    rates: "RateProcess"
+    clock: "Clock"
+    velocities: np.ndarray
+    nis_limits: np.ndarray
+    gate: float
+    noise: float
+    tempering: float
+    n_particles: int
+
+    @classmethod
+    def learn(cls, warped, rates, groups, clock, noise, tempering, n_particles):
+        """Learn from synchronised performances.
+
+        Parameters
+        ----------
+        warped : ndarray, shape (n, P, n_features)
+            At least two performances.
+        rates : ndarray, shape (n, P)
+            Their rates along the clock.
+        groups : ndarray of int, shape (n,)
+            At least two groups, counted from 0.
+        clock : Clock
+        noise, tempering, n_particles :
+            As of the tracker.
+        """
+        deviations, step = deviations_from_others(warped, groups), 1 / clock.speed
+        process, rates = MaternProcess.learn(deviations, step), RateProcess.learn(rates, step)
+        slopes, unit_noise = _causal_slopes(deviations, step, clock.window)
+        velocities = shrunk_covariance(slopes)
+        by_velocity = _largest_nis(slopes, unit_noise * noise**2, velocities, step, clock.memory)
+        noises = np.full(deviations.shape[1], noise**2)
+        by_posture = _largest_nis(deviations, noises, process.covariance, step, clock.memory)
+        # Velocities of different windows are independent.
+        chance = _CHANCE * np.sqrt(2 / (warped.shape[2] * _MEMORY))
+        excess = (
+            max(_EXCESS * (by_velocity - 1), chance),
+            max(_EXCESS * (by_posture - 1), _MIN_POSTURE_LIMIT - 1),
+        )
+        gate = max(_MIN_GATE, _GATE_FACTOR * _largest_innovation(deviations, process, step, noise))
+        learnt = warped.mean(axis=0), process, rates, clock, velocities, 1 + np.array(excess), gate
+        return cls(*learnt, noise, tempering, n_particles)
+
+
+class Clock(NamedTuple):
+    """The clock of the pattern, and times in frames of the training performances.
+
+    Parameters
+    ----------
+    last : float
+        The last frame of the clock.
+    duration : float
+        Mean time from the first frame of a performance to its last.
+    """
+
+    last: float
+    duration: float
+
+    @property
+    def speed(self):
+        """Frames of the clock that a performance of mean duration passes a unit of time."""
+        return self.last / self.duration
+
+    def restart_probability(self, dt):
+        """Of a movement at its end, within a time: restart times are exponential."""
+        return 1 - (1 - _RESTART) ** (100 * dt / self.duration)
+
+    @property
+    def window(self):
+        """Of causal velocities: at least a frame."""
+        return max(_WINDOW * self.duration, 1.0)
+
+    @property
+    def memory(self):
+        """Time constant of the averages of the NIS."""
+        return _MEMORY * self.window
+
+
+# -- processes: deviations from the mean, and rates --------------------------------------
+
+# Weight of the diagonal in a shrunk covariance.
+_SHRINKAGE = 0.5
+# Smallest variance of a feature, as a share of the largest: that of constant features.
+_MIN_VARIANCE = 1e-9
+# Where the Matern-3/2 correlation (1 + x) exp(-x) is a half.
+_HALF = 1.6783469900166605
+# Rates beyond these, in either direction, are pauses or errors of a warp.
+_MAX_RATE = 4.0
+
+
+class MaternProcess(NamedTuple):
+    """A Matern-3/2 process of several features as a state-space model.
+
+    ``k(s) = (1 + l s) exp(-l s) C`` for elapsed time ``s``. The states are values and derivatives;
+    the derivative has the covariance ``l^2 C`` and is independent of the value at the same time.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (n_features, n_features)
+        ``C``, of the values.
+    decay : float
+        ``l = sqrt(3) / length scale``, per frame.
+    """
+
+    covariance: np.ndarray
+    decay: float
+
+    @classmethod
+    def learn(cls, deviations, step):
+        """Learn from deviations (n, P, n_features), whose frames are a step apart."""
+        covariance = shrunk_covariance(deviations)
+        # Each feature is scaled by its standard deviation, so that units do not matter.
+        lag = _correlation_lag(deviations / np.sqrt(np.diag(covariance)), 0.5)
+        return cls(covariance, _HALF / (lag * step))
+
+    @property
+    def stationary(self):
+        """The prior covariance of the states, (2 n_features, 2 n_features)."""
+        return np.kron(np.diag([1.0, self.decay**2]), self.covariance)
+
+    def transition(self, dt):
+        """The transition matrix (2, 2) of (value, derivative), the same for all features."""
+        decay = self.decay
+        rows = [[1 + decay * dt, dt], [-(decay**2) * dt, 1 - decay * dt]]
+        return np.exp(-decay * dt) * np.array(rows)
+
+    def predict(self, means, covariance, dt):
+        """The Kalman prediction of means (2, n, n_features) and their common covariance."""
+        transition = self.transition(dt)
+        means = (transition @ means.reshape(2, -1)).reshape(means.shape)
+        for _ in range(2):
+            covariance = (transition @ covariance.reshape(2, -1)).reshape(covariance.shape).T
+        # Q = S - A S A', so that the stationary covariance stays.
+        powers = np.diag([1.0, self.decay**2])
+        process_noise = (powers - transition @ powers @ transition.T)[:, np.newaxis, :, np.newaxis]
+        blocks = process_noise * self.covariance[:, np.newaxis]
+        return means, covariance + blocks.reshape(covariance.shape)
+
+
+class RateProcess(NamedTuple):
+    """The log rate: an Ornstein-Uhlenbeck process about 0, the mean pace.
+
+    Parameters
+    ----------
+    spread : float
+        Standard deviation of the log rate.
+    memory : float
+        Time after which its correlation is 1/e.
+    """
+
+    spread: float
+    memory: float
+
+    @classmethod
+    def learn(cls, rates, step):
+        """Learn from rates (n, P) along the clock, whose frames are a step apart."""
+        logs = np.log(np.clip(rates, 1 / _MAX_RATE, _MAX_RATE))
+        spread = float(np.sqrt(np.square(logs).mean()))
+        return cls(spread, _correlation_lag(logs[:, :, np.newaxis], np.exp(-1)) * step)
+
+    def draw(self, rng, n):
+        """Draw n log rates from the stationary distribution."""
+        return self.spread * rng.standard_normal(n)
+
+    def predict(self, log_rates, dt):
+        """Means of log rates after a time, and their standard deviation."""
+        kept = np.exp(-dt / self.memory)
+        return kept * log_rates, self.spread * np.sqrt(1 - kept**2)
+
+
+def deviations_from_others(performances, groups):
+    """Deviations of performances (n, P, n_features) from the mean of the other groups."""
+    counts = np.bincount(groups)[:, np.newaxis, np.newaxis]
+    sums = np.zeros((len(counts), *performances.shape[1:]))
+    np.add.at(sums, groups, performances)
+    others = (sums.sum(axis=0) - sums) / (len(performances) - counts)
+    return performances - others[groups]
+
+
+def shrunk_covariance(deviations):
+    """Second moments of deviations about 0, shrunk half-way to their diagonal."""
+    flat = deviations.reshape(-1, deviations.shape[-1])
+    moments = flat.T @ flat / len(flat)
+    variances = np.diag(moments).copy()
+    largest = variances.max() if variances.max() > 0 else 1.0
+    moments *= 1 - _SHRINKAGE
+    np.fill_diagonal(moments, np.maximum(variances, _MIN_VARIANCE * largest))
+    return moments
+
+
+def _correlation_lag(series, level):
+    """Frames after which the autocorrelation about 0 of (n, P, n_features) falls to a level.
+
+    P where it never does, or all is 0.
+    """
+    n_frames, power, before = series.shape[1], float(np.square(series).mean()), 1.0
+    for lag in range(1, n_frames if power > 0 else 1):
+        now = float((series[:, lag:] * series[:, :-lag]).mean()) / power
+        if now <= level:
+            return lag - 1 + (before - level) / (before - now)
+        before = now
+    return float(n_frames)
+
+
+# -- limits of the normalised innovation squared, from the training performances ---------
+
+
+def _causal_slopes(deviations, step, window):
+    """Causal velocities (n, P - 1, n_features), and their variances by unit noise (P - 1,)."""
+    n, n_frames, width = deviations.shape
+    slopes, seen, found = CausalSlopes(n, width, window), np.ones(width, dtype=bool), []
+    for p in range(n_frames):
+        slopes.advance(step)
+        slopes.add(deviations[:, p], seen)
+        if p:
+            found.append(slopes.fit(seen))
+    values, noise = zip(*found, strict=True)
+    return np.stack(values, axis=1), np.array([a[0] for a in noise])
+
+
+def _largest_nis(departures, noise, covariance, step, memory):
+    """The largest average NIS of takes (n, n_frames, n_features) at their own phase, at least 1."""
+    nis, largest, width = 1.0, 1.0, departures.shape[-1]
+    for p, variance in enumerate(noise):
+        whiten = whitening(covariance + variance * np.eye(width))
+        # The expected effect of the noise: a fit draws no samples.
+        now = squared_norms(departures[:, p] @ whiten.T) + variance * np.square(whiten).sum()
+        nis = exponential_average(nis, now / width, step, memory)
+        largest = np.maximum(largest, nis)
+    return float(np.max(largest))
+
+
+def _largest_innovation(deviations, process, step, noise):
+    """The largest NIS of a frame, of a Kalman filter of each take at its own phase."""
+    n, n_frames, width = deviations.shape
+    means, covariance, largest = np.zeros((2, n, width)), process.stationary, 0.0
+    for p in range(n_frames):
+        if p:
+            means, covariance = process.predict(means, covariance, step)
+        innovations = deviations[:, p] - means[0]
+        covariance, update = kalman_update(covariance, np.eye(width), innovations, noise)
+        means = means + update.corrections
+        largest = max(largest, float(update.nis.max()))
+    return largest
+
+
+def exponential_average(before, now, dt, memory):
+    """An exponential moving average after a time, by the one before and a new value."""
+    left = np.exp(-dt / memory)
+    return left * before + (1 - left) * now
+
+
+# -- the Kalman update of many hypotheses that share one covariance, and so one gain ------
+
+# The innovation covariance is larger by this share, so that rounding leaves the updated covariance
+# positive, however small the noise.
+_MARGIN = 1e-13
+
+
+class KalmanUpdate(NamedTuple):
+    """The update of states by an observation; ``W' W = S^-1`` for the innovation covariance S.
+
+    Parameters
+    ----------
+    whitened : ndarray, shape (n, n_seen)
+        Whitened innovations ``W v`` of each hypothesis.
+    gain_rows : ndarray, shape (n_seen, 2 n_features)
+        ``gain_rows' W v = K v``, with the Kalman gain ``K``.
+    obs_rows : ndarray, shape (n_seen, n_features)
+        ``W H``, the whitened observation matrix.
+    """
+
+    whitened: np.ndarray
+    gain_rows: np.ndarray
+    obs_rows: np.ndarray
+
+    @property
+    def nis(self):
+        """Normalised innovation squared per observed number: (n,)."""
+        return squared_norms(self.whitened) / self.whitened.shape[1]
+
+    @property
+    def corrections(self):
+        """``K v``: (2, n, n_features)."""
+        n_seen, n_features = self.obs_rows.shape
+        return self.whitened @ self.gain_rows.reshape(n_seen, 2, n_features).swapaxes(0, 1)
+
+
+def kalman_update(covariance, matrix, innovations, noise):
+    """The Kalman update.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (2 n_features, 2 n_features)
+        Of the values, then derivatives, before the observation.
+    matrix : ndarray, shape (n_seen, n_features)
+        ``H``, without rows of missing numbers.
+    innovations : ndarray, shape (n, n_seen)
+        ``v`` of every hypothesis.
+    noise : float
+        Standard deviation of the observation.
+
+    Returns
+    -------
+    covariance : ndarray, shape (2 n_features, 2 n_features)
+        After it: symmetric.
+    KalmanUpdate
+    """
+    n_seen, n_features = matrix.shape
+    cross_covariance = covariance[:, :n_features] @ matrix.T
+    innovation_covariance = matrix @ cross_covariance[:n_features]
+    diagonal = np.diag_indices(n_seen)
+    innovation_covariance[diagonal] = (innovation_covariance[diagonal] + noise**2) * (1 + _MARGIN)
+    whiten = whitening(innovation_covariance)
+    gain_rows = whiten @ cross_covariance.T
+    update = KalmanUpdate(innovations @ whiten.T, gain_rows, whiten @ matrix)
+    return covariance - gain_rows.T @ gain_rows, update
+
+
+def whitening(covariance):
+    """The inverse of the Cholesky factor of a covariance."""
+    return dtrtri(np.linalg.cholesky(covariance), lower=1)[0]
+
+
+def squared_norms(vectors):
+    """Of vectors (n, n_dims): (n,)."""
+    return np.einsum("ij,ij->i", vectors, vectors)
+
+
+# -- causal velocities: slopes of weighted regression lines ------------------------------
+
+# A feature has a slope if its earlier values weigh at least this, beside 1 of the value now.
+_MIN_WEIGHT = 1e-3
+
+
+class CausalSlopes:
+    """Slopes of regression lines through past values with weights ``exp(-age / window)``.
+
+    All sequences share the weights. So the slope of a difference is the difference of the slopes,
+    whose delays cancel.
+
+    Parameters
+    ----------
+    n : int
+        Sequences.
+    width : int
+        Features.
+    window : float
+        Age at which a value weighs 1/e.
+    """
+
+    def __init__(self, n, width, window):
+        self.width, self.window = width, window
+        # Sums of weights, and of their squares, times the age to the power 0, 1, 2.
+        self.ages, self.squares = np.zeros((3, width)), np.zeros((3, width))
+        # Sums of weighted values times the age to the power 0, 1.
+        self.values = np.zeros((2, n, width))
+
+    def advance(self, dt):
+        """Let a time pass."""
+        left = np.exp(-dt / self.window)
+        for (zero, one, two), share in ((self.ages, left), (self.squares, left**2)):
+            two += 2 * dt * one + dt**2 * zero
+            one += dt * zero
+            for moment in (zero, one, two):
+                moment *= share
+        transition = left * np.array([[1.0, 0.0], [dt, 1.0]])
+        self.values = (transition @ self.values.reshape(2, -1)).reshape(self.values.shape)
+
+    def add(self, values, seen):
+        """Add values (n, n_seen) of the features with the mask ``seen`` (width,)."""
+        self.ages[0, seen] += 1
+        self.squares[0, seen] += 1
+        self.values[0][:, _as_slice(seen)] += values
+
+    def resample(self, indices):
+        """Replace the sequences by those of these indices."""
+        self.values = self.values[:, indices]
+
+    def shift(self, chosen, offset):
+        """Add a constant (width,) to all past values of some sequences."""
+        self.values[:, chosen] += (self.ages[:2] * offset)[:, np.newaxis]
+
+    def have_slopes(self, seen):
+        """Which of the features that are seen now were seen lately, too: bool (width,)."""
+        return seen & (self.ages[0] - 1 > _MIN_WEIGHT)
+
+    def fit(self, chosen):
+        """Slopes (n, n_chosen) of some features, and their variances by unit noise (n_chosen,)."""
+        chosen = _as_slice(chosen)
+        zero, one, two = self.ages[:, chosen]
+        zeros, ones, twos = self.squares[:, chosen]
+        determinant = zero * two - one**2
+        values, aged = self.values[:, :, chosen]
+        slopes = (one / determinant) * values
+        slopes -= (zero / determinant) * aged
+        noise = (zero**2 * twos - 2 * zero * one * ones + one**2 * zeros) / determinant**2
+        return slopes, noise
+
+
+def _as_slice(mask):
+    """The mask, or, to save a copy, a slice where it is all True."""
+    return slice(None) if mask.all() else mask

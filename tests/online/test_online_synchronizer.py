@@ -1,0 +1,383 @@
+"""OnlineSynchronizer: phases of running performances against known warps and the offline path."""
+
+import copy
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    OnlineSynchronizer,
+)
+from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.matching.causal import CausalDerivative
+from sklearn_motionsync.matching.matcher import Features
+from sklearn_motionsync.matching.units import Unit
+from sklearn_motionsync.online.stream import Streams, check_times
+from sklearn_motionsync.online.synchronizer import Reference
+
+P = 60
+
+
+def movement(phase):
+    """Three features of a movement from phase 0 to 1, different at every phase."""
+    phase = np.asarray(phase)[..., np.newaxis]
+    return np.concatenate(
+        [np.cos(np.pi * phase), np.sin(2 * np.pi * phase), np.sin(np.pi * phase) ** 2], axis=-1
+    )
+
+
+def performance(n_frames, bend=0.0, noise=0.0, seed=0):
+    """A performance and the phase of its frames, from 0 to 1."""
+    t = np.linspace(0, 1, n_frames)
+    phase = t + bend * np.sin(2 * np.pi * t) / (2 * np.pi)
+    rng = np.random.default_rng(seed)
+    return movement(phase) + noise * rng.standard_normal((n_frames, 3)), phase
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    bends = np.linspace(-0.4, 0.4, 9)
+    X = [performance(50 + 5 * (i % 5), b, 0.02, i)[0] for i, b in enumerate(bends)]
+    return OnlineSynchronizer(DenseSynchronizer(P)).fit(X)
+
+
+@pytest.fixture
+def live(fitted):
+    return copy.deepcopy(fitted)
+
+
+def step_all(live, frames, times=None):
+    times = [None] * len(frames) if times is None else times
+    return [live.step(x, t) for x, t in zip(frames, times, strict=True)]
+
+
+def error(found, phase):
+    return np.abs(np.asarray(found.phase) - phase * (P - 1))
+
+
+# -- phases -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("n_frames", "bend"), [(60, 0.0), (45, 0.5), (80, -0.5), (100, 0.3)])
+def test_phase_and_rate_follow_known_warps(fitted, n_frames, bend):
+    x, phase = performance(n_frames, bend, 0.02, 77)
+    (found,) = fitted.track([x])
+    errors = error(found, phase)
+    # At another rate the delay of the filters differs: twice 1.8 frames times the difference.
+    assert np.median(errors) < 1.8
+    assert errors.max() < 4.5
+    # The rate is the mean of the last tenth of the clock.
+    lag = 0.1 * fitted.duration_
+    before = np.interp(np.arange(n_frames) - lag, np.arange(n_frames), phase)
+    rate = (phase - before) * fitted.duration_ / lag
+    assert np.median(np.abs(found.rate - rate)[n_frames // 4 :]) < 0.25
+    # Confidence is lower at paces and bends beyond those of the training set.
+    assert np.mean(found.confidence) > (0.8 if bend == 0 else 0.3)
+
+
+@pytest.mark.parametrize("action", ["depositFloorR", "grabHighR"])
+def test_phase_of_new_person_is_near_offline_path(real_data, action):
+    clips, n_frames = load_performances(real_data / "hdm05" / "hdm05_positions.npz"), 100
+
+    def load(action, held_out):
+        """Clips at 30 frames a second, by one actor or by the others."""
+        chosen = (clips.target == action) & ((clips.actor == "bk") == held_out)
+        return [clips.data[i][::4] for i in np.flatnonzero(chosen)]
+
+    features = make_pipeline(DirectionCosines(clips.skeleton), ASpace())
+    training = features.fit_transform(load(action, held_out=False))
+    X = features.transform(load(action, held_out=True))
+    live = OnlineSynchronizer(DenseSynchronizer(n_frames)).fit(training)
+    errors, tracks = [], live.track(X)
+    for x, times, found in zip(X, live.synchronizer_.match(X).times, tracks, strict=True):
+        clock = np.linspace(0, n_frames - 1, len(x))
+        offline = np.interp(clock, times + 1e-9 * np.arange(n_frames), np.arange(n_frames))
+        errors.append(np.abs(found.phase - offline)[clock >= n_frames / 5])
+    assert np.median(np.concatenate(errors)) < 3.5
+    # The confidence of another action is less than half of that.
+    other = {"depositFloorR": "grabHighR", "grabHighR": "depositFloorR"}[action]
+    others = live.track(features.transform(load(other, held_out=True)))
+    right, wrong = (
+        np.median([found.confidence[len(found.phase) // 2 :].mean() for found in some])
+        for some in (tracks, others)
+    )
+    assert wrong < right / 2
+
+
+def test_track_equals_step_and_does_not_look_ahead(fitted, live):
+    x, _ = performance(70, 0.4, 0.05, 5)
+    whole, part = fitted.track([x, x[:40]])
+    steps = step_all(live, x)
+    for values, name in zip(whole, ("phase", "rate", "confidence"), strict=True):
+        np.testing.assert_array_equal(values, [getattr(step, name) for step in steps])
+        np.testing.assert_array_equal(values[:40], getattr(part, name))
+        np.testing.assert_array_equal(values, getattr(live.history, name))
+    assert all(isinstance(value, float) for value in steps[0])
+
+
+def test_costs_at_the_end_equal_offline_trellis_to_the_last_bit():
+    mean, x = movement(np.linspace(0, 1, P)), performance(75, 0.4, 0.05)[0]
+    unit = Unit.of(mean[np.newaxis])
+    reference = Reference(Features("velocity", 1, 0.03, unit), mean, P - 1, 0.1, 0.03, 3)
+    streams = Streams(reference, 1, 3)
+    for frame in x:
+        streams.update(frame[np.newaxis])
+    derivative, trellis = CausalDerivative(reference.width, (1, 3)), reference.trellis
+    base = [reference.features.compare(derivative.step(y), y)[0] for y in unit(x)[:, np.newaxis]]
+    given = np.array(base)[np.newaxis], reference.moving[np.newaxis]
+    np.testing.assert_array_equal(streams.trellis.costs, trellis.ends(*given)[0])
+    assert streams.estimate(0.0).phase[0] == min(trellis.paths(*given)[0, 0][-1] / 2, P - 1)
+
+
+@pytest.mark.parametrize("every", [1, 2, 4])
+def test_times_give_the_same_phases_at_any_frame_rate(fitted, live, every):
+    _, phase = performance(241, 0.4)
+    rng = np.random.default_rng(1)
+    kept = np.arange(0, 241, every)
+    # From 0 to 60 frames of the training performances, not evenly.
+    times = kept / 4 + np.where(kept % 240 == 0, 0, rng.uniform(-0.05, 0.05, len(kept)))
+    truth = np.interp(times * 4, np.arange(241), phase)
+    (found,) = fitted.track([movement(truth)], [times])
+    assert np.median(error(found, truth)) < 1
+    (same,) = live.set_params(frame_rate=30).track([movement(truth)], [times / 30 + 1000])
+    np.testing.assert_allclose(same.phase, found.phase, atol=0.6)
+
+
+def test_hidden_features_are_not_compared(fitted):
+    x, phase = performance(60, 0.3, 0.02, 9)
+    rng = np.random.default_rng(2)
+    (found,) = fitted.track([np.where(rng.random(x.shape) < 0.3, np.nan, x)])
+    assert np.median(error(found, phase)) < 1.5
+    hidden = x.copy()
+    hidden[:, 1] = np.nan
+    hidden[20:26] = np.nan
+    (found,) = fitted.track([hidden])
+    assert np.median(error(found, phase)) < 2
+    assert (error(found, phase) < 8).all()
+
+
+def test_phase_goes_on_at_mean_pace_without_observations(fitted):
+    n = round(fitted.duration_) + 1
+    (found,) = fitted.track([np.full((n, 3), np.nan)])
+    expected = np.arange(n) / fitted.duration_ * (P - 1)
+    np.testing.assert_allclose(found.phase, np.minimum(expected, P - 1), atol=0.6)
+    assert found.confidence.max() < 0.5
+
+
+def test_time_without_frames_equals_frames_of_nan(fitted, live):
+    x, _ = performance(60, 0.0, 0.02, 3)
+    gap = x.copy()
+    gap[20:45] = np.nan
+    kept = np.r_[:20, 45:60]
+    (hidden,) = fitted.track([gap])
+    (late,) = fitted.track([x[kept]], [kept])
+    np.testing.assert_allclose(late.phase[25:], hidden.phase[50:], atol=1)
+    # A long gap ends in bounded time.
+    assert np.isfinite(step_all(live, x[:3], [0, 1, 1e6])[-1]).all()
+
+
+def test_phase_stays_at_beginning_and_end_during_rests(fitted):
+    x, phase = performance(60, 0.2, 0.0)
+    rests = [np.repeat(x[:1], 40, axis=0), x, np.repeat(x[-1:], 40, axis=0)]
+    (found,) = fitted.track([np.concatenate(rests)])
+    assert found.phase[:40].max() < 2
+    assert np.median(np.abs(found.phase[40:100] - phase * (P - 1))) < 1.5
+    np.testing.assert_array_equal(found.phase[-30:], P - 1)
+    np.testing.assert_allclose(found.rate[-20:], 0, atol=1e-12)
+
+
+def test_confidence_is_low_for_other_movements(fitted):
+    x, _ = performance(60, 0.2, 0.02, 4)
+    right, backwards, other = fitted.track([x, x[::-1], np.roll(x, 1, axis=1)])
+    assert right.confidence[30:].mean() > 0.8
+    assert backwards.confidence[30:].mean() < 0.3
+    assert other.confidence[30:].mean() < 0.3
+
+
+def test_time_left_is_weighted_mean_of_duration_and_phase(live):
+    assert live.duration_ == np.mean([50 + 5 * (i % 5) for i in range(9)]) - 1
+    live.set_params(frame_rate=10)
+    mean = live.duration_ / 10
+    assert live.time_left() == pytest.approx(mean)
+    for k, frame in enumerate(performance(60)[0]):
+        share = live.step(frame, 100 + k / 10).phase / (P - 1)
+        expected = (1 - share) * (max(mean - k / 10, 0) + mean * share)
+        assert live.time_left() == pytest.approx(expected)
+
+
+# -- streams and sessions -----------------------------------------------------------------
+
+
+def test_streams_side_by_side_equal_streams_alone(fitted, live):
+    x, y = performance(60, 0.4, 0.02, 1)[0], performance(60, -0.4, 0.02, 2)[0]
+    x[10, 2] = np.nan
+    both, alone = step_all(live, np.stack([x, y], axis=1)), fitted.track([x, y])
+    for i, one in enumerate(alone):
+        np.testing.assert_allclose([step.phase[i] for step in both], one.phase, atol=1e-9)
+        np.testing.assert_allclose([step.confidence[i] for step in both], one.confidence, atol=1e-9)
+    assert live.history.phase.shape == (60, 2)
+    live.reset(1)
+    again = [live.step(np.stack([x[-1], frame])) for frame in y[:30]]
+    assert all(step.phase[0] == P - 1 for step in again[5:])
+    np.testing.assert_allclose([step.phase[1] for step in again], alone[1].phase[:30], atol=1.5)
+
+
+def test_reset_of_one_stream_does_not_interpolate_from_its_last_frame(fitted, live):
+    x, _ = performance(60, 0.0, 0.02, 6)
+    times, first, second = 1.7 * np.arange(20), x[::3], x[1::3]
+    step_all(live, np.stack([first, first], axis=1), times)
+    live.reset(1)
+    frames = np.stack([np.repeat(first[-1:], 20, axis=0), second], axis=1)
+    late = [step.phase[1] for step in step_all(live, frames, times + times[-1] + 1.7)]
+    (alone,) = fitted.track([second], [times])
+    np.testing.assert_allclose(late, alone.phase, atol=2)
+
+
+def test_time_left_begins_again_for_a_reset_stream(live):
+    x, _ = performance(60)
+    step_all(live, [x[[0, 0]], x[[9, 9]]], [0, 9])
+    live.reset(0)
+    assert live.time_left()[0] == pytest.approx(live.duration_)
+    live.step(x[[0, 10]], 10)
+    first, second = live.time_left()
+    assert first == pytest.approx(live.duration_, abs=2)
+    assert second < first - 5
+
+
+def test_copies_continue_independently(live):
+    x, _ = performance(60, 0.4, 0.02, 8)
+    expected = step_all(live, x)
+    live.reset()
+    assert len(live.history.phase) == 0
+    step_all(live, x[:30])
+    other = pickle.loads(pickle.dumps(live))
+    assert step_all(other, x[30:]) == expected[30:]
+    assert step_all(live, x[30:]) == expected[30:]
+    assert not hasattr(clone(live), "mean_")
+
+
+def test_frames_and_results_may_be_overwritten(fitted, live):
+    x, _ = performance(50, 0.3)
+    expected, buffer = step_all(copy.deepcopy(fitted), np.stack([x, x], axis=1)), np.empty((2, 3))
+    for frame, right in zip(x, expected, strict=True):
+        buffer[:] = frame
+        step = live.step(buffer)
+        np.testing.assert_array_equal(step, right)
+        for values in step:
+            values[:] = 99
+    np.testing.assert_array_equal(live.history.rate, [right.rate for right in expected])
+
+
+# -- training sets ------------------------------------------------------------------------
+
+
+def test_rows_and_linear_synchronizer():
+    rng = np.random.default_rng(0)
+    t = np.linspace(0, 1, 50)
+    rows = np.array([np.sin(np.pi * t**b) for b in rng.uniform(0.8, 1.25, 8)])
+    live = OnlineSynchronizer(LinearSynchronizer()).fit(rows)
+    assert live.mean_.shape == (50, 1)
+    (found,) = live.track(rows[:1])
+    np.testing.assert_array_equal(found.phase, [step.phase for step in step_all(live, rows[0])])
+    assert np.median(np.abs(found.phase - np.arange(50))) < 5
+
+
+def test_single_precision_and_single_training_performance():
+    X = [performance(50, b)[0].astype(np.float32) for b in (0.0, 0.3)]
+    live = OnlineSynchronizer(DenseSynchronizer(P, metric=None, refine=False)).fit(X[:1])
+    (found,) = live.track(X[1:])
+    assert np.median(error(found, performance(50, 0.3)[1])) < 1.5
+    assert found.confidence.mean() > 0.5
+
+
+def test_constant_and_equal_training_performances():
+    x, _ = performance(40)
+    constant = OnlineSynchronizer(LinearSynchronizer()).fit([np.ones((40, 3))] * 2)
+    for y in (x, np.ones((40, 3))):
+        assert np.isfinite(constant.track([y])[0]).all()
+    (found,) = OnlineSynchronizer(LinearSynchronizer()).fit([x] * 3).track([x])
+    np.testing.assert_array_equal(found.phase, np.arange(40))
+    assert found.confidence.min() > 0.9
+
+
+def test_max_rate_is_bounded_by_the_pattern():
+    X = [performance(20, bend)[0] for bend in (0.0, 0.3)]
+    a, b = (OnlineSynchronizer(DenseSynchronizer(20), max_rate=r).fit(X) for r in (19, 1e9))
+    np.testing.assert_array_equal(a.track(X), b.track(X))
+
+
+# -- refusals -----------------------------------------------------------------------------
+
+
+def test_refused_frame_changes_nothing(fitted, live):
+    x, _ = performance(20)
+    expected = step_all(copy.deepcopy(fitted), x)
+    assert live.step(x[0]) == expected[0]
+    for k, frame in enumerate(x[1:], 1):
+        for bad, time, message in [
+            (frame[:2], None, r"The frame has shape \(2,\), expected \(3,\) or \(n, 3\)"),
+            (np.append(frame[:2], np.inf), None, "The frame, frame 0, feature 2 is infinity"),
+            (["a", "b", "c"], None, "The frame"),
+            (np.stack([frame, frame]), None, r"had the shape \(3,\), this one has \(2, 3\)"),
+            (frame, k - 1.0, "time stamps must increase"),
+            (frame, np.nan, "must be finite"),
+        ]:
+            with pytest.raises(ValueError, match=message):
+                live.step(bad, time)
+        assert live.step(frame) == expected[k]
+
+
+def test_unknown_streams_and_wrong_times_are_refused(fitted, live):
+    with pytest.raises(ValueError, match="0 performances run"):
+        live.reset(0)
+    live.step(np.zeros((2, 3)))
+    live.reset([])
+    for stream in (2, -3, "a", 0.5):
+        with pytest.raises(ValueError, match="2 performances run"):
+            live.reset(stream)
+    with pytest.raises(ValueError, match="1 performances, but 2 sequences of times"):
+        fitted.track([performance(9)[0]], [None, None])
+    with pytest.raises(ValueError, match="Performance 1: times must be one a frame"):
+        fitted.track([performance(9)[0]] * 2, [range(9), range(8)])
+
+
+def test_feature_names_of_frames_are_checked():
+    X = [pd.DataFrame(performance(30, bend)[0], columns=list("abc")) for bend in (0.0, 0.3)]
+    live = OnlineSynchronizer(DenseSynchronizer(30)).fit(X)
+    expected = live.step(X[0].iloc[0])
+    live.reset()
+    assert live.step(X[0].to_numpy()[0]) == expected
+    for row in (X[0].iloc[1][::-1], X[0].iloc[1:3, ::-1]):
+        with pytest.raises(ValueError, match=r"The frame has the columns .*'c', 'b', 'a'"):
+            live.step(row)
+
+
+def test_check_times_returns_frames_of_the_training_performances():
+    assert check_times(None, 3).tolist() == [0, 1, 2]
+    assert check_times(None, 2, after=4.5).tolist() == [5.5, 6.5]
+    assert check_times([0.5, 1], 2, frame_rate=30).tolist() == [15, 30]
+    assert check_times([0.5, 1], 2).tolist() == [0.5, 1]
+    assert check_times(2, 1, after=1.0).tolist() == [2]
+
+
+@pytest.mark.parametrize(
+    ("times", "after", "message"),
+    [
+        ([0, 1], None, r"Take 4: times must be one a frame, shape \(3,\), got \(2,\)"),
+        ([0, np.nan, 1], None, "time of frame 1 is nan"),
+        ([0, 1, 1], None, "1 follows 1"),
+        ([2, 1, 3], None, "1 follows 2"),
+        ([2, 3, 4], 20.0, "2 follows 2"),
+        (["a", "b", "c"], None, "times"),
+    ],
+)
+def test_check_times_refuses(times, after, message):
+    with pytest.raises(ValueError, match=message):
+        check_times(times, 3, frame_rate=None if after is None else 10, what="Take 4", after=after)
