@@ -3,12 +3,21 @@
 import datetime
 import math
 import os
+from numbers import Integral, Real
 
 import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
-__all__ = ["as_numbers", "check_finite", "check_names", "check_squares", "names_of", "refuse"]
+__all__ = [
+    "as_numbers",
+    "check_finite",
+    "check_names",
+    "check_squares",
+    "is_integer",
+    "names_of",
+    "refuse",
+]
 
 _TIMES = (np.datetime64, np.timedelta64, datetime.date, datetime.time, datetime.timedelta)
 _FILES = {"amc", "bvh", "c3d", "csv", "json", "npy", "npz", "parquet", "txt", "xlsx"}
@@ -281,3 +290,10 @@ def check_names(x, expected, what):
         "should match those that were passed during fit"
         + (", in the same order: select them by df[names]." if same else ".")
     )
+
+
+def is_integer(value):
+    """Whether a value is an integer, of an integer or a floating-point type, and no bool."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False
+    return isinstance(value, Integral) or float(value).is_integer()

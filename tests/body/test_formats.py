@@ -107,7 +107,7 @@ def test_they_are_told_from_their_names(name, spelling, n_dims):
     skeleton = Skeleton.from_frame(df)
     assert skeleton.landmarks == expected
     assert (skeleton.up, skeleton.n_dims) == ("y", n_dims)
-    assert Skeleton.from_names(skeleton.joints, skeleton.parents).landmarks == expected
+    assert Skeleton(skeleton.joints, skeleton.parents).landmarks == expected
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -5,7 +5,7 @@ import pytest
 from made_bodies import columns_of, standing, turned, turned_over
 from sklearn.utils import get_tags
 from sklearn_motionsync import ASpace, DirectionCosines, Skeleton, to_frame
-from sklearn_motionsync.body.hidden import seen_heading
+from sklearn_motionsync.body.axes import heading_axes_with_gaps
 from sklearn_motionsync.datasets import load_performances, make_bending
 
 PAPER = Skeleton.paper()
@@ -214,7 +214,7 @@ def test_the_floor_and_the_legs_are_of_what_is_seen():
     assert np.isnan(cosines.transform(hide(x, slice(None), *feet))[:, 0]).all()
 
 
-@pytest.mark.parametrize("factor", [1, 100, 1e-300])
+@pytest.mark.parametrize("factor", [1, 100, 1e-6])
 def test_legs_never_seen_are_in_proportion_to_what_is(factor):
     """Of a body of the proportions of those of ``fit``, in any unit, the height is the same."""
     x = np.concatenate([standing(), standing() + 0.3])
@@ -256,7 +256,7 @@ def test_what_is_refused(recordings, fitted):
         usual.inverse_transform(fitted().transform([x]))
     with pytest.raises(ValueError, match=r"Performance 0, frame 3, .* is NaN.*Interpolate"):
         ASpace().fit(usual.transform(recordings)).transform(fitted().transform([x]))
-    for hidden, allowed in (("nan", True), ("refuse", False)):
+    for hidden, allowed in (("nan", True), ("raise", False)):
         tags = get_tags(DirectionCosines(PAPER, hidden=hidden))
         assert tags.input_tags.allow_nan is allowed
     with pytest.raises(ValueError, match="The 'hidden' parameter"):
@@ -296,7 +296,7 @@ def test_everything_may_be_hidden_but_in_fit(recordings, fitted):
     wrist = hide(recordings[0], slice(None), "left_wrist")
     with pytest.raises(ValueError, match=r"limbs \['left_forearm'\] are hidden .* landmarks="):
         cosines.fit([wrist])
-    tiny = 1e-300 * recordings[1]
+    tiny = 1e-6 * recordings[1]
     lengths = cosines.fit([tiny]).limb_lengths_
     np.testing.assert_array_equal(cosines.fit([nothing, tiny]).limb_lengths_, lengths)
 
@@ -389,7 +389,7 @@ def test_the_matrix_of_a_body_that_lacks_landmarks():
 
 
 def test_there_is_no_matrix_along_parents_or_of_wrong_lengths(recordings, fitted):
-    with pytest.raises(ValueError, match="no linear map of cosines along parent limbs"):
+    with pytest.raises(ValueError, match="not linear in cosines along parent limbs"):
         fitted("parent").position_matrix()
     with pytest.raises(ValueError, match="above 0, got -1 for 'torso'"):
         fitted().position_matrix([1, -1, *[1] * 10])
@@ -405,14 +405,14 @@ def test_the_shoulders_tell_the_heading_of_people_who_turn(real_data):
     for i in np.flatnonzero(bunch.target == "jogLeftCircle4StepsRstart"):
         x = bunch.data[i].astype(float).reshape(len(bunch.data[i]), -1, 3)
         hips, shoulders = (across(x, bunch.skeleton, part) for part in ("hip", "shoulder"))
-        true = seen_heading(hips)[:, 0]
+        true = heading_axes_with_gaps(hips)[:, 0]
         for start in range(1, len(x) - 120, 60):
             gap = slice(start, start + 120)
             lost = hips.copy()
             lost[gap] = np.nan
             for name, found in (
-                ("shoulders", seen_heading(lost, shoulders)),
-                ("held", seen_heading(lost)),
+                ("shoulders", heading_axes_with_gaps(lost, shoulders)),
+                ("held", heading_axes_with_gaps(lost)),
             ):
                 cosines = np.clip((true * found[:, 0]).sum(axis=1), -1, 1)
                 errors[name].append(np.rad2deg(np.arccos(cosines))[gap])

@@ -199,7 +199,7 @@ def test_means_are_paired_in_their_order():
 
 def test_who_has_no_partner():
     df = with_markers(["RBAK", "C7"], middle=["C7"])
-    message = "'RBAK' is on one side in every frame, and none takes its place"
+    message = "'RBAK' is on one side in every frame, and has no counterpart"
     with pytest.raises(ValueError, match=message):
         mirror(df, Skeleton.from_frame(df))
     df = with_markers(["C7"], middle=["C7"])
@@ -208,7 +208,7 @@ def test_who_has_no_partner():
     with pytest.raises(ValueError, match=r"'left_toe' is on one side, .* Leave its columns out"):
         mirror(df, Skeleton.from_frame(df))
     leg = ["left_hip", "left_knee", "left_ankle"]
-    with pytest.raises(ValueError, match="'left_hip' is on one side, and none"):
+    with pytest.raises(ValueError, match="'left_hip' is on one side, and has no"):
         mirror(np.zeros((2, 9)), Skeleton(leg, [-1, 0, 1], {j: j for j in leg}))
 
 

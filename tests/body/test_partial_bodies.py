@@ -196,8 +196,6 @@ def test_a_mean_of_joints_is_where_the_middle_is():
         np.testing.assert_allclose(
             kind(skeleton).fit_transform(df), kind(PAPER).fit_transform(x), atol=1e-12
         )
-        far = kind(skeleton).fit_transform(1e300 * df)
-        np.testing.assert_allclose(far, kind(PAPER).fit_transform(x), atol=1e-9)
     with pytest.raises(ValueError, match=r"'left_knee' is the mean of .* indices_of gives all"):
         skeleton.index_of("left_knee")
     assert skeleton.indices_of("left_knee") == (15, 16)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from sklearn_motionsync.body.sphere import blended, mean_direction
+from sklearn_motionsync.body.sphere import mean_direction, mean_vector
 
 
 def directions(n, dims, around=None, seed=0):
@@ -64,7 +64,7 @@ def test_every_place_has_a_mean_of_its_own():
 
 def test_lengths_are_averaged():
     u = directions(2, 3)
-    found = blended(u * [[1.0], [3.0]], np.array([0.25, 0.75]))
+    found = mean_vector(u * [[1.0], [3.0]], np.array([0.25, 0.75]))
     np.testing.assert_allclose(np.linalg.norm(found), 2.5, rtol=1e-15)
     # Beyond them they stay above 0.
-    assert np.linalg.norm(blended(u * [[1.0], [3.0]], np.array([2, -1]))) == pytest.approx(0.5)
+    assert np.linalg.norm(mean_vector(u * [[1.0], [3.0]], np.array([2, -1]))) == pytest.approx(0.5)
