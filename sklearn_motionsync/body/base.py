@@ -18,7 +18,6 @@ from .limbs import (
     body_size,
     landmark_positions,
     limb_vectors,
-    max_abs,
     median_lengths,
 )
 from .skeleton import Skeleton, check_columns
@@ -163,8 +162,9 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
             mask_hidden(points)
         limbs = limb_vectors(points)
         lengths = np.linalg.norm(limbs, axis=2)
-        # A shorter limb is rounding of the coordinates.
-        zero = lengths <= np.finfo(lengths.dtype).eps * max_abs(points)
+        # A shorter limb is rounding of the largest coordinate.
+        largest = np.fmax.reduce(np.abs(points), axis=None, initial=0)
+        zero = lengths <= np.finfo(lengths.dtype).eps * largest
         there = skeleton.limbs
         for k, name in enumerate(LIMB_NAMES):
             if name not in there:

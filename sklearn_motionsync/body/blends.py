@@ -173,8 +173,6 @@ class Figure(NamedTuple):
         Height of the lower ankle, or the lowest landmark of a body without ankles.
     floor : float
         The smallest height of the foot.
-    lengths : ndarray, shape (n_frames, n_links)
-        Of the links.
     """
 
     links: np.ndarray
@@ -186,10 +184,6 @@ class Figure(NamedTuple):
     @property
     def floor(self):
         return self.foot.min()
-
-    @property
-    def lengths(self):
-        return np.linalg.norm(self.links, axis=2)
 
 
 class LinkStructure:
@@ -252,8 +246,8 @@ class LinkStructure:
 
     def directed_links(self, figures):
         """The rigid links that have a direction in every frame of all figures: (n_links,)."""
-        shown = [(x.lengths > _LEAST_LENGTH * x.size).all(axis=0) for x in figures]
-        return self.rigid & np.all(shown, axis=0)
+        norms = np.concatenate([np.linalg.norm(x.links, axis=2) / x.size for x in figures])
+        return self.rigid & (norms > _LEAST_LENGTH).all(axis=0)
 
     def _count(self):
         """The number of points: the joints, means of joints, and midpoints."""

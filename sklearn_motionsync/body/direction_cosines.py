@@ -27,7 +27,6 @@ from .skeleton import Skeleton
 
 __all__ = ["DirectionCosines"]
 
-_NUMBER = {2: "two", 3: "three"}
 # Largest shift of the hips from the pelvis, in leg lengths, that puts a body on the floor. Of 144
 # performances of optical motion capture, and of their approximations in an aSpace, none needs more
 # than 0.21.
@@ -213,7 +212,7 @@ class DirectionCosines(PositionsTransformer):
             ``get_feature_names_out``, or ``limb_lengths`` are not numbers above 0, one a limb.
         """
         check_is_fitted(self)
-        lengths = self._lengths(limb_lengths)
+        lengths = self._as_lengths(limb_lengths)
         names = self.get_feature_names_out()
         performances = check_transformed(self, X, names, finite=self._finite)
         arrays = [self._positions(performances, i, lengths) for i in range(len(performances))]
@@ -275,7 +274,7 @@ class DirectionCosines(PositionsTransformer):
                 "Positions are not linear in cosines along parent limbs, which turn with the "
                 "posture. Use reference='heading' or 'world', or inverse_transform."
             )
-        lengths = self._lengths(limb_lengths).astype(np.float64)
+        lengths = self._as_lengths(limb_lengths).astype(np.float64)
         matrix = _forward_matrix(self._all_lengths(lengths), self.skeleton)
         return matrix, self.skeleton.body().column_names
 
@@ -315,8 +314,26 @@ class DirectionCosines(PositionsTransformer):
             leg = leg_length(lengths, limbs)
         return np.column_stack([(body.position_of("pelvis")[:, 1] - floor) / leg, cosines])
 
-    def _lengths(self, given):
-        return self.limb_lengths_ if given is None else _as_lengths(given, self.skeleton.limbs)
+    def _as_lengths(self, limb_lengths):
+        """One length above 0 for each limb; by default those of ``fit``."""
+        if limb_lengths is None:
+            return self.limb_lengths_
+        limbs = self.skeleton.limbs
+        names = list(limb_lengths.index) if isinstance(limb_lengths, pd.Series) else limbs
+        if names not in (limbs, list(range(len(limbs)))):
+            raise ValueError(f"limb_lengths is indexed by {names}; select {limbs}, in that order.")
+        lengths = as_numbers(limb_lengths, "limb_lengths", dtype=np.float64)
+        if lengths.shape != (len(limbs),):
+            raise ValueError(
+                f"limb_lengths needs one length for each of {limbs}, got shape {lengths.shape}."
+            )
+        wrong = ~((lengths > 0) & np.isfinite(lengths))
+        if wrong.any():
+            limb = int(wrong.argmax())
+            raise ValueError(
+                f"limb_lengths must be numbers above 0, got {lengths[limb]:g} for {limbs[limb]!r}."
+            )
+        return lengths
 
     def _all_lengths(self, lengths):
         """Lengths (12,) of all limbs, 0 of those that the skeleton lacks."""
@@ -340,7 +357,7 @@ class DirectionCosines(PositionsTransformer):
                 frame, limb = np.argwhere(zero)[0]
                 raise ValueError(
                     f"{performances.called(i)}, frame {frame}: the limb {limbs[limb]!r} has no "
-                    f"direction, its {_NUMBER[n_dims]} cosines are 0. Drop the frame, or give it a "
+                    f"direction, its cosines are 0. Drop the frame, or give it a "
                     "direction."
                 )
         # Means and approximations of cosines are shorter than 1.
@@ -354,25 +371,6 @@ class DirectionCosines(PositionsTransformer):
         if self._finite is not True:
             mask_hidden(positions.reshape(len(positions), -1, n_dims))
         return positions
-
-
-def _as_lengths(limb_lengths, limbs):
-    """One length above 0 for each limb."""
-    names = list(limb_lengths.index) if isinstance(limb_lengths, pd.Series) else limbs
-    if names not in (limbs, list(range(len(limbs)))):
-        raise ValueError(f"limb_lengths is indexed by {names}; select {limbs}, in that order.")
-    lengths = as_numbers(limb_lengths, "limb_lengths", dtype=np.float64)
-    if lengths.shape != (len(limbs),):
-        raise ValueError(
-            f"limb_lengths needs one length for each of {limbs}, got shape {lengths.shape}."
-        )
-    wrong = ~((lengths > 0) & np.isfinite(lengths))
-    if wrong.any():
-        limb = int(wrong.argmax())
-        raise ValueError(
-            f"limb_lengths must be numbers above 0, got {lengths[limb]:g} for {limbs[limb]!r}."
-        )
-    return lengths
 
 
 # -- forward kinematics -------------------------------------------------------------------

@@ -20,7 +20,6 @@ __all__ = [
     "limb_vectors",
     "limbs_between",
     "lowest_height",
-    "max_abs",
     "median_lengths",
     "nearest_ancestor",
     "parts_of_names",
@@ -166,11 +165,6 @@ def body_size(lengths, limbs):
 def lowest_height(tracks):
     """The smallest second coordinate of (n_frames, n_dims) tracks; NaN if all are hidden."""
     return np.fmin.reduce([np.fmin.reduce(track[:, 1]) for track in tracks])
-
-
-def max_abs(values):
-    """The largest absolute value, NaN left out; 0 if there is none."""
-    return np.fmax.reduce(np.abs(values), axis=None, initial=0)
 
 
 def exponent_of(largest, dtype):

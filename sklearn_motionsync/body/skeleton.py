@@ -138,11 +138,7 @@ class Skeleton:
         return vars(self) | {"landmarks": dict(self.landmarks)}
 
     def __setstate__(self, state):
-        landmarks = {
-            name: at if isinstance(at, str) else tuple(at)
-            for name, at in state["landmarks"].items()
-        }
-        vars(self).update(state, landmarks=_ReadOnly(landmarks))
+        vars(self).update(state, landmarks=_ReadOnly(state["landmarks"]))
 
     def __repr__(self):
         for name in FORMATS:
@@ -327,34 +323,33 @@ class Skeleton:
 
 # -- the constructors of known skeletons --------------------------------------------------
 
-_CONSTRUCTOR_DOC = """{known.summary}
-
-Parameters
-----------
-n_dims : {{3, 2}}, default=3
-    Axes of a position: 2 for key-points in a picture.
-up : {{"y", "x", "z", "-y", "-x", "-z"}}, default=None
-    The vertical axis; by default {known.up!r} in space and {known.up_2d!r} in a picture.
-
-Returns
--------
-Skeleton
-    With the joints of this format, in its order.
-"""
-
 
 def _constructor(name):
     """The class method of `Skeleton` that makes the skeleton of one of `FORMATS`."""
     known = FORMATS[name]
 
     def constructor(cls, *, n_dims=3, up=None):
+        """{known.summary}
+
+        Parameters
+        ----------
+        n_dims : {{3, 2}}, default=3
+            Axes of a position: 2 for key-points in a picture.
+        up : {{"y", "x", "z", "-y", "-x", "-z"}}, default=None
+            The vertical axis; by default {known.up!r} in space and {known.up_2d!r} in a picture.
+
+        Returns
+        -------
+        Skeleton
+            With the joints of this format, in its order.
+        """
         joints = list(known.parents)
         parents = [joints.index(p) if p else -1 for p in known.parents.values()]
         default = known.up_2d if n_dims == 2 else known.up
         return cls(joints, parents, known.landmarks, default if up is None else up, n_dims)
 
     constructor.__name__, constructor.__qualname__ = name, f"Skeleton.{name}"
-    constructor.__doc__ = _CONSTRUCTOR_DOC.format(known=known)
+    constructor.__doc__ = (constructor.__doc__ or "").format(known=known)
     return classmethod(constructor)
 
 
@@ -508,15 +503,12 @@ def _check_landmarks(landmarks, given, joints):
 
 def _find_cycle(parents):
     """Joints whose parents lead back to the first of them; empty if all lead to a root."""
-    rooted = set()
-    for joint in range(len(parents)):
-        chain = []
-        while joint >= 0 and joint not in rooted:
+    for start in range(len(parents)):
+        chain = [start]
+        while (joint := parents[chain[-1]]) >= 0:
             if joint in chain:
                 return [*chain[chain.index(joint) :], joint]
             chain.append(joint)
-            joint = parents[joint]
-        rooted.update(chain)
     return []
 
 

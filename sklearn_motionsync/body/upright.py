@@ -95,15 +95,14 @@ def check_upright(points, lengths, skeleton, what):
     trunk = [] if upper is None else _seen_rises(middle, upper)
     if len(trunk) and trunk[:, 1].mean() > -margin:
         return
-    parts = ["the pelvis is below the ankles"] if lower is not None else []
-    parts += ["the head is below the pelvis"] if len(trunk) else []
-    segments = [_seen_rises(bottom, top)] + [trunk] * (len(parts) == 2)
-    rise = sum(segment.mean(axis=0) for segment in segments)
+    rise = _seen_rises(bottom, top).mean(axis=0)
+    if lower is not None and len(trunk):
+        rise = rise + trunk.mean(axis=0)
     found = _nearest_axis(from_y_up(rise, skeleton))
     raise ValueError(
-        f"{what} is upside down: {' and '.join(parts)}. The skeleton says that "
-        f"{_signed(skeleton.up)} is up, but {_signed(found)} seems to be. Turn the skeleton, not "
-        f"the positions: Skeleton(..., up={found!r}), or Skeleton.from_frame(df, up={found!r})."
+        f"{what} is upside down: the skeleton says that {skeleton.up!r} is up, but {found!r} seems "
+        f"to be. Turn the skeleton, not the positions: Skeleton(..., up={found!r}), or "
+        f"Skeleton.from_frame(df, up={found!r})."
     )
 
 
@@ -148,7 +147,3 @@ def _is_symmetric(lengths, limbs):
 def _nearest_axis(rise):
     axis = int(np.abs(rise).argmax())
     return f"{'-' if rise[axis] < 0 else ''}{'xyz'[axis]}"
-
-
-def _signed(up):
-    return up if up.startswith("-") else f"+{up}"
