@@ -8,9 +8,8 @@ import pandas as pd
 import pytest
 from made_bodies import moved, standing, turned
 from sklearn import clone, config_context
-from sklearn.pipeline import make_pipeline, make_union
+from sklearn.pipeline import make_union
 from sklearn_motionsync import (
-    DenseSynchronizer,
     DirectionCosines,
     JointPositions,
     Skeleton,
@@ -218,14 +217,3 @@ def test_union_without_pandas_output_refuses_performances():
             views().fit_transform(X)
     rows = views().fit_transform(BUNCH.data[0])
     np.testing.assert_array_equal(rows, expected_of(BUNCH.data[:1])[0])
-
-
-def test_union_can_be_synchronised():
-    sync = DenseSynchronizer(30)
-    expected = clone(sync).fit(expected_of(BUNCH.data))
-    pipe = make_pipeline(in_pandas(), sync).fit(BUNCH.data)
-    np.testing.assert_array_equal(pipe[-1].pattern_, expected.pattern_)
-    aligned = expected.transform(expected_of(BUNCH.data))
-    np.testing.assert_array_equal(pipe.transform(BUNCH.data), aligned)
-    np.testing.assert_array_equal(clone(pipe).fit_transform(BUNCH.data), aligned)
-    np.testing.assert_array_equal(pipe.transform(BUNCH.data[:2]), aligned[:2])

@@ -1,5 +1,7 @@
 """The mirror image: left and right exchanged, by landmarks and by names, of any kind of input."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import polars as pl
@@ -75,36 +77,23 @@ def test_counterparts_of_all_formats(name):
     skeleton = getattr(Skeleton, name)()
     joints = list(skeleton.joints)
     x = np.random.default_rng(0).normal(size=(4, 3 * len(joints)))
-    x.reshape(4, -1, 3)[..., 0] *= [_side_of(j) != "" for j in joints]
+    x.reshape(4, -1, 3)[..., 0] *= [_split(j)[1] != "" for j in joints]
     found = mirror(x, skeleton).reshape(4, -1, 3) * [-1, 1, 1]
     for j, joint in enumerate(joints):
         same = [k for k in range(len(joints))
                 if np.array_equal(found[:, j], x.reshape(4, -1, 3)[:, k])]  # fmt: skip
         assert len(same) == 1
-        assert _without_side(joints[same[0]]) == _without_side(joint)
-        assert (same[0] == j) is (_side_of(joint) == "")
+        assert _split(joints[same[0]])[0] == _split(joint)[0]
+        assert (same[0] == j) is (_split(joint)[1] == "")
 
 
 def _split(joint):
-    """A name without its side, and its side, as formats write them."""
-    for word, side in (("left", "l"), ("right", "r")):
-        if word in joint.lower():
-            return joint.lower().replace(word, ""), side
-    if joint.endswith(("_l", "_r")):
-        return joint[:-2], joint[-1]
-    initial, rest = joint[0].lower(), joint[1:]
-    middle = ("root", "lowerback", "lowerneck")
-    if initial in "lr" and joint not in middle:
-        return rest, initial
-    return joint, ""
-
-
-def _without_side(joint):
-    return _split(joint)[0]
-
-
-def _side_of(joint):
-    return _split(joint)[1]
+    """A name without its side, and the side, as the formats write them."""
+    if joint in ("root", "lowerback", "lowerneck"):
+        return joint, ""
+    forms = ("(?i)left|right", "_[lr]$", "^[lrLR]")
+    side = next((found[0] for form in forms if (found := re.search(form, joint))), "")
+    return joint.replace(side, "", 1).lower(), side.strip("_").lower()[:1]
 
 
 # -- kinds of input -----------------------------------------------------------------------

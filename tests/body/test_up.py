@@ -149,7 +149,11 @@ def test_body_upside_down_is_refused_for_any_axis(up, landmarks, recording):
 @pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
 def test_parts_of_people_are_accepted_and_upside_down_refused(real_data, name):
     bunch = load_performances(real_data / f"{name}_positions.npz")
-    for landmarks, all_tell in ((LEGS, True), ([*TRUNK, "left_elbow"], False)):
+    for landmarks, all_tell in (
+        (PAPER.joints, True),
+        (LEGS, True),
+        ([*TRUNK, "left_elbow"], False),
+    ):
         known = {j: bunch.skeleton.landmarks[j] for j in landmarks}
         some = Skeleton(bunch.joints, bunch.skeleton.parents, known)
         fitted = DirectionCosines(some).fit(bunch.data)
