@@ -56,14 +56,9 @@ class Body(NamedTuple):
         return self.points[:, LANDMARKS.index(landmark)]
 
     @property
-    def median_lengths(self):
-        """Median lengths (12,) of the limbs over the performance; NaN of limbs never seen."""
-        return median_lengths(self.lengths)
-
-    @property
     def size(self):
         """The unit of length: the stretched leg, or without one the sum of all limbs."""
-        return body_size(self.median_lengths, self.skeleton.limbs)
+        return body_size(median_lengths(self.lengths), self.skeleton.limbs)
 
     @property
     def directions(self):

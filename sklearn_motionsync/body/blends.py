@@ -149,8 +149,9 @@ def _blend_path(figures, frames, weights, size):
 
 def _blend_heights(tracks, figures, frames, weights, size):
     """Heights above each floor, blended in units of the body, on the mean floor."""
-    own = [(x - figure.floor) / figure.size for x, figure in zip(tracks, figures, strict=True)]
-    return blend_numbers(own, frames, weights) * size + weights[:, 0] @ [x.floor for x in figures]
+    floors = [x.foot.min() for x in figures]
+    own = [(x - y) / f.size for x, y, f in zip(tracks, floors, figures, strict=True)]
+    return blend_numbers(own, frames, weights) * size + weights[:, 0] @ floors
 
 
 # -- bodies as links along axes that turn with them ---------------------------------------
@@ -171,8 +172,6 @@ class Figure(NamedTuple):
         The unit of length of the body.
     foot : ndarray, shape (n_frames,)
         Height of the lower ankle, or the lowest landmark of a body without ankles.
-    floor : float
-        The smallest height of the foot.
     """
 
     links: np.ndarray
@@ -180,10 +179,6 @@ class Figure(NamedTuple):
     angle: np.ndarray
     size: float
     foot: np.ndarray
-
-    @property
-    def floor(self):
-        return self.foot.min()
 
 
 class LinkStructure:

@@ -307,7 +307,7 @@ class DirectionCosines(PositionsTransformer):
             return cosines
         ankles = [f"{side}_ankle" for side in SIDES if f"{side}_ankle" in self.skeleton.landmarks]
         floor = lowest_height([body.position_of(ankle) for ankle in ankles])
-        lengths = body.median_lengths
+        lengths = median_lengths(body.lengths)
         leg = leg_length(lengths, limbs)
         if np.isnan(leg):
             lengths = scale_missing_lengths(lengths, self._all_lengths(self.limb_lengths_))
