@@ -1,4 +1,4 @@
-"""What transformers of joint positions share: how they take them, and what bodies they see."""
+"""The base of the transformers of joint positions: what they accept, and the body they see."""
 
 from typing import NamedTuple
 
@@ -9,92 +9,92 @@ from sklearn.utils.validation import check_is_fitted
 from ..inputs.validation import check_performances, restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
-from .axes import heading
-from .columns import AXES, check_columns
-from .formats import LANDMARKS
-from .hidden import hide_whole, seen_heading, typical_lengths
-from .limbs import LIMB_NAMES, LIMBS, landmarks_of, largest_of, limbs_of, size_of
-from .skeleton import Skeleton
-from .upright import check_upright, y_up
+from .axes import heading_axes, heading_axes_with_gaps, to_y_up
+from .formats import AXES, LANDMARKS
+from .limbs import (
+    LATERAL_LIMBS,
+    LIMB_NAMES,
+    LIMBS,
+    body_size,
+    landmark_positions,
+    limb_vectors,
+    median_lengths,
+)
+from .skeleton import Skeleton, check_columns
+from .upright import check_upright
 
-__all__ = ["ACROSS", "Body", "PositionsTransformer"]
+__all__ = ["Body", "PositionsTransformer", "mask_hidden"]
 
-# Limbs that point at the camera when a body is seen from the side.
-ACROSS = ("hip", "shoulder")
+
+def mask_hidden(points):
+    """Make points (n_frames, n, n_dims) NaN, in place, of which a coordinate is NaN."""
+    points[np.isnan(points).any(axis=2)] = np.nan
 
 
 class Body(NamedTuple):
-    """The body of a performance, y up, in units of ``2**exponent`` of the positions.
+    """The body of a performance, y up.
 
     Attributes
     ----------
     points : ndarray, shape (n_frames, 15, n_dims)
-        Of the landmarks; 0 for those that lack, NaN where they are hidden.
+        The landmarks; 0 if the skeleton lacks them, NaN where they are hidden.
     limbs : ndarray, shape (n_frames, 12, n_dims)
-        Those of `skeleton`; whatever the others. NaN where an end is hidden.
+        The limbs; 0 if the skeleton lacks them, NaN where an end is hidden.
     lengths : ndarray, shape (n_frames, 12)
-        Of the limbs, above 0; of hips and shoulders that a picture shows end-on, 0; NaN where
-        they are hidden.
-    exponent : int
+        Lengths of the limbs; 0 if the skeleton lacks them, and for hips and shoulders that a
+        picture shows end-on; NaN where they are hidden.
     skeleton : Skeleton
     """
 
     points: np.ndarray
     limbs: np.ndarray
     lengths: np.ndarray
-    exponent: int
     skeleton: Skeleton
 
-    def at(self, landmark):
-        """Where a landmark is: (n_frames, n_dims)."""
+    def position_of(self, landmark):
+        """Positions (n_frames, n_dims) of a landmark."""
         return self.points[:, LANDMARKS.index(landmark)]
 
     @property
-    def typical(self):
-        """Lengths (12,) of the performance's median limbs; NaN of those never seen."""
-        return typical_lengths(self.lengths)
-
-    @property
     def size(self):
-        """Length of their stretched leg; of a body without a whole one, of all of them."""
-        return size_of(self.typical, self.skeleton.limbs)
+        """The unit of length: the stretched leg, or without one the sum of all limbs."""
+        return body_size(median_lengths(self.lengths), self.skeleton.limbs)
 
     @property
     def directions(self):
-        """Limbs of length 1; of those that lack or have no length, 0."""
+        """Limbs (n_frames, 12, n_dims) divided by their length; 0 without a length."""
         lengths = self.lengths
         if not lengths.all():
             lengths = np.where(lengths > 0, lengths, 1)
         return self.limbs / lengths[:, :, np.newaxis]
 
     @property
-    def heading(self):
-        """Axes that turn with the body: (n_frames, 3, 3), rows x to the left, y up, z forward.
+    def axes(self):
+        """Axes (n_frames, 3, 3) that turn with the body: rows x to the left, y up, z forward.
 
-        None where nothing tells them: in the plane, and without hips and shoulders.
+        None in the plane, and without hips and shoulders.
         """
-        across = [name for name in ACROSS if name in self.skeleton.limbs]
-        if not across or self.skeleton.n_dims == 2:
+        lateral = [name for name in LATERAL_LIMBS if name in self.skeleton.limbs]
+        if not lateral or self.skeleton.n_dims == 2:
             return None
-        ways = self._along(across.pop(0))
-        if not np.isnan(ways[:, 0]).any():
-            return heading(ways)
-        return seen_heading(ways, *map(self._along, across))
+        first, *others = map(self._direction, lateral)
+        if not np.isnan(first[:, 0]).any():
+            return heading_axes(first)
+        return heading_axes_with_gaps(first, *others)
 
-    def _along(self, limb):
-        """Directions (n_frames, n_dims) of a limb that has a length."""
+    def _direction(self, limb):
         i = LIMB_NAMES.index(limb)
         return self.limbs[:, i] / self.lengths[:, i, np.newaxis]
 
 
 class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
-    """Base of what turns joint positions into features, body by body.
+    """Base of the transformers that compute features of joint positions, body by body.
 
-    Whoever inherits has a ``skeleton``, a ``fit`` that calls ``_check(X, reset=True)``, a
-    ``get_feature_names_out``, and tells by ``_features(body)`` what is made of a body.
+    A subclass has a ``skeleton``, a ``fit`` that calls ``_check(X, reset=True)``, a
+    ``get_feature_names_out``, and a ``_features(body)`` that returns the features of a `Body`.
     """
 
-    # What the contract asks of the input: "allow-nan" of who takes hidden joints.
+    # How `check_performances` treats NaN; "allow-nan" admits hidden joints.
     _finite = True
 
     fit_transform = atomic_fit(TransformerMixin.fit_transform)
@@ -110,15 +110,16 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
 
         Returns
         -------
-        The kind that was given, with the features that ``get_feature_names_out`` names
+        list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            The features that ``get_feature_names_out`` names, in the kind that was given.
 
         Raises
         ------
         ValueError
-            If the width is not that of the skeleton, a column of the skeleton stands in another
-            one's place, a limb has no length, or a body is upside down: in nine of ten frames its
-            pelvis is below the ankles, and its head is below the pelvis on average. Of a body of
-            which only one of the two is there, that one decides.
+            If the width is not that of the skeleton, a column of the skeleton has the place of
+            another one, a limb has length 0, or a body is upside down: in nine of ten frames its
+            pelvis is below the ankles, and its head is below the pelvis on average. If the body
+            has only one of the two segments, that one decides.
         """
         check_is_fitted(self)
         performances = self._check(X, reset=False)
@@ -143,32 +144,32 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
                 f"{len(skeleton.joints)} joints need {expected}: "
                 f"{', '.join(AXES[skeleton.n_dims])} of each."
             )
-        # All tables of a list have the names of the first.
+        # All tables of a list have the column names of the first.
         first = X[0] if isinstance(X, (list, tuple, np.ndarray)) else X
         check_columns(first, skeleton, "Performance 0")
         return performances
 
     def _body(self, performances, i):
-        """The body of a performance, or a refusal."""
+        """The body of a performance, checked."""
         skeleton = self.skeleton
-        points, exponent = landmarks_of(performances[i], skeleton)
-        points = y_up(points, skeleton)
+        points = to_y_up(landmark_positions(performances[i], skeleton), skeleton)
         if self._finite is not True:
-            hide_whole(points)
-        limbs = limbs_of(points)
+            mask_hidden(points)
+        limbs = limb_vectors(points)
         lengths = np.linalg.norm(limbs, axis=2)
-        # What is less is rounding of the coordinates.
-        without = lengths <= np.finfo(lengths.dtype).eps * largest_of(points)
+        # A shorter limb is rounding of the largest coordinate.
+        largest = np.fmax.reduce(np.abs(points), axis=None, initial=0)
+        zero = lengths <= np.finfo(lengths.dtype).eps * largest
         there = skeleton.limbs
         for k, name in enumerate(LIMB_NAMES):
             if name not in there:
-                limbs[:, k], lengths[:, k], without[:, k] = 0, 0, False
-            elif skeleton.n_dims == 2 and name in ACROSS:
-                end_on = without[:, k].copy()
+                limbs[:, k], lengths[:, k], zero[:, k] = 0, 0, False
+            elif skeleton.n_dims == 2 and name in LATERAL_LIMBS:
+                end_on = zero[:, k].copy()
                 if (end_on | np.isnan(lengths[:, k])).all():
-                    limbs[end_on, k], lengths[end_on, k], without[end_on, k] = 0, 0, False
-        if without.any():
-            frame, limb = np.argwhere(without)[0]
+                    limbs[end_on, k], lengths[end_on, k], zero[end_on, k] = 0, 0, False
+        if zero.any():
+            frame, limb = np.argwhere(zero)[0]
             name = LIMB_NAMES[limb]
             raise ValueError(
                 f"{performances.called(i)}, frame {frame}: the limb {name!r} has no length, its "
@@ -176,4 +177,4 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
                 "the frame, or choose other landmarks."
             )
         check_upright(points, lengths, skeleton, performances.called(i))
-        return Body(points, limbs, lengths, exponent, skeleton)
+        return Body(points, limbs, lengths, skeleton)

@@ -1,4 +1,4 @@
-"""DirectionCosines: from joint positions to postures, and back (Eq. 1)."""
+"""DirectionCosines: postures of joint positions (Eq. 1), and joint positions of postures."""
 
 import numpy as np
 import pandas as pd
@@ -9,55 +9,64 @@ from sklearn.utils.validation import check_is_fitted
 from ..inputs.numbers import as_numbers
 from ..inputs.validation import check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
-from .axes import along_parents, turned
-from .base import ACROSS, PositionsTransformer
-from .columns import AXES
-from .formats import LANDMARKS, SIDES
-from .hidden import hide_whole, in_proportion, typical_lengths
-from .limbs import LIMB_NAMES, LIMBS, exponent_of, leg_length, lowest, places_of, unit
+from .axes import convert_to_parent_axes, project_on_axes
+from .base import PositionsTransformer, mask_hidden
+from .formats import AXES, LANDMARKS, SIDES
+from .limbs import (
+    LATERAL_LIMBS,
+    LIMB_NAMES,
+    LIMBS,
+    leg_length,
+    limb_indices,
+    lowest_height,
+    median_lengths,
+    scale_missing_lengths,
+    unit_vectors,
+)
 from .skeleton import Skeleton
 
 __all__ = ["DirectionCosines"]
 
-_HEIGHT = "pelvis_height"
-_NUMBER = {2: "two", 3: "three"}
+# Largest shift of the hips from the pelvis, in leg lengths, that puts a body on the floor. Of 144
+# performances of optical motion capture, and of their approximations in an aSpace, none needs more
+# than 0.21.
+_LARGEST_SHIFT = 0.25
 
 
 class DirectionCosines(PositionsTransformer):
     """Postures of 37 parameters from joint positions (Eq. 1).
 
     A posture is the height of the pelvis and, for each of twelve limbs, the cosines of the
-    angles between the limb and three axes. It does not change when the body is moved,
-    or when all its limbs are longer by the same factor; with the default frame of
-    reference, nor when it faces another way.
+    angles between the limb and three axes. It is invariant to the place and the size of the body,
+    and with the default axes to its heading.
 
-    A skeleton that lacks landmarks has fewer parameters: the cosines of the limbs that are
-    there, and the height if there is a pelvis and a whole leg. Key-points in a picture
+    A skeleton that lacks landmarks has fewer parameters: the cosines of its limbs, and the height
+    if there are a pelvis and a complete leg. Key-points in a picture
     (``Skeleton(..., n_dims=2)``) have two cosines a limb.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Which columns are which joints: a ready one such as ``Skeleton.acclaim()``, that of a
+        Which columns are which joints: a known one such as ``Skeleton.acclaim()``, that of a
         table, ``Skeleton.from_frame(df)``, or your own.
     reference : {"heading", "parent", "world"}, default="heading"
         The axes of the cosines. ``"heading"``: x to the left along the hips, y up, z forward; of
         a body without hips along the shoulders, and without those the axes of the recording.
         ``"parent"``: those of the parent limb, which turn with it (without twist), or of the
         nearest limb above it that is there; the hip's are those of ``"heading"``. ``"world"``:
-        those of the recording, of which y is made the vertical one. A picture shows no heading:
+        those of the recording, turned so that y is vertical. A picture shows no heading:
         in the plane ``"heading"`` is ``"world"``, x across the picture and y up.
-    hidden : {"refuse", "nan"}, default="refuse"
-        What becomes of NaN, joints that were not seen. ``"refuse"``: it is an error. ``"nan"``: a
-        joint is hidden in a frame if any of its coordinates is NaN, and so is a landmark that is
-        the mean of it and others; limbs of which an end is hidden are NaN in that frame, and what
-        is seen stays as it is.
+    hidden : {"raise", "nan"}, default="raise"
+        How NaN, the positions of hidden joints, are treated. ``"raise"``: they are an error.
+        ``"nan"``: a joint is hidden in a frame if any of its coordinates is NaN, and so is a
+        landmark that is the mean of it and others; limbs with a hidden end are NaN in that frame,
+        and all other values are unchanged.
 
     Attributes
     ----------
     limb_lengths_ : ndarray, shape (n_limbs,)
-        Median length of each of ``skeleton.limbs`` over the postures of ``fit`` that show it, in
-        the unit of the positions; what ``inverse_transform`` builds a body of.
+        Median length of each of ``skeleton.limbs`` over the frames of ``fit`` that show it, in
+        the unit of the positions. ``inverse_transform`` uses them by default.
     n_features_in_ : int
         The number of joints times that of their axes.
     feature_names_in_ : ndarray of str
@@ -66,33 +75,31 @@ class DirectionCosines(PositionsTransformer):
     See Also
     --------
     ASpace : The reduced space of these postures.
-    JointPositions : Where the joints are: the other view of a body.
+    JointPositions : The positions of the joints relative to the pelvis.
 
     Notes
     -----
     The first parameter is the height of the pelvis above the lowest ankle of the whole
     performance, divided by the length of the stretched leg (the median over the performance):
     1 for standing, less for sitting, more in the air. The floor is a property of a
-    performance; a 2-D input is taken as one performance.
+    performance; a 2-D input is one performance.
 
     In a picture, hips and shoulders that coincide in a whole performance point at the camera: both
-    of their cosines are 0, as the two of three would be. A joint that was not found, and that the
-    program put at (0, 0), is to be repaired, left out, or made NaN where ``hidden="nan"``: no
-    position tells it from others.
+    of their cosines are 0. A joint that the program did not find and put at (0, 0) cannot be told
+    from others: repair it, leave it out, or make it NaN and use ``hidden="nan"``.
 
-    **Hidden joints.** Where the hips are hidden, axes of ``"heading"`` and ``"parent"`` face along
-    the shoulders, turned by as much as they were against the hips when both were last seen; if
-    they never were, along the shoulders. Where those are hidden, too, the body faces where it
-    faced before; until anything tells, all limbs are NaN. With ``"parent"`` a limb is NaN if the
-    limbs it hangs on are. The height needs the pelvis in its frame, an ankle in any frame, and
-    the lengths of the legs: of limbs that a performance never shows they are those of ``fit``,
-    in proportion to the limbs that it shows.
+    **Hidden joints.** Where the hips are hidden, the shoulders give the axes of ``"heading"`` and
+    ``"parent"``, corrected by the angle between hips and shoulders when both were last seen;
+    before that, by none. Where both are hidden, the last heading stays; before the first heading
+    all limbs are NaN. With ``"parent"`` a limb is NaN if one of the limbs above it is. The height
+    needs the pelvis in its frame, an ankle in any frame, and the lengths of the legs: of limbs that
+    a performance never shows they are those of ``fit``, scaled to the limbs that it shows.
 
-    **Live.** No row but the height looks at later frames, so the last row of the frames so far,
+    **Live.** No row but the height depends on later frames, so the last row of the frames so far,
     ``transform(frames[: k + 1])[-1]``, is that of the whole take; its floor is the lowest ankle so
-    far. The last seconds will do if they show the hips once, and a foot on the floor. A single
+    far. The last seconds suffice if they show the hips once, and a foot on the floor. A single
     frame, ``transform(frame[np.newaxis])[0]``, has its own lowest ankle as floor, so that
-    a jump is not seen, its own leg, and no frame before it that tells the heading.
+    a jump is not seen, its own leg length, and no earlier heading.
 
     Examples
     --------
@@ -120,10 +127,10 @@ class DirectionCosines(PositionsTransformer):
     _parameter_constraints: dict = {
         "skeleton": [Skeleton],
         "reference": [StrOptions({"heading", "parent", "world"})],
-        "hidden": [StrOptions({"refuse", "nan"})],
+        "hidden": [StrOptions({"raise", "nan"})],
     }
 
-    def __init__(self, skeleton, reference="heading", hidden="refuse"):
+    def __init__(self, skeleton, reference="heading", hidden="raise"):
         self.skeleton = skeleton
         self.reference = reference
         self.hidden = hidden
@@ -138,10 +145,12 @@ class DirectionCosines(PositionsTransformer):
         X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, or 2-D array
             Joint positions, joint by joint x, y, z; or x, y.
         y : ignored
+            Present for API consistency.
 
         Returns
         -------
-        self
+        DirectionCosines
+            The fitted transformer.
 
         Raises
         ------
@@ -150,13 +159,8 @@ class DirectionCosines(PositionsTransformer):
         """
         performances = self._check(X, reset=True)
         limbs = self.skeleton.limbs
-        bodies = [self._body(performances, i)[2:4] for i in range(len(performances))]
-        # What is hidden throughout has no unit.
-        unit_of_all = max((k for x, k in bodies if (x > 0).any()), default=0)
-        lengths = [x if k == unit_of_all else np.ldexp(x, k - unit_of_all) for x, k in bodies]
-        with np.errstate(over="ignore"):
-            found = np.ldexp(typical_lengths(np.concatenate(lengths)), unit_of_all)
-        found = found[places_of(limbs)]
+        lengths = [self._body(performances, i).lengths for i in range(len(performances))]
+        found = median_lengths(np.concatenate(lengths))[limb_indices(limbs)]
         if np.isnan(found).any():
             never = [name for name, length in zip(limbs, found, strict=True) if np.isnan(length)]
             raise ValueError(
@@ -164,47 +168,42 @@ class DirectionCosines(PositionsTransformer):
                 "lengths cannot be learnt. Fit on performances that show them, or leave their "
                 "landmarks out of the skeleton: Skeleton(..., landmarks={'left_wrist': None, ...})."
             )
-        has_length = (found > 0) | self._may_lack_length
-        if not has_length.all() or not np.isfinite(found).all():
-            raise ValueError(
-                f"The lengths of the limbs are beyond {found.dtype} numbers: give the positions in "
-                "another unit, such as metres."
-            )
         self.limb_lengths_ = found
         return self
 
     @snapshot
     def inverse_transform(self, X, limb_lengths=None):
-        """Joint positions of postures: the paper's fifteen joints, for drawing.
+        """Joint positions of postures: the paper's fifteen joints.
 
-        Of a body that lacks landmarks it is those that limbs hold together, ``skeleton.body()``.
+        Of a skeleton that lacks landmarks they are those that its limbs join,
+        ``skeleton.body()``.
 
-        The lowest ankle of a performance stands on the floor y = 0, its pelvis above the
-        origin; unless ``reference="world"`` it faces along z. Its hips lie evenly on both sides
-        of the pelvis and its shoulders of the neck, so a body built that way comes back exactly.
+        The lowest ankle of a performance is on the floor y = 0, its pelvis above the
+        origin; unless ``reference="world"`` it faces along z. The pelvis is the middle of the hips
+        and the neck that of the shoulders. A body of these proportions is reconstructed exactly.
 
-        Postures do not tell how far the hips are below the pelvis. All hips of a performance
-        are moved up or down by as much as puts its lowest ankle on the floor: then
-        ``transform`` gives the same height of the pelvis, and the same cosines. They
-        are moved by a quarter of a leg at most. A body that is farther from the floor, such as a
-        single posture in the air, stays there, and its height comes back as near as that allows.
-        A posture without a height has its pelvis at height 0; so has a part of the body that no
-        limb joins to the pelvis its uppermost joint.
+        Postures do not contain the height of the hips relative to the pelvis. All hips of a
+        performance are shifted up or down by one distance that puts its lowest ankle on the floor:
+        then ``transform`` gives the same height of the pelvis, and the same cosines. The largest
+        shift is a quarter of a leg. A body farther from the floor, such as a single posture in the
+        air, stays there, and its height is approximated. A posture without a height has its pelvis
+        at height 0; so has the uppermost joint of a part that no limb joins to the pelvis.
 
-        With ``hidden="nan"`` a limb of which a cosine is NaN is hidden: joints that hang on it are
-        NaN, and where the height is, all are.
+        With ``hidden="nan"`` a limb of which a cosine is NaN is hidden: joints below it are
+        NaN, and where the height is NaN, all are.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, 37), 3-D array, or 2-D array
-            Postures; the cosines of a limb only give its direction.
+            Postures. Cosines of a limb are scaled to length 1.
         limb_lengths : array-like of shape (n_limbs,), default=None
             Length of each limb, above 0; by default ``limb_lengths_``.
 
         Returns
         -------
-        The kind that was given, with 45 features: the positions of ``Skeleton.paper()``, or those
-        of ``skeleton.body()``
+        list of arrays (n_frames_i, 45), 3-D array, or 2-D array
+            The positions of ``Skeleton.paper()``, or of ``skeleton.body()``, in the kind that was
+            given.
 
         Raises
         ------
@@ -213,7 +212,7 @@ class DirectionCosines(PositionsTransformer):
             ``get_feature_names_out``, or ``limb_lengths`` are not numbers above 0, one a limb.
         """
         check_is_fitted(self)
-        lengths = self._lengths(limb_lengths)
+        lengths = self._as_lengths(limb_lengths)
         names = self.get_feature_names_out()
         performances = check_transformed(self, X, names, finite=self._finite)
         arrays = [self._positions(performances, i, lengths) for i in range(len(performances))]
@@ -221,16 +220,16 @@ class DirectionCosines(PositionsTransformer):
 
     @snapshot
     def position_matrix(self, limb_lengths=None):
-        """The linear map from postures to joint positions, for given limb lengths.
+        """The matrix of the linear map from postures to joint positions.
 
         The pelvis is at its height above the origin, and each joint at the end of its limb. That
-        is what ``inverse_transform`` gives of cosines of length 1, but for its last step: the
-        matrix leaves the hips beside the pelvis, where ``inverse_transform`` moves those of a
-        performance, and the legs with them, by one height that puts its lowest ankle on the floor.
+        equals ``inverse_transform`` of cosines of length 1, except for its last step: there the
+        hips of a performance, and the legs with them, are shifted by one height that puts the
+        lowest ankle on the floor.
 
-        Some of its rows are a camera: x and y are an orthographic picture from the front. A
-        tracker that sees positions takes them as the projection of a posture, and as its offset
-        that height of the legs, 0 elsewhere, where the hips of those it sees are below the pelvis.
+        The rows of x and y are an orthographic picture from the front. A `MotionTracker` that
+        observes positions takes such rows as its projection, and that height of the legs as its
+        offset, 0 for other joints.
 
         Parameters
         ----------
@@ -240,10 +239,10 @@ class DirectionCosines(PositionsTransformer):
         Returns
         -------
         matrix : ndarray of float64, shape (n_dims * n_joints, n_features)
-            ``postures @ matrix.T`` are positions of the joints of ``skeleton.body()``, y up, x to
-            the left of who faces along z; with ``reference="world"`` along the recording's axes.
+            ``postures @ matrix.T`` are positions of the joints of ``skeleton.body()``, y up, of a
+            body that faces along z; with ``reference="world"`` along the recording's axes.
         names : list of str
-            Of its rows, ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, ...
+            Names of its rows, ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, ...
 
         Raises
         ------
@@ -272,11 +271,12 @@ class DirectionCosines(PositionsTransformer):
         check_is_fitted(self)
         if self.reference == "parent":
             raise ValueError(
-                "Positions are no linear map of cosines along parent limbs, which turn with the "
+                "Positions are not linear in cosines along parent limbs, which turn with the "
                 "posture. Use reference='heading' or 'world', or inverse_transform."
             )
-        lengths = self._lengths(limb_lengths).astype(np.float64)
-        return matrix_of(self._of_twelve(lengths), self.skeleton), self.skeleton.body().column_names
+        lengths = self._as_lengths(limb_lengths).astype(np.float64)
+        matrix = _forward_matrix(self._all_lengths(lengths), self.skeleton)
+        return matrix, self.skeleton.body().column_names
 
     def get_feature_names_out(self, input_features=None):
         """Names of the 37 parameters: ``pelvis_height``, ``hip_x``, ..., ``right_forearm_z``.
@@ -284,169 +284,145 @@ class DirectionCosines(PositionsTransformer):
         Parameters
         ----------
         input_features : ignored
+            Present for API consistency.
 
         Returns
         -------
         ndarray of str
+            One name a feature.
         """
         axes = AXES[self.skeleton.n_dims]
         names = [f"{limb}_{axis}" for limb in self.skeleton.limbs for axis in axes]
-        return np.asarray([_HEIGHT] * self.skeleton.has_height + names, dtype=object)
+        return np.asarray(["pelvis_height"] * self.skeleton.has_height + names, dtype=object)
 
     def _features(self, body):
         limbs, cosines = self.skeleton.limbs, body.directions
-        heading = body.heading if self.reference != "world" else None
-        if heading is not None:
-            cosines = turned(cosines, heading)
+        axes = body.axes if self.reference != "world" else None
+        if axes is not None:
+            cosines = project_on_axes(cosines, axes)
         if self.reference == "parent":
-            cosines = along_parents(cosines, limbs)
-        cosines = cosines[:, places_of(limbs)].reshape(len(cosines), -1)
+            cosines = convert_to_parent_axes(cosines, limbs)
+        cosines = cosines[:, limb_indices(limbs)].reshape(len(cosines), -1)
         if not self.skeleton.has_height:
             return cosines
         ankles = [f"{side}_ankle" for side in SIDES if f"{side}_ankle" in self.skeleton.landmarks]
-        floor, lengths = lowest([body.at(ankle) for ankle in ankles]), body.typical
+        floor = lowest_height([body.position_of(ankle) for ankle in ankles])
+        lengths = median_lengths(body.lengths)
         leg = leg_length(lengths, limbs)
         if np.isnan(leg):
-            whole = in_proportion(lengths, self._of_twelve(self.limb_lengths_))
-            leg = leg_length(whole, limbs)
-        return np.column_stack([(body.at("pelvis")[:, 1] - floor) / leg, cosines])
+            lengths = scale_missing_lengths(lengths, self._all_lengths(self.limb_lengths_))
+            leg = leg_length(lengths, limbs)
+        return np.column_stack([(body.position_of("pelvis")[:, 1] - floor) / leg, cosines])
 
-    def _lengths(self, given):
-        if given is None:
+    def _as_lengths(self, limb_lengths):
+        """One length above 0 for each limb; by default those of ``fit``."""
+        if limb_lengths is None:
             return self.limb_lengths_
-        return checked_lengths(given, self.skeleton.limbs)
+        limbs = self.skeleton.limbs
+        names = list(limb_lengths.index) if isinstance(limb_lengths, pd.Series) else limbs
+        if names not in (limbs, list(range(len(limbs)))):
+            raise ValueError(f"limb_lengths is indexed by {names}; select {limbs}, in that order.")
+        lengths = as_numbers(limb_lengths, "limb_lengths", dtype=np.float64)
+        if lengths.shape != (len(limbs),):
+            raise ValueError(
+                f"limb_lengths needs one length for each of {limbs}, got shape {lengths.shape}."
+            )
+        wrong = ~((lengths > 0) & np.isfinite(lengths))
+        if wrong.any():
+            limb = int(wrong.argmax())
+            raise ValueError(
+                f"limb_lengths must be numbers above 0, got {lengths[limb]:g} for {limbs[limb]!r}."
+            )
+        return lengths
 
-    def _of_twelve(self, lengths):
-        whole = np.zeros(len(LIMB_NAMES), dtype=lengths.dtype)
-        whole[places_of(self.skeleton.limbs)] = lengths
-        return whole
+    def _all_lengths(self, lengths):
+        """Lengths (12,) of all limbs, 0 of those that the skeleton lacks."""
+        found = np.zeros(len(LIMB_NAMES), dtype=lengths.dtype)
+        found[limb_indices(self.skeleton.limbs)] = lengths
+        return found
 
     @property
     def _finite(self):
         return "allow-nan" if self.hidden == "nan" else True
 
-    @property
-    def _may_lack_length(self):
-        """Which limbs a picture may show end-on."""
-        in_plane = self.skeleton.n_dims == 2
-        return np.array([in_plane and name in ACROSS for name in self.skeleton.limbs])
-
     def _positions(self, performances, i, lengths):
         postures, limbs = performances[i], self.skeleton.limbs
         first, n_dims = int(self.skeleton.has_height), self.skeleton.n_dims
         given = postures[:, first:].reshape(len(postures), -1, n_dims)
-        # All of them being there is told sooner than one of each limb.
-        without = np.zeros(()) if given.all() else ~given.any(axis=2) & ~self._may_lack_length
-        if without.any():
-            frame, limb = np.argwhere(without)[0]
-            raise ValueError(
-                f"{performances.called(i)}, frame {frame}: the limb {limbs[limb]!r} has no "
-                f"direction, its {_NUMBER[n_dims]} cosines are 0. Drop the frame, or give it a "
-                "direction."
-            )
-        # A mean or an approximation of cosines is shorter than 1, a limb is not.
+        if not given.all():
+            # A picture may show hips and shoulders end-on.
+            end_on = np.array([n_dims == 2 and name in LATERAL_LIMBS for name in limbs])
+            zero = ~given.any(axis=2) & ~end_on
+            if zero.any():
+                frame, limb = np.argwhere(zero)[0]
+                raise ValueError(
+                    f"{performances.called(i)}, frame {frame}: the limb {limbs[limb]!r} has no "
+                    f"direction, its cosines are 0. Drop the frame, or give it a "
+                    "direction."
+                )
+        # Means and approximations of cosines are shorter than 1.
         cosines = np.zeros((len(given), len(LIMB_NAMES), n_dims), dtype=given.dtype)
-        cosines[:, places_of(limbs)] = unit(given)
+        cosines[:, limb_indices(limbs)] = unit_vectors(given)
         if self.reference == "parent":
-            cosines = along_parents(cosines, limbs, inverse=True)
-        k = exponent_of(lengths.max(), postures.dtype)
+            cosines = convert_to_parent_axes(cosines, limbs, inverse=True)
         heights = postures[:, 0] if first else None
-        with np.errstate(over="ignore", invalid="ignore"):
-            whole = self._of_twelve(np.ldexp(lengths, -k)).astype(postures.dtype)
-            body = built(heights, cosines, whole, self.skeleton)
-            positions = np.ldexp(body, k) if k else body
-            sound = np.isfinite(positions.sum()) or self._is_sound(positions)
-        if not sound or lengths[lengths > 0].min(initial=1) < np.finfo(positions.dtype).tiny:
-            raise ValueError(
-                f"{performances.called(i)}: the positions are beyond {positions.dtype} numbers. "
-                "Give limb_lengths in another unit, or smaller heights of the pelvis."
-            )
+        lengths = self._all_lengths(lengths).astype(postures.dtype)
+        positions = _forward_kinematics(heights, cosines, lengths, self.skeleton)
         if self._finite is not True:
-            hide_whole(positions.reshape(len(positions), -1, n_dims))
+            mask_hidden(positions.reshape(len(positions), -1, n_dims))
         return positions
 
-    def _is_sound(self, positions):
-        beyond = np.isinf(positions) if self._finite == "allow-nan" else ~np.isfinite(positions)
-        return not beyond.any()
+
+# -- forward kinematics -------------------------------------------------------------------
 
 
-# -- bodies built of the heights, directions and lengths of their limbs, and the matrix of that
-
-# How far the hips of a body may be moved from where its pelvis is, in leg lengths, so that it
-# stands on the floor. Of 144 performances of optical motion capture, and of their approximations in
-# an aSpace, none needs more than 0.21.
-_MOVED = 0.25
-
-
-def checked_lengths(limb_lengths, limbs):
-    """One length above 0 for each limb."""
-    names = list(limb_lengths.index) if isinstance(limb_lengths, pd.Series) else limbs
-    if names not in (limbs, list(range(len(limbs)))):
-        raise ValueError(f"limb_lengths is indexed by {names}; select {limbs}, in that order.")
-    lengths = as_numbers(limb_lengths, "limb_lengths", dtype=np.float64)
-    if lengths.shape != (len(limbs),):
-        raise ValueError(
-            f"limb_lengths needs one length for each of {limbs}, got shape {lengths.shape}."
-        )
-    wrong = ~((lengths > 0) & np.isfinite(lengths))
-    if wrong.any():
-        limb = int(wrong.argmax())
-        raise ValueError(
-            f"limb_lengths must be numbers above 0, got {lengths[limb]:g} for {limbs[limb]!r}."
-        )
-    return lengths
-
-
-def built(heights, cosines, lengths, skeleton):
+def _forward_kinematics(heights, cosines, lengths, skeleton):
     """Positions of bodies with given heights, directions and lengths of limbs.
 
     Parameters
     ----------
     heights : ndarray, shape (n_frames,), or None
-        Of the pelvis, in legs; None leaves it at height 0.
+        Of the pelvis, in leg lengths; None for height 0.
     cosines : ndarray, shape (n_frames, 12, n_dims)
-        Of length 1; 0 for limbs that lack. What hangs on NaN is NaN.
+        Unit vectors; 0 for limbs that the skeleton lacks. Joints below NaN are NaN.
     lengths : ndarray, shape (12,)
     skeleton : Skeleton
-        Tells which limbs and landmarks there are.
 
     Returns
     -------
     ndarray, shape (n_frames, n_dims * n_landmarks)
         Of the landmarks of ``skeleton.body()``.
     """
-    at = _chained(heights, cosines, lengths, skeleton.limbs)
+    at = _landmarks_of(heights, cosines, lengths, skeleton.limbs)
     if heights is not None:
-        legs = leg_length(lengths, skeleton.limbs)
+        limit = _LARGEST_SHIFT * leg_length(lengths, skeleton.limbs)
         ankles = [f"{side}_ankle" for side in SIDES if f"{side}_leg" in skeleton.limbs]
-        above = lowest([at[ankle] for ankle in ankles])
-        # Where no ankle is seen, nothing tells the floor.
-        down = 0 if np.isnan(above) else np.clip(above, -_MOVED * legs, _MOVED * legs)
+        above = lowest_height([at[ankle] for ankle in ankles])
+        # The floor is unknown if every ankle is hidden.
+        shift = 0 if np.isnan(above) else np.clip(above, -limit, limit)
         for side in SIDES:
             for joint in ("hip", "knee", "ankle"):
-                at[f"{side}_{joint}"][:, 1] -= down
+                at[f"{side}_{joint}"][:, 1] -= shift
     return _joined(at, skeleton)
 
 
-def matrix_of(lengths, skeleton):
-    """The matrix (n_dims * n_landmarks, n_features) of the positions in heights and cosines.
-
-    They are those that are ``built``, but for the move to the floor.
-    """
+def _forward_matrix(lengths, skeleton):
+    """The matrix (n_dims * n_landmarks, n_features) of the forward kinematics without the shift."""
     first, n_dims, limbs = int(skeleton.has_height), skeleton.n_dims, skeleton.limbs
-    each = np.eye(first + n_dims * len(limbs))
-    cosines = np.zeros((len(each), len(LIMBS), n_dims))
-    cosines[:, places_of(limbs)] = each[:, first:].reshape(len(each), -1, n_dims)
-    return _joined(_chained(each[:, 0] if first else None, cosines, lengths, limbs), skeleton).T
+    basis = np.eye(first + n_dims * len(limbs))
+    cosines = np.zeros((len(basis), len(LIMBS), n_dims))
+    cosines[:, limb_indices(limbs)] = basis[:, first:].reshape(len(basis), -1, n_dims)
+    heights = basis[:, 0] if first else None
+    return _joined(_landmarks_of(heights, cosines, lengths, limbs), skeleton).T
 
 
-def _chained(heights, cosines, lengths, limbs):
+def _landmarks_of(heights, cosines, lengths, limbs):
     """Positions (n_frames, n_dims) by landmark, linear in heights and cosines."""
     limb = dict(zip(LIMBS, np.moveaxis(cosines * lengths[:, np.newaxis], 1, 0), strict=True))
     at = {"pelvis": np.zeros_like(limb["hip"])}
     if heights is not None:
         at["pelvis"][:, 1] = heights * leg_length(lengths, limbs)
-    # What no limb joins to the pelvis starts where that is.
+    # A part that no limb joins to the pelvis begins there.
     at["neck"] = at["pelvis"] + limb["torso"]
     at["head"] = at["neck"] + limb["neck"]
     for side, sign in zip(SIDES, (0.5, -0.5), strict=True):

@@ -1,221 +1,174 @@
-"""Skeletons known by heart: their joints, the parent of each, and which are the landmarks."""
+"""Known skeletons: the joints of a recording format, the parent of each, and the landmarks."""
 
 from typing import NamedTuple
 
-__all__ = ["FORMATS", "LANDMARKS", "SIDES", "Format"]
+__all__ = ["AXES", "FORMATS", "LANDMARKS", "SIDES", "Format"]
 
+# Axes of a position in the plane and in space.
+AXES = {2: "xy", 3: "xyz"}
 SIDES = ("left", "right")
+# The fifteen joints of the paper's body model.
+LANDMARKS = ["pelvis", "neck", "head"]
+LANDMARKS += [
+    f"{side}_{part}"
+    for side in SIDES
+    for part in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+]
 
 
 class Format(NamedTuple):
-    """Joints as a program writes them.
+    """Joints in the order in which a program writes them.
 
     Attributes
     ----------
+    summary : str
+        One sentence for the documentation.
     parents : dict of str to str or None
         The parent of each joint, in the order of the columns.
     landmarks : dict of str to str or tuple of str
         The joint of each landmark, or those whose mean it is.
     up : str
-        The vertical axis that is usual in space.
-    up_in_pictures : str
-        The same of two coordinates.
+        The vertical axis in space.
+    up_2d : str
+        The vertical axis in a picture.
     """
 
+    summary: str
     parents: dict
     landmarks: dict
     up: str = "y"
-    up_in_pictures: str = "-y"
+    up_2d: str = "-y"
 
 
-def _both(parts, name):
-    """Landmarks of both sides: ``name(side, joint)`` of each part."""
-    return {f"{side}_{part}": name(side, joint) for side in SIDES for part, joint in parts.items()}
+def _format(summary, joints, landmarks, **up):
+    """A format from two tables in text.
 
-
-def _chains(name, roots, *chains):
-    """Parents of the joints of both sides; each chain hangs on one of the roots or on a chain."""
-    parents = {}
-    for side in SIDES:
-        for above, *chain in chains:
-            for joint in chain:
-                parents[name(side, joint)] = above if above in roots else name(side, above)
-                above = joint
-    return parents
-
-
-def _in_order(parents, joints):
-    return {joint: parents[joint] for joint in joints}
-
-
-_PARTS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-_ARM, _LEG = _PARTS[:3], _PARTS[3:]
-
-
-def _snake(side, joint):
-    return f"{side}_{joint}"
-
-
-def _initial(side, joint):
-    return side[0].upper() + joint
-
-
-# The fifteen joints of the body model.
-_PAPER = {"pelvis": None, "neck": "pelvis", "head": "neck"} | _chains(
-    _snake, ("neck", "pelvis"), ("neck", *_ARM), ("pelvis", *_LEG)
-)
-LANDMARKS = list(_PAPER)
-
-
-def _acclaim():
-    parents = {
-        "root": None,
-        **{"lhipjoint": "root", "rhipjoint": "root", "lowerback": "root"},
-        **{"lfemur": "lhipjoint", "ltibia": "lfemur", "lfoot": "ltibia", "ltoes": "lfoot"},
-        **{"rfemur": "rhipjoint", "rtibia": "rfemur", "rfoot": "rtibia", "rtoes": "rfoot"},
-        **{"upperback": "lowerback", "thorax": "upperback", "lowerneck": "thorax"},
-        **{"lclavicle": "thorax", "rclavicle": "thorax"},
-        **{"upperneck": "lowerneck", "head": "upperneck"},
-        **{"lhumerus": "lclavicle", "lradius": "lhumerus", "lwrist": "lradius"},
-        **{"lhand": "lwrist", "lthumb": "lwrist", "lfingers": "lhand"},
-        **{"rhumerus": "rclavicle", "rradius": "rhumerus", "rwrist": "rradius"},
-        **{"rhand": "rwrist", "rthumb": "rwrist", "rfingers": "rhand"},
+    Parameters
+    ----------
+    summary : str
+    joints : str
+        The joints in the order of the columns: ``name<parent``, ``>name`` for a child of the joint
+        before it, or ``name`` for a root.
+    landmarks : str
+        The joint at each of `LANDMARKS`: ``a+b`` is the mean of two joints, ``-`` stands for none.
+    **up : str
+        The vertical axes where they are not the default.
+    """
+    parents, previous = {}, None
+    for item in joints.split():
+        name, _, parent = item.removeprefix(">").partition("<")
+        parents[name] = previous if item.startswith(">") else parent or None
+        previous = name
+    at = {
+        landmark: tuple(names.split("+")) if "+" in names else names
+        for landmark, names in zip(LANDMARKS, landmarks.split(), strict=True)
+        if names != "-"
     }
-    # An Acclaim joint is the far end of the bone of that name.
-    bones = ("clavicle", "humerus", "radius", "hipjoint", "femur", "tibia")
-    sides = _both(dict(zip(_PARTS, bones, strict=True)), lambda side, bone: side[0] + bone)
-    landmarks = {"pelvis": "root", "neck": "thorax", "head": "head"} | sides
-    return Format(parents, landmarks, up_in_pictures="y")
+    return Format(summary, parents, at, **up)
 
 
-def _kinect(version):
-    def name(side, joint):
-        return joint + side.capitalize()
-
-    arm, leg = ("Shoulder", "Elbow", "Wrist", "Hand"), ("Hip", "Knee", "Ankle", "Foot")
-    names = {1: ("HipCenter", "Spine", "ShoulderCenter"), 2: ("SpineBase", "SpineMid", "Neck")}
-    pelvis, middle, third = names[version]
-    shoulders = third if version == 1 else "SpineShoulder"
-    parents = {pelvis: None, middle: pelvis, shoulders: middle, third: shoulders, "Head": third}
-    if version == 1:
-        parents[third] = middle
-    sides = _chains(name, (shoulders, pelvis), (shoulders, *arm), (pelvis, *leg))
-    order = [pelvis, middle, third, "Head"]
-    order += [name(side, joint) for chain in (arm, leg) for side in SIDES for joint in chain]
-    parents |= sides
-    if version == 2:
-        parents |= _chains(name, (), ("Hand", "HandTip"), ("Hand", "Thumb"))
-        tips = [name(side, joint) for side in SIDES for joint in ("HandTip", "Thumb")]
-        order += [shoulders, *tips]
-    landmarks = {"pelvis": pelvis, "neck": shoulders, "head": "Head"}
-    landmarks |= _both({part: part.capitalize() for part in _PARTS}, name)
-    return Format(_in_order(parents, order), landmarks)
-
-
-def _openpose(*, face, pelvis):
-    """BODY_25, or without the face OpenCap's key-points."""
-    arm, leg = [[part.capitalize() for part in chain] for chain in (_ARM, _LEG)]
-    parents = {pelvis: None, "Neck": pelvis, "Nose": "Neck"} | _chains(
-        _initial, ("Neck", pelvis, "Nose"), ("Neck", *arm), (pelvis, *leg), ("Nose", "Eye", "Ear"),
-        ("Ankle", "BigToe", "SmallToe"), ("Ankle", "Heel"),
-    )  # fmt: skip
-    order = ["Nose", "Neck", *(s + j for s in "RL" for j in arm), pelvis]
-    order += [s + j for s in "RL" for j in leg] + ["REye", "LEye", "REar", "LEar"]
-    order += [s + j for s in "LR" for j in ("BigToe", "SmallToe", "Heel")]
-    landmarks = {"pelvis": pelvis, "neck": "Neck"} | ({"head": "Nose"} if face else {})
-    landmarks |= _both({part: part.capitalize() for part in _PARTS}, _initial)
-    if not face:
-        order = [joint for joint in order if joint[1:] not in ("Eye", "Ear", "ose")]
-    return Format(_in_order(parents, order), landmarks)
-
-
-def _key_points(*, more):
-    """COCO's seventeen, or MediaPipe's thirty-three."""
-    # A tree has one way between two joints: the right side of the trunk is left open.
-    trunk = {"nose": None, "left_hip": None, "right_hip": "left_hip"}
-    trunk |= {"left_shoulder": "left_hip", "right_shoulder": "left_shoulder"}
-    face = ("nose", "eye_inner", "eye", "eye_outer", "ear") if more else ("nose", "eye", "ear")
-    parents = trunk | _chains(_snake, ("nose",), _ARM, _LEG, face)
-    order = ["nose"]
-    if more:
-        parents |= {"mouth_left": None, "mouth_right": "mouth_left"}
-        parents |= _chains(
-            _snake, (), *(("wrist", tip) for tip in ("pinky", "index", "thumb")),
-            ("ankle", "heel", "foot_index"),
-        )  # fmt: skip
-        order += [_snake(s, j) for s in SIDES for j in ("eye_inner", "eye", "eye_outer")]
-        order += [*(_snake(s, "ear") for s in SIDES), "mouth_left", "mouth_right"]
-        pairs = (*_ARM, "pinky", "index", "thumb", *_LEG, "heel", "foot_index")
-    else:
-        pairs = ("eye", "ear", *_PARTS)
-    order += [_snake(side, joint) for joint in pairs for side in SIDES]
-    hips, shoulders = (tuple(_snake(side, part) for side in SIDES) for part in ("hip", "shoulder"))
-    landmarks = {"pelvis": hips, "neck": shoulders, "head": "nose"}
-    landmarks |= _both({part: part for part in _PARTS}, _snake)
-    return Format(_in_order(parents, order), landmarks, up="-y" if more else "y")
-
-
-def _near_ends(name, middle, neck, limbs, *, clavicle, toes, up):
-    """A rig whose joints are the near ends of its bones; `middle` leads up from the pelvis."""
-    pelvis, chest = middle[0], middle[-1]
-    parents = {joint: above for above, joint in zip((None, *middle), middle, strict=False)}
-    parents |= {neck[0]: chest, **{joint: neck[0] for joint in neck[1:]}}
-    arm, leg = limbs[:3], limbs[3:]
-    parents |= _chains(name, (chest, pelvis), (chest, *clavicle, *arm), (pelvis, *leg, *toes))
-    landmarks = {"pelvis": pelvis, "neck": neck[0], "head": neck[-1]}
-    landmarks |= _both(dict(zip(_PARTS, limbs, strict=True)), name)
-    return parents, landmarks, up
-
-
-def _optitrack():
-    limbs = ("UArm", "FArm", "Hand", "Thigh", "Shin", "Foot")
-    parents, landmarks, up = _near_ends(
-        _initial, ("Hip", "Ab", "Chest"), ("Neck", "Head"), limbs,
-        clavicle=("Shoulder",), toes=("Toe",), up="y",
-    )  # fmt: skip
-    order = ["Hip", "Ab", "Chest", "Neck", "Head"]
-    order += [s + j for s in "LR" for j in ("Shoulder", *limbs[:3])]
-    order += [s + j for s in "LR" for j in (*limbs[3:], "Toe")]
-    return Format(_in_order(parents, order), landmarks, up)
-
-
-def _unreal():
-    def name(side, joint):
-        return f"{joint}_{side[0]}"
-
-    limbs = ("upperarm", "lowerarm", "hand", "thigh", "calf", "foot")
-    spine = ("pelvis", "spine_01", "spine_02", "spine_03")
-    parents, landmarks, up = _near_ends(
-        name, spine, ("neck_01", "head"), limbs, clavicle=("clavicle",), toes=("ball",), up="z"
-    )
-    order = [*spine, *(f"{j}_{s}" for s in "lr" for j in ("clavicle", *limbs[:3]))]
-    order += ["neck_01", "head", *(f"{j}_{s}" for s in "lr" for j in (*limbs[3:], "ball"))]
-    return Format(_in_order(parents, order), landmarks, up)
-
-
-def _plug_in_gait():
-    centres = {part: f"{part[0].upper()}JC" for part in _PARTS}
-    parents = {"PELO": None, "TRXO": "PELO", "HEDO": "TRXO"} | _chains(
-        _initial, ("PELO", "TRXO"), ("PELO", *(centres[part] for part in _LEG)),
-        ("TRXO", *(centres[part] for part in _ARM)),
-    )  # fmt: skip
-    landmarks = {"pelvis": "PELO", "neck": "TRXO", "head": "HEDO"} | _both(centres, _initial)
-    order = ["PELO", *(s + centres[part] for s in "LR" for part in _LEG), "TRXO", "HEDO"]
-    order += [s + centres[part] for s in "LR" for part in _ARM]
-    return Format(_in_order(parents, order), landmarks, up="z")
-
-
-# In the order in which names are held against them: who has most landmarks first.
+# Names of joints are compared with the formats in this order: the most complete come first.
 FORMATS = {
-    "acclaim": _acclaim(),
-    "kinect": _kinect(1),
-    "paper": Format(_PAPER, {name: name for name in LANDMARKS}, up_in_pictures="y"),
-    "kinect_v2": _kinect(2),
-    "openpose": _openpose(face=True, pelvis="MidHip"),
-    "mediapipe": _key_points(more=True),
-    "coco": _key_points(more=False),
-    "plug_in_gait": _plug_in_gait(),
-    "optitrack": _optitrack(),
-    "unreal": _unreal(),
-    "opencap": _openpose(face=False, pelvis="midHip"),
+    "acclaim": _format(
+        "The 31 joints of HDM05 and of CMU's ASF/AMC files.",
+        """root >lhipjoint rhipjoint<root lowerback<root lfemur<lhipjoint >ltibia >lfoot >ltoes
+        rfemur<rhipjoint >rtibia >rfoot >rtoes upperback<lowerback >thorax >lowerneck
+        lclavicle<thorax rclavicle<thorax upperneck<lowerneck >head lhumerus<lclavicle >lradius
+        >lwrist >lhand lthumb<lwrist lfingers<lhand rhumerus<rclavicle >rradius >rwrist >rhand
+        rthumb<rwrist rfingers<rhand""",
+        """root thorax head lclavicle lhumerus lradius lhipjoint lfemur ltibia rclavicle rhumerus
+        rradius rhipjoint rfemur rtibia""",
+        up_2d="y",
+    ),
+    "kinect": _format(
+        "The 20 joints of the first Kinect.",
+        """HipCenter >Spine >ShoulderCenter >Head ShoulderLeft<ShoulderCenter >ElbowLeft >WristLeft
+        >HandLeft ShoulderRight<ShoulderCenter >ElbowRight >WristRight >HandRight HipLeft<HipCenter
+        >KneeLeft >AnkleLeft >FootLeft HipRight<HipCenter >KneeRight >AnkleRight >FootRight""",
+        """HipCenter ShoulderCenter Head ShoulderLeft ElbowLeft WristLeft HipLeft KneeLeft AnkleLeft
+        ShoulderRight ElbowRight WristRight HipRight KneeRight AnkleRight""",
+    ),
+    "paper": _format(
+        "The fifteen joints of the paper's body model.",
+        """pelvis >neck >head left_shoulder<neck >left_elbow >left_wrist left_hip<pelvis >left_knee
+        >left_ankle right_shoulder<neck >right_elbow >right_wrist right_hip<pelvis >right_knee
+        >right_ankle""",
+        """pelvis neck head left_shoulder left_elbow left_wrist left_hip left_knee left_ankle
+        right_shoulder right_elbow right_wrist right_hip right_knee right_ankle""",
+        up_2d="y",
+    ),
+    "kinect_v2": _format(
+        "The 25 joints of the second Kinect and, in the same order, of NTU RGB+D.",
+        """SpineBase >SpineMid Neck<SpineShoulder >Head ShoulderLeft<SpineShoulder >ElbowLeft
+        >WristLeft >HandLeft ShoulderRight<SpineShoulder >ElbowRight >WristRight >HandRight
+        HipLeft<SpineBase >KneeLeft >AnkleLeft >FootLeft HipRight<SpineBase >KneeRight >AnkleRight
+        >FootRight SpineShoulder<SpineMid HandTipLeft<HandLeft ThumbLeft<HandLeft
+        HandTipRight<HandRight ThumbRight<HandRight""",
+        """SpineBase SpineShoulder Head ShoulderLeft ElbowLeft WristLeft HipLeft KneeLeft AnkleLeft
+        ShoulderRight ElbowRight WristRight HipRight KneeRight AnkleRight""",
+    ),
+    "openpose": _format(
+        "The 25 key-points of OpenPose, BODY_25; the head is the nose.",
+        """Nose<Neck Neck<MidHip >RShoulder >RElbow >RWrist LShoulder<Neck >LElbow >LWrist MidHip
+        >RHip >RKnee >RAnkle LHip<MidHip >LKnee >LAnkle REye<Nose LEye<Nose REar<REye LEar<LEye
+        LBigToe<LAnkle >LSmallToe LHeel<LAnkle RBigToe<RAnkle >RSmallToe RHeel<RAnkle""",
+        """MidHip Neck Nose LShoulder LElbow LWrist LHip LKnee LAnkle RShoulder RElbow RWrist RHip
+        RKnee RAnkle""",
+    ),
+    "mediapipe": _format(
+        "The 33 landmarks of MediaPipe's pose; the head is the nose.",
+        """nose >left_eye_inner >left_eye >left_eye_outer right_eye_inner<nose >right_eye
+        >right_eye_outer left_ear<left_eye_outer right_ear<right_eye_outer mouth_left >mouth_right
+        left_shoulder<left_hip >right_shoulder left_elbow<left_shoulder right_elbow<right_shoulder
+        left_wrist<left_elbow right_wrist<right_elbow left_pinky<left_wrist right_pinky<right_wrist
+        left_index<left_wrist right_index<right_wrist left_thumb<left_wrist right_thumb<right_wrist
+        left_hip >right_hip left_knee<left_hip right_knee<right_hip left_ankle<left_knee
+        right_ankle<right_knee left_heel<left_ankle right_heel<right_ankle left_foot_index<left_heel
+        right_foot_index<right_heel""",
+        """left_hip+right_hip left_shoulder+right_shoulder nose left_shoulder left_elbow left_wrist
+        left_hip left_knee left_ankle right_shoulder right_elbow right_wrist right_hip right_knee
+        right_ankle""",
+        up="-y",
+    ),
+    "coco": _format(
+        "The 17 key-points of COCO; the head is the nose.",
+        """nose >left_eye right_eye<nose left_ear<left_eye right_ear<right_eye
+        left_shoulder<left_hip >right_shoulder left_elbow<left_shoulder right_elbow<right_shoulder
+        left_wrist<left_elbow right_wrist<right_elbow left_hip >right_hip left_knee<left_hip
+        right_knee<right_hip left_ankle<left_knee right_ankle<right_knee""",
+        """left_hip+right_hip left_shoulder+right_shoulder nose left_shoulder left_elbow left_wrist
+        left_hip left_knee left_ankle right_shoulder right_elbow right_wrist right_hip right_knee
+        right_ankle""",
+    ),
+    "plug_in_gait": _format(
+        "Joint centres and segment origins of Vicon's Plug-in Gait.",
+        """PELO >LHJC >LKJC >LAJC RHJC<PELO >RKJC >RAJC TRXO<PELO >HEDO LSJC<TRXO >LEJC >LWJC
+        RSJC<TRXO >REJC >RWJC""",
+        """PELO TRXO HEDO LSJC LEJC LWJC LHJC LKJC LAJC RSJC REJC RWJC RHJC RKJC RAJC""",
+        up="z",
+    ),
+    "optitrack": _format(
+        "The 21 bones of OptiTrack's Motive.",
+        """Hip >Ab >Chest >Neck >Head LShoulder<Chest >LUArm >LFArm >LHand RShoulder<Chest >RUArm
+        >RFArm >RHand LThigh<Hip >LShin >LFoot >LToe RThigh<Hip >RShin >RFoot >RToe""",
+        """Hip Neck Head LUArm LFArm LHand LThigh LShin LFoot
+        RUArm RFArm RHand RThigh RShin RFoot""",
+    ),
+    "unreal": _format(
+        "The body of Unreal Engine's mannequin, 22 bones.",
+        """pelvis >spine_01 >spine_02 >spine_03 >clavicle_l >upperarm_l >lowerarm_l >hand_l
+        clavicle_r<spine_03 >upperarm_r >lowerarm_r >hand_r neck_01<spine_03 >head thigh_l<pelvis
+        >calf_l >foot_l >ball_l thigh_r<pelvis >calf_r >foot_r >ball_r""",
+        """pelvis neck_01 head upperarm_l lowerarm_l hand_l thigh_l calf_l foot_l upperarm_r
+        lowerarm_r hand_r thigh_r calf_r foot_r""",
+        up="z",
+    ),
+    "opencap": _format(
+        "The 20 video key-points of OpenCap, without a head.",
+        """Neck<midHip >RShoulder >RElbow >RWrist LShoulder<Neck >LElbow >LWrist midHip >RHip >RKnee
+        >RAnkle LHip<midHip >LKnee >LAnkle >LBigToe >LSmallToe LHeel<LAnkle RBigToe<RAnkle
+        >RSmallToe RHeel<RAnkle""",
+        """midHip Neck - LShoulder LElbow LWrist LHip LKnee LAnkle RShoulder RElbow RWrist RHip
+        RKnee RAnkle""",
+    ),
 }

@@ -1,38 +1,37 @@
-"""JointPositions: where the joints of a body are, seen from its pelvis."""
+"""JointPositions: positions of the joints of a body relative to its pelvis."""
 
 import numpy as np
 from sklearn.base import _fit_context
 from sklearn.utils._param_validation import StrOptions
 
 from ..utils.atomic import atomic_fit
-from .axes import turned
+from .axes import project_on_axes
 from .base import PositionsTransformer
-from .columns import AXES
-from .formats import LANDMARKS, SIDES
+from .formats import AXES, LANDMARKS, SIDES
 from .skeleton import Skeleton
 
 __all__ = ["JointPositions"]
 
 
 class JointPositions(PositionsTransformer):
-    """Where the joints of a body are, seen from its pelvis: 42 features.
+    """Positions of the joints of a body relative to its pelvis: 42 features.
 
-    For each landmark of the paper's body model but the pelvis, its place relative to the pelvis,
-    in leg lengths. It does not change when the body is moved, or is larger as a whole; with the
-    default frame of reference, nor when it faces another way.
+    For each landmark of the paper's body model except the pelvis, its position relative to the
+    pelvis in leg lengths. The features are invariant to the place and the size of the body, and
+    with the default axes to its heading.
 
-    A skeleton that lacks landmarks has the places of those that are there; key-points in a picture
+    A skeleton that lacks landmarks has the positions of its own; key-points in a picture
     have two coordinates each.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Which columns are which joints: a ready one such as ``Skeleton.acclaim()``, that of a
+        Which columns are which joints: a known one such as ``Skeleton.acclaim()``, that of a
         table, ``Skeleton.from_frame(df)``, or your own.
     reference : {"heading", "world"}, default="heading"
         The axes. ``"heading"``: those of the body at each frame, x to the left along the hips,
-        y up, z forward, as in `DirectionCosines`. ``"world"``: those of the recording, of which
-        y is made the vertical one. In the plane both are the picture's, x across and y up.
+        y up, z forward, as in `DirectionCosines`. ``"world"``: those of the recording, turned so
+        that y is vertical. In the plane both are the picture's, x across and y up.
 
     Attributes
     ----------
@@ -43,23 +42,22 @@ class JointPositions(PositionsTransformer):
 
     See Also
     --------
-    DirectionCosines : Postures of the directions of limbs, and back: the other view of a body.
+    DirectionCosines : Postures of the directions of limbs, with an inverse.
 
     Notes
     -----
     The unit is that of the pelvis' height in `DirectionCosines`: the length of the stretched leg,
-    the median over the performance; of a body without a whole leg, the length of all its limbs.
-    Without a pelvis, places are relative to the middle of the hips, the neck, the middle of the
-    shoulders, or the first landmark, whichever is there first. A 2-D input is taken as one
-    performance.
+    the median over the performance; of a body without a complete leg, the sum of its limbs.
+    Without a pelvis, positions are relative to the first of these that is there: the middle of the
+    hips, the neck, the middle of the shoulders, the first landmark. A 2-D input is one performance.
 
-    To directions all limbs are alike; to positions those matter most that reach far.
-    scikit-learn's ``make_union`` puts both side by side, frame by frame. It needs pandas output
+    `DirectionCosines` weighs all limbs alike; positions weigh long limbs more.
+    scikit-learn's ``make_union`` joins the features of both, frame by frame. It needs pandas output
     for that, as in the example: without it a union takes the list or 3-D array of each
     transformer for one matrix, and refuses it with a message about shapes. Where all widths and
     all lengths are equal (``"heading"`` beside ``"world"``, performances of the same number of
     frames) it may join a list along time. A 2-D input, one performance, needs no pandas. Keep the
-    prefixes that the union puts before names, for both views have a neck.
+    prefixes that the union puts before names: "neck" is both a limb and a joint.
 
     Examples
     --------
@@ -70,7 +68,7 @@ class JointPositions(PositionsTransformer):
     >>> positions.transform(bunch.data)[0].shape[1], list(positions.get_feature_names_out()[:3])
     (42, ['neck_x', 'neck_y', 'neck_z'])
 
-    Both views, synchronised:
+    Both kinds of features, synchronised:
 
     >>> from sklearn.pipeline import make_pipeline, make_union
     >>> from sklearn_motionsync import DenseSynchronizer, DirectionCosines
@@ -95,17 +93,19 @@ class JointPositions(PositionsTransformer):
     @atomic_fit
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X, y=None):
-        """Check the performances; nothing is learnt but the number and the names of the columns.
+        """Check the performances, and store the number and the names of the columns.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, or 2-D array
             Joint positions, joint by joint x, y, z; or x, y.
         y : ignored
+            Present for API consistency.
 
         Returns
         -------
-        self
+        JointPositions
+            The fitted transformer.
 
         Raises
         ------
@@ -123,10 +123,12 @@ class JointPositions(PositionsTransformer):
         Parameters
         ----------
         input_features : ignored
+            Present for API consistency.
 
         Returns
         -------
         ndarray of str
+            One name a feature.
         """
         axes = AXES[self.skeleton.n_dims]
         names = [f"{landmark}_{axis}" for landmark in self._landmarks for axis in axes]
@@ -134,17 +136,17 @@ class JointPositions(PositionsTransformer):
 
     @property
     def _landmarks(self):
-        """Those whose places are features: all but the one that is the origin."""
+        """The landmarks whose positions are features: all but the origin."""
         origin = _origin_of(self.skeleton)
         return [name for name in self.skeleton.landmarks if [name] != origin]
 
     def _features(self, body):
-        origin = [body.at(name) for name in _origin_of(self.skeleton)]
-        # The pelvis is the first landmark; no other is the origin if it is there.
+        origin = [body.position_of(name) for name in _origin_of(self.skeleton)]
+        # The pelvis is the first landmark, and the origin if it is there.
         places = (body.points[:, 1:] - (sum(origin) / len(origin))[:, np.newaxis]) / body.size
-        heading = body.heading if self.reference == "heading" else None
-        if heading is not None:
-            places = turned(places, heading)
+        axes = body.axes if self.reference == "heading" else None
+        if axes is not None:
+            places = project_on_axes(places, axes)
         if len(self._landmarks) < places.shape[1]:
             places = places[:, [LANDMARKS.index(name) - 1 for name in self._landmarks]]
         return places.reshape(len(places), -1)

@@ -1,15 +1,21 @@
-"""Landmarks told from the names of joints: those of a known format, or the likeliest ones."""
+"""Landmarks guessed from the names of joints: those of a known format, or by common synonyms."""
 
 import os
 import re
 
 from .formats import FORMATS, LANDMARKS, SIDES
 
-__all__ = ["LANDMARKS", "as_tuple", "completed", "likely_landmarks", "one_sided", "plain_names"]
+__all__ = [
+    "add_midpoints",
+    "as_tuple",
+    "guess_landmarks",
+    "missing_counterparts",
+    "other_side",
+]
 
 # Names of the joint at each landmark in files whose joints are the near ends of the
-# bones, the likeliest first. The last are what Plug-in Gait calls its bones, and its markers on
-# the skin, which stand for the joints where no centres were computed.
+# bones, the likeliest first. The last are names of bones in Plug-in Gait, and of its markers on
+# the skin, which stand for the joints where no joint centres were computed.
 _SYNONYMS = {
     "pelvis": ("pelvis", "hips", "hip", "hipcenter", "midhip", "spinebase", "root", "pelo"),
     "neck": ("neck", "neck1", "neck01", "necktwist01", "shouldercenter", "spineshoulder", "thorax",
@@ -22,65 +28,72 @@ _SYNONYMS = {
     "knee": ("knee", "calf", "leg", "lowerleg", "lowleg", "shin", "shank", "kjc", "feo", "kne"),
     "ankle": ("ankle", "foot", "ajc", "tio", "ank"),
 }  # fmt: skip
-# Joints or markers of which a landmark is the mean where none of those names is there: one of each
-# side, or several of one.
-_AROUND = {"head": ("ear", "fhd"), "wrist": ("wra", "wrb")}
-# Formats that the guess could read otherwise; it finds what others lack in files that have more.
+# Pairs of joints or markers whose mean is a landmark if no synonym is found.
+_PAIRS = {
+    "head": [("left", "ear", "right", "ear"), ("left", "fhd", "right", "fhd")],
+    **{f"{side}_wrist": [(side, "wra", side, "wrb")] for side in SIDES},
+}
+# Formats with all landmarks at joints of their own. The names of the others are synonyms.
 _KNOWN = [
     known.landmarks
     for known in FORMATS.values()
     if len(known.landmarks) == len(LANDMARKS)
     and all(isinstance(at, str) for at in known.landmarks.values())
 ]
-# What stands in the middle of a pair, where no joint does.
-_MIDDLES = {"pelvis": "hip", "neck": "shoulder"}
+_MIDPOINTS = {"pelvis": "hip", "neck": "shoulder"}
 
 
-def likely_landmarks(joints, names=()):
-    """The landmarks of a known format if the names are its, otherwise guessed ones.
+def guess_landmarks(joints, names=()):
+    """The landmarks of a known format if the names are its, otherwise guessed by synonyms.
 
-    `names` may tell more joints than are there; their landmarks are left out.
+    `names` may list joints of the file that have no columns; their landmarks are left out.
     """
     there = {*joints, *names}
-    plain = plain_names([*joints, *(name for name in names if name not in set(joints))])
+    plain = _plain_names([*joints, *(name for name in names if name not in set(joints))])
     for landmarks in _KNOWN:
         if not set(landmarks.values()) <= there:
             landmarks = {name: plain.get(_plain(joint)) for name, joint in landmarks.items()}
         if None not in landmarks.values():
             return {name: joint for name, joint in landmarks.items() if joint in set(joints)}
-    return _guessed(plain_names(joints))
+    return _guess_by_synonyms(_plain_names(joints))
 
 
-def completed(landmarks):
-    """Landmarks with a pelvis and a neck in the middle of the hips and the shoulders."""
-    for name, part in _MIDDLES.items():
+def add_midpoints(landmarks):
+    """Landmarks with a missing pelvis and neck as the means of the hips and the shoulders."""
+    for name, part in _MIDPOINTS.items():
         pair = [landmarks.get(f"{side}_{part}") for side in SIDES]
         if name not in landmarks and None not in pair:
             landmarks = landmarks | {name: tuple(j for at in pair for j in as_tuple(at))}
     return landmarks
 
 
-def one_sided(landmarks, given):
-    """Landmarks that lack though their counterpart was told from the names; but those given."""
-    lacking = []
-    for name in LANDMARKS:
-        side, _, part = name.rpartition("_")
-        other = f"{SIDES[side == SIDES[0]]}_{part}"
-        if side and name not in {*landmarks, *given} and other in landmarks and other not in given:
-            lacking.append(name)
-    return lacking
+def missing_counterparts(landmarks, given):
+    """Landmarks that are missing while the other side was guessed, unless they were given."""
+    return [
+        name
+        for name in LANDMARKS
+        if name not in {*landmarks, *given}
+        and (other := other_side(name)) in landmarks
+        and other not in given
+    ]
+
+
+def other_side(landmark):
+    """The landmark of the other side; None for pelvis, neck and head."""
+    side, _, part = landmark.rpartition("_")
+    return f"{SIDES[side == SIDES[0]]}_{part}" if side else None
 
 
 def as_tuple(at):
-    """The joints of a landmark, of which there is one or several."""
+    """The joints of a landmark, one or several, as a tuple."""
     return (at,) if isinstance(at, str) else tuple(at)
 
 
-def plain_names(joints):
+def _plain_names(joints):
     """Joints by their names in small letters and digits; of equal names the first."""
-    # A prefix that a program gave to every joint but perhaps the root is no part of a name.
+    # Programs put a prefix before every joint, except perhaps the root.
     prefix = re.match(r"(.*[^A-Za-z0-9])?", os.path.commonprefix(joints[1:])).group()  # noqa: RUF071
-    # Of a body of which one side was recorded, every name has the side.
+    # If one side was recorded, the side is in every name, and no prefix.
     prefix = re.sub(r"(?i)(?<![a-z0-9])(left|right|l|r)[^a-z0-9]+$", "", prefix)
     return {_plain(j.removeprefix(prefix)): j for j in reversed(joints)}
 
@@ -89,27 +102,24 @@ def _plain(name):
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
-def _guessed(plain):
-    """The joint of each landmark that can be told from the names."""
+def _guess_by_synonyms(plain):
+    """The joint of each landmark that a synonym or a pair of joints gives."""
     found = {}
     for landmark in LANDMARKS:
         side, _, part = landmark.rpartition("_")
         joint = _find(plain, side, _SYNONYMS[part])
         if joint is not None:
             found[landmark] = joint
-    for name in _AROUND["head"]:
-        pair = [_find(plain, side, (name,)) for side in SIDES]
-        if "head" not in found and None not in pair:
-            found["head"] = tuple(pair)
-    for side in SIDES:
-        pair = [_find(plain, side, (name,)) for name in _AROUND["wrist"]]
-        if f"{side}_wrist" not in found and None not in pair:
-            found[f"{side}_wrist"] = tuple(pair)
+    for landmark, pairs in _PAIRS.items():
+        for side, name, other, other_name in pairs:
+            pair = _find(plain, side, (name,)), _find(plain, other, (other_name,))
+            if landmark not in found and None not in pair:
+                found[landmark] = pair
     return found
 
 
 def _find(plain, side, synonyms):
-    """The joint that is called by one of these names, of this side."""
+    """The joint with one of these names on a side, or None."""
     forms = ("{side}{part}", "{part}{side}", "{side[0]}{part}", "{part}{side[0]}")
     names = [
         form.format(side=side, part=synonym)

@@ -1,36 +1,39 @@
-"""The limbs of the body model: between which landmarks they are, and how long."""
+"""The limbs of the body model: the landmarks they join, their lengths, and the parts they form."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from .formats import LANDMARKS, SIDES
+from .formats import AXES, LANDMARKS, SIDES
 
 __all__ = [
-    "LEFT",
+    "LATERAL_LIMBS",
     "LIMBS",
     "LIMB_NAMES",
-    "UP",
-    "ancestor_of",
+    "body_size",
+    "complete_legs",
     "exponent_of",
-    "landmarks_of",
-    "largest_of",
+    "features_of_parts",
+    "landmark_positions",
     "leg_length",
+    "limb_indices",
+    "limb_vectors",
     "limbs_between",
-    "limbs_of",
-    "lowest",
-    "places_of",
-    "size_of",
-    "stretched_legs",
-    "unit",
+    "lowest_height",
+    "median_lengths",
+    "nearest_ancestor",
+    "parts_of_names",
+    "parts_of_postures",
+    "scale_missing_lengths",
+    "unit_vectors",
 ]
 
 
 class Limb(NamedTuple):
-    """A limb of the body model: its two joints, its parent limb, and where it points at rest.
+    """A limb of the body model: its two joints, its parent limb, and its direction at rest.
 
-    Rest directions are those of a person standing with the arms out, seen in a frame
-    whose x axis points to the person's left, y up and z forward.
+    At rest a person stands with the arms out to the sides. The axes are x to the person's left,
+    y up and z forward.
     """
 
     start: str
@@ -39,24 +42,40 @@ class Limb(NamedTuple):
     rest: tuple
 
 
-LEFT, _RIGHT, UP, _DOWN = (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)
+_LEFT, _RIGHT, _UP, _DOWN = (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)
 
-# Parents come before their children: frames are built in this order.
+# Parents come before their children.
 LIMBS = {
-    "hip": Limb("right_hip", "left_hip", None, LEFT),
-    "torso": Limb("pelvis", "neck", "hip", UP),
-    "shoulder": Limb("right_shoulder", "left_shoulder", "torso", LEFT),
-    "neck": Limb("neck", "head", "torso", UP),
+    "hip": Limb("right_hip", "left_hip", None, _LEFT),
+    "torso": Limb("pelvis", "neck", "hip", _UP),
+    "shoulder": Limb("right_shoulder", "left_shoulder", "torso", _LEFT),
+    "neck": Limb("neck", "head", "torso", _UP),
     "left_thigh": Limb("left_hip", "left_knee", "hip", _DOWN),
     "right_thigh": Limb("right_hip", "right_knee", "hip", _DOWN),
     "left_leg": Limb("left_knee", "left_ankle", "left_thigh", _DOWN),
     "right_leg": Limb("right_knee", "right_ankle", "right_thigh", _DOWN),
-    "left_arm": Limb("left_shoulder", "left_elbow", "shoulder", LEFT),
+    "left_arm": Limb("left_shoulder", "left_elbow", "shoulder", _LEFT),
     "right_arm": Limb("right_shoulder", "right_elbow", "shoulder", _RIGHT),
-    "left_forearm": Limb("left_elbow", "left_wrist", "left_arm", LEFT),
+    "left_forearm": Limb("left_elbow", "left_wrist", "left_arm", _LEFT),
     "right_forearm": Limb("right_elbow", "right_wrist", "right_arm", _RIGHT),
 }
 LIMB_NAMES = list(LIMBS)
+# Limbs between the left and the right side: they point at a camera that sees the body's side.
+LATERAL_LIMBS = ("hip", "shoulder")
+# The limbs of each part of the body. The height of the pelvis belongs to no part.
+PARTS = {
+    "left arm": ("left_arm", "left_forearm"),
+    "right arm": ("right_arm", "right_forearm"),
+    "left leg": ("left_thigh", "left_leg"),
+    "right leg": ("right_thigh", "right_leg"),
+    "trunk": ("hip", "torso", "shoulder", "neck"),
+}
+# Largest mean deviation of the squared length of three cosines from 1: smoothing and resampling
+# shorten them a little.
+_UNIT_TOLERANCE = 0.05
+
+
+# -- which limbs a body has ---------------------------------------------------------------
 
 
 def limbs_between(landmarks):
@@ -64,46 +83,88 @@ def limbs_between(landmarks):
     return [name for name, limb in LIMBS.items() if {limb.start, limb.end} <= set(landmarks)]
 
 
-def ancestor_of(name, limbs):
-    """The nearest of the limbs that a limb hangs on; None if none of them is above it."""
+def limb_indices(limbs):
+    """Indices of limbs among all twelve: a slice if all are given."""
+    if len(limbs) == len(LIMB_NAMES):
+        return slice(None)
+    return [LIMB_NAMES.index(name) for name in limbs]
+
+
+def nearest_ancestor(name, limbs):
+    """The nearest of the limbs above a limb in the tree of parents, or None."""
     above = LIMBS[name].parent
     while above is not None and above not in limbs:
         above = LIMBS[above].parent
     return above
 
 
-def stretched_legs(limbs):
-    """The sides whose thigh and leg are both there."""
+def complete_legs(limbs):
+    """The sides whose thigh and leg are both among the limbs."""
     return [side for side in SIDES if {f"{side}_thigh", f"{side}_leg"} <= set(limbs)]
 
 
-def landmarks_of(positions, skeleton):
-    """(n_frames, 15, n_dims) places of the landmarks along the recording's axes, and ``k``.
+# -- positions and lengths ----------------------------------------------------------------
 
-    They are in units of ``2**k``, in which no square leaves the range of the numbers, and no
-    digit is lost. A landmark that the skeleton lacks is at 0; one whose joints have NaN has NaN.
+
+def landmark_positions(positions, skeleton):
+    """Landmarks (n_frames, 15, n_dims) of positions (n_frames, n_dims * n_joints).
+
+    A landmark that the skeleton lacks is 0; one with a joint that is NaN is NaN.
     """
     joints = positions.reshape(len(positions), -1, skeleton.n_dims)
-    columns = {LANDMARKS.index(name): skeleton.indices_of(name) for name in skeleton.landmarks}
-    used = joints[:, sorted({j for of_one in columns.values() for j in of_one})]
-    k = exponent_of(largest_of(used), used.dtype)
-    if k:
-        joints = np.ldexp(joints, -k)
-    if len(columns) == len(LANDMARKS):
-        points = joints[:, [of_one[0] for of_one in columns.values()]]
-    else:
-        points = np.zeros((len(joints), len(LANDMARKS), skeleton.n_dims), dtype=joints.dtype)
-        points[:, list(columns)] = joints[:, [of_one[0] for of_one in columns.values()]]
-    for place, of_one in columns.items():
+    points = np.zeros((len(joints), len(LANDMARKS), skeleton.n_dims), dtype=joints.dtype)
+    indices = {LANDMARKS.index(name): skeleton.indices_of(name) for name in skeleton.landmarks}
+    points[:, list(indices)] = joints[:, [of_one[0] for of_one in indices.values()]]
+    for k, of_one in indices.items():
         if len(of_one) > 1:
-            points[:, place] = sum(joints[:, j] for j in of_one) / len(of_one)
-    return points, k
+            points[:, k] = sum(joints[:, j] for j in of_one) / len(of_one)
+    return points
 
 
-def largest_of(values):
-    """The largest absolute value of those that are not NaN; 0 if all are."""
-    largest = max(values.max(), -values.min())
-    return np.fmax.reduce(np.abs(values), axis=None, initial=0) if np.isnan(largest) else largest
+def limb_vectors(points):
+    """Limbs (n_frames, 12, n_dims) of landmarks (n_frames, 15, n_dims), from start to end."""
+    start, end = ([LANDMARKS.index(limb[k]) for limb in LIMBS.values()] for k in (0, 1))
+    return points[:, end] - points[:, start]
+
+
+def median_lengths(lengths):
+    """Medians (12,) of lengths (n_frames, 12) over the frames that show a limb, else NaN."""
+    medians = np.median(lengths, axis=0)
+    for k in np.flatnonzero(np.isnan(medians)):
+        seen = lengths[~np.isnan(lengths[:, k]), k]
+        if seen.size:
+            medians[k] = np.median(seen)
+    return medians
+
+
+def scale_missing_lengths(lengths, learnt):
+    """Lengths (12,) with NaN filled in: learnt lengths scaled to the body that is seen.
+
+    NaN remains if no limb is seen.
+    """
+    seen = ~np.isnan(lengths)
+    total = learnt[seen].sum()
+    ratio = lengths[seen].sum() / total if total > 0 else np.nan
+    return np.where(seen, lengths, ratio * learnt).astype(lengths.dtype)
+
+
+def leg_length(lengths, limbs=LIMB_NAMES):
+    """Length of the stretched leg: the mean of the complete legs, thigh plus leg."""
+    sides = complete_legs(limbs)
+    parts = [lengths[LIMB_NAMES.index(f"{s}_{p}")] for s in sides for p in ("thigh", "leg")]
+    return sum(parts) / len(sides)
+
+
+def body_size(lengths, limbs):
+    """The unit of length of a body: the stretched leg, or without one the sum of its limbs."""
+    if complete_legs(limbs):
+        return leg_length(lengths, limbs)
+    return sum(lengths[LIMB_NAMES.index(name)] for name in limbs)
+
+
+def lowest_height(tracks):
+    """The smallest second coordinate of (n_frames, n_dims) tracks; NaN if all are hidden."""
+    return np.fmin.reduce([np.fmin.reduce(track[:, 1]) for track in tracks])
 
 
 def exponent_of(largest, dtype):
@@ -114,47 +175,66 @@ def exponent_of(largest, dtype):
     return k
 
 
-def limbs_of(points):
-    """(n_frames, 12, n_dims) limb vectors of (n_frames, 15, n_dims) landmarks."""
-    start, end = ([LANDMARKS.index(limb[k]) for limb in LIMBS.values()] for k in (0, 1))
-    return points[:, end] - points[:, start]
+def unit_vectors(vectors):
+    """Vectors (..., n_dims) divided by their length; 0 where that is 0, NaN where it is NaN."""
+    norms = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, norms, out=np.zeros_like(vectors), where=norms != 0)
 
 
-def places_of(limbs):
-    """Where limbs are among all twelve: a slice, if they are all."""
-    if len(limbs) == len(LIMB_NAMES):
-        return slice(None)
-    return [LIMB_NAMES.index(name) for name in limbs]
+# -- parts of the body --------------------------------------------------------------------
 
 
-def leg_length(lengths, limbs=LIMB_NAMES):
-    """Length of the stretched leg, the mean of the sides that have one."""
-    sides = stretched_legs(limbs)
-    parts = [lengths[LIMB_NAMES.index(f"{s}_{p}")] for s in sides for p in ("thigh", "leg")]
-    return sum(parts) / len(sides)
+def features_of_parts(limbs, n_dims, first):
+    """Indices of the features of each part.
+
+    Parameters
+    ----------
+    limbs : list of str
+        The limbs in the order of their cosines.
+    n_dims : int
+        Cosines of a limb.
+    first : int
+        Index of the first cosine.
+
+    Returns
+    -------
+    dict of str to list of int
+    """
+    limb_of = [None] * first + [limb for limb in limbs for _ in range(n_dims)]
+    return _by_part(limb_of)
 
 
-def size_of(lengths, limbs):
-    """What tells the size of a body: the stretched leg, or without one all of its limbs."""
-    if stretched_legs(limbs):
-        return leg_length(lengths, limbs)
-    return sum(lengths[LIMB_NAMES.index(name)] for name in limbs)
+def parts_of_names(names):
+    """Indices of the features of each part, of features of which some are ``<limb>_<axis>``.
+
+    Empty if only the trunk is found: joints may be called neck or hip, too.
+    """
+    split = [str(name).rpartition("_") for name in names]
+    parts = _by_part([limb if axis in AXES[3] else None for limb, _, axis in split])
+    return {} if [*parts] == ["trunk"] else parts
 
 
-def lowest(tracks):
-    """The lowest height of (n_frames, n_dims) tracks, the second axis vertical; NaN of none."""
-    return np.fmin.reduce([np.fmin.reduce(track[:, 1]) for track in tracks])
+def parts_of_postures(performances):
+    """Indices of the features of each part, of postures without names; empty if they are others.
+
+    Postures of the whole body are recognised by their 37 features: a height, and twelve times
+    three cosines of length 1.
+    """
+    n_limbs, n_dims = len(LIMB_NAMES), 3
+    if performances[0].shape[1] != 1 + n_limbs * n_dims:
+        return {}
+    cosines = np.concatenate([x[:, 1:] for x in performances]).astype(np.float64)
+    if not np.abs(cosines).max() < 1 + _UNIT_TOLERANCE:
+        return {}
+    squares = np.square(cosines.reshape(-1, n_limbs, n_dims)).sum(axis=2)
+    are_directions = np.abs(squares - 1).mean(axis=0) < _UNIT_TOLERANCE
+    return features_of_parts(LIMB_NAMES, n_dims, 1) if are_directions.all() else {}
 
 
-def unit(vectors):
-    """Directions of vectors (..., n_dims) of any length; what has none stays 0, or NaN."""
-    norm = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    small = np.finfo(vectors.dtype).tiny ** 0.25
-    shortest, longest = norm.min(), norm.max()
-    if np.isnan(longest):
-        shortest, longest = (f.reduce(norm, axis=None) for f in (np.fmin, np.fmax))
-    if not (shortest > small and longest < 1 / small):
-        largest = np.abs(vectors).max(axis=-1, keepdims=True)
-        vectors = vectors / np.where(largest > 0, largest, 1)
-        norm = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(norm > 0, norm, 1)
+def _by_part(limb_of):
+    """Indices of the features whose limb is of a part; parts without features are left out."""
+    parts = {
+        name: [k for k, limb in enumerate(limb_of) if limb in limbs]
+        for name, limbs in PARTS.items()
+    }
+    return {name: features for name, features in parts.items() if features}

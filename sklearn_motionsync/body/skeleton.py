@@ -1,120 +1,25 @@
-"""Skeleton: which columns are which joints, and which joints are the body's."""
+"""Skeleton: which columns are which joints, and which joints are the landmarks of the body."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..inputs.numbers import as_numbers
-from .columns import (
-    AXES,
-    as_joints,
-    as_landmarks,
-    as_parents,
-    check_columns,
-    circle_of,
-    is_whole,
-    joints_with_axes,
-    kept_parents,
-)
-from .formats import FORMATS, LANDMARKS
-from .landmarks import as_tuple, completed, likely_landmarks, one_sided
-from .limbs import LIMBS, limbs_between, stretched_legs
-from .parts import parts_of_limbs
-from .upright import UPS, seems_up
+from ..inputs.numbers import as_numbers, column_names, is_integer
+from .axes import UP_AXES
+from .formats import AXES, FORMATS, LANDMARKS
+from .landmarks import add_midpoints, as_tuple, guess_landmarks, missing_counterparts
+from .limbs import LIMBS, complete_legs, features_of_parts, limbs_between
+from .upright import estimate_up
 
-__all__ = ["LANDMARKS", "Skeleton", "check_columns"]
-
-# -- ready skeletons: those whose joints are known by heart ------------------------------
-
-
-class ReadySkeletons:
-    """Ways to make a `Skeleton` without naming a joint.
-
-    ``n_dims`` is 3, or 2 for positions in a picture. ``up`` is the vertical axis; by default the
-    one that is usual with the format, which in pictures is "-y".
-    """
-
-    @classmethod
-    def paper(cls, *, n_dims=3, up=None):
-        """The paper's fifteen joints; "y" is up."""
-        return cls._ready("paper", n_dims, up)
-
-    @classmethod
-    def acclaim(cls, *, n_dims=3, up=None):
-        """The 31 joints of HDM05 and of CMU's ASF/AMC files; "y" is up."""
-        return cls._ready("acclaim", n_dims, up)
-
-    @classmethod
-    def kinect(cls, *, n_dims=3, up=None):
-        """The 20 joints of the first Kinect; "y" is up."""
-        return cls._ready("kinect", n_dims, up)
-
-    @classmethod
-    def kinect_v2(cls, *, n_dims=3, up=None):
-        """The 25 joints of the second Kinect, and of NTU RGB+D in the same order; "y" is up."""
-        return cls._ready("kinect_v2", n_dims, up)
-
-    @classmethod
-    def openpose(cls, *, n_dims=3, up=None):
-        """OpenPose's 25 key-points, BODY_25; "y" is up in space. The head is the nose."""
-        return cls._ready("openpose", n_dims, up)
-
-    @classmethod
-    def coco(cls, *, n_dims=3, up=None):
-        """The 17 key-points of COCO; "y" is up in space.
-
-        The pelvis is the mean of the hips, the neck that of the shoulders, the head the nose.
-        """
-        return cls._ready("coco", n_dims, up)
-
-    @classmethod
-    def mediapipe(cls, *, n_dims=3, up=None):
-        """The 33 landmarks of MediaPipe's pose; "-y" is up, in space as in pictures.
-
-        The pelvis is the mean of the hips, the neck that of the shoulders, the head the nose.
-        """
-        return cls._ready("mediapipe", n_dims, up)
-
-    @classmethod
-    def opencap(cls, *, n_dims=3, up=None):
-        """The 20 video key-points of OpenCap, which have no head; "y" is up."""
-        return cls._ready("opencap", n_dims, up)
-
-    @classmethod
-    def plug_in_gait(cls, *, n_dims=3, up=None):
-        """Joint centres of Vicon's Plug-in Gait, and origins of its bones; "z" is up.
-
-        The pelvis is ``PELO``, the neck the thorax' ``TRXO``, the head ``HEDO``. A file without
-        them has fewer limbs: use ``Skeleton.from_frame``.
-        """
-        return cls._ready("plug_in_gait", n_dims, up)
-
-    @classmethod
-    def optitrack(cls, *, n_dims=3, up=None):
-        """The 21 bones of a skeleton of OptiTrack's Motive; "y" is up."""
-        return cls._ready("optitrack", n_dims, up)
-
-    @classmethod
-    def unreal(cls, *, n_dims=3, up=None):
-        """The body of Unreal Engine's mannequin, 22 bones; "z" is up."""
-        return cls._ready("unreal", n_dims, up)
-
-    @classmethod
-    def _ready(cls, name, n_dims, up):
-        known = FORMATS[name]
-        joints = list(known.parents)
-        parents = [joints.index(p) if p else -1 for p in known.parents.values()]
-        if up is None:
-            up = known.up_in_pictures if n_dims == 2 else known.up
-        return cls(joints, parents, known.landmarks, up, n_dims)
+__all__ = ["Skeleton", "check_columns", "parse_joint_columns"]
 
 
 class _ReadOnly(dict):
-    """A dict that stays as it is, so that what holds it can be hashed."""
+    """A dict that cannot be changed, so that the skeleton that holds it can be hashed."""
 
     def _refuse(self, *args, **kwargs):
-        raise TypeError("The landmarks of a skeleton stay as they are: make another skeleton.")
+        raise TypeError("The landmarks of a skeleton cannot be changed: make another skeleton.")
 
     __setitem__ = __delitem__ = __ior__ = _refuse
     clear = pop = popitem = setdefault = update = _refuse
@@ -127,8 +32,8 @@ class _ReadOnly(dict):
 
 
 @dataclass(frozen=True)
-class Skeleton(ReadySkeletons):
-    """Which joints the positions hold, how they hang together, and which are the body's.
+class Skeleton:
+    """The joints of a recording, their parents, and the landmarks of the body.
 
     Parameters
     ----------
@@ -136,30 +41,41 @@ class Skeleton(ReadySkeletons):
         Names of the joints, in the order of the columns: joint j has the columns
         ``3 j``, ``3 j + 1``, ``3 j + 2`` (x, y, z), or with two axes ``2 j``, ``2 j + 1`` (x, y).
     parents : sequence of int
-        Index of each joint's parent, -1 for a root. Used to draw bones.
+        Index of each joint's parent, -1 for a root. Bones join a joint to its parent.
     landmarks : mapping of str to str or tuple of str, default=None
         The joint at each of the fifteen landmarks of the paper's body model:
         ``pelvis``, ``neck``, ``head`` and ``left_``/``right_`` ``shoulder``, ``elbow``,
         ``wrist``, ``hip``, ``knee``, ``ankle``. Several joints stand for their mean, such as two
-        markers for the middle of a knee. Landmarks may lack, or be None; two of them that belong to
-        one limb must be there. By default it is guessed from the names: a pelvis or a neck without
-        a joint is the mean of the hips or the shoulders.
+        markers for the middle of a knee. Landmarks may be missing, or None; both ends of at least
+        one limb must be given. By default they are guessed from the names, and a missing pelvis or
+        neck is the mean of the hips or the shoulders.
     up : {"y", "x", "z", "-y", "-x", "-z"}, default="y"
         The vertical axis of the positions; "-y" where y points downwards, as in pictures.
     n_dims : {3, 2}, default=3
         Axes of a position: 2 for key-points in a picture.
 
+    Attributes
+    ----------
+    limbs : list of str
+        Names of the limbs both of whose ends are landmarks; twelve for the whole body.
+    has_height : bool
+        Whether the height of the pelvis is a feature: there is a pelvis and a complete leg.
+    bones : list of tuple of int
+        Pairs (parent, joint) of indices of joints.
+    column_names : list of str
+        Names of the position columns, ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, ...
+
     Raises
     ------
     ValueError
-        If lengths disagree, a name is no text or comes twice, a parent is no index of another
-        joint, parents run in a circle, a landmark is unknown or names no joint, the landmarks leave
-        no limb, or a guess finds a landmark on one side only.
+        If lengths disagree, a name is not text or is repeated, a parent is not the index of another
+        joint, parents form a cycle, a landmark is unknown or names no joint, the landmarks form no
+        limb, or a guess finds a landmark on one side only.
 
     Notes
     -----
     The skeleton of a file is ``Skeleton.from_frame(io.read_motion(path))``. A skeleton cannot
-    be changed, and serves as a key: equal ones have equal hashes.
+    be changed, and can be a key of a dict: equal skeletons have equal hashes.
 
     Examples
     --------
@@ -184,7 +100,7 @@ class Skeleton(ReadySkeletons):
     n_dims: int = 3
 
     def __post_init__(self):
-        joints, parents = as_joints(self.joints), as_parents(self.parents)
+        joints, parents = _as_joints(self.joints), _as_parents(self.parents)
         if len(joints) != len(parents) or len(set(joints)) != len(joints):
             raise ValueError(
                 f"A skeleton needs different joint names and one parent each, got {len(joints)} "
@@ -192,88 +108,77 @@ class Skeleton(ReadySkeletons):
             )
         if any(not -1 <= p < len(joints) or p == i for i, p in enumerate(parents)):
             raise ValueError(f"parents must be other joints' indices, or -1; got {parents}.")
-        if circle := circle_of(parents):
+        if cycle := _find_cycle(parents):
             raise ValueError(
-                f"parents run in a circle: {' > '.join(joints[j] for j in circle)}. The chain of "
+                f"parents form a cycle: {' > '.join(joints[j] for j in cycle)}. The chain of "
                 "every joint must end at a root, whose parent is -1."
             )
-        if not is_whole(self.n_dims) or self.n_dims not in UPS:
+        if not is_integer(self.n_dims) or self.n_dims not in UP_AXES:
             raise ValueError(
                 f"n_dims must be 3, or 2 for positions in the plane, got {self.n_dims!r}."
             )
-        ups = UPS[self.n_dims]
+        ups = UP_AXES[self.n_dims]
         if not (isinstance(self.up, str) and self.up in ups):
             raise ValueError(
                 f"up must be {', '.join(map(repr, list(ups)[:-1]))} or {list(ups)[-1]!r}, got "
                 f"{self.up!r}."
             )
+        given = {} if self.landmarks is None else _as_landmarks(self.landmarks)
+        landmarks = given
+        if self.landmarks is None:
+            landmarks = add_midpoints(guess_landmarks(joints))
         object.__setattr__(self, "joints", joints)
         object.__setattr__(self, "parents", parents)
         object.__setattr__(self, "n_dims", int(self.n_dims))
-        object.__setattr__(self, "landmarks", self._checked_landmarks())
+        object.__setattr__(self, "landmarks", _check_landmarks(landmarks, given, joints))
 
-    def _checked_landmarks(self):
-        if self.landmarks is None:
-            return _sound(completed(likely_landmarks(self.joints)), (), self.joints)
-        landmarks = as_landmarks(self.landmarks)
-        return _sound(landmarks, landmarks, self.joints)
-
-    # Files hold the landmarks as a plain dict, which every kind of file can fill again.
+    # In files the landmarks are a plain dict.
 
     def __getstate__(self):
         return vars(self) | {"landmarks": dict(self.landmarks)}
 
     def __setstate__(self, state):
-        landmarks = {
-            name: at if isinstance(at, str) else tuple(at)
-            for name, at in state["landmarks"].items()
-        }
-        vars(self).update(state, landmarks=_ReadOnly(landmarks))
+        vars(self).update(state, landmarks=_ReadOnly(state["landmarks"]))
 
     def __repr__(self):
         for name in FORMATS:
             if self == getattr(type(self), name)(n_dims=self.n_dims):
                 return f"Skeleton.{name}({'n_dims=2' if self.n_dims == 2 else ''})"
-        some = len(self.landmarks)
-        of = "" if some == len(LANDMARKS) else f", {some} of {len(LANDMARKS)} landmarks"
+        count = len(self.landmarks)
+        partial = "" if count == len(LANDMARKS) else f", {count} of {len(LANDMARKS)} landmarks"
         plane = ", n_dims=2" if self.n_dims == 2 else ""
-        return f"Skeleton(<{len(self.joints)} joints{of}>, up={self.up!r}{plane})"
-
-    @classmethod
-    def from_names(cls, joints, parents, up="y", n_dims=3):
-        """A ready skeleton if the names are one's, otherwise landmarks guessed from names."""
-        return cls(joints, parents, None, up, n_dims)
+        return f"Skeleton(<{len(self.joints)} joints{partial}>, up={self.up!r}{plane})"
 
     @classmethod
     def from_frame(cls, df, *, landmarks=None, up=None):
-        """The skeleton of a DataFrame of positions, such as `io.read_motion` gives.
+        """The skeleton of a DataFrame of positions, such as `io.read_motion` returns.
 
         Parameters
         ----------
         df : DataFrame (n_frames, 3 * n_joints), or (n_frames, 2 * n_joints)
             Columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint by joint, or ``<joint>_x``,
-            ``<joint>_y`` of key-points in a picture. Where its
-            ``attrs`` name ``joints`` and ``parents``, the parent of a joint is its nearest
-            ancestor that has columns; otherwise nothing is joined.
+            ``<joint>_y`` of key-points in a picture. If ``df.attrs`` has ``joints`` and
+            ``parents``, the parent of a joint is its nearest ancestor that has columns; otherwise
+            every joint is a root.
         landmarks : mapping of str to str or tuple of str, default=None
-            The joints of some or all landmarks, several for their mean; the others are told from
+            The joints of some or all landmarks, several for their mean; the others are guessed from
             the names. None as a joint leaves a landmark out.
         up : {"y", "x", "z", "-y", "-x", "-z"}, default=None
-            The vertical axis; by default ``df.attrs["up"]``, or the one along which the head is
+            The vertical axis; by default ``df.attrs["up"]``, or the axis along which the head is
             above the feet on average; without feet, the head above the pelvis and the shoulders
-            above the hands. Where the positions do not tell clearly, it is "y". Give it for those
-            who lie or stand on their hands, and for trunks that bend and have no arms or legs:
-            their positions tell another one.
+            above the hands. "y" if the positions leave doubt. Give it for people that lie or stand
+            on their hands, and for bent trunks without arms and legs.
 
         Returns
         -------
         Skeleton
+            With the joints of the columns.
 
         Raises
         ------
         ValueError
-            If the columns are not such triples or pairs, no limb is told from the names, or a
-            landmark on one side only. Without columns, as an array: make the skeleton by
+            If the columns are not such triples or pairs, the names give no limb, or a
+            landmark on one side only. For an array without columns use
             ``Skeleton(joints, parents)``.
 
         Examples
@@ -287,26 +192,42 @@ class Skeleton(ReadySkeletons):
         >>> Skeleton.from_frame(legs, landmarks={"pelvis": ("left_hip", "right_hip")}, up="z")
         Skeleton(<12 joints, 14 of 15 landmarks>, up='z')
         """
-        joints, n_dims = joints_with_axes(df)
+        joints, n_dims = parse_joint_columns(df)
         if twice := sorted({joint for joint in joints if joints.count(joint) > 1}):
             raise ValueError(
-                f"The columns of the joints {twice} come more than once; use "
+                f"The columns of the joints {twice} are repeated; use "
                 "df.loc[:, ~df.columns.duplicated()]."
             )
-        given = {} if landmarks is None else as_landmarks(landmarks)
+        given = {} if landmarks is None else _as_landmarks(landmarks)
         attrs = getattr(df, "attrs", {})
-        names = as_joints(attrs.get("joints", ()))
-        # Columns that were renamed are none of the joints that the file had.
-        likely = likely_landmarks(joints, names if set(joints) <= set(names) else ())
-        landmarks = _sound(completed(likely | given), given, joints)
-        parents = kept_parents(joints, names, as_parents(attrs.get("parents", ())))
+        names = _as_joints(attrs.get("joints", ()))
+        # Renamed columns are not joints of the file.
+        guess = guess_landmarks(joints, names if set(joints) <= set(names) else ())
+        landmarks = _check_landmarks(add_midpoints(guess | given), given, joints)
+        parents = _nearest_parents(joints, names, _as_parents(attrs.get("parents", ())))
         up = attrs.get("up") if up is None else up
         skeleton = cls(joints, parents, landmarks, "y" if up is None else up, n_dims)
-        seems = _seems_up(df, skeleton) if up is None else None
-        return skeleton if seems is None else cls(joints, parents, landmarks, seems, n_dims)
+        estimate = _estimate_up(df, skeleton) if up is None else None
+        return skeleton if estimate is None else cls(joints, parents, landmarks, estimate, n_dims)
 
     def index_of(self, landmark):
-        """Index of the joint that stands for a landmark."""
+        """Index of the joint at a landmark.
+
+        Parameters
+        ----------
+        landmark : str
+            Name of one of the fifteen landmarks.
+
+        Returns
+        -------
+        int
+            Index among ``joints``.
+
+        Raises
+        ------
+        ValueError
+            If there is no such landmark, or if it is the mean of several joints.
+        """
         indices = self.indices_of(landmark)
         if len(indices) > 1:
             raise ValueError(
@@ -316,7 +237,23 @@ class Skeleton(ReadySkeletons):
         return indices[0]
 
     def indices_of(self, landmark):
-        """Indices of the joints whose mean a landmark is: a tuple, mostly of one."""
+        """Indices of the joints whose mean is a landmark.
+
+        Parameters
+        ----------
+        landmark : str
+            Name of one of the fifteen landmarks.
+
+        Returns
+        -------
+        tuple of int
+            Indices among ``joints``, most often a single one.
+
+        Raises
+        ------
+        ValueError
+            If there is no such landmark.
+        """
         if landmark not in LANDMARKS:
             raise ValueError(f"landmark must be among {LANDMARKS}, got {landmark!r}.")
         if landmark not in self.landmarks:
@@ -326,14 +263,13 @@ class Skeleton(ReadySkeletons):
         return tuple(self.joints.index(joint) for joint in as_tuple(self.landmarks[landmark]))
 
     def body(self):
-        """The skeleton of the landmarks that limbs hold together, with "y" up.
-
-        It is that of the positions which `DirectionCosines.inverse_transform` gives; of a whole
-        body, ``Skeleton.paper()``.
+        """The skeleton of the landmarks that the limbs join, with "y" up.
 
         Returns
         -------
         Skeleton
+            That of the positions which `DirectionCosines.inverse_transform` returns; of a whole
+            body, ``Skeleton.paper()``.
         """
         held = {joint for name in self.limbs for joint in LIMBS[name][:2]}
         # The pelvis is between the hips, the neck between the shoulders.
@@ -341,19 +277,20 @@ class Skeleton(ReadySkeletons):
         held |= {"neck"} if "shoulder" in self.limbs else set()
         joints = [name for name in LANDMARKS if name in held and name in self.landmarks]
         paper = type(self).paper()
-        parents = kept_parents(joints, paper.joints, paper.parents)
+        parents = _nearest_parents(joints, paper.joints, paper.parents)
         return type(self)(joints, parents, {name: name for name in joints}, "y", self.n_dims)
 
     def parts(self):
-        """Which features of `DirectionCosines` are the arms', the legs' and the trunk's.
+        """The features of `DirectionCosines` of each arm, each leg and the trunk.
 
-        For `PartSynchronizer`. The trunk is hip line, torso, shoulder line and neck; the height of
-        the pelvis is no part's, and a part without limbs is left out.
+        For `PartSynchronizer`. The trunk is hip line, torso, shoulder line and neck. The height of
+        the pelvis is in no part, and a part without limbs is left out.
 
         Returns
         -------
         dict of str to list of int
-            ``"left arm"``, ``"right arm"``, ``"left leg"``, ``"right leg"``, ``"trunk"``.
+            Indices of the features of ``"left arm"``, ``"right arm"``, ``"left leg"``,
+            ``"right leg"`` and ``"trunk"``.
 
         Examples
         --------
@@ -361,21 +298,21 @@ class Skeleton(ReadySkeletons):
         >>> Skeleton.paper().parts()["left leg"]
         [13, 14, 15, 19, 20, 21]
         """
-        return parts_of_limbs(self.limbs, self.n_dims, int(self.has_height))
+        return features_of_parts(self.limbs, self.n_dims, int(self.has_height))
 
     @property
     def limbs(self):
-        """Names of the limbs, both of whose joints are landmarks: of the whole body twelve."""
+        """Names of the limbs both of whose ends are landmarks; twelve for the whole body."""
         return limbs_between(self.landmarks)
 
     @property
     def has_height(self):
-        """Whether the height of the pelvis is told: there is one, and a leg down to the ankle."""
-        return "pelvis" in self.landmarks and bool(stretched_legs(self.limbs))
+        """Whether the height of the pelvis is a feature: a pelvis and a complete leg are there."""
+        return "pelvis" in self.landmarks and bool(complete_legs(self.limbs))
 
     @property
     def bones(self):
-        """Pairs (parent, joint) of joint indices."""
+        """Pairs (parent, joint) of indices of joints."""
         return [(p, j) for j, p in enumerate(self.parents) if p >= 0]
 
     @property
@@ -384,14 +321,173 @@ class Skeleton(ReadySkeletons):
         return [f"{joint}_{axis}" for joint in self.joints for axis in AXES[self.n_dims]]
 
 
-def _sound(landmarks, given, joints):
-    """The landmarks that are there, in their order; a refusal if they make no body.
+# -- the constructors of known skeletons --------------------------------------------------
 
-    Those that are given are meant as they are, those that are guessed come in pairs.
+
+def _constructor(name):
+    """The class method of `Skeleton` that makes the skeleton of one of `FORMATS`."""
+    known = FORMATS[name]
+
+    def constructor(cls, *, n_dims=3, up=None):
+        """{known.summary}
+
+        Parameters
+        ----------
+        n_dims : {{3, 2}}, default=3
+            Axes of a position: 2 for key-points in a picture.
+        up : {{"y", "x", "z", "-y", "-x", "-z"}}, default=None
+            The vertical axis; by default {known.up!r} in space and {known.up_2d!r} in a picture.
+
+        Returns
+        -------
+        Skeleton
+            With the joints of this format, in its order.
+        """
+        joints = list(known.parents)
+        parents = [joints.index(p) if p else -1 for p in known.parents.values()]
+        default = known.up_2d if n_dims == 2 else known.up
+        return cls(joints, parents, known.landmarks, default if up is None else up, n_dims)
+
+    constructor.__name__, constructor.__qualname__ = name, f"Skeleton.{name}"
+    constructor.__doc__ = (constructor.__doc__ or "").format(known=known)
+    return classmethod(constructor)
+
+
+for _name in FORMATS:
+    setattr(Skeleton, _name, _constructor(_name))
+
+
+# -- columns of positions -----------------------------------------------------------------
+
+
+def parse_joint_columns(df):
+    """Names of the joints of a DataFrame of positions, and the number of axes of each.
+
+    The columns are ``<joint>_x``, ``_y``, ``_z``, joint by joint, or in the plane ``<joint>_x``,
+    ``_y``.
+    """
+    columns = getattr(df, "columns", None)
+    if columns is None or callable(columns):
+        raise ValueError(
+            "The names of joints are read from the columns of a DataFrame, got "
+            f"{type(df).__name__}. Use pd.DataFrame(positions, columns=skeleton.column_names)."
+        )
+    columns = [str(column) for column in columns]
+    for n_dims, axes in sorted(AXES.items(), reverse=True):
+        joints = [column[:-2] for column in columns[::n_dims]]
+        if joints and columns == [f"{joint}_{axis}" for joint in joints for axis in axes]:
+            return joints, n_dims
+    raise ValueError(
+        "The columns must be <joint>_x, <joint>_y, <joint>_z or, in the plane, <joint>_x, "
+        f"<joint>_y for one joint after the other, got {columns[:4]}"
+        f"{' ...' if len(columns) > 4 else ''}; select them with df[skeleton.column_names], with "
+        "df.filter(regex='_[xyz]$'), or drop the others."
+    )
+
+
+def check_columns(x, skeleton, what):
+    """Refuse a table in which a column of the skeleton has the place of another one.
+
+    Columns with other names are accepted.
+
+    Parameters
+    ----------
+    x : table, or anything without names
+    skeleton : Skeleton
+    what : str
+        The subject of the message, with a capital letter.
+    """
+    expected = skeleton.column_names
+    place_of = {name: place for place, name in enumerate(expected)}
+    for place, name in enumerate(column_names(x) or ()):
+        if place_of.get(name, place) != place:
+            raise ValueError(
+                f"{what}: column {place} is {name!r}, where the skeleton has "
+                f"{(*expected, 'none')[min(place, len(expected))]!r}. Bring the columns into the "
+                "order of the skeleton's joints by df[skeleton.column_names]."
+            )
+
+
+def _estimate_up(df, skeleton):
+    """The vertical axis estimated from a table of positions, or None."""
+    try:
+        positions = as_numbers(df, "df", dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    return estimate_up(positions, skeleton)
+
+
+# -- checks of names, parents and landmarks -----------------------------------------------
+
+
+def _as_joints(joints):
+    """Names as a tuple of str."""
+    names = _as_sequence(joints)
+    if names is None or not all(isinstance(name, str) and name for name in names):
+        raise ValueError(
+            "joints must be the names of the joints, a list of text in the order of the columns; "
+            f"got {joints!r}."
+        )
+    return tuple(map(str, names))
+
+
+def _as_parents(parents):
+    """Indices as a tuple of int."""
+    listed = _as_sequence(parents)
+    if listed is None:
+        raise ValueError(
+            "parents must be a list, the index of each joint's parent or -1; got "
+            f"{type(parents).__name__}."
+        )
+    for j, parent in enumerate(listed):
+        if not is_integer(parent):
+            raise ValueError(
+                "parents must be whole numbers, the index of each joint's parent or -1; got "
+                f"{parent!r} for joint {j}."
+            )
+    return tuple(map(int, listed))
+
+
+def _as_sequence(values):
+    """An ordered collection as a tuple; None for text, sets and scalars."""
+    if isinstance(values, (str, bytes, Set)) or not isinstance(values, Iterable):
+        return None
+    return None if getattr(values, "ndim", 1) == 0 else tuple(values)
+
+
+def _as_landmarks(landmarks):
+    """Landmarks as a dict: the name of a joint, a tuple of several, or None."""
+    if not isinstance(landmarks, Mapping):
+        raise ValueError(
+            "landmarks must be a mapping, the joint at each landmark such as "
+            f"{{'pelvis': 'root'}}; got {landmarks!r}."
+        )
+    if unknown := sorted(str(name) for name in landmarks if name not in LANDMARKS):
+        raise ValueError(f"landmarks must be among {LANDMARKS}, got {unknown}.")
+    return {name: _as_landmark(name, at) for name, at in landmarks.items()}
+
+
+def _as_landmark(landmark, at):
+    if at is None:
+        return None
+    joints = (at,) if isinstance(at, str) else _as_sequence(at)
+    are_names = joints and all(isinstance(joint, str) for joint in joints)
+    if not are_names or len(set(joints)) < len(joints):
+        raise ValueError(
+            f"The landmark {landmark!r} must be a joint's name, a tuple of different names for "
+            f"their mean, or None where it is missing; got {at!r}."
+        )
+    return str(joints[0]) if len(joints) == 1 else tuple(map(str, joints))
+
+
+def _check_landmarks(landmarks, given, joints):
+    """The landmarks that are not None, in their order; a refusal if they form no limb.
+
+    Guessed landmarks must come in pairs of left and right, given ones need not.
     """
     there = {name: landmarks[name] for name in LANDMARKS if landmarks.get(name) is not None}
     absent = [name for name, at in there.items() if not set(as_tuple(at)) <= set(joints)]
-    missing = absent or one_sided(there, given)
+    missing = absent or missing_counterparts(there, given)
     if not missing and not limbs_between(there):
         missing = [name for name in LANDMARKS if name not in there]
     if missing:
@@ -405,10 +501,32 @@ def _sound(landmarks, given, joints):
     return _ReadOnly(there)
 
 
-def _seems_up(df, skeleton):
-    """The vertical axis that a table of positions seems to have, or None."""
-    try:
-        positions = as_numbers(df, "df", dtype=np.float64)
-    except (TypeError, ValueError):
-        return None
-    return seems_up(positions, skeleton)
+def _find_cycle(parents):
+    """Joints whose parents lead back to the first of them; empty if all lead to a root."""
+    for start in range(len(parents)):
+        chain = [start]
+        while (joint := parents[chain[-1]]) >= 0:
+            if joint in chain:
+                return [*chain[chain.index(joint) :], joint]
+            chain.append(joint)
+    return []
+
+
+def _nearest_parents(joints, names, parents):
+    """For each joint the index of its nearest ancestor among the joints, or -1."""
+    if len(names) != len(parents) or any(not -1 <= p < len(names) for p in parents):
+        raise ValueError(
+            "df.attrs must have one parent, an index or -1, for each of its joints; got "
+            f"{len(names)} joints and the parents {parents}."
+        )
+    above = {name: names[p] for name, p in zip(names, parents, strict=True) if p >= 0}
+    index = {joint: j for j, joint in enumerate(joints)}
+    result = []
+    for joint in joints:
+        ancestor = above.get(joint)
+        for _ in names:  # no more steps than joints, in case the parents form a cycle
+            if ancestor is None or ancestor in index:
+                break
+            ancestor = above.get(ancestor)
+        result.append(index.get(ancestor, -1))
+    return result

@@ -77,7 +77,7 @@ def load_performances(path):
     frame_rate = _check_frame_rates(path, fields["fps"])
     _check_finite(path, positions, offsets, joints)
     try:
-        skeleton = Skeleton.from_names(joints, parents)
+        skeleton = Skeleton(joints, parents)
     except ValueError:
         skeleton = None
     frames = positions.reshape(len(positions), -1)

@@ -127,7 +127,7 @@ def fetch_cmu(
     data = _read(files[0], files[1:], new)
     joints = data[0].attrs["joints"]
     try:
-        skeleton = Skeleton.from_names(joints, data[0].attrs["parents"])
+        skeleton = Skeleton(joints, data[0].attrs["parents"])
     except ValueError:
         skeleton = None
     return Bunch(

@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from ..body.axes import heading
-from ..body.columns import check_columns
-from ..body.limbs import unit
-from ..body.upright import y_up
+from ..body.axes import heading_axes, to_y_up
+from ..body.limbs import unit_vectors
+from ..body.skeleton import check_columns
 from ..inputs.numbers import as_numbers, column_names
 from .given import mean_of_seen
 
@@ -61,7 +60,7 @@ def upright(x, skeleton, i):
             f"{what}, frame {frame}, column {column} is {size}; make it NaN to leave a gap."
         )
     points = x.reshape(len(x), -1, n_dims)
-    return points if skeleton is None else y_up(points, skeleton)
+    return points if skeleton is None else to_y_up(points, skeleton)
 
 
 def placed(x, skeleton, *, follow=False):
@@ -76,7 +75,7 @@ def placed(x, skeleton, *, follow=False):
     across = None if skeleton is None or n_dims == 2 else _side_by_side(skeleton)
     if across is not None:
         left, right = (place_of(x, skeleton, f"{side}_{across}") for side in ("left", "right"))
-        turn = heading(unit(_known(left - right, f"{across}s")[:1]))[0]
+        turn = heading_axes(unit_vectors(_known(left - right, f"{across}s")[:1]))[0]
     if skeleton is not None and "pelvis" in skeleton.landmarks:
         way = _known(place_of(x, skeleton, "pelvis"), "pelvis")
     else:

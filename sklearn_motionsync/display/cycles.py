@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..body.columns import is_whole
 from ..body.formats import SIDES
 from ..inputs.features import choose_features
+from ..inputs.numbers import is_integer
 from ..segmentation.cycles import CycleSegmenter, examined, names_of_compared, start_curves, taken
 from ..segmentation.self_correlation import asked_of
 from .drawing import COLORS, panels
@@ -191,7 +191,7 @@ class CycleDisplay:
 
 def _indices(indices, count, what):
     listed = list(np.ravel(np.asarray(indices)))
-    if not all(is_whole(i) and 0 <= i < count for i in listed):
+    if not all(is_integer(i) and 0 <= i < count for i in listed):
         raise ValueError(f"{what} must be whole numbers from 0 to {count - 1}, got {listed!r}.")
     return np.array(listed, dtype=int)
 

@@ -6,10 +6,9 @@ from numbers import Real
 import numpy as np
 import pandas as pd
 
-from ..body.columns import is_whole
 from ..body.skeleton import Skeleton
 from ..inputs.collections import as_collection
-from ..inputs.numbers import as_numbers
+from ..inputs.numbers import as_numbers, is_integer
 
 __all__ = [
     "as_behind",
@@ -65,7 +64,7 @@ def as_names(names, count, what, each):
 def as_indices(indices, count, what):
     """Indices from 0 to ``count - 1`` as a list, of one or several; at least one."""
     listed = [indices] if isinstance(indices, Real) else _listed(indices)
-    if not listed or not all(is_whole(i) and 0 <= i < count for i in listed):
+    if not listed or not all(is_integer(i) and 0 <= i < count for i in listed):
         raise ValueError(
             f"{what} must be from 0 to {count - 1}, got "
             f"{indices if listed is None else listed!r}: give whole numbers."
@@ -84,7 +83,7 @@ def as_frames(frames, n_frames):
     """Frames by their numbers, or so many, evenly spaced from the first to the last."""
     if not isinstance(frames, Real):
         return as_indices(frames, n_frames, "frames")
-    if not (is_whole(frames) and 1 <= frames <= _MOST):
+    if not (is_integer(frames) and 1 <= frames <= _MOST):
         raise ValueError(
             f"frames must be how many, a whole number from 1 to {_MOST}, or a list of frames from "
             f"0 to {n_frames - 1}; got {frames!r}."
@@ -106,7 +105,7 @@ def as_pictures(seconds, fps):
 
 def as_performance(performance, count):
     """The index of one of so many performances."""
-    if not (is_whole(performance) and 0 <= performance < count):
+    if not (is_integer(performance) and 0 <= performance < count):
         raise ValueError(
             f"performance={performance!r} is out of range: there are {count} performances, from 0 "
             f"to {count - 1}."
@@ -241,7 +240,7 @@ def as_marked(marked, n_panels, skeleton):
     for k, of_panel in enumerate(panels):
         pairs = [_listed(bone) for bone in of_panel]
         for bone, pair in zip(of_panel, pairs, strict=True):
-            if pair is None or not all(map(is_whole, pair)) or tuple(pair) not in bones:
+            if pair is None or not all(map(is_integer, pair)) or tuple(pair) not in bones:
                 raise ValueError(
                     f"marked, panel {k}: {bone!r} is no bone of the skeleton; its bones are "
                     f"{bones}."

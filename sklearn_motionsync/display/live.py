@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 from sklearn.utils.validation import check_is_fitted
 
-from ..body.columns import is_whole
 from ..body.direction_cosines import DirectionCosines
 from ..inputs.collections import as_collection
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.numbers import is_integer
 from ..inputs.tables import labels_of
 from ..online.stream import LivePhase, check_times
 from ..online.synchronizer import OnlineSynchronizer
@@ -124,7 +124,7 @@ class PhaseDisplay:
         names=None,
         unit="frames",
     ):
-        if not is_whole(n_frames) or n_frames < 2:
+        if not is_integer(n_frames) or n_frames < 2:
             raise ValueError(f"n_frames must be frames of the clock, at least 2; got {n_frames!r}.")
         if duration is not None and not (is_number(duration, 0) and duration > 0):
             raise ValueError(f"duration must be a number above 0, or None; got {duration!r}.")

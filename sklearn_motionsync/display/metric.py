@@ -3,8 +3,8 @@
 import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
-from ..body.columns import is_whole
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.numbers import is_integer
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import find_step
 from .drawing import COLORS, panels
@@ -62,7 +62,7 @@ class MetricDisplay:
         self.feature_names = as_names(
             feature_names, len(self.share), "feature_names", "features shown"
         )
-        if n_performances is not None and not (is_whole(n_performances) and n_performances > 0):
+        if n_performances is not None and not (is_integer(n_performances) and n_performances > 0):
             raise ValueError(
                 "n_performances must be a whole number above 0, or None for a title without it; "
                 f"got {n_performances!r}."

@@ -5,17 +5,11 @@ from textwrap import fill
 
 import numpy as np
 
-from ..body.columns import is_whole
 from ..body.direction_cosines import DirectionCosines
-<<<<<<< HEAD
 from ..inputs.features import choose_features, names_of_features
-from ..online.tracker import MotionTracker, Track
-=======
-from ..inputs.features import choose_features
-from ..inputs.features import names_of as names_of_features
+from ..inputs.numbers import is_integer
 from ..online.particle_filter import Track
 from ..online.tracker import MotionTracker
->>>>>>> online
 from .departing import bones_of, limb_of
 from .drawing import COLORS, legend_above, panels
 from .given import as_drawn, as_frames, as_index, as_names
@@ -103,7 +97,7 @@ class TrackingDisplay:
                 f"track must be the Track of one take, as from MotionTracker.track; got {got}. Of "
                 "a list of them give one."
             )
-        if n_frames is not None and (not is_whole(n_frames) or n_frames < 2):
+        if n_frames is not None and (not is_integer(n_frames) or n_frames < 2):
             raise ValueError(f"n_frames must be frames of the clock, at least 2; got {n_frames!r}.")
         if unit not in list(_UNITS):
             raise ValueError(f"unit must be one of {list(_UNITS)}, got {unit!r}.")

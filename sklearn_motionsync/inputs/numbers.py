@@ -3,6 +3,7 @@
 import datetime
 import math
 import os
+from numbers import Integral, Real
 
 import numpy as np
 import pandas as pd
@@ -16,6 +17,7 @@ __all__ = [
     "check_magnitude",
     "check_names",
     "column_names",
+    "is_integer",
     "refuse_non_numeric",
 ]
 
@@ -233,3 +235,10 @@ def check_names(x, expected, what):
         "should match those that were passed during fit, in the same order: select them by "
         "df[names]."
     )
+
+
+def is_integer(value):
+    """Whether a value is an integer, of an integer or a floating-point type, and no bool."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False
+    return isinstance(value, Integral) or float(value).is_integer()

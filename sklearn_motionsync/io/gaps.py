@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pandas as pd
 
-from ..body.columns import joints_with_axes
+from ..body.skeleton import parse_joint_columns
 
 
 def find_gaps(df):
@@ -139,7 +139,7 @@ def warn_of_gaps(df, name):
     gaps = find_gaps(df)
     if gaps.empty:
         return
-    joints, _ = joints_with_axes(df)
+    joints, _ = parse_joint_columns(df)
     worst = gaps.groupby("joint")["n_frames"].sum().sort_values(ascending=False, kind="stable")
     n_missing = int(worst.sum())
     names = ", ".join(str(joint)[:20] for joint in worst.index[:4])
@@ -182,7 +182,7 @@ def _read(df):
             f"A recording must be a DataFrame, as read_motion gives, got {type(df).__name__}; name "
             "the columns of an array with pd.DataFrame(x, columns=skeleton.column_names)."
         )
-    joints, n_dims = joints_with_axes(df)
+    joints, n_dims = parse_joint_columns(df)
     levels = df.index.droplevel(-1) if df.index.nlevels > 1 else df.index[:0]
     if levels.nunique() > 1:
         raise ValueError(

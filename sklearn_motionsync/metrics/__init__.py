@@ -1,4 +1,4 @@
-"""What tells how well performances are synchronised: measures, and scorers for grid searches."""
+"""Measures of how well performances are synchronised, and scorers for grid searches."""
 
 from .measures import (
     group_timing_error,

@@ -1,21 +1,14 @@
-"""How well performances are synchronised: timing errors, and the health of warps.
+"""How well performances are synchronised: timing errors, and the regularity of warps.
 
-Times are those of ``match``: tau(p), shape (n_sequences, P), from 0 to P - 1, in frames of the
-common clock. They may step back, as warps that others made do by rounding, or altogether.
+Warps are the ``times`` of a `Match`: tau(p), shape (n_sequences, P), from 0 to P - 1, in frames of
+the common clock. They may decrease.
 """
 
 import numpy as np
+import pandas as pd
 
+from ..inputs.numbers import as_numbers
 from ..matching.warps import follow
-from .arguments import (
-    as_frame_rates,
-    as_keyframes,
-    as_lengths,
-    as_moments,
-    as_quantile,
-    as_times,
-    check_same_shape,
-)
 
 __all__ = [
     "group_timing_error",
@@ -26,28 +19,33 @@ __all__ = [
     "timing_error",
 ]
 
-# -- timing, against the truth ----------------------------------------------------------
+# Rounding of warps, in frames: bounds may be exceeded by as much.
+_ROUNDING = 1e-9
+
+# -- timing errors against known warps, moments and key-frames -----------------------------
 
 
 def timing_error(times, true_times, *, quantile=None):
-    """Mean distance of warps from known ones, in frames of the clock.
+    """Mean absolute difference of warps from known ones, in frames of the clock.
 
     ``mean_{m,p} |tau_m(p) - tau*_m(p)|``
 
     Parameters
     ----------
     times, true_times : array-like, shape (n_sequences, P)
+        Warps, and the known ones, from 0 to P - 1.
     quantile : float in [0, 1], default=None
-        That quantile of the distances instead of their mean; 0.95 for the 95th percentile.
+        Return this quantile of the differences instead of their mean.
 
     Returns
     -------
     float
+        The error in frames of the clock.
 
     Raises
     ------
     ValueError
-        If times are not all from 0 to P - 1, or differ in shape, or there is no such quantile.
+        If times are not all from 0 to P - 1 or differ in shape, or for a quantile beyond 0 and 1.
 
     Examples
     --------
@@ -55,38 +53,38 @@ def timing_error(times, true_times, *, quantile=None):
     >>> timing_error([[0, 1.5, 2, 3]], [[0, 1, 1.5, 3]])
     0.25
     """
-    times, true_times = as_times(times), as_times(true_times, "true_times")
-    check_same_shape(times, true_times, "true_times")
+    times, true_times = _as_warps_of_one_shape(times, true_times, "true_times")
     return _summary(np.abs(times - true_times), quantile)
 
 
 def group_timing_error(times, moments, *, quantile=None):
-    """How far synchronised performances of a group are from the same moment, without a pattern.
+    """Mean absolute difference of the moments that a group shows at the same frame of the clock.
 
-    With ``phi_m`` the true share of the action that is over at each frame of performance m, and
-    ``phi_m(tau_m(p))`` what it shows at frame p: ``(P-1) mean_{m,p} |phi_m(tau_m(p)) - mean_m
-    phi_m(tau_m(p))|``. Zero if and only if all performances show the same moment at every frame; of
-    one performance alone it is zero.
+    With ``phi_m`` the true share of the action that is completed at each frame of performance m:
+    ``(P-1) mean_{m,p} |phi_m(tau_m(p)) - mean_m phi_m(tau_m(p))|``. It needs no pattern. It is 0 if
+    and only if all performances show the same moment at every frame; of one performance alone it
+    is 0.
 
     Parameters
     ----------
     times : array-like, shape (n_sequences, P)
+        Warps, from 0 to P - 1.
     moments : list of array-like (n_frames_i,)
         ``phi``, from 0 to 1 and never decreasing, at the performances' own frames, such as
         ``make_bending().times``.
     quantile : float in [0, 1], default=None
-        That quantile instead of the mean.
+        Return this quantile of the differences instead of their mean.
 
     Returns
     -------
     float
-        In frames of the clock.
+        The error in frames of the clock.
 
     Raises
     ------
     ValueError
-        If times are not all from 0 to P - 1, there are not as many moments as warps, or these are
-        no shares of an action.
+        If times are not all from 0 to P - 1, the numbers of warps and of moments differ, or
+        moments are no shares of an action.
 
     Examples
     --------
@@ -94,8 +92,8 @@ def group_timing_error(times, moments, *, quantile=None):
     >>> group_timing_error([[0, 1, 2], [0, 1, 2]], [[0, 0.5, 1], [0, 0.7, 1]])
     0.0666...
     """
-    times = as_times(times)
-    moments = as_moments(moments, len(times))
+    times = _as_warps(times)
+    moments = _as_moments(moments, len(times))
     last = times.shape[1] - 1
     shown = np.stack(
         [
@@ -109,7 +107,7 @@ def group_timing_error(times, moments, *, quantile=None):
 def keyframe_error(
     times, keyframes, pattern_keyframes, n_frames, *, frame_rate=None, quantile=None
 ):
-    """Distance of where the pattern's key-frames land in performances from where they are.
+    """Mean absolute difference between matched and true key-frames.
 
     ``mean_{m,k} |tau_m(k_n) - k_m|``, with all key-frames on the clock: frame f of F is
     ``f (P-1) / (F-1)``.
@@ -117,6 +115,7 @@ def keyframe_error(
     Parameters
     ----------
     times : array-like, shape (n_sequences, P)
+        Warps, from 0 to P - 1.
     keyframes : array-like, shape (n_sequences, n_keyframes)
         True key-frames, in the performances' own frames, from 0 to ``n_frames_i - 1``, increasing.
     pattern_keyframes : array-like, shape (n_keyframes,)
@@ -124,21 +123,20 @@ def keyframe_error(
     n_frames : array-like of int, shape (n_sequences,)
         Lengths of the performances, at least 2.
     frame_rate : float or array-like of shape (n_sequences,), default=None
-        Frames a second of the performances, one for each if they differ: gives the error in
-        seconds.
+        Frames a second of the performances. If given, the error is in seconds.
     quantile : float in [0, 1], default=None
-        That quantile instead of the mean.
+        Return this quantile of the differences instead of their mean.
 
     Returns
     -------
     float
-        In frames of the clock, or in seconds.
+        The error in frames of the clock, or in seconds.
 
     Raises
     ------
     ValueError
-        If there are not as many warps, key-frames and lengths, a key-frame is outside its clip, or
-        a frame rate is not above 0.
+        If the numbers of warps, key-frames and lengths differ, a key-frame is outside its
+        performance, or a frame rate is not above 0.
 
     Examples
     --------
@@ -148,36 +146,33 @@ def keyframe_error(
     >>> keyframe_error([[0, 1, 2, 3, 4]], [[5]], [2], [9], frame_rate=10)
     0.1
     """
-    times = as_times(times)
+    times = _as_warps(times)
     n_sequences, P = times.shape
-    lengths = as_lengths(n_frames, n_sequences)
-    keyframes, pattern_keyframes = as_keyframes(keyframes, pattern_keyframes, lengths, P)
+    lengths = _as_lengths(n_frames, n_sequences)
+    keyframes, pattern_keyframes = _as_keyframes(keyframes, pattern_keyframes, lengths, P)
     own = (lengths[:, np.newaxis] - 1) / (P - 1)
-    landed = follow(times, np.tile(pattern_keyframes, (n_sequences, 1)))
-    errors = np.abs(landed - keyframes / own)
+    matched = follow(times, np.tile(pattern_keyframes, (n_sequences, 1)))
+    errors = np.abs(matched - keyframes / own)
     if frame_rate is not None:
-        with np.errstate(over="ignore"):
-            errors = errors * own / as_frame_rates(frame_rate, n_sequences)
-        if not np.isfinite(errors).all():
-            raise ValueError(f"frame_rate={frame_rate!r} is too small: the error is infinite.")
+        errors = errors * own / _as_frame_rates(frame_rate, n_sequences)
     return _summary(errors, quantile)
 
 
-# -- health of the warps ------------------------------------------------------------------
+# -- regularity of warps ------------------------------------------------------------------
 
 
 def pause_share(times):
-    """Share of frames at which a performance stands still: ``mean [tau(p+1) <= tau(p)]``.
-
-    Equal to a billionth of a frame; a step back counts as standing still, too.
+    """Share of the steps of a warp that do not advance: ``mean [tau(p+1) <= tau(p) + 1e-9]``.
 
     Parameters
     ----------
     times : array-like, shape (n_sequences, P)
+        Warps, from 0 to P - 1.
 
     Returns
     -------
     float
+        A share from 0 to 1.
 
     Raises
     ------
@@ -190,21 +185,21 @@ def pause_share(times):
     >>> pause_share([[0, 0, 2, 3, 4]])
     0.25
     """
-    return float((np.diff(as_times(times)) <= 1e-9).mean())
+    return float((np.diff(_as_warps(times)) <= _ROUNDING).mean())
 
 
 def roughness(times):
-    """Root mean square of the changes of rate, ``tau(p+1) - 2 tau(p) + tau(p-1)``.
-
-    On a clock of two frames there is one rate, which cannot change: 0.
+    """Root mean square of the second differences ``tau(p+1) - 2 tau(p) + tau(p-1)``.
 
     Parameters
     ----------
     times : array-like, shape (n_sequences, P)
+        Warps, from 0 to P - 1.
 
     Returns
     -------
     float
+        The root mean square, in frames of the clock; 0 on a clock of two frames.
 
     Raises
     ------
@@ -217,12 +212,12 @@ def roughness(times):
     >>> roughness([[0, 0, 1, 3]])
     1.0
     """
-    changes = np.diff(as_times(times), 2)
+    changes = np.diff(_as_warps(times), 2)
     return float(np.sqrt(np.square(changes).mean())) if changes.size else 0.0
 
 
 def inverse_consistency(times, back):
-    """How far there and back misses: ``mean |tau_mn(tau_nm(p)) - p|``, in frames.
+    """Mean absolute error of warps composed with their inverses, ``mean |tau_mn(tau_nm(p)) - p|``.
 
     Parameters
     ----------
@@ -232,6 +227,7 @@ def inverse_consistency(times, back):
     Returns
     -------
     float
+        The error in frames of the clock.
 
     Raises
     ------
@@ -244,14 +240,150 @@ def inverse_consistency(times, back):
     >>> inverse_consistency([[0, 2, 3, 3.5, 4]], [[0, 1, 2, 3, 4]])
     0.5
     """
-    times, back = as_times(times), as_times(back, "back")
-    check_same_shape(times, back, "back")
+    times, back = _as_warps_of_one_shape(times, back, "back")
     return float(np.abs(follow(back, times) - np.arange(times.shape[1])).mean())
 
 
-# -- helpers --------------------------------------------------------------------------------
-
-
 def _summary(errors, quantile):
-    quantile = as_quantile(quantile)
-    return float(errors.mean() if quantile is None else np.quantile(errors, quantile))
+    if quantile is None:
+        return float(errors.mean())
+    number = as_numbers(quantile, "quantile", dtype=np.float64)
+    if number.ndim != 0 or not 0 <= number <= 1:
+        raise ValueError(f"quantile must be a number from 0 to 1, or None, got {quantile!r}.")
+    return float(np.quantile(errors, number))
+
+
+# -- checks of arguments ------------------------------------------------------------------
+
+
+def _as_warps(times, what="times"):
+    """Warps (n_sequences >= 1, P >= 2), from 0 to P - 1."""
+    times = as_numbers(times, what, dtype=np.float64)
+    if times.ndim != 2 or times.shape[0] < 1 or times.shape[1] < 2:
+        raise ValueError(
+            f"{what} must have shape (n_sequences, P), one row a performance and P at least 2, "
+            f"got {times.shape}."
+        )
+    last = times.shape[1] - 1
+    inside = _is_inside(times, last)
+    if not inside.all():
+        i, p = np.argwhere(~inside)[0]
+        raise ValueError(
+            f"Performance {i}: {what} must be from 0 to P - 1 = {last}, in frames of the clock, "
+            f"got {times[i, p]:.10g} at frame {p}."
+        )
+    return np.clip(times, 0, last)
+
+
+def _as_warps_of_one_shape(times, others, what):
+    times, others = _as_warps(times), _as_warps(others, what)
+    if times.shape != others.shape:
+        raise ValueError(f"times {times.shape} and {what} {others.shape} differ in shape.")
+    return times, others
+
+
+def _as_moments(moments, n_sequences):
+    """Shares of the action, one array (n_frames_i >= 2,) a warp, from 0 to 1, not decreasing."""
+    rows = _as_rows(moments, "moments")
+    if len(rows) != n_sequences:
+        raise ValueError(f"There are {n_sequences} warps and {len(rows)} sets of moments.")
+    for i, phi in enumerate(rows):
+        if phi.ndim != 1 or len(phi) < 2:
+            raise ValueError(
+                f"Performance {i}: moments must have shape (n_frames,), one a frame of the "
+                f"performance and at least 2, got {phi.shape}."
+            )
+        inside = _is_inside(phi, 1)
+        if not inside.all():
+            p = int(np.argmin(inside))
+            raise ValueError(
+                f"Performance {i}: moments are shares of the action, from 0 to 1, got {phi[p]:.10g}"
+                f" at frame {p}. For seconds give (t - t[0]) / (t[-1] - t[0])."
+            )
+        decreases = np.diff(phi) < -_ROUNDING
+        if decreases.any():
+            raise ValueError(
+                f"Performance {i}: moments must not decrease; they do after frame "
+                f"{int(np.argmax(decreases))}."
+            )
+    return [np.clip(phi, 0, 1) for phi in rows]
+
+
+def _as_lengths(n_frames, n_sequences):
+    """Lengths of performances as floats: whole numbers of at least 2, one a warp."""
+    lengths = as_numbers(n_frames, "n_frames", dtype=np.float64)
+    if lengths.shape != (n_sequences,):
+        raise ValueError(
+            f"n_frames must be the lengths of the {n_sequences} performances, such as "
+            f"[len(x) for x in X], got shape {lengths.shape}."
+        )
+    valid = (lengths >= 2) & (lengths == np.floor(lengths)) & np.isfinite(lengths)
+    if not valid.all():
+        i = int(np.argmin(valid))
+        raise ValueError(
+            f"Performance {i}: n_frames must be a whole number of at least 2, got "
+            f"{lengths[i]:.10g}."
+        )
+    return lengths
+
+
+def _as_keyframes(keyframes, pattern_keyframes, lengths, n_frames):
+    """Key-frames (n_sequences, n_keyframes) of performances, and (n_keyframes,) of the pattern."""
+    pattern = as_numbers(pattern_keyframes, "pattern_keyframes", dtype=np.float64)
+    if pattern.ndim != 1 or len(pattern) < 1:
+        raise ValueError(
+            "pattern_keyframes must have shape (n_keyframes,), with at least one, got "
+            f"{pattern.shape}."
+        )
+    rows = _as_rows(keyframes, "keyframes")
+    if [row.shape for row in rows] != [pattern.shape] * len(lengths):
+        raise ValueError(
+            f"keyframes must have {len(pattern)} numbers, as pattern_keyframes, for each of the "
+            f"{len(lengths)} warps; got the shapes {[row.shape for row in rows]}."
+        )
+    pattern = _in_order(pattern, n_frames - 1, "The pattern", "frames of the clock")
+    frames = [
+        _in_order(row, length - 1, f"Performance {i}", "its own frames")
+        for i, (row, length) in enumerate(zip(rows, lengths, strict=True))
+    ]
+    return np.stack(frames), pattern
+
+
+def _in_order(frames, last, whose, unit):
+    """Key-frames of one performance, if they are inside it and increase."""
+    if not (_is_inside(frames, last).all() and (np.diff(frames) > 0).all()):
+        raise ValueError(
+            f"{whose}: key-frames must increase and be from 0 to {last:.10g}, in {unit}, got "
+            f"{frames.tolist()}."
+        )
+    return np.clip(frames, 0, last)
+
+
+def _as_frame_rates(frame_rate, n_sequences):
+    """Frames a second, a scalar or a column of one a performance."""
+    rate = as_numbers(frame_rate, "frame_rate", dtype=np.float64)
+    if rate.shape not in ((), (n_sequences,)) or not ((rate > 0) & np.isfinite(rate)).all():
+        raise ValueError(
+            "frame_rate must be one number above 0, in frames a second, or one for each of the "
+            f"{n_sequences} performances, got {frame_rate!r}."
+        )
+    return rate[..., np.newaxis]
+
+
+def _as_rows(values, what):
+    """The entries of a list or the rows of a table as arrays, one a performance."""
+    if isinstance(values, pd.DataFrame):
+        values = as_numbers(values, what)
+    if isinstance(values, (str, bytes, dict)) or not np.iterable(values):
+        raise ValueError(
+            f"{what} must be a list of arrays, one a performance, got {type(values).__name__}."
+        )
+    return [
+        as_numbers(row, f"Performance {i}: {what}", dtype=np.float64)
+        for i, row in enumerate(values)
+    ]
+
+
+def _is_inside(array, last):
+    # False for NaN.
+    return (array >= -_ROUNDING) & (array <= last + _ROUNDING)

@@ -1,29 +1,35 @@
-"""How much of what performances differ in is shape, and how much is timing."""
+"""The variance of performances split into that of their shapes and that of their timing."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from .arguments import as_movements
+from .spread import check_pair
 
 __all__ = ["AmplitudePhase", "amplitude_phase_variance"]
 
 
 class AmplitudePhase(NamedTuple):
-    """What `amplitude_phase_variance` finds, in squares of the unit of the performances.
+    """The result of `amplitude_phase_variance`, in squares of the unit of the performances.
 
-    Attributes
+    Parameters
     ----------
     amplitude : float
-        ``MSE_amp``: what performances differ in at the same moment of the action.
+        ``MSE_amp``: the variance at the same moment of the action.
     phase : float
-        ``MSE_phase``: what they differ in because the same moment comes at other times.
+        ``MSE_phase``: the variance that is due to the timing of the moments.
     total : float
         ``MSE_total``, the sum of both: the variance before synchronising.
     phase_share : float
         ``R^2 = MSE_phase / MSE_total``; NaN if performances did not differ.
     constant : float
-        ``C_R``: how much warping changed the energy of the performances.
+        ``C_R``: the ratio of the energies of the performances before and after warping.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync.metrics import AmplitudePhase
+    >>> AmplitudePhase(amplitude=1.0, phase=3.0, total=4.0, phase_share=0.75, constant=1.0).phase
+    3.0
     """
 
     amplitude: float
@@ -59,21 +65,19 @@ def amplitude_phase_variance(before, after):
     Raises
     ------
     ValueError
-        If they are not of one shape and finite; or one is zero everywhere and the other is not; or
-        their squares are beyond double precision.
+        If they are not of one shape and finite; or one is zero everywhere and the other is not.
 
     Notes
     -----
     Kneip and Ramsay write ``C_R`` by the covariance of the rates of the warps with the squares of
-    the synchronised curves. As ``int |x_i|^2 dt = int |y_i|^2 tau_i' dt``, it is the share of
-    energies above, which needs no derivative, and holds as well if the mean of the warps is
-    not an even pace.
+    the synchronised curves. As ``int |x_i|^2 dt = int |y_i|^2 tau_i' dt``, it is the ratio of
+    energies above, which needs no derivative, and is also valid if the mean of the warps is
+    not the identity.
 
-    The share of the phase is negative if synchronising made performances differ more than they
-    did. It rests on energies and not on differences alone: the zero of the features counts, and
-    features of larger values count more. Give angles from where the joint is at rest, one by one
-    or scaled. Small variances are easily had by distorting time, and then they are called
-    phase: `FeatureHoldoutScorer` tells.
+    The share of the phase is negative if synchronising increased the differences. It depends on
+    the zero of the features, as energies do, and features of larger values count more. Give angles
+    relative to the joint at rest, one by one or scaled. Warps that distort time reduce the
+    amplitude, and the rest is called phase: `FeatureHoldoutScorer` detects that.
 
     References
     ----------
@@ -85,7 +89,7 @@ def amplitude_phase_variance(before, after):
 
     Examples
     --------
-    The same two bumps, one of them late: all that they differ in is timing.
+    The same two bumps, one of them late: they differ in timing alone.
 
     >>> import numpy as np
     >>> from sklearn_motionsync.metrics import amplitude_phase_variance
@@ -98,34 +102,24 @@ def amplitude_phase_variance(before, after):
     >>> round(amplitude_phase_variance(higher, higher).phase_share, 3)
     0.0
     """
-    x, y = as_movements(before, after)
-    total, energy = _variance(x.values), _energy(x.values)
-    left, energy_left = _variance(y.values), _energy(y.values)
+    (x, tolerance), (y, _) = check_pair(before, after)
+    total, energy = _variance(x), _energy(x)
+    left, energy_left = _variance(y), _energy(y)
     if energy == 0 < energy_left or energy_left == 0 < energy:
         raise ValueError(
             "One of before and after is zero everywhere, and the other is not. Give the same "
             "performances, normalised and synchronised."
         )
     amplitude = energy * (left / energy_left) if energy_left > 0 else 0.0
-    # What rounding explains is no difference.
-    differ = total > x.values.shape[2] * x.rounding**2
+    differ = total > x.shape[2] * tolerance**2
     share = (total - amplitude) / total if differ else np.nan
-    squares = np.array([amplitude, total - amplitude, total])
     constant = energy / energy_left if energy_left > 0 else 1.0
-    with np.errstate(over="ignore", under="ignore"):
-        squares = np.ldexp(squares, 2 * x.exponent)
-        constant = np.ldexp(constant, 2 * (x.exponent - y.exponent))
-    if not (np.isfinite(squares).all() and np.isfinite(constant)):
-        raise ValueError(
-            "The squares of the performances are beyond double precision: give them in a larger "
-            "unit, both in the same."
-        )
-    return AmplitudePhase(*squares.tolist(), float(share), float(constant))
+    return AmplitudePhase(amplitude, total - amplitude, total, float(share), float(constant))
 
 
 def _variance(z):
     """The mean over performances of the integral of their squared distance from the mean."""
-    # From the first one, so that nothing at all is between identical ones.
+    # Relative to the first one, so that identical ones differ by exactly 0.
     z = z - z[0]
     return _energy(z - z.mean(axis=0))
 

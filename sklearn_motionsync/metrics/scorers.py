@@ -1,4 +1,4 @@
-"""Scorers of synchronizers that need no truth, for ``cross_val_score`` and grid searches."""
+"""Scorers of synchronizers without ground truth, for ``cross_val_score`` and grid searches."""
 
 from copy import deepcopy
 from numbers import Integral
@@ -23,35 +23,36 @@ _SPREADS = {
 
 
 class _SynchronizerScorer(BaseEstimator):
-    """What scorers share: a measure of spread, and the metadata that they ask for."""
+    """Base of the scorers: a measure of spread, and the metadata requests."""
 
     def get_metadata_routing(self):
-        """What the scorer asks cross-validation and searches for, besides performances.
+        """The metadata that the scorer requests from cross-validation and searches.
 
         Returns
         -------
         MetadataRequest
+            As of scikit-learn.
         """
         request = MetadataRequest(owner=type(self).__name__)
-        for name, alias in self._asked_for().items():
+        for name, alias in self._current_requests().items():
             request.score.add_request(param=name, alias=alias)
         return request
 
     def set_score_request(self, **requests):
-        """Ask for metadata, such as key-frames, in cross-validation and searches.
+        """Request metadata, such as key-frames, in cross-validation and searches.
 
-        It takes scikit-learn's metadata routing,
-        ``sklearn.set_config(enable_metadata_routing=True)``.
+        Needs ``sklearn.set_config(enable_metadata_routing=True)``.
 
         Parameters
         ----------
         **requests : dict of bool, None or str
-            By the name of the metadata: True asks for it, False does without, None makes it an
+            For each name of metadata: True requests it, False does not, None makes it an
             error to give it, and a string is the name under which it is given.
 
         Returns
         -------
-        self
+        SpreadScorer or FeatureHoldoutScorer
+            The scorer itself.
 
         Examples
         --------
@@ -77,22 +78,21 @@ class _SynchronizerScorer(BaseEstimator):
                 "Metadata is only routed to scorers when scikit-learn's metadata routing is "
                 "enabled: sklearn.set_config(enable_metadata_routing=True)."
             )
-        asked = {**self._asked_for(), **requests}
         for name, alias in requests.items():
-            # Refuses what is no request.
+            # Refuses invalid requests.
             MetadataRequest(owner=type(self).__name__).score.add_request(param=name, alias=alias)
-        self._requests = asked
+        self._requests = {**self._current_requests(), **requests}
         return self
 
     def __sklearn_clone__(self):
         return deepcopy(self)
 
-    def _asked_for(self):
-        # Key-frames that are given without being asked for, or declined, are an error.
+    def _current_requests(self):
+        # Key-frames that are given but neither requested nor declined are an error.
         return getattr(self, "_requests", {"keyframes": None})
 
     def _measure(self):
-        """The measure, and its sign: greater scores are better."""
+        """The measure, and its sign, with which greater scores are better."""
         if not isinstance(self.spread, str) or self.spread not in _SPREADS:
             raise ValueError(f"spread={self.spread!r} is unknown; use one of {list(_SPREADS)}.")
         return _SPREADS[self.spread]
@@ -102,7 +102,7 @@ class _SynchronizerScorer(BaseEstimator):
         return sign * measure(before, after)
 
     def _reach(self, estimator, X, params, uses=("match",)):
-        """The synchronizer and the performances, of which there must be two to differ."""
+        """The synchronizer and the performances, at least two."""
         self._measure()
         name = type(self).__name__
         hint = (
@@ -113,7 +113,7 @@ class _SynchronizerScorer(BaseEstimator):
         reached = route_to_synchronizer(estimator, X, params, f"{name}()", uses=uses, hint=hint)
         if len(reached.performances) < 2:
             raise ValueError(
-                f"{name} tells how much performances differ from each other, and got one alone. "
+                f"{name} measures how much performances differ from each other, and got one. "
                 "In cross-validation each test fold needs at least 2: instead of LeaveOneOut use "
                 "fewer folds, such as cv=2 or KFold(len(X) // 2), or LeavePOut(2)."
             )
@@ -121,7 +121,7 @@ class _SynchronizerScorer(BaseEstimator):
 
 
 class SpreadScorer(_SynchronizerScorer):
-    """Scorer of a synchronizer, or of a pipeline with one: how alike it makes performances.
+    """Scorer of a synchronizer, or a pipeline with one, by the spread of all features.
 
     Parameters
     ----------
@@ -130,9 +130,8 @@ class SpreadScorer(_SynchronizerScorer):
 
     Notes
     -----
-    In-sample spread rewards over-warping: prefer `FeatureHoldoutScorer` to choose parameters.
-
-    What is scored are at least two performances: ``LeaveOneOut`` leaves nothing to compare.
+    The spread of matched features rewards over-warping: prefer `FeatureHoldoutScorer` to choose
+    parameters. Scores need at least two performances, so ``LeaveOneOut`` cannot be used.
 
     Examples
     --------
@@ -156,17 +155,20 @@ class SpreadScorer(_SynchronizerScorer):
 
         Parameters
         ----------
-        estimator : a synchronizer, or a Pipeline with one
-        X : performances, as the estimator takes them
-            At least two.
+        estimator : synchronizer or Pipeline
+            Fitted; the pipeline has a synchronizer.
+        X : list of arrays, 3-D array or DataFrame
+            At least two performances, as for the estimator.
         y : ignored
+            Present for API consistency.
         **params : dict
-            What the ``match`` of the synchronizer takes besides, such as ``keyframes``; in
-            cross-validation asked for by `set_score_request`.
+            Metadata of the synchronizer's ``match``, such as ``keyframes``; in
+            cross-validation requested by `set_score_request`.
 
         Returns
         -------
         float
+            The score; greater is better.
 
         Raises
         ------
@@ -174,7 +176,7 @@ class SpreadScorer(_SynchronizerScorer):
             If there is no synchronizer, a single performance, or the synchronizer needs key-frames
             and gets none.
         TypeError
-            If nobody takes one of the params.
+            If the synchronizer does not accept one of the params.
         """
         reached = self._reach(estimator, X, params)
         before = reached.synchronizer.normalize(reached.performances)
@@ -182,12 +184,12 @@ class SpreadScorer(_SynchronizerScorer):
 
 
 class FeatureHoldoutScorer(_SynchronizerScorer):
-    """Scorer that aligns on some features and judges by the others.
+    """Scorer that synchronises by some features and measures the spread of the others.
 
-    Features are dealt into ``n_folds`` hands. For each hand a clone of the synchronizer is
-    fitted without it, to a median pattern, and its warps are judged by the spread of the hand
-    alone. Warping more than the time tells does not help features that had no say. Key-frames of
-    the performances that are scored go to the clones, too.
+    Features are divided into ``n_folds`` folds. For each fold a clone of the synchronizer is
+    fitted without it, to a median pattern, and its warps are scored by the spread of the fold
+    alone, which over-warping does not reduce. The clones are given the key-frames of the
+    performances that are scored.
 
     Parameters
     ----------
@@ -196,7 +198,7 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
     n_folds : int, default=3
         At least 2, and at most the number of features.
     random_state : int, RandomState instance or None, default=0
-        How features are dealt.
+        Determines the folds.
 
     Examples
     --------
@@ -223,17 +225,20 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
 
         Parameters
         ----------
-        estimator : a synchronizer, or a Pipeline with one
-        X : performances, as the estimator takes them
-            At least two, of at least ``n_folds`` features.
+        estimator : synchronizer or Pipeline
+            Fitted; the pipeline has a synchronizer.
+        X : list of arrays, 3-D array or DataFrame
+            At least two performances of at least ``n_folds`` features, as for the estimator.
         y : ignored
+            Present for API consistency.
         **params : dict
-            What the ``fit`` and ``match`` of the synchronizer take besides, such as ``keyframes``;
-            in cross-validation asked for by `set_score_request`.
+            Metadata of the synchronizer's ``fit`` and ``match``, such as ``keyframes``;
+            in cross-validation requested by `set_score_request`.
 
         Returns
         -------
         float
+            The mean score of the folds; greater is better.
 
         Raises
         ------
@@ -241,7 +246,7 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
             If there is no synchronizer, a single performance, a single feature, or the synchronizer
             needs key-frames and gets none.
         TypeError
-            If nobody takes one of the params.
+            If the synchronizer does not accept one of the params.
         """
         reached = self._reach(estimator, X, params, ("match", "fit"))
         synchronizer, performances = reached.synchronizer, reached.performances
@@ -258,18 +263,18 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
                 "are, a whole number."
             )
         if reached.takes_params:
-            # What it asks for here, its clones cannot do without.
+            # Metadata that the estimator needs are missing for its clones, too.
             reached.match()
-        fitting = accepted_params(synchronizer.fit, params)
-        dealt = check_random_state(self.random_state).permutation(n_features)
+        fit_params = accepted_params(synchronizer.fit, params)
+        order = check_random_state(self.random_state).permutation(n_features)
         scores = []
-        for held in np.array_split(dealt, self.n_folds):
-            shown = np.setdiff1d(dealt, held)
-            blind = clone(synchronizer).set_params(
+        for held_out in np.array_split(order, self.n_folds):
+            others = np.setdiff1d(order, held_out)
+            refitted = clone(synchronizer).set_params(
                 n_frames=synchronizer.n_frames_, pattern="median"
             )
-            seen, hidden = ([x[:, part] for x in performances] for part in (shown, held))
-            match = blind.fit(seen, **fitting).match(seen, **reached.params)
+            seen, hidden = ([x[:, part] for x in performances] for part in (others, held_out))
+            match = refitted.fit(seen, **fit_params).match(seen, **reached.params)
             before = normalise(hidden, synchronizer.n_frames_)
             scores.append(self._score(before, match.warp(hidden)))
         return float(np.mean(scores))

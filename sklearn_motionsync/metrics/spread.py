@@ -1,39 +1,51 @@
-"""How much performances differ: the share of the spread that synchronising leaves."""
+"""Spread: how much performances differ from each other after synchronising, as a share of before.
+
+`least_squares` and `sobolev_least_squares` are ratios of squares: where all differences are halved
+they are 0.25.
+"""
 
 import numpy as np
+import pandas as pd
 
-from .arguments import as_movements
+from ..inputs.collections import as_collection
+from ..inputs.numbers import as_numbers, check_finite
 
-__all__ = ["least_squares", "pairwise_correlation", "sobolev_least_squares"]
+__all__ = [
+    "check_pair",
+    "least_squares",
+    "pairwise_correlation",
+    "sobolev_least_squares",
+]
 
 
 def least_squares(before, after):
-    """Share of the spread that is left: 1 for no gain, 0 for identical performances.
+    """Ratio of squared differences after and before: 1 for no gain, 0 for identical performances.
 
     ``mean_i  int |y_i - mean_{j != i} y_j|^2 dt / int |x_i - mean_{j != i} x_j|^2 dt``, the norm
-    taken over all features; a performance that was no different before does not count. If none
-    was, there was nothing to gain: 1.
+    over all features. Performances that equal the mean of the others before are left out.
 
     Parameters
     ----------
     before, after : array-like, shape (n_sequences, P, n_features)
-        On one clock, linearly normalised and synchronised.
+        On one clock, linearly normalised and synchronised, in one unit.
 
     Returns
     -------
     float
+        The ratio of squares: 0.25 where all differences are halved. It does not depend on the unit.
+        1 if all performances were identical before and are after.
 
     Raises
     ------
     ValueError
         If they are not of one shape and finite; or performances that were identical before are not
-        after, of which there is no share.
+        after.
 
     Notes
     -----
-    The share does not depend on the unit. Differences that rounding explains are none.
+    Differences within rounding are 0.
 
-    Small values are easily had by distorting time: judge on features that were not matched
+    Warps that distort time give small values: judge by features that were not matched
     (`FeatureHoldoutScorer`).
 
     Examples
@@ -45,27 +57,30 @@ def least_squares(before, after):
     >>> least_squares(x, x / 2)
     0.25
     """
-    x, y = as_movements(before, after)
-    old, new = (_integral(_from_others(z.values)) for z in (x, y))
-    counts = old > _least(x)
+    (x, tolerance), (y, tolerance_after) = check_pair(before, after)
+    old, new = (_squared_norms(_from_others(z)) for z in (x, y))
+    counts = old > x.shape[2] * tolerance**2
     if not counts.any():
-        return _no_share((new <= _least(y)).all(), "identical")
-    return _in_one_unit(np.mean(new[counts] / old[counts]), x, y)
+        is_same = (new <= y.shape[2] * tolerance_after**2).all()
+        return _without_spread_before(is_same, "identical")
+    return float(np.mean(new[counts] / old[counts]))
 
 
 def sobolev_least_squares(before, after):
-    """Share of the spread of velocities that is left.
+    """Ratio of squared differences of velocities after and before; 1 for no gain.
 
-    ``sum_i int |y_i' - mean_j y_j'|^2 dt / sum_i int |x_i' - mean_j x_j'|^2 dt``; 1 if velocities
-    did not differ before, since there was nothing to gain.
+    ``sum_i int |y_i' - mean_j y_j'|^2 dt / sum_i int |x_i' - mean_j x_j'|^2 dt``
 
     Parameters
     ----------
     before, after : array-like, shape (n_sequences, P, n_features)
+        On one clock, linearly normalised and synchronised, in one unit.
 
     Returns
     -------
     float
+        The ratio of squares: 0.25 where all differences are halved. 1 if all velocities were
+        identical before and are after.
 
     Raises
     ------
@@ -81,39 +96,35 @@ def sobolev_least_squares(before, after):
     >>> sobolev_least_squares(x, x + 5)
     1.0
     """
-    x, y = as_movements(before, after)
-    slopes = [np.gradient(z.values, axis=1) for z in (x, y)]
-    old, new = (_integral(_from_others(z)).sum() for z in slopes)
-    if old <= len(x.values) * _least(x):
-        return _no_share(new <= len(y.values) * _least(y), "of identical velocity")
-    return _in_one_unit(new / old, x, y)
+    (x, tolerance), (y, tolerance_after) = check_pair(before, after)
+    old, new = (_squared_norms(_from_others(np.gradient(z, axis=1))).sum() for z in (x, y))
+    if old <= len(x) * x.shape[2] * tolerance**2:
+        is_same = new <= len(y) * y.shape[2] * tolerance_after**2
+        return _without_spread_before(is_same, "of identical velocity")
+    return float(new / old)
 
 
 def pairwise_correlation(before, after):
-    """Gain in the correlation of pairs: more than 1 if synchronising made them more alike.
+    """Ratio of the correlations of pairs after and before: above 1 for a gain.
 
     ``sum_{i != j} cc(y_i, y_j) / sum_{i != j} cc(x_i, x_j)``, where cc is the correlation over
-    time, features centred one by one and pooled. A performance that stands still correlates with
-    none: its cc are 0. If the sum is 0 before and after, there was nothing to gain: 1.
+    time, features centred one by one and pooled. Correlations with a constant performance are 0.
 
     Parameters
     ----------
     before, after : array-like, shape (n_sequences, P, n_features)
+        On one clock, linearly normalised and synchronised.
 
     Returns
     -------
     float
+        The ratio. 1 if both sums are 0; negative if the sum is negative before, and then not
+        comparable.
 
     Raises
     ------
     ValueError
-        If they are not of one shape and finite; or correlations whose sum is 0 before do not have
-        that sum after.
-
-    Notes
-    -----
-    Performances that correlate negatively before, in sum, give a negative ratio, which cannot be
-    compared with others.
+        If they are not of one shape and finite; or the sum is 0 before and not after.
 
     Examples
     --------
@@ -123,62 +134,85 @@ def pairwise_correlation(before, after):
     >>> pairwise_correlation(x, x[[0, 0]])
     2.0
     """
-    pair = as_movements(before, after)
-    old, new = (_mean_correlation(z) for z in pair)
-    least = np.finfo(np.float64).eps * pair[0].values[0].size
-    if abs(old) <= least:
-        return _no_share(abs(new) <= least, "uncorrelated")
+    pair = check_pair(before, after)
+    old, new = (_mean_correlation(*z) for z in pair)
+    tolerance = np.finfo(np.float64).eps * pair[0][0][0].size
+    if abs(old) <= tolerance:
+        return _without_spread_before(abs(new) <= tolerance, "uncorrelated")
     return float(new / old)
 
 
-# -- helpers --------------------------------------------------------------------------------
+# -- checks and sums ----------------------------------------------------------------------
 
 
-def _integral(z):
-    """int |z_i|^2 dt, by the trapezoidal rule over [0, 1], of every sequence."""
+def check_pair(before, after):
+    """The same performances before and after, each with the size of its rounding errors.
+
+    Returns
+    -------
+    pair : list of (ndarray of float64, shape (n_sequences, P, n_features), float)
+    """
+    pair = [_on_clock(z, what) for z, what in ((before, "before"), (after, "after"))]
+    shape = pair[0].shape
+    is_valid = len(shape) == 3 and shape[0] >= 2 and shape[1] >= 2 and shape[2] >= 1
+    if not is_valid or pair[1].shape != shape:
+        raise ValueError(
+            "before and after must have one shape (n_sequences, P, n_features), of at least 2 "
+            f"sequences, 2 frames and 1 feature; got {shape} and {pair[1].shape}. Give univariate "
+            "ones as x[:, :, np.newaxis]."
+        )
+    for z, what in zip(pair, ("before", "after"), strict=True):
+        for i, x in enumerate(z):
+            check_finite(x, f"{what}, performance {i}, frame")
+    eps = [np.finfo(z.dtype).eps + len(z) * np.finfo(np.float64).eps for z in pair]
+    return [(z.astype(np.float64), 4 * e * np.abs(z).max()) for z, e in zip(pair, eps, strict=True)]
+
+
+def _on_clock(values, what):
+    """Performances on one clock as an array."""
+    if isinstance(values, pd.DataFrame) and values.index.nlevels >= 2:
+        values = as_collection(values)
+    if isinstance(values, np.ndarray) and values.dtype == object and values.ndim == 1:
+        values = list(values)
+    if isinstance(values, (list, tuple)):
+        shapes = [np.shape(x) for x in values if hasattr(x, "shape")]
+        if len(set(shapes)) > 1:
+            raise ValueError(
+                f"{what} must be performances on one clock, all of one shape (P, n_features), got "
+                f"{shapes[0]} and {next(s for s in shapes if s != shapes[0])}: give those that "
+                "transform or normalize return."
+            )
+    return as_numbers(values, what)
+
+
+def _squared_norms(z):
+    """``int |z_i|^2 dt`` over [0, 1] of every sequence, by the trapezoidal rule."""
     return np.trapezoid(np.square(z).sum(axis=2), dx=1 / (z.shape[1] - 1), axis=1)
 
 
 def _from_others(z):
-    # From the first one, so that nothing at all is between identical ones.
+    """Differences of every sequence from the mean of the others."""
+    # Relative to the first one, so that identical sequences differ by exactly 0.
     z = z - z[0]
     return (z - z.mean(axis=0)) * len(z) / (len(z) - 1)
 
 
-def _least(movements):
-    """The integral of one performance up to which it is rounding."""
-    return movements.values.shape[2] * movements.rounding**2
-
-
-def _in_one_unit(share, before, after):
-    """A share of squares that were taken in units of two kinds."""
-    with np.errstate(over="ignore", under="ignore"):
-        share = float(np.ldexp(share, 2 * (after.exponent - before.exponent)))
-    if not np.isfinite(share):
-        raise ValueError(
-            "after is so much larger than before that the share is beyond double precision: give "
-            "both in one unit."
-        )
-    return share
-
-
-def _no_share(none_after, what):
-    """1, for no gain, of what had nothing to gain before, and has nothing to lose after."""
+def _without_spread_before(none_after, what):
+    """1, for no gain, if there is no spread before and after."""
     if none_after:
         return 1.0
     raise ValueError(
-        f"The performances are {what} before and are not after: that is no share of anything, nor "
-        "a gain. Compare with performances that differ, such as normalize(X) of a synchronizer."
+        f"The performances are {what} before and are not after: the ratio is not defined. "
+        "Compare with performances that differ, such as normalize(X) of a synchronizer."
     )
 
 
-def _mean_correlation(movements):
-    z = movements.values
-    # From the first frame, so that nothing at all moves where nothing moved.
+def _mean_correlation(z, tolerance):
+    # Relative to the first frame, so that constant sequences are exactly 0.
     z = z - z[:, :1]
     centred = (z - z.mean(axis=1, keepdims=True)).reshape(len(z), -1)
     norms = np.linalg.norm(centred, axis=1)
-    moves = norms > movements.rounding * np.sqrt(centred.shape[1])
+    moves = norms > tolerance * np.sqrt(centred.shape[1])
     centred = centred[moves] / norms[moves, np.newaxis]
     correlation = centred @ centred.T
     pairs = len(z) * (len(z) - 1)

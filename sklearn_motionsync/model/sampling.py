@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from ..body.limbs import unit
-from ..body.sphere import away, mean_direction, towards
+from ..body.limbs import unit_vectors
+from ..body.sphere import exp_map, log_map, mean_direction
 
 __all__ = ["PERFORMANCE", "POSTURE", "sample_performances", "sample_postures"]
 
@@ -169,10 +169,10 @@ class Chart:
         if self.directions:
             self.coordinates = deviations.copy()
         for columns in self.directions:
-            directions = unit(known[..., columns])
+            directions = unit_vectors(known[..., columns])
             base = mean_direction(directions, even)
             self._bases.append(base)
-            self.coordinates[..., columns] = towards(base, directions)
+            self.coordinates[..., columns] = log_map(base, directions)
 
     def performances(self, coordinates):
         """Performances (m, P, n_features) at coordinates: their directions have the length 1."""
@@ -180,7 +180,7 @@ class Chart:
         for columns, base in zip(self.directions, self._bases, strict=True):
             tangents = coordinates[..., columns]
             tangents = tangents - (tangents * base).sum(axis=-1, keepdims=True) * base
-            found[..., columns] = away(base, tangents)
+            found[..., columns] = exp_map(base, tangents)
         return found.astype(self.mean.dtype)
 
 

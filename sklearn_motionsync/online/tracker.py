@@ -9,11 +9,7 @@ from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
-<<<<<<< HEAD
-from ..inputs.numbers import as_numbers, check_finite, check_names
-=======
 from ..inputs.numbers import as_numbers, check_finite
->>>>>>> online
 from ..inputs.tables import as_pandas, labels_of, name_performance
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
@@ -206,17 +202,10 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         match = sync.match(X)
         check_answer(match, n, sync.n_frames_, type(sync).__name__)
         warped = match.warp(performances)
-<<<<<<< HEAD
-        lengths = np.array([len(x) for x in performances], dtype=np.float64)
-        self.n_frames_, self.duration_ = int(sync.n_frames_), float(lengths.mean())
-        clock = Clock(self.n_frames_ - 1.0, self.duration_ - 1.0)
-        rates = clock.duration / (lengths[:, np.newaxis] - 1) / match.rates
-=======
         durations = np.array([len(x) for x in performances], dtype=np.float64) - 1
         self.n_frames_, self.duration_ = int(sync.n_frames_), float(durations.mean())
         clock = Clock(self.n_frames_ - 1.0, self.duration_)
         rates = clock.duration / durations[:, np.newaxis] / match.rates
->>>>>>> online
         codes, settings = _as_codes(groups, n), (self.noise, self.tempering, self.n_particles)
         given = warped.astype(np.float64), rates, codes, clock
         self._model = on_one_thread(TrackerModel.learn, *given, *settings)

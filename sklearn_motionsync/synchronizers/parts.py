@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from sklearn.utils._param_validation import Interval
 
-from ..body.parts import parts_of_names, parts_of_postures
+from ..body.limbs import parts_of_names, parts_of_postures
 from ..inputs.features import choose_features
 from ..inputs.validation import names_of_input
 from ..matching.matcher import Matcher

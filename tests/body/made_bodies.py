@@ -1,4 +1,4 @@
-"""Bodies made by hand, and bodies that are elsewhere."""
+"""Bodies made by hand, rotated and moved."""
 
 import numpy as np
 import pandas as pd
@@ -16,7 +16,7 @@ def moved(positions, shift):
 
 
 def standing(**moves):
-    """One posture in metres, facing z: standing straight with the arms hanging, or moved."""
+    """One posture in metres, facing z: standing straight, arms down, joints moved as given."""
     at = {
         "pelvis": (0, 1, 0),
         "neck": (0, 1.5, 0),

@@ -1,4 +1,4 @@
-"""What all transformers of joint positions owe bodies: invariances, and what they refuse."""
+"""All transformers of joint positions: invariances of the features, and refusals."""
 
 import numpy as np
 import pandas as pd
@@ -6,7 +6,7 @@ import pytest
 from made_bodies import moved, standing, turned, turned_over
 from sklearn import clone
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton, to_frame
-from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.datasets import make_bending
 
 PAPER = Skeleton.paper()
 NAMES = PAPER.column_names
@@ -28,51 +28,32 @@ def recording():
     return make_bending(1, random_state=1).data[0]
 
 
-def test_moving_and_growing_change_nothing(made, recording):
+def test_features_are_invariant_to_place_and_size(made, recording):
     expected = made().fit_transform([recording])[0]
     for changed in (moved(recording, [3.0, -7.0, 2.0]), 1.3 * recording, 100 * recording):
         np.testing.assert_allclose(made().fit_transform([changed])[0], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("degrees", [30, 90, 179, -135])
-def test_turning_changes_nothing_but_world(made, degrees, recording):
+def test_features_are_invariant_to_heading_unless_world(made, degrees, recording):
     straight, other = made().fit_transform([recording, turned(recording, degrees)])
     assert np.allclose(straight, other, atol=1e-9) is (made().reference != "world")
 
 
-def test_real_people_turn_and_move_without_changing(made, bends):
-    estimator = made(bends.skeleton)
-    X = [x.astype(float) for x in bends.data[:3]]
-    turn = 0 if estimator.reference == "world" else 77
-    changed = [1.2 * moved(turned(x, turn), [1.0, 2.0, 3.0]) for x in X]
-    for a, b in zip(estimator.fit_transform(X), estimator.transform(changed), strict=True):
-        np.testing.assert_allclose(a, b, atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("dtype", "factor"), [(float, 1e-300), (float, 1e300), ("f4", 1e-30), ("f4", 1e36)]
-)
-def test_the_unit_of_the_positions_does_not_matter(made, recording, dtype, factor):
+@pytest.mark.parametrize("dtype", ["f4", "f8"])
+@pytest.mark.parametrize("factor", [1e-8, 1e8])
+def test_features_do_not_depend_on_the_unit(made, recording, dtype, factor):
     near = made().fit_transform([recording.astype(dtype)])[0]
     far = made().fit_transform([(recording * factor).astype(dtype)])[0]
     assert far.dtype == near.dtype == dtype
-    np.testing.assert_allclose(far, near, atol=1e-5 if dtype == "f4" else 1e-12)
+    np.testing.assert_allclose(far, near, atol=1e-5 if dtype == "f4" else 1e-9)
 
 
-def test_a_performance_alone_or_together(made, bends):
+def test_transform_of_one_performance_equals_that_of_several(made, bends):
     fitted = made(bends.skeleton).fit(bends.data)
     for x, together in zip(bends.data[:4], fitted.transform(bends.data), strict=False):
         np.testing.assert_array_equal(fitted.transform([x])[0], together)
         np.testing.assert_array_equal(fitted.transform(x), together)
-
-
-def test_z_up(made, recording):
-    x, y, z = np.moveaxis(recording.reshape(-1, 15, 3), 2, 0)
-    z_up = np.stack([x, -z, y], axis=2).reshape(len(recording), -1)
-    upright = Skeleton(PAPER.joints, PAPER.parents, up="z")
-    np.testing.assert_allclose(
-        made(upright).fit_transform(z_up), made().fit_transform(recording), atol=1e-12
-    )
 
 
 def with_ankle_at_knee(positions, factor=1.0):
@@ -82,7 +63,7 @@ def with_ankle_at_knee(positions, factor=1.0):
     return X
 
 
-def test_a_limb_without_length_is_named(made, recording):
+def test_limb_without_length_is_refused(made, recording):
     message = r"Performance 1, frame 7: the limb 'left_leg' has no length"
     faulty = [recording, with_ankle_at_knee(recording)]
     for ask in (made().fit, made().fit_transform, made().fit([recording]).transform):
@@ -90,30 +71,30 @@ def test_a_limb_without_length_is_named(made, recording):
             ask(faulty)
 
 
-def test_a_limb_of_rounding_has_no_length(made, recording):
-    """Joints that coincide but for the last digit show no direction."""
+def test_limb_as_short_as_rounding_is_refused(made, recording):
+    """Joints that coincide except for the last digit give no direction."""
     X = with_ankle_at_knee(moved(recording, [7.0, 0.0, 0.0]), 1 + 2e-16)
     with pytest.raises(ValueError, match=r"Performance 0, frame 7: the limb 'left_leg' has no le"):
         made().fit([X])
 
 
-def test_hips_above_each_other_have_no_heading(made):
+def test_vertical_hips_give_finite_features(made):
     lying = standing(left_hip=(0, 1.1, 0), right_hip=(0, 0.9, 0))
     assert np.isfinite(made().fit_transform(lying)).all()
 
 
-def test_wrong_number_of_joints(made):
+def test_wrong_width_is_refused(made):
     with pytest.raises(ValueError, match="31 joints need 93"):
         made(Skeleton.acclaim()).fit([np.zeros((4, 45))])
 
 
-# -- which way is up ------------------------------------------------------------------------
+# -- which way is up ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("axes", [(1, -1, -1), (1, -1, 1)])
-def test_bodies_upside_down_are_refused(made, recording, axes):
+def test_body_upside_down_is_refused_with_its_performance(made, recording, axes):
     estimator, down = made(), turned_over(recording, axes)
-    message = r"Performance 1 is upside down.* says that \+y is up, but -y seems to be\. Turn"
+    message = r"Performance 1 is upside down.* says that 'y' is up, but '-y' seems to be\. Turn"
     with pytest.raises(ValueError, match=message):
         estimator.fit([recording, down])
     with pytest.raises(ValueError, match=message):
@@ -124,31 +105,13 @@ def test_bodies_upside_down_are_refused(made, recording, axes):
         estimator.transform(to_frame([recording, down], performances=["a", "b"]))
 
 
-def test_the_vertical_axis_of_the_skeleton_counts(made, recording):
-    z_up = recording.reshape(-1, 15, 3)[..., [0, 2, 1]] * [1, -1, 1]
-    upright = made(Skeleton(PAPER.joints, PAPER.parents, up="z"))
-    upright.fit(z_up.reshape(len(recording), -1))
-    with pytest.raises(ValueError, match=r"says that \+z is up, but -z seems to be"):
-        upright.fit((z_up * [1, -1, -1]).reshape(len(recording), -1))
-
-
-@pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
-def test_real_people_are_upright_and_turned_over_they_are_not(real_data, name):
-    bunch = load_performances(real_data / f"{name}_positions.npz")
-    for kind in (DirectionCosines, JointPositions):
-        fitted = kind(bunch.skeleton).fit(bunch.data)
-        for x in bunch.data:
-            with pytest.raises(ValueError, match="upside down"):
-                fitted.transform([turned_over(x)])
-
-
-def test_what_is_no_body_has_no_upside(made):
+def test_random_points_are_not_taken_for_a_body_upside_down(made):
     rng = np.random.default_rng(0)
     walks = list(np.cumsum(rng.standard_normal((200, 30, 45)), axis=1))
     made().fit(walks + [-x for x in walks])
 
 
-def test_who_lies_down_or_stands_on_the_hands_for_a_while_is_taken(made, recording):
+def test_lying_and_handstands_are_accepted(made, recording):
     lying = recording.reshape(-1, 15, 3)[..., [0, 2, 1]].reshape(recording.shape)
     handstand = recording.copy()
     half = len(recording) // 2
@@ -156,10 +119,10 @@ def test_who_lies_down_or_stands_on_the_hands_for_a_while_is_taken(made, recordi
     assert len(made().fit_transform([lying, turned_over(lying), handstand])) == 3
 
 
-# -- names of columns -----------------------------------------------------------------------
+# -- names of columns ---------------------------------------------------------------------
 
 
-def test_columns_in_another_order_are_refused(made, recording):
+def test_wrong_order_of_columns_is_refused(made, recording):
     estimator, table = made(), pd.DataFrame(recording, columns=NAMES)
     swapped = table[[*NAMES[3:], *NAMES[:3]]]
     half = swapped.set_axis([*swapped.columns[:20], *map(str, range(25))], axis=1)
@@ -167,14 +130,14 @@ def test_columns_in_another_order_are_refused(made, recording):
     for wrong in (swapped, half, [swapped] * 2, to_frame([swapped])):
         with pytest.raises(ValueError, match=message):
             clone(estimator).fit(wrong)
-    # Fitted without names, names still count.
+    # Also after a fit without names.
     estimator.fit([recording])
     with pytest.warns(UserWarning, match="fitted without feature names"):  # noqa: SIM117
         with pytest.raises(ValueError, match=message):
             estimator.transform([swapped])
 
 
-def test_other_names_and_the_right_order_are_taken(made, recording):
+def test_other_column_names_are_accepted(made, recording):
     expected = made().fit_transform(recording)
     for names in (NAMES, [f"marker {i}" for i in range(45)], range(45)):
         given = pd.DataFrame(recording, columns=names)

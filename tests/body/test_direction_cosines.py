@@ -1,4 +1,4 @@
-"""Postures against what is known of bodies: hand-made limbs, the way back."""
+"""Postures: cosines of known bodies, and positions reconstructed from them."""
 
 import numpy as np
 import pandas as pd
@@ -15,7 +15,7 @@ def recording():
     return make_bending(1, random_state=1).data[0]
 
 
-def test_a_jump_shows_and_sitting_shows(recording):
+def test_height_rises_in_a_jump(recording):
     up = recording.reshape(-1, 15, 3).copy()
     up[40:60, :, 1] += 0.3
     cosines = DirectionCosines(Skeleton.paper())
@@ -34,7 +34,7 @@ def named(cosines, positions):
     } | {"u": round(values[0], 9)}
 
 
-def test_cosines_of_a_body_made_by_hand():
+def test_cosines_of_a_known_body():
     body = named(DirectionCosines(Skeleton.paper()), standing(left_wrist=(0.2, 1.2, 0.3)))
     assert body["u"] == 1
     assert body["hip"] == (1, 0, 0)
@@ -43,8 +43,7 @@ def test_cosines_of_a_body_made_by_hand():
     assert body["left_forearm"] == (0, 0, 1)
 
 
-def test_parent_cosines_turn_with_the_parent():
-    """A leg that stays stretched says the same however the thigh swings."""
+def test_parent_cosines_of_a_stretched_leg_do_not_change_with_the_thigh():
     swung = standing(left_knee=(0.1, 0.7, 0.4), left_ankle=(0.1, 0.4, 0.8))
     for body in (standing(), swung):
         limbs = named(DirectionCosines(Skeleton.paper(), "parent"), body)
@@ -55,7 +54,7 @@ def test_parent_cosines_turn_with_the_parent():
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize("n_dims", [2, 3])
-def test_parent_cosines_of_limbs_that_point_the_other_way(n_dims, dtype):
+def test_parent_cosines_of_limbs_opposite_to_rest_are_unit_and_invertible(n_dims, dtype):
     """Hips of people seen from behind, level to any digit or exactly, and an arm across."""
     x = standing().reshape(-1, 3)[:, :n_dims].reshape(1, -1)
     skeleton = Skeleton.paper(n_dims=n_dims)
@@ -79,7 +78,7 @@ def test_parent_cosines_of_limbs_that_point_the_other_way(n_dims, dtype):
 
 
 @pytest.mark.parametrize("reference", REFERENCES)
-def test_joint_positions_come_back(reference, recording):
+def test_inverse_transform_reconstructs_positions_except_place_and_heading(reference, recording):
     """Exactly, but for place and heading: the embedded body is built like the inverse's."""
     bunch = make_bending(1, noise=0, random_state=1)
     cosines = DirectionCosines(bunch.skeleton, reference)
@@ -98,7 +97,7 @@ def test_joint_positions_come_back(reference, recording):
     np.testing.assert_allclose(again[0], postures[0], atol=1e-9)
 
 
-def test_given_limb_lengths_are_used(recording):
+def test_inverse_transform_uses_given_limb_lengths(recording):
     cosines = DirectionCosines(Skeleton.paper()).fit(recording)
     back = cosines.inverse_transform(cosines.transform(recording), 2 * cosines.limb_lengths_)
     again = DirectionCosines(Skeleton.paper()).fit(back)
@@ -107,38 +106,7 @@ def test_given_limb_lengths_are_used(recording):
         cosines.inverse_transform(cosines.transform(recording), [1.0])
 
 
-@pytest.mark.parametrize("reference", REFERENCES)
-@pytest.mark.parametrize(
-    ("dtype", "factor"), [(float, 1e-300), (float, 1e300), ("f4", 1e-30), ("f4", 1e36)]
-)
-def test_the_unit_of_the_positions_does_not_matter(recording, reference, dtype, factor):
-    positions = recording.astype(dtype)
-    cosines = DirectionCosines(Skeleton.paper(), reference).fit([positions])
-    postures, lengths = cosines.transform([positions]), cosines.limb_lengths_
-    scaled = (recording * factor).astype(dtype)
-    again = cosines.fit_transform([scaled])
-    assert again[0].dtype == positions.dtype
-    np.testing.assert_allclose(again[0], postures[0], atol=1e-5 if dtype == "f4" else 1e-12)
-    np.testing.assert_allclose(cosines.limb_lengths_ / factor, lengths, rtol=1e-6)
-    built = cosines.inverse_transform(postures)
-    np.testing.assert_allclose(cosines.transform(built)[0], postures[0], atol=1e-5)
-
-
-def test_lengths_that_no_number_holds(recording):
-    cosines = DirectionCosines(Skeleton.paper())
-    broad = standing(left_shoulder=(1, 1.5, 0), right_shoulder=(-1, 1.5, 0), head=(0, 1.6, 0))
-    with pytest.raises(ValueError, match="beyond float64 numbers: give the positions in another"):
-        cosines.fit(1.1e308 * broad)
-    postures = cosines.fit_transform([recording])
-    with pytest.raises(ValueError, match="Performance 0: the positions are beyond float64"):
-        cosines.inverse_transform(postures, np.full(12, 1e308))
-    small = [x.astype(np.float32) for x in postures]
-    for length in (1e-60, 1e60):
-        with pytest.raises(ValueError, match="Performance 0: the positions are beyond float32"):
-            cosines.inverse_transform(small, np.full(12, length))
-
-
-# -- the way back ---------------------------------------------------------------------------
+# -- inverse_transform --------------------------------------------------------------------
 
 
 def heights(postures):
@@ -146,7 +114,7 @@ def heights(postures):
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_the_height_of_the_pelvis_comes_back(bends, dtype):
+def test_inverse_transform_keeps_the_height_of_the_pelvis(bends, dtype):
     """Of real people, whose hips are below the pelvis, and of approximations of them."""
     cosines = DirectionCosines(bends.skeleton)
     postures = cosines.fit_transform([x.astype(dtype) for x in bends.data])
@@ -160,16 +128,7 @@ def test_the_height_of_the_pelvis_comes_back(bends, dtype):
             np.testing.assert_allclose(ankles.min(), 0, atol=1e-5)
 
 
-def test_exact_postures_come_back_whole(bends):
-    cosines = DirectionCosines(bends.skeleton)
-    postures = cosines.fit_transform([x.astype(float) for x in bends.data[:4]])
-    back = cosines.inverse_transform(postures)
-    again = DirectionCosines(Skeleton.paper()).fit_transform(back)
-    np.testing.assert_allclose(np.concatenate(again), np.concatenate(postures), atol=1e-12)
-
-
-def test_a_body_far_above_the_floor_stays_there(recording):
-    """Nobody is torn in two; its height comes back as near as a quarter of a leg allows."""
+def test_inverse_transform_shifts_hips_by_a_quarter_of_a_leg_at_most(recording):
     cosines = DirectionCosines(Skeleton.paper())
     (postures,) = cosines.fit_transform([recording])
     heights = []
@@ -182,15 +141,15 @@ def test_a_body_far_above_the_floor_stays_there(recording):
 
 
 @pytest.mark.parametrize("reference", REFERENCES)
-def test_a_posture_without_direction_is_refused(recording, reference):
+def test_inverse_transform_refuses_cosines_of_length_0_and_scales_others(recording, reference):
     cosines = DirectionCosines(Skeleton.paper(), reference)
     (postures,) = cosines.fit_transform([recording])
     faulty, tiny = postures.copy(), postures.copy()
     faulty[9, 4:7] = 0
-    message = r"Performance 1, frame 9: the limb 'torso' has no direction, its three cosines are 0"
+    message = r"Performance 1, frame 9: the limb 'torso' has no direction, its cosines are 0"
     with pytest.raises(ValueError, match=message):
         cosines.inverse_transform([postures, faulty])
-    tiny[:, 1:] *= 1e-200
+    tiny[:, 1:] *= 1e-6
     np.testing.assert_allclose(
         cosines.inverse_transform(tiny), cosines.inverse_transform(postures), atol=1e-9
     )
@@ -215,14 +174,14 @@ GOOD = np.ones(12)
         (pd.Series(GOOD, index=list("abcdefghijkl")), "limb_lengths is indexed by"),
     ],
 )  # fmt: skip
-def test_lengths_that_no_limb_has(recording, lengths, message):
+def test_inverse_transform_refuses_wrong_limb_lengths(recording, lengths, message):
     cosines = DirectionCosines(Skeleton.paper())
     postures = cosines.fit_transform([recording])
     with pytest.raises(ValueError, match=message):
         cosines.inverse_transform(postures, lengths)
 
 
-def test_lengths_of_any_kind(recording):
+def test_limb_lengths_of_any_kind_give_the_same(recording):
     cosines = DirectionCosines(Skeleton.paper())
     postures = cosines.fit_transform([recording])
     lengths = pd.Series(cosines.limb_lengths_)
@@ -234,7 +193,7 @@ def test_lengths_of_any_kind(recording):
         )
 
 
-# -- names of columns -----------------------------------------------------------------------
+# -- names of columns ---------------------------------------------------------------------
 
 NAMES = Skeleton.paper().column_names
 
@@ -243,7 +202,7 @@ def as_table(x, names=NAMES):
     return pd.DataFrame(x, columns=names)
 
 
-def test_postures_in_another_order_are_refused(recording):
+def test_inverse_transform_refuses_wrong_order_of_columns(recording):
     cosines = DirectionCosines(Skeleton.paper()).set_output(transform="pandas")
     table = cosines.fit_transform(as_table(recording))
     expected = cosines.inverse_transform(np.asarray(table))
@@ -254,54 +213,3 @@ def test_postures_in_another_order_are_refused(recording):
         for given in (wrong, [wrong], to_frame([wrong])):
             with pytest.raises(ValueError, match="names should match"):
                 cosines.inverse_transform(given)
-
-
-# -- Skeleton ---------------------------------------------------------------------------
-
-
-def test_ready_skeletons_are_those_of_the_archives(real_data):
-    archives = {"hdm05/hdm05": Skeleton.acclaim(), "utkinect/utkinect": Skeleton.kinect()}
-    for name, skeleton in archives.items():
-        with np.load(real_data / f"{name}_positions.npz") as archive:
-            assert skeleton.joints == tuple(archive["joints"])
-            assert skeleton.parents == tuple(archive["parents"])
-
-
-def test_landmarks_are_guessed_from_names(real_data):
-    with np.load(real_data / "cmu07_walk" / "cmu07_walk_positions.npz") as archive:
-        skeleton = Skeleton.from_names(archive["joints"], archive["parents"])
-    assert skeleton.landmarks["left_hip"] == "CC_Base_L_Thigh"
-    assert skeleton.landmarks["right_elbow"] == "CC_Base_R_Forearm"
-    assert skeleton.landmarks["pelvis"] == "CC_Base_Hip"
-
-
-def test_landmarks_of_common_names():
-    left = [
-        "LeftUpLeg",
-        "LeftLeg",
-        "LeftFoot",
-        "LeftShoulder",
-        "LeftArm",
-        "LeftForeArm",
-        "LeftHand",
-    ]
-    joints = ["Hips", "Spine", "Neck", "Head", *left, *(n.replace("Left", "Right") for n in left)]
-    skeleton = Skeleton(joints, [-1] + [0] * (len(joints) - 1))
-    assert skeleton.landmarks["left_shoulder"] == "LeftArm"
-    assert skeleton.landmarks["right_knee"] == "RightLeg"
-    assert skeleton.landmarks["left_wrist"] == "LeftHand"
-
-
-def test_shanks_and_lower_arms_are_knees_and_elbows():
-    segments = ("thigh", "shank", "foot", "uarm", "larm", "hand")
-    joints = ["pelvis", "torso", "head", *(f"{side}_{name}" for side in "lr" for name in segments)]
-    skeleton = Skeleton(joints, [-1] * len(joints))
-    assert skeleton.landmarks["left_knee"] == "l_shank"
-    assert skeleton.landmarks["right_elbow"] == "r_larm"
-    assert len(skeleton.limbs) == 12
-
-
-def test_bones_and_columns():
-    skeleton = Skeleton.kinect()
-    assert len(skeleton.bones) == 19
-    assert skeleton.column_names[:3] == ["HipCenter_x", "HipCenter_y", "HipCenter_z"]

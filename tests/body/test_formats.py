@@ -1,15 +1,16 @@
-"""Skeletons known by heart: their joints, how they are recognised, and that they show a body."""
+"""Known skeletons: their joints, how their names are recognised, and their bodies."""
 
 import numpy as np
 import pandas as pd
 import pytest
 from made_bodies import columns_of
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
-from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.body.formats import FORMATS
+from sklearn_motionsync.datasets import load_performances, make_bending
 
 PAPER = Skeleton.paper()
-# How many joints, some of them by their place, what is up in space, and landmarks that tell.
-FORMATS = {
+# Number of joints, some joints by their index, the vertical axis in space, and some landmarks.
+EXPECTED = {
     "paper": (15, {0: "pelvis"}, "y", {}),
     "acclaim": (31, {0: "root"}, "y", {"left_knee": "lfemur"}),
     "kinect": (20, {3: "Head", 19: "FootRight"}, "y", {"neck": "ShoulderCenter"}),
@@ -49,7 +50,7 @@ def ready(name, **settings):
 
 
 def embedded(name, n_dims=3):
-    """A made person as a format shows it: what is no landmark lies at the neck."""
+    """A synthetic person as a format shows it: other joints lie at the neck."""
     (x,) = make_bending(1, random_state=1).data
     skeleton = ready(name, n_dims=n_dims, up="y")
     points = dict(zip(PAPER.joints, np.moveaxis(x.reshape(-1, 15, 3), 1, 0), strict=True))
@@ -60,7 +61,8 @@ def embedded(name, n_dims=3):
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_joints_and_landmarks(name):
-    count, places, up, landmarks = FORMATS[name]
+    assert name in EXPECTED, f"The format {name!r} lacks an entry in EXPECTED of {__file__}."
+    count, places, up, landmarks = EXPECTED[name]
     skeleton = ready(name)
     assert (len(skeleton.joints), skeleton.up, skeleton.n_dims) == (count, up, 3)
     assert {j: skeleton.joints[j] for j in places} == places
@@ -70,7 +72,7 @@ def test_joints_and_landmarks(name):
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_what_they_are_called(name):
+def test_repr_is_the_constructor(name):
     for settings, called in (({}, ""), ({"n_dims": 2}, "n_dims=2")):
         skeleton = ready(name, **settings)
         assert repr(skeleton) == f"Skeleton.{name}({called})"
@@ -81,7 +83,7 @@ def test_what_they_are_called(name):
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_pictures_have_y_downwards(name):
+def test_up_is_downwards_in_pictures(name):
     skeleton = ready(name, n_dims=2)
     assert skeleton.up == ("y" if name in ("paper", "acclaim") else "-y")
     assert skeleton.column_names[:2] == [f"{skeleton.joints[0]}_x", f"{skeleton.joints[0]}_y"]
@@ -91,8 +93,7 @@ def test_pictures_have_y_downwards(name):
 @pytest.mark.parametrize("n_dims", [3, 2])
 @pytest.mark.parametrize("spelling", [str, str.lower, str.upper, "subject 1:{}".format])
 @pytest.mark.parametrize("name", FORMATS)
-def test_they_are_told_from_their_names(name, spelling, n_dims):
-    """However they are written, and with joints besides."""
+def test_landmarks_are_recognised_in_any_spelling_and_among_other_joints(name, spelling, n_dims):
     known = ready(name, n_dims=n_dims)
     df = embedded(name, n_dims)
     names = [spelling(joint) for joint in known.joints]
@@ -107,17 +108,17 @@ def test_they_are_told_from_their_names(name, spelling, n_dims):
     skeleton = Skeleton.from_frame(df)
     assert skeleton.landmarks == expected
     assert (skeleton.up, skeleton.n_dims) == ("y", n_dims)
-    assert Skeleton.from_names(skeleton.joints, skeleton.parents).landmarks == expected
+    assert Skeleton(skeleton.joints, skeleton.parents).landmarks == expected
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_a_body_is_the_same_in_any_format(name):
+def test_features_do_not_depend_on_the_format(name):
     (x,) = make_bending(1, random_state=1).data
     for kind in (DirectionCosines, JointPositions):
         some = kind(ready(name, up="y")).set_output(transform="pandas")
         expected = kind(PAPER).set_output(transform="pandas").fit_transform(x)
         found = some.fit_transform(embedded(name))
-        # The made people have their pelvis and neck in the middle, but for noise.
+        # The synthetic people have their pelvis and neck in the middle, but for noise.
         atol = 0.06 if name in ("coco", "mediapipe") else 1e-12
         np.testing.assert_allclose(found, expected[found.columns], atol=atol)
 
@@ -129,6 +130,11 @@ def test_a_body_is_the_same_in_any_format(name):
         ("LHJC RHJC LKJC RKJC LAJC RAJC", {"pelvis": ("LHJC", "RHJC"), "left_knee": "LKJC"}),
         ("PELO LFEP RFEP LFEO RFEO LTIO RTIO", {"left_hip": "LFEP", "left_ankle": "LTIO"}),
         ("Hip LThigh RThigh LShin RShin LFoot RFoot", {"pelvis": "Hip", "right_hip": "RThigh"}),
+        # Segments named after their near ends.
+        ("pelvis head l_thigh r_thigh l_shank r_shank l_foot r_foot l_uarm r_uarm l_larm r_larm",
+         {"left_knee": "l_shank", "right_elbow": "r_larm", "left_ankle": "l_foot"}),
+        ("Hips Spine Head LeftUpLeg RightUpLeg LeftLeg RightLeg LeftShoulder RightShoulder LeftArm "
+         "RightArm", {"left_shoulder": "LeftArm", "right_knee": "RightLeg", "pelvis": "Hips"}),
         # A key-point format with a neck and a head of its own.
         ("left_shoulder right_shoulder left_elbow right_elbow nose head neck",
          {"neck": "neck", "head": "head"}),
@@ -144,8 +150,24 @@ def test_a_body_is_the_same_in_any_format(name):
         ("LASI RASI LKNE RKNE LANK RANK LHJC RHJC", {"left_hip": "LHJC", "left_knee": "LKNE"}),
     ],
 )  # fmt: skip
-def test_names_that_are_no_format(joints, landmarks):
+def test_landmarks_of_other_names_are_guessed(joints, landmarks):
     joints = joints.split()
     df = pd.DataFrame(0.0, index=[0], columns=[f"{j}_{a}" for j in joints for a in "xyz"])
     found = Skeleton.from_frame(df).landmarks
     assert found == {**found, **landmarks}
+
+
+@pytest.mark.parametrize(
+    ("archive", "name"), [("hdm05/hdm05", "acclaim"), ("utkinect/utkinect", "kinect")]
+)
+def test_joints_and_parents_are_those_of_real_recordings(real_data, archive, name):
+    bunch = load_performances(real_data / f"{archive}_positions.npz")
+    assert bunch.skeleton == ready(name)
+
+
+def test_landmarks_of_a_recording_without_format_are_guessed(real_data):
+    with np.load(real_data / "cmu07_walk" / "cmu07_walk_positions.npz") as archive:
+        skeleton = Skeleton(archive["joints"], archive["parents"])
+    assert skeleton.landmarks["left_hip"] == "CC_Base_L_Thigh"
+    assert skeleton.landmarks["right_elbow"] == "CC_Base_R_Forearm"
+    assert skeleton.landmarks["pelvis"] == "CC_Base_Hip"

@@ -1,11 +1,11 @@
-"""Joints that are hidden: NaN limbs, a heading from what is seen, and nothing else changes."""
+"""Hidden joints: their limbs are NaN, the heading is estimated, and nothing else changes."""
 
 import numpy as np
 import pytest
 from made_bodies import columns_of, standing, turned, turned_over
 from sklearn.utils import get_tags
 from sklearn_motionsync import ASpace, DirectionCosines, Skeleton, to_frame
-from sklearn_motionsync.body.hidden import seen_heading
+from sklearn_motionsync.body.axes import heading_axes_with_gaps
 from sklearn_motionsync.datasets import load_performances, make_bending
 
 PAPER = Skeleton.paper()
@@ -53,21 +53,19 @@ def fitted(recordings):
     return lambda reference="heading": DirectionCosines(PAPER, reference, "nan").fit(recordings)
 
 
-# -- what is seen stays as it is ------------------------------------------------------------
+# -- visible limbs are unchanged ----------------------------------------------------------
 
 
 @pytest.mark.parametrize("dtype", ["f4", "f8"])
 @pytest.mark.parametrize("n_dims", [2, 3])
 @pytest.mark.parametrize("reference", REFERENCES)
-def test_limbs_are_nan_where_an_end_is_hidden_and_no_other_bit_changes(
-    reference, n_dims, dtype, recordings
-):
+def test_limbs_with_a_hidden_end_are_nan_and_others_unchanged(reference, n_dims, dtype, recordings):
     x = recordings[0].reshape(-1, 15, 3)[..., :n_dims].reshape(len(recordings[0]), -1)
     x = x.astype(dtype)
     skeleton = Skeleton.paper(n_dims=n_dims)
     cosines = DirectionCosines(skeleton, reference, "nan").fit([x])
     hidden = np.random.default_rng(0).random((len(x), 15)) < 0.2
-    # The heading is told by the hips in every frame.
+    # The hips give the heading in every frame.
     for joint in ("left_hip", "right_hip")[: 2 * (reference != "world" and n_dims == 3)]:
         hidden[:, JOINTS.index(joint)] = False
     given = without(x, hidden, n_dims)
@@ -89,17 +87,17 @@ def test_limbs_are_nan_where_an_end_is_hidden_and_no_other_bit_changes(
     np.testing.assert_array_equal(np.isnan(postures[:, 0]), hidden[:, 0])
 
 
-def test_without_gaps_it_is_the_usual_way(recordings, fitted):
+def test_hidden_nan_without_gaps_equals_hidden_raise(recordings, fitted):
     for reference in REFERENCES:
-        usual = DirectionCosines(PAPER, reference).fit(recordings)
+        plain = DirectionCosines(PAPER, reference).fit(recordings)
         live = fitted(reference)
-        np.testing.assert_array_equal(live.limb_lengths_, usual.limb_lengths_)
-        a, b = usual.transform(recordings[0]), live.transform(recordings[0])
+        np.testing.assert_array_equal(live.limb_lengths_, plain.limb_lengths_)
+        a, b = plain.transform(recordings[0]), live.transform(recordings[0])
         np.testing.assert_array_equal(a, b)
-        np.testing.assert_array_equal(usual.inverse_transform(a), live.inverse_transform(b))
+        np.testing.assert_array_equal(plain.inverse_transform(a), live.inverse_transform(b))
 
 
-def test_a_mean_of_joints_is_hidden_with_any_of_them():
+def test_mean_of_joints_is_hidden_with_any_of_them():
     markers = Skeleton(
         ["hip", "in", "out", "ankle"],
         [-1] * 4,
@@ -112,16 +110,16 @@ def test_a_mean_of_joints_is_hidden_with_any_of_them():
     np.testing.assert_array_equal(postures[2], [0, -1, 0, 0, -1, 0])
 
 
-# -- the heading ----------------------------------------------------------------------------
+# -- the heading --------------------------------------------------------------------------
 
 
-def turn_of_x(ways):
+def turn_of_x(directions):
     """By how many degrees about y the x axis is turned into the level parts of directions."""
-    return np.rad2deg(np.arctan2(-ways[:, 2], ways[:, 0]))
+    return np.rad2deg(np.arctan2(-directions[:, 2], directions[:, 0]))
 
 
-def turn_of_z(ways):
-    return np.rad2deg(np.arctan2(ways[:, 0], ways[:, 2]))
+def turn_of_z(directions):
+    return np.rad2deg(np.arctan2(directions[:, 0], directions[:, 2]))
 
 
 def turning(headings, twists):
@@ -136,18 +134,18 @@ def turning(headings, twists):
     return np.concatenate(bodies)
 
 
-def test_the_heading_follows_from_the_shoulders_as_twisted_when_last_seen(fitted):
+def test_shoulders_give_the_heading_with_the_last_seen_twist(fitted):
     x = turning([0, 10, 30, 50, 80, 90], [10, 20, 25, 30, -5, -5])
     x = hide(x, [2, 3], "left_hip")
     cosines = fitted()
     angles = turn_of_x(limb(cosines, cosines.transform(x), "shoulder"))
     np.testing.assert_allclose(angles, [10, 20, 20, 20, -5, -5], atol=1e-9)
-    # The head is forward of the neck: its way tells the estimated heading.
+    # The head is forward of the neck: its direction shows the estimated heading.
     faces = turn_of_z(limb(cosines, cosines.transform(x), "neck"))
     np.testing.assert_allclose(faces, [0, 0, -5, -10, 0, 0], atol=1e-9)
 
 
-def test_the_heading_stays_where_nothing_tells_it(fitted):
+def test_last_heading_stays_where_hips_and_shoulders_are_hidden(fitted):
     x = turning([0, 10, 40, 50], [0, 0, 0, 0])
     x = hide(x, [2], "left_hip", "right_shoulder")
     cosines = fitted()
@@ -155,7 +153,7 @@ def test_the_heading_stays_where_nothing_tells_it(fitted):
     np.testing.assert_allclose(faces, [0, 0, 30, 0], atol=1e-9)
 
 
-def test_until_something_tells_the_heading_limbs_are_nan(fitted):
+def test_limbs_before_the_first_heading_are_nan(fitted):
     x = turning([20, 20, 20, 20], [15, 15, 15, 15])
     x = hide(hide(x, [0, 1], "left_hip"), [0], "left_shoulder")
     for reference in ("heading", "parent"):
@@ -171,8 +169,7 @@ def test_until_something_tells_the_heading_limbs_are_nan(fitted):
     assert np.isfinite(limb(fitted("world"), fitted("world").transform(x), "neck")).all()
 
 
-def test_hips_that_show_no_heading_are_as_of_the_whole_body(fitted):
-    """One above the other, which is seen, and the axes are the recording's as before."""
+def test_vertical_hips_have_the_axes_of_the_recording(fitted):
     x = turning([30] * 3, [0] * 3).reshape(3, 15, 3)
     hips = [JOINTS.index(f"{side}_hip") for side in ("left", "right")]
     x[1, hips] = x[1, hips].mean(axis=0) + [[0, 0.1, 0], [0, -0.1, 0]]
@@ -187,7 +184,7 @@ def test_hips_that_show_no_heading_are_as_of_the_whole_body(fitted):
 
 
 @pytest.mark.parametrize("reference", REFERENCES)
-def test_nothing_but_the_height_looks_ahead(reference, recordings, fitted):
+def test_cosines_do_not_depend_on_later_frames(reference, recordings, fitted):
     x = recordings[0]
     hidden = np.random.default_rng(1).random((len(x), 15)) < 0.5
     x = without(x, hidden)
@@ -198,10 +195,10 @@ def test_nothing_but_the_height_looks_ahead(reference, recordings, fitted):
         np.testing.assert_array_equal(cosines.transform(x[:k])[:, 1:], whole[:k, 1:])
 
 
-# -- the height -----------------------------------------------------------------------------
+# -- the height ---------------------------------------------------------------------------
 
 
-def test_the_floor_and_the_legs_are_of_what_is_seen():
+def test_height_uses_the_ankles_and_legs_that_are_seen():
     x = np.concatenate([standing(), standing() + 0.3, standing()])
     cosines = DirectionCosines(PAPER, hidden="nan").fit(x)
     np.testing.assert_allclose(cosines.transform(x)[:, 0], [1, 1.3, 1])
@@ -214,8 +211,8 @@ def test_the_floor_and_the_legs_are_of_what_is_seen():
     assert np.isnan(cosines.transform(hide(x, slice(None), *feet))[:, 0]).all()
 
 
-@pytest.mark.parametrize("factor", [1, 100, 1e-300])
-def test_legs_never_seen_are_in_proportion_to_what_is(factor):
+@pytest.mark.parametrize("factor", [1, 100, 1e-6])
+def test_legs_never_seen_are_scaled_from_fit(factor):
     """Of a body of the proportions of those of ``fit``, in any unit, the height is the same."""
     x = np.concatenate([standing(), standing() + 0.3])
     cosines = DirectionCosines(PAPER, hidden="nan").fit(x)
@@ -223,10 +220,10 @@ def test_legs_never_seen_are_in_proportion_to_what_is(factor):
     np.testing.assert_allclose(cosines.transform(factor * lost)[:, 0], [1, 1.3])
 
 
-# -- what goes in, and what is refused ------------------------------------------------------
+# -- kinds of input, and refusals ---------------------------------------------------------
 
 
-def test_all_kinds_of_input_give_the_same(recordings, fitted):
+def test_kinds_of_input_with_gaps_give_the_same(recordings, fitted):
     x = without(recordings[0], np.random.default_rng(2).random((len(recordings[0]), 15)) < 0.3)
     cosines = fitted()
     expected = cosines.transform(x)
@@ -243,48 +240,46 @@ def test_all_kinds_of_input_give_the_same(recordings, fitted):
         np.testing.assert_array_equal(got, expected)
 
 
-def test_what_is_refused(recordings, fitted):
+def test_hidden_joints_are_refused_unless_allowed(recordings, fitted):
     x = hide(recordings[0], [3], "head")
     infinite = x.copy()
     infinite[5, 0] = np.inf
     with pytest.raises(ValueError, match="Performance 0, frame 5, feature 0 is infinity"):
         fitted().transform([infinite])
-    usual = DirectionCosines(PAPER).fit(recordings)
+    plain = DirectionCosines(PAPER).fit(recordings)
     with pytest.raises(ValueError, match=r"Performance 0, frame 3, .* is NaN"):
-        usual.transform([x])
+        plain.transform([x])
     with pytest.raises(ValueError, match="is NaN"):
-        usual.inverse_transform(fitted().transform([x]))
+        plain.inverse_transform(fitted().transform([x]))
     with pytest.raises(ValueError, match=r"Performance 0, frame 3, .* is NaN.*Interpolate"):
-        ASpace().fit(usual.transform(recordings)).transform(fitted().transform([x]))
-    for hidden, allowed in (("nan", True), ("refuse", False)):
+        ASpace().fit(plain.transform(recordings)).transform(fitted().transform([x]))
+    for hidden, allowed in (("nan", True), ("raise", False)):
         tags = get_tags(DirectionCosines(PAPER, hidden=hidden))
         assert tags.input_tags.allow_nan is allowed
     with pytest.raises(ValueError, match="The 'hidden' parameter"):
         DirectionCosines(PAPER, hidden="drop").fit(recordings)
 
 
-def test_bodies_are_checked_by_what_is_seen(recordings, fitted):
+def test_visible_limbs_are_checked(recordings, fitted):
     hidden = np.random.default_rng(3).random((len(recordings[0]), 15)) < 0.1
     with pytest.raises(ValueError, match="Performance 0 is upside down"):
         fitted().transform([without(turned_over(recordings[0]), hidden)])
     legs = ("left_hip", "right_hip", "left_knee", "left_ankle", "right_knee", "right_ankle")
     trunk = hide(turned_over(np.concatenate([standing()] * 5)), slice(None), *legs)
-    with pytest.raises(ValueError, match="the head is below the pelvis"):
+    with pytest.raises(ValueError, match="upside down"):
         fitted().transform([trunk])
     # Legs in some frames, the trunk in others.
     x = turned_over(np.concatenate([standing()] * 6))
     x = hide(hide(x, slice(3), "neck", "head"), slice(3, 6), *legs[2:])
     shoulders = [f"{side}_shoulder" for side in ("left", "right")]
-    with pytest.raises(
-        ValueError, match=r"the pelvis is below the ankles and the head .* -y seems"
-    ):
+    with pytest.raises(ValueError, match="'-y' seems to be"):
         fitted().transform(hide(x, slice(3), *shoulders))
     x = hide(np.concatenate([standing(), standing(head=(0, 1.5, 0))]), [0, 1], "left_knee")
     with pytest.raises(ValueError, match="frame 1: the limb 'neck' has no length"):
         fitted().transform(x)
 
 
-def test_everything_may_be_hidden_but_in_fit(recordings, fitted):
+def test_everything_may_be_hidden_in_transform_and_not_in_fit(recordings, fitted):
     nothing = np.full_like(recordings[0], np.nan)
     for reference in REFERENCES:
         assert np.isnan(fitted(reference).transform([nothing])[0]).all()
@@ -296,26 +291,12 @@ def test_everything_may_be_hidden_but_in_fit(recordings, fitted):
     wrist = hide(recordings[0], slice(None), "left_wrist")
     with pytest.raises(ValueError, match=r"limbs \['left_forearm'\] are hidden .* landmarks="):
         cosines.fit([wrist])
-    tiny = 1e-300 * recordings[1]
+    tiny = 1e-6 * recordings[1]
     lengths = cosines.fit([tiny]).limb_lengths_
     np.testing.assert_array_equal(cosines.fit([nothing, tiny]).limb_lengths_, lengths)
 
 
-def test_pictures_of_a_body_from_the_side():
-    """Hips and shoulders end-on have no direction; where they are hidden, they are NaN."""
-    skeleton = Skeleton.paper(n_dims=2)
-    x = np.tile(standing().reshape(-1, 3)[:, [2, 1]].reshape(1, -1), (4, 1))
-    cosines = DirectionCosines(skeleton, hidden="nan").fit(x)
-    lost = x.copy()
-    lost[1, 2 * JOINTS.index("left_hip")] = np.nan
-    postures, whole = cosines.transform(lost), cosines.transform(x)
-    np.testing.assert_array_equal(postures[[0, 2, 3]], whole[[0, 2, 3]])
-    names = cosines.get_feature_names_out()
-    missing = names[np.isnan(postures[1])].tolist()
-    assert missing == ["hip_x", "hip_y", "left_thigh_x", "left_thigh_y"]
-
-
-def test_a_partial_body_follows_its_shoulders():
+def test_body_without_hips_keeps_the_heading_of_its_shoulders():
     names = [name for name in JOINTS if "hip" not in name and "knee" not in name]
     trunk = Skeleton(names, [-1] * len(names), {name: name for name in names})
     x = turning([0, 30, 60, 90], [0] * 4).reshape(4, 15, 3)
@@ -327,11 +308,11 @@ def test_a_partial_body_follows_its_shoulders():
     np.testing.assert_allclose(faces, [0, 0, 30, 0], atol=1e-9)
 
 
-# -- the way back ---------------------------------------------------------------------------
+# -- inverse_transform --------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("reference", REFERENCES)
-def test_joints_that_hang_on_a_hidden_limb_are_hidden(reference, recordings, fitted):
+def test_inverse_transform_hides_joints_below_a_hidden_limb(reference, recordings, fitted):
     cosines = fitted(reference)
     postures = cosines.transform(recordings[0])
     names = list(cosines.get_feature_names_out())
@@ -353,12 +334,12 @@ def test_joints_that_hang_on_a_hidden_limb_are_hidden(reference, recordings, fit
     np.testing.assert_array_equal(back, np.where(expected[..., np.newaxis], np.nan, whole))
 
 
-# -- the matrix -----------------------------------------------------------------------------
+# -- position_matrix ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("reference", ["heading", "world"])
 @pytest.mark.parametrize("n_dims", [2, 3])
-def test_the_matrix_gives_positions_but_for_one_shift_of_the_legs(reference, n_dims, recordings):
+def test_position_matrix_equals_inverse_transform_but_for_the_shift(reference, n_dims, recordings):
     x = recordings[0].reshape(-1, 15, 3)[..., :n_dims].reshape(len(recordings[0]), -1)
     cosines = DirectionCosines(Skeleton.paper(n_dims=n_dims), reference).fit(x)
     postures = cosines.transform(x)
@@ -370,14 +351,14 @@ def test_the_matrix_gives_positions_but_for_one_shift_of_the_legs(reference, n_d
         moves = np.array([name.endswith(("hip_y", "knee_y", "ankle_y")) for name in names])
         np.testing.assert_allclose(off[:, ~moves], 0, atol=1e-12)
         np.testing.assert_allclose(off[:, moves], off[0, moves][0], atol=1e-12)
-    # Who stands straight, the hips beside the pelvis, needs no move.
+    # A body that stands straight, the hips beside the pelvis, is not shifted.
     upright = cosines.fit_transform(standing().reshape(-1, 3)[:, :n_dims].reshape(1, -1))
     np.testing.assert_allclose(
         upright @ cosines.position_matrix()[0].T, cosines.inverse_transform(upright), atol=1e-12
     )
 
 
-def test_the_matrix_of_a_body_that_lacks_landmarks():
+def test_position_matrix_of_a_body_that_lacks_landmarks():
     joints = ["neck", "head", "left_shoulder", "left_elbow"]
     arm = Skeleton(joints, [-1] * 4, {name: name for name in joints}, up="z")
     x = np.tile(np.array([0.0, 0, 1, 0, 0, 2, 1, 0, 1, 3, 0, 1]), (2, 1))
@@ -388,58 +369,39 @@ def test_the_matrix_of_a_body_that_lacks_landmarks():
     np.testing.assert_allclose(postures @ matrix.T, cosines.inverse_transform(postures))
 
 
-def test_there_is_no_matrix_along_parents_or_of_wrong_lengths(recordings, fitted):
-    with pytest.raises(ValueError, match="no linear map of cosines along parent limbs"):
+def test_position_matrix_refuses_parent_axes_and_wrong_lengths(recordings, fitted):
+    with pytest.raises(ValueError, match="not linear in cosines along parent limbs"):
         fitted("parent").position_matrix()
     with pytest.raises(ValueError, match="above 0, got -1 for 'torso'"):
         fitted().position_matrix([1, -1, *[1] * 10])
 
 
-# -- real people ----------------------------------------------------------------------------
+# -- real people --------------------------------------------------------------------------
 
 
-def test_the_shoulders_tell_the_heading_of_people_who_turn(real_data):
-    """Joggers in a circle, hips hidden for a second: less than half the error of a heading held."""
+def test_shoulders_halve_the_error_of_the_heading_of_turning_people(real_data):
+    """Joggers in a circle, hips hidden for a second, against the last heading."""
     bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
     errors = {"shoulders": [], "held": []}
     for i in np.flatnonzero(bunch.target == "jogLeftCircle4StepsRstart"):
         x = bunch.data[i].astype(float).reshape(len(bunch.data[i]), -1, 3)
         hips, shoulders = (across(x, bunch.skeleton, part) for part in ("hip", "shoulder"))
-        true = seen_heading(hips)[:, 0]
+        true = heading_axes_with_gaps(hips)[:, 0]
         for start in range(1, len(x) - 120, 60):
             gap = slice(start, start + 120)
             lost = hips.copy()
             lost[gap] = np.nan
             for name, found in (
-                ("shoulders", seen_heading(lost, shoulders)),
-                ("held", seen_heading(lost)),
+                ("shoulders", heading_axes_with_gaps(lost, shoulders)),
+                ("held", heading_axes_with_gaps(lost)),
             ):
                 cosines = np.clip((true * found[:, 0]).sum(axis=1), -1, 1)
                 errors[name].append(np.rad2deg(np.arccos(cosines))[gap])
-    told, held = (np.quantile(np.concatenate(e), 0.9) for e in errors.values())
-    assert told < 0.5 * held
-    assert told < 25
+    error, held = (np.quantile(np.concatenate(e), 0.9) for e in errors.values())
+    assert error < 0.5 * held
+    assert error < 25
 
 
 def across(x, skeleton, part):
-    way = x[:, skeleton.index_of(f"left_{part}")] - x[:, skeleton.index_of(f"right_{part}")]
-    return way / np.linalg.norm(way, axis=1, keepdims=True)
-
-
-def test_real_people_of_whom_a_tenth_is_hidden(bends):
-    """Lengths are those of the whole, limbs where the hips are seen the same to the last bit."""
-    rng = np.random.default_rng(0)
-    X = [x.astype(float) for x in bends.data[:6]]
-    lost = [without(x, rng.random((len(x), x.shape[1] // 3)) < 0.1) for x in X]
-    usual = DirectionCosines(bends.skeleton).fit(X)
-    cosines = DirectionCosines(bends.skeleton, hidden="nan").fit(lost)
-    np.testing.assert_allclose(cosines.limb_lengths_, usual.limb_lengths_, rtol=2e-3)
-    for whole, seen in zip(usual.transform(X), cosines.transform(lost), strict=True):
-        there = np.isfinite(seen)
-        assert 0.7 < there.mean() < 0.9
-        hips = np.isfinite(limb(cosines, seen, "hip")).all(axis=1)
-        same = np.where(there, whole, np.nan)[hips, 1:]
-        np.testing.assert_array_equal(seen[hips, 1:], same)
-        np.testing.assert_allclose(
-            seen[:, 0], np.where(there[:, 0], whole[:, 0], np.nan), rtol=0.01
-        )
+    direction = x[:, skeleton.index_of(f"left_{part}")] - x[:, skeleton.index_of(f"right_{part}")]
+    return direction / np.linalg.norm(direction, axis=1, keepdims=True)

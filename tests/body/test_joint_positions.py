@@ -1,4 +1,4 @@
-"""Where joints are against closed forms and a slow computation, and side by side with cosines."""
+"""Joint positions against closed forms and a slow computation, and in a union with cosines."""
 
 import math
 from statistics import median
@@ -8,11 +8,8 @@ import pandas as pd
 import pytest
 from made_bodies import moved, standing, turned
 from sklearn import clone, config_context
-from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
-from sklearn.pipeline import make_pipeline, make_union
+from sklearn.pipeline import make_union
 from sklearn_motionsync import (
-    ActionModel,
-    DenseSynchronizer,
     DirectionCosines,
     JointPositions,
     Skeleton,
@@ -31,18 +28,12 @@ def places(body, reference="heading"):
     return dict(zip(LANDMARKS, map(tuple, features.reshape(14, 3).round(9) + 0.0), strict=True))
 
 
-# -- what they are --------------------------------------------------------------------------
-
-
-def test_names():
-    names = JointPositions(PAPER).get_feature_names_out()
-    assert list(names) == [f"{landmark}_{axis}" for landmark in LANDMARKS for axis in "xyz"]
-    assert (len(names), names[0], names[-1]) == (42, "neck_x", "right_ankle_z")
+# -- closed forms -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("size", [1, 2.5])
 @pytest.mark.parametrize("reference", ["heading", "world"])
-def test_a_body_made_by_hand(reference, size):
+def test_positions_of_a_known_body(reference, size):
     """Its legs are 1 long, and it looks along z."""
     at = places(
         size * standing(left_wrist=(0.2, 1.2, 0.3), right_ankle=(-0.1, 0.5, -0.5)), reference
@@ -55,20 +46,20 @@ def test_a_body_made_by_hand(reference, size):
     assert at["right_ankle"] == (-0.1, -0.5, -0.5)
 
 
-def test_the_axes_turn_with_the_body_or_stay():
+def test_axes_turn_with_the_body_unless_world():
     looks_along_x = turned(standing(left_wrist=(0.2, 1.2, 0.3)), 90)
     assert places(looks_along_x)["left_wrist"] == (0.2, 0.2, 0.3)
     assert places(looks_along_x, "world")["left_wrist"] == (0.3, 0.2, -0.2)
 
 
-def test_leaning_hips_leave_up_as_it_is():
+def test_axes_stay_vertical_for_tilted_hips():
     """Only the heading of the hips is taken, not how they lean."""
     at = places(standing(left_hip=(0.1, 1.05, 0), right_hip=(-0.1, 0.95, 0)))
     assert at["head"][0] == at["neck"][0] == at["head"][2] == 0
 
 
 @pytest.mark.parametrize("dtype", [float, "f4"])
-def test_the_unit_is_the_usual_leg_of_the_performance(dtype):
+def test_unit_is_the_median_leg_of_the_performance(dtype):
     """Of several postures, some of them with legs that are measured too long."""
     long = standing(left_ankle=(0.1, -3, 0), right_ankle=(-0.1, -3, 0))
     X = np.vstack([long, standing(), standing(), standing(), long]).astype(dtype)
@@ -78,7 +69,7 @@ def test_the_unit_is_the_usual_leg_of_the_performance(dtype):
     np.testing.assert_allclose(features[0, -2], -4, rtol=1e-6)
 
 
-def test_nobody_who_walks_and_turns_at_every_frame_changes(bending):
+def test_features_are_invariant_to_place_and_heading_of_each_frame(bending):
     rng = np.random.default_rng(0)
     x = bending.data[0]
     other = np.vstack(
@@ -88,7 +79,7 @@ def test_nobody_who_walks_and_turns_at_every_frame_changes(bending):
     np.testing.assert_allclose(astray, straight, atol=1e-9)
 
 
-def test_fit_learns_nothing_of_performances(bending):
+def test_fit_stores_the_number_of_columns_only(bending):
     fitted = JointPositions(bending.skeleton).fit(bending.data[:2])
     assert {name for name in vars(fitted) if name.endswith("_")} == {"n_features_in_"}
     other = clone(fitted).fit([3 * x for x in bending.data[2:]])
@@ -96,7 +87,7 @@ def test_fit_learns_nothing_of_performances(bending):
         np.testing.assert_array_equal(x, y)
 
 
-def test_joints_that_are_no_landmarks_do_not_count(bends):
+def test_other_joints_have_no_influence(bends):
     x = bends.data[0].reshape(-1, 31, 3).copy()
     expected = JointPositions(bends.skeleton).fit_transform([x.reshape(len(x), -1)])[0]
     others = [j for j, name in enumerate(bends.skeleton.joints)
@@ -106,7 +97,7 @@ def test_joints_that_are_no_landmarks_do_not_count(bends):
     np.testing.assert_array_equal(changed, expected)
 
 
-# -- real people ----------------------------------------------------------------------------
+# -- real people --------------------------------------------------------------------------
 
 
 def slowly(x, skeleton, reference):
@@ -140,7 +131,7 @@ def people(request, real_data):
 
 
 @pytest.mark.parametrize("reference", ["heading", "world"])
-def test_real_people_as_computed_slowly(people, reference):
+def test_features_of_people_equal_a_slow_computation(people, reference):
     skeleton, X = people
     found = JointPositions(skeleton, reference).fit_transform(X)
     for features, x in zip(found, X, strict=True):
@@ -148,11 +139,11 @@ def test_real_people_as_computed_slowly(people, reference):
 
 
 @pytest.mark.parametrize("reference", ["heading", "world"])
-def test_the_limbs_between_them_point_as_the_cosines_say(people, reference):
+def test_limbs_between_positions_have_the_direction_cosines(people, reference):
     skeleton, X = people
     cosines = DirectionCosines(skeleton, reference).set_output(transform="pandas")
     positions = JointPositions(skeleton, reference).set_output(transform="pandas")
-    said, at = cosines.fit_transform(X), positions.fit_transform(X)
+    cosine_table, at = cosines.fit_transform(X), positions.fit_transform(X)
     ends = {
         "left_thigh": ("left_hip", "left_knee"),
         "shoulder": ("right_shoulder", "left_shoulder"),
@@ -162,11 +153,11 @@ def test_the_limbs_between_them_point_as_the_cosines_say(people, reference):
     for limb, joints in ends.items():
         start, end = (at[[f"{joint}_{axis}" for axis in "xyz"]].to_numpy() for joint in joints)
         direction = (end - start) / np.linalg.norm(end - start, axis=1, keepdims=True)
-        expected = said[[f"{limb}_{axis}" for axis in "xyz"]]
+        expected = cosine_table[[f"{limb}_{axis}" for axis in "xyz"]]
         np.testing.assert_allclose(direction, expected, atol=1e-9)
 
 
-# -- side by side with the cosines ----------------------------------------------------------
+# -- side by side with the cosines --------------------------------------------------------
 
 BUNCH = make_bending(8, n_frames=40, random_state=3)
 EQUAL = [x[:30] for x in BUNCH.data]
@@ -199,7 +190,7 @@ def expected_of(X):
     ],
     ids=["list", "equal lengths", "3-D", "frames", "MultiIndex", "float32"],
 )
-def test_both_views_of_every_kind_of_collection(X, plain):
+def test_union_of_both_features_of_every_kind_of_collection(X, plain):
     fitted = in_pandas().fit(X)
     with config_context(transform_output="pandas"):
         everywhere = views().fit_transform(X)
@@ -214,43 +205,15 @@ def test_both_views_of_every_kind_of_collection(X, plain):
             np.testing.assert_array_equal(found, right)
 
 
-def test_names_of_both_views_tell_them_apart():
-    """Both have a neck, the limb and the joint."""
+def test_feature_names_of_a_union_are_unique():
     names = list(in_pandas().fit(BUNCH.data).get_feature_names_out())
     assert len(set(names)) == 79
     assert {"directioncosines__neck_x", "jointpositions__neck_x"} < set(names)
 
 
-def test_without_pandas_a_union_refuses_performances():
-    """It would join rows of a matrix, and knows nothing of performances."""
+def test_union_without_pandas_output_refuses_performances():
     for X in (BUNCH.data, EQUAL, np.stack(EQUAL)):
         with pytest.raises(ValueError, match=r"shape|dimension"):
             views().fit_transform(X)
     rows = views().fit_transform(BUNCH.data[0])
     np.testing.assert_array_equal(rows, expected_of(BUNCH.data[:1])[0])
-
-
-def test_both_views_synchronised():
-    sync = DenseSynchronizer(30)
-    expected = clone(sync).fit(expected_of(BUNCH.data))
-    pipe = make_pipeline(in_pandas(), sync).fit(BUNCH.data)
-    np.testing.assert_array_equal(pipe[-1].pattern_, expected.pattern_)
-    aligned = expected.transform(expected_of(BUNCH.data))
-    np.testing.assert_array_equal(pipe.transform(BUNCH.data), aligned)
-    np.testing.assert_array_equal(clone(pipe).fit_transform(BUNCH.data), aligned)
-    np.testing.assert_array_equal(pipe.transform(BUNCH.data[:2]), aligned[:2])
-
-
-def test_both_views_in_cross_validation():
-    steps = DenseSynchronizer(20), ActionModel()
-    scores = cross_val_score(
-        make_pipeline(in_pandas(), *steps), BUNCH.data, groups=BUNCH.actor, cv=GroupKFold(2),
-        error_score="raise",
-    )  # fmt: skip
-    expected = cross_val_score(
-        make_pipeline(*steps), expected_of(BUNCH.data), groups=BUNCH.actor, cv=GroupKFold(2)
-    )
-    np.testing.assert_array_equal(scores, expected)
-    grid = {"featureunion__jointpositions__reference": ["heading", "world"]}
-    search = GridSearchCV(make_pipeline(in_pandas(), *steps), grid, cv=2, error_score="raise")
-    assert search.fit(BUNCH.data).predict(BUNCH.data).shape == (8,)

@@ -1,4 +1,6 @@
-"""The mirror: left and right exchanged, of every kind of input, by landmarks and by names."""
+"""The mirror image: left and right exchanged, by landmarks and by names, of any kind of input."""
+
+import re
 
 import numpy as np
 import pandas as pd
@@ -6,12 +8,11 @@ import polars as pl
 import pytest
 from made_bodies import columns_of
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton, mirror, to_frame
+from sklearn_motionsync.body.formats import FORMATS
 from sklearn_motionsync.datasets import load_performances, make_bending
 
 PAPER = Skeleton.paper()
 BUNCH = make_bending(3, random_state=1)
-FORMATS = ["paper", "acclaim", "kinect", "kinect_v2", "openpose", "coco", "mediapipe", "opencap",
-           "plug_in_gait", "optitrack", "unreal"]  # fmt: skip
 
 
 def other_side(name):
@@ -19,7 +20,7 @@ def other_side(name):
     return {"left": f"right_{part}", "right": f"left_{part}"}.get(side, name)
 
 
-def test_joints_take_each_others_place_and_the_lateral_axis_is_turned_around():
+def test_joints_are_exchanged_and_the_lateral_axis_negated():
     (x,) = mirror(BUNCH.data[:1], PAPER)
     given, found = (y.reshape(len(y), 15, 3) for y in (BUNCH.data[0], x))
     for j, name in enumerate(PAPER.joints):
@@ -28,7 +29,7 @@ def test_joints_take_each_others_place_and_the_lateral_axis_is_turned_around():
 
 
 @pytest.mark.parametrize("reference", ["heading", "parent", "world"])
-def test_cosines_are_those_of_the_mirrored_limbs(reference):
+def test_cosines_of_the_mirror_image_are_those_of_the_other_side(reference):
     for landmarks in (PAPER.joints, [j for j in PAPER.joints if j.endswith(("hip", "knee"))]):
         skeleton = Skeleton(PAPER.joints, PAPER.parents, {j: j for j in landmarks})
         cosines = DirectionCosines(skeleton, reference).set_output(transform="pandas")
@@ -46,7 +47,7 @@ def test_cosines_are_those_of_the_mirrored_limbs(reference):
             )
 
 
-def test_places_are_those_of_the_mirrored_joints():
+def test_positions_of_the_mirror_image_are_those_of_the_other_side():
     positions = JointPositions(PAPER).set_output(transform="pandas")
     plain, mirrored = positions.fit_transform(BUNCH.data), positions.transform(
         mirror(BUNCH.data, PAPER)
@@ -57,8 +58,8 @@ def test_places_are_those_of_the_mirrored_joints():
 
 
 @pytest.mark.parametrize("name", ["hdm05/hdm05", "utkinect/utkinect", "cmu07_walk/cmu07_walk"])
-def test_real_people(real_data, name):
-    """Twice they are themselves, and their limbs are as long as those of the other side."""
+def test_mirror_image_of_the_mirror_image_is_the_original(real_data, name):
+    """Its limbs have the lengths of the other side's."""
     bunch = load_performances(real_data / f"{name}_positions.npz")
     X = bunch.data[::11]
     mirrored = mirror(X, bunch.skeleton)
@@ -72,46 +73,33 @@ def test_real_people(real_data, name):
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_partners_of_all_formats(name):
+def test_counterparts_of_all_formats(name):
     skeleton = getattr(Skeleton, name)()
     joints = list(skeleton.joints)
     x = np.random.default_rng(0).normal(size=(4, 3 * len(joints)))
-    x.reshape(4, -1, 3)[..., 0] *= [_side_of(j) != "" for j in joints]
+    x.reshape(4, -1, 3)[..., 0] *= [_split(j)[1] != "" for j in joints]
     found = mirror(x, skeleton).reshape(4, -1, 3) * [-1, 1, 1]
     for j, joint in enumerate(joints):
         same = [k for k in range(len(joints))
                 if np.array_equal(found[:, j], x.reshape(4, -1, 3)[:, k])]  # fmt: skip
         assert len(same) == 1
-        assert _without_side(joints[same[0]]) == _without_side(joint)
-        assert (same[0] == j) is (_side_of(joint) == "")
+        assert _split(joints[same[0]])[0] == _split(joint)[0]
+        assert (same[0] == j) is (_split(joint)[1] == "")
 
 
 def _split(joint):
-    """A name without its side, and its side, as formats write them."""
-    for word, side in (("left", "l"), ("right", "r")):
-        if word in joint.lower():
-            return joint.lower().replace(word, ""), side
-    if joint.endswith(("_l", "_r")):
-        return joint[:-2], joint[-1]
-    initial, rest = joint[0].lower(), joint[1:]
-    middle = ("root", "lowerback", "lowerneck")
-    if initial in "lr" and joint not in middle:
-        return rest, initial
-    return joint, ""
+    """A name without its side, and the side, as the formats write them."""
+    if joint in ("root", "lowerback", "lowerneck"):
+        return joint, ""
+    forms = ("(?i)left|right", "_[lr]$", "^[lrLR]")
+    side = next((found[0] for form in forms if (found := re.search(form, joint))), "")
+    return joint.replace(side, "", 1).lower(), side.strip("_").lower()[:1]
 
 
-def _without_side(joint):
-    return _split(joint)[0]
+# -- kinds of input -----------------------------------------------------------------------
 
 
-def _side_of(joint):
-    return _split(joint)[1]
-
-
-# -- kinds of input -----------------------------------------------------------------------------
-
-
-def test_every_kind_is_kept():
+def test_mirror_returns_the_kind_that_was_given():
     X = BUNCH.data
     expected = mirror(X, PAPER)
     names = PAPER.column_names
@@ -148,14 +136,14 @@ def test_every_kind_is_kept():
 
 
 @pytest.mark.parametrize(("up", "axis"), [("y", 0), ("z", 0), ("-y", 0), ("-z", 0), ("x", 1)])
-def test_the_axis_is_horizontal(up, axis):
+def test_negated_axis_is_horizontal(up, axis):
     skeleton = Skeleton(PAPER.joints, PAPER.parents, up=up)
     x = BUNCH.data[0]
     changed = mirror(x, skeleton).reshape(-1, 15, 3)[:, 0] != x.reshape(-1, 15, 3)[:, 0]
     assert changed.any(axis=0).tolist() == [k == axis for k in range(3)]
 
 
-def test_pictures():
+def test_mirror_image_of_a_picture():
     skeleton = Skeleton.coco(n_dims=2)
     x = np.random.default_rng(0).normal(size=(5, 34))
     found = mirror(x, skeleton).reshape(5, 17, 2)
@@ -164,11 +152,11 @@ def test_pictures():
     np.testing.assert_array_equal(found[:, 0], x.reshape(5, 17, 2)[:, 0] * [-1, 1])
 
 
-# -- markers ------------------------------------------------------------------------------------
+# -- markers ------------------------------------------------------------------------------
 
 
 def with_markers(names, middle=()):
-    """A made person with markers beside the hips or in the middle; parents unknown."""
+    """A synthetic person with markers at the wrist or in the middle."""
     df = columns_of(BUNCH.data[0])
     for name in names:
         at = "pelvis" if name in middle else "left_wrist"
@@ -182,14 +170,14 @@ def with_markers(names, middle=()):
     [("LASI", "RASI"), ("l.ASIS_study", "R.ASIS_study"), ("Sub:L_toe", "Sub:R_toe"),
      ("ToeL", "ToeR"), ("mouthLeft", "mouthRight"), ("S:LTOE", "S:RTOE")],
 )  # fmt: skip
-def test_partners_by_name(one, other):
+def test_counterparts_by_name(one, other):
     df = with_markers([one, other])
     df[[f"{other}_{a}" for a in "xyz"]] += 1
     found = mirror(df, Skeleton.from_frame(df))
     np.testing.assert_array_equal(found[f"{one}_y"], df[f"{other}_y"])
 
 
-def test_means_are_paired_in_their_order():
+def test_joints_of_means_are_paired_in_their_order():
     df = with_markers(["m1", "m2", "m3", "m4"])
     df[[f"m{i}_{a}" for i in (3, 4) for a in "xyz"]] += 1
     given = {"left_ankle": ("m1", "m2"), "right_ankle": ("m3", "m4")}
@@ -197,9 +185,9 @@ def test_means_are_paired_in_their_order():
     np.testing.assert_array_equal(found["m2_y"], df["m4_y"])
 
 
-def test_who_has_no_partner():
+def test_joint_without_counterpart_is_in_the_middle_or_refused():
     df = with_markers(["RBAK", "C7"], middle=["C7"])
-    message = "'RBAK' is on one side in every frame, and none takes its place"
+    message = "'RBAK' is on one side in every frame, and has no counterpart"
     with pytest.raises(ValueError, match=message):
         mirror(df, Skeleton.from_frame(df))
     df = with_markers(["C7"], middle=["C7"])
@@ -208,11 +196,11 @@ def test_who_has_no_partner():
     with pytest.raises(ValueError, match=r"'left_toe' is on one side, .* Leave its columns out"):
         mirror(df, Skeleton.from_frame(df))
     leg = ["left_hip", "left_knee", "left_ankle"]
-    with pytest.raises(ValueError, match="'left_hip' is on one side, and none"):
+    with pytest.raises(ValueError, match="'left_hip' is on one side, and has no"):
         mirror(np.zeros((2, 9)), Skeleton(leg, [-1, 0, 1], {j: j for j in leg}))
 
 
-def test_what_cannot_be_mirrored():
+def test_mirror_refuses_wrong_input():
     with pytest.raises(ValueError, match=r"15 joints are \(n_frames, 45\)"):
         mirror(np.zeros((4, 30)), PAPER)
     table = columns_of(BUNCH.data[0])

@@ -1,14 +1,9 @@
-"""Bodies that lack landmarks, and landmarks that are means: what is there is as of the whole."""
+"""Bodies that lack landmarks, and landmarks that are means of joints."""
 
-import copy
-import pickle
-
-import joblib
 import numpy as np
 import pandas as pd
 import pytest
-from made_bodies import columns_of, moved, standing, turned
-from sklearn import clone
+from made_bodies import columns_of, standing, turned
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
 from sklearn_motionsync.datasets import load_performances, make_bending
 from sklearn_motionsync.io import read_motion
@@ -45,12 +40,12 @@ def people(request):
     return bunch.skeleton, bunch.data[::25]
 
 
-# -- cosines of the limbs that are there ------------------------------------------------------
+# -- cosines of the limbs that are there --------------------------------------------------
 
 
 @pytest.mark.parametrize("part", PARTS)
 @pytest.mark.parametrize("reference", ["heading", "parent", "world"])
-def test_cosines_are_those_of_the_whole_body_to_the_last_bit(people, part, reference):
+def test_cosines_equal_those_of_the_whole_body(people, part, reference):
     skeleton, X = people
     whole = DirectionCosines(skeleton, reference).fit(X)
     some = DirectionCosines(only(PARTS[part], skeleton), reference).fit(X)
@@ -64,7 +59,7 @@ def test_cosines_are_those_of_the_whole_body_to_the_last_bit(people, part, refer
     if reference == "world":
         same = names
     else:
-        # Who lacks hips turns with the shoulders, and whose parent is not there with another.
+        # Without hips the heading is another, and without a parent the axes.
         same = [n for n in names if n == "pelvis_height"] if "hip" not in limbs else names
     if reference == "parent" and "hip" in limbs:
         same = [n for n in names if "shoulder" not in n or "torso" in limbs]
@@ -75,7 +70,7 @@ def test_cosines_are_those_of_the_whole_body_to_the_last_bit(people, part, refer
         np.testing.assert_array_equal(b[:, own], a[:, columns])
 
 
-def test_a_part_without_hips_turns_with_the_shoulders():
+def test_body_without_hips_has_the_heading_of_its_shoulders():
     faces_x = turned(standing(left_wrist=(0.2, 1.2, 0.3)), 90)
     features = DirectionCosines(only(ARMS)).fit_transform(faces_x)[0]
     at = dict(zip(DirectionCosines(only(ARMS)).get_feature_names_out(), features, strict=True))
@@ -85,19 +80,9 @@ def test_a_part_without_hips_turns_with_the_shoulders():
     np.testing.assert_allclose(leg, [[0, -1, 0, 0, -1, 0]], atol=1e-12)
 
 
-@pytest.mark.parametrize("part", ["legs", "no head", "no arms", "no wrists", "upper body", "arms"])
-@pytest.mark.parametrize("kind", [DirectionCosines, JointPositions])
-def test_moving_growing_and_turning_change_nothing(kind, part):
-    (x,) = make_bending(1, random_state=1).data
-    estimator = kind(only(PARTS[part]))
-    expected = estimator.fit_transform([x])[0]
-    for changed in (moved(x, [3.0, -7.0, 2.0]), 1.3 * x, turned(x, 77)):
-        np.testing.assert_allclose(estimator.fit_transform([changed])[0], expected, atol=1e-9)
-
-
 @pytest.mark.parametrize("part", PARTS)
 @pytest.mark.parametrize("reference", ["heading", "parent", "world"])
-def test_postures_of_the_built_body_are_the_same(people, part, reference):
+def test_postures_of_reconstructed_positions_are_the_same(people, part, reference):
     skeleton, X = people
     some = DirectionCosines(only(PARTS[part], skeleton), reference).set_output(transform="pandas")
     postures = some.fit_transform(X)
@@ -108,14 +93,14 @@ def test_postures_of_the_built_body_are_the_same(people, part, reference):
     assert body.limbs == some.skeleton.limbs
     again = DirectionCosines(body, reference).set_output(transform="pandas").fit_transform(back)
     assert list(again.columns) == list(postures.columns)
-    # Of people whose limbs change their length, heights come back as near as hips may move.
+    # If limbs change their length, the shift of the hips limits the heights.
     cosines = [c for c in postures if c != "pelvis_height"]
     np.testing.assert_allclose(again[cosines], postures[cosines], atol=1e-5)
     if "pelvis_height" in postures and part != "left half" and "HipLeft" not in skeleton.joints:
         np.testing.assert_allclose(again["pelvis_height"], postures["pelvis_height"], atol=1e-5)
 
 
-def test_the_body_of_a_whole_skeleton_is_the_papers():
+def test_body_is_the_skeleton_of_the_landmarks():
     for skeleton in (PAPER, Skeleton.acclaim(), Skeleton.kinect(), Skeleton.mediapipe()):
         assert skeleton.body() == PAPER
     assert Skeleton.coco(n_dims=2).body() == Skeleton.paper(n_dims=2)
@@ -127,22 +112,11 @@ def test_the_body_of_a_whole_skeleton_is_the_papers():
     assert repr(legs) == "Skeleton(<7 joints, 7 of 15 landmarks>, up='y')"
 
 
-def test_limb_lengths_of_some_limbs():
-    (x,) = make_bending(1, random_state=1).data
-    cosines = DirectionCosines(only(LEFT)).fit(x)
-    back = cosines.inverse_transform(cosines.transform(x), [2.0, 3.0])
-    np.testing.assert_allclose(DirectionCosines(only(LEFT).body()).fit(back).limb_lengths_, [2, 3])
-    with pytest.raises(
-        ValueError, match=r"each of \['left_thigh', 'left_leg'\], got shape \(12,\)"
-    ):
-        cosines.inverse_transform(cosines.transform(x), np.ones(12))
-
-
-# -- places of the landmarks that are there ---------------------------------------------------
+# -- places of the landmarks that are there -----------------------------------------------
 
 
 @pytest.mark.parametrize("part", ["legs", "no head", "no arms", "no wrists", "left half"])
-def test_places_are_those_of_the_whole_body(people, part):
+def test_positions_equal_those_of_the_whole_body(people, part):
     skeleton, X = people
     whole = JointPositions(skeleton, "world").fit(X)
     some = JointPositions(only(PARTS[part], skeleton), "world").fit(X)
@@ -158,7 +132,7 @@ def test_places_are_those_of_the_whole_body(people, part):
             np.testing.assert_array_equal(b, a[:, columns])
 
 
-def test_places_without_a_pelvis_or_a_leg():
+def test_origin_and_unit_without_a_pelvis_or_a_leg():
     x = np.vstack([standing()] * 2)
     hips = JointPositions(only(LEGS[1:]))
     at = dict(zip(hips.get_feature_names_out(), hips.fit_transform(x)[0], strict=True))
@@ -173,7 +147,7 @@ def test_places_without_a_pelvis_or_a_leg():
     np.testing.assert_allclose(leg.fit_transform(x)[0], [0, -0.5, 0, 0, -1, 0])
 
 
-# -- landmarks that are means -----------------------------------------------------------------
+# -- landmarks that are means -------------------------------------------------------------
 
 
 def with_markers(x, spread=0.05):
@@ -186,7 +160,7 @@ def with_markers(x, spread=0.05):
     return df
 
 
-def test_a_mean_of_joints_is_where_the_middle_is():
+def test_landmark_of_two_joints_is_their_mean():
     x = make_bending(1, random_state=1).data[0]
     df = with_markers(x)
     knees = {f"{side}_knee": (f"{side}_in", f"{side}_out") for side in ("left", "right")}
@@ -196,8 +170,6 @@ def test_a_mean_of_joints_is_where_the_middle_is():
         np.testing.assert_allclose(
             kind(skeleton).fit_transform(df), kind(PAPER).fit_transform(x), atol=1e-12
         )
-        far = kind(skeleton).fit_transform(1e300 * df)
-        np.testing.assert_allclose(far, kind(PAPER).fit_transform(x), atol=1e-9)
     with pytest.raises(ValueError, match=r"'left_knee' is the mean of .* indices_of gives all"):
         skeleton.index_of("left_knee")
     assert skeleton.indices_of("left_knee") == (15, 16)
@@ -205,7 +177,7 @@ def test_a_mean_of_joints_is_where_the_middle_is():
         only(LEFT).index_of("head")
 
 
-def test_where_no_joint_is_the_pelvis_the_middle_of_the_hips_is():
+def test_missing_pelvis_and_neck_are_the_middle_of_their_pairs():
     x = make_bending(1, random_state=1).data[0]
     df = columns_of(x).drop(columns=[f"{j}_{a}" for j in ("pelvis", "neck") for a in "xyz"])
     skeleton = Skeleton.from_frame(df)
@@ -219,28 +191,11 @@ def test_where_no_joint_is_the_pelvis_the_middle_of_the_hips_is():
     assert "pelvis" not in Skeleton.from_frame(df, landmarks={"pelvis": None}).landmarks
 
 
-def test_one_joint_in_a_tuple_is_that_joint():
+def test_tuple_of_one_joint_is_that_joint():
     assert Skeleton(PAPER.joints, PAPER.parents, {**PAPER.landmarks, "head": ["head"]}) == PAPER
 
 
-@pytest.mark.parametrize(
-    "skeleton", [Skeleton.mediapipe(), Skeleton.coco(n_dims=2), only(LEGS), only(LEFT).body()]
-)
-def test_copies_are_equal(skeleton):
-    copies = [copy.copy(skeleton), copy.deepcopy(skeleton), pickle.loads(pickle.dumps(skeleton))]
-    copies += [clone(DirectionCosines(skeleton)).skeleton]
-    for other in copies:
-        assert other == skeleton
-        assert hash(other) == hash(skeleton)
-        assert joblib.hash(other) == joblib.hash(skeleton)
-        assert repr(other) == repr(skeleton)
-    old = Skeleton.__new__(Skeleton)
-    lists = {k: v if isinstance(v, str) else list(v) for k, v in skeleton.landmarks.items()}
-    old.__setstate__(vars(skeleton) | {"landmarks": lists})
-    assert old == skeleton
-
-
-# -- what is told from names --------------------------------------------------------------------
+# -- guessed from names -------------------------------------------------------------------
 
 
 def without(*joints):
@@ -248,14 +203,14 @@ def without(*joints):
     return columns_of(x).drop(columns=[f"{j}_{a}" for j in joints for a in "xyz"])
 
 
-def test_a_whole_part_may_lack():
+def test_both_sides_of_a_part_may_be_missing():
     for gone in (["head"], ["left_wrist", "right_wrist"], [j for j in PAPER.joints if j in ARMS]):
         skeleton = Skeleton.from_frame(without(*gone))
         assert set(skeleton.landmarks) == set(PAPER.joints) - set(gone)
         assert len(DirectionCosines(skeleton).fit_transform(without(*gone)))
 
 
-def test_one_side_alone_is_rather_a_name_that_was_not_understood():
+def test_landmark_guessed_on_one_side_only_is_refused():
     message = r"landmarks \['right_knee'\]; give landmarks=.*several of them for their mean"
     with pytest.raises(ValueError, match=message):
         Skeleton.from_frame(without("right_knee"))
@@ -272,8 +227,7 @@ def test_one_side_alone_is_rather_a_name_that_was_not_understood():
 
 
 @pytest.mark.parametrize("spelling", ["left_{}", "L_{}", "Anna:Left_{}"])
-def test_the_side_that_all_names_have_is_a_part_of_them(spelling):
-    """One leg has no pelvis, which its hip would be without the side."""
+def test_side_in_all_names_is_not_a_prefix(spelling):
     joints = [spelling.format(part) for part in ("hip", "knee", "ankle", "toe")]
     df = pd.DataFrame(0.0, index=[0], columns=[f"{j}_{a}" for j in joints for a in "xyz"])
     given = dict(zip(("left_hip", "left_knee", "left_ankle"), joints, strict=False))
@@ -282,19 +236,18 @@ def test_the_side_that_all_names_have_is_a_part_of_them(spelling):
         Skeleton.from_frame(df)
 
 
-def test_names_that_tell_no_limb_are_refused_with_what_to_give():
+def test_names_without_landmarks_are_refused_with_advice():
     df = pd.DataFrame(0.0, index=[0], columns=[f"M{i}_{a}" for i in range(3) for a in "xyz"])
     message = r"\['pelvis', 'neck', .*joints \['M0', 'M1', 'M2'\].*\{'pelvis': \('LASI', 'RASI'\)\}"
     with pytest.raises(ValueError, match=message):
         Skeleton.from_frame(df)
 
 
-# -- real markers -------------------------------------------------------------------------------
+# -- real markers -------------------------------------------------------------------------
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_legs_of_markers_in_a_file(real_data):
-    """Clusters on the segments of the legs: their middles are joined to limbs."""
+def test_landmarks_of_marker_clusters_in_a_file(real_data):
     df = read_motion(real_data / "original_files" / "c3d" / "Eb015pr.c3d", max_gap=20)
     df = df.dropna()
     with pytest.raises(ValueError, match=r"No joint stands for .*'LASI', 'RASI'"):

@@ -1,4 +1,4 @@
-"""Key-points in a picture: two cosines a limb, against those of bodies that move in a plane."""
+"""Key-points in a picture against bodies that move in a plane."""
 
 import numpy as np
 import pandas as pd
@@ -46,7 +46,7 @@ def in_plane(names):
 
 
 @pytest.mark.parametrize("reference", REFERENCES)
-def test_two_cosines_are_those_of_a_body_that_moves_in_a_plane(people, reference):
+def test_cosines_equal_those_of_a_body_that_moves_in_a_plane(people, reference):
     space = DirectionCosines(PAPER, reference).fit(people)
     plane = DirectionCosines(PLANE, reference).fit([picture_of(x) for x in people])
     names = space.get_feature_names_out()
@@ -64,7 +64,7 @@ def test_two_cosines_are_those_of_a_body_that_moves_in_a_plane(people, reference
 
 
 @pytest.mark.parametrize("reference", ["heading", "world"])
-def test_places_are_those_of_a_body_that_moves_in_a_plane(people, reference):
+def test_positions_equal_those_of_a_body_that_moves_in_a_plane(people, reference):
     space, plane = JointPositions(PAPER, reference), JointPositions(PLANE, reference)
     names = space.fit(people).get_feature_names_out()
     assert list(plane.get_feature_names_out()) == [n for n in names if not n.endswith("_z")]
@@ -74,8 +74,8 @@ def test_places_are_those_of_a_body_that_moves_in_a_plane(people, reference):
 
 
 @pytest.mark.parametrize("reference", REFERENCES)
-def test_from_the_side_hips_and_shoulders_point_at_the_camera(reference):
-    """Their two cosines are 0, as they are of three: z is towards the camera."""
+def test_cosines_of_hips_and_shoulders_seen_end_on_are_0(reference):
+    """They point at the camera."""
     bent = standing(neck=(0, 1.4, 0.3), head=(0, 1.5, 0.5), left_knee=(0.1, 0.5, 0.2))
     bent = np.vstack([bent, standing()])
     bent.reshape(-1, 15, 3)[:, PAPER.joints.index("right_shoulder")] += [0, 0, 1e-30]
@@ -110,7 +110,7 @@ def test_from_the_side_hips_and_shoulders_point_at_the_camera(reference):
         ("-x", lambda x, y: (-y, -x)),
     ],
 )
-def test_pictures_as_the_camera_saw_them(people, up, pixels):
+def test_features_do_not_depend_on_the_vertical_axis_of_the_picture(people, up, pixels):
     seen = [picture_of(x) for x in people]
     skeleton = Skeleton(PLANE.joints, PLANE.parents, up=up, n_dims=2)
     given = [np.stack(pixels(x[:, ::2], x[:, 1::2]), axis=2).reshape(x.shape) for x in seen]
@@ -118,14 +118,14 @@ def test_pictures_as_the_camera_saw_them(people, up, pixels):
         found = kind(skeleton).fit_transform([x + 500 for x in given])
         for a, b in zip(found, kind(PLANE).fit_transform(seen), strict=True):
             np.testing.assert_allclose(a, b, atol=1e-9)
-    told = Skeleton.from_frame(columns_of(given[0], skeleton))
-    assert (told.up, told.n_dims, told.landmarks) == (up, 2, PAPER.landmarks)
+    guessed = Skeleton.from_frame(columns_of(given[0], skeleton))
+    assert (guessed.up, guessed.n_dims, guessed.landmarks) == (up, 2, PAPER.landmarks)
     other = {"-y": "y", "x": "-x", "-x": "x"}[up]
     with pytest.raises(ValueError, match=f"seems to be.*up='{up}'"):
         DirectionCosines(Skeleton(PLANE.joints, PLANE.parents, up=other, n_dims=2)).fit(given)
 
 
-def test_columns_of_two_axes():
+def test_two_axes_are_read_from_the_columns():
     df = pd.DataFrame(0.0, index=[0], columns=PLANE.column_names)
     assert Skeleton.from_frame(df).n_dims == 2
     for wrong in (df[df.columns[1:]], df.add_suffix("_x"), df[["neck_y", "neck_x"]]):
@@ -139,8 +139,7 @@ def test_columns_of_two_axes():
         DirectionCosines(PLANE).fit(table[[*table.columns[1::-1], *table.columns[2:]]])
 
 
-def test_a_pipeline_of_key_points(people):
-    """From pictures to a model and back."""
+def test_pipeline_of_key_points(people):
     seen = [picture_of(x) for x in people]
     steps = DirectionCosines(PLANE), ASpace(4), DenseSynchronizer(40), ActionModel()
     pipe = make_pipeline(*steps).fit(seen)

@@ -120,7 +120,7 @@ def test_bodies(display):
     np.testing.assert_allclose(
         estimate.reshape(len(SEEN), -1), COSINES.inverse_transform(display.track.postures)
     )
-    assert COSINES.hidden == "refuse"
+    assert COSINES.hidden == "raise"
 
 
 def test_several_takes_and_projections(tracker):

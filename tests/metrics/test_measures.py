@@ -1,16 +1,16 @@
-"""Metrics against plain loops over their formulas, and scorers inside scikit-learn."""
+"""Measures against oracles, closed forms, wrong arguments, and every kind of right ones."""
 
-import itertools
+import inspect
+import re
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
-from sklearn.model_selection import GridSearchCV, cross_val_score
-from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
-from sklearn_motionsync.datasets import make_bending
+from measure_cases import CASES, CURVES, FIVE, STRAIGHT, WARPS, make_curves
+from sklearn_motionsync import metrics, to_frame
 from sklearn_motionsync.metrics import (
-    FeatureHoldoutScorer,
-    SpreadScorer,
+    amplitude_phase_variance,
     group_timing_error,
     inverse_consistency,
     keyframe_error,
@@ -22,86 +22,59 @@ from sklearn_motionsync.metrics import (
     timing_error,
 )
 
-
-@pytest.fixture(scope="module")
-def pair():
-    rng = np.random.default_rng(0)
-    return rng.standard_normal((4, 20, 3)), rng.standard_normal((4, 20, 3))
+REFERENCE = Path(__file__).resolve().parents[2] / "docs" / "reference.md"
+SPREADS = [least_squares, sobolev_least_squares, pairwise_correlation]
 
 
-@pytest.fixture(scope="module")
-def times():
-    rng = np.random.default_rng(1)
-    steps = rng.uniform(0, 2, (5, 19)) * (rng.uniform(size=(5, 19)) > 0.2)
-    tau = np.concatenate([np.zeros((5, 1)), np.cumsum(steps, axis=1)], axis=1)
-    return 19 * tau / tau[:, -1:]
+@pytest.mark.parametrize("name", metrics.__all__)
+def test_public_name_has_documentation_example_and_tests(name):
+    """The list that fails names what a new measure lacks."""
+    found, missing = getattr(metrics, name), []
+    if not re.search(rf"^ +(metrics\.)?{name}$", REFERENCE.read_text(encoding="utf-8"), re.M):
+        missing.append("an entry in docs/reference.md")
+    if ">>> " not in inspect.getdoc(found):
+        missing.append("an example in its docstring")
+    if inspect.isfunction(found) and name not in CASES:
+        missing.append("an oracle and refused arguments in CASES of tests/metrics/measure_cases.py")
+    elif inspect.isfunction(found) and not CASES[name].refused:
+        missing.append("refused arguments in CASES of tests/metrics/measure_cases.py")
+    elif inspect.isclass(found) and name.endswith("Scorer"):
+        tests = (Path(__file__).parent / "test_scorers.py").read_text(encoding="utf-8")
+        if not re.search(rf"^SCORERS = .*\b{name}\b", tests, re.M):
+            missing.append("a place in SCORERS of tests/metrics/test_scorers.py")
+    assert not missing, f"metrics.{name} lacks {', '.join(missing)}."
 
 
-def integral(f):
-    """Trapezoidal rule over [0, 1]."""
-    return sum((a + b) / 2 for a, b in itertools.pairwise(f)) / (len(f) - 1)
+@pytest.mark.parametrize("name", CASES)
+def test_measure_equals_oracle(name):
+    arguments, oracle, _ = CASES[name]
+    np.testing.assert_allclose(getattr(metrics, name)(*arguments), oracle(*arguments))
 
 
-def test_least_squares(pair):
-    x, y = pair
-    ratios = []
-    for i in range(4):
-        rest = [j for j in range(4) if j != i]
-        new = sum(integral((y[i, :, k] - y[rest, :, k].mean(axis=0)) ** 2) for k in range(3))
-        old = sum(integral((x[i, :, k] - x[rest, :, k].mean(axis=0)) ** 2) for k in range(3))
-        ratios.append(new / old)
-    np.testing.assert_allclose(least_squares(x, y), np.mean(ratios))
+@pytest.mark.parametrize(
+    ("name", "arguments", "keywords", "message"),
+    [(name, *refused) for name, case in CASES.items() for refused in case.refused],
+)
+def test_measure_refuses_wrong_arguments(name, arguments, keywords, message):
+    with pytest.raises(ValueError, match=message):
+        getattr(metrics, name)(*arguments, **keywords)
 
 
-def test_sobolev(pair):
-    def total(z):
-        slopes = np.stack([np.gradient(z[i, :, k]) for i in range(4) for k in range(3)])
-        slopes = slopes.reshape(4, 3, 20)
-        return sum(
-            integral((slopes[i, k] - slopes[:, k].mean(axis=0)) ** 2)
-            for i in range(4)
-            for k in range(3)
-        )
-
-    np.testing.assert_allclose(sobolev_least_squares(*pair), total(pair[1]) / total(pair[0]))
+# -- warps --------------------------------------------------------------------------------
 
 
-def test_pairwise_correlation(pair):
-    def total(z):
-        flat = [(x - x.mean(axis=0)).ravel() for x in z]
-        return sum(a @ b / np.sqrt((a @ a) * (b @ b)) for a in flat for b in flat if a is not b)
-
-    np.testing.assert_allclose(pairwise_correlation(*pair), total(pair[1]) / total(pair[0]))
-    univariate = pair[0][:, :, :1]
-    old = np.corrcoef(univariate[:, :, 0])
-    off = ~np.eye(4, dtype=bool)
-    expected = 1 / old[off].mean()
-    np.testing.assert_allclose(pairwise_correlation(univariate, univariate[[0] * 4]), expected)
+def test_quantile_and_frame_rate():
+    errors = np.abs(WARPS - STRAIGHT)
+    expected = np.percentile(errors, 95)
+    np.testing.assert_allclose(timing_error(WARPS, STRAIGHT, quantile=0.95), expected)
+    arguments, oracle, _ = CASES["keyframe_error"]
+    expected = oracle(*arguments, frame_rate=50)
+    np.testing.assert_allclose(keyframe_error(*arguments, frame_rate=50), expected)
+    error = keyframe_error(FIVE * 2, [[5], [5]], [2], [9, 9], frame_rate=[10, 5])
+    assert error == pytest.approx((0.1 + 0.2) / 2)
 
 
-def test_closed_forms_of_spread(pair):
-    x, _ = pair
-    for measure in (least_squares, sobolev_least_squares, pairwise_correlation):
-        np.testing.assert_allclose(measure(x, x), 1)
-    mean = x.mean(axis=0)
-    halved = mean + (x - mean) / 2
-    np.testing.assert_allclose(least_squares(x, halved), 0.25)
-    np.testing.assert_allclose(sobolev_least_squares(x, halved), 0.25)
-    same = np.stack([mean] * 4)
-    assert least_squares(x, same) < 1e-30
-    assert least_squares(same, same) == 1
-
-
-def test_timing_error(times):
-    truth = np.tile(np.arange(20.0), (5, 1))
-    errors = [abs(a - b) for a, b in zip(times.ravel(), truth.ravel(), strict=True)]
-    np.testing.assert_allclose(timing_error(times, truth), sum(errors) / len(errors))
-    np.testing.assert_allclose(timing_error(times, truth, quantile=0.95), np.percentile(errors, 95))
-    assert timing_error(times, times) == 0
-
-
-def test_group_timing_error_needs_no_pattern(bending):
-    """True warps to any clock at all are without error; a shift of one shows."""
+def test_group_timing_error_is_zero_for_true_warps_to_any_clock(bending):
     own = [np.arange(len(phi)) * 99 / (len(phi) - 1) for phi in bending.times]
     for power in (1.0, 1.7):
         clock = np.linspace(0, 1, 100) ** power
@@ -110,156 +83,123 @@ def test_group_timing_error_needs_no_pattern(bending):
         )
         assert group_timing_error(true, bending.times) < 1e-10
     assert group_timing_error(np.tile(np.arange(100.0), (40, 1)), bending.times) > 2
+    assert group_timing_error(FIVE, [[0, 0.2, 1]]) == 0
 
 
-def test_keyframe_error(times):
-    lengths = [30, 40, 20, 25, 55]
-    pattern, rng = np.array([4.0, 9.5]), np.random.default_rng(2)
-    keyframes = np.sort(rng.uniform(1, 18, (5, 2)), axis=1)
-    clock, seconds = [], []
-    for tau, own, length in zip(times, keyframes, lengths, strict=True):
-        for p, k in zip(pattern, own, strict=True):
-            landed = tau[int(p)] * (1 - p % 1) + tau[int(p) + 1] * (p % 1)
-            clock.append(abs(landed - k * 19 / (length - 1)))
-            seconds.append(abs(landed * (length - 1) / 19 - k) / 50)
-    arguments = times, keyframes, pattern, lengths
-    np.testing.assert_allclose(keyframe_error(*arguments), np.mean(clock))
-    np.testing.assert_allclose(keyframe_error(*arguments, frame_rate=50), np.mean(seconds))
-    np.testing.assert_allclose(keyframe_error(*arguments, quantile=0.5), np.median(clock))
+def test_closed_forms_of_warps():
+    assert timing_error(WARPS, WARPS) == roughness(STRAIGHT) == pause_share(STRAIGHT) == 0
+    assert roughness([[0, 1]]) == pause_share([[0, 1]]) == 0
+    assert keyframe_error(FIVE, [[0, 8]], [0, 4], [9]) == 0
+    # Warps may decrease.
+    assert pause_share([[0, 2, 2 - 1e-12, 1, 4]]) == 0.5
+    assert roughness([[0, 2, 1, 3, 4]]) == pytest.approx(np.sqrt((9 + 9 + 1) / 3))
+    assert inverse_consistency([[0, 2, 1, 3, 4]], FIVE) == pytest.approx(0.4)
+    there, back = (19 * np.linspace(0, 1, 20) ** power for power in (1.5, 1 / 1.5))
+    assert inverse_consistency([there], [back]) < 0.2
 
 
-def test_path_health(times):
-    n, P = times.shape
-    stops = sum(times[i, p + 1] == times[i, p] for i in range(n) for p in range(P - 1))
-    np.testing.assert_allclose(pause_share(times), stops / (n * (P - 1)))
-    bends = [
-        times[i, p + 1] - 2 * times[i, p] + times[i, p - 1]
-        for i in range(n)
-        for p in range(1, P - 1)
-    ]
-    np.testing.assert_allclose(roughness(times), np.sqrt(np.mean(np.square(bends))))
-    straight = np.tile(np.arange(20.0), (5, 1))
-    assert roughness(straight) == pause_share(straight) == 0
+@pytest.mark.parametrize("name", [n for n, case in CASES.items() if case.arguments[0] is WARPS])
+def test_warps_of_any_kind_give_the_same(name):
+    measure, others = getattr(metrics, name), CASES[name].arguments[1:]
+    times = np.rint(WARPS)
+    expected = measure(times, *others)
+    frozen = times.copy()
+    frozen.flags.writeable = False
+    kinds = [times.tolist(), pd.DataFrame(times), times.astype(object), times.astype("i4")]
+    for kind in [*kinds, times.astype("f4"), np.asfortranarray(times), np.ma.array(times), frozen]:
+        assert measure(kind, *others) == expected
+    # Rounding beyond the bounds is accepted.
+    times[:, [0, -1]] += [-1e-15, 1e-15]
+    assert measure(times, *others) == pytest.approx(expected, abs=1e-12)
 
 
-def test_inverse_consistency(times):
-    straight = np.tile(np.arange(20.0), (5, 1))
-    np.testing.assert_allclose(
-        inverse_consistency(times, straight), np.abs(times - straight).mean()
-    )
-    smooth = 19 * np.linspace(0, 1, 20) ** 1.5
-    back = 19 * np.linspace(0, 1, 20) ** (1 / 1.5)
-    assert inverse_consistency([smooth], [back]) < 0.2
+def test_moments_and_keyframes_of_any_kind_give_the_same():
+    times, moments = FIVE * 2, np.array([[0, 0.5, 1], [0, 0.7, 1]])
+    expected = group_timing_error(times, moments.tolist())
+    for kind in (moments, pd.DataFrame(moments), tuple(moments), iter(moments)):
+        assert group_timing_error(times, kind) == expected
+    objects = np.empty(2, dtype=object)
+    objects[:] = [np.array([5]), [5]]
+    for kind in ([[5], [5]], objects, pd.DataFrame([[5], [5]]), np.full((2, 1), 5, "i4")):
+        assert keyframe_error(times, kind, [2], [9, 9]) == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: timing_error([[0, 1]], [[0, 1, 2]]), "differ in shape"),
-        (lambda: timing_error([0, 1], [0, 1]), r"shape \(n_sequences, P\)"),
-        (lambda: inverse_consistency([[0, 1]], [[0, 1, 2]]), "differ in shape"),
-        (lambda: group_timing_error([[0, 1]], []), "1 warps and 0 sets"),
-        (lambda: keyframe_error([[0, 1]], [[1, 2]], [1], [5]), "do not go"),
-        (lambda: least_squares(np.zeros((1, 5, 2)), np.zeros((1, 5, 2))), "at least 2"),
-        (lambda: least_squares(np.zeros((2, 5, 2)), np.zeros((2, 6, 2))), "one shape"),
-        (lambda: SpreadScorer("variance"), "'variance' is unknown"),
-        (lambda: FeatureHoldoutScorer("variance"), "'variance' is unknown"),
-    ],
-)
-def test_what_does_not_go_together(call, message):
-    with pytest.raises(ValueError, match=message):
-        call()
+# -- spread -------------------------------------------------------------------------------
 
 
-# -- scorers ----------------------------------------------------------------------------
+@pytest.mark.parametrize("measure", SPREADS)
+def test_spread_of_any_kind_of_input_and_in_any_unit(measure):
+    x = make_curves().astype(np.float32)
+    y = x + (x.mean(axis=0) - x) / np.float32(2)
+    expected = measure(x, y)
+    objects = np.empty(len(x), dtype=object)
+    objects[:] = list(x)
+    frozen = x.astype(np.float64)
+    frozen.flags.writeable = False
+    frames = [pd.DataFrame(part) for part in x]
+    for kind in (x.tolist(), list(x), objects, frozen, frames, to_frame(x), np.asfortranarray(x)):
+        assert measure(kind, y) == pytest.approx(expected, rel=1e-12)
+    integers = np.rint(x * 9).astype(int)
+    assert measure(integers, integers) == pytest.approx(1)
+    for unit in (1e-9, 1e9):
+        assert measure(frozen * unit, y.astype(float) * unit) == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("scorer", [SpreadScorer, FeatureHoldoutScorer])
-@pytest.mark.parametrize("spread", ["least_squares", "sobolev", "correlation"])
-def test_scorers_prefer_matching(scorer, spread, bending):
-    """Without y, in a pipeline, in cross_val_score and in a grid search."""
-
-    def pipe(synchronizer):
-        return make_pipeline(DirectionCosines(bending.skeleton), ASpace(6), synchronizer)
-
-    scoring, X = scorer(spread), bending.data[:16]
-    linear, dense = (
-        cross_val_score(pipe(s), X, cv=2, scoring=scoring, error_score="raise").mean()
-        for s in (LinearSynchronizer(40), DenseSynchronizer(40))
-    )
-    assert dense > linear
-    grid = {"densesynchronizer__max_offset": [0.0, 0.25]}
-    search = GridSearchCV(
-        pipe(DenseSynchronizer(40)), grid, scoring=scoring, cv=2, error_score="raise"
-    )
-    assert search.fit(X).best_params_ == {"densesynchronizer__max_offset": 0.25}
+def test_closed_forms_of_spread():
+    x, _ = CURVES
+    mean = x.mean(axis=0)
+    halved, same = mean + (x - mean) / 2, np.stack([mean] * 4)
+    for measure in SPREADS[:2]:
+        # Ratios of squares.
+        np.testing.assert_allclose(measure(x, halved), 0.25)
+        assert measure(x, same) < 1e-30
+        assert measure(same, same) == 1
+    for measure in SPREADS:
+        np.testing.assert_allclose(measure(x, x), 1)
+    moved = same + np.array([0, 5, 0.7, 1])[:, np.newaxis, np.newaxis]
+    assert sobolev_least_squares(moved, same) == 1
+    assert pairwise_correlation(moved, same) == pytest.approx(1)
 
 
-def test_spread_scorer_is_the_ratio(bending_aspace):
-    sync = DenseSynchronizer(50).fit(bending_aspace)
-    linear = LinearSynchronizer(50).fit_transform(bending_aspace)
-    expected = least_squares(linear, sync.transform(bending_aspace))
-    np.testing.assert_allclose(SpreadScorer()(sync, bending_aspace), -expected)
+def test_correlation_of_univariate_and_constant_performances():
+    x = CURVES[0][:, :, :1]
+    off = ~np.eye(4, dtype=bool)
+    expected = 1 / np.corrcoef(x[:, :, 0])[off].mean()
+    np.testing.assert_allclose(pairwise_correlation(x, x[[0] * 4]), expected)
+    x = np.array([[0, 1, 2.0], [0, 2, 1.0], [7, 7, 7.0]])[:, :, np.newaxis]
+    assert pairwise_correlation(x, x[[0, 0, 2]]) == pytest.approx(2)
+    assert pairwise_correlation(x, x[[2, 2, 2]]) == 0
 
 
-def test_scorers_take_every_kind_of_input(bending_aspace):
-    rows = np.stack([np.sin(np.linspace(0, 3, 30) ** p) for p in (1, 1.1, 0.9)])
-    columns = list(rows[:, :, np.newaxis])
-    scores = [SpreadScorer()(DenseSynchronizer().fit(X), X) for X in (rows, columns)]
-    assert scores[0] == scores[1]
-    by_index = DenseSynchronizer(40, pattern=30).fit(bending_aspace)
-    by_array = DenseSynchronizer(40, pattern=bending_aspace[30]).fit(bending_aspace)
-    few = bending_aspace[:6]
-    assert FeatureHoldoutScorer()(by_index, few) == FeatureHoldoutScorer()(by_array, few)
+CONSTANT = np.full((3, 20, 2), 0.1)
+# Performances that differ by rounding at most, such as sums of three tenths.
+WITHOUT_SPREAD = {
+    "constant": (CONSTANT, CONSTANT),
+    "zero": (0 * CONSTANT, 0 * CONSTANT),
+    "rounded": (CONSTANT, CONSTANT + [[[0]], [[1e-17]], [[2e-17]]]),
+    "float32": (CONSTANT.astype("f4"), CONSTANT.astype("f4") * np.float32(1 + 1e-7)),
+    "two frames": (CONSTANT[:, :2], CONSTANT[:, :2]),
+}
 
 
-def test_only_hidden_features_see_through_over_warping():
-    """Features of pure noise: warping lowers their spread, but not that of the others."""
-    rng = np.random.default_rng(0)
-    X = [rng.standard_normal((60, 6)) for _ in range(8)]
-    sync = DenseSynchronizer(
-        cost="posture",
-        smoothness=0,
-        max_rate=2,
-        subframes=1,
-        consensus=0,
-    ).fit(X)
-    assert SpreadScorer()(sync, X) > -0.8
-    assert FeatureHoldoutScorer()(sync, X) < -0.95
+@pytest.mark.parametrize("measure", SPREADS)
+@pytest.mark.parametrize("name", WITHOUT_SPREAD)
+def test_spread_is_1_where_performances_differ_by_rounding(measure, name):
+    assert measure(*WITHOUT_SPREAD[name]) == 1
 
 
-def test_holdout_judges_by_every_feature(bending_aspace):
-    """One feature a hand: what is dealt first does not matter, each is judged by the others."""
-    X = [x[:, :4] for x in bending_aspace[:8]]
-    sync = DenseSynchronizer(40).fit(X)
-    scores = []
-    for k in range(4):
-        seen, hidden = [np.delete(x, k, axis=1) for x in X], [x[:, [k]] for x in X]
-        after = DenseSynchronizer(40).fit(seen).match(seen).warp(hidden)
-        before = LinearSynchronizer(40).fit_transform(hidden)
-        scores.append(-least_squares(before, after))
-    assert np.ptp(scores) > 0.1
-    for seed in range(3):
-        found = FeatureHoldoutScorer(n_folds=4, random_state=seed)(sync, X)
-        np.testing.assert_allclose(found, np.mean(scores))
+@pytest.mark.parametrize("measure", SPREADS)
+def test_spread_is_refused_if_there_was_none_before(measure):
+    with pytest.raises(ValueError, match="before and are not after"):
+        measure(CONSTANT, make_curves(3, n_features=2))
 
 
-def test_holdout_needs_features(bending_aspace):
-    sync = DenseSynchronizer(40).fit([x[:, :1] for x in bending_aspace])
-    with pytest.raises(ValueError, match="n_folds=3 must be between 2 and the 1 features"):
-        FeatureHoldoutScorer()(sync, [x[:, :1] for x in bending_aspace])
+def test_least_squares_leaves_out_the_mean_of_the_others():
+    """0.1, 0.2, 0.3: the second differs from the mean of the others by rounding."""
+    x = np.array([0.1, 0.2, 0.3])[:, np.newaxis, np.newaxis] * np.ones((3, 5, 2))
+    assert least_squares(x, x[[0, 0, 2]]) == pytest.approx((4 / 9 + 16 / 9) / 2)
 
 
-def test_scorers_need_a_synchronizer(bending_aspace):
-    with pytest.raises(ValueError, match="no synchronizer in ASpace"):
-        SpreadScorer()(ASpace(2).fit(bending_aspace), bending_aspace)
-
-
-def test_scorers_clone_and_repeat():
-    bunch = make_bending(6, random_state=0)
-    X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-    sync = DenseSynchronizer(40).fit(X)
-    before = sync.pattern_.copy()
-    a, b = (FeatureHoldoutScorer(random_state=3)(sync, X) for _ in range(2))
-    assert a == b
-    np.testing.assert_array_equal(sync.pattern_, before)
+def test_result_of_the_decomposition_is_a_sum():
+    found = amplitude_phase_variance(*CURVES)
+    np.testing.assert_allclose(found.amplitude + found.phase, found.total)

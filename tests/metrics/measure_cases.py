@@ -1,0 +1,263 @@
+"""Every measure with valid arguments, a slow oracle, and arguments that it refuses."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+NAN, INF = np.nan, np.inf
+
+
+class Case(NamedTuple):
+    """One measure: `oracle` computes the same from `arguments` by plain loops."""
+
+    arguments: tuple
+    oracle: Callable
+    refused: list
+
+
+def make_warps():
+    rng = np.random.default_rng(1)
+    steps = rng.uniform(0, 2, (5, 19)) * (rng.uniform(size=(5, 19)) > 0.2)
+    tau = np.concatenate([np.zeros((5, 1)), np.cumsum(steps, axis=1)], axis=1)
+    return 19 * tau / tau[:, -1:]
+
+
+def make_curves(n=4, n_frames=20, n_features=3):
+    rng = np.random.default_rng(5)
+    base = np.cumsum(rng.standard_normal((n_frames, n_features)), axis=0)
+    return base + 0.3 * rng.standard_normal((n, n_frames, n_features))
+
+
+WARPS = make_warps()
+STRAIGHT = np.tile(np.arange(20.0), (5, 1))
+MOMENTS = [np.linspace(0, 1, 12 + i) ** (1 + i / 4) for i in range(5)]
+KEYFRAMES = np.sort(np.random.default_rng(2).uniform(1, 18, (5, 2)), axis=1)
+CURVES = make_curves(), np.random.default_rng(0).standard_normal((4, 20, 3))
+
+# -- oracles ------------------------------------------------------------------------------
+
+
+def interpolate(track, at):
+    i = min(int(at), len(track) - 2)
+    return track[i] * (i + 1 - at) + track[i + 1] * (at - i)
+
+
+def integral(f):
+    """Trapezoidal rule over [0, 1]."""
+    return sum((a + b) / 2 for a, b in pairwise(f)) / (len(f) - 1)
+
+
+def mean_difference(times, others):
+    return np.mean([abs(a - b) for a, b in zip(times.ravel(), others.ravel(), strict=True)])
+
+
+def group_difference(times, moments):
+    P, differences = times.shape[1], []
+    for p in range(P):
+        shown = [
+            interpolate(phi, tau[p] * (len(phi) - 1) / (P - 1))
+            for tau, phi in zip(times, moments, strict=True)
+        ]
+        differences += [abs(phi - sum(shown) / len(shown)) for phi in shown]
+    return (P - 1) * np.mean(differences)
+
+
+def keyframe_difference(times, keyframes, pattern, lengths, frame_rate=None):
+    differences = []
+    for tau, own, length in zip(times, keyframes, lengths, strict=True):
+        frames = (length - 1) / (times.shape[1] - 1)
+        unit = 1 if frame_rate is None else frames / frame_rate
+        for p, k in zip(pattern, own, strict=True):
+            differences.append(abs(interpolate(tau, p) - k / frames) * unit)
+    return np.mean(differences)
+
+
+def stops(times):
+    return np.mean([b <= a for tau in times for a, b in pairwise(tau)])
+
+
+def bending(times):
+    P = times.shape[1]
+    return np.sqrt(np.mean([(t[p + 1] - 2 * t[p] + t[p - 1]) ** 2
+                            for t in times for p in range(1, P - 1)]))  # fmt: skip
+
+
+def round_trip(times, back):
+    return np.mean([
+        abs(interpolate(b, at) - p)
+        for tau, b in zip(times, back, strict=True) for p, at in enumerate(tau)
+    ])  # fmt: skip
+
+
+def squared_distance(x, y):
+    return sum(integral((x[:, k] - y[:, k]) ** 2) for k in range(x.shape[1]))
+
+
+def spread_ratio(before, after):
+    n, ratios = len(before), []
+    for i in range(n):
+        others = [j for j in range(n) if j != i]
+        new, old = (squared_distance(z[i], z[others].mean(axis=0)) for z in (after, before))
+        ratios.append(new / old)
+    return np.mean(ratios)
+
+
+def velocity_ratio(before, after):
+    def total(z):
+        slopes = np.stack([np.gradient(x, axis=0) for x in z])
+        return sum(squared_distance(x, slopes.mean(axis=0)) for x in slopes)
+
+    return total(after) / total(before)
+
+
+def correlation_ratio(before, after):
+    def total(z):
+        flat = [(x - x.mean(axis=0)).ravel() for x in z]
+        return sum(a @ b / np.sqrt((a @ a) * (b @ b)) for a in flat for b in flat if a is not b)
+
+    return total(after) / total(before)
+
+
+def decomposition(before, after):
+    """The formulas of Kneip and Ramsay, curve by curve and feature by feature."""
+
+    def energy(z):
+        return np.mean([squared_distance(x, 0 * x) for x in z])
+
+    constant, mean = energy(before) / energy(after), after.mean(axis=0)
+    amplitude = constant * np.mean([squared_distance(y, mean) for y in after])
+    phase = constant * squared_distance(mean, 0 * mean) - energy([before.mean(axis=0)])
+    total = np.mean([squared_distance(x, before.mean(axis=0)) for x in before])
+    return amplitude, phase, total, phase / (amplitude + phase), constant
+
+
+# -- refused arguments --------------------------------------------------------------------
+
+FIVE = [[0, 1, 2, 3, 4.0]]
+WRONG_WARPS = [
+    ([[0, NAN, 2, 3, 4]], r"Performance 0: \w+ must be from 0 to P - 1 = 4.*nan at frame 1"),
+    ([[0, 1, 2, 3, INF]], "got inf at frame 4"),
+    ([[0, 1, 2, 3, 4.1]], "got 4.1 at frame 4"),
+    ([[-0.1, 1, 2, 3, 4]], "got -0.1 at frame 0"),
+    ([0, 1, 2, 3, 4], r"shape \(n_sequences, P\).*got \(5,\)"),
+    ([[0]], r"P at least 2, got \(1, 1\)"),
+    (np.zeros((0, 5)), r"got \(0, 5\)"),
+    (np.zeros((1, 5, 1)), r"got \(1, 5, 1\)"),
+    ([["0", "1", "2", "3", "4"]], "not a numeric array"),
+    ([[0, 1j, 2, 3, 4]], "complex"),
+    (np.ma.masked_equal(FIVE, 2), "masked"),
+    (np.array(FIVE).astype("m8[s]"), "dates or durations"),
+]
+WRONG_QUANTILES = [(q, "quantile") for q in (-0.1, 1.1, NAN, [0.5], "median")]
+WRONG_MOMENTS = [
+    ([[0, 1.5]], "Performance 0: moments are shares.*got 1.5 at frame 1"),
+    ([[-0.5, 1]], "got -0.5 at frame 0"),
+    ([[0, NAN, 1]], "got nan at frame 1"),
+    ([[0, 0.5, 0.4, 1]], "must not decrease.*after frame 1"),
+    ([[0]], r"at least 2, got \(1,\)"),
+    ([[[0, 1]]], r"got \(1, 2\)"),
+    ([0, 1], "1 warps and 2 sets"),
+    ([], "1 warps and 0 sets"),
+    ([["0", "1"]], "Performance 0: moments is not a numeric"),
+    ({"a": [0, 1]}, "got dict"),
+    (None, "got NoneType"),
+]
+WRONG_KEYFRAMES = [
+    (([[NAN]], [2], [9]), r"Performance 0: key-frames .* from 0 to 8, in its own .*nan"),
+    (([[8.5]], [2], [9]), r"from 0 to 8.*\[8.5\]"),
+    (([[-1]], [2], [9]), "Performance 0: key-frames"),
+    (([[5, 4]], [1, 2], [9]), "Performance 0: key-frames must increase"),
+    (([[4, 5]], [2, 1], [9]), "The pattern: key-frames must increase"),
+    (([[5]], [4.5], [9]), "The pattern: .* from 0 to 4, in frames of the clock"),
+    (([[5]], [NAN], [9]), "The pattern"),
+    (([[5]], 2, [9]), r"pattern_keyframes must have shape \(n_keyframes,\)"),
+    (([[]], [], [9]), "at least one"),
+    (([[5], [5]], [2], [9]), r"each of the 1 warps; got the shapes \[\(1,\), \(1,\)\]"),
+    (([5], [2], [9]), r"got the shapes \[\(\)\]"),
+    (([[5, 6]], [2], [9]), r"got the shapes \[\(2,\)\]"),
+    ((5, [2], [9]), "list of arrays, one a performance, got int"),
+    (("lift", [2], [9]), "got str"),
+    (([["lift"]], [2], [9]), "Performance 0: keyframes is not a numeric"),
+    (([np.ma.masked_equal([5], 5)], [2], [9]), "masked"),
+    (([[5]], [2], [1]), "Performance 0: n_frames must be a whole number of at least 2, got 1"),
+    *((([[5]], [2], [wrong]), f"got {wrong}") for wrong in (9.5, NAN, INF)),
+    (([[5]], [2], [9, 9]), "n_frames must be the lengths of the 1 performances"),
+    (([[5]], [2], 9), "n_frames must be the lengths"),
+]
+
+
+def with_gap(value):
+    x = make_curves()
+    x[2, 7, 1] = value
+    return x
+
+
+WRONG_CURVES = [
+    (with_gap(NAN), "before, performance 2, frame 7, feature 1 is NaN"),
+    (with_gap(INF), "is infinity"),
+    (np.ma.masked_invalid(with_gap(NAN)), "masked"),
+    (CURVES[0] + 1j, "complex"),
+    (CURVES[0].astype(str), "not a numeric array"),
+    (CURVES[0].astype("M8[s]"), "dates"),
+    (CURVES[0][:, :1], "of at least 2 sequences, 2 frames"),
+    (CURVES[0][:1], "at least 2 sequences"),
+    (CURVES[0][:, :, :0], "1 feature"),
+    (CURVES[0][:, :, 0], r"x\[:, :, np.newaxis\]"),
+    (np.empty((0, 20, 3)), "at least 2 sequences"),
+    ([], "at least 2 sequences"),
+    ([x[:k] for x, k in zip(CURVES[0], (20, 19, 18, 17), strict=True)], "on one clock"),
+    ([x[:k].tolist() for x, k in zip(CURVES[0], (9, 8, 7, 6), strict=True)], "not a numeric"),
+    (None, "must have one shape"),
+]
+CURVE_REFUSALS = [((wrong, wrong), {}, message) for wrong, message in WRONG_CURVES]
+CURVE_REFUSALS += [((CURVES[0], wrong), {}, r"before|after") for wrong, _ in WRONG_CURVES]
+ONE_MOMENT, ONE_KEYFRAME = [[0, 0.5, 1]], ([[5]], [2], [9])
+
+
+def refusals(wrong, arguments, **keywords):
+    """Triples of arguments, keywords and message; `arguments` places a wrong value."""
+    return [(arguments(value), keywords, message) for value, message in wrong]
+
+
+def wrong_quantiles(*arguments):
+    return [(arguments, {"quantile": wrong}, message) for wrong, message in WRONG_QUANTILES]
+
+
+def wrong_pairs():
+    first = refusals(WRONG_WARPS, lambda t: (t, np.zeros(np.shape(t))))
+    second = refusals(WRONG_WARPS, lambda t: (np.zeros(np.shape(t)), t))
+    return first + second + [(([[0, 1]], [[0, 1, 2]]), {}, "differ in shape")]
+
+
+CASES = {
+    "timing_error": Case(
+        (WARPS, STRAIGHT), mean_difference, wrong_pairs() + wrong_quantiles(FIVE, FIVE)
+    ),
+    "group_timing_error": Case(
+        (WARPS, MOMENTS),
+        group_difference,
+        refusals(WRONG_WARPS, lambda t: (t, ONE_MOMENT))
+        + refusals(WRONG_MOMENTS, lambda phi: (FIVE, phi))
+        + wrong_quantiles(FIVE, ONE_MOMENT),
+    ),
+    "keyframe_error": Case(
+        (WARPS, KEYFRAMES, np.array([4.0, 9.5]), [30, 40, 20, 25, 55]),
+        keyframe_difference,
+        refusals(WRONG_WARPS, lambda t: (t, *ONE_KEYFRAME))
+        + refusals(WRONG_KEYFRAMES, lambda k: (FIVE, *k))
+        + wrong_quantiles(FIVE, *ONE_KEYFRAME)
+        + [
+            ((FIVE, *ONE_KEYFRAME), {"frame_rate": wrong}, "frame_rate")
+            for wrong in (0, -5, NAN, INF, [50, 50], [], "fast", 1j)
+        ],
+    ),
+    "pause_share": Case((WARPS,), stops, refusals(WRONG_WARPS, lambda t: (t,))),
+    "roughness": Case((WARPS,), bending, refusals(WRONG_WARPS, lambda t: (t,))),
+    "inverse_consistency": Case((WARPS, WARPS[::-1]), round_trip, wrong_pairs()),
+    "least_squares": Case(CURVES, spread_ratio, CURVE_REFUSALS),
+    "sobolev_least_squares": Case(CURVES, velocity_ratio, CURVE_REFUSALS),
+    "pairwise_correlation": Case(CURVES, correlation_ratio, CURVE_REFUSALS),
+    "amplitude_phase_variance": Case(CURVES, decomposition, CURVE_REFUSALS),
+}
