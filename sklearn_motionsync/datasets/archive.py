@@ -11,7 +11,7 @@ from numpy.lib import format as npy
 from sklearn.utils import Bunch
 
 from ..body.skeleton import Skeleton
-from ..io.guard import check_growth
+from ..io.text import check_result_size
 
 _NEEDED = ("positions", "offsets", "label", "actor", "take", "fps", "joints", "parents")
 _TEXTS = ("label", "actor", "take", "joints")
@@ -220,7 +220,7 @@ def read_arrays(path, names):
         with zipfile.ZipFile(path) as archive:
             members = _find_members(archive, names)
             n_bytes = sum(member.file_size for member in members.values())
-            check_growth(path, path.stat().st_size, n_bytes, "the arrays")
+            check_result_size(path, path.stat().st_size, n_bytes, "the arrays")
             return {name: _read_array(archive, name, m) for name, m in members.items()}
     except Exception as error:  # of zipfile, zlib, tokenize, ast, struct: whatever a byte may cause
         if isinstance(error, ValueError) and str(error).startswith(f"{path}: "):

@@ -1,13 +1,13 @@
 """Damage files of motion capture and archives in many ways, and see that reading stays safe.
 
-    python tests/datasets/fuzz_readers.py FOLDER --seconds 600 [--seed 0] [--workers 2]
-    python tests/datasets/fuzz_readers.py archives --seconds 600
+    python tests/io/fuzz_readers.py FOLDER --seconds 600 [--seed 0] [--workers 2]
+    python tests/io/fuzz_readers.py archives --seconds 600
 
-FOLDER holds original files, to which small ones made here are added; ``archives`` are made here.
-A damaged file must be read, to finite numbers (or NaN for a marker that was not seen), or
-be refused with a ValueError that names the file. Anything else is a failure: another error, a
-warning, more than 1 GB, more than 10 seconds. Failures are printed with the number of their
-case, and their files are kept; ``--case N`` runs that case alone.
+FOLDER holds original files, to which the examples of ``motion_files.EXAMPLES`` are added;
+``archives`` are made here. A damaged file must be read, to finite numbers (or NaN for a marker that
+was not seen), or be refused with a ValueError that names the file. Anything else is a failure:
+another error, a warning, more than 1 GB, more than 10 seconds. Failures are printed with the number
+of their case, and their files are kept; ``--case N`` runs that case alone.
 """
 
 import argparse
@@ -29,7 +29,7 @@ from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.io import find_gaps, read_motion
 
 from damaged_archives import ARCHIVE, make_archives
-from motion_files import c3d, everything, opensim
+from motion_files import EXAMPLES, c3d, everything
 
 LIMIT_SECONDS = 10
 LIMIT_BYTES = 2**30
@@ -45,7 +45,7 @@ WORDS = (
     *(b"PathFileType DataRate NumFrames NumMarkers Units Frame# Time X1 Y2 Z time".split()),
     *(b"endheader nRows=7 nColumns=9 inDegrees=yes DataType=Vec3 1,2,3 , \t \t\t\t".split(b" ")),
 )
-# Where the file itself says that there is no number.
+# Formats that may hold missing values.
 WITH_GAPS = ("c3d", "trc", "mot", "sto")
 
 
@@ -53,23 +53,22 @@ def load_originals(folder):
     """A list of {name: bytes}: what one call reads. Texts also come cut to a few frames."""
     if str(folder) == "archives":
         return [{"a.npz": content} for content in make_archives()]
-    originals = [{"a.c3d": c3d(**everything(machine))} for machine in (84, 85, 86)]
-    originals += opensim()
+    originals = [example() for example in EXAMPLES.values()]
+    originals += [{"a.c3d": c3d(**everything(machine))} for machine in (85, 86)]
     files = sorted(path for path in Path(folder).rglob("*") if path.is_file())
     for path in files:
-        content = path.read_bytes()
-        kind = path.suffix.lower()
-        if kind == ".c3d":
-            originals.append({"a.c3d": content})
-        elif kind == ".bvh":
-            originals += [{"a.bvh": content}, {"a.bvh": shorten_bvh(content)}]
-        elif kind == ".amc":
+        content, ending = path.read_bytes(), path.suffix.lower()
+        if ending == ".amc":
             skeleton = max(
                 (p for p in files if p.suffix.lower() == ".asf" and path.stem.startswith(p.stem)),
                 key=lambda p: len(p.stem),
             ).read_bytes()
             short = re.split(rb"(?m)^6\s*$", content)[0]
             originals += [{"a.amc": text, "a.asf": skeleton} for text in (content, short, short)]
+        elif ending in EXAMPLES:
+            originals.append({f"a{ending}": content})
+        if ending == ".bvh":
+            originals.append({"a.bvh": shorten_bvh(content)})
     return originals
 
 
@@ -196,6 +195,9 @@ def explode(rng, data):
 BINARY = (flip_bits, overwrite, truncate, delete, duplicate, move, set_integer, set_float)
 TEXT = (flip_bits, overwrite, truncate, delete, duplicate, move, explode)
 TEXT += (set_number, set_number, set_word, set_word, swap_lines)
+# How files are damaged, by the ending of their names.
+DAMAGES = {".c3d": BINARY, ".npz": BINARY[:6] + ARCHIVE}
+DAMAGES |= dict.fromkeys((".bvh", ".amc", ".asf", ".trc", ".mot", ".sto"), TEXT)
 
 
 def damaged(originals, seed, number):
@@ -205,8 +207,7 @@ def damaged(originals, seed, number):
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         name = rng.choice(list(files))
         if files[name]:
-            damages = {"a.c3d": BINARY, "a.npz": BINARY[:6] + ARCHIVE}.get(name, TEXT)
-            files[name] = rng.choice(damages)(rng, files[name])
+            files[name] = rng.choice(DAMAGES[Path(name).suffix])(rng, files[name])
     return files
 
 

@@ -107,7 +107,7 @@ def test_which_skeleton(tmp_path):
         ("TX TY", "TX TX", "'order' needs different ones of tx ty"),
         ("dof rx rz", "dof l", "'dof' needs different ones of tx ty tz rx ry rz, got 'l'"),
         ("90 XYZ", "90 XYX", "order of the axes like XYZ, got 'XYX'"),
-        ("length 4", "length x", "line 19: length needs finite numbers, got 'x'"),
+        ("length 4", "length x", "line 19: length needs finite numbers below 1e.12, got 'x'"),
         ("length 4", "", "line 24: bone 'thigh' needs a name of its own, a direction and a length"),
         ("name shin", "name thigh", "bone 'thigh' needs a name of its own"),
         ("    dof rx", "begin", "expected end, got 'begin rz'"),
@@ -118,8 +118,7 @@ def test_which_skeleton(tmp_path):
         ("root thigh\n", "\n", "does not connect 2 bones to the root, 'shin' is one"),
         (":bonedata", ":bones", ":hierarchy names 'thigh', which is not in :bonedata"),
         (ASF[ASF.index(":bonedata") :], "", "ends without a complete :root, :bonedata"),
-        ("4\n", "1e308\n", "with :units length 0.5 positions overflow"),
-        ("direction 0 -1 0\n    length 4", "direction 0 9 0\nlength 1e308", "infinitely long"),
+        ("4\n", "1e308\n", "length needs finite numbers below 1e.12, got '1e308'"),
     ],
 )
 def test_bad_asf(tmp_path, old, new, message):
@@ -128,13 +127,6 @@ def test_bad_asf(tmp_path, old, new, message):
     with pytest.raises(ValueError, match=rf"a\.asf, line \d+: |a\.asf: {message}") as caught:
         acclaim(tmp_path, asf)
     caught.match(message)
-
-
-def test_bones_out_of_this_world(tmp_path):
-    old = "direction 0 -1 0\n    length 4\n    axis 0 0 90"
-    asf = ASF.replace(old, "direction 1 1 1\n    length 1.7e308\n    axis 30 40 50")
-    with pytest.raises(ValueError, match="joint 1 is infinitely far away in frame 0"):
-        acclaim(tmp_path, asf)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +138,11 @@ def test_bones_out_of_this_world(tmp_path):
         ("thigh 0 0", "shin 0", "line 6: expected .* a bone that moves in a.asf"),
         ("thigh 0 0", "thigh 0 0\nthigh 0 0", "line 7: expected .* once a frame"),
         ("thigh 0 0", "thigh 0", "line 6: bone 'thigh' needs 2 numbers, got 1"),
-        ("thigh 0 0", "thigh 0 nan", "line 6: bone 'thigh' needs finite numbers, got 'nan'"),
+        (
+            "thigh 0 0",
+            "thigh 0 nan",
+            "line 6: bone 'thigh' needs finite numbers below 1e.12, got 'nan'",
+        ),
         ("thigh 0 0\n", "", "frame 1 has no values of 'thigh', .* or asf= is not its skeleton"),
         ("thigh 90 0\n", "", "frame 2 has no values of 'thigh', .* the file is not complete"),
         ("\n2\n", "\n3\n", "line 7: frame '3' follows frame 1; frames must be numbered"),

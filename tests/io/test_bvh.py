@@ -151,7 +151,7 @@ def moves(rows):
 def test_numbers_are_read_to_the_last_digit(tmp_path):
     rng = np.random.default_rng(0)
     formats = ["%r", "%.6f", "%.17g", "%.25g", "%e", "%+.3E", "%d"]
-    values = rng.uniform(-1, 1, 3000) * 10.0 ** rng.integers(-40, 41, 3000)
+    values = rng.uniform(-1, 1, 3000) * 10.0 ** rng.integers(-40, 11, 3000)
     words = [formats[i % 7] % float(value) for i, value in enumerate(values)]
     words[:6] = ["+5", ".5", "5.", "-.5e-3", "1e-400", "-0"]
     df = read_motion(put(tmp_path, moves([" ".join(words[i : i + 3]) for i in range(0, 3000, 3)])))
@@ -169,15 +169,17 @@ def test_blanks_of_any_kind(tmp_path, blank):
     "word", ["1e", "1e+", "+-1", "1.2.3", ".", "-", "e5", "1-2", "1_0", "0x1", "1,5", "inf", "\xb2"]
 )
 def test_words_that_are_no_numbers(tmp_path, word):
-    with pytest.raises(ValueError, match=r"line 11: a frame .* needs finite numbers, got "):
+    with pytest.raises(
+        ValueError, match=r"line 11: a frame .* needs finite numbers below 1e.12, got "
+    ):
         read_motion(put(tmp_path, moves(["1 2 3", f"1 {word} 3", "1 2 3"])))
 
 
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        ("1 1e 3", "needs finite numbers, got '1e'"),
-        ("1 1e999 3", "needs finite numbers, got '1e999'"),
+        ("1 1e 3", "needs finite numbers below 1e.12, got '1e'"),
+        ("1 1e12 3", "needs finite numbers below 1e.12, got '1e12'"),
         ("1 2", "needs 3 numbers, got 2 \\('1 2'\\)"),
         ("1 2 3 4 5 6", "needs 3 numbers, got 6"),
         ('1 2 "3"', "needs finite numbers"),
@@ -202,8 +204,11 @@ def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame T
         ("\x00\xff", "line 1: expected ROOT, .* got "),
         (small()[:30], "line 4: the file ends where a number of OFFSET"),
         (small().replace("OFFSET 0 0 0\n", ""), "line 5: joint 'a' ends without an OFFSET"),
-        (small().replace("0 0 0", "0 x 0"), "line 4: OFFSET needs finite numbers, got 'x'"),
-        (small().replace("0 0 0", "0 1_0 0"), "OFFSET needs finite numbers, got '1_0'"),
+        (
+            small().replace("0 0 0", "0 x 0"),
+            "line 4: OFFSET needs finite numbers below 1e.12, got 'x'",
+        ),
+        (small().replace("0 0 0", "0 1_0 0"), "OFFSET needs finite numbers below 1e.12, got '1_0'"),
         (small().replace("ROOT a", "ROOT"), "line 3: expected the joint's name"),
         (small().replace("ROOT a\n{", "ROOT a"), "line 3: expected a joint's name and {, got 'OFF"),
         (small().replace("ROOT", "JOINT"), "'JOINT' stands where it cannot"),
@@ -216,25 +221,24 @@ def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame T
         (small().replace("}", "End Site { OFFSET 0 0 0 CHANNELS 1 Xrotation } }"), "End Site has"),
         (small(motion=""), "line 7: expected 'Frames: <number>', got ''"),
         (small(motion="Frames: -1\n"), "Frames: needs a whole number above 0, got '-1'"),
-        (small(motion="Frames: 1\nFrame Time: 0\n1 2 3"), "Frame Time: needs seconds above 0"),
+        (small(motion="Frames: 1\nFrame Time: 0\n1 2 3"), "Frame Time: must be above 0"),
         (small(motion="Frames: 1\nFrame Time: inf\n1 2 3"), "Frame Time: needs finite numbers"),
         (small(motion="Frames: 9999999999\nFrame Time: 1\n1 2 3\n"), "but only 6 bytes follow"),
         (small(motion="Frames: 2\nFrame Time: 1\n1.00 2.00 3.00\n"), "2, but 1 frames follow"),
         (small(motion="Frames: 1\nFrame Time: 1\n1 2 3\n4 5 6\n"), "1, but 2 frames follow"),
         (small(motion="Frames: 1\nFrame Time: 1\n1 2 \n"), r"line 10: a frame .* needs 3 numbers"),
-        (small(motion="Frames: 1\nFrame Time: 1\n1 nan 3\n"), "finite numbers, got 'nan'"),
-        (small(motion="Frames: 1\nFrame Time: 1\n1 1e999 3\n"), "finite numbers, got '1e999'"),
+        (
+            small(motion="Frames: 1\nFrame Time: 1\n1 nan 3\n"),
+            "finite numbers below 1e.12, got 'nan'",
+        ),
+        (
+            small(motion="Frames: 1\nFrame Time: 1\n1 1e999 3\n"),
+            "finite numbers below 1e.12, got '1e999'",
+        ),
     ],
 )
 def test_bad_bvh(tmp_path, text, message):
     with pytest.raises(ValueError, match=rf"a\.bvh, {message}|a\.bvh, line \d+: .*{message}"):
-        read_motion(put(tmp_path, text))
-
-
-def test_positions_out_of_this_world(tmp_path):
-    text = body().replace("OFFSET 0 3 1", "OFFSET 0 1e308 1e308")
-    text = text.replace("OFFSET 1 5 -2", "OFFSET 1e308 1e308 1e308")
-    with pytest.raises(ValueError, match="infinitely far away in frame 1; offsets, lengths"):
         read_motion(put(tmp_path, text))
 
 

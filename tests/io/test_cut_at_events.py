@@ -140,7 +140,7 @@ def test_events_are_keyframes_of_what_lies_between_them():
         (recording(("a", None, None)), "a", None, "have no frames, as its file has no frame rate"),
         (recording(("a", None, "7")), "a", None, "must be a list of dicts .*, got {'label': 'a'"),
         (recording((1, None, 7)), "a", None, "must be a list of dicts"),
-        (pd.Series([1.0]), "a", None, "must be a DataFrame, as read_motion gives, got Series"),
+        (pd.Series([1.0]), "a", None, "must be a DataFrame, as read_motion returns it, got Series"),
     ],
 )
 def test_what_cannot_be_cut(df, start, stop, message):

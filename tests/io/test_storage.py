@@ -143,17 +143,17 @@ def test_times_that_stand_still(tmp_path):
         (("endheader", "end"), r"line 56: the file ends where 'endheader' should follow"),
         (("time\t", "t\t"), r"line 6: expected 'time' and the names of the other columns, got 't"),
         (("\tknee_angle_r", "\t"), "line 6: expected 'time' and the names"),
-        (("nRows=50", "nRows=51"), "the number of rows in line 3 says 51, but 50 frames follow"),
-        (("nRows=50", "nRows=x"), "line 3 needs a whole number of rows, got 'x'"),
+        (("nRows=50", "nRows=51"), "nRows says 51, but 50 frames follow"),
+        (("nRows=50", "nRows=x"), "nRows needs a whole number above 0, got 'x'"),
         (
             ("\n0.08000000\t", "\n0.08000000\t7\t"),
             "line 15: a row needs its time and 3 columns, got",
         ),
         (
             ("\n0.08000000\t", "\n0.08000000\tx"),
-            "line 15: a row needs numbers, or nothing .* got 'x",
+            "line 15: a frame needs numbers, or nothing .* got 'x",
         ),
-        (("\n0.08000000\t", "\n0.08000000\t0,"), "line 15: a row needs numbers, .* got '0,"),
+        (("\n0.08000000\t", "\n0.08000000\t0,"), "line 15: a frame needs numbers, .* got '0,"),
         (("\n0.08000000\t", "\n0.06000000\t"), "line 15: the time .* got 0.06 after 0.07"),
         (("\n0.08000000\t", "\nnan\t"), "line 15: the time of a row must be a number"),
         (
@@ -174,7 +174,9 @@ def test_bad_storage(tmp_path, change, message):
 
 def test_wrong_calls(tmp_path):
     path = put(tmp_path, TEXT, "a.mot")
-    with pytest.raises(ValueError, match=r"max_gap goes with points, got max_gap=3 with .*a\.mot"):
+    with pytest.raises(
+        ValueError, match=r"max_gap goes with positions, got max_gap=3 frames for the coord.*a\.mot"
+    ):
         read_motion(path, max_gap=3)
     with pytest.raises(ValueError, match=r"group= goes with \.c3d files only"):
         read_motion(path, group="forces")

@@ -174,8 +174,8 @@ def test_a_single_frame(tmp_path):
     [
         (("PathFileType", "Path"), "line 1: expected 'PathFileType', with which .* got 'Path 4"),
         (("DataRate\tCameraRate\tNumFrames", "a\tb\tc"), "line 2: expected 'DataRate Camera"),
-        (("\t40\t3\tmm", "\t41\t3\tmm"), "NumFrames in line 3 says 41, but 40 frames follow"),
-        (("\t40\t3\tmm", "\t39\t3\tmm"), "NumFrames in line 3 says 39, but 40 frames follow"),
+        (("\t40\t3\tmm", "\t41\t3\tmm"), "NumFrames says 41, but 40 frames follow"),
+        (("\t40\t3\tmm", "\t39\t3\tmm"), "NumFrames says 39, but 40 frames follow"),
         (
             ("\t40\t3\tmm", "\tmany\t3\tmm"),
             "line 3: NumFrames needs a whole number above 0, got 'm",
