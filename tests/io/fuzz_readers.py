@@ -1,5 +1,6 @@
 """Damage files of motion capture and archives in many ways, and see that reading stays safe.
 
+    export PYTHONPATH=tests/datasets
     python tests/io/fuzz_readers.py FOLDER --seconds 600 [--seed 0] [--workers 2]
     python tests/io/fuzz_readers.py archives --seconds 600
 
