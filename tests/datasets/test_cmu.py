@@ -1,7 +1,6 @@
 """fetch_cmu against a server of this machine: the cache, and failures of the download."""
 
 import hashlib
-import socket
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
@@ -88,7 +87,6 @@ def test_bunch_holds_the_trials(site, tmp_path):
     assert [len(df) for df in bunch.data] == [2, 3]
     assert bunch.subject == "02"
     assert bunch.take.tolist() == ["01", "02"]
-    assert isinstance(bunch.take, np.ndarray)
     assert bunch.skeleton == Skeleton.acclaim()
     assert bunch.joints == list(Skeleton.acclaim().joints)
     assert bunch.frame_rate.tolist() == [120, 120]
@@ -96,8 +94,7 @@ def test_bunch_holds_the_trials(site, tmp_path):
     assert bunch.data[0].attrs["frame_rate"] == 120
     assert bunch.filenames[1] == str(tmp_path / "cmu_mocap" / "02" / "02_02.amc")
     pd.testing.assert_frame_equal(bunch.data[1], read_motion(bunch.filenames[1], frame_rate=120))
-    for words in ("free for all uses", "may not resell this data directly", "NSF EIA-0196217"):
-        assert words in " ".join(bunch.DESCR.split())
+    assert "may not resell this data directly" in " ".join(bunch.DESCR.split())
 
 
 def test_kept_files_need_no_network(site, tmp_path):
@@ -112,13 +109,6 @@ def test_kept_files_need_no_network(site, tmp_path):
     assert kept(tmp_path) == [f"cmu_mocap/02/{n}" for n in ("02.asf", "02_01.amc", "02_02.amc")]
 
 
-def test_missing_file_is_an_error_without_download(site, tmp_path):
-    where = rf"02\.asf is not in {tmp_path}/cmu_mocap/02 .*{site.url}/02/02\.asf: download_if_miss"
-    with pytest.raises(OSError, match=where + r".*by hand into that folder, or give another url="):
-        fetch(site, tmp_path, download_if_missing=False)
-    assert site.requests == []
-
-
 def test_missing_trial_is_an_error(site, tmp_path):
     with pytest.raises(FileNotFoundError, match=r"no 02_77\.amc at .*HTTP 404.* does not exist"):
         fetch(site, tmp_path, [1, 77], n_retries=3, delay=60.0)
@@ -126,16 +116,6 @@ def test_missing_trial_is_an_error(site, tmp_path):
     assert len(site.requests) == 3
     with pytest.raises(FileNotFoundError, match=r"no 900\.asf at "):
         fetch_cmu("900", 1, data_home=tmp_path, url=site.url)
-
-
-def test_unreachable_server_is_an_error(tmp_path, monkeypatch):
-    monkeypatch.setenv("no_proxy", "*")
-    with socket.socket() as closed:
-        closed.bind(("127.0.0.1", 0))
-        url = f"http://127.0.0.1:{closed.getsockname()[1]}"
-        with pytest.raises(OSError, match=rf"could not be got from {url}/02/02\.asf: .*refused"):
-            fetch_cmu(2, 1, data_home=tmp_path, url=url, n_retries=1, delay=0.0)
-    assert kept(tmp_path) == []
 
 
 def test_failed_requests_are_repeated(site, tmp_path):
@@ -156,21 +136,16 @@ def test_incomplete_download_is_not_kept(site, tmp_path):
     assert len(fetch(site, tmp_path).data) == 2
 
 
-def test_download_of_another_format_is_removed(site, tmp_path):
-    site.files["/subjects/02/02_01.amc"] = b"<html>Please log in</html>"
-    with pytest.raises(ValueError, match=r"02_01\.amc, line 1: .* Downloaded files were removed"):
-        fetch(site, tmp_path)
-    assert kept(tmp_path) == []
-
-
-def test_damaged_file_is_an_error_and_stays(site, tmp_path):
-    bunch = fetch(site, tmp_path)
+def test_unreadable_files_are_removed_after_a_download_only(site, tmp_path):
+    bunch = fetch(site, tmp_path / "a")
     with open(bunch.filenames[0], "a") as file:
         file.write("head")
-    with pytest.raises(
-        ValueError, match=r"02_01\.amc, line 7: .* Delete that file to get it again"
-    ):
-        fetch(site, tmp_path)
+    with pytest.raises(ValueError, match=r"02_01\.amc, line 7: .* Delete that file to get it ag"):
+        fetch(site, tmp_path / "a")
+    assert len(kept(tmp_path)) == 3
+    site.files["/subjects/02/02_01.amc"] = b"<html>Please log in</html>"
+    with pytest.raises(ValueError, match=r"02_01\.amc, line 1: .* Downloaded files were removed"):
+        fetch(site, tmp_path / "b")
     assert len(kept(tmp_path)) == 3
 
 
@@ -184,7 +159,10 @@ def test_checksums_are_compared(site, tmp_path):
     with open(bunch.filenames[0], "ab") as file:
         file.write(b"3\nroot 0 3 0 0 0 0\nhead 5\n")
     assert len(fetch(site, tmp_path).data[0]) == 3
-    with pytest.raises(OSError, match=r"02_01\.amc is not in .*download_if_missing is False"):
+    message = (
+        rf"02_01\.amc is not in {tmp_path}/cmu_mocap/02 .*{site.url}/02/02_01\.amc: download_if"
+    )
+    with pytest.raises(OSError, match=message + ".*by hand into that folder, or give another url="):
         fetch(site, tmp_path, sha256=right, download_if_missing=False)
     assert len(fetch(site, tmp_path, sha256=right).data[0]) == 2
 
@@ -195,12 +173,9 @@ def test_wrong_numbers_are_refused(tmp_path, number):
         fetch_cmu(number, 1, data_home=tmp_path)
     with pytest.raises(ValueError, match="trials must be numbers from 1"):
         fetch_cmu(1, [number], data_home=tmp_path)
-    assert kept(tmp_path) == []
-
-
-def test_empty_trials_are_refused(tmp_path):
     with pytest.raises(ValueError, match="trials must be one number or several, got none"):
         fetch_cmu(1, [], data_home=tmp_path)
+    assert kept(tmp_path) == []
 
 
 @pytest.mark.parametrize(
@@ -221,16 +196,10 @@ def test_parameters_out_of_range_are_refused(site, tmp_path, params):
     assert kept(tmp_path) == []
 
 
-def test_real_walks_keep_the_lengths_of_limbs(site, tmp_path, real_data):
+def test_real_walks_have_acclaims_skeleton(site, tmp_path, real_data):
     folder = real_data / "original_files" / "asf_amc"
     for path in folder.glob("02*"):
         site.files[f"/subjects/02/{path.name}"] = path.read_bytes()
     bunch = fetch(site, tmp_path)
     assert [df.shape for df in bunch.data] == [(343, 93), (298, 93)]
     assert bunch.skeleton == Skeleton.acclaim()
-    for df in bunch.data:
-        x = df.to_numpy().reshape(len(df), 31, 3)
-        for a, b in bunch.skeleton.bones:
-            length = np.linalg.norm(x[:, a] - x[:, b], axis=1)
-            assert np.ptp(length) < 1e-9
-            assert 0.01 < length[0] < 0.5

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from sklearn_motionsync import KeyframeSynchronizer
 from sklearn_motionsync.datasets import make_gait
 
 HIP, KNEE, ANKLE, FORCE = range(4)
@@ -28,10 +27,8 @@ def shares(bunch):
 def on_clock(bunch, frames=101):
     """Every cycle at the true moments: (n, frames, 4)."""
     moments = np.linspace(0, 1, frames)
-    found = []
-    for x, times in zip(bunch.data, bunch.times, strict=True):
-        found.append(np.stack([np.interp(moments, times, f) for f in x.T], axis=1))
-    return np.stack(found)
+    cycles = zip(bunch.data, bunch.times, strict=True)
+    return np.array([[np.interp(moments, times, f) for f in x.T] for x, times in cycles]).mT
 
 
 def test_times_keyframes_and_labels_fit_the_cycles(gait):
@@ -77,19 +74,11 @@ def test_cycles_of_a_person_are_continuous():
         np.testing.assert_allclose(gait.data[i][-1], gait.data[i + 1][0], atol=1e-9)
 
 
-def test_keyframes_synchronise_toe_off(gait):
-    sync = KeyframeSynchronizer(101).fit(gait.data, keyframes=gait.keyframes)
-    synchronised = sync.transform(gait.data, keyframes=gait.keyframes)
-    toe_off = int(np.ceil(sync.keyframes_[TOE_OFF])) + 2
-    assert synchronised[:, toe_off:-2, FORCE].max() == 0
-
-
-# -- what differs between the groups ---------------------------------------------------------
+# -- differences between the groups -----------------------------------------------------
 
 
 def test_groups_are_equal_by_default():
     gait = make_gait(4, random_state=0)
-    assert gait.group_names == ["A", "B"]
     np.testing.assert_array_equal(*gait.group_curves)
     np.testing.assert_array_equal(*gait.group_times)
 
@@ -143,22 +132,13 @@ def test_group_curves_and_group_times_are_those_of_the_data(timing, amplitude):
     assert np.abs(higher[:40]).max() == 0
 
 
-def test_means_of_many_people_differ_by_timing_and_amplitude():
-    gait = make_gait(200, 1, timing=3, amplitude=10, random_state=0)
-    in_b = gait.group == "B"
-    difference = shares(gait)[in_b].mean(axis=0) - shares(gait)[~in_b].mean(axis=0)
-    assert difference[TOE_OFF] == pytest.approx(3, abs=0.7)
-    knee = on_clock(gait)[:, 73, KNEE]
-    assert knee[in_b].mean() - knee[~in_b].mean() == pytest.approx(10, abs=1.5)
-
-
 def test_people_differ_more_than_the_cycles_of_a_person():
     at = shares(make_gait(80, 4, random_state=0))[:, TOE_OFF].reshape(80, 4)
     assert at.mean(axis=1).std() == pytest.approx(1.25, abs=0.25)
     assert np.sqrt(at.var(axis=1, ddof=1).mean()) == pytest.approx(0.42, abs=0.1)
 
 
-# -- takes -----------------------------------------------------------------------------------
+# -- takes ------------------------------------------------------------------------------
 
 
 def test_takes_are_continuous_walks_with_their_events(takes):
@@ -205,16 +185,15 @@ def test_takes_and_cycles_show_the_same_people(gait, takes):
         np.testing.assert_allclose(100 * foot_off / lasting, expected, atol=1e-6)
 
 
-# -- parameters ------------------------------------------------------------------------------
+# -- parameters -------------------------------------------------------------------------
 
 
 def test_random_state_makes_people_reproducible():
     a, b, c = (make_gait(2, random_state=seed) for seed in (0, 0, 1))
     np.testing.assert_array_equal(a.data[1], b.data[1])
     assert a.data[1].shape != c.data[1].shape or not np.allclose(a.data[1], c.data[1])
-    assert make_gait(2, random_state=np.random.RandomState(0)).data[1].tolist() == (
-        a.data[1].tolist()
-    )
+    again = make_gait(2, random_state=np.random.RandomState(0))
+    np.testing.assert_array_equal(again.data[1], a.data[1])
 
 
 @pytest.mark.parametrize("takes", [False, True])
