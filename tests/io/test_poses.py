@@ -1,4 +1,4 @@
-"""Poses of labelled arrays, such as movement's Datasets."""
+"""from_poses: xarray Datasets as `movement` makes them."""
 
 import json
 
@@ -26,7 +26,7 @@ def poses(positions=POSITIONS, fps=50.0, unit="seconds", times=None, **attrs):
     return xr.Dataset(variables, coords, {k: v for k, v in attrs.items() if v is not None})
 
 
-def test_what_is_made():
+def test_recordings_hold_the_positions_and_attrs_of_each_individual():
     ann, bob = from_poses(poses())
     for i, df in enumerate((ann, bob)):
         expected = POSITIONS[:, :, :, i].swapaxes(1, 2).reshape(40, 6)
@@ -47,7 +47,7 @@ def test_what_is_made():
     assert len(to_frame([ann, bob])) == 80
 
 
-def test_in_space():
+def test_positions_in_space_have_three_columns():
     positions = np.random.default_rng(0).normal(size=(40, 3, 3, 2))
     ann = from_poses(poses(positions))[0]
     np.testing.assert_array_equal(ann, positions[..., 0].swapaxes(1, 2).reshape(40, 9))
@@ -68,17 +68,17 @@ def test_in_space():
         # As read again from a NetCDF file.
         lambda ds: ds.assign_attrs(fps=np.int64(50)),
         lambda ds: ds.assign_coords(time=pd.to_timedelta(ds.time.values, unit="s")),
-        # A DataArray does not know its Dataset's facts: the times tell.
+        # Without the attrs of the Dataset the times give the frame rate.
         lambda ds: ds.position,
     ],
 )
-def test_poses_of_any_kind(change):
+def test_variants_of_datasets_are_the_same(change):
     for df, expected in zip(from_poses(change(poses())), from_poses(poses()), strict=True):
         pd.testing.assert_frame_equal(df, expected)
         assert df.attrs == expected.attrs
 
 
-def test_one_individual_and_one_keypoint():
+def test_selected_individuals_and_keypoints_keep_their_names():
     expected = from_poses(poses())[1]
     for ds in (poses().sel(individual="bob"), poses().rename(OLD).sel(individuals="bob")):
         (bob,) = from_poses(ds, min_confidence=0)
@@ -94,7 +94,7 @@ def test_one_individual_and_one_keypoint():
 @pytest.mark.parametrize(
     "order", [("time", "keypoint", "individual"), ("individual", "time", "keypoint")]
 )
-def test_low_confidence(order):
+def test_positions_of_low_confidence_are_gaps(order):
     ds = poses()
     ds["confidence"] = ds.confidence.transpose(*order)
     ds["confidence"][{"time": 7}] = np.nan  # not known
@@ -113,9 +113,6 @@ def test_low_confidence(order):
     assert not from_poses(ds)[0].isna().any(axis=None)
 
 
-# -- the clock --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("ds", "rate"),
     [
@@ -125,7 +122,7 @@ def test_low_confidence(order):
         (poses(fps=None, unit=None, times=np.arange(40.0)), None),
         (poses(fps=None, unit=None, times=np.arange(40) / 25), 25),
         (poses(fps=30, unit=None, times=np.arange(40)), 30),
-        # Every second frame was taken, and the attrs say what was before.
+        # Every second frame was selected; attrs["fps"] is that of all.
         (poses().isel(time=slice(0, None, 2)), 25),
         (poses(fps=30, unit="frames").isel(time=slice(1, None, 3)), 10),
         (poses(fps=float("nan"), unit="frames"), None),
@@ -136,7 +133,7 @@ def test_low_confidence(order):
         (poses().isel(time=[3]), 50),
     ],
 )
-def test_frame_rates(ds, rate):
+def test_frame_rate_follows_from_times_and_fps(ds, rate):
     df = from_poses(ds)[0]
     assert df.attrs["frame_rate"] == (rate if rate is None else pytest.approx(rate))
     assert "times" not in df.attrs
@@ -146,7 +143,7 @@ def test_frame_rates(ds, rate):
 @pytest.mark.parametrize(
     ("fps", "unit", "words"), [(50.0, "seconds", "s"), (None, "frames", "frames")]
 )
-def test_uneven_times(fps, unit, words):
+def test_uneven_times_are_kept_with_a_warning(fps, unit, words):
     ds = poses(fps=fps, unit=unit).isel(time=[*range(20), *range(25, 40)])
     with pytest.warns(UserWarning, match=rf"The poses: its times are uneven, .* {words}, but"):
         ann, bob = from_poses(ds)
@@ -160,7 +157,6 @@ def test_uneven_times(fps, unit, words):
     [
         (POSITIONS, {}, "needs an xarray Dataset or DataArray .*, got ndarray"),
         (from_poses(poses())[0], {}, "got DataFrame"),
-        (None, {}, "got NoneType"),
         (poses().drop_vars("position"), {}, r"the variable 'position', got \['confidence'\]"),
         (
             poses().rename(time="frame"),
@@ -200,6 +196,6 @@ def test_uneven_times(fps, unit, words):
         (poses(), {"max_gap": -1}, "max_gap must be a whole number of frames"),
     ],
 )
-def test_what_are_no_poses(ds, params, message):
+def test_wrong_poses_are_refused(ds, params, message):
     with pytest.raises(ValueError, match=message):
         from_poses(ds, **params)
