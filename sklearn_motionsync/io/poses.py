@@ -102,13 +102,7 @@ def from_poses(poses, *, min_confidence=None, frame_rate=None, max_gap=0, perfor
     if times is None:
         facts["frame_rate"] = fps if frame_rate is None else float(frame_rate)
     else:
-        facts |= describe_times(
-            "The poses",
-            times,
-            stated=fps if unit == "s" else None,
-            frame_rate=frame_rate,
-            unit=unit,
-        )
+        facts |= describe_times("The poses", times, stated=fps, frame_rate=frame_rate, unit=unit)
     joints = make_unique(_read_names(position, "keypoint"))
     facts |= {"kind": "keypoints", "joints": joints, "parents": [-1] * len(joints)}
     columns = [f"{joint}_{axis}" for joint in joints for axis in sorted(axes)]

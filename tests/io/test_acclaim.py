@@ -142,14 +142,6 @@ def test_wrong_motions_are_refused(tmp_path, old, new, message):
     caught.match(message)
 
 
-def test_more_frames_than_one_block(tmp_path):
-    amc = "".join(f"{i}\nroot 1 2 3 0 {i} 0\nthigh 0 {i}\n" for i in range(1, 60001))
-    df = acclaim(tmp_path, amc=amc)
-    assert df.shape == (60000, 9)
-    bent = np.radians(df.index + 1)
-    np.testing.assert_allclose(df["thigh_y"] / INCH, 2 - 4 * np.cos(bent), atol=1e-9)
-
-
 def test_real_files_agree_with_the_archive(real_data):
     archive = real_data / "hdm05" / "hdm05_positions.npz"
     bunch = load_performances(archive)

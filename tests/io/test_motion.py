@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import DirectionCosines, Skeleton, to_frame
+from sklearn_motionsync import to_frame
 from sklearn_motionsync.io import read_motion
 from sklearn_motionsync.io.motion import READERS
 
@@ -161,7 +161,7 @@ def test_missing_skeleton_is_an_error(tmp_path):
         read_motion(put(tmp_path, AMC, "a.amc"), asf=tmp_path / "b.asf")
 
 
-# -- recordings in tables and pipelines -------------------------------------------------
+# -- recordings -------------------------------------------------------------------------
 
 
 def test_recordings_have_the_names_of_their_files_in_tables(tmp_path):
@@ -182,23 +182,3 @@ def test_real_files_agree_with_plain_parsers(real_data, benchmark, name):
     scale = 1e-12 * np.abs(expected).max()
     df = read_motion(path)
     np.testing.assert_allclose(df.to_numpy().reshape(expected.shape), expected, atol=scale, rtol=0)
-
-
-@pytest.mark.parametrize(
-    "name", ["bvh/007_01.bvh", "asf_amc/02_01.amc", "asf_amc/HDM_bd_depositFloorR_001_120.amc"]
-)
-def test_real_files_become_postures(real_data, name):
-    df = read_motion(real_data / "original_files" / name)
-    df = df.iloc[1:] if name.startswith("bvh") else df  # its first frame was put there later
-    cosines = DirectionCosines(Skeleton.from_frame(df))
-    (postures,) = cosines.fit_transform([df])
-    limbs = postures[:, 1:].reshape(len(df), 12, 3)
-    np.testing.assert_allclose(np.linalg.norm(limbs, axis=2), 1)
-    if "deposit" not in name:
-        # A walk: the pelvis at about the height of the stretched legs, legs and torso upright.
-        assert 0.9 < postures[:, 0].min() <= postures[:, 0].max() < 1.3
-        names = list(cosines.get_feature_names_out())
-        assert (postures[:, names.index("torso_y")] > 0.9).all()
-        assert (postures[:, names.index("left_thigh_y")] < -0.7).all()
-    else:
-        assert postures[:, 0].min() < 0.8 * postures[0, 0]
