@@ -131,8 +131,8 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0, group=None):
         If there is no such file.
     ValueError
         If the ending is not known; the message lists those that are. If the file is damaged or
-        not complete; the message names the place. If the result would take more than 64 MB and
-        more than 32 times the size of the file.
+        not complete, or has numbers of 1e12 and more (BVH, AMC); the message names the line or
+        byte. If the result would take more than 64 MB and more than 32 times the size of the file.
 
     Warns
     -----

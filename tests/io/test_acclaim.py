@@ -1,10 +1,8 @@
-"""Acclaim: positions by hand and against the archive, and errors of wrong files."""
+"""Acclaim: positions by hand, and errors of wrong files."""
 
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import Skeleton
-from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.io import read_motion
 
 from motion_files import AMC, ASF, joint, put
@@ -140,17 +138,3 @@ def test_wrong_motions_are_refused(tmp_path, old, new, message):
     with pytest.raises(ValueError, match=r"a_01\.amc, line \d+: ") as caught:
         acclaim(tmp_path, amc=AMC.replace(old, new, 1))
     caught.match(message)
-
-
-def test_real_files_agree_with_the_archive(real_data):
-    archive = real_data / "hdm05" / "hdm05_positions.npz"
-    bunch = load_performances(archive)
-    with np.load(archive) as fields:
-        sources = fields["source"].tolist()
-    files = sorted((real_data / "original_files" / "asf_amc").glob("HDM*.[aA]*[cC]"))
-    assert len(files) == 3
-    for path in files:
-        df = read_motion(path)
-        assert df.attrs["joints"] == bunch.joints
-        assert Skeleton.from_frame(df) == Skeleton.acclaim()
-        np.testing.assert_allclose(df, bunch.data[sources.index(path.name)], atol=1e-6)

@@ -137,20 +137,16 @@ def test_all_blanks_separate_numbers(tmp_path, blank):
     "word", ["1e", "1e+", "+-1", "1.2.3", ".", "-", "e5", "1-2", "1_0", "0x1", "1,5", "inf", "\xb2"]
 )
 def test_words_that_are_not_numbers_are_refused(tmp_path, word):
-    with pytest.raises(
-        ValueError, match=r"line 11: a frame .* needs finite numbers below 1e.12, got "
-    ):
+    with pytest.raises(ValueError, match=r"line 11: a frame .* needs finite numbers"):
         read_motion(put(tmp_path, moves(["1 2 3", f"1 {word} 3", "1 2 3"])))
 
 
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        ("1 1e 3", "needs finite numbers below 1e.12, got '1e'"),
-        ("1 1e12 3", "needs finite numbers below 1e.12, got '1e12'"),
+        ("1 1e12 3", "needs finite numbers .*got '1e12'"),
         ("1 2", "needs 3 numbers, got 2 \\('1 2'\\)"),
         ("1 2 3 4 5 6", "needs 3 numbers, got 6"),
-        ('1 2 "3"', "needs finite numbers"),
     ],
 )
 def test_errors_name_their_line_in_long_files(tmp_path, row, message):
@@ -172,11 +168,7 @@ def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame T
         ("\x00\xff", "line 1: expected ROOT, .* got "),
         (small()[:30], "line 4: the file ends where a number of OFFSET"),
         (small().replace("OFFSET 0 0 0\n", ""), "line 5: joint 'a' ends without an OFFSET"),
-        (
-            small().replace("0 0 0", "0 x 0"),
-            "line 4: OFFSET needs finite numbers below 1e.12, got 'x'",
-        ),
-        (small().replace("0 0 0", "0 1_0 0"), "OFFSET needs finite numbers below 1e.12, got '1_0'"),
+        (small().replace("0 0 0", "0 x 0"), "line 4: OFFSET needs finite numbers .*got 'x'"),
         (small().replace("ROOT a", "ROOT"), "line 3: expected the joint's name"),
         (small().replace("ROOT a\n{", "ROOT a"), "line 3: expected a joint's name and {, got 'OFF"),
         (small().replace("ROOT", "JOINT"), "'JOINT' stands where it cannot"),
@@ -195,14 +187,7 @@ def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame T
         (small(motion="Frames: 2\nFrame Time: 1\n1.00 2.00 3.00\n"), "2, but 1 frames follow"),
         (small(motion="Frames: 1\nFrame Time: 1\n1 2 3\n4 5 6\n"), "1, but 2 frames follow"),
         (small(motion="Frames: 1\nFrame Time: 1\n1 2 \n"), r"line 10: a frame .* needs 3 numbers"),
-        (
-            small(motion="Frames: 1\nFrame Time: 1\n1 nan 3\n"),
-            "finite numbers below 1e.12, got 'nan'",
-        ),
-        (
-            small(motion="Frames: 1\nFrame Time: 1\n1 1e999 3\n"),
-            "finite numbers below 1e.12, got '1e999'",
-        ),
+        (small(motion="Frames: 1\nFrame Time: 1\n1 nan 3\n"), "finite numbers .*got 'nan'"),
     ],
 )
 def test_wrong_files_are_refused(tmp_path, text, message):

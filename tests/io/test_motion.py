@@ -11,14 +11,16 @@ from sklearn_motionsync.io import read_motion
 from sklearn_motionsync.io.motion import READERS
 
 import fuzz_readers
-import motion_files
-from motion_files import AMC, body, put
+from fuzz_readers import DAMAGES
+from motion_files import AMC, EXAMPLES, body, put
 
-MANUAL = Path(__file__).resolve().parents[2] / "docs" / "howto" / "own_data.md"
+ROOT = Path(__file__).resolve().parents[2]
+MANUAL = (ROOT / "docs" / "howto" / "own_data.md").read_text(encoding="utf-8")
+DOC = read_motion.__doc__
 
 
 def read_example(folder, ending, **params):
-    files = motion_files.EXAMPLES[ending]()
+    files = EXAMPLES[ending]()
     path, *_ = [put(folder, content, name) for name, content in files.items()]
     return read_motion(path, max_gap=9 if ending in (".c3d", ".trc") else 0, **params)
 
@@ -30,25 +32,13 @@ def read_example(folder, ending, **params):
 @pytest.mark.parametrize(
     ("thing", "is_there"),
     [
+        ("EXAMPLES of tests/io/motion_files.py has no {} file", lambda end: end in EXAMPLES),
+        ("DAMAGES of tests/io/fuzz_readers.py has no {} file", lambda end: end in DAMAGES),
+        ("docs/howto/own_data.md does not mention `{}`", lambda end: f"`{end}`" in MANUAL),
+        ("the docstring of read_motion does not mention ``{}``", lambda end: f"``{end}``" in DOC),
         (
-            "EXAMPLES of tests/io/motion_files.py has no function that returns a small {} file",
-            lambda ending: ending in motion_files.EXAMPLES,
-        ),
-        (
-            "DAMAGES of tests/io/fuzz_readers.py does not say how {} files are damaged",
-            lambda ending: ending in fuzz_readers.DAMAGES,
-        ),
-        (
-            "docs/howto/own_data.md does not mention {} files as `{}`",
-            lambda ending: f"`{ending}`" in MANUAL.read_text(encoding="utf-8"),
-        ),
-        (
-            "the docstring of read_motion does not mention {} files as ``{}``",
-            lambda ending: f"``{ending}``" in read_motion.__doc__,
-        ),
-        (
-            "the docstring of read_motion does not list {} without dot among attrs['format']",
-            lambda ending: f'"{ending[1:]}"' in read_motion.__doc__.partition("format : ")[2],
+            "the docstring of read_motion does not list {}, without the dot, as a format",
+            lambda end: f'"{end[1:]}"' in DOC.partition("format : ")[2],
         ),
     ],
     ids=["example", "fuzz", "manual", "docstring", "format"],
@@ -56,12 +46,10 @@ def read_example(folder, ending, **params):
 def test_every_ending_of_the_registry_has_its_example_fuzz_case_and_documentation(
     ending, thing, is_there
 ):
-    assert is_there(ending), thing.format(ending, ending)
+    assert is_there(ending), thing.format(ending)
 
 
-@pytest.mark.parametrize(
-    "ending", [ending for ending in READERS if ending in motion_files.EXAMPLES]
-)
+@pytest.mark.parametrize("ending", [ending for ending in READERS if ending in EXAMPLES])
 def test_every_reader_returns_a_table_with_its_attrs(tmp_path, ending):
     df = read_example(tmp_path, ending)
     assert set(df.dtypes) == {np.dtype(float)}
@@ -84,12 +72,10 @@ def test_every_reader_returns_a_table_with_its_attrs(tmp_path, ending):
     pd.testing.assert_frame_equal(given, df)
 
 
-@pytest.mark.parametrize(
-    "ending", [ending for ending in READERS if ending in motion_files.EXAMPLES]
-)
+@pytest.mark.parametrize("ending", [ending for ending in READERS if ending in EXAMPLES])
 def test_every_reader_takes_its_ending_in_capitals_and_line_ends_of_windows(tmp_path, ending):
     expected = read_example(tmp_path, ending)
-    for name, content in motion_files.EXAMPLES[ending]().items():
+    for name, content in EXAMPLES[ending]().items():
         (tmp_path / name).unlink()
         other = content if ending == ".c3d" else content.replace(b"\n", b"\r\n")
         put(tmp_path, other, name.upper())
@@ -98,10 +84,10 @@ def test_every_reader_takes_its_ending_in_capitals_and_line_ends_of_windows(tmp_
     assert df.attrs == expected.attrs | {"performance": "A"}
 
 
-@pytest.mark.parametrize("ending", [ending for ending in READERS if ending in fuzz_readers.DAMAGES])
+@pytest.mark.parametrize("ending", [ending for ending in READERS if ending in DAMAGES])
 def test_damaged_files_are_read_or_refused(tmp_path, ending):
     """A short run of fuzz_readers.py on the example."""
-    originals = [motion_files.EXAMPLES[ending]()]
+    originals = [EXAMPLES[ending]()]
     outcomes = {
         fuzz_readers.run_case(fuzz_readers.damaged(originals, 0, number), tmp_path)
         for number in range(150)
@@ -151,7 +137,7 @@ def test_wrong_parameters_are_refused(tmp_path, params, message):
 
 
 def test_max_gap_is_refused_for_channels(tmp_path):
-    path, *_ = [put(tmp_path, x, name) for name, x in motion_files.EXAMPLES[".mot"]().items()]
+    path, *_ = [put(tmp_path, x, name) for name, x in EXAMPLES[".mot"]().items()]
     with pytest.raises(ValueError, match=r"positions, got max_gap=3 frames for the coord.*a\.mot"):
         read_motion(path, max_gap=3)
 

@@ -96,25 +96,6 @@ def test_missing_values_are_nan_with_a_warning(tmp_path, nothing):
     assert df.interpolate(limit=10, limit_area="inside").notna().all(axis=None)
 
 
-def test_uneven_times_are_kept_with_a_warning(tmp_path):
-    times = np.cumsum(np.random.default_rng(0).uniform(0.001, 0.02, 50))
-    text = storage(VALUES, LABELS, times=times)
-    with pytest.warns(UserWarning, match=r"a\.mot: its times are uneven, in steps of 0\.00.* s"):
-        df = read(tmp_path, text)
-    assert df.attrs["frame_rate"] is None
-    np.testing.assert_allclose(df.attrs["times"], times, atol=1e-8)
-    assert df.attrs["first_time"] == df.attrs["times"][0]
-    assert read(tmp_path, text, frame_rate=90).attrs["frame_rate"] == 90
-
-
-@pytest.mark.parametrize("rate", [59.94, 100, 1000])
-def test_even_times_give_the_frame_rate(tmp_path, rate):
-    df = read(tmp_path, storage(VALUES, LABELS, times=417 + np.arange(50) / rate))
-    assert df.attrs["frame_rate"] == pytest.approx(rate, rel=1e-5)
-    assert "times" not in df.attrs
-    assert df.attrs["first_time"] == 417
-
-
 def test_repeated_times_are_uneven(tmp_path):
     times = np.arange(50) / 100
     times[7] = times[6]
@@ -132,22 +113,12 @@ def test_repeated_times_are_uneven(tmp_path):
         (("\tknee_angle_r", "\t"), "line 6: expected 'time' and the names"),
         (("nRows=50", "nRows=51"), "nRows says 51, but 50 frames follow"),
         (("nRows=50", "nRows=x"), "nRows needs a whole number above 0, got 'x'"),
-        (
-            ("\n0.08000000\t", "\n0.08000000\t7\t"),
-            "line 15: a row needs its time and 3 columns, got",
-        ),
-        (
-            ("\n0.08000000\t", "\n0.08000000\tx"),
-            "line 15: a frame needs numbers, or nothing .* got 'x",
-        ),
+        (("\n0.08000000\t", "\n0.08000000\t7\t"), "line 15: a row needs its time and 3 columns"),
+        (("\n0.08000000\t", "\n0.08000000\tx"), "line 15: a frame needs numbers, .* got 'x"),
         (("\n0.08000000\t", "\n0.08000000\t0,"), "line 15: a frame needs numbers, .* got '0,"),
         (("\n0.08000000\t", "\n0.06000000\t"), "line 15: the time .* got 0.06 after 0.07"),
         (("\n0.08000000\t", "\nnan\t"), "line 15: the time of a row must be a number"),
-        (
-            ("version=1", "DataType=Vec3"),
-            "line 7: a row needs its time and 3 columns of 3 numbers, w",
-        ),
-        ((TEXT, ""), "line 0: the file ends where 'endheader' should follow"),
+        (("version=1", "DataType=Vec3"), "line 7: a row needs .* 3 columns of 3 numbers, w"),
         (
             (TEXT[TEXT.index("endheader") :], "endheader\ntime\ta\n"),
             "ends where frames should follow",
