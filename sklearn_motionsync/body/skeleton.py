@@ -12,7 +12,7 @@ from .landmarks import add_midpoints, as_tuple, guess_landmarks, missing_counter
 from .limbs import LIMBS, complete_legs, features_of_parts, limbs_between
 from .upright import estimate_up
 
-__all__ = ["Skeleton", "check_columns", "parse_joint_columns"]
+__all__ = ["Skeleton", "check_columns", "find_cycle", "parse_joint_columns"]
 
 
 class _ReadOnly(dict):
@@ -108,7 +108,7 @@ class Skeleton:
             )
         if any(not -1 <= p < len(joints) or p == i for i, p in enumerate(parents)):
             raise ValueError(f"parents must be other joints' indices, or -1; got {parents}.")
-        if cycle := _find_cycle(parents):
+        if cycle := find_cycle(parents):
             raise ValueError(
                 f"parents form a cycle: {' > '.join(joints[j] for j in cycle)}. The chain of "
                 "every joint must end at a root, whose parent is -1."
@@ -501,7 +501,7 @@ def _check_landmarks(landmarks, given, joints):
     return _ReadOnly(there)
 
 
-def _find_cycle(parents):
+def find_cycle(parents):
     """Joints whose parents lead back to the first of them; empty if all lead to a root."""
     for start in range(len(parents)):
         chain = [start]

@@ -1,4 +1,4 @@
-"""Archives of joint positions (``*_positions.npz``)."""
+"""Performances from archives of joint positions (``*_positions.npz``)."""
 
 import math
 import sys
@@ -10,8 +10,9 @@ import numpy as np
 from numpy.lib import format as npy
 from sklearn.utils import Bunch
 
-from ..body.skeleton import Skeleton
-from ..io.guard import check_growth
+from ..body.skeleton import Skeleton, find_cycle
+from ..inputs.numbers import check_finite
+from ..io.text import check_result_size
 
 _NEEDED = ("positions", "offsets", "label", "actor", "take", "fps", "joints", "parents")
 _TEXTS = ("label", "actor", "take", "joints")
@@ -35,21 +36,21 @@ def load_performances(path):
         data : list of ndarray (n_frames_i, 3 * n_joints)
             Joint positions, joint by joint x, y, z, in the unit and dtype of the archive.
         target, actor, take : ndarray of str (N,)
-            The action, who performed it, and which of their performances it is.
+            The action, the actor, and the number of the performance.
         joints : list of str
             Names of the joints.
         skeleton : Skeleton or None
-            None if the names of the joints do not tell which of them are the body's.
+            None if the landmarks of a body cannot be found by the names of the joints.
         frame_rate : ndarray (N,)
-            Frames a second; NaN where it is not known.
+            Frames per second; NaN where it is not known.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     ValueError
-        If the file is no such archive; the message says what is wrong with it. Arrays of more
-        than 64 MB and 32 times the size of their file are refused before they are unpacked.
+        If the file is no such archive; the message names the fault. If its arrays would take
+        more than 64 MB and more than 32 times the size of the file: they are not unpacked.
 
     Examples
     --------
@@ -69,20 +70,22 @@ def load_performances(path):
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"There is no archive at {path}; give the path of a .npz file.")
-    fields = read_arrays(path, _NEEDED)
+    fields = _read_arrays(path)
     positions, offsets = _check_positions(path, fields)
     texts = {name: _check_texts(path, name, fields[name]) for name in _TEXTS}
     joints = texts["joints"].tolist()
     parents = _check_parents(path, fields["parents"], joints)
     frame_rate = _check_frame_rates(path, fields["fps"])
-    _check_finite(path, positions, offsets, joints)
     try:
         skeleton = Skeleton(joints, parents)
     except ValueError:
         skeleton = None
-    frames = positions.reshape(len(positions), -1)
+    data = np.split(positions.reshape(len(positions), -1), offsets[1:-1])
+    columns = [f"{joint}_{axis}" for joint in joints for axis in "xyz"]
+    for i, x in enumerate(data):
+        check_finite(x, f"{path}: performance {i}, frame", columns)
     return Bunch(
-        data=np.split(frames, offsets[1:-1]),
+        data=data,
         target=texts["label"],
         actor=texts["actor"],
         take=texts["take"],
@@ -97,12 +100,7 @@ def _check_positions(path, fields):
     if missing := [name for name in _NEEDED if name not in fields]:
         raise ValueError(f"{path} lacks {missing}; an archive of performances holds {_NEEDED}.")
     positions, offsets = fields["positions"], fields["offsets"]
-    if (
-        positions.ndim != 3
-        or positions.shape[2] != 3
-        or not positions.shape[1]
-        or positions.dtype.kind != "f"
-    ):
+    if positions.dtype.kind != "f" or positions.shape[2:] != (3,) or not positions.shape[1]:
         raise ValueError(
             f"{path}: positions must be floats of shape (frames, joints, 3), got "
             f"{positions.dtype} {positions.shape}."
@@ -111,30 +109,25 @@ def _check_positions(path, fields):
         raise ValueError(
             f"{path}: offsets must be N + 1 whole numbers, got {offsets.dtype} {offsets.shape}."
         )
-    outside = (offsets < 0) | (offsets > len(positions))
     # Differences of unsigned numbers are never negative.
-    lengths = np.diff(np.where(outside, 0, offsets).astype(np.int64))
-    if offsets[0] != 0 or offsets[-1] != len(positions) or outside.any() or (lengths < 1).any():
+    offsets = offsets.astype(np.int64)
+    n_frames, lengths = len(positions), np.diff(offsets)
+    bad = (lengths < 2) | (lengths > n_frames)
+    if offsets[0] != 0 or offsets[-1] != n_frames or bad.any():
         raise ValueError(
-            f"{path}: offsets must increase from 0 to the {len(positions)} frames of positions."
+            f"{path}: offsets must increase from 0 to the {n_frames} frames of positions, by at "
+            f"least 2 for each performance, got {_quote(offsets)}."
         )
-    if (lengths < 2).any():
-        raise ValueError(
-            f"{path}: performance {np.argmin(lengths)} has one frame; a performance needs at least "
-            "2. Leave it out of positions, offsets, label, actor, take and fps."
-        )
-    n = len(lengths)
-    for name, size in (
-        *((name, n) for name in ("label", "actor", "take", "fps")),
-        *((name, positions.shape[1]) for name in ("joints", "parents")),
-    ):
+    sizes = dict.fromkeys(("label", "actor", "take", "fps"), len(lengths))
+    sizes |= dict.fromkeys(("joints", "parents"), positions.shape[1])
+    for name, size in sizes.items():
         if fields[name].shape != (size,):
             raise ValueError(f"{path}: {name} must have shape ({size},), got {fields[name].shape}.")
-    return positions, offsets.astype(np.int64)
+    return positions, offsets
 
 
 def _check_texts(path, name, values):
-    """Text, or the whole numbers that a label, an actor or a take may be."""
+    """Text; labels, actors and takes may also be whole numbers."""
     kinds = "US" if name == "joints" else "USiu"
     if values.dtype.kind not in kinds:
         raise ValueError(f"{path}: {name} must be text, got {values.dtype}.")
@@ -142,18 +135,14 @@ def _check_texts(path, name, values):
         if values.dtype.kind == "S":
             values = np.char.decode(values, "utf-8")
         values = values.astype(str)
-        # Neither NumPy nor Python asks whether the numbers are characters.
+        # NumPy and Python accept code points beyond the last character.
         if values.view(np.uint32).max() > sys.maxunicode:
             raise ValueError
         "".join(values.tolist()).encode()
     except ValueError as error:
-        raise ValueError(f"{path}: {name} must be text, got bytes that are none.") from error
+        raise ValueError(f"{path}: {name} must be text, got other bytes.") from error
     if name == "joints" and len(set(values.tolist())) < len(values):
-        names, counts = np.unique(values, return_counts=True)
-        raise ValueError(
-            f"{path}: joints must have different names, got {str(names[counts > 1][0])[:40]!r} "
-            "more than once."
-        )
+        raise ValueError(f"{path}: joints must have different names, got {_quote(values)}.")
     return values
 
 
@@ -163,19 +152,13 @@ def _check_parents(path, parents, joints):
     if not whole or (parents < -1).any() or (parents >= n).any():
         raise ValueError(
             f"{path}: parents must be indices of joints, whole numbers from 0 to {n - 1}, or -1 "
-            f"for a root, got {_shown(parents)}."
+            f"for a root, got {_quote(parents)}."
         )
-    parents = parents.astype(np.int64)
-    # Every step leads to an ancestor; after as many as there are joints all are past the root.
-    ancestors = parents.copy()
-    for _ in range(n.bit_length()):
-        above = ancestors >= 0
-        ancestors[above] = ancestors[ancestors[above]]
-    if (ancestors >= 0).any():
-        joint = joints[np.flatnonzero(ancestors >= 0)[0]][:40]
+    parents = parents.astype(int)
+    if cycle := find_cycle(parents.tolist()):
         raise ValueError(
-            f"{path}: parents must lead to a root (-1), but from joint {joint!r} they run in a "
-            f"circle, got {_shown(parents)}."
+            f"{path}: parents must lead to a root (-1), but from joint {joints[cycle[0]][:40]!r} "
+            f"they form a cycle, got {_quote(parents)}."
         )
     return parents.tolist()
 
@@ -183,85 +166,57 @@ def _check_parents(path, parents, joints):
 def _check_frame_rates(path, fps):
     if fps.dtype.kind not in "iuf" or ((fps <= 0) | np.isinf(fps)).any():
         raise ValueError(
-            f"{path}: fps must be frames a second, above 0, or NaN where they are not known, got "
-            f"{_shown(fps)}."
+            f"{path}: fps must be frames per second, above 0, or NaN if it is not known, got "
+            f"{_quote(fps)}."
         )
     return fps.astype(np.float64)
 
 
-def _check_finite(path, positions, offsets, joints):
-    finite = np.isfinite(positions)
-    if not finite.all():
-        frame, joint, _ = np.argwhere(~finite)[0]
-        i = np.searchsorted(offsets, frame, side="right") - 1
-        raise ValueError(
-            f"{path}: performance {i}, frame {frame - offsets[i]}, joint {joints[joint][:40]!r} is "
-            "NaN or infinite. Interpolate the gap before the archive is written (fill_gaps), or "
-            "leave the performance out."
-        )
+def _quote(values):
+    text = str(values.tolist()[:8])[:80].rstrip("]")
+    return text + (", ...]" if len(values) > 8 else "]")
 
 
-def _shown(values):
-    shown = str(values.tolist()[:8])[:80].rstrip("]")
-    return shown + (", ...]" if len(values) > 8 else "]")
+# -- the arrays of a NumPy archive, whose size is checked before they are unpacked ------
 
-
-# -- the arrays of a NumPy archive, each held against its stated size before it is made --
-
-# What NumPy writes. Others unpack by more than is read of them at a time.
+# The methods of NumPy. With others a small part may unpack to very much.
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-_ENCRYPTED = 0x1
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
-def read_arrays(path, names):
-    """Those of the arrays that the archive has, by name."""
+def _read_arrays(path):
+    """The arrays of `_NEEDED` that the archive has, by name."""
     try:
         with zipfile.ZipFile(path) as archive:
-            members = _find_members(archive, names)
+            members = {
+                member.filename.removesuffix(".npy"): member for member in archive.infolist()
+            }
+            members = {name: members[name] for name in _NEEDED if name in members}
+            if any(member.compress_type not in _METHODS for member in members.values()):
+                raise ValueError("it is compressed by another method than NumPy's")
             n_bytes = sum(member.file_size for member in members.values())
-            check_growth(path, path.stat().st_size, n_bytes, "the arrays")
+            check_result_size(path, path.stat().st_size, n_bytes, "the arrays")
             return {name: _read_array(archive, name, m) for name, m in members.items()}
-    except Exception as error:  # of zipfile, zlib, tokenize, ast, struct: whatever a byte may cause
+    except Exception as error:  # of zipfile, zlib, tokenize, ast, struct: any byte may be wrong
         if isinstance(error, ValueError) and str(error).startswith(f"{path}: "):
             raise
         reason = " ".join(str(error).split())[:200].rstrip(".") or type(error).__name__
         raise ValueError(f"{path} cannot be read as a NumPy .npz archive: {reason}.") from error
 
 
-def _find_members(archive, names):
-    found = [member.filename for member in archive.infolist()]
-    members = {}
-    for name in names:
-        if found.count(f"{name}.npy") > 1:
-            raise ValueError(f"it holds {name} twice")
-        if f"{name}.npy" in found:
-            members[name] = archive.getinfo(f"{name}.npy")
-    for name, member in members.items():
-        if member.flag_bits & _ENCRYPTED or member.compress_type not in _METHODS:
-            raise ValueError(f"{name} is encrypted, or packed as NumPy does not; write it again")
-    return members
-
-
 def _read_array(archive, name, member):
     with archive.open(member) as stream:
-        version = npy.read_magic(stream)
-        if version not in _HEADERS:
-            raise ValueError(f"{name} is in version {version} of the format; 1.0 and 2.0 are known")
+        read_header = _HEADERS[npy.read_magic(stream)]
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # headers that Python 2 wrote are as good
-            shape, by_column, dtype = _HEADERS[version](stream)
-        if dtype.hasobject or dtype.names or dtype.subdtype or not dtype.itemsize:
-            raise ValueError(f"{name} holds Python objects or records; numbers or text are needed")
+            warnings.simplefilter("ignore")  # headers that Python 2 wrote are valid
+            shape, by_column, dtype = read_header(stream)
         n_bytes = math.prod(shape) * dtype.itemsize
         n_left = member.file_size - stream.tell()
-        if n_bytes != n_left or any(n < 0 for n in shape):
+        if n_bytes != n_left:
             raise ValueError(
                 f"{name} says {dtype} {shape}, {n_bytes} bytes, but there are {n_left} of them"
             )
         content = stream.read(n_bytes)
-    if len(content) != n_bytes:
-        raise ValueError(f"{name} ends after {len(content)} of its {n_bytes} bytes")
     values = np.frombuffer(content, dtype).reshape(shape, order="F" if by_column else "C")
     # A copy: in the machine's own byte order, and writeable.
     return values.astype(dtype.newbyteorder("="))

@@ -1,15 +1,16 @@
-"""A skeleton that bends down and rises again, by forward kinematics."""
+"""Synthetic performances of a skeleton that bends down and rises again."""
 
-from numbers import Integral, Real
+from numbers import Integral
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from sklearn.utils import Bunch, check_random_state
+from sklearn.utils._param_validation import Interval, validate_params
 
 from ..body.skeleton import Skeleton
-from .limits import check_parameters, check_size
+from .limits import LIMITS, check_size
 
-# When the five moments come, in shares of the action.
+# The five moments, as shares of the action.
 _KEYFRAMES = {
     "starts to bend": 0.12,
     "half way down": 0.30,
@@ -24,9 +25,9 @@ _LENGTHS = {
     "thigh": 0.43, "leg": 0.42, "arm": 0.30, "forearm": 0.26,
 }  # fmt: skip
 
-# Degrees of every angle at the beginning, the five moments, and the end. In the plane of
-# the walk positive leans or swings forward; the others go aside, or turn. The right
-# hand carries something down and comes back empty.
+# Degrees of every angle at the start, the five moments, and the end. In the sagittal plane
+# positive angles are forward; the others are sideways, or about the vertical. The right
+# hand carries an object down and returns without it.
 _ANGLES = {
     "shin": (3, 3, 18, 28, 12, 3, 3),
     "thigh": (3, 2, -38, -66, -24, 3, 3),
@@ -43,6 +44,15 @@ _ANGLES = {
 }
 
 
+@validate_params(
+    {
+        "n_performances": [Interval(Integral, 1, 10**6, closed="both")],
+        "n_frames": [Interval(Integral, 10, 10**6, closed="both")],
+        "n_actors": [Interval(Integral, 1, 10**6, closed="both")],
+        **LIMITS,
+    },
+    prefer_skip_nested_validation=True,
+)
 def make_bending(
     n_performances=40,
     *,
@@ -57,28 +67,29 @@ def make_bending(
     """Performances of a bending action, with the true warps and key-frames.
 
     A skeleton of fifteen joints stands, bends down until its right hand is near the
-    floor, and rises again. Every actor has a body and a style of its own; every performance
-    has its own pace (a smooth random warp), duration, place and heading, and the noise of
-    a motion capture system.
+    floor, and rises again. Every actor has a body and a style; every performance has a pace (a
+    smooth random warp), a duration, a place and a heading, and the noise of a motion capture
+    system.
 
     Parameters
     ----------
     n_performances : int, default=40
-        How many, up to a million.
+        Number of performances, up to a million.
     n_frames : int, default=100
         Mean number of frames, from 10 to a million; performances have 0.75 to 1.25 times as many.
     n_actors : int, default=4
-        Performances go round the actors.
+        Number of actors, up to a million; the performances are theirs in turn.
     style : float, default=1.0
-        How much actors and performances differ in their movement, up to 100; 0 for not at all.
+        Size of the differences in movement between actors and between performances, from 0 to 100.
     warp : float, default=1.0
-        How much the pace varies within a performance, up to 10; 0 for an even pace. At 1 the
+        Size of the variation of pace within a performance, from 0 (an even pace) to 10. At 1 the
         rates of two performances differ at most by a factor of 2, at 10 by one of 1024.
     noise : float, default=0.002
         Standard deviation of the noise of each coordinate, in metres, up to 1000.
     frame_rate : float, default=50.0
-        Frames a second, from 0.001; only returned.
+        Frames per second, from 0.001; only returned.
     random_state : int, RandomState instance or None, default=None
+        Seed of the generator; by default every call makes other performances.
 
     Returns
     -------
@@ -86,28 +97,31 @@ def make_bending(
         data : list of ndarray (n_frames_i, 45)
             Joint positions in metres, y up.
         times : list of ndarray (n_frames_i,)
-            How much of the action is over at each frame, from 0 to 1: frames of two
+            The moment of the action that each frame shows, from 0 to 1: frames of two
             performances with equal times show the same moment.
         keyframes : ndarray (n_performances, 5)
             Frame (with fraction) of five moments in each performance.
         keyframe_names : list of str
-            What these moments are.
+            Names of these moments.
         keyframe_times : ndarray (5,)
-            When these moments come, on the scale of ``times``.
+            These moments on the scale of ``times``.
         skeleton : Skeleton
-            The paper's fifteen joints.
+            The paper's skeleton of fifteen joints.
         joints : list of str
-            Their names.
+            Names of the joints.
         target, actor, take : ndarray of str (n_performances,)
-            The action, who performed it, and which of their performances it is.
+            The action, the actor, and the number of the performance.
         frame_rate : float
-            Frames a second, as given.
+            Frames per second, as given.
 
     Raises
     ------
     ValueError
-        If a parameter is out of its range; the message names it. If the performances would take
-        more than 16 GB.
+        If a parameter is out of its range, or the performances would take more than 16 GB.
+
+    See Also
+    --------
+    make_gait : Gait cycles of two groups.
 
     Examples
     --------
@@ -116,29 +130,18 @@ def make_bending(
     >>> [x.shape[1] for x in bunch.data], bunch.keyframes.shape
     ([45, 45, 45], (3, 5))
     """
-    check_parameters(
-        "make_bending",
-        [
-            ("n_performances", n_performances, Integral, 1, 10**6),
-            ("n_frames", n_frames, Integral, 10, 10**6),
-            ("n_actors", n_actors, Integral, 1, 10**6),
-            ("style", style, Real, 0, 100),
-            ("warp", warp, Real, 0, 10),
-            ("noise", noise, Real, 0, 1000),
-            ("frame_rate", frame_rate, Real, 0.001, 10**9),
-        ],
-    )
     what = f"{n_performances} performances of about {n_frames} frames"
-    smaller = "n_performances or n_frames"
-    check_size("make_bending", what, n_performances * n_frames * 45, smaller)
+    n_numbers = n_performances * n_frames * 45
+    check_size("make_bending", what, n_numbers, "n_performances or n_frames")
     random_state = check_random_state(random_state)
     actors = [_draw_actor(random_state, style) for _ in range(n_actors)]
     moments = np.array(list(_KEYFRAMES.values()))
     data, times, keyframes = [], [], []
     for i in range(n_performances):
-        length = max(2, round(n_frames * random_state.uniform(0.75, 1.25)))
+        length = round(n_frames * random_state.uniform(0.75, 1.25))
         phase = _draw_warp(random_state, length, warp)
-        positions = _animate(phase, *_draw_performance(random_state, actors[i % n_actors], style))
+        lengths, angles = actors[i % n_actors]
+        positions = _animate(phase, lengths, _vary(random_state, 0.3 * style, angles))
         positions = _place(random_state, positions)
         positions += noise * random_state.standard_normal(positions.shape)
         data.append(positions.reshape(length, -1))
@@ -173,7 +176,7 @@ def _draw_warp(random_state, length, strength):
 
 
 def _draw_actor(random_state, style):
-    """A body and a way of moving: the lengths of the limbs, and the course of every angle."""
+    """The lengths of the limbs, and every angle over time."""
     size = np.exp(0.05 * random_state.standard_normal())
     lengths = {
         name: value * size * np.exp(0.03 * random_state.standard_normal())
@@ -182,21 +185,16 @@ def _draw_actor(random_state, style):
     return lengths, _vary(random_state, style, _ANGLES)
 
 
-def _draw_performance(random_state, actor, style):
-    lengths, angles = actor
-    return lengths, _vary(random_state, 0.3 * style, angles)
-
-
 def _vary(random_state, style, angles):
     """Every angle a little larger or smaller, throughout and at single moments."""
     varied = {}
     for name, values in angles.items():
-        larger = np.exp(0.04 * style * random_state.standard_normal())
-        # People differ most in what says least about the time: sideways and in twist.
+        scale = np.exp(0.04 * style * random_state.standard_normal())
+        # Differences are largest in the angles that change least: sideways and in twist.
         sideways = name == "twist" or name.endswith("aside")
-        shifted = (4 if sideways else 1.0) * style * random_state.standard_normal()
-        bent = 0.3 * style * random_state.standard_normal(len(values))
-        varied[name] = larger * np.asarray(values) + shifted + bent
+        shift = (4 if sideways else 1.0) * style * random_state.standard_normal()
+        changes = 0.3 * style * random_state.standard_normal(len(values))
+        varied[name] = scale * np.asarray(values) + shift + changes
     return varied
 
 
@@ -246,7 +244,7 @@ def _up(forward, aside=0.0):
 
 
 def _place(random_state, positions):
-    """Somewhere on the floor, facing any way."""
+    """Turn about the vertical and move on the floor, at random."""
     angle = random_state.uniform(0, 2 * np.pi)
     cosine, sine = np.cos(angle), np.sin(angle)
     turn = np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])

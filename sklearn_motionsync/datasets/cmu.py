@@ -1,7 +1,6 @@
 """The motion capture database of Carnegie Mellon University, clip by clip."""
 
 import hashlib
-import re
 import time
 from collections.abc import Mapping
 from numbers import Integral, Real
@@ -10,12 +9,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from sklearn.utils import Bunch
+from sklearn.utils._param_validation import Interval, validate_params
 
 from ..body.skeleton import Skeleton
 from ..io.motion import read_motion
 
 _FRAME_RATE = 120.0
-_LONGEST_DELAY = 3600
 _DESCR = """\
 CMU Graphics Lab Motion Capture Database, mocap.cs.cmu.edu: optical motion capture of a
 person ("subject") in many takes ("trials"), as Acclaim ASF/AMC files, 120 frames a second.
@@ -25,11 +24,21 @@ Terms, in the words of the site: "This dataset of motions is free for all uses."
 data is free for use in research projects. You may include this data in commercially-sold
 products, but you may not resell this data directly, even in converted form."
 
-Acknowledgement asked for: "The data used in this project was obtained from mocap.cs.cmu.edu.
+Acknowledgement: "The data used in this project was obtained from mocap.cs.cmu.edu.
 The database was created with funding from NSF EIA-0196217."
 """
 
 
+@validate_params(
+    {
+        "download_if_missing": ["boolean"],
+        "url": [str],
+        "sha256": [Mapping, None],
+        "n_retries": [Interval(Integral, 0, None, closed="left")],
+        "delay": [Interval(Real, 0, 3600, closed="both")],
+    },
+    prefer_skip_nested_validation=True,
+)
 def fetch_cmu(
     subject,
     trials,
@@ -41,7 +50,7 @@ def fetch_cmu(
     n_retries=3,
     delay=1.0,
 ):
-    """Load trials of one subject of the CMU motion capture database, downloading what lacks.
+    """Load trials of one subject of the CMU motion capture database, downloaded where needed.
 
     Parameters
     ----------
@@ -53,22 +62,22 @@ def fetch_cmu(
         Files are kept in ``cmu_mocap/<subject>`` of this folder, by default scikit-learn's
         (see `sklearn.datasets.get_data_home`).
     download_if_missing : bool, default=True
-        If False, a file that is not there is an error.
+        Whether to download missing files; if False they are an error.
     url : str, default="http://mocap.cs.cmu.edu/subjects"
-        Where the folders of the subjects are.
+        Address of the folders of the subjects.
     sha256 : mapping of str to str, default=None
         Checksums of files by name, such as ``{"02.asf": "..."}``. A file of another checksum is
-        downloaded again, and refused if that does not help.
+        downloaded again, and refused if it still has another. By default none is checked.
     n_retries : int, default=3
-        How often a download is tried again after the network failed; 0 for not at all.
+        Number of further attempts after the network failed.
     delay : float, default=1.0
-        Seconds between these, up to an hour.
+        Seconds between attempts, up to an hour.
 
     Returns
     -------
     Bunch
         data : list of DataFrame (n_frames_i, 3 * n_joints)
-            Joint positions in metres, as `read_motion` gives them.
+            Joint positions in metres, as `read_motion` returns them.
         subject : str
             Number of the subject, in two digits.
         take : ndarray of str (n_trials,)
@@ -76,25 +85,29 @@ def fetch_cmu(
         joints : list of str
             Names of the joints.
         skeleton : Skeleton or None
-            None if the names of the joints do not tell which of them are the body's.
+            None if the landmarks of a body cannot be found by the names of the joints.
         frame_rate : ndarray (n_trials,)
-            120 frames a second.
+            Frames per second: 120.
         units : str
-            "m".
+            The unit of the positions, "m".
         filenames : list of str
             Paths of the AMC files.
         DESCR : str
-            Terms of use, and the acknowledgement that the site asks for.
+            Terms of use, and the acknowledgement that the site requests.
 
     Raises
     ------
     FileNotFoundError
         If the site has no such subject or trial.
     OSError
-        If a file is neither there nor can be downloaded, or has another checksum.
+        If a file is missing and cannot be downloaded, or has another checksum.
     ValueError
-        If a parameter makes no sense, or a file cannot be read. What was just downloaded and
-        cannot be read is removed again.
+        If a parameter is out of its range, or a file cannot be read. A file that was just
+        downloaded and cannot be read is removed again.
+
+    See Also
+    --------
+    sklearn_motionsync.io.read_motion : Reads the files.
 
     Examples
     --------
@@ -105,10 +118,8 @@ def fetch_cmu(
     """
     from sklearn.datasets import get_data_home
 
-    _check_download(download_if_missing, url, sha256, n_retries, delay)
     subject = _two_digits(subject, "subject")
-    many = isinstance(trials, list | tuple | range | np.ndarray)
-    takes = [_two_digits(trial, "trials") for trial in (trials if many else [trials])]
+    takes = [_two_digits(trial, "trials") for trial in np.atleast_1d(trials).tolist()]
     if not takes:
         raise ValueError("trials must be one number or several, got none.")
     folder = Path(get_data_home(data_home)) / "cmu_mocap" / subject
@@ -116,11 +127,11 @@ def fetch_cmu(
     known = sha256 or {}
     new = []
     for name in dict.fromkeys(names):
-        if _is_whole(folder / name, known.get(name)):
+        if _is_valid(folder / name, known.get(name)):
             continue
         address = f"{url.rstrip('/')}/{subject}/{name}"
         if not download_if_missing:
-            raise OSError(_missing(folder / name, address, "download_if_missing is False"))
+            raise OSError(_describe_missing(folder / name, address, "download_if_missing is False"))
         _download(address, folder / name, known.get(name), n_retries, delay)
         new.append(folder / name)
     files = [folder / name for name in names]
@@ -143,27 +154,6 @@ def fetch_cmu(
     )
 
 
-def _check_download(download_if_missing, url, sha256, n_retries, delay):
-    if not isinstance(download_if_missing, bool | np.bool_):
-        raise ValueError(f"download_if_missing must be True or False, got {download_if_missing!r}.")
-    if not isinstance(url, str) or not re.fullmatch(r"[a-z]+://\S+", url):
-        raise ValueError(f"url must be an address, such as 'http://host/folder', got {url!r}.")
-    whole = isinstance(n_retries, Integral) and not isinstance(n_retries, bool)
-    if not whole or n_retries < 0:
-        raise ValueError(f"n_retries must be a whole number, 0 or more, got {n_retries!r}.")
-    number = isinstance(delay, Real) and not isinstance(delay, bool)
-    if not number or not 0 <= delay <= _LONGEST_DELAY:
-        raise ValueError(f"delay must be seconds, from 0 to {_LONGEST_DELAY}, got {delay!r}.")
-    if sha256 is not None and not isinstance(sha256, Mapping):
-        raise ValueError(
-            'sha256 must be checksums by the names of files, such as {"02.asf": "..."}, got '
-            f"{sha256!r}."
-        )
-    for name, known in (sha256 or {}).items():
-        if not isinstance(known, str) or not re.fullmatch("[0-9a-fA-F]{64}", known):
-            raise ValueError(f"sha256 of {name!r} must be 64 hexadecimal digits, got {known!r}.")
-
-
 def _two_digits(number, name):
     text = str(number)
     # The number becomes part of a path, so it must be a number.
@@ -172,25 +162,25 @@ def _two_digits(number, name):
     return f"{int(text):02d}"
 
 
-def _is_whole(path, sha256):
+def _is_valid(path, sha256):
     if not path.is_file():
         return False
     return sha256 is None or hashlib.sha256(path.read_bytes()).hexdigest() == sha256.lower()
 
 
-def _missing(path, address, reason):
+def _describe_missing(path, address, reason):
     return (
-        f"{path.name} is not in {path.parent} and could not be had from {address}: {reason}. "
+        f"{path.name} is not in {path.parent} and could not be got from {address}: {reason}. "
         "Download it by hand into that folder, or give another url=."
     )
 
 
 def _download(address, path, sha256, n_retries, delay):
-    """Fetch one file. It only gets its name when it is whole and has the right checksum."""
+    """Fetch one file. It gets its name only when it is complete and has the right checksum."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix="download_", dir=path.parent) as folder:
         fetched = _try(address, Path(folder) / path.name, path, n_retries, delay)
-        if not _is_whole(fetched, sha256):
+        if not _is_valid(fetched, sha256):
             found = hashlib.sha256(fetched.read_bytes()).hexdigest()
             raise OSError(
                 f"{path.name} from {address} has the checksum {found}, not {sha256}; it was not "
@@ -200,7 +190,7 @@ def _download(address, path, sha256, n_retries, delay):
 
 
 def _try(address, fetched, path, n_retries, delay):
-    """Try again here: fetch_file would ask again for what does not exist, and warn each time."""
+    """Attempts are counted here: fetch_file repeats them also for files that do not exist."""
     from http.client import HTTPException
     from urllib.error import HTTPError
 
@@ -219,8 +209,7 @@ def _try(address, fetched, path, n_retries, delay):
                         "another url=."
                     ) from error
             if not left:
-                reason = str(error) or repr(error)
-                raise OSError(_missing(path, address, reason)) from error
+                raise OSError(_describe_missing(path, address, error)) from error
         time.sleep(delay)
 
 
@@ -230,5 +219,5 @@ def _read(asf, files, new):
     except ValueError as error:
         for path in new:
             path.unlink()
-        advice = "What was downloaded was removed." if new else "Delete that file to get it anew."
+        advice = "Downloaded files were removed." if new else "Delete that file to get it again."
         raise ValueError(f"{error} {advice}") from error

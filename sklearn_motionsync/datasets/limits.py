@@ -1,28 +1,24 @@
-"""Limits of what is made: parameters of synthetic performances, and their size."""
+"""Limits of synthetic performances: their parameters, and their size."""
 
-from numbers import Integral
+from numbers import Real
 
-# What is made at once at most, in bytes.
+from sklearn.utils._param_validation import Interval
+
+# Ranges of the parameters that all makers have.
+LIMITS = {
+    "style": [Interval(Real, 0, 100, closed="both")],
+    "warp": [Interval(Real, 0, 10, closed="both")],
+    "noise": [Interval(Real, 0, 1000, closed="both")],
+    "frame_rate": [Interval(Real, 0.001, 10**9, closed="both")],
+    "random_state": ["random_state"],
+}
+
+# Bytes that a maker makes at most.
 _LARGEST = 16e9
 
 
-def check_parameters(maker, parameters):
-    """Refuse what is no number of its kind, or out of its range.
-
-    Parameters are ``(name, value, kind, least, most)``, kind being Integral or Real.
-    """
-    for name, value, kind, least, most in parameters:
-        number = isinstance(value, kind) and not isinstance(value, bool)
-        if not number or not least <= value <= most:
-            what = "a whole number" if kind is Integral else "a number"
-            raise ValueError(
-                f"The '{name}' parameter of {maker} must be {what} from {least} to "
-                f"{most}, got {value!r}."
-            )
-
-
 def check_size(maker, what, n_numbers, smaller):
-    """Say what so many numbers would take before memory runs out."""
+    """Refuse so many numbers, with the memory they would take, before memory runs out."""
     n_bytes = 8 * n_numbers
     if n_bytes > _LARGEST:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""Files of motion, and what belongs to them: gaps, events, key-points."""
+"""Readers of motion capture files, and functions for gaps, events and tracked key-points."""
 
 from .events import cut_at_events
 from .gaps import fill_gaps, find_gaps

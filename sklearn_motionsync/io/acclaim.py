@@ -1,35 +1,31 @@
-"""AMC: the motion of an Acclaim skeleton, which is a file of its own."""
+"""Acclaim: an ASF file with the skeleton, and AMC files with its motion."""
 
 import array
-import math
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
-from .kinematics import Tree, along, check_positions, turn
-from .text import MotionText, decode, show
+from .kinematics import place_joints, rotate, split_channels, turn
+from .text import MotionText, decode, quote
 
 _METRES_PER_INCH = 0.0254
+_DOFS = ("tx", "ty", "tz", "rx", "ry", "rz")
 
 
-def read_acclaim(path, asf):
-    """Names, parents, positions in metres and facts of an AMC file; `asf` is its skeleton."""
-    skeleton = read_asf(asf)
+def read_acclaim(path, *, asf=None):
+    """An AMC file as a reader of `motion.READERS` returns it; `asf` is its skeleton."""
+    asf = find_asf(path) if asf is None else Path(asf)
+    bones, length_unit, in_degrees = read_asf(asf)
     text = MotionText(path)
-    values, degrees, frame_rate = _read_amc(text, skeleton, asf)
-    bones = skeleton.bones
-    check_positions(path, text.size, len(values), len(bones))
-    parents = [bone.parent for bone in bones]
-    with np.errstate(over="ignore", invalid="ignore"):
-        tree, translations = _body(skeleton, parents, degrees)
-        positions = tree.positions(path, values, translations)
-        positions /= skeleton.length_unit
-        positions *= _METRES_PER_INCH
-    if not np.isfinite(positions).all():
-        raise ValueError(f"{asf}: with :units length {skeleton.length_unit} positions overflow.")
+    values, degrees, frame_rate = _read_amc(text, bones, in_degrees, asf)
+    text.check_size(len(values), len(bones))
+    positions = _place_bones(bones, in_degrees, values, degrees)
+    positions /= length_unit
+    positions *= _METRES_PER_INCH
     return {
         "joints": [bone.name for bone in bones],
-        "parents": parents,
+        "parents": [bone.parent for bone in bones],
         "positions": positions,
         "frame_rate": frame_rate,
         "units": "m",
@@ -38,11 +34,168 @@ def read_acclaim(path, asf):
     }
 
 
-def _read_amc(text, skeleton, asf):
-    """Values (n_frames, n_dofs) in the order of the bones, and what the header says."""
-    n_dofs = {bone.name: len(bone.dofs) for bone in skeleton.bones}
+# -- the skeleton: ASF ------------------------------------------------------------------
+
+
+@dataclass
+class _Bone:
+    name: str = ""
+    offset: object = None
+    direction: object = None
+    length: float | None = None
+    axis: object = (0.0, 0.0, 0.0)
+    axis_order: str = "xyz"
+    dofs: list = field(default_factory=list)
+    parent: int = -1
+
+
+def find_asf(path):
+    """The skeleton of an AMC file, by the names of the files in its folder."""
+    found = sorted(p for p in path.parent.iterdir() if p.suffix.lower() == ".asf" and p.is_file())
+    named = [p for p in found if path.stem.lower().startswith(p.stem.lower())]
+    if named or len(found) == 1:
+        return max(named or found, key=lambda p: len(p.stem))
+    names = ", ".join(p.name for p in found[:5]) or "none"
+    raise ValueError(
+        f"{path} needs the skeleton it was recorded with, and none of the .asf files in its folder "
+        f"({names}) has a name that {path.name} begins with; give asf=."
+    )
+
+
+def read_asf(path):
+    """The root and the bones in the order of the hierarchy, unit of length, whether in degrees."""
+    text = MotionText(path)
+    root = _Bone(name="root", offset=np.zeros(3))
+    units = {"length": 1.0, "degrees": True}
+    bones, bone, parents = {"root": root}, None, {}
+    section = b""
+    for words in text.lines():
+        if words[0].startswith(b"#"):
+            continue
+        if words[0].startswith(b":"):
+            section = words[0].lower()
+        elif section == b":units":
+            _read_unit(text, words, units)
+        elif section == b":root":
+            _read_root(text, words, root)
+        elif section == b":bonedata":
+            bone = _read_bone(text, words, bone, bones)
+        elif section == b":hierarchy":
+            _read_children(text, words, bones, parents)
+    if bone is not None or len(bones) == 1 or not root.dofs:
+        raise text.error(
+            "the file ends without a complete :root, :bonedata and :hierarchy; an .asf has all."
+        )
+    _connect(text, bones, parents)
+    return [root, *(bones[name] for name in parents)], units["length"], units["degrees"]
+
+
+def _read_unit(text, words, units):
+    key = words[0].lower()
+    if key == b"length":
+        units["length"] = text.positive(words[1:], ":units length")
+    elif key == b"angle":
+        if len(words) != 2 or words[1].lower()[:3] not in (b"deg", b"rad"):
+            raise text.error(f":units angle must be deg or rad, got {quote(words[1:])}.")
+        units["degrees"] = words[1].lower().startswith(b"deg")
+
+
+def _read_root(text, words, root):
+    key = words[0].lower()
+    if key == b"order":
+        root.dofs = _read_dofs(text, words)
+    elif key == b"axis":
+        root.axis_order = _read_order(text, words[1:])
+    elif key == b"position":
+        root.offset = np.array(text.numbers(words[1:], 3, ":root position"))
+    elif key == b"orientation":
+        root.axis = text.numbers(words[1:], 3, ":root orientation")
+
+
+def _read_bone(text, words, bone, bones):
+    """The bone that is open after this line, or None."""
+    key = words[0].lower()
+    if key == b"begin" and bone is None:
+        return _Bone()
+    if bone is None or key == b"begin":
+        raise text.error(f"expected {'begin' if bone is None else 'end'}, got {quote(words)}.")
+    if key == b"end":
+        if not bone.name or bone.name in bones or bone.direction is None or bone.length is None:
+            raise text.error(
+                f"bone {bone.name[:60]!r} needs a name of its own, a direction and a length."
+            )
+        bone.offset = [bone.length * part for part in bone.direction]
+        bones[bone.name] = bone
+        return None
+    if key == b"name":
+        bone.name = decode(b" ".join(words[1:]))
+    elif key == b"direction":
+        bone.direction = text.numbers(words[1:], 3, "direction")
+    elif key == b"length":
+        (bone.length,) = text.numbers(words[1:], 1, "length")
+    elif key == b"axis":
+        bone.axis = text.numbers(words[1:4], 3, "axis")
+        bone.axis_order = _read_order(text, words[4:])
+    elif key == b"dof":
+        bone.dofs = _read_dofs(text, words)
+    return bone
+
+
+def _read_order(text, words):
+    order = b" ".join(words).decode("latin-1").lower()
+    if sorted(order) != ["x", "y", "z"]:
+        raise text.error(f"expected an order of the axes like XYZ, got {quote(words)}.")
+    return order
+
+
+def _read_dofs(text, words):
+    dofs = [word.decode("latin-1").lower() for word in words[1:]]
+    if not set(dofs) <= set(_DOFS) or len(set(dofs)) < len(dofs):
+        raise text.error(
+            f"{quote(words[:1])} needs different ones of {' '.join(_DOFS)}, got {quote(words[1:])}."
+        )
+    return dofs
+
+
+def _read_children(text, words, bones, parents):
+    names = [decode(word) for word in words]
+    if len(names) == 1 and names[0].lower() in ("begin", "end"):
+        return
+    for name in names:
+        if name not in bones:
+            raise text.error(f":hierarchy names {name[:60]!r}, which is not in :bonedata.")
+    for name in names[1:]:
+        if name == "root" or name in parents:
+            raise text.error(f":hierarchy gives {name[:60]!r} two parents, or the root one.")
+        parents[name] = names[0]
+
+
+def _connect(text, bones, parents):
+    """Set every bone's parent, and check that all are connected to the root."""
+    index = {name: i for i, name in enumerate(["root", *parents])}
+    children = {}
+    for name, parent in parents.items():
+        # A parent without a parent is not reached from the root below, nor are its children.
+        bones[name].parent = index.get(parent, -1)
+        children.setdefault(parent, []).append(name)
+    reached = ["root"]
+    for name in reached:
+        reached += children.get(name, [])
+    if len(reached) < len(bones):
+        lost = sorted(set(bones) - set(reached))
+        raise text.error(
+            f":hierarchy does not connect {len(lost)} bones to the root, {lost[0][:60]!r} is one."
+        )
+
+
+# -- the motion: AMC --------------------------------------------------------------------
+
+
+def _read_amc(text, bones, in_degrees, asf):
+    """Values (n_frames, n_dofs) in the order of the bones, whether in degrees, and frame rate."""
+    n_dofs = {bone.name: len(bone.dofs) for bone in bones}
     moving = [name for name, n in n_dofs.items() if n]
-    header = {"degrees": skeleton.degrees, "frame_rate": None}
+    header = {"degrees": in_degrees, "frame_rate": None}
     values, n_frames = array.array("d"), 0
     for number, frame in _frames(text, n_dofs, header, asf):
         if len(frame) < len(moving):
@@ -68,7 +221,7 @@ def _frames(text, n_dofs, header, asf):
         elif len(words) == 1 and words[0].isdigit():
             if len(words[0]) > 18 or (number is not None and int(words[0]) != number + 1):
                 raise text.error(
-                    f"frame {show(words)} follows frame {number}; frames must be numbered one by "
+                    f"frame {quote(words)} follows frame {number}; frames must be numbered one by "
                     "one, since a lost frame would shift all that follow in time."
                 )
             if number is not None:
@@ -79,7 +232,7 @@ def _frames(text, n_dofs, header, asf):
             if number is None or not n_dofs.get(name) or name in frame:
                 raise text.error(
                     f"expected the number of a frame, or a bone that moves in {asf.name}, once a "
-                    f"frame, and its values; got {show(words)}."
+                    f"frame, and its values; got {quote(words)}."
                 )
             frame[name] = text.numbers(words[1:], n_dofs[name], f"bone {name[:60]!r}")
     if number is not None:
@@ -91,245 +244,60 @@ def _read_setting(text, words, header):
     if key in (b":DEGREES", b":RADIANS"):
         header["degrees"] = key == b":DEGREES"
     elif key == b":SAMPLES-PER-SECOND":
-        (rate,) = text.numbers(words[1:], 1, ":SAMPLES-PER-SECOND")
-        if rate <= 0:
-            raise text.error(f":SAMPLES-PER-SECOND must be above 0, got {rate!r}.")
-        header["frame_rate"] = rate
+        header["frame_rate"] = text.positive(words[1:], ":SAMPLES-PER-SECOND")
 
 
-def _body(skeleton, parents, degrees):
-    """The tree of the bones, and the function that turns values into translations.
+# -- positions --------------------------------------------------------------------------
+
+
+def _place_bones(bones, in_degrees, values, degrees):
+    """Positions of the far ends of the bones, in the unit of the skeleton.
 
     A bone turns about its own axes, C: its rotation in its parent is C M inv(C), with M the
     motion, which it is moved before, along C. Its joint is its far end, so its own rotation acts
-    on its offset. The root's C is where it begins, so its rotation is C M; it moves along the axes
-    of the world, from its offset, and bones that hang on it are told in what it turns to.
+    on its offset. The root's C is its orientation at the start, so its rotation is C M; it moves
+    along the axes of space, from its offset, and the axes of its children are given in the axes
+    that it has turned to.
     """
-    bones = skeleton.bones
-    own = _own_axes(bones, skeleton.degrees)
+    own = _own_axes(bones, in_degrees)
     back = own.swapaxes(0, 1).copy()
     back[:, :, 0] = np.eye(3)
     offsets = np.array([bone.offset for bone in bones]).T
-    far_ends = along(back, offsets)
-    begin = np.zeros((3, len(bones), 1))
-    begin[:, 0, 0], far_ends[:, 0] = offsets[:, 0], 0
+    far_ends = rotate(back, offsets)
+    start = np.zeros((3, len(bones), 1))
+    start[:, 0, 0], far_ends[:, 0] = offsets[:, 0], 0
+    parents = [bone.parent for bone in bones]
     above = back[:, :, parents]
     above[:, :, 0] = np.eye(3)
-    at_rest = along(above[:, :, None], own)
+    at_rest = rotate(above[:, :, None], own)
     shifts = at_rest.copy()
     shifts[:, :, 0] = np.eye(3)
-    (axes, moved, columns), turning = _columns(bones)
+    channels = [[(kind, axis.upper()) for kind, axis in bone.dofs] for bone in bones]
+    (axes, moved, columns), turning = split_channels(channels)
+    # Degrees of freedom act in their order, about fixed axes.
+    turning = {
+        order[::-1]: [(j, columns[::-1]) for j, columns in members]
+        for order, members in turning.items()
+    }
 
     def translations(values):
         steps = np.zeros((3, len(bones), len(values)))
         steps[axes, moved] = values[:, columns].T
-        return along(shifts[..., None], steps) + begin
+        return rotate(shifts[..., None], steps) + start
 
-    return Tree(parents, turning, degrees, at_rest, far_ends), translations
-
-
-def _own_axes(bones, degrees):
-    """C (3, 3, n_bones)."""
-    axes = np.repeat(np.eye(3)[:, :, None], len(bones), axis=2)
-    orders = {}
-    for j, bone in enumerate(bones):
-        orders.setdefault(bone.axis_order, []).append(j)
-    for order, members in orders.items():
-        angles = np.array([bones[j].axis for j in members]).T
-        turned = axes[:, :, members]
-        # Axes that stay where they are turn as those that turn along, the last first.
-        turn(turned, order[::-1].upper(), np.radians(angles[::-1]) if degrees else angles[::-1])
-        axes[:, :, members] = turned
-    return axes
-
-
-def _columns(bones):
-    """Axes, joints and columns of the translations (3, n), and the turns by their axes.
-
-    Degrees of freedom act in the order in which they are named, about axes that stay.
-    """
-    moving, turning, column = [], {}, 0
-    for j, bone in enumerate(bones):
-        order, columns = "", []
-        for kind, axis in bone.dofs:
-            if kind == "t":
-                moving.append(("xyz".index(axis), j, column))
-            else:
-                order += axis.upper()
-                columns.append(column)
-            column += 1
-        if order:
-            turning.setdefault(order[::-1], []).append((j, columns[::-1]))
-    return np.array(moving, dtype=int).reshape(-1, 3).T, turning
-
-
-# -- aSF: the skeleton of Acclaim's motion files, with the bones' lengths and own axes ---
-
-_DOFS = ("tx", "ty", "tz", "rx", "ry", "rz")
-
-
-@dataclass
-class Bone:
-    name: str = ""
-    offset: object = None
-    direction: object = None
-    length: float | None = None
-    axis: object = (0.0, 0.0, 0.0)
-    axis_order: str = "xyz"
-    dofs: list = field(default_factory=list)
-    parent: int = -1
-
-
-@dataclass
-class Asf:
-    """The root and the bones, in the order in which the hierarchy names them."""
-
-    bones: list
-    length_unit: float
-    degrees: bool
-
-
-def find_asf(path):
-    """The skeleton of an AMC file, told from the names in its folder."""
-    found = sorted(p for p in path.parent.iterdir() if p.suffix.lower() == ".asf" and p.is_file())
-    named = [p for p in found if path.stem.lower().startswith(p.stem.lower())]
-    if named:
-        return max(named, key=lambda p: len(p.stem))
-    if len(found) == 1:
-        return found[0]
-    names = ", ".join(p.name for p in found[:5]) or "none"
-    raise ValueError(
-        f"{path} needs the skeleton it was recorded with, and none of the .asf files in its folder "
-        f"({names}) has a name that {path.name} begins with; give asf=."
+    return place_joints(
+        parents, turning, values, translations, degrees=degrees, at_rest=at_rest, bones=far_ends
     )
 
 
-def read_asf(path):
-    """The skeleton of an ASF file."""
-    text = MotionText(path)
-    root = Bone(name="root", offset=np.zeros(3), direction=(0.0, 0.0, 0.0))
-    units = {"length": 1.0, "angle": b"deg"}
-    bones, bone, parents = {"root": root}, None, {}
-    section = b""
-    for words in text.lines():
-        if words[0].startswith(b"#"):
-            continue
-        if words[0].startswith(b":"):
-            section = words[0].lower()
-        elif section == b":units":
-            _read_unit(text, words, units)
-        elif section == b":root":
-            _read_root(text, words, root)
-        elif section == b":bonedata":
-            bone = _read_bone(text, words, bone, bones)
-        elif section == b":hierarchy":
-            _read_children(text, words, bones, parents)
-    if bone is not None or len(bones) == 1 or not root.dofs:
-        raise text.error(
-            "the file ends without a complete :root, :bonedata and :hierarchy; an .asf has all."
-        )
-    _connect(text, bones, parents)
-    chosen = [root] + [bones[name] for name in parents]
-    return Asf(chosen, units["length"], units["angle"].startswith(b"deg"))
-
-
-def _read_unit(text, words, units):
-    key = words[0].lower()
-    if key == b"length":
-        (units["length"],) = text.numbers(words[1:], 1, ":units length")
-        if units["length"] <= 0:
-            raise text.error(f":units length must be above 0, got {units['length']!r}.")
-    elif key == b"angle":
-        if len(words) != 2 or words[1].lower()[:3] not in (b"deg", b"rad"):
-            raise text.error(f":units angle must be deg or rad, got {show(words[1:])}.")
-        units["angle"] = words[1].lower()
-
-
-def _read_root(text, words, root):
-    key = words[0].lower()
-    if key == b"order":
-        root.dofs = _read_dofs(text, words)
-    elif key == b"axis":
-        root.axis_order = _read_order(text, words[1:])
-    elif key == b"position":
-        root.offset = np.array(text.numbers(words[1:], 3, ":root position"))
-    elif key == b"orientation":
-        root.axis = text.numbers(words[1:], 3, ":root orientation")
-
-
-def _read_bone(text, words, bone, bones):
-    """The bone that is open after this line, or None."""
-    key = words[0].lower()
-    if key == b"begin" and bone is None:
-        return Bone()
-    if bone is None or key == b"begin":
-        raise text.error(f"expected {'begin' if bone is None else 'end'}, got {show(words)}.")
-    if key == b"end":
-        if not bone.name or bone.name in bones or bone.direction is None or bone.length is None:
-            raise text.error(
-                f"bone {bone.name[:60]!r} needs a name of its own, a direction and a length."
-            )
-        bone.offset = [bone.length * part for part in bone.direction]
-        if not all(map(math.isfinite, bone.offset)):
-            raise text.error(f"bone {bone.name[:60]!r} is infinitely long.")
-        bones[bone.name] = bone
-        return None
-    if key == b"name":
-        bone.name = decode(b" ".join(words[1:]))
-    elif key == b"direction":
-        bone.direction = text.numbers(words[1:], 3, "direction")
-    elif key == b"length":
-        (bone.length,) = text.numbers(words[1:], 1, "length")
-    elif key == b"axis":
-        bone.axis = text.numbers(words[1:4], 3, "axis")
-        bone.axis_order = _read_order(text, words[4:])
-    elif key == b"dof":
-        bone.dofs = _read_dofs(text, words)
-    return bone
-
-
-def _read_order(text, words):
-    order = b" ".join(words).decode("latin-1").lower()
-    if sorted(order) != ["x", "y", "z"]:
-        raise text.error(f"expected an order of the axes like XYZ, got {show(words)}.")
-    return order
-
-
-def _read_dofs(text, words):
-    dofs = [word.decode("latin-1").lower() for word in words[1:]]
-    if not set(dofs) <= set(_DOFS) or len(set(dofs)) < len(dofs):
-        raise text.error(
-            f"{show(words[:1])} needs different ones of {' '.join(_DOFS)}, got {show(words[1:])}."
-        )
-    return dofs
-
-
-def _read_children(text, words, bones, parents):
-    names = [decode(word) for word in words]
-    if len(names) == 1 and names[0].lower() in ("begin", "end"):
-        return
-    for name in names:
-        if name not in bones:
-            raise text.error(f":hierarchy names {name[:60]!r}, which is not in :bonedata.")
-    for name in names[1:]:
-        if name == "root" or name in parents:
-            raise text.error(f":hierarchy gives {name[:60]!r} two parents, or the root one.")
-        parents[name] = names[0]
-
-
-def _connect(text, bones, parents):
-    """Set every bone's parent, and see that all hang on the root."""
-    index = {name: i for i, name in enumerate(["root", *parents])}
-    children = {}
-    for name, parent in parents.items():
-        # A parent that is nobody's child is not reached below, nor what hangs on it.
-        bones[name].parent = index.get(parent, -1)
-        children.setdefault(parent, []).append(name)
-    reached = ["root"]
-    for name in reached:
-        reached += children.get(name, [])
-    if len(reached) < len(bones):
-        lost = sorted(set(bones) - set(reached))
-        raise text.error(
-            f":hierarchy does not connect {len(lost)} bones to the root, {lost[0][:60]!r} is one."
-        )
+def _own_axes(bones, in_degrees):
+    """C (3, 3, n_bones)."""
+    axes = np.repeat(np.eye(3)[:, :, None], len(bones), axis=2)
+    for order in {bone.axis_order for bone in bones}:
+        members = [j for j, bone in enumerate(bones) if bone.axis_order == order]
+        angles = np.array([bones[j].axis for j in members]).T[::-1]
+        own = axes[:, :, members]
+        # Rotations about fixed axes are those about turning axes in the opposite order.
+        turn(own, order[::-1].upper(), np.radians(angles) if in_degrees else angles)
+        axes[:, :, members] = own
+    return axes

@@ -1,36 +1,51 @@
-"""C3D: markers, what was computed from them, and analog channels of optical motion capture."""
+"""C3D: markers, quantities computed from them, and analog channels of optical motion capture."""
 
 import math
 
 import numpy as np
 
-from .text import decode, unique
+from .text import decode, make_unique
 
-# Where Cortex did not see a marker.
-_NOWHERE = 9999999.0
+_BLOCK = 512
+# How processors write numbers: Intel, DEC and MIPS.
+_LITTLE, _DEC, _BIG = 84, 85, 86
+# Coordinates that Cortex writes for a marker it did not see.
+_UNSEEN = 9999999.0
+# Groups of points that are computed from markers. There may be others, which have units.
+_COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
+# The header has room for so many events, and this number where their labels have 4 characters.
+_MAX_HEADER_EVENTS = 18
+_LONG_LABELS = 12345
 
 
-def read_c3d(path, group="markers"):
-    """Names, values and facts of a group of a C3D file; invalid points are NaN."""
-    file = C3DFile(path)
-    parameters = Parameters(file)
-    n_points, n_analog, per_frame = _check_counts(file, parameters)
-    layout = _Layout(file, parameters, n_points, n_analog)
+def read_c3d(path, *, group="markers"):
+    """A C3D file as a reader of `motion.READERS` returns it; invalid points are NaN.
+
+    `group` is "markers", "analog", or a group of points that the file lists.
+    """
+    file = _File(path)
+    parameters = _Parameters(file)
+    n_points, n_analog, per_frame = _read_counts(file, parameters)
+    frames = _Frames(file, parameters, n_points, n_analog)
     rate = parameters.number("POINT", "RATE", file.float(20))
     rate = float(rate) if math.isfinite(rate) and rate > 0 else None
-    labels = find_labels(parameters, "POINT", n_points, "marker")
-    members = find_point_groups(parameters, labels)
+    labels = _read_labels(parameters, "POINT", n_points, "marker")
+    members = _read_point_groups(parameters, labels)
     groups = {
         name: {"n": len(points), "units": units, "frame_rate": rate}
         for name, (points, units) in members.items()
     }
     if n_analog:
-        analog_rate = None if rate is None else rate * per_frame
-        channels, units = find_channels(parameters, n_analog // per_frame)
-        groups["analog"] = {"n": len(units), "units": units, "frame_rate": analog_rate}
+        n_channels = n_analog // per_frame
+        units = (parameters.texts("ANALOG", "UNITS") + [""] * n_channels)[:n_channels]
+        groups["analog"] = {
+            "n": n_channels,
+            "units": [unit or None for unit in units],
+            "frame_rate": None if rate is None else rate * per_frame,
+        }
     _check_group(file, groups, group)
-    first_frame = find_first_frame(file, parameters)
-    events, n_lost = find_events(file, parameters, rate, first_frame)
+    first_frame = _read_first_frame(file, parameters)
+    events, n_untimed = _read_events(file, parameters, rate, first_frame)
     facts = {
         "frame_rate": groups[group]["frame_rate"],
         "units": groups[group]["units"],
@@ -39,243 +54,69 @@ def read_c3d(path, group="markers"):
         "first_frame": first_frame,
         "events": events,
         "groups": groups,
-        "left_out": _left_out(parameters, groups, group, n_lost),
+        "left_out": _describe_others(parameters, groups, group, n_untimed),
     }
     if group == "analog":
         for event in events:
             event["frame"] = None if event["frame"] is None else event["frame"] * per_frame
-        values = _read_analog(layout, parameters, len(channels))
-        return facts | {"channels": unique(channels), "values": values}
+        channels = _read_labels(parameters, "ANALOG", n_channels, "channel")
+        values = _read_analog(frames, parameters, n_channels)
+        return facts | {"channels": make_unique(channels), "values": values}
     points = members[group][0]
-    positions = _read_points(layout, points, computed=group != "markers")
-    joints = unique([labels[i] for i in points])
+    positions = _read_points(frames, points, computed=group != "markers")
+    joints = make_unique([labels[i] for i in points])
     return facts | {"joints": joints, "parents": [-1] * len(points), "positions": positions}
 
 
-def _check_group(file, groups, group):
-    if group in groups and groups[group]["n"]:
-        return
-    there = [f"{name!r} ({facts['n']})" for name, facts in groups.items() if facts["n"]]
-    if not there:
-        raise file.error("the header says 0 markers and 0 analog values; there is nothing to read")
-    raise ValueError(
-        f"{file.path}: there are no {group} in this file; read_motion(..., group=...) reads "
-        f"{', '.join(there)}."
-    )
+# -- the header, and how numbers are written --------------------------------------------
 
 
-def _left_out(parameters, groups, group, n_lost):
-    """What the file holds beside the group, in one line; empty if there is nothing."""
-    parts = []
-    for name, facts in groups.items():
-        if name == group or not facts["n"]:
-            continue
-        if name == "analog":
-            rate = facts["frame_rate"]
-            at = "" if rate is None else f" at {rate:g} Hz"
-            parts.append(f"{facts['n']} analog {_plural('channel', facts['n'])}{at}")
-        else:
-            parts.append(f"{facts['n']} {_plural(name.removesuffix('s'), facts['n'])}")
-    plates = parameters.number("FORCE_PLATFORM", "USED", 0)
-    if math.isfinite(plates) and plates > 0:
-        parts.append(f"the geometry of {plates:g} force {_plural('plate', plates)}")
-    if n_lost:
-        parts.append(f"{n_lost} {_plural('event', n_lost)} without a time")
-    return ", ".join(parts)
-
-
-def _plural(noun, n):
-    return noun if n == 1 else noun + "s"
-
-
-class _Layout:
-    """Where the numbers of a frame are, and how they are written."""
-
-    def __init__(self, file, parameters, n_points, n_analog):
-        self.file = file
-        self.n_points, self.n_analog = n_points, n_analog
-        scale = _find_scale(file, parameters)
-        self.real = scale < 0
-        self.scale = 1.0 if self.real else scale
-        self.word = 4 if self.real else 2
-        frame_bytes = self.word * (4 * n_points + n_analog)
-        start = file.data_start
-        stated = (parameters.number("POINT", "DATA_START", 0) or start // BLOCK + 1) - 1
-        if not file.first_parameter < start < len(file.data) or start != stated * BLOCK:
-            raise file.error(
-                f"the header says that data begin at byte {start}, POINT:DATA_START says "
-                f"{stated * BLOCK:g}; both must be the same, behind the parameters at byte "
-                f"{file.first_parameter} and before the end at byte {len(file.data)}"
-            )
-        self.n_frames = _count_frames(file, parameters, frame_bytes, len(file.data) - start)
-        raw = np.frombuffer(file.data, np.uint8, self.n_frames * frame_bytes, start)
-        self._raw = raw.reshape(self.n_frames, frame_bytes)
-
-    def numbers(self, first, stop, kind="i"):
-        """The numbers first to stop of every frame, integers of kind "i" or "u"."""
-        raw = np.ascontiguousarray(self._raw[:, first * self.word : stop * self.word])
-        if self.real:
-            return self.file.floats(raw)
-        return raw.view(f"{self.file.order}{kind}2").astype(np.float64)
-
-
-def _read_points(layout, points, computed):
-    numbers = layout.numbers(0, 4 * layout.n_points).reshape(layout.n_frames, -1, 4)
-    blank = (numbers[..., :3] == 0).all(axis=2)
-    anything = not blank.all()
-    numbers, blank = numbers[:, points], blank[:, points]
-    positions, cameras = numbers[..., :3] * layout.scale, numbers[..., 3]
-    # The fourth number is negative where the point was not seen. NaN is no number at all.
-    seen = (cameras >= 0) & np.isfinite(positions).all(axis=2)
-    if not computed:
-        # It holds the cameras and the residual in 16 bits, the sign for the highest. Nothing
-        # in it, at the very origin, is how many writers leave a marker that no camera saw.
-        named = (cameras > 0) & (cameras < 2**15)
-        seen &= ~(blank & ~named & anything)
-        seen &= ~(positions == _NOWHERE).all(axis=2)
-    positions[~seen] = np.nan
-    return positions
-
-
-def _read_analog(layout, parameters, n):
-    kind, offsets, scales = find_scales(layout.file, parameters, n)
-    first = 4 * layout.n_points
-    values = layout.numbers(first, first + layout.n_analog, kind).reshape(-1, n)
-    with np.errstate(over="ignore", invalid="ignore"):
-        values = (values - offsets) * scales
-    values[~np.isfinite(values)] = np.nan
-    return values
-
-
-def _check_counts(file, parameters):
-    """Numbers of points and of analog values in a frame, as header and parameters agree."""
-    n_points, n_analog, per_frame = (file.integer(at) for at in (2, 4, 18))
-    used = parameters.number("POINT", "USED", n_points)
-    if used != n_points or not (n_points or n_analog):
-        raise file.error(
-            f"the header says {n_points} markers, POINT:USED says {used:g}; both must be the same "
-            "and above 0"
-        )
-    channels = parameters.number("ANALOG", "USED")
-    if channels is not None and channels * per_frame != n_analog:
-        raise file.error(
-            f"the header says {n_analog} analog values a frame, but ANALOG:USED says {channels:g} "
-            f"channels, {per_frame} values each"
-        )
-    if n_analog % max(per_frame, 1):
-        raise file.error(
-            f"the header says {n_analog} analog values a frame, {per_frame} of each channel, which "
-            "is no whole number of channels"
-        )
-    return n_points, n_analog, max(per_frame, 1)
-
-
-def _find_scale(file, parameters):
-    """What an integer is multiplied with; negative where numbers are floats."""
-    header = file.float(12)
-    scale = parameters.number("POINT", "SCALE", header)
-    if scale < 0 and header < 0:
-        # Floats are not scaled, so writers did not care what stands there.
-        return scale
-    if not math.isfinite(scale) or not scale or not math.isclose(scale, header, rel_tol=1e-3):
-        raise file.error(
-            f"the header says scale {header:g}, POINT:SCALE says {scale:g}; both must be the same "
-            "and not 0"
-        )
-    return scale
-
-
-def _count_frames(file, parameters, frame_bytes, n_bytes):
-    """The number of frames. Where the file states several, its size decides.
-
-    Long recordings do not fit the 16 bits of the header, and writers worked around that
-    in different ways.
-    """
-    header = file.integer(8) - file.integer(6) + 1
-    stated = {header}
-    stated |= {parameters.number("POINT", name, 0) for name in ("FRAMES", "LONG_FRAMES")}
-    limits = [parameters.numbers("TRIAL", f"ACTUAL_{end}_FIELD") for end in ("START", "END")]
-    if all(limit is not None and len(limit) == 2 for limit in limits):
-        low, high = (limit[0] + 65536 * limit[1] for limit in limits)
-        stated.add(high - low + 1)
-    stated = sorted(int(n) for n in stated if math.isfinite(n) and n > 0 and n == int(n))
-    possible = [n for n in stated if n * frame_bytes <= n_bytes]
-    # Data are padded to whole blocks.
-    exact = [n for n in possible if n_bytes - n * frame_bytes < BLOCK]
-    if exact:
-        return header if header in exact else exact[-1]
-    if len(stated) == 1 and possible:
-        return stated[0]
-    raise file.error(
-        f"it says {' or '.join(map(str, stated)) or 'no'} frames of {frame_bytes} bytes, but holds "
-        f"{n_bytes / frame_bytes:.1f} frames; it is not complete, or its header is wrong"
-    )
-
-
-# -- the header and the parameters of a C3D file, in one of three machines' binary forms -
-
-BLOCK = 512
-_LITTLE, _DEC, _BIG = 84, 85, 86
-
-
-class C3DFile:
-    """The bytes of the file, and how its machine wrote numbers."""
+class _File:
+    """The bytes of the file, and how its processor wrote numbers."""
 
     def __init__(self, path):
         self.path = path
         self.data = path.read_bytes()
-        if len(self.data) < 2 * BLOCK or self.data[1] != 0x50:
+        if len(self.data) < 2 * _BLOCK or self.data[1] != 0x50:
             raise self.error(
-                f"byte 1 must be hexadecimal 50 and the file {2 * BLOCK} bytes or more, got "
+                f"byte 1 must be hexadecimal 50 and the file {2 * _BLOCK} bytes or more, got "
                 f"{self.data[1:2].hex() or 'nothing'} and {len(self.data)} bytes; it is no C3D "
                 "file, or not complete"
             )
-        self.first_parameter = (self.data[0] - 1) * BLOCK
+        self.first_parameter = (self.data[0] - 1) * _BLOCK
         if not 0 < self.first_parameter <= len(self.data) - 4:
             raise self.error(
                 f"byte 0 says that parameters begin in block {self.data[0]}, but the file has "
-                f"{len(self.data) // BLOCK} blocks"
+                f"{len(self.data) // _BLOCK} blocks"
             )
-        self.machine = self.data[self.first_parameter + 3]
-        if self.machine not in (_LITTLE, _DEC, _BIG):
+        self.processor = self.data[self.first_parameter + 3]
+        if self.processor not in (_LITTLE, _DEC, _BIG):
             raise self.error(
-                f"byte {self.first_parameter + 3} says processor {self.machine}; 84 (Intel), "
+                f"byte {self.first_parameter + 3} says processor {self.processor}; 84 (Intel), "
                 "85 (DEC) and 86 (MIPS) are known"
             )
-        self.order = ">" if self.machine == _BIG else "<"
-        self.float_order = self.order
-        other = "<" if self.order == ">" else ">"
-        # Some writers turned the floats only, or the integers only.
-        if not self._holds(self.data_start) and self._holds(self._find_data_start(other)):
-            self.order = other
-
-    @property
-    def data_start(self):
-        """Where the data begin, as the header says."""
-        return self._find_data_start(self.order)
-
-    def _find_data_start(self, order):
-        return (int(np.frombuffer(self.data, order + "u2", 1, 16)[0]) - 1) * BLOCK
-
-    def _holds(self, at):
-        return self.first_parameter < at < len(self.data)
+        orders = "><" if self.processor == _BIG else "<>"
+        self.float_order = orders[0]
+        # Some writers convert the floats only, or the integers only. The header says where the
+        # data begin; in the wrong order that is outside of the file.
+        for self.order in (*orders, orders[0]):
+            self.data_start = (self.integer(16) - 1) * _BLOCK
+            if self.first_parameter < self.data_start < len(self.data):
+                break
 
     def error(self, message):
         return ValueError(f"{self.path}: {message}. Export the recording again.")
 
-    def integers(self, at, n=1, kind="u2"):
-        return np.frombuffer(self.data, self.order + kind, n, at)
-
     def integer(self, at):
-        return int(self.integers(at)[0])
+        return int(np.frombuffer(self.data, self.order + "u2", 1, at)[0])
 
     def float(self, at):
         return float(self.floats(np.frombuffer(self.data, np.uint8, 4, at))[0])
 
     def floats(self, raw):
         """Numbers of 4 bytes, given as an array of their bytes."""
-        if self.machine != _DEC:
-            with np.errstate(invalid="ignore"):
+        if self.processor != _DEC:
+            with np.errstate(invalid="ignore"):  # signalling NaN
                 return raw.view(self.float_order + "f4").astype(np.float64)
         # A DEC number has its two 16-bit words swapped and is four times too large for IEEE;
         # those with an exponent of 0 are 0.
@@ -287,7 +128,10 @@ class C3DFile:
         return np.where(exponent > 0, np.ldexp(sign * mantissa, exponent - 152), 0.0)
 
 
-class Parameters:
+# -- the parameters ---------------------------------------------------------------------
+
+
+class _Parameters:
     """The parameters of the file: (group, name) to type, dimensions and bytes."""
 
     def __init__(self, file):
@@ -296,20 +140,19 @@ class Parameters:
         groups, members = {}, []
         data, at = file.data, file.first_parameter
         n_blocks = data[at + 2]
-        counted = min(len(data), at + n_blocks * BLOCK) if n_blocks else len(data)
+        counted = min(len(data), at + n_blocks * _BLOCK) if n_blocks else len(data)
         # Writers count wrongly, and one byte is too little for many; the data bound them.
         end = file.data_start if at < file.data_start < len(data) else counted
         at += 4
         # Every entry is longer than 4 bytes, so this comes to an end.
         while at + 4 < end and data[at] and data[at + 1]:
-            n_chars, group = file.integers(at, 2, "i1").tolist()
-            n_chars = abs(n_chars)
-            link = at + 2 + n_chars
+            n_chars, group = np.frombuffer(data, "i1", 2, at).tolist()
+            link = at + 2 + abs(n_chars)
             step = file.integer(link) if link + 2 <= end else 0
             content = data[link + 2 : min(end, link + step) if step else end]
             if link + 2 > end or link + step > end or step == 1:
                 if at >= counted:
-                    break  # what follows them may be anything
+                    break  # no parameters follow here
                 raise self._error(at, "leads out of the parameters")
             name = decode(data[at + 2 : link]).strip().upper()
             if group < 0:
@@ -342,82 +185,211 @@ class Parameters:
         return [name for found, name in self._found if found == group]
 
     def numbers(self, group, name, kind="u"):
-        """The numbers of a parameter, integers unsigned or of kind "i"; None without any."""
-        size, _, values = self._found.get((group, name), (-1, [], b""))
-        if size < 0 or not values:
-            return None
-        if size == 4:
-            return self._file.floats(np.frombuffer(values, np.uint8))
-        return np.frombuffer(values, f"{self._file.order}{kind}{size}").astype(np.float64)
+        """The numbers of a parameter and its continuations, integers of kind "u" or "i"."""
 
-    def number(self, group, name, default=None):
-        numbers = self.numbers(group, name)
-        return default if numbers is None else float(numbers[0])
+        def read(size, _, values):
+            if size <= 0:
+                return []
+            if size == 4:
+                return self._file.floats(np.frombuffer(values, np.uint8)).tolist()
+            return np.frombuffer(values, f"{self._file.order}{kind}{size}").astype(float).tolist()
+
+        return self._continued(read, group, name)
 
     def texts(self, group, name):
-        size, dimensions, values = self._found.get((group, name), (1, [], b""))
-        width = dimensions[0] if dimensions else 1
-        if size != -1 or not width:
-            return []
-        pieces = (values[i : i + width] for i in range(0, len(values), width))
-        return [decode(piece).replace("\0", " ").strip() for piece in pieces]
+        """The texts of a parameter and its continuations."""
 
-    def all_texts(self, group, name):
-        """Those of a parameter and of its continuations, NAME2, NAME3, ..."""
-        return self._continued(self.texts, group, name)
+        def read(size, dimensions, values):
+            width = dimensions[0] if dimensions else 1
+            if size != -1 or not width:
+                return []
+            pieces = (values[i : i + width] for i in range(0, len(values), width))
+            return [decode(piece).replace("\0", " ").strip() for piece in pieces]
 
-    def all_numbers(self, group, name, kind="u"):
-        def numbers(group, name):
-            found = self.numbers(group, name, kind)
-            return [] if found is None else found.tolist()
-
-        return self._continued(numbers, group, name)
+        return self._continued(read, group, name)
 
     def _continued(self, read, group, name):
-        result, number = list(read(group, name)), 2
-        while more := read(group, f"{name}{number}"):
+        """The values of a parameter and of NAME2, NAME3, ..."""
+        result, number = read(*self._found.get((group, name), (0, [], b""))), 2
+        while more := read(*self._found.get((group, f"{name}{number}"), (0, [], b""))):
             result += more
             number += 1
         return result
 
+    def number(self, group, name, default=None):
+        return next(iter(self.numbers(group, name)), default)
+
     def text(self, group, name):
-        texts = self.texts(group, name)
-        return texts[0] or None if texts else None
+        return next(iter(self.texts(group, name)), None) or None
 
 
-# -- when a C3D file begins, and the events that somebody marked in it -------------------
-
-# The header has room for so many events, and this number where their labels have 4 characters.
-_MOST = 18
-_LONG_LABELS = 12345
+# -- the data: frames of points and analog values ---------------------------------------
 
 
-def find_first_frame(file, parameters):
-    """The number that the first frame has in its trial, which mostly counts from 1."""
+def _read_counts(file, parameters):
+    """Numbers of points and of analog values in a frame, and of values of a channel."""
+    n_points, n_analog, per_frame = (file.integer(at) for at in (2, 4, 18))
+    used = parameters.number("POINT", "USED", n_points)
+    if used != n_points or not (n_points or n_analog):
+        raise file.error(
+            f"the header says {n_points} markers, POINT:USED says {used:g}; both must be the same "
+            "and above 0"
+        )
+    channels = parameters.number("ANALOG", "USED")
+    if channels is not None and channels * per_frame != n_analog:
+        raise file.error(
+            f"the header says {n_analog} analog values a frame, but ANALOG:USED says {channels:g} "
+            f"channels, {per_frame} values each"
+        )
+    if n_analog % max(per_frame, 1):
+        raise file.error(
+            f"the header says {n_analog} analog values a frame, {per_frame} of each channel, which "
+            "is no whole number of channels"
+        )
+    return n_points, n_analog, max(per_frame, 1)
+
+
+class _Frames:
+    """The numbers of all frames, and how they are written."""
+
+    def __init__(self, file, parameters, n_points, n_analog):
+        self.file = file
+        self.n_points, self.n_analog = n_points, n_analog
+        scale = _read_scale(file, parameters)
+        self.real = scale < 0
+        self.scale = 1.0 if self.real else scale
+        self.word = 4 if self.real else 2
+        frame_bytes = self.word * (4 * n_points + n_analog)
+        start = file.data_start
+        stated = (parameters.number("POINT", "DATA_START", 0) or start // _BLOCK + 1) - 1
+        if not file.first_parameter < start < len(file.data) or start != stated * _BLOCK:
+            raise file.error(
+                f"the header says that data begin at byte {start}, POINT:DATA_START says "
+                f"{stated * _BLOCK:g}; both must be the same, behind the parameters at byte "
+                f"{file.first_parameter} and before the end at byte {len(file.data)}"
+            )
+        self.n_frames = _count_frames(file, parameters, frame_bytes, len(file.data) - start)
+        raw = np.frombuffer(file.data, np.uint8, self.n_frames * frame_bytes, start)
+        self._raw = raw.reshape(self.n_frames, frame_bytes)
+
+    def numbers(self, first, stop, kind="i"):
+        """The numbers first to stop of every frame, integers of kind "i" or "u"."""
+        raw = np.ascontiguousarray(self._raw[:, first * self.word : stop * self.word])
+        if self.real:
+            return self.file.floats(raw)
+        return raw.view(f"{self.file.order}{kind}2").astype(np.float64)
+
+
+def _read_scale(file, parameters):
+    """The factor of integers; negative where numbers are floats."""
+    header = file.float(12)
+    scale = parameters.number("POINT", "SCALE", header)
+    if scale < 0 and header < 0:
+        # Floats are not scaled, and some writers put any negative number here.
+        return scale
+    if not math.isfinite(scale) or not scale or not math.isclose(scale, header, rel_tol=1e-3):
+        raise file.error(
+            f"the header says scale {header:g}, POINT:SCALE says {scale:g}; both must be the same "
+            "and not 0"
+        )
+    return scale
+
+
+def _count_frames(file, parameters, frame_bytes, n_bytes):
+    """The number of frames. Where the file states several, its size decides.
+
+    Long recordings do not fit the 16 bits of the header, and writers worked around that
+    in different ways.
+    """
+    header = file.integer(8) - file.integer(6) + 1
+    stated = {header}
+    stated |= {parameters.number("POINT", name, 0) for name in ("FRAMES", "LONG_FRAMES")}
+    limits = [parameters.numbers("TRIAL", f"ACTUAL_{end}_FIELD") for end in ("START", "END")]
+    if all(len(limit) == 2 for limit in limits):
+        low, high = (limit[0] + 65536 * limit[1] for limit in limits)
+        stated.add(high - low + 1)
+    stated = sorted(int(n) for n in stated if math.isfinite(n) and n > 0 and n == int(n))
+    possible = [n for n in stated if n * frame_bytes <= n_bytes]
+    # Data are padded to whole blocks.
+    exact = [n for n in possible if n_bytes - n * frame_bytes < _BLOCK]
+    if exact:
+        return header if header in exact else exact[-1]
+    if len(stated) == 1 and possible:
+        return stated[0]
+    raise file.error(
+        f"it says {' or '.join(map(str, stated)) or 'no'} frames of {frame_bytes} bytes, but holds "
+        f"{n_bytes / frame_bytes:.1f} frames; it is not complete, or its header is wrong"
+    )
+
+
+def _read_points(frames, points, computed):
+    numbers = frames.numbers(0, 4 * frames.n_points).reshape(frames.n_frames, -1, 4)
+    zero = (numbers[..., :3] == 0).all(axis=2)
+    all_zero = zero.all()
+    numbers, zero = numbers[:, points], zero[:, points]
+    positions, cameras = numbers[..., :3] * frames.scale, numbers[..., 3]
+    # The fourth number is negative where the point was not seen. NaN is no number at all.
+    seen = (cameras >= 0) & np.isfinite(positions).all(axis=2)
+    if not computed:
+        # It holds the cameras and the residual in 16 bits, the sign for the highest. Many writers
+        # leave a marker that no camera saw at the origin, with a 0 here.
+        has_camera = (cameras > 0) & (cameras < 2**15)
+        seen &= ~zero | has_camera | all_zero
+        seen &= ~(positions == _UNSEEN).all(axis=2)
+    positions[~seen] = np.nan
+    return positions
+
+
+def _read_analog(frames, parameters, n):
+    kind = "u" if (parameters.text("ANALOG", "FORMAT") or "").upper() == "UNSIGNED" else "i"
+    general = parameters.number("ANALOG", "GEN_SCALE", 1.0)
+    offsets = parameters.numbers("ANALOG", "OFFSET", kind) or [0.0] * n
+    scales = parameters.numbers("ANALOG", "SCALE") or [1.0] * n
+    for name, numbers in (("OFFSET", offsets), ("SCALE", scales)):
+        if len(numbers) < n:
+            raise frames.file.error(f"ANALOG:{name} has {len(numbers)} numbers for {n} channels")
+    offsets, scales = offsets[:n], scales[:n]
+    if not general or not np.isfinite([general, *offsets, *scales]).all():
+        raise frames.file.error(
+            f"ANALOG:GEN_SCALE must not be 0, and it, ANALOG:SCALE and ANALOG:OFFSET must be "
+            f"finite, got GEN_SCALE {general:g}, SCALE from {min(scales):g} to {max(scales):g}, "
+            f"OFFSET from {min(offsets):g} to {max(offsets):g}"
+        )
+    first = 4 * frames.n_points
+    values = frames.numbers(first, first + frames.n_analog, kind).reshape(-1, n)
+    values[~np.isfinite(values)] = np.nan
+    return (values - offsets) * [general * scale for scale in scales]
+
+
+# -- events -----------------------------------------------------------------------------
+
+
+def _read_first_frame(file, parameters):
+    """The number of the first frame in its trial, which usually counts from 1."""
     start = parameters.numbers("TRIAL", "ACTUAL_START_FIELD")
-    if start is None or not np.isfinite(start).all() or (start < 0).any():
+    if not start or not all(math.isfinite(word) and word >= 0 for word in start):
         return file.integer(6)
     # Two words of 16 bits, the lower first.
     return int(start[0]) + (65536 * int(start[1]) if len(start) > 1 else 0)
 
 
-def find_events(file, parameters, rate, first_frame):
-    """Events by time, and how many have none.
+def _read_events(file, parameters, rate, first_frame):
+    """Events by time, and the number of those without a time.
 
     Each is a dict of its label, its context, its time in seconds of the trial, and its frame
     in the recording, from 0; None where the frame rate is not known.
     """
-    # Frame 1 of the trial is at 0 seconds. Who counts from 0 means the same frame.
-    begin = max(first_frame - 1, 0)
-    found = _read_parameters(parameters)
+    # Frame 1 of the trial is at 0 seconds. In files that count from 0 it is frame 0.
+    start = max(first_frame - 1, 0)
+    found = _read_event_parameters(parameters)
     if found is None:
-        found = _read_header(file, 0.0 if rate is None else begin / rate)
+        found = _read_header_events(file, 0.0 if rate is None else start / rate)
     events = [
         {
             "label": label,
             "context": context or None,
             "time": time,
-            "frame": None if rate is None else round(time * rate - begin, 5),
+            "frame": None if rate is None else round(time * rate - start, 5),
         }
         # The file's numbers have 24 bits.
         for label, context, time in ((*texts, round(time, 6)) for *texts, time in found)
@@ -426,102 +398,99 @@ def find_events(file, parameters, rate, first_frame):
     return sorted(events, key=lambda event: event["time"]), len(found) - len(events)
 
 
-def _read_parameters(parameters):
+def _read_event_parameters(parameters):
     """(label, context, time) of each event of the group EVENT; None without any."""
     group = next((g for g in ("EVENT", "EVENTS") if "TIMES" in parameters.names(g)), "EVENT")
     # Pairs of minutes and seconds.
-    times = np.array(parameters.all_numbers(group, "TIMES"))
+    times = np.array(parameters.numbers(group, "TIMES"))
     times = times[: len(times) // 2 * 2].reshape(-1, 2) @ [60.0, 1.0]
     n = parameters.number(group, "USED", len(times))
     n = int(n) if n in range(65536) else len(times)
     if not n:
         return None
-    columns = [parameters.all_texts(group, name) for name in ("LABELS", "CONTEXTS")]
+    columns = [parameters.texts(group, name) for name in ("LABELS", "CONTEXTS")]
     labels, contexts = ((texts + [""] * n)[:n] for texts in columns)
     times = [*times.tolist(), *[math.nan] * n][:n]
     return list(zip(labels, contexts, times, strict=True))
 
 
-def _read_header(file, begin):
+def _read_header_events(file, start):
     """The same of the events in the header, whose times count from the first frame."""
     n = file.integer(300)
-    if n > _MOST:
+    if n > _MAX_HEADER_EVENTS:
         return []
     width = 4 if file.integer(298) == _LONG_LABELS else 2
     labels = (file.data[396 + width * i : 396 + width * (i + 1)] for i in range(n))
     return [
-        (label.decode("latin-1").replace("\0", " ").strip(), "", begin + file.float(304 + 4 * i))
+        (label.decode("latin-1").replace("\0", " ").strip(), "", start + file.float(304 + 4 * i))
         for i, label in enumerate(labels)
     ]
 
 
-# -- what the points and the analog channels of a C3D file are: groups, names, units, scales
-
-# What writers compute from markers and store as points, beside others that have units.
-_COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
+# -- groups of points and channels ------------------------------------------------------
 
 
-def find_labels(parameters, group, n, what):
-    """A name for each of n, though labels may lack or come in several parameters."""
-    labels = parameters.all_texts(group, "LABELS")
-    labels = (labels + [""] * n)[:n]
+def _read_labels(parameters, group, n, what):
+    """A name for each of n points or channels, some of which may have no label."""
+    labels = (parameters.texts(group, "LABELS") + [""] * n)[:n]
     return [label or f"{what}_{i + 1}" for i, label in enumerate(labels)]
 
 
-def find_point_groups(parameters, labels):
+def _read_point_groups(parameters, labels):
     """Indices and units of the points of each group, by name; markers are the rest.
 
     POINT:ANGLES lists the labels of the points that are angles, POINT:ANGLE_UNITS says what
     they are measured in; forces, moments and others likewise.
     """
+    names, marker_unit = parameters.names("POINT"), parameters.text("POINT", "UNITS")
+    # Points in the unit of markers, such as centres of joints, are used like markers.
+    others = {
+        f"{name.removesuffix('_UNITS')}S"
+        for name in names
+        if name.endswith("_UNITS") and parameters.text("POINT", name) != marker_unit
+    } - {"LABELS", "DESCRIPTIONS", "MARKERS"}
     left = dict.fromkeys(range(len(labels)))
     groups = {}
-    for name in _group_names(parameters):
-        listed = {label.upper() for label in parameters.all_texts("POINT", name)}
+    for name in dict.fromkeys([*_COMPUTED, *sorted(others)]):
+        listed = {label.upper() for label in parameters.texts("POINT", name)}
         points = [i for i in left if labels[i].upper() in listed]
         if points:
             units = parameters.text("POINT", f"{name.removesuffix('S')}_UNITS")
             groups[name.lower()] = (points, units)
             for i in points:
                 del left[i]
-    return {"markers": (list(left), parameters.text("POINT", "UNITS"))} | groups
+    return {"markers": (list(left), marker_unit)} | groups
 
 
-def _group_names(parameters):
-    there = parameters.names("POINT")
-    markers = parameters.text("POINT", "UNITS")
-    # Points in the unit of markers, such as centres of joints, are as good as markers.
-    others = {
-        f"{name.removesuffix('_UNITS')}S"
-        for name in there
-        if name.endswith("_UNITS") and parameters.text("POINT", name) != markers
-    } - {"LABELS", "DESCRIPTIONS", "MARKERS"}
-    return [name for name in dict.fromkeys([*_COMPUTED, *sorted(others)]) if name in there]
+def _check_group(file, groups, group):
+    if group in groups and groups[group]["n"]:
+        return
+    there = [f"{name!r} ({facts['n']})" for name, facts in groups.items() if facts["n"]]
+    raise ValueError(
+        f"{file.path}: there are no {group} in this file; read_motion(..., group=...) reads "
+        f"{', '.join(there)}."
+    )
 
 
-def find_channels(parameters, n):
-    """Labels and units of the n analog channels."""
-    units = (parameters.all_texts("ANALOG", "UNITS") + [""] * n)[:n]
-    return find_labels(parameters, "ANALOG", n, "channel"), [unit or None for unit in units]
+def _describe_others(parameters, groups, group, n_untimed):
+    """The contents of the file beside the group, in one line; empty if there are none."""
 
+    def plural(n, noun):
+        return f"{n:g} {noun}" if n == 1 else f"{n:g} {noun}s"
 
-def find_scales(file, parameters, n):
-    """Kind of the raw integers of the n channels, what to subtract, what to multiply with."""
-    unsigned = (parameters.text("ANALOG", "FORMAT") or "").upper() == "UNSIGNED"
-    kind = "u" if unsigned else "i"
-    general = parameters.number("ANALOG", "GEN_SCALE", 1.0)
-    offsets = _one_each(file, parameters.all_numbers("ANALOG", "OFFSET", kind), "OFFSET", n, 0.0)
-    scales = _one_each(file, parameters.all_numbers("ANALOG", "SCALE"), "SCALE", n, 1.0)
-    if not general or not all(map(math.isfinite, [general, *offsets, *scales])):
-        raise file.error(
-            f"ANALOG:GEN_SCALE must not be 0, and it, ANALOG:SCALE and ANALOG:OFFSET must be "
-            f"finite, got GEN_SCALE {general:g}, SCALE from {min(scales):g} to {max(scales):g}, "
-            f"OFFSET from {min(offsets):g} to {max(offsets):g}"
-        )
-    return kind, offsets, [general * scale for scale in scales]
-
-
-def _one_each(file, numbers, name, n, default):
-    if numbers and len(numbers) < n:
-        raise file.error(f"ANALOG:{name} has {len(numbers)} numbers for {n} channels")
-    return numbers[:n] or [default] * n
+    parts = []
+    for name, facts in groups.items():
+        if name == group or not facts["n"]:
+            continue
+        if name == "analog":
+            rate = facts["frame_rate"]
+            at = "" if rate is None else f" at {rate:g} Hz"
+            parts.append(f"{plural(facts['n'], 'analog channel')}{at}")
+        else:
+            parts.append(plural(facts["n"], name.removesuffix("s")))
+    plates = parameters.number("FORCE_PLATFORM", "USED", 0)
+    if math.isfinite(plates) and plates > 0:
+        parts.append(f"the geometry of {plural(plates, 'force plate')}")
+    if n_untimed:
+        parts.append(f"{plural(n_untimed, 'event')} without a time")
+    return ", ".join(parts)

@@ -1,6 +1,7 @@
-"""Performances of a recording, from one of its events to another."""
+"""Cut recordings into performances, from one event to another."""
 
 import math
+from collections import Counter
 from numbers import Real
 
 import pandas as pd
@@ -8,8 +9,8 @@ import pandas as pd
 from ..inputs.tables import FRAME, label_of_part
 
 _HELP = (
-    "attrs['events'] must be a list of dicts with label, context and frame, as read_motion gives "
-    "for C3D files"
+    "attrs['events'] must be a list of dicts with label, context and frame, as read_motion returns "
+    "it for C3D files"
 )
 
 
@@ -19,46 +20,51 @@ def cut_at_events(df, start, stop=None, *, performance=None):
     Parameters
     ----------
     df : DataFrame (n_frames, n_features)
-        A recording whose ``attrs["events"]`` are as `read_motion` gives them: a list of dicts with
-        ``label``, ``context`` and ``frame``, its place in the rows, from 0, with fractions. Any
-        group of a C3D file has them at its own rate.
+        A recording whose ``attrs["events"]`` are as `read_motion` returns them: a list of dicts
+        with ``label``, ``context`` and ``frame``, the position in the rows, from 0, with
+        fractions. Every group of a C3D file has them at its own frame rate.
     start : str or (str, str)
         Label of the events at which a performance begins, or label and context: ``"Foot Strike"``,
-        ``("Foot Strike", "Left")``. Capitals do not matter.
+        ``("Foot Strike", "Left")``. Case is ignored.
     stop : str or (str, str), default=None
-        The same of the events at which it ends; by default the next event like `start`.
+        Label, or label and context, of the events at which a performance ends. By default it is
+        `start`, so that a performance lasts until the next event of the same kind.
     performance : hashable, default=None
-        What the recording is called; by default ``df.attrs["performance"]``, if it has that.
+        Label of the recording; by default ``df.attrs["performance"]``, if there is one.
 
     Returns
     -------
     list of DataFrame (n_frames_i, n_features)
-        By time, one for each `start` that is followed by a `stop`, both included, rounded to whole
-        frames, and indexed from 0. A performance is left out where another `start` comes before
-        its `stop`, or where one of them lies outside of the recording. The list is empty
-        if none is complete. Their ``attrs`` are those of the recording, but for
+        The performances by time, one for each `start` that is followed by a `stop`. Both are
+        included, rounded to whole frames, and frames are indexed from 0. A performance is left
+        out if another `start` comes before its `stop`, or if one of them lies outside of the
+        recording. The list is empty if none is complete. The ``attrs`` of a performance are those
+        of the recording, with these changed or added:
 
         events : list of dict
-            Those within the performance, ``frame`` counted from its first one. The events that
-            bound it are left out, so that the others are key-frames for `KeyframeSynchronizer`.
+            The events within the performance, with ``frame`` counted from its first frame. The
+            events at its two ends are left out, so that the others are key-frames for
+            `KeyframeSynchronizer`.
         rows : list of int
-            First and last row in the recording.
+            Its first and last row in the recording.
         first_frame : int
-            The number of its first frame in the trial, if the recording has that.
+            The number of its first frame in the trial, if the recording has ``first_frame``.
+        first_time, times : float, list of float
+            The time of its first frame and the times of all, in seconds, if the recording has them.
         performance, levels : hashable, tuple of str
-            What it is called: 0, 1, ... by time, behind the name of the recording if that has
-            one; and the names of the levels of an index of them.
+            Its label, 0, 1, ... by time, behind the label of the recording if it has one; and the
+            names of the levels of an index of labels.
 
     Raises
     ------
     ValueError
-        If the recording has no events, or none like `start` or `stop`; the message tells which
-        there are.
+        If the recording has no events, or none of `start` or `stop`; the message lists those that
+        it has.
 
     See Also
     --------
     read_motion : Reads events of C3D files.
-    sklearn_motionsync.KeyframeSynchronizer : Lets the other events coincide.
+    sklearn_motionsync.KeyframeSynchronizer : Aligns the other events.
 
     Examples
     --------
@@ -78,40 +84,44 @@ def cut_at_events(df, start, stop=None, *, performance=None):
     """
     if not isinstance(df, pd.DataFrame):
         raise ValueError(
-            f"A recording must be a DataFrame, as read_motion gives, got {type(df).__name__}."
+            f"A recording must be a DataFrame, as read_motion returns it, got {type(df).__name__}."
         )
-    events = _check_events(df)
-    starts = _find(events, start, "start")
-    stops = starts if stop is None else _find(events, stop, "stop")
+    events = _read_events(df)
+    starts = _select(events, start, "start")
+    stops = starts if stop is None else _select(events, stop, "stop")
     parts = []
-    for first, last, own in _bounds(starts, stops):
+    for begin, end in _pair(starts, stops):
+        first, last = _row(begin), _row(end)
         if first >= 0 and last < len(df):
-            parts.append(_cut(df, first, last, [e for e in events if not any(e is o for o in own)]))
-    return _name(parts, df.attrs, performance)
+            others = [event for event in events if event is not begin and event is not end]
+            parts.append(_cut(df, first, last, others))
+    whole = df.attrs.get("performance") if performance is None else performance
+    for i, part in enumerate(parts):
+        part.attrs |= {"performance": i, "levels": ("performance", FRAME)}
+        if whole is not None:
+            part.attrs |= label_of_part(whole, i, "part", df.attrs.get("levels", ()))
+    return parts
 
 
-def _check_events(df):
-    """The events that have a place, by time."""
+def _read_events(df):
+    """The events that have a frame, by time."""
     events = df.attrs.get("events")
     if not isinstance(events, (list, tuple)) or not events:
         raise ValueError(f"This recording has no events; {_HELP}.")
     for event in events:
         known = isinstance(event, dict) and isinstance(event.get("label"), str)
-        frame = event.get("frame") if known else None
-        if not known or not (frame is None or isinstance(frame, Real)):
+        if not known or not isinstance(event.get("frame"), Real | None):
             raise ValueError(f"{_HELP}, got {event!r} among them.")
-    placed = [event for event in events if event.get("frame") is not None]
+    placed = [e for e in events if e.get("frame") is not None and math.isfinite(e["frame"])]
     if not placed:
         raise ValueError(
             "The events of this recording have no frames, as its file has no frame rate. Set them: "
             "event['frame'] = event['time'] * rate, for each of df.attrs['events']."
         )
-    return sorted(
-        (event for event in placed if math.isfinite(event["frame"])), key=lambda e: e["frame"]
-    )
+    return sorted(placed, key=lambda event: event["frame"])
 
 
-def _find(events, what, name):
+def _select(events, what, name):
     """Events of a label, or of a label and a context."""
     wanted = (what,) if isinstance(what, str) else what
     good = isinstance(wanted, (tuple, list)) and len(wanted) in (1, 2)
@@ -122,13 +132,9 @@ def _find(events, what, name):
     wanted = [word.strip().casefold() for word in wanted]
     found = [event for event in events if _words(event)[: len(wanted)] == wanted]
     if not found:
-        there = {}
-        for event in events:
-            key = event["label"], event.get("context")
-            there[key] = there.get(key, 0) + 1
+        kinds = Counter((event["label"], event.get("context")) for event in events)
         listed = ", ".join(
-            f"{label!r} ({n})" if context is None else f"{(label, context)!r} ({n})"
-            for (label, context), n in there.items()
+            f"{(kind[0] if kind[1] is None else kind)!r} ({n})" for kind, n in kinds.items()
         )
         raise ValueError(f"There is no event {what!r} for {name}; there are {listed}.")
     return found
@@ -142,58 +148,41 @@ def _row(event):
     return math.floor(event["frame"] + 0.5)
 
 
-def _bounds(starts, stops):
-    """First and last row of every start that a stop follows before the next start, and both."""
+def _pair(starts, stops):
+    """Every start with the next stop, if no other start lies between them."""
     for i, start in enumerate(starts):
-        first = _row(start)
-        stop = next((event for event in stops if _row(event) > first), None)
+        stop = next((event for event in stops if _row(event) > _row(start)), None)
         if stop is None:
             continue
         others = (event for event in starts[i + 1 :] if event is not stop)
-        # A start marked twice in the same row is one.
-        if not any(first <= _row(other) < _row(stop) for other in others):
-            yield first, _row(stop), (start, stop)
+        # Two starts in the same row are one: the last of them counts.
+        if not any(_row(start) <= _row(other) < _row(stop) for other in others):
+            yield start, stop
 
 
 def _cut(df, first, last, events):
-    """The rows first to last, which know their events."""
+    """The rows first to last, with the ``attrs`` that belong to them."""
     part = df.iloc[first : last + 1].set_axis(pd.RangeIndex(last - first + 1, name="frame"))
-    part.attrs = df.attrs | {"rows": [first, last]} | _first(df.attrs, first, last)
-    part.attrs["events"] = [
+    attrs = df.attrs | {"rows": [first, last]}
+    attrs["events"] = [
         event | {"frame": round(event["frame"] - first, 5)}
         for event in events
         if first < event["frame"] < last
     ]
+    if isinstance(number := attrs.get("first_frame"), int):
+        attrs["first_frame"] = number + math.floor(first / _rows_per_frame(attrs))
+    if (times := attrs.get("times")) is not None:
+        attrs |= {"times": times[first : last + 1], "first_time": times[first]}
+    elif attrs.get("frame_rate") and "first_time" in attrs:
+        attrs["first_time"] += first / attrs["frame_rate"]
+    part.attrs = attrs
     return part
 
 
-def _first(attrs, first, last):
-    """What else counts from the first row."""
-    changed = {}
-    rate, times = attrs.get("frame_rate"), attrs.get("times")
-    if isinstance(number := attrs.get("first_frame"), int):
-        changed["first_frame"] = number + math.floor(first / _samples(attrs))
-    if times is not None:
-        changed |= {"times": times[first : last + 1], "first_time": times[first]}
-    elif rate and "first_time" in attrs:
-        changed["first_time"] = attrs["first_time"] + first / rate
-    return changed
-
-
-def _samples(attrs):
-    """Rows in a frame of the trial: analog channels have several."""
+def _rows_per_frame(attrs):
+    """Analog channels have several rows in a frame of the trial."""
     groups = attrs.get("groups", {})
     rates = [groups.get(group, {}).get("frame_rate") for group in ("analog", "markers")]
     if attrs.get("kind") != "analog" or not all(rates):
         return 1
     return rates[0] / rates[1]
-
-
-def _name(parts, attrs, performance):
-    """The parts, with their labels."""
-    whole = attrs.get("performance") if performance is None else performance
-    for i, part in enumerate(parts):
-        part.attrs["performance"], part.attrs["levels"] = i, ("performance", FRAME)
-        if whole is not None:
-            part.attrs |= label_of_part(whole, i, "part", attrs.get("levels", ()))
-    return parts

@@ -1,11 +1,13 @@
-"""Gaps: frames where a marker was not seen."""
+"""Gaps: frames in which a marker was not seen."""
 
 import warnings
+from numbers import Integral
 
 import numpy as np
 import pandas as pd
 
 from ..body.skeleton import parse_joint_columns
+from ..inputs.numbers import as_numbers, check_finite
 
 
 def find_gaps(df):
@@ -14,22 +16,34 @@ def find_gaps(df):
     Parameters
     ----------
     df : DataFrame (n_frames, 3 * n_joints) or (n_frames, 2 * n_joints)
-        Columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, as `read_motion` gives them, or
-        ``<joint>_x``, ``<joint>_y`` of key-points in the plane. A joint is missing in a frame
-        where any of them is NaN.
+        Joint positions: columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, as `read_motion`
+        returns them, or ``<joint>_x``, ``<joint>_y`` of key-points in the plane. A joint is
+        missing in a frame where any of them is NaN.
 
     Returns
     -------
     DataFrame
-        One row a gap, by joint and time: ``joint``; ``first`` and ``last``, positions of the
-        frames, counted from 0; ``n_frames``; ``inside``, False where the gap touches the
-        beginning or the end of the recording, so that nothing can be interpolated.
+        One row for each gap, sorted by joint and time, with the columns
+
+        joint : str
+            Name of the joint.
+        first, last : int
+            First and last missing frame, counted from 0.
+        n_frames : int
+            Length of the gap, in frames.
+        inside : bool
+            False if the gap touches the start or the end of the recording, so that it cannot be
+            interpolated.
 
     Raises
     ------
     ValueError
-        If it is no DataFrame, the columns are not such triples or pairs, values are infinite or
-        no numbers, or it holds several performances.
+        If `df` is not a DataFrame of such columns, holds several performances, or has values that
+        are infinite or not numeric.
+
+    See Also
+    --------
+    fill_gaps : Interpolates short gaps.
 
     Examples
     --------
@@ -60,27 +74,32 @@ def fill_gaps(df, max_gap):
     Parameters
     ----------
     df : DataFrame (n_frames, 3 * n_joints) or (n_frames, 2 * n_joints)
-        As for `find_gaps`. It is not changed.
+        Joint positions, as for `find_gaps`. It is not changed.
     max_gap : int
-        The longest gap to fill, in frames. Longer ones stay NaN, as do those that touch an end
-        of the recording: nothing is extrapolated. Joints of the same name are filled each by
-        itself.
+        The longest gap to fill, in frames. Longer gaps stay NaN, as do those that touch an end
+        of the recording: nothing is extrapolated.
 
     Returns
     -------
     DataFrame
-        The same columns, index and ``attrs``.
+        The positions with gaps filled, in the unit of `df`, with the same columns, index and
+        ``attrs``.
 
     Raises
     ------
     ValueError
-        If `max_gap` is no whole number from 0, or as for `find_gaps`.
+        If `max_gap` is not a whole number of frames, 0 or more. If `df` is not as `find_gaps`
+        needs it.
+
+    See Also
+    --------
+    find_gaps : Lists all gaps.
 
     Notes
     -----
-    Akima's piecewise cubic polynomials are used. Gaps cut out of real recordings came back with
-    these errors (RMS over 600 gaps, in millimetres; hands and feet of HDM05 at 120 Hz, and
-    the markers of a C3D file of walking at 50 Hz):
+    Each coordinate is interpolated by Akima's piecewise cubic polynomials. Gaps cut out of real
+    recordings are filled with these errors (RMS over 600 gaps, in millimetres; hands and feet of
+    HDM05 at 120 Hz, and the markers of a C3D file of walking at 50 Hz):
 
     ======  ======  =====  =====  ======  ======  =====  =====  ======
     gap of  HDM05                         markers
@@ -93,9 +112,9 @@ def fill_gaps(df, max_gap):
     40        85.6   56.5   38.3    35.0    62.4   43.2   40.3    41.8
     ======  ======  =====  =====  ======  ======  =====  =====  ======
 
-    The cubic spline wins on HDM05's joints, which were smoothed before; Akima wins on
-    markers as they were recorded, where gaps are. With 20 frames and more the error
-    of any is centimetres.
+    The cubic spline is best on HDM05's joints, which were smoothed before; Akima is best on
+    markers as they were recorded, where gaps occur. From 20 frames on the error of each is
+    centimetres.
 
     Examples
     --------
@@ -113,13 +132,10 @@ def fill_gaps(df, max_gap):
     missing = _missing(values, n_dims)
     joint, first, last = _find(missing)
     short = (first > 0) & (last < len(df) - 1) & (last - first < max_gap)
-    # By the joint's place: names may come twice.
+    # By the joint's index: names may be repeated.
     for j in np.unique(joint[short]):
-        rows = short & (joint == j)
-        here = np.zeros(len(df) + 1, dtype=int)
-        np.add.at(here, first[rows], 1)
-        np.add.at(here, last[rows] + 1, -1)
-        frames = np.flatnonzero(np.cumsum(here[:-1]))
+        gaps = short & (joint == j)
+        frames = np.concatenate(list(map(np.arange, first[gaps], last[gaps] + 1)))
         part = values[:, n_dims * j : n_dims * (j + 1)]
         filled = _interpolate(np.flatnonzero(~missing[:, j]), part, frames)
         part[frames] = np.where(np.isnan(part[frames]), filled, part[frames])
@@ -129,27 +145,22 @@ def fill_gaps(df, max_gap):
 
 
 def check_max_gap(max_gap):
-    whole = isinstance(max_gap, int | np.integer) and not isinstance(max_gap, bool)
-    if not whole or max_gap < 0:
+    if not isinstance(max_gap, Integral) or isinstance(max_gap, bool) or max_gap < 0:
         raise ValueError(f"max_gap must be a whole number of frames, 0 or more, got {max_gap!r}.")
 
 
 def warn_of_gaps(df, name):
-    """Say once and shortly what is missing, if anything is."""
+    """Warn of missing positions in a recording that a file was read into, if there are any."""
     gaps = find_gaps(df)
     if gaps.empty:
         return
     joints, _ = parse_joint_columns(df)
-    worst = gaps.groupby("joint")["n_frames"].sum().sort_values(ascending=False, kind="stable")
-    n_missing = int(worst.sum())
-    names = ", ".join(str(joint)[:20] for joint in worst.index[:4])
-    names += ", ..." if len(worst) > 4 else ""
+    n_missing = gaps.groupby("joint")["n_frames"].sum()
     n_outside = int((~gaps["inside"]).sum())
     ends = f"; {n_outside} touch an end and cannot be interpolated" if n_outside else ""
     warnings.warn(
-        f"{name}: {100 * n_missing / (len(df) * len(joints)):.2g} % of the positions are missing "
-        f"(NaN), of {len(worst)} of {len(joints)} {df.attrs.get('kind', 'joints')} ({names}): "
-        f"{len(gaps)} gaps, the longest of {gaps['n_frames'].max()} frames{ends}. Interpolate "
+        _describe_missing(name, "positions", n_missing, df, len(joints), "joints")
+        + f": {len(gaps)} gaps, the longest of {gaps['n_frames'].max()} frames{ends}. Interpolate "
         "short gaps with read_motion(..., max_gap=<frames>), list them with find_gaps(df), or drop "
         "those columns.",
         UserWarning,
@@ -158,20 +169,29 @@ def warn_of_gaps(df, name):
 
 
 def warn_of_missing(df, name):
-    """The same of a table that holds no positions."""
-    missing = df.isna().sum()
-    missing = missing[missing > 0].sort_values(ascending=False, kind="stable")
-    if missing.empty:
+    """Warn of missing values in a table of channels that a file was read into."""
+    n_missing = df.isna().sum()
+    n_missing = n_missing[n_missing > 0]
+    if n_missing.empty:
         return
-    names = ", ".join(str(column)[:40] for column in missing.index[:4])
-    names += ", ..." if len(missing) > 4 else ""
     warnings.warn(
-        f"{name}: {100 * missing.sum() / df.size:.2g} % of the values are missing (NaN), of "
-        f"{len(missing)} of {df.shape[1]} {df.attrs.get('kind', 'columns')} ({names}). Interpolate "
-        "short gaps with df.interpolate(limit=<frames>, limit_area='inside'), or drop those "
-        "columns.",
+        _describe_missing(name, "values", n_missing, df, df.shape[1], "columns")
+        + ". Interpolate short gaps with df.interpolate(limit=<frames>, limit_area='inside'), or "
+        "drop those columns.",
         UserWarning,
         stacklevel=3,
+    )
+
+
+def _describe_missing(name, what, n_missing, df, n_columns, kind):
+    """How much is missing, and of which joints or columns, the worst first."""
+    worst = n_missing.sort_values(ascending=False, kind="stable")
+    names = ", ".join(str(column)[:40] for column in worst.index[:4])
+    names += ", ..." if len(worst) > 4 else ""
+    share = 100 * worst.sum() / (len(df) * n_columns)
+    return (
+        f"{name}: {share:.2g} % of the {what} are missing (NaN), of {len(worst)} of {n_columns} "
+        f"{df.attrs.get('kind', kind)} ({names})"
     )
 
 
@@ -179,47 +199,21 @@ def _read(df):
     """Names of the joints, their dimensions, and a copy of the positions."""
     if not isinstance(df, pd.DataFrame):
         raise ValueError(
-            f"A recording must be a DataFrame, as read_motion gives, got {type(df).__name__}; name "
-            "the columns of an array with pd.DataFrame(x, columns=skeleton.column_names)."
+            f"A recording must be a DataFrame, as read_motion returns it, got {type(df).__name__}; "
+            "name the columns of an array with pd.DataFrame(x, columns=skeleton.column_names)."
         )
     joints, n_dims = parse_joint_columns(df)
     levels = df.index.droplevel(-1) if df.index.nlevels > 1 else df.index[:0]
     if levels.nunique() > 1:
         raise ValueError(
-            f"A recording must be of one performance, got a table of {levels.nunique()}; take them "
-            "one by one, as in df.groupby(level=0, group_keys=False).apply(fill_gaps, max_gap=10)."
+            f"A recording must be of one performance, got a table of {levels.nunique()}; use "
+            "df.groupby(level=0, group_keys=False).apply(fill_gaps, max_gap=10)."
         )
-    for column, dtype in enumerate(df.dtypes):
-        if getattr(dtype, "kind", "O") not in "fiubO":
-            raise _no_numbers(df, column, dtype)
-    try:
-        values = df.to_numpy(dtype=np.float64, na_value=np.nan, copy=True)
-    except (TypeError, ValueError) as error:
-        column = next(i for i in range(df.shape[1]) if not _is_numeric(df.iloc[:, i]))
-        raise _no_numbers(df, column, df.dtypes.iloc[column]) from error
-    if np.isinf(values).any():
-        frame, column = np.argwhere(np.isinf(values))[0]
-        raise ValueError(
-            f"Frame {frame}, column {df.columns[column]!r} is infinite; positions must be finite, "
-            "or NaN where a marker was not seen. Replace it, as in "
-            "df.replace([np.inf, -np.inf], np.nan)."
-        )
+    values = df.to_numpy(copy=True)
+    if values.dtype != np.float64:
+        values = np.array(as_numbers(df, "The recording", dtype=np.float64))
+    check_finite(values, "The recording, frame", list(df.columns), allow_nan=True)
     return joints, n_dims, values
-
-
-def _is_numeric(column):
-    try:
-        column.to_numpy(dtype=np.float64, na_value=np.nan)
-    except (TypeError, ValueError):
-        return False
-    return True
-
-
-def _no_numbers(df, column, dtype):
-    return ValueError(
-        f"Column {df.columns[column]!r} must hold numbers, got {dtype}; convert it with "
-        "pd.to_numeric, or drop that joint."
-    )
 
 
 def _missing(values, n_dims):
@@ -237,7 +231,7 @@ def _interpolate(known, part, frames):
     from scipy.interpolate import Akima1DInterpolator
 
     if len(known) == 2:
-        # A line. SciPy 1.13 reads memory it never set here.
+        # With two points SciPy 1.13 reads uninitialised memory.
         share = ((frames - known[0]) / (known[1] - known[0]))[:, None]
         return (1 - share) * part[known[0]] + share * part[known[1]]
     return Akima1DInterpolator(known, part[known])(frames)

@@ -1,25 +1,19 @@
-"""MOT and STO: OpenSim's tables of coordinates, forces and whatever else has a time."""
-
-import array
-import math
+"""MOT and STO: OpenSim's tables of coordinates, forces and other values by time."""
 
 import numpy as np
 
-from .guard import check_growth
 from .text import (
     MotionText,
-    check_n_rows,
-    check_time,
-    count_decimals,
     decode,
-    fields_of,
-    read_numbers,
-    show,
-    unique,
+    make_unique,
+    quote,
+    read_rate,
+    read_timed_rows,
+    split_fields,
 )
 
-# The parts of one column, by the DataType of the file.
-_PARTS = {
+# The components of a column, by the DataType of the file.
+_COMPONENTS = {
     b"vec2": "xy",
     b"vec3": "xyz",
     b"unitvec3": "xyz",
@@ -30,110 +24,72 @@ _PARTS = {
     b"spatialvec": "123456",
 }
 _FORCES = ("force", "torque", "moment")
+_ANGLE_UNITS = {b"yes": "deg", b"true": "deg", b"1": "deg"}
+_ANGLE_UNITS |= {b"no": "rad", b"false": "rad", b"0": "rad"}
 
 
 def read_storage(path):
-    """Names, values and facts of a MOT or STO file."""
+    """A MOT or STO file as a reader of `motion.READERS` returns it."""
     text = MotionText(path)
-    header, lines = _read_header(text)
-    n_rows = next((key for key in (b"nrows", b"datarows") if key in header), None)
-    n_stated = None if n_rows is None else _count(text, header[n_rows], lines[n_rows])
+    header = _read_header(text)
     labels = _read_labels(text)
-    parts = _PARTS.get(header.get(b"datatype", b"").lower(), "")
-    values, times, decimals = _read_rows(text, len(labels), len(parts))
-    check_n_rows(text, "the number of rows", lines.get(n_rows), n_stated, len(times))
-    check_growth(path, text.size, 8 * len(values), f"{len(times)} rows of {len(labels)} columns")
+    components = _COMPONENTS.get(header.get(b"datatype"), "")
+    rows = _split_rows(text, len(labels), len(components))
+    frames, decimals = read_timed_rows(text, rows, time_column=0)
+    for key, name in ((b"nrows", "nRows"), (b"datarows", "datarows")):
+        if key in header:
+            text.check_n_frames(len(frames), text.count(header[key], name), name)
+    values = np.frombuffer(b"".join(frames)).reshape(len(frames), -1)
     forces = all(any(word in label.lower() for word in _FORCES) for label in labels)
+    columns = [f"{a}_{b}" for a in labels for b in components] if components else labels
     return {
-        "channels": unique([f"{a}_{b}" for a in labels for b in parts] if parts else labels),
-        "values": np.frombuffer(values).reshape(len(times), -1),
-        "times": np.frombuffer(times),
+        "channels": make_unique(columns),
+        "values": values[:, 1:].copy(),
+        "times": values[:, 0].copy(),
         "decimals": decimals,
-        "frame_rate": _rate(header),
-        "units": None if forces else _units(header),
+        "frame_rate": read_rate(header.get(b"datarate", b"")),
+        "units": None if forces else _ANGLE_UNITS.get(header.get(b"indegrees")),
         "up": None,
         "kind": "forces" if forces else "coordinates",
     }
 
 
 def _read_header(text):
-    """What the lines above 'endheader' say, by its name in small letters, and where."""
-    header, lines = {}, {}
+    """The values above 'endheader' by their names, both in small letters."""
+    header = {}
     while row := text.row().strip():
-        if row.lower() == b"endheader":
-            return header, lines
-        key, equals, value = row.partition(b"=")
-        if not equals:
-            key, _, value = row.partition(b" ")
-        key = key.strip().lower()
-        header[key], lines[key] = value.strip(), text.line_number
+        row = row.lower()
+        if row == b"endheader":
+            return header
+        key, _, value = row.partition(b"=" if b"=" in row else b" ")
+        header[key.strip()] = value.strip()
     raise text.error("the file ends where 'endheader' should follow; it is not complete.")
-
-
-def _count(text, value, line_number):
-    if not value.isdigit() or len(value) > 18:
-        raise text.error(f"line {line_number} needs a whole number of rows, got {show([value])}.")
-    return int(value)
-
-
-def _rate(header):
-    try:
-        rate = float(header.get(b"datarate", b""))
-    except ValueError:
-        return None
-    return rate if 0 < rate < math.inf else None
-
-
-def _units(header):
-    """Of the angles; None if the file does not say."""
-    said = header.get(b"indegrees", b"").lower()
-    return {
-        b"yes": "deg",
-        b"true": "deg",
-        b"1": "deg",
-        b"no": "rad",
-        b"false": "rad",
-        b"0": "rad",
-    }.get(said)
 
 
 def _read_labels(text):
     """Names of the columns behind the time."""
-    labels = fields_of(text.row())
-    while labels and not labels[-1]:
-        labels.pop()
+    labels = split_fields(text.row(), 0)
     if len(labels) < 2 or labels[0].lower() != b"time" or b"" in labels:
-        raise text.error(f"expected 'time' and the names of the other columns, got {show(labels)}.")
+        raise text.error(
+            f"expected 'time' and the names of the other columns, got {quote(labels)}."
+        )
     return [decode(label) for label in labels[1:]]
 
 
-def _read_rows(text, n_labels, n_parts):
-    """Values and times one after the other, and how many decimals the times have."""
-    values, times, decimals, time = array.array("d"), array.array("d"), 0, -math.inf
-    n = n_labels * max(n_parts, 1)
+def _split_rows(text, n_labels, n_components):
+    """The time and the components of every row."""
+    n = 1 + n_labels
     while row := text.row():
         fields = row.split()
-        if len(fields) != 1 + n_labels:
-            fields = _without_the_end(fields_of(row), 1 + n_labels)
-        first, rest = fields[:1], fields[1:]
-        if n_parts:
-            rest = [part for field in rest for part in field.strip(b"~[]()").split(b",")]
-        if len(fields) != 1 + n_labels or len(rest) != n:
+        if len(fields) != n:
+            fields = split_fields(row, n)
+        parts = fields
+        if n_components:
+            parts = [part for x in fields[1:] for part in x.strip(b"~[]()").split(b",")]
+            parts = fields[:1] + parts
+        if len(fields) != n or len(parts) != 1 + n_labels * max(n_components, 1):
+            commas = f" of {n_components} numbers, with commas between them" * bool(n_components)
             raise text.error(
-                f"a row needs its time and {n_labels} columns"
-                f"{f' of {n_parts} numbers, with commas between them' if n_parts else ''}, "
-                f"got {show([row])}."
+                f"a row needs its time and {n_labels} columns{commas}, got {quote([row])}."
             )
-        numbers = read_numbers(text, first + rest, "a row")
-        time = check_time(text, numbers[0], time)
-        decimals = max(decimals, count_decimals(first[0]))
-        times.append(time)
-        values.extend(numbers[1:])
-    return values, times, decimals
-
-
-def _without_the_end(fields, n):
-    """The fields without blank ones behind the last of n."""
-    while len(fields) > n and not fields[-1]:
-        fields = fields[:-1]
-    return fields
+        yield parts

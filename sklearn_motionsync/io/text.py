@@ -1,24 +1,34 @@
-"""What the readers of text files share: its words, rows and tables of numbers, and its names."""
+"""What the readers of text files share: words, tables of numbers, rows with a time, names."""
 
 import array
 import io
 import math
+from collections import Counter
 
 import numpy as np
 import pandas as pd
 
-# Bytes of a table that are read at once: memory beside the file and its numbers stays constant.
+# No number of a recording is larger, in any unit.
+_LARGEST = 1e12
+# Bytes of a table that are parsed at once: memory beside the file and its numbers stays constant.
 _PORTION = 2**20
-# What plain decimal numbers and the blanks between them are made of.
+# The characters of plain decimal numbers and of the blanks between them.
 _PLAIN = b"0123456789+-.eE \t\n"
 _ONE_A_LINE = bytes.maketrans(b" \t", b"\n\n")
-# Before 3.1 the last digit is right on demand only; since then always, and nobody may ask for it.
+# Before pandas 3.1 the last digit is right only with this option; since then it is deprecated.
 _OLD = tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1)
 _EXACT = {"float_precision": "round_trip"} if _OLD else {}
+# What programs write for a missing number, without its sign.
+_MISSING = {b"", b"nan", b"na", b"n/a", b"null", b"none", b"inf", b"infinity"}
+_MISSING |= {b"1.#ind", b"1.#inf", b"1.#qnan", b"1.#snan", b"nan(ind)", b"nan(snan)"}
+# A small file may describe a huge result (many joints that never move, many short frames, a
+# compressed archive of zeros). The result of a real recording is about as large as its file.
+_LARGE_RESULT = 64 * 2**20
+_MAX_GROWTH = 32
 
 
 class MotionText:
-    """The words of a text file, one by one or line by line, and where they stand.
+    """The words of a text file, one by one or line by line, and their line numbers.
 
     Words are bytes: old files hold any encoding in their comments.
     """
@@ -53,9 +63,7 @@ class MotionText:
         return words or self.row().split()
 
     def lines(self):
-        """All lines that are left."""
-        if self._words:
-            yield self.line()
+        """The words of all lines that have any."""
         for line in self._lines:
             self.line_number += 1
             if words := line.split():
@@ -73,16 +81,33 @@ class MotionText:
     def numbers(self, words, n, what):
         """`n` finite numbers."""
         if len(words) != n:
-            raise self.error(f"{what} needs {n} numbers, got {len(words)} ({show(words)}).")
+            raise self.error(f"{what} needs {n} numbers, got {len(words)} ({quote(words)}).")
         try:
             numbers = array.array("d", map(float, words))
         except ValueError:
             numbers = array.array("d", [math.nan])
-        # Python reads 1_0 as a number, files do not mean it.
-        if b"_" in b"".join(words) or not all(map(math.isfinite, numbers)):
-            bad = next(word for word in words if not _is_number(word))
-            raise self.error(f"{what} needs finite numbers, got {show([bad])}.")
+        # Python accepts 1_0 as a number; no file means it.
+        if b"_" in b"".join(words) or not math.hypot(*numbers) < _LARGEST:
+            for word in words:
+                if not _is_number(word):
+                    raise self.error(
+                        f"{what} needs finite numbers below {_LARGEST:g}, got {quote([word])}."
+                    )
         return numbers
+
+    def positive(self, words, what):
+        """A single number above 0, neither so small nor so large that its inverse overflows."""
+        (number,) = self.numbers(words, 1, what)
+        if not number > 1 / _LARGEST:
+            raise self.error(f"{what} must be above 0, got {number!r}.")
+        return number
+
+    def count(self, word, what):
+        """A whole number above 0."""
+        number = read_rate(word)
+        if number is None or number > _LARGEST or number != int(number):
+            raise self.error(f"{what} needs a whole number above 0, got {quote([word])}.")
+        return int(number)
 
     def table(self, n, what):
         """The lines that are left, `n` finite numbers each, as an array (n_lines, n)."""
@@ -95,14 +120,38 @@ class MotionText:
                 rows.append(numbers)
                 self.line_number += portion.count(b"\n") + (not portion.endswith(b"\n"))
                 continue
-            # Line by line, which finds out what is wrong with it, if anything is.
+            # Line by line: this finds the line of an error, if there is one.
             self._lines.seek(start)
             while self._lines.tell() < start + len(portion) and (words := self.line()):
                 rows.append(np.array([self.numbers(words, n, what)]))
         return np.concatenate(rows)
 
+    def check_n_frames(self, n_frames, n_stated, name):
+        """Refuse a file that states another number of frames than it has."""
+        if n_stated not in (None, n_frames):
+            raise self.error(
+                f"{name} says {n_stated}, but {n_frames} frames follow; the file is not complete, "
+                "or that line is wrong: then correct it."
+            )
+
+    def check_size(self, n_frames, n_joints):
+        """Refuse positions out of all proportion to the file, before they are made."""
+        n_bytes = 24 * n_frames * n_joints
+        what = f"{n_frames} frames of {n_joints} joints"
+        check_result_size(self.path, self.size, n_bytes, what)
+
     def error(self, message):
         return ValueError(f"{self.path}, line {self.line_number}: {message}")
+
+
+def check_result_size(path, file_size, n_bytes, what):
+    """Refuse a result of `n_bytes` from a file of `file_size` bytes, before it is made."""
+    if n_bytes > max(_LARGE_RESULT, _MAX_GROWTH * file_size):
+        raise ValueError(
+            f"{path}: {what} would take {n_bytes / 2**20:.0f} MB, from a file of "
+            f"{file_size / 2**20:.2f} MB. No recording grows like that, so the file is probably "
+            "damaged. Remove the joints or the frames that are not needed."
+        )
 
 
 def _plain_numbers(text, n):
@@ -130,19 +179,97 @@ def _plain_numbers(text, n):
     except ValueError:
         return None
     numbers = column.to_numpy()
-    if numbers.size != len(words) or not np.isfinite(numbers).all():
+    if numbers.size != len(words) or not max(numbers.max(), -numbers.min()) < _LARGEST:
         return None
     return numbers.reshape(-1, n)
 
 
 def _is_number(word):
     try:
-        return math.isfinite(float(word)) and b"_" not in word
+        return abs(float(word)) < _LARGEST and b"_" not in word
     except ValueError:
         return False
 
 
-def show(words):
+# -- rows that begin with their time: TRC, MOT and STO ----------------------------------
+
+
+def split_fields(row, n=None):
+    """The fields between tabs, or between blanks in a row without tabs.
+
+    Blank ones behind the first `n` are left out.
+    """
+    fields = [field.strip() for field in row.split(b"\t")] if b"\t" in row else row.split()
+    while n is not None and len(fields) > n and not fields[-1]:
+        fields.pop()
+    return fields
+
+
+def read_timed_rows(text, rows, time_column):
+    """The numbers of each row, NaN where one is missing, and how many decimals the times have.
+
+    `rows` yields the fields of one row after the other, as they are read from `text`.
+    """
+    result, decimals, before = [], 0, -math.inf
+    for fields in rows:
+        numbers = _numbers_or_nan(text, fields)
+        time = numbers[time_column]
+        if not -_LARGEST < time < _LARGEST or time < before:
+            raise text.error(
+                "the time of a row must be a number of seconds, and not lie before that of the "
+                f"row above, got {time:g} after {before:g}."
+            )
+        before = time
+        decimals = max(decimals, _count_decimals(fields[time_column]))
+        result.append(numbers)
+    if not result:
+        raise text.error("the file ends where frames should follow; it is not complete.")
+    return result, decimals
+
+
+def read_rate(word):
+    """Frames a second as the header states them; None if it states no such number."""
+    try:
+        rate = float(word)
+    except ValueError:
+        return None
+    return rate if 0 < rate < math.inf else None
+
+
+def _numbers_or_nan(text, fields):
+    try:
+        numbers = array.array("d", map(float, fields))
+        # Python accepts 1_0 as a number; no file means it.
+        if not any(map(math.isinf, numbers)) and b"_" not in b"".join(fields):
+            return numbers
+    except ValueError:
+        pass
+    return array.array("d", (_number_or_nan(text, field) for field in fields))
+
+
+def _number_or_nan(text, field):
+    if field.strip().lower().lstrip(b"+-") in _MISSING:
+        return math.nan
+    try:
+        number = float(field)
+    except ValueError:
+        number = math.inf
+    if math.isinf(number) or b"_" in field:
+        raise text.error(
+            f"a frame needs numbers, or nothing where one is missing, got {quote([field])}."
+        )
+    return number
+
+
+def _count_decimals(field):
+    """Digits behind the point of a number as it is written."""
+    return len(field.strip().partition(b".")[2]) if b"e" not in field.lower() else 17
+
+
+# -- names and quotations ---------------------------------------------------------------
+
+
+def quote(words):
     """Words as an error message quotes them, never more than a line."""
     text = decode(b" ".join(words[:8])[:61])
     return repr(text if len(text) <= 60 else text[:60] + "...")
@@ -156,87 +283,16 @@ def decode(name):
         return name.decode("latin-1")
 
 
-def unique(names):
+def make_unique(names):
     """The names, with ``_2``, ``_3``, ... behind those that came before."""
-    taken, last = set(names), {}
-    result = []
+    used, number, result = set(names), Counter(), []
     for name in names:
-        new = name
-        if name in last:
-            # Counting on from the last number keeps this linear.
-            while new in taken:
-                last[name] += 1
-                new = f"{name}_{last[name]}"
-            taken.add(new)
-        else:
-            last[name] = 1
+        number[name] += 1
+        new = name if number[name] == 1 else f"{name}_{number[name]}"
+        # Counting on from the last number keeps this linear.
+        while number[name] > 1 and new in used:
+            number[name] += 1
+            new = f"{name}_{number[name]}"
+        used.add(new)
         result.append(new)
     return result
-
-
-# -- what the readers of columns of text share: fields, numbers or nothing, times that go on
-
-# What programs write where they have no number, without its sign.
-_NOTHING = {b"", b"nan", b"na", b"n/a", b"null", b"none", b"-", b"inf", b"infinity"}
-_NOTHING |= {b"1.#ind", b"1.#inf", b"1.#qnan", b"1.#snan", b"nan(ind)", b"nan(snan)"}
-# Seconds; no recording is as late.
-_LONG = 1e12
-
-
-def fields_of(row):
-    """What stands between tabs; between blanks in a row without tabs."""
-    if b"\t" not in row:
-        return row.split()
-    return [field.strip() for field in row.split(b"\t")]
-
-
-def read_numbers(text, fields, what):
-    """A number for each field, NaN where there is none."""
-    try:
-        numbers = array.array("d", map(float, fields))
-        # Python reads 1_0 as a number, files do not mean it.
-        if not any(map(math.isinf, numbers)) and b"_" not in b"".join(fields):
-            return numbers
-    except ValueError:
-        pass
-    return array.array("d", (_read_number(text, field, what) for field in fields))
-
-
-def _read_number(text, field, what):
-    if field.strip().lower().lstrip(b"+-") in _NOTHING or field.strip() == b"-":
-        return math.nan
-    try:
-        number = float(field)
-    except ValueError:
-        number = math.inf
-    if math.isinf(number) or b"_" in field:
-        raise text.error(
-            f"{what} needs numbers, or nothing where none is known, got {show([field])}."
-        )
-    return number
-
-
-def check_time(text, time, before):
-    """Refuse a time that is none, or that lies before the one of the row above."""
-    if not -_LONG < time < _LONG or time < before:
-        raise text.error(
-            "the time of a row must be a number of seconds, and not lie before that of the row "
-            f"above, got {time:g} after {before:g}."
-        )
-    return time
-
-
-def check_n_rows(text, name, line_number, n_stated, n_rows):
-    """Refuse a file that states another number of rows, or has none."""
-    if not n_rows:
-        raise text.error("the file ends where frames should follow; it is not complete.")
-    if n_stated is not None and n_stated != n_rows:
-        raise text.error(
-            f"{name} in line {line_number} says {n_stated}, but {n_rows} frames follow; the file "
-            "is not complete, or that line is wrong: then correct it."
-        )
-
-
-def count_decimals(field):
-    """Digits behind the point of a number as it is written."""
-    return len(field.strip().partition(b".")[2]) if b"e" not in field.lower() else 17

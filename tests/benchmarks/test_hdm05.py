@@ -1,4 +1,4 @@
-"""The archive of HDM05 that is made from the downloaded files, against the one that tests read."""
+"""benchmarks/hdm05.py: the archive it makes of downloaded files, against the one of the tests."""
 
 import re
 import shutil
@@ -19,7 +19,7 @@ def make(hdm05, monkeypatch, *args):
     hdm05.main()
 
 
-def test_converted_clips_equal_the_archive(hdm05, real_data, tmp_path, monkeypatch, capsys):
+def test_archive_agrees_with_that_of_the_tests(hdm05, real_data, tmp_path, monkeypatch, capsys):
     output = tmp_path / "new" / "hdm05_positions.npz"
     make(hdm05, monkeypatch, real_data / "original_files", output)
     assert "3 clips, " in capsys.readouterr().out
@@ -31,11 +31,11 @@ def test_converted_clips_equal_the_archive(hdm05, real_data, tmp_path, monkeypat
     clips = [archive["source"].tolist().index(name) for name in made["source"]]
     assert sorted(clips) == clips
     for i, clip in enumerate(clips):
-        ours, theirs = (
+        positions, expected = (
             part["positions"][slice(*part["offsets"][k : k + 2])]
             for part, k in ((made, i), (archive, clip))
         )
-        np.testing.assert_allclose(ours, theirs, rtol=0, atol=2e-6)  # metres
+        np.testing.assert_allclose(positions, expected, rtol=0, atol=2e-6)  # metres
     for name in ("label", "actor", "take", "fps"):
         assert made[name].tolist() == archive[name][clips].tolist()
     for name in ("joints", "parents"):
@@ -46,8 +46,7 @@ def test_converted_clips_equal_the_archive(hdm05, real_data, tmp_path, monkeypat
     assert len(load_performances(output).data) == 3
 
 
-def test_every_archived_clip_is_selected(hdm05, real_data, tmp_path):
-    """And in its order."""
+def test_find_clips_finds_all_clips_of_the_archive_in_its_order(hdm05, real_data, tmp_path):
     with np.load(real_data / "hdm05" / "hdm05_positions.npz") as file:
         sources = file["source"].tolist()
     for number, name in enumerate(sources):
@@ -60,7 +59,7 @@ def test_every_archived_clip_is_selected(hdm05, real_data, tmp_path):
     assert [path.name for path, _ in hdm05.find_clips(tmp_path)] == sources
 
 
-def test_missing_files_are_refused(hdm05, tmp_path, monkeypatch):
+def test_missing_clips_and_skeletons_are_errors(hdm05, tmp_path, monkeypatch):
     with pytest.raises(
         SystemExit, match=re.escape(f"below {tmp_path}; download them as docs/bench")
     ):

@@ -1,7 +1,6 @@
-"""fetch_cmu against a server of this machine: the cache, and whatever can go wrong on the way."""
+"""fetch_cmu against a server of this machine: the cache, and failures of the download."""
 
 import hashlib
-import socket
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
@@ -16,7 +15,7 @@ BONE = "begin\nname {}\ndirection 0 {} 0\nlength 1\naxis 0 0 0 XYZ\n{}end\n"
 AMC = b"1\nroot 0 1 0 0 0 0\nhead 0\n2\nroot 0 2 0 0 0 0\nhead 5\n"
 
 
-def a_skeleton():
+def skeleton_file():
     """Acclaim's joints; only the head moves."""
     known = Skeleton.acclaim()
     names = known.joints
@@ -28,20 +27,20 @@ def a_skeleton():
 
 
 class Site:
-    """What the server holds, how it misbehaves, and what it was asked for."""
+    """The files of the server, its failures, and the paths that were requested."""
 
     def __init__(self):
         self.files = {
-            "/subjects/02/02.asf": a_skeleton(),
+            "/subjects/02/02.asf": skeleton_file(),
             "/subjects/02/02_01.amc": AMC,
             "/subjects/02/02_02.amc": AMC + b"3\nroot 0 3 0 0 0 0\nhead 5\n",
         }
-        self.asked = []
+        self.requests = []
         self.fail = []  # status codes of the answers to come
         self.missing_bytes = 0
 
     def answer(self, handler):
-        self.asked.append(handler.path)
+        self.requests.append(handler.path)
         content = self.files.get(handler.path)
         code = self.fail.pop(0) if self.fail else 200 if content is not None else 404
         handler.send_response(code)
@@ -53,7 +52,7 @@ class Site:
 
 @pytest.fixture
 def site(monkeypatch):
-    # A proxy would be asked for 127.0.0.1.
+    # No proxy for 127.0.0.1.
     monkeypatch.setenv("no_proxy", "*")
     site = Site()
 
@@ -83,12 +82,11 @@ def kept(folder):
     return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
 
 
-def test_what_it_gives(site, tmp_path):
+def test_bunch_holds_the_trials(site, tmp_path):
     bunch = fetch(site, tmp_path)
     assert [len(df) for df in bunch.data] == [2, 3]
     assert bunch.subject == "02"
     assert bunch.take.tolist() == ["01", "02"]
-    assert isinstance(bunch.take, np.ndarray)
     assert bunch.skeleton == Skeleton.acclaim()
     assert bunch.joints == list(Skeleton.acclaim().joints)
     assert bunch.frame_rate.tolist() == [120, 120]
@@ -96,58 +94,40 @@ def test_what_it_gives(site, tmp_path):
     assert bunch.data[0].attrs["frame_rate"] == 120
     assert bunch.filenames[1] == str(tmp_path / "cmu_mocap" / "02" / "02_02.amc")
     pd.testing.assert_frame_equal(bunch.data[1], read_motion(bunch.filenames[1], frame_rate=120))
-    for words in ("free for all uses", "may not resell this data directly", "NSF EIA-0196217"):
-        assert words in " ".join(bunch.DESCR.split())
+    assert "may not resell this data directly" in " ".join(bunch.DESCR.split())
 
 
-def test_the_second_time_needs_no_network(site, tmp_path):
+def test_kept_files_need_no_network(site, tmp_path):
     first = fetch(site, tmp_path)
-    assert site.asked == list(site.files)
+    assert site.requests == list(site.files)
     again = fetch(site, tmp_path)
     fetch(site, tmp_path, "01", url="http://127.0.0.1:1", download_if_missing=False)
-    assert len(site.asked) == 3
+    assert len(site.requests) == 3
     pd.testing.assert_frame_equal(first.data[1], again.data[1])
     fetch(site, tmp_path, [1, 1, "2"])
-    assert len(site.asked) == 3
+    assert len(site.requests) == 3
     assert kept(tmp_path) == [f"cmu_mocap/02/{n}" for n in ("02.asf", "02_01.amc", "02_02.amc")]
 
 
-def test_nothing_there_and_nothing_wanted(site, tmp_path):
-    where = rf"02\.asf is not in {tmp_path}/cmu_mocap/02 .*{site.url}/02/02\.asf: download_if_miss"
-    with pytest.raises(OSError, match=where + r".*by hand into that folder, or give another url="):
-        fetch(site, tmp_path, download_if_missing=False)
-    assert site.asked == []
-
-
-def test_no_such_trial(site, tmp_path):
+def test_missing_trial_is_an_error(site, tmp_path):
     with pytest.raises(FileNotFoundError, match=r"no 02_77\.amc at .*HTTP 404.* does not exist"):
         fetch(site, tmp_path, [1, 77], n_retries=3, delay=60.0)
     assert kept(tmp_path) == ["cmu_mocap/02/02.asf", "cmu_mocap/02/02_01.amc"]
-    assert len(site.asked) == 3
+    assert len(site.requests) == 3
     with pytest.raises(FileNotFoundError, match=r"no 900\.asf at "):
         fetch_cmu("900", 1, data_home=tmp_path, url=site.url)
 
 
-def test_nobody_answers(tmp_path, monkeypatch):
-    monkeypatch.setenv("no_proxy", "*")
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        url = f"http://127.0.0.1:{taken.getsockname()[1]}"
-        with pytest.raises(OSError, match=rf"could not be had from {url}/02/02\.asf: .*refused"):
-            fetch_cmu(2, 1, data_home=tmp_path, url=url, n_retries=1, delay=0.0)
-    assert kept(tmp_path) == []
-
-
-def test_it_tries_again(site, tmp_path):
+def test_failed_requests_are_repeated(site, tmp_path):
     site.fail = [503, 500]
     assert len(fetch(site, tmp_path, n_retries=2).data) == 2
-    assert len(site.asked) == 5
+    assert len(site.requests) == 5
     site.fail = [503, 503]
-    with pytest.raises(OSError, match=r"could not be had from .*503.*by hand"):
+    with pytest.raises(OSError, match=r"could not be got from .*503.*by hand"):
         fetch(site, tmp_path / "other", n_retries=1)
 
 
-def test_a_download_that_breaks_off(site, tmp_path):
+def test_incomplete_download_is_not_kept(site, tmp_path):
     site.missing_bytes = 20
     with pytest.raises(OSError, match=r"02\.asf is not in .*got only \d+ out of \d+ bytes"):
         fetch(site, tmp_path, n_retries=1)
@@ -156,23 +136,20 @@ def test_a_download_that_breaks_off(site, tmp_path):
     assert len(fetch(site, tmp_path).data) == 2
 
 
-def test_a_download_that_is_something_else(site, tmp_path):
-    site.files["/subjects/02/02_01.amc"] = b"<html>Please log in</html>"
-    with pytest.raises(ValueError, match=r"02_01\.amc, line 1: .* What was downloaded was removed"):
-        fetch(site, tmp_path)
-    assert kept(tmp_path) == []
-
-
-def test_a_damaged_file_of_before(site, tmp_path):
-    bunch = fetch(site, tmp_path)
+def test_unreadable_files_are_removed_after_a_download_only(site, tmp_path):
+    bunch = fetch(site, tmp_path / "a")
     with open(bunch.filenames[0], "a") as file:
         file.write("head")
-    with pytest.raises(ValueError, match=r"02_01\.amc, line 7: .* Delete that file to get it anew"):
-        fetch(site, tmp_path)
+    with pytest.raises(ValueError, match=r"02_01\.amc, line 7: .* Delete that file to get it ag"):
+        fetch(site, tmp_path / "a")
+    assert len(kept(tmp_path)) == 3
+    site.files["/subjects/02/02_01.amc"] = b"<html>Please log in</html>"
+    with pytest.raises(ValueError, match=r"02_01\.amc, line 1: .* Downloaded files were removed"):
+        fetch(site, tmp_path / "b")
     assert len(kept(tmp_path)) == 3
 
 
-def test_checksums(site, tmp_path):
+def test_checksums_are_compared(site, tmp_path):
     right = {p.rsplit("/", 1)[1]: hashlib.sha256(c).hexdigest() for p, c in site.files.items()}
     wrong = right | {"02_02.amc": "0" * 64}
     with pytest.raises(OSError, match=rf"has the checksum {right['02_02.amc']}, not 0000"):
@@ -182,63 +159,47 @@ def test_checksums(site, tmp_path):
     with open(bunch.filenames[0], "ab") as file:
         file.write(b"3\nroot 0 3 0 0 0 0\nhead 5\n")
     assert len(fetch(site, tmp_path).data[0]) == 3
-    with pytest.raises(OSError, match=r"02_01\.amc is not in .*download_if_missing is False"):
+    message = (
+        rf"02_01\.amc is not in {tmp_path}/cmu_mocap/02 .*{site.url}/02/02_01\.amc: download_if"
+    )
+    with pytest.raises(OSError, match=message + ".*by hand into that folder, or give another url="):
         fetch(site, tmp_path, sha256=right, download_if_missing=False)
     assert len(fetch(site, tmp_path, sha256=right).data[0]) == 2
 
 
-@pytest.mark.parametrize("number", ["..", "../01", "", 0, -1, 1.5, None, "1e3", "\u0663", 12345])
-def test_numbers_that_are_none(tmp_path, number):
+@pytest.mark.parametrize("number", ["../01", "", 0, 1.5, None, "1e3", "\u0663", 12345])
+def test_wrong_numbers_are_refused(tmp_path, number):
     with pytest.raises(ValueError, match="subject must be numbers from 1"):
         fetch_cmu(number, 1, data_home=tmp_path)
     with pytest.raises(ValueError, match="trials must be numbers from 1"):
         fetch_cmu(1, [number], data_home=tmp_path)
-    assert kept(tmp_path) == []
-
-
-def test_no_trials(tmp_path):
     with pytest.raises(ValueError, match="trials must be one number or several, got none"):
         fetch_cmu(1, [], data_home=tmp_path)
+    assert kept(tmp_path) == []
 
 
 @pytest.mark.parametrize(
-    ("params", "message"),
+    "params",
     [
-        *(
-            ({"n_retries": n}, "n_retries must be a whole number, 0 or")
-            for n in (-1, 1.5, None, True)
-        ),
-        *(({"delay": d}, "delay must be seconds, from 0") for d in (-1, np.nan, np.inf, "1", True)),
-        *(
-            ({"url": u}, "url must be an address, such as")
-            for u in (None, 3, "", "host", b"http://h")
-        ),
-        *(({"sha256": m}, "sha256 must be checksums by the na") for m in ("0" * 64, ["0" * 64], 5)),
-        *(
-            ({"sha256": {"02.asf": c}}, "sha256 of '02.asf' must be 64 hex")
-            for c in (None, "", "0")
-        ),
-        *(({"download_if_missing": d}, "must be True or False") for d in ("no", None)),
+        {"n_retries": -1},
+        {"delay": np.nan},
+        {"url": None},
+        {"sha256": "0" * 64},
+        {"download_if_missing": "no"},
     ],
     ids=str,
 )
-def test_parameters_that_make_no_sense(site, tmp_path, params, message):
-    with pytest.raises(ValueError, match=message):
+def test_parameters_out_of_range_are_refused(site, tmp_path, params):
+    with pytest.raises(ValueError, match=f"'{next(iter(params))}' parameter of fetch_cmu"):
         fetch(site, tmp_path, **params)
-    assert site.asked == []
+    assert site.requests == []
     assert kept(tmp_path) == []
 
 
-def test_real_walks(site, tmp_path, real_data):
+def test_real_walks_have_acclaims_skeleton(site, tmp_path, real_data):
     folder = real_data / "original_files" / "asf_amc"
     for path in folder.glob("02*"):
         site.files[f"/subjects/02/{path.name}"] = path.read_bytes()
     bunch = fetch(site, tmp_path)
     assert [df.shape for df in bunch.data] == [(343, 93), (298, 93)]
     assert bunch.skeleton == Skeleton.acclaim()
-    for df in bunch.data:
-        x = df.to_numpy().reshape(len(df), 31, 3)
-        for a, b in bunch.skeleton.bones:
-            length = np.linalg.norm(x[:, a] - x[:, b], axis=1)
-            assert np.ptp(length) < 1e-9
-            assert 0.01 < length[0] < 0.5

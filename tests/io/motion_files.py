@@ -1,59 +1,8 @@
-"""Small files of motion capture, and what they must be read as."""
+"""Small files of motion capture."""
 
 import struct
 
 import numpy as np
-
-
-def turn(axis, degrees):
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    matrix = np.eye(4)
-    i, j = {"X": (1, 2), "Y": (2, 0), "Z": (0, 1)}[axis]
-    matrix[i, i] = matrix[j, j] = c
-    matrix[i, j], matrix[j, i] = -s, s
-    return matrix
-
-
-def bvh_oracle(text):
-    """Positions by name, one (n_frames, 3) array each."""
-    words = text.split()
-    at = words.index("MOTION")
-    n_frames = int(words[at + 2])
-    numbers = list(map(float, words[at + 6 :]))
-    per_frame = len(numbers) // n_frames
-    result = {}
-    for frame in range(n_frames):
-        values = iter(numbers[frame * per_frame : (frame + 1) * per_frame])
-        worlds, names, i = [np.eye(4)], [], 1
-        while i < at:
-            word = words[i]
-            if word in ("ROOT", "JOINT"):
-                names.append(words[i + 1])
-                i += 3
-            elif word == "End":
-                names.append(names[-1] + "_end")
-                i += 3
-            elif word == "OFFSET":
-                offset = list(map(float, words[i + 1 : i + 4]))
-                rotation = np.eye(4)
-                i += 4
-                if words[i] == "CHANNELS":
-                    for channel in words[i + 2 : i + 2 + int(words[i + 1])]:
-                        if channel.endswith("position"):
-                            offset["XYZ".index(channel[0])] = next(values)
-                        else:
-                            rotation = rotation @ turn(channel[0], next(values))
-                    i += 2 + int(words[i + 1])
-                local = np.eye(4)
-                local[:3, 3] = offset
-                worlds.append(worlds[-1] @ local @ rotation)
-                result.setdefault(names[-1], []).append(worlds[-1][:3, 3])
-            else:
-                worlds.pop()
-                names.pop()
-                i += 1
-    return {name: np.array(track) for name, track in result.items()}
-
 
 BODY = """HIERARCHY
 ROOT hips
@@ -326,13 +275,14 @@ def storage(values, labels, rate=100, times=None, header="version=1\nnRows={n}\n
     return text
 
 
-def opensim():
-    """Small TRC, MOT and STO files, by name, one a call of `read_motion`."""
-    values = np.random.default_rng(0).normal(size=(20, 2)).round(4)
-    vectors = [["1,2,3", "~[4,5,6]"]] * 20
-    texts = {
-        "a.trc": trc(tracks(gap=(3, 9)), ["LASI", "R Knee", "V_Sacral"]),
-        "a.mot": storage(values, ["knee", "ground_force_vx"]),
-        "a.sto": storage(vectors, ["pelvis", "torso"], header="DataType=Vec3\nDataRate=100\n"),
-    }
-    return [{name: text.encode()} for name, text in texts.items()]
+VECTORS, VEC3 = [["1,2,3", "~[4,5,6]"]] * 20, "DataType=Vec3\nDataRate=100\n"
+# For each ending a function that returns the files of a small example, {name: bytes}, the first of
+# which is read.
+EXAMPLES = {
+    ".bvh": lambda: {"a.bvh": body().encode()},
+    ".amc": lambda: {"a.amc": AMC.encode(), "a.asf": ASF.encode("latin-1")},
+    ".c3d": lambda: {"a.c3d": c3d(**everything())},
+    ".trc": lambda: {"a.trc": trc(tracks(gap=(3, 9)), ["LASI", "R Knee", "V_Sacral"]).encode()},
+    ".mot": lambda: {"a.mot": storage([[1.5, -2], [2, 0]] * 9, ["knee", "force_vx"]).encode()},
+    ".sto": lambda: {"a.sto": storage(VECTORS, ["pelvis", "torso"], header=VEC3).encode()},
+}

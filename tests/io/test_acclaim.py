@@ -1,10 +1,8 @@
-"""Reading ASF/AMC: by hand, against the archive, and where the files are wrong."""
+"""Acclaim: positions by hand, and errors of wrong files."""
 
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import Skeleton
-from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.io import read_motion
 
 from motion_files import AMC, ASF, joint, put
@@ -17,19 +15,10 @@ def acclaim(folder, asf=ASF, amc=AMC, **params):
     return read_motion(put(folder, amc, "a_01.amc"), **params)
 
 
-def test_acclaim_by_hand(tmp_path):
+def test_positions_by_hand(tmp_path):
     df = acclaim(tmp_path)
-    assert df.attrs == {
-        "format": "amc",
-        "frame_rate": None,
-        "units": "m",
-        "up": "y",
-        "kind": "joints",
-        "joints": ["root", "thigh", "shin"],
-        "parents": [-1, 0, 1],
-        "performance": "a_01",
-        "levels": ["recording", "frame"],
-    }
+    assert (df.attrs["units"], df.attrs["up"], df.attrs["kind"]) == ("m", "y", "joints")
+    assert (df.attrs["joints"], df.attrs["parents"]) == (["root", "thigh", "shin"], [-1, 0, 1])
     expected = np.array([[1, 2, 3], [1, -2, 3], [1, -5, 3]]) * INCH
     np.testing.assert_allclose(df.iloc[0].to_numpy().reshape(3, 3), expected)
     # The thigh's x axis is the root's y, about which -y does not turn; shin and thigh are one line.
@@ -41,8 +30,7 @@ def test_acclaim_by_hand(tmp_path):
     )
 
 
-def test_order_of_the_degrees_of_freedom(tmp_path):
-    """The first named acts first, about fixed axes; so do the root's."""
+def test_degrees_of_freedom_act_in_their_order_about_fixed_axes(tmp_path):
     asf = ASF.replace("axis 0 0 90 XYZ\n    dof rx rz", "axis 0 0 0 XYZ\n    dof {} tx")
     amc = "1\nroot 0 0 0 0 0 0\nthigh 90 90 2\n"
     first_x = acclaim(tmp_path, asf.format("rx rz"), amc)
@@ -55,7 +43,7 @@ def test_order_of_the_degrees_of_freedom(tmp_path):
     np.testing.assert_allclose(joint(df, "thigh")[0] / INCH, [5, 2, 3], atol=1e-12)
 
 
-def test_where_the_root_begins(tmp_path):
+def test_root_starts_at_its_position_and_orientation(tmp_path):
     asf = ASF.replace("position 0 0 0", "position 1 1 1")
     asf = asf.replace("orientation 0 0 0", "orientation 0 0 90")
     df = acclaim(tmp_path, asf)
@@ -63,7 +51,7 @@ def test_where_the_root_begins(tmp_path):
     np.testing.assert_allclose(joint(df, "thigh")[0] / INCH, [6, 3, 4])
 
 
-def test_a_hierarchy_in_any_order(tmp_path):
+def test_hierarchy_may_have_any_order(tmp_path):
     expected = acclaim(tmp_path)
     asf = ASF.replace("root thigh\n    thigh shin", "thigh shin\n    root thigh")
     assert asf != ASF
@@ -72,7 +60,7 @@ def test_a_hierarchy_in_any_order(tmp_path):
     pd.testing.assert_frame_equal(df[expected.columns], expected)
 
 
-def test_radians(tmp_path):
+def test_angles_may_be_radians(tmp_path):
     expected = acclaim(tmp_path)
     asf = ASF.replace("angle deg", "angle rad").replace("0 0 90", f"0 0 {np.pi / 2}")
     amc = AMC.replace("90", f"{np.pi / 2}").replace(":DEGREES\n", "")
@@ -80,13 +68,12 @@ def test_radians(tmp_path):
     pd.testing.assert_frame_equal(acclaim(tmp_path, asf, AMC), expected)
 
 
-def test_the_rate_where_it_is_stated(tmp_path):
+def test_frame_rate_is_the_stated_one(tmp_path):
     amc = AMC.replace(":DEGREES", ":DEGREES\n:SAMPLES-PER-SECOND 60")
     assert acclaim(tmp_path, amc=amc).attrs["frame_rate"] == 60
-    assert acclaim(tmp_path, amc=amc, frame_rate=120).attrs["frame_rate"] == 120
 
 
-def test_which_skeleton(tmp_path):
+def test_skeleton_is_found_by_its_name(tmp_path):
     put(tmp_path, ASF.replace("length 0.5", "length 1"), "HDM.asf")
     put(tmp_path, ASF, "HDM_bd.ASF")
     amc = put(tmp_path, AMC.replace("\n", "\r\n"), "HDM_bd_sneak_120.AMC")
@@ -107,22 +94,19 @@ def test_which_skeleton(tmp_path):
         ("TX TY", "TX TX", "'order' needs different ones of tx ty"),
         ("dof rx rz", "dof l", "'dof' needs different ones of tx ty tz rx ry rz, got 'l'"),
         ("90 XYZ", "90 XYX", "order of the axes like XYZ, got 'XYX'"),
-        ("length 4", "length x", "line 19: length needs finite numbers, got 'x'"),
+        ("length 4", "length x", "line 19: length needs finite numbers below 1e.12, got 'x'"),
         ("length 4", "", "line 24: bone 'thigh' needs a name of its own, a direction and a length"),
-        ("name shin", "name thigh", "bone 'thigh' needs a name of its own"),
         ("    dof rx", "begin", "expected end, got 'begin rz'"),
         ("root thigh\n", "root leg\n", ":hierarchy names 'leg', which is not in :bonedata"),
         ("thigh shin\n", "shin thigh\n", ":hierarchy gives 'thigh' two parents"),
         ("thigh shin\n", "\n", "does not connect 1 bones to the root, 'shin' is one"),
-        ("root thigh\n", "shin thigh\n", "does not connect 2 bones"),
         ("root thigh\n", "\n", "does not connect 2 bones to the root, 'shin' is one"),
         (":bonedata", ":bones", ":hierarchy names 'thigh', which is not in :bonedata"),
         (ASF[ASF.index(":bonedata") :], "", "ends without a complete :root, :bonedata"),
-        ("4\n", "1e308\n", "with :units length 0.5 positions overflow"),
-        ("direction 0 -1 0\n    length 4", "direction 0 9 0\nlength 1e308", "infinitely long"),
+        ("4\n", "1e308\n", "length needs finite numbers below 1e.12, got '1e308'"),
     ],
 )
-def test_bad_asf(tmp_path, old, new, message):
+def test_wrong_skeletons_are_refused(tmp_path, old, new, message):
     assert old in ASF
     asf = ASF.replace(old, new, 1)
     with pytest.raises(ValueError, match=rf"a\.asf, line \d+: |a\.asf: {message}") as caught:
@@ -130,54 +114,27 @@ def test_bad_asf(tmp_path, old, new, message):
     caught.match(message)
 
 
-def test_bones_out_of_this_world(tmp_path):
-    old = "direction 0 -1 0\n    length 4\n    axis 0 0 90"
-    asf = ASF.replace(old, "direction 1 1 1\n    length 1.7e308\n    axis 30 40 50")
-    with pytest.raises(ValueError, match="joint 1 is infinitely far away in frame 0"):
-        acclaim(tmp_path, asf)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
         (AMC, "", "line 0: the file ends without a frame"),
         ("1\nroot", "root", "line 4: expected the number of a frame, or a bone that moves"),
-        ("thigh 0 0", "leg 0 0", "line 6: expected .* got 'leg 0 0'"),
         ("thigh 0 0", "shin 0", "line 6: expected .* a bone that moves in a.asf"),
         ("thigh 0 0", "thigh 0 0\nthigh 0 0", "line 7: expected .* once a frame"),
         ("thigh 0 0", "thigh 0", "line 6: bone 'thigh' needs 2 numbers, got 1"),
-        ("thigh 0 0", "thigh 0 nan", "line 6: bone 'thigh' needs finite numbers, got 'nan'"),
+        (
+            "thigh 0 0",
+            "thigh 0 nan",
+            "line 6: bone 'thigh' needs finite numbers below 1e.12, got 'nan'",
+        ),
         ("thigh 0 0\n", "", "frame 1 has no values of 'thigh', .* or asf= is not its skeleton"),
         ("thigh 90 0\n", "", "frame 2 has no values of 'thigh', .* the file is not complete"),
         ("\n2\n", "\n3\n", "line 7: frame '3' follows frame 1; frames must be numbered"),
         (":DEGREES", ":SAMPLES-PER-SECOND 0", ":SAMPLES-PER-SECOND must be above 0"),
     ],
 )
-def test_bad_amc(tmp_path, old, new, message):
+def test_wrong_motions_are_refused(tmp_path, old, new, message):
     assert old in AMC
     with pytest.raises(ValueError, match=r"a_01\.amc, line \d+: ") as caught:
         acclaim(tmp_path, amc=AMC.replace(old, new, 1))
     caught.match(message)
-
-
-def test_many_frames(tmp_path):
-    """More than are placed at once."""
-    amc = "".join(f"{i}\nroot 1 2 3 0 {i} 0\nthigh 0 {i}\n" for i in range(1, 60001))
-    df = acclaim(tmp_path, amc=amc)
-    assert df.shape == (60000, 9)
-    bent = np.radians(df.index + 1)
-    np.testing.assert_allclose(df["thigh_y"] / INCH, 2 - 4 * np.cos(bent), atol=1e-9)
-
-
-def test_real_acclaim(real_data):
-    archive = real_data / "hdm05" / "hdm05_positions.npz"
-    bunch = load_performances(archive)
-    with np.load(archive) as fields:
-        sources = fields["source"].tolist()
-    files = sorted((real_data / "original_files" / "asf_amc").glob("HDM*.[aA]*[cC]"))
-    assert len(files) == 3
-    for path in files:
-        df = read_motion(path)
-        assert df.attrs["joints"] == bunch.joints
-        assert Skeleton.from_frame(df) == Skeleton.acclaim()
-        np.testing.assert_allclose(df, bunch.data[sources.index(path.name)], atol=1e-6)

@@ -1,4 +1,4 @@
-"""Reading C3D: as every machine wrote it, against a peer, and where the file is wrong."""
+"""C3D: numbers of every processor, groups, channels, events, a peer, and errors of wrong files."""
 
 import struct
 import warnings
@@ -6,7 +6,6 @@ import warnings
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn_motionsync import Skeleton
 from sklearn_motionsync.io import fill_gaps, read_motion
 
 from motion_files import c3d, put, texts, tracks
@@ -14,28 +13,17 @@ from motion_files import c3d, put, texts, tracks
 
 @pytest.mark.parametrize("machine", [84, 85, 86])
 @pytest.mark.parametrize("real", [True, False])
-def test_c3d_of_every_machine(tmp_path, machine, real):
+def test_files_of_every_processor_are_the_same(tmp_path, machine, real):
     path = put(tmp_path, c3d(tracks(), machine, real), "a.C3D")
     df = read_motion(path)
     np.testing.assert_array_equal(df.to_numpy().reshape(40, 3, 3), tracks())
-    assert df.attrs == {
-        "format": "c3d",
-        "frame_rate": 50.0,
-        "units": "mm",
-        "up": "z",
-        "kind": "markers",
-        "joints": ["M0", "M1", "M2"],
-        "parents": [-1, -1, -1],
-        "first_frame": 1,
-        "events": [],
-        "groups": {"markers": {"n": 3, "units": "mm", "frame_rate": 50.0}},
-        "left_out": "",
-        "performance": "a",
-        "levels": ["recording", "frame"],
-    }
+    assert (df.attrs["units"], df.attrs["up"], df.attrs["kind"]) == ("mm", "z", "markers")
+    assert (df.attrs["joints"], df.attrs["frame_rate"]) == (["M0", "M1", "M2"], 50)
+    assert (df.attrs["first_frame"], df.attrs["events"], df.attrs["left_out"]) == (1, [], "")
+    assert df.attrs["groups"] == {"markers": {"n": 3, "units": "mm", "frame_rate": 50.0}}
 
 
-def test_c3d_with_gaps(tmp_path):
+def test_gaps_are_nan_with_a_warning_or_filled(tmp_path):
     path = put(tmp_path, c3d(tracks(gap=(10, 14))), "a.c3d")
     message = (
         r"^a\.c3d: 3\.3 % of the positions are missing \(NaN\), of 1 of 3 markers \(M1\): 1 gaps, "
@@ -49,12 +37,9 @@ def test_c3d_with_gaps(tmp_path):
     filled = read_motion(path, max_gap=4)
     pd.testing.assert_frame_equal(filled, fill_gaps(df, 4))
     assert filled.attrs == df.attrs
-    path = put(tmp_path, c3d(tracks(gap=(35, 40))), "a.c3d")
-    with pytest.warns(UserWarning, match="5 frames; 1 touch an end and cannot be interpolated"):
-        read_motion(path, max_gap=40)
 
 
-def test_c3d_that_says_little(tmp_path):
+def test_missing_parameters_have_defaults(tmp_path):
     nothing = dict.fromkeys(("LABELS", "UNITS", "Y_SCREEN", "RATE", "DATA_START", "FRAMES"))
     df = read_motion(put(tmp_path, c3d(tracks(), changes=nothing), "a.c3d"))
     assert df.attrs["joints"] == ["marker_1", "marker_2", "marker_3"]
@@ -66,8 +51,7 @@ def test_c3d_that_says_little(tmp_path):
     assert df.attrs["joints"] == ["knee", "kn", "knee_2"]
 
 
-def test_c3d_longer_than_its_header_can_say(tmp_path):
-    """The statement that fits the size of the file is taken."""
+def test_number_of_frames_is_the_one_that_fits_the_size(tmp_path):
     n = 70000
     positions = np.zeros((n, 1, 3))
     changes = {"LONG_FRAMES": (4, [], struct.pack("<f", n))}
@@ -75,8 +59,7 @@ def test_c3d_longer_than_its_header_can_say(tmp_path):
     assert len(read_motion(path)) == n
 
 
-def test_scales_of_floats_do_not_matter(tmp_path):
-    """Writers leave any negative number there, not always the same twice."""
+def test_floats_are_not_scaled(tmp_path):
     positions = tracks()
     other = {"SCALE": (4, [], struct.pack("<f", -0.1))}
     df = read_motion(put(tmp_path, c3d(positions, changes=other), "a.c3d"))
@@ -87,8 +70,7 @@ def many_texts(n):
     return {"NOTES": {f"N{i}": texts("x" * 255, "y" * 255) for i in range(n)}}
 
 
-def test_parameters_longer_than_they_count(tmp_path):
-    """The beginning of the data bounds them, and what lies behind their end may be anything."""
+def test_parameters_end_at_the_data_whatever_their_stated_length(tmp_path):
     for n_blocks in (1, 2, 255):
         content = c3d(tracks(), others=many_texts(5), n_blocks=n_blocks)
         path = put(tmp_path, content, "a.c3d")
@@ -102,7 +84,7 @@ def test_parameters_longer_than_they_count(tmp_path):
 
 @pytest.mark.parametrize(("machine", "order"), [(86, "<"), (84, ">")])
 @pytest.mark.parametrize("real", [True, False])
-def test_integers_in_the_order_of_another_machine(tmp_path, machine, order, real):
+def test_integers_may_have_another_byte_order_than_floats(tmp_path, machine, order, real):
     analog = np.random.default_rng(0).integers(-300, 300, (40, 2, 2))
     content = c3d(tracks(gap=(3, 5)), machine, real, analog=analog, order=order)
     path = put(tmp_path, content, "a.c3d")
@@ -113,8 +95,7 @@ def test_integers_in_the_order_of_another_machine(tmp_path, machine, order, real
 
 
 @pytest.mark.parametrize("real", [True, False])
-def test_points_at_the_origin_that_nobody_saw(tmp_path, real):
-    """No camera and no residual is no sight of the origin; a camera is."""
+def test_points_at_the_origin_without_a_camera_are_nan(tmp_path, real):
     positions, words = tracks(), np.full((40, 3), 257.0)
     positions[5:9, 0] = positions[20:22, 1] = positions[30, 2] = 0
     words[5:9, 0], words[12:15, 0], words[30, 2] = 0, 0, -1
@@ -126,7 +107,7 @@ def test_points_at_the_origin_that_nobody_saw(tmp_path, real):
     np.testing.assert_array_equal(df.to_numpy().reshape(40, 3, 3), expected)
 
 
-def test_other_signs_of_points_that_nobody_saw(tmp_path):
+def test_other_marks_of_unseen_points_are_nan(tmp_path):
     positions, words = tracks(), np.zeros((40, 3))
     positions[5:9, 0], words[5:9, 0] = 0, 65535  # -1 in 16 bits
     positions[20:22, 1] = 9999999
@@ -154,56 +135,257 @@ def test_other_signs_of_points_that_nobody_saw(tmp_path):
         (c3d(tracks()).replace(b"UNITS\x0a\0", b"UNITS\xff\xff"), "leads out of the parameters"),
     ],
 )
-def test_bad_c3d(tmp_path, content, message):
+def test_wrong_files_are_refused(tmp_path, content, message):
     with pytest.raises(ValueError, match=rf"a\.c3d: .*{message}.*Export the recording again\.$"):
         read_motion(put(tmp_path, content, "a.c3d"))
 
 
-def test_two_statements_that_both_fit(tmp_path):
-    """A frame more may be padding, so the header is believed."""
+def test_header_counts_where_several_numbers_of_frames_fit(tmp_path):
     assert len(read_motion(put(tmp_path, c3d(tracks(), header={"last": 39}), "a.c3d"))) == 39
     assert len(read_motion(put(tmp_path, c3d(tracks(), header={"last": 4}), "a.c3d"))) == 40
 
 
-def test_real_c3d(real_data):
-    """All encodings are alike, and as the package c3d reads them."""
+# -- groups of points ------------------------------------------------------------------
+
+
+def floats(*values):
+    return 4, [len(values)], struct.pack(f"<{len(values)}f", *values)
+
+
+def words(*values):
+    return 2, [len(values)], struct.pack(f"<{len(values)}H", *(v % 65536 for v in values))
+
+
+MODELLED = {
+    "LABELS": texts("LKNE", "LKneeAngles", "LKneeMoment", "RKNE", "LKneePower", "Sway"),
+    "ANGLES": texts("LKneeAngles", ""),
+    "MOMENTS": texts("Other"),
+    "MOMENTS2": texts("LKNEEMOMENT"),
+    "POWERS": texts("LKneePower"),
+    "SWAYS": texts("Sway"),
+    "ANGLE_UNITS": texts("deg"),
+    "MOMENT_UNITS": texts("Nmm"),
+    "SWAY_UNITS": texts("cm"),
+    # Centres of joints have the unit of markers and belong to them.
+    "CENTRES": texts("RKNE"),
+    "CENTRE_UNITS": texts("mm"),
+}
+
+
+def modelled(**params):
+    rng = np.random.default_rng(0)
+    changes = MODELLED | params.pop("changes", {})
+    return c3d(rng.integers(-900, 900, (40, 6, 3)) / 2, changes=changes, **params)
+
+
+def test_groups_of_points_are_read_with_their_units(tmp_path):
+    path = put(tmp_path, modelled(), "a.c3d")
+    positions = np.random.default_rng(0).integers(-900, 900, (40, 6, 3)) / 2
+    expected = {
+        "markers": (["LKNE", "RKNE"], [0, 3], "mm"),
+        "angles": (["LKneeAngles"], [1], "deg"),
+        "moments": (["LKneeMoment"], [2], "Nmm"),
+        "powers": (["LKneePower"], [4], None),
+        "sways": (["Sway"], [5], "cm"),
+    }
+    for group, (joints, points, units) in expected.items():
+        df = read_motion(path, group=group)
+        np.testing.assert_array_equal(df, positions[:, points].reshape(40, -1))
+        assert (df.attrs["kind"], df.attrs["joints"], df.attrs["units"]) == (group, joints, units)
+        assert list(df.columns) == [f"{joint}_{axis}" for joint in joints for axis in "xyz"]
+        assert df.attrs["groups"] == {
+            name: {"n": len(points), "units": units, "frame_rate": 50.0}
+            for name, (_, points, units) in expected.items()
+        }
+    df = read_motion(path)
+    pd.testing.assert_frame_equal(df, read_motion(path, group="markers"))
+    assert df.attrs["left_out"] == "1 angle, 1 moment, 1 power, 1 sway"
+
+
+def test_angles_of_zero_are_not_missing(tmp_path):
+    positions = tracks()
+    positions[4:6, :2] = 0
+    changes = {"ANGLES": texts("M1")}
+    path = put(tmp_path, c3d(positions, changes=changes), "a.c3d")
+    assert (read_motion(path, group="angles").iloc[4:6] == 0).all(axis=None)
+    with pytest.warns(UserWarning, match=r"of 1 of 2 markers \(M0\)"):
+        read_motion(path)
+
+
+def test_missing_groups_are_refused(tmp_path):
+    path = put(tmp_path, modelled(analog=np.zeros((40, 2, 3))), "a.c3d")
+    message = r"a\.c3d: there are no forces in this file; .* 'markers' \(2\), .*'analog' \(3\)\."
+    with pytest.raises(ValueError, match=message):
+        read_motion(path, group="forces")
+    path = put(tmp_path, c3d(tracks(), changes={"ANGLES": texts("M0", "M1", "M2")}), "a.c3d")
+    with pytest.raises(ValueError, match=r"no markers in this file; .* 'angles' \(3\)\."):
+        read_motion(path)
+
+
+# -- analog channels --------------------------------------------------------------------
+
+
+def analog_parameters(n=3, **changes):
+    return {
+        "ANALOG": {
+            "USED": words(n),
+            "LABELS": texts("Fx", "EMG"),
+            "LABELS2": texts("EMG"),
+            "UNITS": texts("N", "V"),
+            "SCALE": floats(0.5, 2, -1),
+            "OFFSET": words(10, -20, 0),
+            "GEN_SCALE": floats(0.25),
+        }
+        | changes
+    }
+
+
+@pytest.mark.parametrize("real", [True, False])
+def test_analog_channels_are_scaled(tmp_path, real):
+    raw = np.random.default_rng(0).integers(-2000, 2000, (40, 4, 3))
+    content = c3d(tracks(), real=real, analog=raw, others=analog_parameters())
+    path = put(tmp_path, content, "a.c3d")
+    df = read_motion(path, group="analog")
+    expected = (raw.reshape(160, 3) - [10, -20, 0]) * [0.125, 0.5, -0.25]
+    np.testing.assert_allclose(df, expected)
+    assert list(df.columns) == df.attrs["channels"] == ["Fx", "EMG", "EMG_2"]
+    assert (df.attrs["kind"], df.attrs["frame_rate"]) == ("analog", 200)
+    assert df.attrs["units"] == ["N", "V", None]
+    assert df.attrs["left_out"] == "3 markers"
+    assert read_motion(path).attrs["left_out"] == "3 analog channels at 200 Hz"
+    assert read_motion(path).attrs["groups"]["analog"]["n"] == 3
+
+
+def test_analog_channels_may_be_unsigned(tmp_path):
+    raw = np.random.default_rng(0).integers(0, 65536, (40, 2, 1))
+    changes = {"FORMAT": texts("UNSIGNED"), "OFFSET": words(40000), "GEN_SCALE": None}
+    others = analog_parameters(1, **changes)
+    path = put(tmp_path, c3d(tracks(), real=False, analog=raw, others=others), "a.c3d")
+    df = read_motion(path, group="analog")
+    np.testing.assert_array_equal(df["Fx"], (raw.ravel() - 40000) * 0.5)
+
+
+def test_files_may_have_analog_channels_only(tmp_path):
+    path = put(tmp_path, c3d(np.zeros((40, 0, 3)), analog=np.ones((40, 2, 2))), "a.c3d")
+    df = read_motion(path, group="analog")
+    assert df.shape == (80, 2)
+    assert df.attrs["channels"] == ["channel_1", "channel_2"]
+    with pytest.raises(ValueError, match=r"no markers in this file; .* 'analog' \(2\)\."):
+        read_motion(path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"SCALE": floats(1, 2)}, r"ANALOG:SCALE has 2 numbers for 3 channels"),
+        ({"OFFSET": words(1)}, r"ANALOG:OFFSET has 1 numbers for 3 channels"),
+        ({"GEN_SCALE": floats(0)}, r"ANALOG:GEN_SCALE must not be 0"),
+        ({"SCALE": floats(1, np.nan, 1)}, r"must be finite, got GEN_SCALE 0\.25, SCALE from "),
+    ],
+)
+def test_wrong_scales_are_refused_for_analog_channels_only(tmp_path, changes, message):
+    content = c3d(tracks(), analog=np.ones((40, 2, 3)), others=analog_parameters(**changes))
+    path = put(tmp_path, content, "a.c3d")
+    assert len(read_motion(path)) == 40
+    with pytest.raises(ValueError, match=rf"a\.c3d: .*{message}.*Export the recording again\.$"):
+        read_motion(path, group="analog")
+
+
+# -- events -----------------------------------------------------------------------------
+
+
+def event_parameters(**changes):
+    return {
+        "USED": words(3),
+        "LABELS": texts("Foot Off", "Foot Strike", "Turn"),
+        "CONTEXTS": texts("Left", "Right"),
+        "TIMES": (4, [2, 3], struct.pack("<6f", 0, 2.5, 0, 2.2, 1, 0.5)),
+    } | changes
+
+
+@pytest.mark.parametrize("group", ["EVENT", "EVENTS"])
+def test_events_have_times_of_the_trial_and_frames_of_the_file(tmp_path, group):
+    header = {"first": 101, "last": 140, "events": [("OLD", 0.2)]}
+    content = c3d(tracks(), header=header, others={group: event_parameters()})
+    df = read_motion(put(tmp_path, content, "a.c3d"))
+    assert df.attrs["first_frame"] == 101
+    assert df.attrs["events"] == [
+        {"label": "Foot Strike", "context": "Right", "time": 2.2, "frame": 10.0},
+        {"label": "Foot Off", "context": "Left", "time": 2.5, "frame": 25.0},
+        {"label": "Turn", "context": None, "time": 60.5, "frame": 2925.0},
+    ]
+    assert df.attrs["left_out"] == ""
+
+
+def test_events_of_the_header_count_from_the_first_frame(tmp_path):
+    header = {"first": 101, "last": 140, "events": [("RHS", 0.5), ("RTO", 0.11)]}
+    for others in (None, {"EVENT": {"USED": words(0)}}):
+        df = read_motion(put(tmp_path, c3d(tracks(), header=header, others=others), "a.c3d"))
+        assert df.attrs["events"] == [
+            {"label": "RTO", "context": None, "time": 2.11, "frame": 5.5},
+            {"label": "RHS", "context": None, "time": 2.5, "frame": 25.0},
+        ]
+
+
+def test_first_frame_may_take_two_words_or_be_0(tmp_path):
+    trial = {"ACTUAL_START_FIELD": words(10, 2), "ACTUAL_END_FIELD": words(49, 2)}
+    events = {"EVENT": event_parameters()}
+    for first, others, expected in ((65535, {"TRIAL": trial}, 2 * 65536 + 10), (0, {}, 0)):
+        header = {"first": first, "last": min(first + 39, 65535)}
+        content = c3d(tracks(), header=header, others=others | events)
+        df = read_motion(put(tmp_path, content, "a.c3d"))
+        assert df.attrs["first_frame"] == expected
+        assert df.attrs["events"][0]["frame"] == 110 - max(expected - 1, 0)
+
+
+def test_events_without_a_time_are_left_out_and_have_no_frame_without_a_rate(tmp_path):
+    others = {"EVENT": event_parameters(TIMES=(4, [2, 2], struct.pack("<4f", 0, np.nan, 0, 0.2)))}
+    df = read_motion(put(tmp_path, c3d(tracks(), others=others), "a.c3d"))
+    assert [event["frame"] for event in df.attrs["events"]] == [10]
+    assert df.attrs["left_out"] == "2 events without a time"
+    others = {"EVENT": event_parameters()}
+    changes = {"RATE": floats(0)}
+    df = read_motion(put(tmp_path, c3d(tracks(), changes=changes, others=others), "a.c3d"))
+    assert [event["frame"] for event in df.attrs["events"]] == [None] * 3
+    df = read_motion(put(tmp_path, c3d(tracks(), others=others), "a.c3d"), frame_rate=25)
+    assert df.attrs["events"][0]["frame"] == 110  # the file's own clock
+
+
+@pytest.mark.parametrize("used", [-3, 0.5, np.nan])
+def test_wrong_numbers_of_events_are_ignored(tmp_path, used):
+    others = {"EVENT": event_parameters(USED=floats(used))}
+    df = read_motion(put(tmp_path, c3d(tracks(), others=others), "a.c3d"))
+    assert [event["frame"] for event in df.attrs["events"]] == [110, 125, 3025]
+
+
+# -- real files -------------------------------------------------------------------------
+
+
+def test_real_files_agree_with_the_package_c3d(real_data):
     import c3d as peer
 
     frames = {}
     for path in sorted((real_data / "original_files" / "c3d").glob("*.c3d")):
         with pytest.warns(UserWarning, match=r"1\.9 % of the positions are missing .* of 26 mark"):
             df = frames[path.stem] = read_motion(path)
+        channels = read_motion(path, group="analog")
         with path.open("rb") as file, warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            points = np.array([frame[1] for frame in peer.Reader(file).read_frames()])
+            _, points, values = zip(*peer.Reader(file).read_frames(copy=True), strict=True)
+        points = np.array(points)
         expected = np.where(points[..., 3:4] < 0, np.nan, points[..., :3])
         np.testing.assert_allclose(df, expected.reshape(450, -1), rtol=1e-6, atol=1e-4)
+        expected = np.concatenate(values, axis=1).T
+        np.testing.assert_allclose(channels, expected, rtol=1e-6, atol=1e-4)
+        assert channels.attrs["frame_rate"] == 200
+        assert channels.attrs["units"][:4] == ["nt", "nt", "nt", "ntmm"]
+        assert channels.attrs["events"][0]["frame"] == 4 * 136
     assert len(frames) == 6
     first = frames["Eb015pi"]
-    assert first.attrs["joints"][:3] == ["RFT1", "RFT2", "RFT3"]
-    assert (len(first.attrs["joints"]), first.attrs["frame_rate"]) == (26, 50)
-    assert (first.attrs["units"], first.attrs["up"]) == ("mm", "z")
-    with pytest.raises(ValueError, match=r"No joint stands for the landmarks \['pelvis'"):
-        Skeleton.from_frame(first)
     for name, df in frames.items():
         np.testing.assert_allclose(df, first, atol=1e-3)
         assert df.attrs == first.attrs | {"performance": name}
+    assert first.attrs["joints"][:3] == ["RFT1", "RFT2", "RFT3"]
     events = [(event["label"], event["time"], event["frame"]) for event in first.attrs["events"]]
     assert events == [("RIC", 2.72, 136), ("RHS", 5.4, 270), ("RTO", 7.32, 366)]
     assert first.attrs["left_out"] == "16 analog channels at 200 Hz, the geometry of 2 force plates"
-
-
-def test_real_analog(real_data):
-    """All encodings are alike, and as the package c3d reads and scales them."""
-    import c3d as peer
-
-    for path in sorted((real_data / "original_files" / "c3d").glob("*.c3d")):
-        df = read_motion(path, group="analog")
-        with path.open("rb") as file, warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            values = [frame[2] for frame in peer.Reader(file).read_frames(copy=True)]
-        np.testing.assert_allclose(df, np.concatenate(values, axis=1).T, rtol=1e-6, atol=1e-4)
-        assert df.attrs["frame_rate"] == 200
-        assert df.attrs["channels"] == list(df.columns)
-        assert df.attrs["units"][:4] == ["nt", "nt", "nt", "ntmm"]
-        assert df.attrs["events"][0]["frame"] == 4 * 136

@@ -1,93 +1,170 @@
-"""The call of read_motion, and files damaged at random."""
+"""read_motion: what every reader of the registry owes, wrong calls, and files damaged at random."""
+
+import json
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
-from sklearn_motionsync import DirectionCosines, Skeleton, to_frame
+from sklearn_motionsync import to_frame
 from sklearn_motionsync.io import read_motion
+from sklearn_motionsync.io.motion import READERS
 
 import fuzz_readers
-from motion_files import AMC, ASF, body, c3d, everything, opensim, put, tracks
+from fuzz_readers import DAMAGES
+from motion_files import AMC, EXAMPLES, body, put
+
+ROOT = Path(__file__).resolve().parents[2]
+MANUAL = (ROOT / "docs" / "howto" / "own_data.md").read_text(encoding="utf-8")
+DOC = read_motion.__doc__
 
 
-@pytest.mark.parametrize("name", ["a.bvh", "a.amc", "a.c3d", "a.trc", "a.mot", "a.sto"])
-def test_no_file(tmp_path, name):
-    with pytest.raises(FileNotFoundError, match=rf"no motion file at .*{name}"):
-        read_motion(tmp_path / name)
-    (tmp_path / name).mkdir()
-    with pytest.raises(FileNotFoundError, match="no motion file"):
-        read_motion(str(tmp_path / name))
+def read_example(folder, ending, **params):
+    files = EXAMPLES[ending]()
+    path, *_ = [put(folder, content, name) for name, content in files.items()]
+    return read_motion(path, max_gap=9 if ending in (".c3d", ".trc") else 0, **params)
 
 
-def test_wrong_calls(tmp_path):
-    path = put(tmp_path, body())
-    with pytest.raises(ValueError, match=r"a skeleton without motion; give the \.amc file"):
-        read_motion(put(tmp_path, ASF, "a.asf"))
-    with pytest.raises(ValueError, match=r"end with \.bvh, .*, \.mot or \.sto, got '\.txt'"):
-        read_motion(put(tmp_path, "", "a.txt"))
-    with pytest.raises(ValueError, match=r"asf= goes with \.amc files only"):
-        read_motion(path, asf=tmp_path / "a.asf")
-    with pytest.raises(FileNotFoundError, match=r"no skeleton \(asf=\) at .*b\.asf"):
+# -- every reader -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ending", READERS)
+@pytest.mark.parametrize(
+    ("thing", "is_there"),
+    [
+        ("EXAMPLES of tests/io/motion_files.py has no {} file", lambda end: end in EXAMPLES),
+        ("DAMAGES of tests/io/fuzz_readers.py has no {} file", lambda end: end in DAMAGES),
+        ("docs/howto/own_data.md does not mention `{}`", lambda end: f"`{end}`" in MANUAL),
+        ("the docstring of read_motion does not mention ``{}``", lambda end: f"``{end}``" in DOC),
+        (
+            "the docstring of read_motion does not list {}, without the dot, as a format",
+            lambda end: f'"{end[1:]}"' in DOC.partition("format : ")[2],
+        ),
+    ],
+    ids=["example", "fuzz", "manual", "docstring", "format"],
+)
+def test_every_ending_of_the_registry_has_its_example_fuzz_case_and_documentation(
+    ending, thing, is_there
+):
+    assert is_there(ending), thing.format(ending)
+
+
+@pytest.mark.parametrize("ending", [ending for ending in READERS if ending in EXAMPLES])
+def test_every_reader_returns_a_table_with_its_attrs(tmp_path, ending):
+    df = read_example(tmp_path, ending)
+    assert set(df.dtypes) == {np.dtype(float)}
+    assert df.columns.is_unique
+    assert df.notna().all(axis=None)
+    pd.testing.assert_index_equal(df.index, pd.RangeIndex(len(df), name="frame"))
+    attrs = df.attrs
+    assert json.loads(json.dumps(attrs, allow_nan=False)) == attrs
+    assert attrs["format"] == ending.removeprefix(".")
+    assert (attrs["performance"], attrs["levels"]) == ("a", ["recording", "frame"])
+    assert {"frame_rate", "units", "up", "kind"} < set(attrs)
+    assert ("joints" in attrs) == ("parents" in attrs) == ("channels" not in attrs)
+    if "joints" in attrs:
+        assert len(attrs["joints"]) == len(attrs["parents"])
+        assert list(df) == [f"{joint}_{axis}" for joint in attrs["joints"] for axis in "xyz"]
+    else:
+        assert list(df) == attrs["channels"]
+    given = read_example(tmp_path, ending, frame_rate=25)
+    assert given.attrs == attrs | {"frame_rate": 25.0}
+    pd.testing.assert_frame_equal(given, df)
+
+
+@pytest.mark.parametrize("ending", [ending for ending in READERS if ending in EXAMPLES])
+def test_every_reader_takes_its_ending_in_capitals_and_line_ends_of_windows(tmp_path, ending):
+    expected = read_example(tmp_path, ending)
+    for name, content in EXAMPLES[ending]().items():
+        (tmp_path / name).unlink()
+        other = content if ending == ".c3d" else content.replace(b"\n", b"\r\n")
+        put(tmp_path, other, name.upper())
+    df = read_motion(tmp_path / f"A{ending.upper()}", max_gap=9 * ("joints" in expected.attrs))
+    pd.testing.assert_frame_equal(df, expected)
+    assert df.attrs == expected.attrs | {"performance": "A"}
+
+
+@pytest.mark.parametrize("ending", [ending for ending in READERS if ending in DAMAGES])
+def test_damaged_files_are_read_or_refused(tmp_path, ending):
+    """A short run of fuzz_readers.py on the example."""
+    originals = [EXAMPLES[ending]()]
+    outcomes = {
+        fuzz_readers.run_case(fuzz_readers.damaged(originals, 0, number), tmp_path)
+        for number in range(150)
+    }
+    assert outcomes == {"read", "ValueError"}
+
+
+# -- wrong calls ------------------------------------------------------------------------
+
+
+def test_unknown_ending_is_an_error_that_lists_the_known_ones(tmp_path):
+    for name, ending in (("a.unknown", ".unknown"), ("a", ""), ("a.asf", ".asf")):
+        path = put(tmp_path, "", name)
+        with pytest.raises(ValueError, match="no reader is for; the known endings") as caught:
+            read_motion(path)
+        message = str(caught.value)
+        assert message.startswith(f"{path} ends with {ending!r}")
+        assert all(known in message for known in READERS)
+
+
+@pytest.mark.parametrize("ending", READERS)
+def test_missing_file_is_an_error(tmp_path, ending):
+    (tmp_path / f"b{ending}").mkdir()
+    for name in "ab":
+        with pytest.raises(FileNotFoundError, match=rf"no motion file at .*{name}\{ending}"):
+            read_motion(str(tmp_path / f"{name}{ending}"))
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({"asf": "a.asf"}, r"asf= goes with \.amc files only, got asf='a\.asf' with .*a\.bvh"),
+        ({"group": "angles"}, r"group= goes with \.c3d files only, got group='angles' with .*a\.b"),
+        *(
+            ({"frame_rate": rate}, "frame_rate must be frames a second, above 0, got")
+            for rate in (0, -1, np.nan, np.inf, "60")
+        ),
+        *(
+            ({"max_gap": gap}, "max_gap must be a whole number of frames, 0 or more, got")
+            for gap in (-1, 1.5, "5", True, None)
+        ),
+    ],
+)
+def test_wrong_parameters_are_refused(tmp_path, params, message):
+    with pytest.raises(ValueError, match=message):
+        read_motion(put(tmp_path, body()), **params)
+
+
+def test_max_gap_is_refused_for_channels(tmp_path):
+    path, *_ = [put(tmp_path, x, name) for name, x in EXAMPLES[".mot"]().items()]
+    with pytest.raises(ValueError, match=r"positions, got max_gap=3 frames for the coord.*a\.mot"):
+        read_motion(path, max_gap=3)
+
+
+def test_missing_skeleton_is_an_error(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"b\.asf"):
         read_motion(put(tmp_path, AMC, "a.amc"), asf=tmp_path / "b.asf")
-    for rate in (0, -1, np.nan, np.inf, "60", True):
-        with pytest.raises(ValueError, match="frame_rate must be frames a second, above 0"):
-            read_motion(path, frame_rate=rate)
-    for gap in (-1, 1.5, "5", True, None):
-        with pytest.raises(ValueError, match="max_gap must be a whole number of frames, 0 or mor"):
-            read_motion(path, max_gap=gap)
 
 
-def test_recordings_are_called_like_their_files(tmp_path):
-    """So that tables of several say which is which; of folders with the same names nothing is."""
+# -- recordings -------------------------------------------------------------------------
+
+
+def test_recordings_have_the_names_of_their_files_in_tables(tmp_path):
     recordings = [read_motion(put(tmp_path, body(), f"walk {k}.bvh")) for k in "ba"]
     table = to_frame(recordings)
     assert table.index.names == ["recording", "frame"]
     assert list(table.index.unique("recording")) == ["walk b", "walk a"]
+    # The same name twice would join two recordings.
     assert list(to_frame(recordings[:1] * 2).index.unique(0)) == [0, 1]
-
-
-def test_damaged_files(tmp_path):
-    """A short run of tests/datasets/fuzz_readers.py on files made here."""
-    originals = [
-        {"a.bvh": body().encode()},
-        {"a.amc": AMC.encode(), "a.asf": ASF.encode("latin-1")},
-        *({"a.c3d": c3d(tracks(gap=(3, 9)), machine)} for machine in (84, 85, 86)),
-        *({"a.c3d": c3d(**everything(machine))} for machine in (84, 85, 86)),
-        *opensim(),
-    ]
-    outcomes = [
-        fuzz_readers.run_case(fuzz_readers.damaged(originals, 0, number), tmp_path)
-        for number in range(800)
-    ]
-    assert set(outcomes) == {"read", "ValueError"}
 
 
 @pytest.mark.parametrize(
     "name", ["bvh/007_01.bvh", "asf_amc/02_02.amc", "asf_amc/HDM_bk_depositFloorR_011_120.amc"]
 )
-def test_as_plain_parsers_read_it(real_data, benchmark, name):
+def test_real_files_agree_with_plain_parsers(real_data, benchmark, name):
     path = real_data / "original_files" / name
     expected = benchmark("readers").PLAIN[path.suffix](path)
     scale = 1e-12 * np.abs(expected).max()
     df = read_motion(path)
     np.testing.assert_allclose(df.to_numpy().reshape(expected.shape), expected, atol=scale, rtol=0)
-
-
-@pytest.mark.parametrize(
-    "name", ["bvh/007_01.bvh", "asf_amc/02_01.amc", "asf_amc/HDM_bd_depositFloorR_001_120.amc"]
-)
-def test_from_a_file_to_postures(real_data, name):
-    """What is read goes into the pipeline as it is."""
-    df = read_motion(real_data / "original_files" / name)
-    df = df.iloc[1:] if name.startswith("bvh") else df  # its first frame was put there later
-    cosines = DirectionCosines(Skeleton.from_frame(df))
-    (postures,) = cosines.fit_transform([df])
-    limbs = postures[:, 1:].reshape(len(df), 12, 3)
-    np.testing.assert_allclose(np.linalg.norm(limbs, axis=2), 1)
-    if "deposit" not in name:
-        # A walk: the pelvis at about the height of the stretched legs, legs and torso upright.
-        assert 0.9 < postures[:, 0].min() <= postures[:, 0].max() < 1.3
-        names = list(cosines.get_feature_names_out())
-        assert (postures[:, names.index("torso_y")] > 0.9).all()
-        assert (postures[:, names.index("left_thigh_y")] < -0.7).all()
-    else:
-        assert postures[:, 0].min() < 0.8 * postures[0, 0]
