@@ -37,7 +37,8 @@ N_JOINTS = 15
 WIDTH = 3 * N_JOINTS
 
 # Its interface is checked: what takes its time is that of DenseSynchronizer.
-PART = PartSynchronizer({"first": [0]}, n_frames=30, metric=None, consensus=1, refine=False)
+BODY = DenseSynchronizer(n_frames=30, metric=None, consensus=1, refine=False)
+PART = PartSynchronizer({"first": [0]}, synchronizer=BODY)
 
 SYNCHRONIZERS = [
     LinearSynchronizer(),
@@ -332,7 +333,9 @@ def test_the_pattern_matches_itself(estimator, pattern, performances, request):
     # A cross-correlation finds no shift of what never moves.
     others = [] if isinstance(estimator, ShiftSynchronizer) else [still]
     for X in (performances, *([people] if people else []), *others):
-        sync = clone(estimator).set_params(pattern=pattern).fit(X)
+        sync = clone(estimator)
+        name = "pattern" if "pattern" in sync.get_params() else "synchronizer__pattern"
+        sync.set_params(**{name: pattern}).fit(X)
         own = sync.match([X[sync.pattern_index_]]).times[0]
         np.testing.assert_array_equal(own, np.arange(sync.n_frames_))
 
