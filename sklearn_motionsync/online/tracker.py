@@ -15,7 +15,7 @@ from ..inputs.numbers import as_numbers, check_finite, check_names, check_square
 from ..inputs.tables import as_pandas, labels_of, name_performance
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
-from ..synchronizers.match import check_answer
+from ..synchronizers.match import check_match
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.threads import on_one_thread
@@ -197,7 +197,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
         self.synchronizer_ = sync.fit(X)
         match = sync.match(X)
-        check_answer(match, n, sync.n_frames_, type(sync).__name__)
+        check_match(match, n, sync.n_frames_, type(sync).__name__)
         warped = match.warp(performances)
         lengths = np.array([len(x) for x in performances], dtype=np.float64)
         self.n_frames_, self.duration_ = int(sync.n_frames_), float(lengths.mean())

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
-from .match import table_of_timing
+from .match import timing_table
 
 __all__ = ["Lags"]
 
@@ -105,7 +105,7 @@ class Lags(NamedTuple):
             A row a performance and frame of the pattern, a column a part.
         """
         columns = {part: self.values[:, i] for i, part in enumerate(self.parts)}
-        return table_of_timing(columns, None, self.labels)
+        return timing_table(columns, None, self.labels)
 
     def __repr__(self):
         n_sequences, n_parts, n_frames = self.values.shape

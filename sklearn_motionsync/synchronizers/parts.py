@@ -250,7 +250,9 @@ class PartSynchronizer(Synchronizer):
         """
         performances = self.check_performances(X)
         self._check_reference(against)
-        groups, people = encode_groups(groups, len(performances))
+        people = None
+        if groups is not None:
+            groups, people = encode_groups(groups, len(performances))
         body = self.match(performances)
         parts = self._match_parts(performances, body, "part")
         references = dict.fromkeys(parts, parts.get(against, body))
@@ -390,9 +392,7 @@ def choose_parts(parts, performances, names):
 
 
 def encode_groups(groups, n_sequences):
-    """The group of every performance counted from 0, and their names; None for none."""
-    if groups is None:
-        return None, None
+    """The group of every performance as an integer from 0, and the labels of the groups."""
     given = (
         groups if isinstance(groups, (pd.Series, pd.Index)) else np.asarray(groups, dtype=object)
     )
