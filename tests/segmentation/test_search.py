@@ -20,7 +20,7 @@ from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.model.similarity import learn_border
-from sklearn_motionsync.segmentation.search import Proposer, Unlikeness, chance_movements, scales
+from sklearn_motionsync.segmentation.search import Proposer, Unlikeness, chance_movements
 
 import oracle
 
@@ -67,7 +67,7 @@ def pipe():
     return make_pipeline(*steps).fit(TRAINING, actionmodel__groups=SUBJECTS)
 
 
-# -- what is found ---------------------------------------------------------------------------------
+# -- results ---------------------------------------------------------------------------------------
 
 
 def test_planted_patterns_are_found():
@@ -118,7 +118,7 @@ def test_best_window_is_that_of_an_exhaustive_search():
 
 
 def brute_unlikeness(window, pattern):
-    """Of a window to a single pattern, by the formulas of the docstrings."""
+    """Dissimilarity of a window to a single pattern, by the formulas of the docstrings."""
     n = len(pattern)
     at = np.linspace(0, len(window) - 1, n)
     x = np.column_stack([np.interp(at, np.arange(len(window)), column) for column in window.T])
@@ -153,15 +153,6 @@ def test_proposals_are_the_best_paths_of_their_portions():
     assert {tuple(window) for window in proposer(take).tolist()} == expected
 
 
-def test_scales_go_from_the_shortest_to_the_longest():
-    assert scales(30, 30).tolist() == [30]
-    assert scales(10, 100)[[0, -1]].tolist() == [10, 100]
-    assert (np.diff(np.log(scales(10, 100))) < np.log(1.7)).all()
-
-
-# -- real people -----------------------------------------------------------------------------------
-
-
 def test_sitting_down_is_found_in_recordings_of_a_new_actor(real_data):
     bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
     file = np.load(real_data / "utkinect" / "utkinect_takes.npz")
@@ -187,7 +178,7 @@ def test_sitting_down_is_found_in_recordings_of_a_new_actor(real_data):
     assert right == len(locations) == 2
 
 
-# -- takes of every kind ---------------------------------------------------------------------------
+# -- kinds of input --------------------------------------------------------------------------------
 
 
 def test_every_kind_of_collection_gives_equal_results(pipe):
@@ -195,6 +186,9 @@ def test_every_kind_of_collection_gives_equal_results(pipe):
     stacked = np.stack([TAKE, TAKE])
     several = np.empty(2, dtype=object)
     several[:] = [TAKE, TAKE[:350]]
+    row = np.sin(np.linspace(0, 9, 50))
+    take = np.concatenate([np.zeros(70), row, np.full(60, row[-1])])
+    assert spans(find_performances(row, take, max_hits=1)[1]) == [[70, 120]]
     for takes in (stacked, [TAKE, TAKE], several):
         locations = find_performances(pipe, takes)[1]
         first = locations[locations["take"] == 0]
@@ -217,12 +211,6 @@ def test_tables_keep_names_and_float32_stays_float32(pipe):
     assert spans(there) == spans(find_performances(pipe, TAKE)[1])
 
 
-def test_one_feature_may_be_one_dimensional():
-    pattern = np.sin(np.linspace(0, 9, 50))
-    take = np.concatenate([np.zeros(70), pattern, np.full(60, pattern[-1])])
-    assert spans(find_performances(pattern, take, max_hits=1)[1]) == [[70, 120]]
-
-
 def test_unit_does_not_matter_and_input_is_not_changed(pipe):
     expected = spans(find_performances(pipe, TAKE)[1])
     large = TAKE * 2.0**20
@@ -242,7 +230,7 @@ def test_takes_without_the_action_give_no_hits(pipe, take):
         assert locations[["start", "stop"]].dtypes.tolist() == [np.dtype(int)] * 2
 
 
-# -- how many --------------------------------------------------------------------------------------
+# -- threshold and number of hits ------------------------------------------------------------------
 
 
 def test_threshold_coverage_and_number(pipe):
@@ -269,7 +257,7 @@ def test_auto_threshold_falls_with_coverage():
 
 
 def wander(n_frames, rng):
-    """Two features that forget within 20 frames: means of as many random numbers."""
+    """Moving averages over 20 frames of white noise in two features."""
     noise = rng.standard_normal((n_frames + 19, 2))
     return np.lib.stride_tricks.sliding_window_view(noise, 20, axis=0).sum(axis=2) / np.sqrt(20)
 
@@ -277,9 +265,9 @@ def wander(n_frames, rng):
 def test_auto_threshold_rejects_random_movements():
     rng = np.random.default_rng(0)
     bump = np.sin(np.linspace(0, np.pi, 20))[:, np.newaxis]
-    people = [bump * [1, 0.5 * (-1) ** k] + 0.8 * wander(20, rng) for k in range(12)]
-    unlikeness = Unlikeness(DenseSynchronizer(20).fit(people))
-    frames, take = np.concatenate(people), wander(4000, rng)
+    training = [bump * [1, 0.5 * (-1) ** k] + 0.8 * wander(20, rng) for k in range(12)]
+    unlikeness = Unlikeness(DenseSynchronizer(20).fit(training))
+    frames, take = np.concatenate(training), wander(4000, rng)
     windows = np.arange(0, 3980, 20)[:, np.newaxis] + [0, 20]
     chance = unlikeness(take * frames.std(axis=0) + frames.mean(axis=0), windows)
     assert (chance < unlikeness.border(0.6)).mean() < 0.02
@@ -300,15 +288,6 @@ def test_chance_movements_have_mean_covariance_and_autocorrelation_of_the_postur
     np.testing.assert_array_equal(some, next(chance_movements(positions, [2000])))
 
 
-def test_clock_resolution_does_not_change_the_hits():
-    some = [x[:, :2] for x in TRAINING[::2]]
-    take = TAKE[:260, :2]
-    coarse, fine = (DenseSynchronizer(n, consensus=2).fit(some) for n in (60, 240))
-    first, second = (find_performances(sync, take)[1] for sync in (coarse, fine))
-    np.testing.assert_allclose(spans(first), spans(second), atol=3)
-    np.testing.assert_allclose(first["score"], second["score"], atol=0.005)
-
-
 def test_durations_bound_the_hits(pipe):
     locations = find_performances(pipe, TAKE, durations=(20, 57), threshold=None)[1]
     lengths = locations["stop"] - locations["start"]
@@ -320,7 +299,7 @@ def test_large_training_sets_are_subsampled():
     sync = LinearSynchronizer(30).fit(many)
     assert len(sync.training_.kept) == 64
     assert len(sync.training_.durations) == 70
-    groups = [f"person {i // 8}" for i in range(70)]
+    groups = [f"subject {i // 8}" for i in range(70)]
     _, locations = find_performances(sync, TAKE[:130], groups=groups, durations=(50, 75))
     np.testing.assert_allclose(spans(locations), TRUE[:1], atol=8)
     pipe = make_pipeline(sync, ActionModel()).fit(many, actionmodel__groups=groups)
@@ -347,7 +326,7 @@ def test_memory_does_not_grow_with_the_take(pipe):
     assert peak < 8e6
 
 
-# -- what is refused -------------------------------------------------------------------------------
+# -- errors ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

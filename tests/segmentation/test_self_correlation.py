@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync import Skeleton, self_correlation, to_frame
-from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.segmentation.self_correlation import correlate, rejection_reason
 
 
@@ -104,13 +104,6 @@ def test_path_of_the_body_does_not_change_the_period():
     path = np.linspace(0, 50, len(twice))[:, np.newaxis] * np.tile([1, 0, 1], 15)
     found = self_correlation(twice + path, bunch.skeleton)
     assert found.period == pytest.approx(len(bend) - 1, rel=0.03)
-
-
-def test_period_of_gait():
-    bunch = make_gait(6, 5, takes=True, random_state=0)
-    for x, keyframes in zip(bunch.data, bunch.keyframes, strict=True):
-        found = self_correlation(x)
-        assert found.period == pytest.approx((keyframes[-1] - keyframes[0]) / 5, rel=0.05)
 
 
 @pytest.mark.parametrize(
