@@ -3,7 +3,8 @@
 import numpy as np
 
 from ..inputs.collections import as_collection
-from ..synchronizers.match import check_frame_rate, check_unit
+from ..metrics.arguments import as_frame_rates
+from ..synchronizers.match import check_unit
 
 __all__ = ["TimeAxis", "lengths_of"]
 
@@ -83,10 +84,4 @@ def _rates(frame_rate, lengths):
     count = 1 if lengths is None else len(lengths)
     if frame_rate is None:
         raise ValueError("unit='seconds' needs frame_rate, frames a second of the performances.")
-    rate = check_frame_rate(frame_rate)
-    if rate.ndim == 1 and len(rate) != count:
-        raise ValueError(
-            f"frame_rate must be one number, or one for each of the {count} performances, got "
-            f"{len(rate)}."
-        )
-    return np.broadcast_to(rate, (count,))
+    return np.broadcast_to(as_frame_rates(frame_rate, count), (count, 1))[:, 0]

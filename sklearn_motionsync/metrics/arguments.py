@@ -156,10 +156,10 @@ def as_frame_rates(frame_rate, n_sequences):
     rate = _as_double(frame_rate, "frame_rate")
     sound = (rate > 0) & np.isfinite(rate)
     if rate.shape not in ((), (n_sequences,)) or not sound.all():
-        which = f" for performance {int(np.argmin(sound))}" if rate.ndim and rate.size else ""
+        which = f": performance {int(np.argmin(sound))}" if rate.ndim and not sound.all() else ""
         raise ValueError(
             "frame_rate must be one number above 0, in frames a second, or one for each of the "
-            f"{n_sequences} performances, got {frame_rate!r}: wrong{which}."
+            f"{n_sequences} performances, got {frame_rate!r}{which}."
         )
     return rate[..., np.newaxis]
 

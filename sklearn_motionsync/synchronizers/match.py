@@ -9,12 +9,12 @@ from ..inputs.collections import as_collection, to_frame
 from ..inputs.numbers import as_numbers
 from ..inputs.validation import read_collection
 from ..matching.warps import sample
+from ..metrics.arguments import as_frame_rates
 from ..utils.pipelines import reach_synchronizer
 
 __all__ = [
     "UNITS",
     "Match",
-    "check_frame_rate",
     "check_match",
     "check_unit",
     "match_of_times",
@@ -351,10 +351,8 @@ class Match:
         return times * (lengths[:, np.newaxis] - 1) / (self.times.shape[1] - 1)
 
     def _in_seconds(self, times, X, frame_rate):
-        rate = check_frame_rate(frame_rate)
-        if rate.ndim == 1:
-            self._check_count(rate, "frame rates")
-        return self._stretched(times, X) / rate[..., np.newaxis]
+        rates = as_frame_rates(frame_rate, len(self.times))
+        return self._stretched(times, X) / rates
 
     def __iter__(self):
         return iter((self.offsets, self.times, self.distances))
@@ -396,19 +394,6 @@ def check_unit(unit):
     if not (isinstance(unit, str) and unit in UNITS):
         raise ValueError(f"unit must be one of {list(UNITS)}, got {unit!r}.")
     return unit
-
-
-def check_frame_rate(frame_rate):
-    """Frames per second: one number above 0, or one for each performance."""
-    rate = as_numbers(frame_rate, "frame_rate")
-    sound = (rate > 0) & np.isfinite(rate)
-    if rate.ndim > 1 or not sound.all():
-        which = f" for performance {int(np.argmin(sound))}" if rate.ndim == 1 else ""
-        raise ValueError(
-            f"frame_rate must be one number above 0, or one a performance, got {frame_rate!r}"
-            f"{which}."
-        )
-    return rate
 
 
 def timing_table(columns, X, labels):

@@ -293,12 +293,9 @@ class PartSynchronizer(Synchronizer):
 
     def _check_reference(self, against):
         if not self.parts_:
-            why = "the features are not recognised as those of DirectionCosines"
-            if self.parts is not None:
-                why = f"parts={self.parts!r}"
             raise ValueError(
-                f"There are no parts: {why}. Fit again with parts={{name: features}}; "
-                "skeleton.parts() gives them for direction cosines."
+                "There are no parts: they are not given, and the features are not recognised as "
+                "direction cosines. Fit again with parts={name: features}, or skeleton.parts()."
             )
         known = [*_REFERENCES, *self.parts_]
         if not (isinstance(against, str) and against in known):

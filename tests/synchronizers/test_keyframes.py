@@ -195,7 +195,8 @@ def test_keyframes_are_split_in_cross_validation(bending):
 @pytest.mark.parametrize(
     ("keyframes", "message"),
     [
-        ([[2, 5]], "one array a performance, 2; got 1"),
+        ([[2, 5]], r"list of 2 arrays .*; got \[\[2, 5\]\]"),
+        (3, "list of 2 arrays .*; got 3"),
         (
             [[2, 5], [5, 2]],
             r"Performance 1: key-frames must be 2 increasing frames between 0 and 9",
