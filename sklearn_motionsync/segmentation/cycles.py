@@ -260,17 +260,13 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         given, takes = check_takes(clone(self), X, reset=True)
         _, found = correlate_takes(given, takes, self.skeleton)
         reasons = [rejection_reason(f, self.threshold) for f in found]
-        return pd.DataFrame(
-            {
-                "n_frames": [len(take) for take in takes],
-                "period": [f.period for f in found],
-                "n_cycles": [f.n_cycles for f in found],
-                "strength": [f.strength for f in found],
-                "cyclic": [not reason for reason in reasons],
-                "reason": reasons,
-            },
-            index=pd.Index(takes.labels, tupleize_cols=False, name="take"),
-        )
+        rows = [
+            (len(x), f.period, f.n_cycles, f.strength, not reason, reason)
+            for x, f, reason in zip(takes, found, reasons, strict=True)
+        ]
+        columns = ["n_frames", "period", "n_cycles", "strength", "cyclic", "reason"]
+        index = pd.Index(takes.labels, tupleize_cols=False, name="take")
+        return pd.DataFrame(rows, columns=columns, index=index)
 
     def _select_cyclic(self, takes, found):
         """Indices of the takes that are cyclic; an error if others are not to be skipped."""

@@ -80,27 +80,19 @@ def test_takes_of_new_subjects_are_cut_at_the_same_phase(gait):
     )
 
 
-def test_phases_follow_a_take_that_slows_down():
-    take, phases = slowing_take()
+@pytest.mark.parametrize(("n_cycles", "n_frames"), [(8, 800), (45, 2000)])
+def test_phases_follow_takes_that_slow_down(n_cycles, n_frames):
+    """Also where the portions of 16 cycles of a long take meet."""
+    take, phases = slowing_take(n_cycles, n_frames)
     segmenter = CycleSegmenter(start=0).fit(take)
     (found,) = segmenter.phases(take)
-    d = found - phases
-    assert np.ptp(d) < 0.05  # at constant period 0.4
-    _, locations = segmenter.segment(take)
-    assert len(locations) == 7
-    lengths = (locations["stop"] - locations["start"] - 1).to_numpy()
-    np.testing.assert_allclose(np.diff(phases[locations["start"]]), 1, atol=0.03)
-    assert lengths[-1] > 1.25 * lengths[0]
-
-
-def test_phases_of_long_takes_are_continuous():
-    """Also where the portions of 16 cycles meet."""
-    take, phases = slowing_take(45, 2000)
-    segmenter = CycleSegmenter(start=0).fit(take)
-    (found,) = segmenter.phases(take)
-    assert np.ptp(found - phases) < 0.05  # at constant period 2.2
+    assert np.ptp(found - phases) < 0.05  # at constant periods 0.4 and 2.2
     assert (np.diff(found) >= 0).all()
-    assert len(segmenter.segment(take)[0]) in (44, 45)
+    _, locations = segmenter.segment(take)
+    assert len(locations) in (n_cycles - 1, n_cycles)
+    np.testing.assert_allclose(np.diff(phases[locations["start"]]), 1, atol=0.05)
+    lengths = (locations["stop"] - locations["start"] - 1).to_numpy()
+    assert lengths[-1] > 1.25 * lengths[0]
 
 
 def test_cycles_begin_at_the_maximum_of_the_start_feature(gait):
@@ -206,13 +198,10 @@ def test_takes_that_are_not_cyclic_can_be_skipped(gait):
     ("change", "message"),
     [
         (lambda x: np.where(np.eye(len(x), 4) > 0, np.nan, x), "Performance 1, frame 0, .* NaN"),
-        (lambda x: x * np.inf, "Performance 1, frame 0"),
-        (lambda x: x[:1], "Performance 1 has shape"),
         (lambda x: x[:, :3], "Performance 1 has 3 features a frame, performance 0 has 4"),
         (lambda x: x[:, 0], "Performance 1 has shape"),
     ],
 )
-@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
 def test_errors_name_the_bad_take(change, message, gait, fitted):
     bad = [gait.data[0], change(gait.data[1])]
     for method in (CycleSegmenter().fit, CycleSegmenter().report, fitted.segment):
@@ -271,17 +260,10 @@ def assert_same(answer, expected):
     pd.testing.assert_frame_equal(locations, other)
 
 
-def objects(X):
-    out = np.empty(len(X), dtype=object)
-    out[:] = X
-    return out
-
-
 @pytest.mark.parametrize(
     "kind",
     [
         tuple,
-        objects,
         np.stack,
         lambda X: [x.tolist() for x in X],
         lambda X: [np.asfortranarray(x) for x in X],

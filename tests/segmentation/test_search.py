@@ -233,7 +233,7 @@ def test_takes_without_the_action_give_no_hits(pipe, take):
 # -- threshold and number of hits ------------------------------------------------------------------
 
 
-def test_threshold_coverage_and_number(pipe):
+def test_threshold_max_hits_and_durations_select_hits(pipe):
     locations = find_performances(pipe, TAKE, threshold=None)[1]
     assert len(locations) > 3
     assert (locations["stop"].to_numpy()[:-1] <= locations["start"].to_numpy()[1:]).all()
@@ -241,6 +241,8 @@ def test_threshold_coverage_and_number(pipe):
     assert sorted(best["score"]) == sorted(locations["score"])[-2:]
     level = float(locations["score"].nlargest(2).min())
     assert len(find_performances(pipe, TAKE, threshold=level)[1]) == 2
+    locations = find_performances(pipe, TAKE, durations=(20, 57), threshold=None)[1]
+    assert (locations["stop"] - locations["start"]).between(20, 57).all()
 
 
 def test_auto_threshold_falls_with_coverage():
@@ -286,12 +288,6 @@ def test_chance_movements_have_mean_covariance_and_autocorrelation_of_the_postur
     left = [np.corrcoef(some[:, 10, k], some[:, 35, k])[0, 1] for k in (0, 1)]
     np.testing.assert_allclose(left, np.exp(-0.5), atol=0.08)
     np.testing.assert_array_equal(some, next(chance_movements(positions, [2000])))
-
-
-def test_durations_bound_the_hits(pipe):
-    locations = find_performances(pipe, TAKE, durations=(20, 57), threshold=None)[1]
-    lengths = locations["stop"] - locations["start"]
-    assert lengths.between(20, 57).all()
 
 
 def test_large_training_sets_are_subsampled():

@@ -78,14 +78,6 @@ def test_strength_is_robust_to_white_noise(size, lost):
     assert found.period == pytest.approx(expected.period, rel=0.02)
 
 
-def test_slow_changes_of_pace_keep_the_mean_period():
-    t = np.linspace(0, 1, 600)
-    angle = 24 * np.pi * (t + 0.05 * np.sin(np.pi * t))  # cycles of 0.86 to 1.19 of the mean
-    found = self_correlation(np.column_stack([np.sin(angle), np.cos(angle), np.cos(2 * angle)]))
-    assert found.strength > 0.5
-    assert found.n_cycles == pytest.approx(12, rel=0.05)
-
-
 @pytest.mark.parametrize("n_frames", [2, 3, 4, 7])
 def test_still_or_very_short_takes_have_no_period(n_frames):
     for x in (np.zeros((n_frames, 2)), np.full((n_frames, 1), 1e9), waves(n_frames, 50)):

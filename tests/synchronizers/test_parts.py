@@ -288,13 +288,6 @@ def test_tables_in_and_out(postures):
     assert lags.to_frame().loc["g"].columns.tolist() == ["arm", "foot"]
 
 
-def test_univariate_rows():
-    X = np.cumsum(np.random.default_rng(0).normal(size=(5, 30)), axis=1)
-    sync = PartSynchronizer({"all": 0}, coupling=0).fit(X)
-    assert sync.transform(X).shape == (5, 30)
-    assert sync.lags(X).values.shape == (5, 1, 30)
-
-
 # -- reports of lags ---------------------------------------------------------------------
 
 

@@ -19,7 +19,6 @@ from sklearn_motionsync import (
     Match,
     TimingChannel,
     find_departures,
-    to_frame,
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import (
@@ -94,14 +93,6 @@ def test_rows_give_curves_followed_by_the_channel(points):
     np.testing.assert_array_equal(out.iloc[:, :20], inner.transform(rows))
     np.testing.assert_array_equal(out.iloc[:, 20:], inner.match(rows).offsets_in("percent"))
     assert make_pipeline(channel, PCA(2)).fit_transform(rows).shape == (5, 2)
-
-
-def test_tables_keep_their_labels(points):
-    X = to_frame(points, performances=list("abcdefg"), columns=["p", "q", "r"])
-    out = TimingChannel(LinearSynchronizer(9)).set_output(transform="pandas").fit_transform(X)
-    assert list(out.columns) == ["p", "q", "r", "offset"]
-    assert list(out.index.unique(0)) == list("abcdefg")
-    assert (out["offset"] == 0).all()
 
 
 def test_keyframes_are_routed_by_name_and_by_request(bunch):
