@@ -17,7 +17,7 @@ import argparse
 
 import numpy as np
 from events import P, read_archive
-from sklearn_motionsync import DirectionCosines, PartSynchronizer
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines, PartSynchronizer
 
 ACTIONS = ("depositFloorR", "grabHighR", "elbowToKnee1RepsLelbowStart")
 ARMS = ("right arm", "left arm")
@@ -56,7 +56,7 @@ def held_out(postures, actors, **params):
     for actor in np.unique(actors):
         others = [x for x, a in zip(postures, actors, strict=True) if a != actor]
         clips = [x for x, a in zip(postures, actors, strict=True) if a == actor]
-        yield PartSynchronizer(n_frames=P, **params).fit(others), clips
+        yield PartSynchronizer(synchronizer=DenseSynchronizer(P), **params).fit(others), clips
 
 
 def told(errors):
@@ -73,10 +73,10 @@ def show_recovery(postures, actors):
                 against: told([errors_of(*fold, arm, size, against) for fold in folds])
                 for against in ("rest", "body")
             }
-            sync = PartSynchronizer(n_frames=P, coupling=0)
+            sync = PartSynchronizer(coupling=0, synchronizer=DenseSynchronizer(P))
             same = []
             for i in range(0, len(postures), 8):
-                sync.set_params(pattern=i).fit(postures)
+                sync.set_params(synchronizer__pattern=i).fit(postures)
                 late = [delayed(postures[i], sync.parts_[arm], size)]
                 found = sync.match_parts(late)[arm].offsets
                 same.append(np.abs(found - put_in(np.arange(P), size)))
@@ -102,7 +102,8 @@ def show_coupling(postures, actors):
 def show_people(postures, actors):
     print("3. lags of people, behind the rest of the body, mean over the clock")
     for coupling in (0, 1e-3):
-        sync = PartSynchronizer(n_frames=P, coupling=coupling).fit(postures)
+        body = DenseSynchronizer(P)
+        sync = PartSynchronizer(coupling=coupling, synchronizer=body).fit(postures)
         print(f"   coupling={coupling:g}")
         print(sync.lags(postures, actors).summary().round(2).to_string())
         if {"left leg", "right leg"} <= set(sync.parts_):

@@ -89,10 +89,10 @@ def ours(recordings, action, held_out, coverage=0.6):
     takes = recordings.takes_of(held_out)
     given = [recordings.takes[i] for i in takes]
     found = {}
-    for threshold in ("learned", None):
+    for threshold in ("auto", None):
         how = {"threshold": threshold, "coverage": coverage, "max_hits": 30}
-        _, origin = find_performances(pipe, given, **how)
-        rows = origin[["take", "start", "stop", "score"]].to_numpy()
+        _, locations = find_performances(pipe, given, **how)
+        rows = locations[["take", "start", "stop", "score"]].to_numpy()
         found[threshold] = [(takes[int(t)], int(a), int(b), s) for t, a, b, s in rows]
     return found
 
@@ -172,7 +172,7 @@ def figures(found, parts):
     sums = [at(right, count, k) for k in range(1, len(right) + 1)]
     precisions = np.cumsum(right) / np.arange(1, len(right) + 1)
     best, average = max(sums, key=lambda three: three[2]), (precisions * right).sum() / count
-    learnt = found.get("learned")
+    learnt = found.get("auto")
     own = best if learnt is None else at(judge(learnt, parts), count, len(learnt))
     return [*own, best[2], average]
 
@@ -190,7 +190,7 @@ def table(recordings, folds, methods):
                 for threshold, hits in method(recordings, action, fold).items():
                     found.setdefault(threshold, []).extend(hits)
             row.append(figures(found, parts))
-            hits = found.get("learned", [])
+            hits = found.get("auto", [])
             apart = [
                 h for h in hits if not any(p[0] == h[0] and overlap(h[1:3], p[1:3]) for p in parts)
             ]

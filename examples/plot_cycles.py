@@ -55,13 +55,13 @@ axis.legend()
 # %%
 # Cycles are performances
 # -----------------------
-# What is cut goes into any pipeline; ``origin`` says which take each cycle comes from, to keep the
+# The cycles go into any pipeline; ``locations`` says which take each comes from, to keep the
 # cycles of one person together in cross-validation.
 
-cycles, origin = segmenter.segment(takes)
-print(origin.head(3))
+cycles, locations = segmenter.segment(takes)
+print(locations.head(3))
 pipe = make_pipeline(DenseSynchronizer(101), ActionModel()).fit(
-    cycles, actionmodel__groups=origin["take"]
+    cycles, actionmodel__groups=locations["take"]
 )
 ActionModelDisplay.from_estimator(pipe, cycles, features=[0, 1])
 

@@ -67,8 +67,8 @@ second = np.concatenate([*second, standing(100)])
 # A score of 1 is equal to the two most similar bends of the training set, 0.37 as unlike as
 # standing still.
 
-performances, origin = find_performances(pipe, [first, second])
-print(origin.round(2).to_string())
+performances, locations = find_performances(pipe, [first, second])
+print(locations.round(2).to_string())
 print("true:", [part[1:] for part in true])
 
 # %%

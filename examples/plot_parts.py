@@ -10,7 +10,7 @@ the trunk is late now and then, in whoever it is.
 """
 
 import numpy as np
-from sklearn_motionsync import DirectionCosines, PartSynchronizer
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines, PartSynchronizer
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import LagDisplay
 
@@ -41,7 +41,7 @@ for x, actor in zip(postures, bunch.actor, strict=True):
 # average; ``icc``, the share of the variance that is between people, whether that is their own. The
 # pattern has no lag, so all are counted from how it goes.
 
-sync = PartSynchronizer(n_frames=60, coupling=0).fit(X)
+sync = PartSynchronizer(coupling=0, synchronizer=DenseSynchronizer(n_frames=60)).fit(X)
 lags = sync.lags(X, groups=bunch.actor, unit="percent")
 print(lags.summary().round(2))
 

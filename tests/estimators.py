@@ -39,7 +39,7 @@ NAMES = Skeleton.paper().column_names
 
 # Inside other estimators: the interface of the defaults, without what they learn and try.
 QUICK = DenseSynchronizer(metric=None, refine=False)
-PARTS = {"n_frames": 30, "metric": None, "consensus": 1, "refine": False}
+WHOLE = DenseSynchronizer(n_frames=30, metric=None, consensus=1, refine=False)
 
 
 class AlternatingClassifier(ActionClassifier):
@@ -61,7 +61,7 @@ INSTANCES = {
     "LinearSynchronizer": [LinearSynchronizer()],
     "KeyframeSynchronizer": [KeyframeSynchronizer()],
     "DenseSynchronizer": [DenseSynchronizer()],
-    "PartSynchronizer": [PartSynchronizer({"first": [0]}, **PARTS)],
+    "PartSynchronizer": [PartSynchronizer({"first": [0]}, synchronizer=WHOLE)],
     "Synchronizer": [ShiftSynchronizer()],
     "TimingChannel": [TimingChannel(LinearSynchronizer()), TimingChannel(QUICK, "log_rate")],
     "ActionModel": [ActionModel()],

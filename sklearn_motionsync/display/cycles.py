@@ -5,8 +5,14 @@ import numpy as np
 from ..body.formats import SIDES
 from ..inputs.features import choose_features
 from ..inputs.numbers import is_integer
-from ..segmentation.cycles import CycleSegmenter, examined, names_of_compared, start_curves, taken
-from ..segmentation.self_correlation import asked_of
+from ..segmentation.cycles import (
+    CycleSegmenter,
+    check_takes,
+    compared_names,
+    correlate_takes,
+    start_curves,
+)
+from ..segmentation.self_correlation import required_strength
 from .drawing import COLORS, panels
 from .given import as_drawn, as_index, is_number
 from .time_axis import TimeAxis
@@ -110,9 +116,9 @@ class CycleDisplay:
             raise ValueError(f"Give a CycleSegmenter, got {type(estimator).__name__}.")
         fitted = hasattr(estimator, "template_")
         segmenter = CycleSegmenter(**estimator.get_params()).set_params(not_cyclic="skip")
-        given, takes = taken(segmenter, X, reset=True)
+        given, takes = check_takes(segmenter, X, reset=True)
         i = as_index(take, len(takes), "take")
-        (x,), (found,) = examined(given[i : i + 1], takes[i : i + 1], segmenter.skeleton)
+        (x,), (found,) = correlate_takes(given[i : i + 1], takes[i : i + 1], segmenter.skeleton)
         row = segmenter.report(given[i : i + 1]).iloc[0]
         name, curve = _curve_of(segmenter, estimator if fitted else None, given[i], x, feature)
         cuts = np.array([], dtype=int)
@@ -126,7 +132,7 @@ class CycleDisplay:
             found.peaks,
             curve,
             cuts,
-            threshold=float(asked_of(np.inf, found.breadth, segmenter.threshold)),
+            threshold=float(required_strength(np.inf, found.breadth, segmenter.threshold)),
             period=period,
             name=name,
             reason=row["reason"],
@@ -157,7 +163,7 @@ class CycleDisplay:
         (self.peaks_,) = upper.plot(at, values, "o", color=blue, fillstyle="none", label="peaks")
         # More is asked of takes of less than two cycles; of narrow movements it is already.
         cycles = len(self.curve) / np.arange(1, len(lags))
-        asked = asked_of(cycles, np.inf, self.threshold)
+        asked = required_strength(cycles, np.inf, self.threshold)
         (self.threshold_,) = upper.plot(
             lags[1:], asked, color="0.4", linestyle="--", linewidth=1, label="threshold"
         )
@@ -198,7 +204,7 @@ def _indices(indices, count, what):
 
 def _curve_of(segmenter, fitted, take, x, feature):
     """What is drawn of a take, and what to call it."""
-    names = names_of_compared(segmenter)
+    names = compared_names(segmenter)
     if feature is None:
         start = segmenter.start if fitted is None else fitted.start_
         curves = start_curves(segmenter.set_params(start=start), [take], [x])

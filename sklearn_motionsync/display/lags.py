@@ -48,7 +48,7 @@ class LagDisplay:
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch = make_bending(6, n_frames=50, random_state=0)
     >>> X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-    >>> sync = PartSynchronizer(n_frames=50).fit(X)
+    >>> sync = PartSynchronizer().fit(X)
     >>> LagDisplay.from_estimator(sync, X, groups=bunch.actor)
     LagDisplay(5 parts behind the rest of the body, 6 performances of 4 people)
     """

@@ -83,7 +83,7 @@ class SearchDisplay:
         -------
         SearchDisplay
         """
-        if params.get("threshold", "learned") != "learned":
+        if params.get("threshold", "auto") != "auto":
             raise ValueError(
                 "SearchDisplay.from_estimator draws hits beside the learnt threshold; for another "
                 "one give what find_performances found to from_predictions."

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..inputs.tables import labels_of
-from ..synchronizers.match import as_match
+from ..synchronizers.match import match_of_times
 from .animation import playable
 from .bodies import (
     bodies_of_postures,
@@ -196,7 +196,7 @@ class SkeletonDisplay(PipelineFigures):
         SkeletonDisplay
         """
         raw, labels = _beside_each_other(X, skeleton, names)
-        match = as_match(times, len(raw))
+        match = match_of_times(times, len(raw))
         flat = [x.reshape(len(x), -1) for x in raw]
         warped = match.warp(flat)
         warped = warped.reshape(*warped.shape[:2], *raw[0].shape[1:])

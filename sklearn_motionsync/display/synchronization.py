@@ -5,7 +5,7 @@ import numpy as np
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import check_names
 from ..inputs.validation import read_collection
-from ..synchronizers.match import as_match
+from ..synchronizers.match import match_of_times
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .drawing import COLORS, curves, front_line, group_colors, group_lines, legend_above, panels
 from .given import as_drawn, as_names, mean_of_seen
@@ -86,7 +86,7 @@ class SynchronizationDisplay:
         frame_rate=None,
     ):
         before, _ = read_collection(before)
-        self.times = as_match(times, len(before)).times
+        self.times = match_of_times(times, len(before)).times
         n_sequences, n_frames = self.times.shape
         n_shown = np.shape(after)[-1] if np.ndim(after) else 0
         self.feature_names = as_names(feature_names, n_shown, "feature_names", "features")
@@ -208,7 +208,7 @@ class SynchronizationDisplay:
             number of names, a feature that does not exist, or something infinite.
         """
         arrays, names = read_collection(X)
-        match, width = as_match(times, len(arrays)), arrays[0].shape[1]
+        match, width = match_of_times(times, len(arrays)), arrays[0].shape[1]
         if feature_names is None:
             feature_names = names or [f"x{i}" for i in range(width)]
         feature_names = as_names(feature_names, width, "feature_names", "features")

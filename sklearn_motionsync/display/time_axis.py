@@ -3,7 +3,8 @@
 import numpy as np
 
 from ..inputs.collections import as_collection
-from ..synchronizers.match import as_frame_rate, as_unit
+from ..inputs.resampling import as_frame_rates
+from ..synchronizers.match import check_unit
 
 __all__ = ["TimeAxis", "lengths_of"]
 
@@ -42,7 +43,7 @@ class TimeAxis:
     """
 
     def __init__(self, unit, n_frames, lengths=None, frame_rate=None):
-        self.unit = as_unit(unit)
+        self.unit = check_unit(unit)
         self.label, self.label_of_performances = _OF_CLOCK[unit], _OF_PERFORMANCES[unit]
         self._lengths, self._rates = lengths, None
         clock = np.arange(n_frames)
@@ -83,10 +84,4 @@ def _rates(frame_rate, lengths):
     count = 1 if lengths is None else len(lengths)
     if frame_rate is None:
         raise ValueError("unit='seconds' needs frame_rate, frames a second of the performances.")
-    rate = as_frame_rate(frame_rate)
-    if rate.ndim == 1 and len(rate) != count:
-        raise ValueError(
-            f"frame_rate must be one number, or one for each of the {count} performances, got "
-            f"{len(rate)}."
-        )
-    return np.broadcast_to(rate, (count,))
+    return np.broadcast_to(as_frame_rates(frame_rate, count), (count, 1))[:, 0]

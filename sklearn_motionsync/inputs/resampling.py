@@ -8,6 +8,7 @@ import pandas as pd
 from .numbers import as_numbers
 
 __all__ = [
+    "as_frame_rates",
     "attrs_of_rows",
     "even_grid",
     "find_time_gaps",
@@ -233,3 +234,16 @@ def _is_even(times, slack):
     slope = frames @ times / max(frames @ frames, 1e-300)
     # Rounding moves a time by half a digit up or down.
     return np.ptp(times - slope * frames) < 0.999 * slack
+
+
+def as_frame_rates(frame_rate, n_sequences):
+    """Frames a second: one number, or a column of one number for each performance."""
+    rate = as_numbers(frame_rate, "frame_rate", dtype=np.float64)
+    valid = (rate > 0) & np.isfinite(rate)
+    if rate.shape not in ((), (n_sequences,)) or not valid.all():
+        which = f": performance {int(np.argmin(valid))}" if rate.ndim and not valid.all() else ""
+        raise ValueError(
+            "frame_rate must be one number above 0, in frames a second, or one for each of the "
+            f"{n_sequences} performances, got {frame_rate!r}{which}."
+        )
+    return rate[..., np.newaxis]

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ..inputs.numbers import as_numbers
+from ..inputs.resampling import as_frame_rates
 from ..matching.warps import follow
 
 __all__ = [
@@ -154,7 +155,7 @@ def keyframe_error(
     matched = follow(times, np.tile(pattern_keyframes, (n_sequences, 1)))
     errors = np.abs(matched - keyframes / own)
     if frame_rate is not None:
-        errors = errors * own / _as_frame_rates(frame_rate, n_sequences)
+        errors = errors * own / as_frame_rates(frame_rate, n_sequences)
     return _summary(errors, quantile)
 
 
@@ -357,17 +358,6 @@ def _in_order(frames, last, whose, unit):
             f"{frames.tolist()}."
         )
     return np.clip(frames, 0, last)
-
-
-def _as_frame_rates(frame_rate, n_sequences):
-    """Frames a second, a scalar or a column of one a performance."""
-    rate = as_numbers(frame_rate, "frame_rate", dtype=np.float64)
-    if rate.shape not in ((), (n_sequences,)) or not ((rate > 0) & np.isfinite(rate)).all():
-        raise ValueError(
-            "frame_rate must be one number above 0, in frames a second, or one for each of the "
-            f"{n_sequences} performances, got {frame_rate!r}."
-        )
-    return rate[..., np.newaxis]
 
 
 def _as_rows(values, what):

@@ -13,7 +13,7 @@ from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.tables import as_pandas, labels_of, name_performance
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
-from ..synchronizers.match import check_answer
+from ..synchronizers.match import check_match
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.threads import on_one_thread
@@ -200,7 +200,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
         self.synchronizer_ = sync.fit(X)
         match = sync.match(X)
-        check_answer(match, n, sync.n_frames_, type(sync).__name__)
+        check_match(match, n, sync.n_frames_, type(sync).__name__)
         warped = match.warp(performances)
         durations = np.array([len(x) for x in performances], dtype=np.float64) - 1
         self.n_frames_, self.duration_ = int(sync.n_frames_), float(durations.mean())

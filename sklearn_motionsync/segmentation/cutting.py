@@ -1,15 +1,34 @@
-"""Performances cut out of takes, and where in which take they come from."""
+"""Takes, and performances that are cut out of them."""
 
 import numpy as np
 import pandas as pd
 
 from ..inputs.collections import as_collection
-from ..inputs.tables import FRAME, label_of_part, own_label
+from ..inputs.numbers import as_numbers
+from ..inputs.tables import FRAME, as_pandas, label_of_part, own_label
 
-__all__ = ["cut_takes"]
+__all__ = ["as_takes", "cut_takes"]
 
-# Level of the labels of takes that have none.
-_TAKE = "take"
+
+def as_takes(X, *, univariate=False):
+    """A collection of takes; a single take (n_frames, n_features) as a list of one.
+
+    With ``univariate`` a one-dimensional array is a take of a single feature.
+    """
+    X = as_pandas(X)
+    if as_collection(X) is not None:
+        return X
+    if isinstance(X, pd.DataFrame):
+        return [X]
+    take = as_numbers(X, "The take")
+    if univariate and take.ndim == 1:
+        take = take[:, np.newaxis]
+    if take.ndim != 2:
+        raise ValueError(
+            f"Expected 2D array, one take (n_frames, n_features), or a list of takes; got an array "
+            f"of shape {take.shape}. A single feature is a column, x[:, np.newaxis]."
+        )
+    return [take]
 
 
 def cut_takes(X, performances, rows):
@@ -18,45 +37,39 @@ def cut_takes(X, performances, rows):
     Parameters
     ----------
     X : list of arrays (n_frames_i, n_features), or any collection
-        The takes as they were given, so that the parts are of the same kind: DataFrames keep
-        columns and ``attrs``.
+        The takes as they were given: DataFrames keep columns and ``attrs``.
     performances : Performances
         The same, checked.
     rows : DataFrame
         One row a performance: ``take``, its index in ``X``; ``start`` and ``stop``, whole frames
-        of the take, the last of which is excluded; and more.
+        of the take, ``stop`` excluded; and other columns.
 
     Returns
     -------
     performances : list of array, or of DataFrame, (n_frames_i, n_features)
-        In the order of ``rows``. Parts of DataFrames are called by the label of the take and their
-        number in it, by time, and indexed from 0.
-    origin : DataFrame
-        ``rows``, with the labels of the takes in place of their indices; row ``i`` is that of
-        performance ``i``.
+        In the order of ``rows``. Those of DataFrames are indexed from 0, and labelled by the label
+        of the take and their number in it, in order of time.
+    locations : DataFrame
+        ``rows``, with the labels of the takes in place of their indices.
     """
     given = as_collection(X)
     takes = list(performances if given is None else given)
-    counts = rows.groupby("take")["start"].rank(method="first").astype(int).to_numpy() - 1
+    numbers = rows.groupby("take")["start"].rank(method="first").astype(int).to_numpy() - 1
     parts = []
     for take, start, stop, number in zip(
-        rows["take"], rows["start"], rows["stop"], counts, strict=True
+        rows["take"], rows["start"], rows["stop"], numbers, strict=True
     ):
-        source, array = takes[take], performances[take]
+        source = takes[take]
         if isinstance(source, pd.DataFrame):
-            rows_of_part, label = slice(start, stop), performances.labels[take]
-            parts.append(_part_of_table(source, rows_of_part, label, int(number)))
+            part = source.iloc[start:stop]
+            part = part.set_axis(pd.RangeIndex(len(part), name=FRAME))
+            label, levels = own_label(source)
+            levels = ("take",) if label is None else levels
+            name = label_of_part(performances.labels[take], int(number), "part", (*levels, FRAME))
+            part.attrs = source.attrs | name
+            parts.append(part)
         else:
-            parts.append(array[start:stop].copy())
+            parts.append(performances[take][start:stop].copy())
     labels = np.empty(len(rows), dtype=object)
     labels[:] = [performances.labels[take] for take in rows["take"]]
     return parts, rows.assign(take=pd.Series(labels, index=rows.index).infer_objects())
-
-
-def _part_of_table(df, rows, take, number):
-    part = df.iloc[rows]
-    part = part.set_axis(pd.RangeIndex(len(part), name=FRAME))
-    label, levels = own_label(df)
-    names = (_TAKE,) if label is None else levels
-    part.attrs = df.attrs | label_of_part(take, number, "part", (*names, FRAME))
-    return part

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 from sklearn.base import BaseEstimator
+from sklearn.utils._param_validation import Interval, StrOptions, validate_params
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
@@ -25,95 +26,101 @@ from ..model.detector import energies
 from ..model.similarity import as_codes, learn_border
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import find_synchronizer, flat_steps, route_to_synchronizer
-from .cutting import cut_takes
+from .cutting import as_takes, cut_takes
 
 __all__ = ["find_performances"]
 
-# A pattern that is given as an array is compared on at most so many frames.
+# The clock of a pattern that is given as an array has at most so many frames.
 _CLOCK = 100
-# How much shorter and longer than those that were learnt performances may be: of many, and where
-# there is only a pattern.
+# Hits may be shorter and longer than the training performances by this ratio; the larger one is for
+# a single pattern.
 _MARGIN, _MARGIN_OF_ONE = 1.1, 1.5
-# No window is shorter.
-_FEWEST = 3
-# Ends of a hit are moved by this share of its length at first, then by ever less.
+# The shortest window, in frames.
+_SHORTEST = 3
+# The first step by which ends of a hit are moved, as a share of its length; later steps are halved.
 _FIRST_MOVE = 1 / 8
 _MOVES = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
-# Twice as unlike as the threshold allows: no move of the ends makes that up.
+# A window that is so many times as unlike as the threshold allows is not refined.
 _HOPELESS = 2
 
 
+@validate_params(
+    {
+        "threshold": [Interval(Real, 0, 1, closed="both"), StrOptions({"auto"}), None],
+        "coverage": [Interval(Real, 0, 1, closed="neither")],
+        "max_hits": [Interval(Integral, 1, None, closed="left"), None],
+    },
+    prefer_skip_nested_validation=True,
+)
 def find_performances(
-    pattern, X, *, threshold="learned", coverage=0.6, max_hits=None, durations=None, groups=None
+    pattern, X, *, threshold="auto", coverage=0.6, max_hits=None, durations=None, groups=None
 ):
-    """Where in long takes an action happens: performances cut out of them.
+    """Find an action in long takes, and cut its performances out of them.
 
-    1. The pattern is looked for in portions of a take that overlap, at several time scales: the
-       trellis with free ends finds where in each it begins and ends best.
-    2. Each of these windows is compared with the training performances, as they are: how unlike
-       it is to the two most similar ones in posture and in what the synchronizer compares, in
-       length and in energy. The score is ``exp(-unlikeness)``: 1 is equal, 0.37 as unlike as
-       standing still.
+    1. The pattern is matched to overlapping portions of a take, at several time scales. Both ends
+       of a path are free, so the match proposes a window: a start and a stop.
+    2. Each window is compared with the training performances after linear normalisation: by its
+       dissimilarity to the two nearest ones in posture and in the synchronizer's features, and by
+       its length and energy. The score is ``exp(-dissimilarity)``: 1 is equal, 0.37 as
+       dissimilar as standing still.
     3. The ends of the best window are moved to where its score is best; then those of the best
-       that does not overlap it, and so on. What reaches the threshold is a hit.
+       window that does not overlap it, and so on. Windows that reach the threshold are hits.
 
     Time grows with the length of a take, memory does not.
 
     Parameters
     ----------
     pattern : fitted synchronizer, Pipeline, ActionDetector, or array (n_frames, n_features)
-        What to look for. A pipeline ends in a synchronizer or in what follows one; its first step
-        takes the takes. An array (one performance) has nobody beside it: it says what
-        to look for, not how people differ.
+        The action to find. A pipeline ends in a synchronizer or in what follows one; its first step
+        takes the takes. An array is a single performance, which carries no information about the
+        differences between performances.
     X : array (n_frames, n_features), list of such arrays, or other collection
-        One take, or several, at the frame rate of the training performances. A single
+        One take, or several, at the frame rate of the training performances. A take of a single
         feature may be one-dimensional.
-    threshold : "learned", float or None, default="learned"
-        The lowest score of a hit. ``"learned"``: from the training performances, each compared
-        with those of other groups, but no lower than what movements by chance among their postures
-        hardly ever reach; at least 0.50 and at most 0.86. 0.61 for an array, half as unlike as
-        standing still. None: whatever is better than what it overlaps, to be compared
-        with the learnt one.
+    threshold : "auto", float or None, default="auto"
+        The lowest score of a hit. ``"auto"``: learnt from the training performances, each compared
+        with those of other groups, but not below what random movements among their postures rarely
+        exceed; at least 0.50 and at most 0.86. For an array 0.61, half as dissimilar as standing
+        still. None: all windows that are better than those they overlap.
     coverage : float, default=0.6
-        Share of performances of people not seen, cut out by hand, that a learnt threshold lets in,
-        unless chance gets as far.
+        Share of performances of new subjects, cut out by hand, that a threshold of ``"auto"``
+        accepts, unless random movements score as high.
     max_hits : int, default=None
-        How many are kept of each take, the best ones; by default all.
+        How many hits are kept of each take, the best ones; by default all.
     durations : (int, int), default=None
-        Numbers of frames of the shortest and the longest performance looked for. By default a
-        tenth beyond those of the training set, and what is unusually short or long counts as
-        unlike; for an array from 2/3 to 3/2 of its length.
+        Smallest and largest number of frames of a hit. By default 10 % beyond the training
+        performances, and an unusual length lowers the score; for an array from 2/3 to 3/2 of its
+        length.
     groups : array-like, default=None
-        Who performed each training performance, or what else makes them resemble each other. By
-        default those that an `ActionModel` in the pipeline was fitted with, which it knows of at
-        most 64 performances.
+        Group of each training performance, such as its subject. By default the groups that an
+        `ActionModel` in the pipeline was fitted with; it keeps those of at most 64 performances.
 
     Returns
     -------
     performances : list of array, or of DataFrame, (n_frames_i, n_features)
-        Cut out of the takes, in the order of their time, take by take. DataFrames keep columns, and
-        are called by the label of their take and their number in it.
-    origin : DataFrame
-        One row each: ``take``, its index or label; ``start`` and ``stop``, frames of the take, the
-        last excluded; ``score``; ``threshold``, the one that was given or learnt.
+        Cut out of the takes, take by take, in order of time. DataFrames keep columns, and are
+        labelled by the label of their take and their number in it.
+    locations : DataFrame
+        One row a performance: ``take``, its index or label; ``start`` and ``stop``, frames of the
+        take, ``stop`` excluded; ``score``; ``threshold``, the given or learnt one.
 
     Raises
     ------
     ValueError
         If the takes break the input contract or have other features than the training set, or a
-        parameter is none of those that are accepted.
+        parameter is invalid.
 
     See Also
     --------
-    ActionDetector : Whether what was cut out already is the action.
+    ActionDetector : Whether a performance that is cut out already is the action.
     SearchDisplay : Draws hits along the takes.
 
     Notes
     -----
-    A learnt threshold takes for known how people differ. How much else in a take looks like the
-    action nobody knows before: give more ``coverage`` to miss less, a higher threshold for fewer
-    false hits, and see docs/method.md for figures. What people do in entirely different ways
-    is hardly found.
+    The threshold of ``"auto"`` depends on how subjects differ, and not on what else in a take
+    resembles the action, which is unknown. Raise ``coverage`` to miss less, or the threshold for
+    fewer false hits; docs/method.md has figures. Actions that subjects perform in entirely
+    different ways are found rarely.
 
     Examples
     --------
@@ -124,20 +131,25 @@ def find_performances(
     >>> take = np.zeros((300, 2))
     >>> take[50:90], take[200:250] = wave, np.column_stack(
     ...     [np.interp(np.linspace(0, 1, 50), t, x) for x in wave.T])
-    >>> performances, origin = find_performances(wave, take)
-    >>> origin[["take", "start", "stop"]].to_numpy().tolist()
+    >>> performances, locations = find_performances(wave, take)
+    >>> locations[["take", "start", "stop"]].to_numpy().tolist()
     [[0, 50, 90], [0, 200, 250]]
     """
-    _check(threshold=threshold, coverage=coverage, max_hits=max_hits, durations=durations)
-    X = _as_takes(X)
-    reader = type("find_performances", (SequenceLevelMixin, BaseEstimator), {})()
-    given = check_performances(reader, X, reset=True, level="sequence")
+    X = as_takes(X, univariate=True)
+    checker = type("find_performances", (SequenceLevelMixin, BaseEstimator), {})()
+    given = check_performances(checker, X, reset=True, level="sequence")
     synchronizer, takes, groups = _reach(pattern, X, groups)
-    _check_lengths(given, takes)
-    shortest, longest = _durations(synchronizer, durations)
+    for i, (before, after) in enumerate(zip(given, takes, strict=True)):
+        if len(before) != len(after):
+            raise ValueError(
+                f"{given.called(i)} has {len(before)} frames, and {len(after)} after the steps "
+                "before the synchronizer, so frames of hits are unknown. Resample the takes first."
+            )
+    shortest, longest = _check_durations(synchronizer, durations)
     propose = Proposer.of(synchronizer, shortest, longest)
     unlikeness = Unlikeness(synchronizer, groups, length=durations is None)
-    level = _level(unlikeness, threshold, coverage)
+    learns = threshold is None or threshold == "auto"
+    level = float(np.exp(-unlikeness.border(coverage)) if learns else threshold)
     lowest = 0.0 if threshold is None else level
     rows = []
     for i, take in enumerate(takes):
@@ -154,37 +166,34 @@ class _Search:
 
     def __init__(self, take, unlikeness, shortest, longest):
         self._take, self._unlikeness = take, unlikeness
-        self._shortest, self._longest = shortest, min(longest, len(take))
+        self._shortest, self._longest = shortest, longest
 
-    def hits(self, windows, threshold, most):
-        """Start, stop and score of the best of windows (n, 2), in the order of time.
+    def hits(self, windows, threshold, count):
+        """Start, stop and score of the best of windows (n, 2), in order of time.
 
-        Windows are tried the best first, and each takes its place whether it is accepted or not:
-        so a threshold chooses among hits, and changes none.
+        A window that is refined excludes those it overlaps even if it is rejected, so that the
+        threshold selects among hits and changes none.
         """
         scores = np.exp(-self._unlikeness(self._take, windows))
-        tried = []
+        refined = []
         for k in np.argsort(-scores, kind="stable"):
             if scores[k] < threshold**_HOPELESS:
                 break
-            room = self._room(windows[k], tried)
-            if room is not None:
-                insort(tried, self._moved(windows[k], scores[k], *room))
-        found = sorted((hit for hit in tried if hit[2] >= threshold), key=lambda hit: -hit[2])
-        return sorted(found[:most])
+            limits = self._limits(windows[k], refined)
+            if limits is not None:
+                insort(refined, self._refine(windows[k], scores[k], *limits))
+        found = sorted((hit for hit in refined if hit[2] >= threshold), key=lambda hit: -hit[2])
+        return sorted(found[:count])
 
-    def _room(self, window, tried):
-        """From where to where a window may reach; None if it overlaps what was tried.
-
-        What was tried is in order of time, and does not overlap.
-        """
-        at = bisect(tried, tuple(window))
-        before = tried[at - 1][1] if at else 0
-        after = tried[at][0] if at < len(tried) else len(self._take)
+    def _limits(self, window, refined):
+        """The free interval about a window; None if it overlaps refined ones, sorted by time."""
+        at = bisect(refined, tuple(window))
+        before = refined[at - 1][1] if at else 0
+        after = refined[at][0] if at < len(refined) else len(self._take)
         return (before, after) if before <= window[0] and window[1] <= after else None
 
-    def _moved(self, window, score, first, last):
-        """The window with its ends moved, by ever less, to where its score is best."""
+    def _refine(self, window, score, first, last):
+        """The window with its ends moved, by smaller and smaller steps, to the best score."""
         window, move = np.asarray(window), max(1, int(_FIRST_MOVE * (window[1] - window[0])))
         while move:
             some = window + move * _MOVES
@@ -199,166 +208,115 @@ class _Search:
         return int(window[0]), int(window[1]), float(score)
 
 
-def _as_takes(X):
-    """A collection of takes, one being wrapped."""
-    X = as_pandas(X)
-    if as_collection(X) is not None:
-        return X
-    if isinstance(X, pd.DataFrame):
-        return [X]
-    array = as_numbers(X, "The take")
-    return [array[:, np.newaxis] if array.ndim == 1 else array]
-
-
 def _reach(pattern, X, groups):
-    """The synchronizer, the takes as they reach it, and the groups of what it keeps."""
+    """The synchronizer, the takes as they reach it, and the groups of its training set."""
     if not hasattr(pattern, "fit"):
         if groups is not None:
-            raise ValueError("groups tell training performances apart; an array is only one.")
-        pattern = _as_pattern(pattern)
+            raise ValueError("groups are those of training performances; an array has none.")
+        pattern = _check_pattern(pattern)
         synchronizer = DenseSynchronizer(min(len(pattern), _CLOCK), pattern=0).fit([pattern])
         return synchronizer, synchronizer.check_performances(X), None
-    _check_synchronizer(find_synchronizer(pattern)[1])
+    _, synchronizer = find_synchronizer(pattern)
+    check_is_fitted(synchronizer)
+    if synchronizer.training_.on_clock.shape[2] != synchronizer.n_features_in_:
+        raise ValueError(
+            f"{type(synchronizer).__name__} was fitted on the rows of a 2-D array, all of one "
+            "length, but hits differ in length: fit it on [row[:, np.newaxis] for row in X]."
+        )
     reached = route_to_synchronizer(pattern, X, {}, "find_performances")
-    return reached.synchronizer, reached.performances, _groups(pattern, reached, groups)
+    return reached.synchronizer, reached.performances, _training_groups(pattern, reached, groups)
 
 
-def _as_pattern(pattern):
+def _check_pattern(pattern):
     """One performance: a DataFrame, or an array (n_frames, n_features)."""
     pattern = as_pandas(pattern)
-    several = isinstance(pattern, (list, tuple, np.ndarray, pd.DataFrame))
-    if several and as_collection(pattern) is not None:
+    is_array = isinstance(pattern, (list, tuple, np.ndarray, pd.DataFrame))
+    if is_array and as_collection(pattern) is not None:
         raise ValueError(
-            "The pattern is a list of performances, or a 3-D array: give one of them, "
-            "(n_frames, n_features), or fit a synchronizer to all, and give that."
+            "The pattern is a collection of performances: give one of them, (n_frames, "
+            "n_features), or fit a synchronizer to all, and give that."
         )
     array = as_numbers(pattern, "The pattern")
     array = array[:, np.newaxis] if array.ndim == 1 else array
-    if array.ndim != 2 or len(array) < _FEWEST:
+    if array.ndim != 2 or len(array) < _SHORTEST:
         raise ValueError(
             f"The pattern has shape {array.shape}: give one performance, (n_frames, "
-            f"n_features), of at least {_FEWEST} frames, or a fitted synchronizer."
+            f"n_features), of at least {_SHORTEST} frames, or a fitted synchronizer."
         )
     check_finite(array, "The pattern, frame")
     return pattern if isinstance(pattern, pd.DataFrame) else array
 
 
-def _check_synchronizer(synchronizer):
-    check_is_fitted(synchronizer)
-    if synchronizer.training_.on_clock.shape[2] != synchronizer.n_features_in_:
-        raise ValueError(
-            f"{type(synchronizer).__name__} was fitted on the rows of a 2-D array, all of one "
-            "length, and hits differ in theirs: fit it on [row[:, np.newaxis] for row in X]."
-        )
-
-
-def _check_lengths(given, takes):
-    for i, (before, after) in enumerate(zip(given, takes, strict=True)):
-        if len(before) != len(after):
-            raise ValueError(
-                f"{given.called(i)} has {len(before)} frames, and {len(after)} after the steps "
-                "before the synchronizer: where a hit is could not be told. Resample the takes "
-                "before you give them."
-            )
-
-
-def _groups(pattern, reached, groups):
+def _training_groups(pattern, reached, groups):
+    """Codes of the groups of the training performances that the synchronizer keeps, or None."""
     training = reached.synchronizer.training_
-    if len(training.durations) < 2:
+    count = len(training.durations)
+    if count < 2:
         return None
     if groups is not None:
-        return as_codes(groups, len(training.durations))[training.kept]
+        return as_codes(groups, count)[training.kept]
     models = [step for step in flat_steps(pattern) if isinstance(step, ActionModel)]
-    fitted = [model for model in models if hasattr(model, "groups_")]
-    if not fitted:
+    if not models or not hasattr(models[0], "groups_"):
         return None
-    known, n_seen = fitted[0].groups_, fitted[0].n_samples_seen_
-    # A model may have learnt of others since.
-    if len(known) == n_seen == len(training.durations):
+    known, n_seen = models[0].groups_, models[0].n_samples_seen_
+    # The model may have learnt from other performances since, by partial_fit.
+    if len(known) == n_seen == count:
         return known
     if len(np.unique(known)) < len(known):
         warnings.warn(
-            f"The model keeps {len(known)} of {n_seen} performances, the synchronizer learnt of "
-            f"{len(training.durations)}, so that who gave these is not known, and each counts for "
-            "itself: the threshold will be too high. Give groups, one for each performance.",
+            f"The model keeps the groups of {len(known)} of {n_seen} performances, the "
+            f"synchronizer was fitted on {count}: their groups are unknown, each counts as its "
+            "own, and the threshold will be too high. Give groups, one for each performance.",
             UserWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
     return None
 
 
-def _durations(synchronizer, durations):
-    """The shortest and the longest window."""
-    known = synchronizer.training_.durations
-    if durations is not None:
-        return max(int(durations[0]), 2), int(durations[1])
-    margin = _MARGIN if len(known) > 1 else _MARGIN_OF_ONE
-    return max(_FEWEST, int(known.min() / margin)), int(np.ceil(known.max() * margin))
-
-
-def _level(unlikeness, threshold, coverage):
-    """The score that is given, or learnt."""
-    if threshold is None or isinstance(threshold, str):
-        return float(np.exp(-unlikeness.border(coverage)))
-    return float(threshold)
-
-
-def _check(*, threshold, coverage, max_hits, durations):
-    def is_number(x, kind=Real):
-        return isinstance(x, kind) and not isinstance(x, bool)
-
-    if not (
-        threshold is None
-        or (isinstance(threshold, str) and threshold == "learned")
-        or (is_number(threshold) and 0 <= threshold <= 1)
-    ):
-        raise ValueError(
-            f"threshold must be 'learned', a score from 0 to 1, or None; got {threshold!r}."
-        )
-    if not (is_number(coverage) and 0 < coverage < 1):
-        raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
-    if not (max_hits is None or (is_number(max_hits, Integral) and max_hits >= 1)):
-        raise ValueError(f"max_hits must be a whole number from 1 on, or None; got {max_hits!r}.")
+def _check_durations(synchronizer, durations):
+    """The smallest and the largest number of frames of a window."""
     if durations is None:
-        return
+        known = synchronizer.training_.durations
+        margin = _MARGIN if len(known) > 1 else _MARGIN_OF_ONE
+        return max(_SHORTEST, int(known.min() / margin)), int(np.ceil(known.max() * margin))
     pair = tuple(durations) if isinstance(durations, (tuple, list, np.ndarray)) else ()
-    if not (
-        len(pair) == 2 and all(is_number(n, Integral) for n in pair) and 2 <= pair[0] <= pair[1]
-    ):
+    whole = len(pair) == 2 and all(isinstance(n, Integral) for n in pair)
+    if not (whole and 2 <= pair[0] <= pair[1]):
         raise ValueError(
-            "durations must be two whole numbers of frames, the shortest from 2 on and the longest "
-            f"performance; got {durations!r}."
+            "durations must be two whole numbers of frames, the smallest, at least 2, and the "
+            f"largest; got {durations!r}."
         )
+    return int(pair[0]), int(pair[1])
 
 
-# -- proposals: windows of a take in which an action may happen, by matching with free ends
+# -- proposals: windows of a take that may hold the action, by matching with free ends ------
 
-# On so many frames the pattern is looked for: only where it is, roughly, matters here.
+# Frames of the clock of proposals, which need only be rough.
 _CLOCK_FRAMES = 50
-# How far both ends are free, as a share of the clock; portions follow each other as far apart.
+# Free offset of both ends, as a share of the clock; also the distance between portions.
 _SHARE = 0.2
-# From one time scale to the next: ends that are free by a fifth cover what is between.
+# Ratio between time scales: free ends cover those between.
 _RATIO = 1.6
 _SMOOTHNESS, _MAX_RATE = 0.003, 3
-# Portions matched at a time: bounds the memory, whatever the length of the take.
+# Portions matched at a time, which bounds the memory.
 _PROPOSAL_BATCH = 64
 
 
 class Proposer(NamedTuple):
-    """Finds windows of takes that a pattern may lie in.
+    """Proposes windows of takes that may hold a pattern.
 
     Attributes
     ----------
     features : Features
         What is compared of portions, of which it is made on the clock of the pattern.
     base : ndarray, shape (1, P, n_compared)
-        What is compared of the pattern.
+        Features of the pattern.
     trellis : Trellis
         With free ends.
     lengths : ndarray of int
-        Usual numbers of frames, one a time scale.
+        Typical number of frames at each time scale.
     shortest, longest : int
-        Numbers of frames of windows.
+        Limits of the numbers of frames of windows.
     """
 
     features: Features
@@ -384,7 +342,7 @@ class Proposer(NamedTuple):
         return cls(features, base, trellis, scales(shortest, longest), shortest, longest)
 
     def __call__(self, take):
-        """Windows of a take (n_frames, n_features), each once: (n_windows, 2) of start and stop."""
+        """Distinct windows of a take (n_frames, n_features): (n_windows, 2) of start and stop."""
         lengths = self.lengths[self.lengths <= len(take)]
         found = [self._at_scale(take, int(length)) for length in lengths]
         windows = np.concatenate([np.empty((0, 2), dtype=np.intp), *found])
@@ -393,7 +351,7 @@ class Proposer(NamedTuple):
         return np.unique(windows[fits], axis=0)
 
     def _at_scale(self, take, length):
-        """The best window of every portion, the pattern taking about this number of frames."""
+        """The best window of every portion, for a pattern of about this number of frames."""
         n_frames, width = self.base.shape[1], self.trellis.width
         step = (length - 1) / (n_frames - 1)
         count = int(np.ceil((len(take) - length) / max(width * step, 1.0))) + 1
@@ -411,7 +369,7 @@ class Proposer(NamedTuple):
 
 
 def scales(shortest, longest):
-    """Numbers of frames from the shortest to the longest, by a constant ratio or less."""
+    """Numbers of frames from the shortest to the longest, by a constant ratio of at most 1.6."""
     count = int(np.ceil(np.log(longest / shortest) / np.log(_RATIO))) + 1
     return np.unique(np.round(np.geomspace(shortest, longest, count)).astype(np.intp))
 

@@ -1,4 +1,4 @@
-"""How much a take is like itself some time later: what tells its period, or that it has none."""
+"""Self-correlation of a take: its period, or whether it has one."""
 
 from typing import NamedTuple
 
@@ -14,52 +14,52 @@ from ..matching.filters import smooth
 __all__ = [
     "LEAST_CYCLES",
     "SelfCorrelation",
-    "asked_of",
     "correlate",
-    "lack_of",
-    "reason_of",
+    "rejection_reason",
+    "required_strength",
     "self_correlation",
 ]
 
-# Of shorter takes nobody can say that they repeat.
+# Cycles that a take must hold at least to show that it repeats.
 LEAST_CYCLES = 1.6
-# The shortest overlap of a take with itself, as a share of it.
+# The shortest overlap of a take with itself, as a share of the take.
 _OVERLAP = 0.3
-# The first peak counts that comes so near to the highest: multiples of a period have peaks, too.
+# Multiples of a period have peaks, too: the period is at the first peak of this share of the
+# highest.
 _NEAR = 0.9
-# Before a peak the correlation falls below this share of it; what does not is a ripple of noise.
+# Before a peak the correlation falls below this share of the peak, or the peak is a noise ripple.
 _FALL = 0.5
-# Width of the smoothing, as a share of the time in which the movement changes.
+# Width of the smoothing, as a share of the time scale of the movement.
 _SMOOTHING = 1 / 4
-# Of narrower movements more is asked.
+# A lower breadth of the movement raises the required strength.
 _BROAD = 2.25
-# Variances below this share of the whole are rounding.
+# Variances below this share of the total are rounding errors.
 _NOTHING = 1e-12
 
 
 class SelfCorrelation(NamedTuple):
-    """What `self_correlation` finds.
+    """Result of `self_correlation`.
 
     Attributes
     ----------
     correlation : ndarray, shape (n_lags,)
-        Of the take with itself a number of frames later, from -1 to 1: the mean of the two that
-        follow. Lags are 0, 1, ... frames, up to 70 % of the take.
+        Correlation of the take with itself at lags of 0, 1, ... frames, up to 70 % of the take: the
+        mean of ``posture`` and ``velocity``, from -1 to 1.
     posture, velocity : ndarray, shape (n_lags,)
-        Of where the movement is, and of how it goes on.
+        Correlations of the postures, and of their velocities.
     peaks : ndarray of int
-        Lags of those maxima before which the correlation falls below half of them.
+        Lags of the maxima before which the correlation falls below half their height.
     period : float
-        Frames of a cycle, with fractions: where the first peak is that reaches 90 % of the highest.
-        NaN without any.
+        Frames of a cycle, with fractions: the lag of the first peak that reaches 90 % of the
+        highest. NaN without any.
     strength : float
-        The correlation there, 0 without any.
+        The correlation at the period; 0 without any.
     n_cycles : float
-        Frames of the take by those of a cycle; 0 without any.
+        Length of the take in periods; 0 without any.
     breadth : float
-        How many directions of equal variance the movement is worth, the squared sum of the
-        variances along its principal components by the sum of their squares: 1 for a single
-        feature. The fewer, the more easily noise is like itself.
+        Participation ratio of the variances along the principal components, the effective number of
+        dimensions: the squared sum of the variances by the sum of their squares, 1 for a single
+        feature. The smaller it is, the larger are chance correlations of noise.
     """
 
     correlation: np.ndarray
@@ -73,28 +73,30 @@ class SelfCorrelation(NamedTuple):
 
 
 def self_correlation(take, skeleton=None):
-    r"""Compare a take with itself at every lag: what repeats is like itself after a period.
+    r"""Correlate a take with itself at every lag, to find the period of what repeats.
 
-    Of a lag :math:`L` it compares the frames :math:`a(t) = x(t)` and :math:`b(t) = x(t + L)`, from
-    which the means of this overlap are taken:
+    At lag :math:`L` it correlates the frames :math:`a(t) = x(t)` and :math:`b(t) = x(t + L)`, less
+    their means over the overlap:
 
     .. math:: r(L) = \frac{\sum_t \langle a(t), b(t) \rangle}
               {\sqrt{\sum_t |a(t)|^2 \; \sum_t |b(t)|^2}}
 
-    The correlation is the mean of that of the postures and that of their velocities. Velocity by
-    itself takes one stroke of several for the whole; posture by itself sees slow changes. Lags are
-    those at which at least 30 % of the take overlap.
+    The result is the mean of the correlations of postures and of velocities. Velocities alone
+    mistake one stroke of several for a cycle; postures alone are sensitive to slow changes. At
+    every lag at least 30 % of the take overlap.
 
     Parameters
     ----------
     take : array-like or DataFrame, shape (n_frames, n_features)
+        One take.
     skeleton : Skeleton, default=None
-        That of joint positions, whose direction cosines are compared; None compares the features
-        as they are, of which those with the largest variance count most.
+        Skeleton of joint positions, whose direction cosines are correlated; None correlates the
+        features themselves, each weighted by its variance.
 
     Returns
     -------
     SelfCorrelation
+        The correlation at every lag, its peaks, and the period.
 
     Raises
     ------
@@ -107,9 +109,9 @@ def self_correlation(take, skeleton=None):
 
     Notes
     -----
-    Postures are smoothed by a Gaussian, a fourth as wide as the root of their variance by that of
-    their change in a frame: of a sine, a twenty-fifth of its period. Time and memory grow with the
-    take as a Fourier transform of it does.
+    Postures are smoothed by a Gaussian whose standard deviation is a fourth of the square root of
+    their variance divided by the variance of their change per frame: for a sine, a twenty-fifth of
+    its period. Time and memory grow as those of a Fourier transform of the take.
 
     References
     ----------
@@ -132,8 +134,8 @@ def self_correlation(take, skeleton=None):
     several = as_collection(take)
     if several is not None and not (isinstance(take, pd.DataFrame) and len(several) == 1):
         raise ValueError(
-            f"Give one take, (n_frames, n_features), got {len(several)} performances; "
-            "CycleSegmenter().report(X) tells of several."
+            f"Give one take, (n_frames, n_features), got {len(several)} performances; for several "
+            "use CycleSegmenter().report(X)."
         )
     (array,) = check_members([take])
     if skeleton is not None:
@@ -145,55 +147,44 @@ def correlate(x):
     """`self_correlation` of features (n_frames, n_features) that were checked."""
     n_frames = len(x)
     x = x.astype(np.float64) - x[0]
-    # In units of a power of two no square is out of range.
-    x = np.ldexp(x, -int(np.frexp(np.abs(x).max())[1]))
     x -= x.mean(axis=0)
-    width, n_lags, noise = _width(x), int((1 - _OVERLAP) * n_frames) + 1, _noise(x)
+    width, n_lags, noise = _smoothing_width(x), int((1 - _OVERLAP) * n_frames) + 1, _noise(x)
     smoothed = [smooth(x[np.newaxis], width, order)[0] for order in (0, 1)]
     posture, velocity = (
-        _normalized(y, n_lags, noise * _left_of_noise(width, order))
+        _autocorrelation(y, n_lags, noise * _noise_gain(width, order))
         for order, y in enumerate(smoothed)
     )
-    breadth = _breadth(smoothed[0])
-    correlation = (posture + velocity) / 2
-    peaks = _peaks_of(correlation, posture)
-    if len(peaks) == 0:
-        return SelfCorrelation(correlation, posture, velocity, peaks, np.nan, 0.0, 0.0, breadth)
-    lags, values = _vertices(correlation, peaks)
-    first = int(np.argmax(values >= _NEAR * values.max()))
-    period, strength = float(lags[first]), float(values[first])
-    told = period, strength, n_frames / period, breadth
-    return SelfCorrelation(correlation, posture, velocity, peaks, *told)
+    breadth, correlation = _breadth(smoothed[0]), (posture + velocity) / 2
+    peaks = _find_peaks(correlation, posture)
+    period, strength, n_cycles = np.nan, 0.0, 0.0
+    if len(peaks):
+        lags, values = _vertices(correlation, peaks)
+        first = int(np.argmax(values >= _NEAR * values.max()))
+        period, strength = float(lags[first]), float(values[first])
+        n_cycles = n_frames / period
+    return SelfCorrelation(
+        correlation, posture, velocity, peaks, period, strength, n_cycles, breadth
+    )
 
 
-def asked_of(n_cycles, breadth, threshold):
-    """The strength from which so many cycles of a movement are a repetition.
+def required_strength(n_cycles, breadth, threshold):
+    """The strength from which a movement of so many cycles is cyclic.
 
-    The take is compared with itself over all cycles but one. If these are less than a whole one, or
-    if the movement has hardly more than one direction, it is more likely by chance that they are
-    alike.
+    All cycles but one are correlated with others. Chance correlations are larger if these are less
+    than one cycle, and for movements in few directions.
     """
-    met = np.clip(np.asarray(n_cycles) - 1, 1e-12, 1)
-    asked = 1 - (1 - threshold) * min(1, np.sqrt(breadth / _BROAD))
-    return asked / np.sqrt(met)
+    overlap = np.clip(np.asarray(n_cycles) - 1, 1e-12, 1)
+    required = 1 - (1 - threshold) * min(1, np.sqrt(breadth / _BROAD))
+    return required / np.sqrt(overlap)
 
 
-def reason_of(found, threshold):
+def rejection_reason(found, threshold):
     """Why a take cannot be segmented; empty, if it can."""
-    if not found.n_cycles or found.strength < asked_of(found.n_cycles, found.breadth, threshold):
+    required = required_strength(found.n_cycles, found.breadth, threshold)
+    if not found.n_cycles or found.strength < required:
         return "not cyclic"
     enough = found.n_cycles >= LEAST_CYCLES
     return "" if enough else f"holds {np.floor(100 * found.n_cycles) / 100:.2f} cycles"
-
-
-def lack_of(found, threshold):
-    """What is missing of a self-correlation that is not cyclic."""
-    if not found.n_cycles:
-        return "has no peak"
-    asked = (
-        f"{asked_of(found.n_cycles, found.breadth, threshold):.2f} at {found.n_cycles:.2f} cycles"
-    )
-    return f"has the strength {found.strength:.2f}, below {threshold=:g} ({asked})"
 
 
 def _breadth(x):
@@ -204,35 +195,36 @@ def _breadth(x):
     return float(1 / np.square(products / total).sum()) if total > 0 else 1.0
 
 
-def _width(x):
-    """Standard deviation, in frames, of a Gaussian that leaves the movement of centred features."""
+def _smoothing_width(x):
+    """Standard deviation, in frames, of the Gaussian that smooths centred features."""
     change, bend = (np.square(np.diff(x, k, axis=0)).sum() / max(len(x) - k, 1) for k in (1, 2))
-    # White noise adds 2 to the square of a change where it adds 6 to that of a second difference.
+    # White noise of variance 1 has first differences of variance 2 and second ones of variance 6.
     change = max(change - bend / 3, change / 100)
     return _SMOOTHING * np.sqrt(np.square(x).sum() / len(x) / change) if change > 0 else 0.0
 
 
 def _noise(x):
-    """White noise a frame in the square of centred features, in the share that is none."""
+    """Variance of white noise in centred features, reduced by its share of the whole variance."""
     bends = np.diff(x, 3, axis=0)
     energy = np.square(x).sum() / len(x)
-    # It adds 1 + 9 + 9 + 1 to the square of a third difference, slow movement hardly anything.
+    # Third differences of white noise have 1 + 9 + 9 + 1 times its variance; those of slow movement
+    # are small.
     noise = np.square(bends).sum() / (20 * max(len(bends), 1))
     return noise * max(1 - noise / energy, 0) if energy > 0 else 0.0
 
 
-def _left_of_noise(width, order):
-    """The share of the variance of white noise that is left by a filter."""
+def _noise_gain(width, order):
+    """The share of the variance of white noise that passes a filter."""
     middle = int(np.ceil(4 * width)) + 2
     impulse = np.zeros((1, 2 * middle + 1, 1))
     impulse[0, middle] = 1
     return np.square(smooth(impulse, width, order)).sum()
 
 
-def _normalized(x, n_lags, noise):
-    """The correlation of features with themselves at every lag, means of each overlap removed.
+def _autocorrelation(x, n_lags, noise):
+    """The correlation of features with themselves at every lag, less the means of each overlap.
 
-    ``noise`` of the squares of every frame is noise.
+    ``noise`` is the variance of noise in a frame.
     """
     n, lags = len(x), np.arange(n_lags)
     x = x - x.mean(axis=0)
@@ -254,8 +246,8 @@ def _normalized(x, n_lags, noise):
     return np.clip(out, -1, 1)
 
 
-def _peaks_of(correlation, posture):
-    """Maxima above 0 before which that of the postures falls below half of them."""
+def _find_peaks(correlation, posture):
+    """Maxima above 0 before which the correlation of postures falls below half their height."""
     inner, before, after = correlation[1:-1], correlation[:-2], correlation[2:]
     peaks = np.flatnonzero((inner > before) & (inner >= after) & (inner > 0)) + 1
     lowest = np.minimum.accumulate(posture)
@@ -263,7 +255,7 @@ def _peaks_of(correlation, posture):
 
 
 def _vertices(correlation, peaks):
-    """Where parabolas through peaks and their neighbours have their maxima, and these."""
+    """Maxima of parabolas through peaks and their neighbours: lags and values."""
     before, here, after = (correlation[peaks + k] for k in (-1, 0, 1))
     bend = before - 2 * here + after
     offsets = (before - after) / (2 * bend)

@@ -25,7 +25,7 @@ from ..matching.units import Unit
 from ..matching.warps import normalise
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
-from .match import Match, check_answer
+from .match import Match, check_match
 
 __all__ = ["Synchronizer", "TrainingSet"]
 
@@ -271,7 +271,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
 
     def _warp_part(self, performances, **params):
         match = self.match(performances, **params)
-        check_answer(match, len(performances), self.n_frames_, type(self).__name__)
+        check_match(match, len(performances), self.n_frames_, type(self).__name__)
         return match.warp(performances)
 
     def _warp_parts(self, n_sequences, parts):

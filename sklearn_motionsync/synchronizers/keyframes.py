@@ -1,4 +1,4 @@
-"""KeyframeSynchronizer: the paper's manual baseline (Figs. 1c and 3c)."""
+"""KeyframeSynchronizer: piecewise linear warps between key-frames (Figs. 1c and 3c)."""
 
 from numbers import Integral
 
@@ -18,20 +18,22 @@ from .match import Match
 
 __all__ = ["KeyframeSynchronizer"]
 
-# Performances that are handled together.
-_AT_ONCE = 256
+# Performances that are warped together, which bounds the memory.
+_BATCH = 256
+# Weight of the distance in time, which decides between equal postures.
+_TIE = 1e-9
 
 
 class KeyframeSynchronizer(Synchronizer):
     """Synchronise performances by key-frames, piecewise linearly between them.
 
-    1. The pattern is the performance closest to all others, once the key-frames coincide if
-       they were given, after linear normalisation if not.
-    2. If no key-frames were given, find them: those of the pattern where the curvature of
-       its path is largest, the paper's own criterion; those of another performance among
-       its own peaks of curvature, by the closest postures in the same order.
-    3. ``transform`` stretches each performance evenly between its key-frames so that they
-       fall on those of the pattern.
+    1. The pattern is the performance with the smallest sum of squared distances to all others:
+       after warping by the key-frames if they are given, else after linear normalisation.
+    2. If no key-frames are given, those of the pattern are the frames of largest curvature of its
+       path, the paper's criterion; those of another performance are peaks of its curvature, with
+       the closest postures in the same order.
+    3. ``transform`` stretches each performance linearly between its key-frames so that they
+       coincide with those of the pattern.
 
     Parameters
     ----------
@@ -39,11 +41,10 @@ class KeyframeSynchronizer(Synchronizer):
         Frames of the common clock; by default the median length of the performances, or
         the length of a pattern given as an array.
     pattern : "median", int or array (n_frames, n_features), default="median"
-        The performance whose key-frames the others follow. For an array, key-frames are
+        The pattern: the median performance, the one of an index, or an array, whose key-frames are
         always found by curvature.
     n_keyframes : int, default=5
-        How many to find when none are given, as far as there are frames for them; the
-        paper uses 5.
+        How many key-frames to find when none are given, at most ``P - 2``; the paper uses 5.
 
     Attributes
     ----------
@@ -69,13 +70,13 @@ class KeyframeSynchronizer(Synchronizer):
 
     Notes
     -----
-    Found key-frames serve performances of one style. Between people who differ in style they
-    are often not the same moments, and linear normalisation is better than a wrong key-frame.
+    Automatic key-frames suit performances of one style. In different styles they are often
+    different moments, and linear normalisation is more accurate.
 
-    Key-frames are metadata: in a Pipeline enable scikit-learn's metadata routing and ask for them
-    with ``set_fit_request(keyframes=True)`` and ``set_transform_request(keyframes=True)``. Scorers
-    are asked to take them with ``set_score_request(keyframes=True)``; scorers that are called by
-    hand, displays and ``Match.from_estimator`` take ``keyframes=...``.
+    Key-frames are metadata: in a Pipeline enable scikit-learn's metadata routing and request them
+    with ``set_fit_request(keyframes=True)`` and ``set_transform_request(keyframes=True)``, for
+    scorers with ``set_score_request(keyframes=True)``. Scorers that are called directly, displays
+    and ``Match.from_estimator`` take ``keyframes=...``.
 
     Examples
     --------
@@ -107,13 +108,21 @@ class KeyframeSynchronizer(Synchronizer):
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Performances; the rows of a 2-D array are univariate ones.
         y : ignored
+            Present for API consistency.
         keyframes : list of arrays (n_keyframes,), default=None
             Key-frames of each performance, in its own frames (fractions allowed), increasing;
             found by curvature if None.
 
         Returns
         -------
-        self
+        self : KeyframeSynchronizer
+            The fitted synchronizer.
+
+        Raises
+        ------
+        ValueError
+            If the input breaks the contract, the pattern does not exist or fit, or key-frames are
+            not increasing, inside their performance and equally many in all.
         """
         self._learn(self._check_training_set(X), keyframes)
         return self
@@ -124,22 +133,29 @@ class KeyframeSynchronizer(Synchronizer):
 
         Parameters
         ----------
-        X, y, keyframes : as for ``fit``
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+        y : ignored
+            Present for API consistency.
+        keyframes : list of arrays (n_keyframes,), default=None
+            Key-frames of each performance, as for ``fit``.
 
         Returns
         -------
-        As ``transform``
+        ndarray, shape (n_sequences, P, n_features)
+            As from ``transform``.
         """
         return self.fit(X, y, keyframes=keyframes).transform(X, keyframes=keyframes)
 
     def transform(self, X, keyframes=None):
-        """Warp performances so that their key-frames fall on those of the pattern.
+        """Warp performances so that their key-frames coincide with those of the pattern.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
         keyframes : list of arrays (n_keyframes,), default=None
-            Needed if ``fit`` was given key-frames.
+            Required if ``fit`` was given key-frames.
 
         Returns
         -------
@@ -156,8 +172,9 @@ class KeyframeSynchronizer(Synchronizer):
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
         keyframes : list of arrays (n_keyframes,), default=None
-            Needed if ``fit`` was given key-frames.
+            Required if ``fit`` was given key-frames.
 
         Returns
         -------
@@ -171,12 +188,16 @@ class KeyframeSynchronizer(Synchronizer):
                 "keyframes",
             )
         if keyframes is not None:
-            knots = self._given_knots(performances, keyframes, len(self.keyframes_))
+            knots = self._check_keyframes(performances, keyframes, len(self.keyframes_))
         distances, times = np.empty(len(performances)), []
-        for rows in even_slices(len(performances), _AT_ONCE):
-            some = performances.take(rows)
-            own = self._found_knots(some) if keyframes is None else knots[rows]
-            times.append(self._between(self.keyframes_, own))
+        for rows in even_slices(len(performances), _BATCH):
+            some = performances[rows]
+            if keyframes is None:
+                on_clock = self.normalize(some)
+                own = [match_keyframes(self.pattern_, self.keyframes_, x) for x in on_clock]
+            else:
+                own = knots[rows]
+            times.append(self._interpolate(self.keyframes_, own))
             synchronised = sample(some, times[-1], self.n_frames_)
             distances[rows] = squared_distances(synchronised, self.pattern_)
         return Match(np.concatenate(times), distances)
@@ -184,11 +205,10 @@ class KeyframeSynchronizer(Synchronizer):
     def _learn(self, performances, keyframes):
         self._given = keyframes is not None
         training = self._set_clock(performances)
-        knots, comparable = None, training.scaled
+        comparable = training.scaled
         if self._given:
-            knots = self._given_knots(performances, keyframes)
-            # On the mean key-frames all performances are comparable, as on one clock.
-            times = self._between(knots.mean(axis=0), knots)
+            knots = self._check_keyframes(performances, keyframes)
+            times = self._interpolate(knots.mean(axis=0), knots)
             comparable = training.unit.fill(sample(performances, times, self.n_frames_))
         self._set_pattern(training, self._plain_median(comparable))
         if self._given and self.pattern_index_ is not None:
@@ -197,38 +217,27 @@ class KeyframeSynchronizer(Synchronizer):
             count = knots.shape[1] if self._given else self.n_keyframes
             self.keyframes_ = curvature_keyframes(self.pattern_, count)
 
-    def _found_knots(self, performances):
-        """Those that are closest to the pattern's, by curvature."""
-        on_clock = self.normalize(performances)
-        return np.stack([match_keyframes(self.pattern_, self.keyframes_, x) for x in on_clock])
-
-    def _between(self, knots, others):
+    def _interpolate(self, knots, others):
         """tau(p): piecewise linear through the ends and the key-frames."""
         p, last = np.arange(self.n_frames_), self.n_frames_ - 1
         return np.stack([np.interp(p, [0, *knots, last], [0, *other, last]) for other in others])
 
-    def _given_knots(self, arrays, keyframes, count=None):
-        """Given key-frames, checked, in frames of the common clock."""
+    def _check_keyframes(self, arrays, keyframes, count=None):
+        """Given key-frames, checked, in frames of the common clock: (n_sequences, n_keyframes)."""
         if isinstance(keyframes, (pd.DataFrame, pd.Series)):
             # One row a performance; iterating would give columns.
             keyframes = keyframes.to_numpy()
-        if isinstance(keyframes, (str, dict)) or not hasattr(keyframes, "__len__"):
+        if not hasattr(keyframes, "__len__") or len(keyframes) != len(arrays):
             raise ValueError(
-                "keyframes must be a list of arrays (n_keyframes,), one a performance; got "
-                f"{type(keyframes).__name__}."
-            )
-        if len(keyframes) != len(arrays):
-            raise ValueError(
-                f"keyframes must hold one array a performance, {len(arrays)}; got {len(keyframes)}."
+                f"keyframes must be a list of {len(arrays)} arrays (n_keyframes,), one a "
+                f"performance; got {keyframes!r:.200}."
             )
         checked = []
         for i, (given, x) in enumerate(zip(keyframes, arrays, strict=True)):
             frames = as_numbers(given, f"Performance {i}: keyframes", dtype=np.float64)
-            count = len(np.atleast_1d(frames)) if count is None else count
-            inside = frames.ndim == 1 and bool(
-                (np.diff(frames) > 0).all() and (frames > 0).all() and (frames < len(x) - 1).all()
-            )
-            if frames.shape != (count,) or count == 0 or not inside:
+            count = frames.size if count is None else count
+            path = np.concatenate([[0], frames.ravel(), [len(x) - 1]])
+            if frames.shape != (count,) or count == 0 or not (np.diff(path) > 0).all():
                 raise ValueError(
                     f"Performance {i}: key-frames must be {count or 'some'} increasing frames "
                     f"between 0 and {len(x) - 1}, both excluded, got {given}."
@@ -237,17 +246,14 @@ class KeyframeSynchronizer(Synchronizer):
         return np.stack(checked)
 
 
-# -- key-frames of a performance: where its path bends most (Figs. 1c and 3c) ------------
-
-# Weight of the distance in time, which only decides between postures that are equally close.
-_TIE = 1e-9
+# -- automatic key-frames: frames of large curvature (Figs. 1c and 3c) ---------------------
 
 
 def curvature_keyframes(on_clock, count):
     """The frames of maximum curvature of one performance, in order of time.
 
-    Frames closer than a third of their mean distance to one already chosen, or to an end, are
-    passed over while there are others.
+    Frames closer than a third of the mean distance to a chosen one, or to an end, are chosen only
+    if there are no others.
 
     Parameters
     ----------
@@ -265,18 +271,18 @@ def curvature_keyframes(on_clock, count):
     chosen = []
     for near in (gap, 0):
         for frame in order:
-            taken = [0, n_frames - 1, *chosen]
-            if len(chosen) < count and min(abs(frame - other) for other in taken) > near:
+            others = [0, n_frames - 1, *chosen]
+            if len(chosen) < count and min(abs(frame - other) for other in others) > near:
                 chosen.append(int(frame))
     return np.sort(np.array(chosen, dtype=np.float64))
 
 
 def match_keyframes(pattern, keyframes, on_clock):
-    """The frames of a performance that show the key-frames of the pattern.
+    """The frames of a performance that correspond to the key-frames of the pattern.
 
-    Among the frames where its own curvature peaks, and those that would be its key-frames, the ones
-    in the same order whose postures are closest in sum, found by dynamic programming. Of postures
-    that are equally close those at the time of the pattern's: so the pattern matches itself.
+    Candidates are the peaks of its curvature, and its own key-frames. Dynamic programming finds the
+    increasing sequence with the smallest sum of squared distances between postures; of equal
+    postures those closest in time, so that the pattern matches itself.
 
     Parameters
     ----------
@@ -295,12 +301,12 @@ def match_keyframes(pattern, keyframes, on_clock):
     own = curvature_keyframes(on_clock, len(keyframes)).astype(np.intp)
     peaks = np.union1d(peaks, own)
     unit = Unit.of(pattern[np.newaxis])
-    wanted, shown = unit(pattern[keyframes.astype(np.intp)]), unit(on_clock[peaks])
-    costs = np.square(wanted[:, np.newaxis] - shown).sum(axis=2, dtype=np.float64)
+    expected, candidates = unit(pattern[keyframes.astype(np.intp)]), unit(on_clock[peaks])
+    costs = np.square(expected[:, np.newaxis] - candidates).sum(axis=2, dtype=np.float64)
     costs += _TIE * np.square((keyframes[:, np.newaxis] - peaks) / n_frames)
     best, choices = np.zeros(len(peaks)), []
     for cost in costs:
-        # best[j]: the key-frames so far, all of them before peak j.
+        # best[j]: the smallest cost of the key-frames so far, all of them before peak j.
         total = best + cost
         choices.append(np.concatenate([[-1], _running_argmin(total)]))
         best = np.concatenate([[np.inf], np.minimum.accumulate(total)[:-1]])
@@ -319,7 +325,7 @@ def _running_argmin(values):
 
 
 def _curvature(on_clock):
-    """``sqrt(|v|^2 |a|^2 - (v.a)^2) / |v|^3`` of the path, damped where the movement rests."""
+    """Curvature ``sqrt(|v|^2 |a|^2 - (v.a)^2) / |v|^3`` of the path, damped at low speed."""
     sigma = SMOOTHING * (len(on_clock) - 1)
     on_clock = on_clock[np.newaxis]
     scaled = Unit.of(on_clock)(on_clock)
@@ -327,6 +333,5 @@ def _curvature(on_clock):
     vv, aa, va = np.square(v).sum(1), np.square(a).sum(1), (v * a).sum(1)
     rest = 0.1 * vv.mean()
     if rest == 0:
-        # What never moves bends nowhere.
         return np.zeros_like(vv)
     return np.sqrt(np.maximum(vv * aa - va**2, 0)) / (vv + rest) ** 1.5

@@ -1,4 +1,4 @@
-"""Lags: how much later than the rest parts of the body are, and whether that is a person's own."""
+"""Lags: delays of parts of the body, with their spread within and between subjects."""
 
 from typing import NamedTuple
 
@@ -6,41 +6,40 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
-from .match import table_of_timing
+from .match import timing_table
 
 __all__ = ["Lags"]
 
-# Share of such intervals that hold what they are made for.
+# Level of the confidence intervals.
 _CONFIDENCE = 0.95
 
 
 class Lags(NamedTuple):
     """How much later than the rest of the body each part is, at every frame of the pattern.
 
-    `PartSynchronizer.lags` makes them. The pattern has no lag: it is how much *more* than in the
-    pattern the part is late. Whether a lag is a habit of people or comes and goes is what the
-    spread is for, so no table is without it.
+    `PartSynchronizer.lags` returns them. Lags are relative to the pattern, whose lags are 0. Their
+    spread shows whether a lag is a habit of subjects or varies from performance to performance.
 
-    Attributes
+    Parameters
     ----------
     values : ndarray, shape (n_sequences, n_parts, P)
-        Positive where a part is late, negative where it leads.
+        The lags: positive where a part is late, negative where it leads.
     parts : list of str
-        What is late.
+        Names of the parts.
     against : str
-        Than what: ``"rest"``, ``"body"``, or the name of a part.
+        The reference: ``"rest"``, ``"body"``, or the name of a part.
     unit : {"frames", "percent", "seconds"}
-        Of the values.
+        Unit of the values.
     groups : ndarray of int, shape (n_sequences,), or None
-        The person of every performance, counted from 0.
+        The subject of every performance, counted from 0.
     people : list or None
-        What they are called.
+        Labels of the subjects.
     labels : list or None
-        What performances are called.
+        Labels of the performances.
 
     Examples
     --------
-    Two people, twice each. The arm of one of them is always late by 4 frames.
+    Two subjects, two performances each. The arm of the second is always late by 4 frames.
 
     >>> import numpy as np
     >>> from sklearn_motionsync import Lags
@@ -52,7 +51,7 @@ class Lags(NamedTuple):
     part
     arm   2.15       0.22        2.89  0.99
 
-    Nobody can tell from two people where the mean of all people is:
+    Two subjects do not determine the mean of the population:
 
     >>> lags.summary()[["low", "high"]].round().to_numpy().tolist()
     [[-24.0, 28.0]]
@@ -72,12 +71,12 @@ class Lags(NamedTuple):
         Returns
         -------
         DataFrame
-            A row a part. ``mean`` over all; with people, of the means of each. ``sd`` over
-            performances. ``low`` and ``high``: the 95 % interval of the mean, by the t distribution
-            over people, or performances where nobody said whose they are. With people also those of
-            a one-way analysis of variance: ``sd_within`` and ``sd_between`` people, and ``icc``,
-            the share of the variance that is between them, ICC(1,1): near 1 for a habit, near 0 for
-            a lag that comes and goes. NaN where there are too few to tell.
+            A row a part. ``mean`` over performances, or with groups over the means of subjects;
+            ``sd`` over performances; ``low`` and ``high``, the 95 % confidence interval of the
+            mean, by the t distribution over subjects, or over performances without groups. With
+            groups also a one-way analysis of variance: ``sd_within`` and ``sd_between`` subjects,
+            and ``icc``, the share of the variance between subjects, ICC(1,1): near 1 for a habit,
+            near 0 for a lag that varies. NaN where there are too few performances or subjects.
         """
         columns = self._spread(self.values.mean(axis=2))
         return pd.DataFrame(columns, index=pd.Index(self.parts, name="part"))
@@ -88,8 +87,8 @@ class Lags(NamedTuple):
         Returns
         -------
         DataFrame
-            A row a part and frame, columns as in ``summary``. The intervals are those of each frame
-            by itself: 5 % of all frames lie outside by chance, and neighbours together.
+            A row a part and frame, columns as in ``summary``. Intervals are pointwise: at 5 % of
+            the frames they miss the mean by chance.
         """
         n_frames = self.values.shape[2]
         index = pd.MultiIndex.from_product([self.parts, range(n_frames)], names=["part", "frame"])
@@ -105,7 +104,7 @@ class Lags(NamedTuple):
             A row a performance and frame of the pattern, a column a part.
         """
         columns = {part: self.values[:, i] for i, part in enumerate(self.parts)}
-        return table_of_timing(columns, None, self.labels)
+        return timing_table(columns, None, self.labels)
 
     def __repr__(self):
         n_sequences, n_parts, n_frames = self.values.shape
@@ -141,26 +140,24 @@ def _sd(values):
 
 
 def _interval(mean, sd, n):
-    """Where the mean of all that there could be lies."""
-    reach = np.nan
-    if n > 1:
-        reach = student.ppf((1 + _CONFIDENCE) / 2, n - 1) * sd / np.sqrt(n)
+    """The confidence interval of a mean."""
+    quantile = student.ppf((1 + _CONFIDENCE) / 2, n - 1) if n > 1 else np.nan
+    reach = quantile * sd / np.sqrt(n)
     return {"low": mean - reach, "high": mean + reach}
 
 
 def _components(values, own, groups, counts):
-    """Variances within and between people: a one-way analysis, people of unequal counts.
+    """Variances within and between groups of unequal counts, by a one-way analysis of variance.
 
-    NaN where nobody has two performances, or there is one person only.
+    NaN if no group has two performances, or there is only one group.
     """
-    n_people, n = len(counts), len(values)
-    nothing = np.full(values.shape[1], np.nan)
-    within = between = nothing
-    if n > n_people:
-        within = np.square(values - own[groups]).sum(axis=0) / (n - n_people)
-    if n > n_people > 1:
+    n_groups, n = len(counts), len(values)
+    within = between = np.full(values.shape[1], np.nan)
+    if n > n_groups:
+        within = np.square(values - own[groups]).sum(axis=0) / (n - n_groups)
+    if n > n_groups > 1:
         squares = np.square(own - values.mean(axis=0))
-        mean_square = (counts[:, np.newaxis] * squares).sum(axis=0) / (n_people - 1)
-        typical = (n - np.square(counts).sum() / n) / (n_people - 1)
+        mean_square = (counts[:, np.newaxis] * squares).sum(axis=0) / (n_groups - 1)
+        typical = (n - np.square(counts).sum() / n) / (n_groups - 1)
         between = np.maximum(mean_square - within, 0) / typical
     return within, between

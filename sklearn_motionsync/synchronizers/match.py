@@ -1,4 +1,4 @@
-"""Match: how performances meet the pattern, which every synchronizer answers with."""
+"""Match: warps of performances to the pattern, the result of every synchronizer."""
 
 from collections.abc import Mapping
 
@@ -8,6 +8,7 @@ import pandas as pd
 from ..inputs.collections import as_collection
 from ..inputs.long_tables import to_frame
 from ..inputs.numbers import as_numbers
+from ..inputs.resampling import as_frame_rates
 from ..inputs.validation import read_collection
 from ..matching.warps import sample
 from ..utils.pipelines import route_to_synchronizer
@@ -15,31 +16,32 @@ from ..utils.pipelines import route_to_synchronizer
 __all__ = [
     "UNITS",
     "Match",
-    "as_frame_rate",
-    "as_match",
-    "as_unit",
-    "check_answer",
-    "table_of_timing",
+    "check_match",
+    "check_unit",
+    "match_of_times",
+    "timing_table",
 ]
 
-# Rounding may take times back by this share of the clock.
+# Units of time of the clock of the pattern.
+UNITS = ("frames", "percent", "seconds")
+# Times may decrease by rounding errors, by this share of the clock.
 _ROUNDING = 1e-9
-# Slower is standing still: a hundredth of the pace of the pattern.
+# The smallest rate, so that logarithms are finite.
 _SLOWEST = 0.01
 
 
 class Match:
     """Warps of a set of performances to the pattern.
 
-    Synchronizers make them, by ``match``; `from_estimator` gets them out of a whole pipeline.
+    The ``match`` of a synchronizer returns one, and `from_estimator` that of a whole pipeline.
 
     Parameters
     ----------
     times : array-like, shape (n_sequences, P)
-        ``tau(p)``, from 0 to ``P - 1``: what frame p of the pattern meets, in frames of
+        ``tau(p)``, from 0 to ``P - 1``: the frame that corresponds to frame p of the pattern, in
         performances that are linearly normalised to its length.
     distances : array-like, shape (n_sequences,), default=None
-        How far each performance is from the pattern; NaN if nobody measured.
+        Distance of each performance from the pattern; NaN by default.
 
     Attributes
     ----------
@@ -53,8 +55,8 @@ class Match:
     Raises
     ------
     ValueError
-        If times are no table of at least two frames, or decrease, or are not within the clock, or
-        there is not one distance a performance.
+        If times are not of shape (n_sequences, P) with at least two frames, decrease, or are not
+        within the clock; or if there is not one distance a performance.
 
     Notes
     -----
@@ -68,7 +70,7 @@ class Match:
     >>> match = LinearSynchronizer(n_frames=5).fit(X).match(X)
     >>> match
     Match(2 performances on 5 frames)
-    >>> match.frames(X)[1].tolist()  # of the second performance, which has nine
+    >>> match.frames(X)[1].tolist()  # the second performance has nine frames
     [0.0, 2.0, 4.0, 6.0, 8.0]
     >>> match.seconds(X, frame_rate=4)[1].tolist()
     [0.0, 0.5, 1.0, 1.5, 2.0]
@@ -76,7 +78,7 @@ class Match:
     >>> match.warp(forces)[1].ravel().tolist()
     [0.0, 20.0, 40.0, 60.0, 80.0]
 
-    Timing is a result, too: this one is late at first, by a quarter of the clock at most.
+    Timing is a result, too: this performance is late by up to a quarter of the clock.
 
     >>> late = Match([[0, 2, 3, 3.5, 4]])
     >>> late.offsets_in("percent").tolist()
@@ -107,7 +109,7 @@ class Match:
             i, p = np.argwhere(back)[0]
             raise ValueError(
                 f"Performance {i}: times must not decrease, but {times[i, p + 1]:g} at frame "
-                f"{p + 1} follows {times[i, p]:g}: a movement that runs backwards is no warp."
+                f"{p + 1} follows {times[i, p]:g}."
             )
         np.maximum.accumulate(times, axis=1, out=times)
         if distances is None:
@@ -130,31 +132,29 @@ class Match:
 
     @property
     def rates(self):
-        """``d tau / dp``, how long performances take where the pattern takes 1: (n_sequences, P).
+        """Local rates ``d tau / dp``: (n_sequences, P).
 
-        Central differences of ``times``, one-sided at both ends. Where tau stands still the rate is
-        0.01 and not less, so that its log, ``np.log(match.rates)``, is finite: 0 at the pace of the
-        pattern, positive where a performance is slower and its offset grows, negative where it is
-        faster.
+        Central differences of ``times``, one-sided at both ends, and at least 0.01. The log rate,
+        ``np.log(match.rates)``, is 0 at the pace of the pattern, positive where a performance is
+        slower and its offset grows, negative where it is faster.
         """
         return np.maximum(np.gradient(self.times, axis=1), _SLOWEST)
 
     def offsets_in(self, unit, X=None, frame_rate=None):
         """How much later than the pattern performances are at every frame of it, in a unit of time.
 
-        The lengths of performances do not count: all begin and end with the pattern. Who
-        is slower evenly is not late.
+        Offsets are relative to linear normalisation: all performances begin and end with the
+        pattern, and one that is uniformly slower is not late.
 
         Parameters
         ----------
         unit : {"frames", "percent", "seconds"}
             Frames of the pattern, as ``offsets``; per cent of the clock, ``100 Delta / (P - 1)``;
-            or seconds of each performance as it was recorded, by which it is later than it would
-            be had it gone evenly with the pattern.
-        X : as for ``frames``, default=None
+            or seconds of each performance as recorded.
+        X : performances, or array-like of numbers, shape (n_sequences,), default=None
             For seconds: the performances, or how many frames each has.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
-            For seconds: frames a second of what X is.
+            For seconds: frames per second of X.
 
         Returns
         -------
@@ -164,7 +164,7 @@ class Match:
         Raises
         ------
         ValueError
-            If there is no such unit, or X or the frame rate is missing for seconds; as from
+            If there is no such unit, or X or the frame rate is missing for seconds; and as from
             ``seconds``.
         """
         return self._in_unit(unit, X, frame_rate)[1]
@@ -176,20 +176,20 @@ class Match:
         ----------
         unit : {"frames", "percent", "seconds"}, default="frames"
             Of ``time`` and ``offset``, as in ``offsets_in``.
-        X : as for ``frames``, default=None
-            For seconds; and where it has labels, they are those of the table.
+        X : performances, or array-like of numbers, shape (n_sequences,), default=None
+            Needed for seconds. The labels of X are those of the table.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
-            For seconds: frames a second of what X is.
+            For seconds: frames per second of X.
         labels : sequence of length n_sequences, or Index, default=None
-            What performances are called; by default as in X, or 0, 1, ... A MultiIndex makes
+            Labels of the performances; by default those of X, or 0, 1, ... A MultiIndex makes
             several levels.
 
         Returns
         -------
         DataFrame
-            Indexed by performance, called as in X, and frame of the pattern. Columns: ``time``,
-            tau(p) in the unit, from the beginning of each performance; ``offset``, how much later
-            than the pattern that is; ``rate``.
+            Indexed by the label of the performance and the frame of the pattern. Columns:
+            ``time``, tau(p) in the unit, from the beginning of each performance; ``offset``;
+            ``rate``.
 
         Raises
         ------
@@ -214,7 +214,7 @@ class Match:
         if labels is not None:
             self._check_count(labels, "labels")
         columns = {"time": times, "offset": offsets, "rate": self.rates}
-        return table_of_timing(columns, X, labels)
+        return timing_table(columns, X, labels)
 
     @classmethod
     def from_estimator(cls, estimator, X, **params):
@@ -224,21 +224,23 @@ class Match:
         ----------
         estimator : synchronizer, or Pipeline with one
             Fitted.
-        X : performances, as the estimator takes them
+        X : list of arrays (n_frames_i, n_features), or other collection
+            Performances, as the estimator takes them.
         **params : dict
-            What the ``match`` of the synchronizer takes besides, such as ``keyframes``; steps
-            before it whose ``transform`` takes the same are given it, too.
+            Metadata for the ``match`` of the synchronizer, such as ``keyframes``, and for the
+            ``transform`` of the steps before it.
 
         Returns
         -------
         Match
+            The warps of X.
 
         Raises
         ------
         ValueError
-            If the estimator has no synchronizer, or that needs key-frames and gets none.
+            If the estimator has no synchronizer, or key-frames that it needs are missing.
         TypeError
-            If nobody takes one of the params.
+            If no step takes one of the params.
 
         Examples
         --------
@@ -253,20 +255,21 @@ class Match:
         return route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator").match()
 
     def warp(self, X):
-        """Whatever was recorded along with the performances, on the clock of the pattern (Eq. 18).
+        """Warp sequences recorded with the performances onto the clock of the pattern (Eq. 18).
 
-        Joint positions when the match was made in the aSpace, forces, muscle signals, at any rate:
-        the first and last frame of each are those of the performance.
+        Such as joint positions when the match was made in the aSpace, forces, or muscle signals, at
+        any frame rate: the first and last frame of each are those of the performance.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or (performance, frame) frame
-            One sequence a performance, in the same order. NaN and infinite values stay where they
-            are: between frames, what is next to one is one, too.
+            One sequence a performance, in the same order. Samples interpolated from NaN or
+            infinite values are such, too.
 
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features)
+            The sequences at ``times``.
 
         Raises
         ------
@@ -279,13 +282,13 @@ class Match:
         return sample(arrays, self.times, self.times.shape[1])
 
     def frames(self, X):
-        """The frame of each performance that meets each frame of the pattern.
+        """The frame of each performance that corresponds to each frame of the pattern.
 
         Parameters
         ----------
         X : performances, or array-like of numbers, shape (n_sequences,)
-            The performances, whatever was recorded along with them, or how many frames each has.
-            Of univariate performances in rows, give how many: ``[X.shape[1]] * len(X)``.
+            The performances, sequences recorded with them, or how many frames each has. For
+            univariate performances in rows give ``[X.shape[1]] * len(X)``.
 
         Returns
         -------
@@ -300,17 +303,19 @@ class Match:
         return self._stretched(self.times, X)
 
     def seconds(self, X, frame_rate):
-        """When in each performance, from its beginning, each frame of the pattern is met.
+        """The time in each performance that corresponds to each frame of the pattern.
 
         Parameters
         ----------
-        X : as for ``frames``
+        X : performances, or array-like of numbers, shape (n_sequences,)
+            The performances, or how many frames each has, as for ``frames``.
         frame_rate : float, or array-like of shape (n_sequences,)
-            Frames a second of what X is; one for each performance if they differ.
+            Frames per second of X; one for each performance if they differ.
 
         Returns
         -------
         ndarray, shape (n_sequences, P)
+            Seconds from the first frame of each performance.
 
         Raises
         ------
@@ -320,22 +325,21 @@ class Match:
         return self._in_seconds(self.times, X, frame_rate)
 
     def _in_unit(self, unit, X, frame_rate):
-        """tau(p) in a unit of time, and how much of it is offset."""
-        unit, last = as_unit(unit), self.times.shape[1] - 1
-        if unit != "seconds":
-            scale = 100 / last if unit == "percent" else 1
-            if X is not None:
-                self._check_count(_lengths(X), "lengths")
-            return self.times * scale, self.offsets * scale
-        if X is None or frame_rate is None:
-            raise ValueError(
-                "unit='seconds' needs X, the performances or how many frames each has, and "
-                "frame_rate: how long each of them takes."
-            )
-        return tuple(self._in_seconds(t, X, frame_rate) for t in (self.times, self.offsets))
+        """``times`` and ``offsets`` in a unit of time."""
+        if check_unit(unit) == "seconds":
+            if X is None or frame_rate is None:
+                raise ValueError(
+                    "unit='seconds' needs X, the performances or how many frames each has, and "
+                    "frame_rate."
+                )
+            return tuple(self._in_seconds(t, X, frame_rate) for t in (self.times, self.offsets))
+        if X is not None:
+            self._check_count(_lengths(X), "lengths")
+        scale = 100 / (self.times.shape[1] - 1) if unit == "percent" else 1
+        return self.times * scale, self.offsets * scale
 
     def _stretched(self, times, X):
-        """Frames of the pattern as frames of each performance, which has as many as it has."""
+        """Frames of the pattern in frames of each performance."""
         lengths = _lengths(X)
         self._check_count(lengths, "lengths")
         sound = (lengths >= 2) & (lengths == np.floor(lengths))
@@ -348,10 +352,8 @@ class Match:
         return times * (lengths[:, np.newaxis] - 1) / (self.times.shape[1] - 1)
 
     def _in_seconds(self, times, X, frame_rate):
-        rate = as_frame_rate(frame_rate)
-        if rate.ndim == 1:
-            self._check_count(rate, "frame rates")
-        return self._stretched(times, X) / rate[..., np.newaxis]
+        rates = as_frame_rates(frame_rate, len(self.times))
+        return self._stretched(times, X) / rates
 
     def __iter__(self):
         return iter((self.offsets, self.times, self.distances))
@@ -368,8 +370,8 @@ class Match:
             )
 
 
-def as_match(times, n_sequences):
-    """Warps that somebody made of so many performances, as a match without distances."""
+def match_of_times(times, n_sequences):
+    """A match without distances, of given warps of so many performances."""
     if np.ndim(times) > 0 and len(times) != n_sequences:
         raise ValueError(
             f"times must have shape (n_sequences, P), one row for each of the {n_sequences} "
@@ -378,8 +380,8 @@ def as_match(times, n_sequences):
     return Match(times)
 
 
-def check_answer(match, n_sequences, n_frames, name):
-    """Refuse what a synchronizer of this name answers with, unless it matches all performances."""
+def check_match(match, n_sequences, n_frames, name):
+    """Refuse the match of a synchronizer of this name unless it has all performances."""
     shape = np.shape(getattr(match, "times", None))
     if shape != (n_sequences, n_frames):
         raise ValueError(
@@ -388,31 +390,22 @@ def check_answer(match, n_sequences, n_frames, name):
         )
 
 
-def _lengths(X):
-    """How many frames the sequences have, of sequences or of such numbers."""
-    if getattr(X, "ndim", 0) == 2 and not hasattr(X, "columns"):
-        raise ValueError(
-            "X is a single 2-D input. Wrap one performance as [X]; of univariate ones in rows give "
-            "how many frames each has, [X.shape[1]] * len(X)."
-        )
-    is_plain = hasattr(X, "__len__") and not isinstance(X, Mapping) and not hasattr(X, "columns")
-    if is_plain and all(np.ndim(n) == 0 for n in X):
-        return as_numbers(X, "The lengths", dtype=np.float64)
-    return np.array([len(x) for x in read_collection(X)[0]], dtype=np.float64)
+def check_unit(unit):
+    """Refuse what is no unit of time."""
+    if not (isinstance(unit, str) and unit in UNITS):
+        raise ValueError(f"unit must be one of {list(UNITS)}, got {unit!r}.")
+    return unit
 
 
-# -- the timing of performances as a table, which calls them as they came in -------------
-
-
-def table_of_timing(columns, X, labels):
-    """Columns over performance and frame of the pattern.
+def timing_table(columns, X, labels):
+    """A table indexed by performance and frame of the pattern.
 
     Parameters
     ----------
     columns : dict of ndarray, shape (n_sequences, P)
         By name.
     X : performances, how many frames each has, or None
-        Who may know what performances are called.
+        Its labels are those of the table if there are no ``labels``.
     labels : sequence of length n_sequences, Index, or None
 
     Returns
@@ -426,38 +419,31 @@ def table_of_timing(columns, X, labels):
     return to_frame(tables, performances=_labels_of(X) if labels is None else labels)
 
 
+def _are_lengths(X):
+    """Whether X holds how many frames performances have, instead of the performances."""
+    is_plain = hasattr(X, "__len__") and not isinstance(X, Mapping) and not hasattr(X, "columns")
+    return is_plain and all(np.ndim(n) == 0 for n in X)
+
+
+def _lengths(X):
+    """How many frames the performances have, of performances or of such numbers."""
+    if getattr(X, "ndim", 0) == 2 and not hasattr(X, "columns"):
+        raise ValueError(
+            "X is a single 2-D input. Wrap one performance as [X]; for univariate ones in rows "
+            "give how many frames each has, [X.shape[1]] * len(X)."
+        )
+    if _are_lengths(X):
+        return as_numbers(X, "The lengths", dtype=np.float64)
+    return np.array([len(x) for x in read_collection(X)[0]], dtype=np.float64)
+
+
 def _labels_of(X):
-    """What performances are called, or tables which may know it; None if nobody does."""
+    """Labels of performances, or tables that have them; None without any."""
     if isinstance(X, pd.Series):
         is_numbered = isinstance(X.index, pd.RangeIndex) or not X.index.is_unique
         return None if is_numbered else X.index
-    if X is None or (not hasattr(X, "columns") and all(np.ndim(n) == 0 for n in X)):
+    if X is None or _are_lengths(X):
         return None
     sequences = as_collection(X)
     are_tables = sequences and all(isinstance(x, pd.DataFrame) for x in sequences)
     return sequences if are_tables else None
-
-
-# -- units of time that the clock of the pattern is told in, and frame rates -------------
-
-UNITS = ("frames", "percent", "seconds")
-
-
-def as_unit(unit):
-    """A unit of time by its name."""
-    if not (isinstance(unit, str) and unit in UNITS):
-        raise ValueError(f"unit must be one of {list(UNITS)}, got {unit!r}.")
-    return unit
-
-
-def as_frame_rate(frame_rate):
-    """Frames a second: one number above 0, or one a performance."""
-    rate = as_numbers(frame_rate, "frame_rate")
-    sound = (rate > 0) & np.isfinite(rate)
-    if rate.ndim > 1 or not sound.all():
-        which = f" for performance {int(np.argmin(sound))}" if rate.ndim == 1 else ""
-        raise ValueError(
-            f"frame_rate must be one number above 0, or one a performance, got {frame_rate!r}"
-            f"{which}."
-        )
-    return rate

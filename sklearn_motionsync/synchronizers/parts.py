@@ -1,4 +1,4 @@
-"""PartSynchronizer: every part of the body with a warp of its own, drawn to the whole body's."""
+"""PartSynchronizer: a warp for each part of the body, coupled to the warp of the whole body."""
 
 import math
 from collections.abc import Mapping
@@ -7,7 +7,9 @@ from numbers import Real
 
 import numpy as np
 import pandas as pd
+from sklearn.base import _fit_context, clone
 from sklearn.utils._param_validation import Interval
+from sklearn.utils.validation import check_is_fitted
 
 from ..body.limbs import parts_of_names, parts_of_postures
 from ..inputs.features import choose_features
@@ -16,8 +18,9 @@ from ..matching.matcher import Matcher
 from ..matching.rows import Coupling
 from ..matching.warper import Warper
 from ..matching.warps import follow, normalise
-from ..utils.atomic import snapshot
-from ..utils.parallel import run
+from ..utils.atomic import atomic_fit, snapshot
+from ..utils.parallel import Progress, run
+from .base import Synchronizer
 from .dense import DenseSynchronizer
 from .lags import Lags
 from .match import Match
@@ -25,48 +28,78 @@ from .portions import warp_in_portions
 
 __all__ = ["PartSynchronizer"]
 
+# What a part can be compared with besides another part; no part may have such a name.
+_REFERENCES = ("rest", "body")
+# Fitted attributes of the synchronizer of the whole body that are also those of the parts.
+_SHARED = (
+    "pattern_",
+    "pattern_index_",
+    "n_frames_",
+    "global_distances_",
+    "training_",
+    "n_features_in_",
+    "feature_names_in_",
+    "_names_in",
+    "_fitted_on_rows",
+    "_unit",
+)
 
-class PartSynchronizer(DenseSynchronizer):
-    """Synchronise the parts of the body, each by a warp of its own that is drawn to the body's.
 
-    Nobody's arm keeps in step with the rest exactly. One warp for the whole body leaves that in
-    the postures; here it is taken out, part by part, and told: ``lags``.
+class PartSynchronizer(Synchronizer):
+    """Synchronise parts of the body, each by a warp of its own, coupled to the body's warp.
 
-    1. The whole body is matched to the pattern, as `DenseSynchronizer` does: tau_body.
-    2. Each part is matched by its own features, as they count in the learnt metric, to the same
-       pattern by way of the same exemplars. What is added to the local cost of Eq. 12 draws it to
-       the body::
+    A single warp for the whole body cannot show that an arm is late while the legs are not: the
+    delay stays in the synchronised postures. Here every part has its own warp, and ``lags`` reports
+    how much later each part is than the rest.
+
+    1. A `DenseSynchronizer` matches the whole body to the pattern: tau_body.
+    2. Each part is matched to the same pattern by way of the same exemplars, by its own features,
+       weighted as in the learnt metric. A coupling term is added to the local cost of Eq. 12::
 
            lambda (d - d_body)^2
 
-       where d_body is the body's offset between the same two, and lambda is ``coupling`` times the
-       mean squared norm of the part's features, d being in per cent of the clock.
-    3. ``transform`` samples every part at its own times; features in no part follow the body.
+       where d_body is the body's offset between the same two performances, and lambda is
+       ``coupling`` times the mean squared norm of the part's features, with d in per cent of the
+       clock.
+    3. ``transform`` samples every part at its own times. Features that belong to no part follow the
+       body.
 
     Parameters
     ----------
     parts : dict of str to features, default=None
-        What belongs together: by name, one feature or several, by index or name, none of them
-        twice. By default both arms, both legs and the trunk, if the features are those of
-        `DirectionCosines`: called like them, or whole postures without names. Of other features
-        there are then no parts, and all follow the body. ``Skeleton.parts()`` gives them for part
-        of a body. A part of joint positions is named by its columns.
+        The features of each part, by name or index. No feature may be in two parts. By default both
+        arms, both legs and the trunk, if the features are direction cosines: recognised by their
+        names, or as whole postures without names. For other features the default is no parts, and
+        all of them follow the body. ``Skeleton.parts()`` gives the parts of an incomplete body.
+        For joint positions, name the columns of each part.
     coupling : float, default=0.001
-        How strongly parts are drawn to the body, a pure number: 0 leaves each by itself, infinity
-        makes all follow the body. Useful from 0.0001 to 0.01; 0 to measure lags of parts that move
-        clearly.
-    n_frames, pattern, velocity_smoothing, refine, max_offset, metric, consensus, warp_smoothing, \
-cost, smoothness, max_rate, subframes, search, max_fit, random_state, n_jobs, verbose
-        As of `DenseSynchronizer`, for the body and its parts. ``refine`` is for the body only.
+        Strength of the coupling of a part to the body, a pure number: 0 matches each part
+        independently, infinity makes all parts follow the body. Useful values lie between 0.0001
+        and 0.01; use 0 to measure lags of parts that move clearly.
+    synchronizer : DenseSynchronizer, default=None
+        Matches the whole body; a clone of it is fitted. Its settings hold for the parts too, except
+        ``refine``. None is ``DenseSynchronizer()``.
 
     Attributes
     ----------
+    synchronizer_ : DenseSynchronizer
+        The fitted synchronizer of the whole body.
     parts_ : dict of str to ndarray of int
         Indices of the features of every part.
-    pattern_, pattern_index_, n_frames_, global_distances_, certified_, n_matches_, search_, \
-sample_, typical_share_, metric_, mu_, exemplars_, misfit_, refinement_, refines_, \
-n_features_in_, feature_names_in_
-        Of the whole body, as of `DenseSynchronizer`.
+    pattern_ : ndarray, shape (P, n_features)
+        The pattern on the common clock.
+    pattern_index_ : int or None
+        Index of the pattern in the training set; None if it was given as an array.
+    n_frames_ : int
+        ``P``.
+    global_distances_ : ndarray, shape (n_sequences,)
+        Global distances of the whole body, as of `DenseSynchronizer`.
+    training_ : Bunch
+        The part of the training set that `find_performances` needs, as of `Synchronizer`.
+    n_features_in_ : int
+        Features of a frame (columns, for 2-D input).
+    feature_names_in_ : ndarray of str
+        Names of the features; only if the input had names.
 
     See Also
     --------
@@ -75,12 +108,13 @@ n_features_in_, feature_names_in_
 
     Notes
     -----
-    ``match`` is the body's: scorers and displays see what they see of a `DenseSynchronizer`.
+    ``match`` is that of the whole body, so scorers and displays give the same as for a
+    `DenseSynchronizer`.
 
-    A part that hardly moves, such as the idle arm of a grab, has no timing that could be told:
-    without coupling its warp is chance, and so is its lag. `Lags.summary` shows it by its spread.
-    What falls with the coupling is its distance from the body on average; a single performance of
-    it may jump.
+    A part that hardly moves, such as the idle arm of a grab, carries no information about timing:
+    without coupling its warp and its lag are random. `Lags.summary` shows this as a large spread.
+    The coupling reduces the mean distance of a part from the body; a single performance may still
+    jump.
 
     References
     ----------
@@ -92,11 +126,12 @@ n_features_in_, feature_names_in_
     The right arm of the last of six bends is late, by 5 % of its time in the middle.
 
     >>> import numpy as np
-    >>> from sklearn_motionsync import DirectionCosines, PartSynchronizer
+    >>> from sklearn_motionsync import DenseSynchronizer, DirectionCosines, PartSynchronizer
     >>> from sklearn_motionsync.datasets import make_bending
     >>> bunch = make_bending(6, n_frames=100, random_state=0)
     >>> X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
-    >>> sync = PartSynchronizer(n_frames=100, pattern=0, coupling=0).fit(X)
+    >>> body = DenseSynchronizer(n_frames=100, pattern=0)
+    >>> sync = PartSynchronizer(coupling=0, synchronizer=body).fit(X)
     >>> t, last = np.linspace(0, 1, len(X[5])), X[5].copy()
     >>> for k in sync.parts_["right arm"]:
     ...     last[:, k] = np.interp(t - 0.05 * np.sin(np.pi * t) ** 2, t, X[5][:, k])
@@ -107,78 +142,63 @@ n_features_in_, feature_names_in_
     """
 
     _parameter_constraints: dict = {
-        **DenseSynchronizer._parameter_constraints,
         "parts": [Mapping, None],
         "coupling": [Interval(Real, 0, None, closed="both")],
+        "synchronizer": [DenseSynchronizer, None],
     }
 
-    def __init__(
-        self,
-        parts=None,
-        coupling=0.001,
-        *,
-        n_frames=None,
-        pattern="median",
-        velocity_smoothing="auto",
-        refine="auto",
-        max_offset="auto",
-        metric="learned",
-        consensus=8,
-        warp_smoothing=0.02,
-        cost="velocity",
-        smoothness=0.003,
-        max_rate=4,
-        subframes=1,
-        search="auto",
-        max_fit=None,
-        random_state=0,
-        n_jobs=None,
-        verbose=0,
-    ):
-        super().__init__(
-            n_frames,
-            pattern,
-            velocity_smoothing=velocity_smoothing,
-            refine=refine,
-            max_offset=max_offset,
-            metric=metric,
-            consensus=consensus,
-            warp_smoothing=warp_smoothing,
-            cost=cost,
-            smoothness=smoothness,
-            max_rate=max_rate,
-            subframes=subframes,
-            search=search,
-            max_fit=max_fit,
-            random_state=random_state,
-            n_jobs=n_jobs,
-            verbose=verbose,
-        )
+    def __init__(self, parts=None, coupling=0.001, synchronizer=None):
         self.parts = parts
         self.coupling = coupling
+        self.synchronizer = synchronizer
 
-    def transform(self, X):
-        """Warp every part onto the clock of the pattern, by its own warp (Eq. 18).
+    @atomic_fit
+    @_fit_context(prefer_skip_nested_validation=False)
+    def fit(self, X, y=None):
+        """Learn the whole body, then every part.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+        y : ignored
+            Present for API consistency.
 
         Returns
         -------
-        ndarray, shape (n_sequences, P, n_features)
-            ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
-            ``set_output(transform="pandas")``.
-        """
-        return self._warp(X)
+        self : PartSynchronizer
+            The fitted synchronizer.
 
-    def _warp_part(self, performances):
-        body = self.match(performances)
-        out = body.warp(performances)
-        for name, match in self._match_parts(performances, body, "part").items():
-            columns = self.parts_[name]
-            out[:, :, columns] = match.warp([x[:, columns] for x in performances])
-        return out
+        Raises
+        ------
+        ValueError
+            If the input breaks the contract, the pattern does not exist or fit, or there are no
+            such parts.
+        """
+        body = clone(DenseSynchronizer() if self.synchronizer is None else self.synchronizer)
+        self.parts_, self._warpers = fit_body_and_parts(body, X, self.parts, self.coupling)
+        self.synchronizer_ = body
+        for name in _SHARED:
+            if hasattr(body, name):
+                setattr(self, name, getattr(body, name))
+        return self
+
+    @snapshot
+    def match(self, X):
+        """Match the whole body of performances to the pattern.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+
+        Returns
+        -------
+        Match
+            As from ``DenseSynchronizer.match``.
+        """
+        check_is_fitted(self)
+        return self.synchronizer_.match(X)
 
     @snapshot
     def match_parts(self, X):
@@ -187,12 +207,13 @@ n_features_in_, feature_names_in_
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
         dict of str to Match
-            By part, as ``match`` gives it of the whole body. ``distances`` are those of the part's
-            own features, without the coupling; NaN of parts that only follow the body.
+            By part. ``distances`` are those of the part's own features, without the coupling; NaN
+            for parts that only follow the body.
         """
         performances = self.check_performances(X)
         return self._match_parts(performances, self.match(performances), "part")
@@ -204,57 +225,110 @@ n_features_in_, feature_names_in_
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
         groups : array-like of shape (n_sequences,), default=None
-            Who each performance is of: then the spread is told within and between people.
+            The subject of each performance: then the report separates the spread within and
+            between subjects.
         against : {"rest", "body"} or name of a part, default="rest"
-            Later than what. ``"rest"``: than the body without the part, which is matched by
-            itself; where that does not move, or is nothing, than the whole body. ``"body"``: than
-            the whole body, which a part that moves most takes along. A name: than that part.
+            The reference. ``"rest"``: the body without the part, matched separately, or the whole
+            body where nothing else moves. ``"body"``: the whole body, whose warp follows a part
+            that moves most. A name: that part.
         unit : {"frames", "percent", "seconds"}, default="frames"
-            Of the lags, as in ``Match.offsets_in``.
+            Unit of the lags, as in ``Match.offsets_in``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
-            For seconds: frames a second of X.
+            Frames per second of X, for seconds.
 
         Returns
         -------
         Lags
+            One curve a performance and part.
 
         Raises
         ------
         ValueError
-            If there are no parts, or not the one to compare with, or not one of the groups a
-            performance.
+            If there are no parts, no such reference, or not one group a performance.
         """
         performances = self.check_performances(X)
-        self._check_lags(against)
-        groups, people = people_of(groups, len(performances))
+        self._check_reference(against)
+        people = None
+        if groups is not None:
+            groups, people = encode_groups(groups, len(performances))
         body = self.match(performances)
         parts = self._match_parts(performances, body, "part")
-        others = dict.fromkeys(parts, parts.get(against, body))
+        references = dict.fromkeys(parts, parts.get(against, body))
         if against == "rest":
-            others = self._match_parts(performances, body, "rest")
-        lengths = [len(x) for x in performances]
-        values = np.stack(
-            [
-                match.offsets_in(unit, lengths, frame_rate)
-                - others[name].offsets_in(unit, lengths, frame_rate)
-                for name, match in parts.items()
-                if name != against
-            ],
-            axis=1,
-        )
+            references = self._match_parts(performances, body, "rest")
+        clock = unit, [len(x) for x in performances], frame_rate
         names = [name for name in parts if name != against]
+        values = [
+            parts[name].offsets_in(*clock) - references[name].offsets_in(*clock) for name in names
+        ]
+        values = np.stack(values, axis=1)
         return Lags(values, names, against, unit, groups, people, performances.labels)
 
-    def _learn(self, performances):
-        parts = choose_parts(self.parts, performances, names_of_input(self))
-        super()._learn(performances)
-        self.parts_, self._warpers = parts, self._learn_parts(performances, parts)
+    def _warp_part(self, performances):
+        body = self.match(performances)
+        out = body.warp(performances)
+        for name, match in self._match_parts(performances, body, "part").items():
+            columns = self.parts_[name]
+            out[:, :, columns] = match.warp([x[:, columns] for x in performances])
+        return out
 
-    def _learn_parts(self, performances, parts):
-        """The warper of every part, and of the rest without it; of some that move."""
-        if not parts or self.coupling == math.inf:
-            return {}
+    def _match_parts(self, performances, body, what):
+        """Matches of the parts, or of the rest of the body without each, by the name of the part.
+
+        What does not move has the warp of the body.
+        """
+        found, sync = {}, self.synchronizer_
+        with Progress(self, sync.verbose) as progress:
+            for name in self.parts_:
+                warper = self._warpers[what].get(name)
+                if warper is None:
+                    found[name] = Match(body.times)
+                    continue
+                portions = {"n_jobs": sync.n_jobs, "progress": progress, "name": f"warping {name}"}
+                distances, times = warp_in_portions(warper, performances, body.times, **portions)
+                found[name] = Match(times, warper.matcher.features.back(distances))
+        return found
+
+    def _check_reference(self, against):
+        if not self.parts_:
+            raise ValueError(
+                "There are no parts: they are not given, and the features are not recognised as "
+                "direction cosines. Fit again with parts={name: features}, or skeleton.parts()."
+            )
+        known = [*_REFERENCES, *self.parts_]
+        if not (isinstance(against, str) and against in known):
+            raise ValueError(f"against must be one of {known}, got {against!r}.")
+        if [against] == [*self.parts_]:
+            raise ValueError(f"{against!r} is the only part: use against='rest' or 'body'.")
+
+
+@atomic_fit
+@_fit_context(prefer_skip_nested_validation=True)
+def fit_body_and_parts(self, X, parts, coupling):
+    """A ``fit`` of the synchronizer of the whole body, which also learns the parts.
+
+    Parameters
+    ----------
+    self : DenseSynchronizer
+        Of the whole body.
+    X : as for ``PartSynchronizer.fit``
+    parts, coupling : parameters of `PartSynchronizer`
+
+    Returns
+    -------
+    parts : dict of str to ndarray of int
+        Indices of the features of every part.
+    warpers : dict of dict of str to PartWarper or None
+        ``"part"``: of every part by name; ``"rest"``: of the body without it. None if nothing of it
+        moves. No warpers for an infinite coupling.
+    """
+    performances = self._check_training_set(X)
+    parts = choose_parts(parts, performances, names_of_input(self))
+    self._learn(performances)
+    warpers = {"part": {}, "rest": {}}
+    if coupling < math.inf:
         source = self._given_pattern(performances)
         if source is None:
             source = performances[self.pattern_index_]
@@ -262,57 +336,19 @@ n_features_in_, feature_names_in_
         # In double precision, as all that is warped.
         chosen = [x.astype(np.float64, copy=False) for x in chosen]
         chosen = normalise(chosen, self.n_frames_, self.subframes)
-        (times,) = run(_warps_of_bodies, [(self._warper, chosen)])
+        (times,) = run(_warp_pattern_and_exemplars, [(self._warper, chosen)])
         training = normalise(performances, self.n_frames_, self.subframes)
-        own = self._warper, times, training, chosen, self.coupling, self._settings()
-        columns = {(name, "part"): of_part for name, of_part in parts.items()}
+        common = self._warper, times, training, chosen, coupling, self._settings()
         everything = np.arange(performances[0].shape[1])
-        columns |= {(name, "rest"): np.setdiff1d(everything, x) for name, x in parts.items()}
-        portions = [(x, *own) for x in columns.values()]
-        warpers = run(PartWarper.of, portions, n_jobs=self.n_jobs, prefer="threads")
-        return {key: w for key, w in zip(columns, warpers, strict=True) if w is not None}
-
-    def _match_parts(self, performances, body, what):
-        """A match by part: of the part, or of the rest without it."""
-        found = {}
-        with self._progress(fits=False) as progress:
-            for name in self.parts_:
-                warper = self._warpers.get((name, what))
-                if warper is None:
-                    found[name] = Match(body.times)
-                    continue
-                portions = {"n_jobs": self.n_jobs, "progress": progress, "name": f"warping {name}"}
-                distances, times = warp_in_portions(warper, performances, body.times, **portions)
-                found[name] = Match(times, warper.matcher.features.back(distances))
-        return found
-
-    def _check_lags(self, against):
-        if not self.parts_:
-            why = "the features are not known to be those of DirectionCosines"
-            if self.parts is not None:
-                why = f"parts={self.parts!r} names none"
-            raise ValueError(
-                f"There are no parts that could lag: {why}. Fit again, and give parts={{name: "
-                "features}; skeleton.parts() has them of direction cosines."
-            )
-        known = ["rest", "body", *self.parts_]
-        if not (isinstance(against, str) and against in known):
-            raise ValueError(f"against must be one of {known}, got {against!r}.")
-        if len(self.parts_) == 1 and against in self.parts_:
-            raise ValueError(f"{against!r} is the only part: use against='rest' or 'body'.")
-
-
-def _warps_of_bodies(warper, chosen):
-    """The body's warps of the pattern and its exemplars, of which the first keeps its own pace."""
-    times = warper.warps(warper.matcher.features.unit(chosen), np.s_[:])[1]
-    times[0] = np.arange(times.shape[1])
-    return times
-
-
-# -- which features are a part of the body, and who performs: what users call by name ----
-
-# What a part is compared with cannot be its name.
-_TAKEN = ("rest", "body")
+        for what, columns in {
+            "part": parts,
+            "rest": {name: np.setdiff1d(everything, part) for name, part in parts.items()},
+        }.items():
+            portions = [(x, *common) for x in columns.values()]
+            found = run(PartWarper.of, portions, n_jobs=self.n_jobs, prefer="threads")
+            warpers[what] = dict(zip(parts, found, strict=True))
+    self._number_as_given()
+    return parts, warpers
 
 
 def choose_parts(parts, performances, names):
@@ -321,7 +357,7 @@ def choose_parts(parts, performances, names):
     Parameters
     ----------
     parts : mapping of str to features, or None
-        As a user gave them; None for those that the names, or the postures, tell.
+        Given by the user; None to recognise them by their names or as postures.
     performances : Performances
     names : sequence or None
         Of their features.
@@ -329,13 +365,13 @@ def choose_parts(parts, performances, names):
     if parts is None:
         found = parts_of_postures(performances) if names is None else parts_of_names(names)
         return {name: np.array(features) for name, features in found.items()}
-    width = performances[0].shape[1]
-    names = [f"x{i}" for i in range(width)] if names is None else [*names]
+    names = [f"x{i}" for i in range(performances[0].shape[1])] if names is None else [*names]
     chosen, owner = {}, {}
     for part, features in parts.items():
-        if not isinstance(part, str) or part in _TAKEN:
+        if not isinstance(part, str) or part in _REFERENCES:
             raise ValueError(
-                f"A part must have a name, and not {' or '.join(map(repr, _TAKEN))}; got {part!r}."
+                "The name of a part must be a string other than "
+                f"{' and '.join(map(repr, _REFERENCES))}; got {part!r}."
             )
         try:
             indices = choose_features([] if features is None else features, names)
@@ -344,18 +380,16 @@ def choose_parts(parts, performances, names):
         for k in indices:
             if k in owner:
                 raise ValueError(
-                    f"Feature {names[k]!r} is in part {owner[k]!r} and again in {part!r}: it can "
-                    "be warped once only. Give it to one of them, once."
+                    f"Feature {names[k]!r} is in part {owner[k]!r} and again in {part!r}: a "
+                    "feature has one warp. Name it once."
                 )
             owner[k] = part
         chosen[part] = np.array(indices, dtype=np.intp)
     return chosen
 
 
-def people_of(groups, n_sequences):
-    """The person of every performance counted from 0, and what they are called; None for none."""
-    if groups is None:
-        return None, None
+def encode_groups(groups, n_sequences):
+    """The group of every performance as an integer from 0, and the labels of the groups."""
     given = (
         groups if isinstance(groups, (pd.Series, pd.Index)) else np.asarray(groups, dtype=object)
     )
@@ -364,34 +398,42 @@ def people_of(groups, n_sequences):
             f"groups must be one for each of the {n_sequences} performances, got shape "
             f"{np.shape(given)}."
         )
-    codes, people = pd.factorize(given)
+    codes, names = pd.factorize(given)
     if (codes < 0).any():
         i = int(np.argmin(codes))
         raise ValueError(
-            f"Performance {i}: its group is missing, {list(given)[i]!r}. Say whose it is, or leave "
-            "it out."
+            f"Performance {i}: its group is missing, {list(given)[i]!r}. Give its label, or leave "
+            "the performance out."
         )
-    return codes, list(people)
+    return codes, list(names)
 
 
-# -- parts: some features of the body alone, with warps of their own that are drawn to the body's
+# -- the warper of a part -----------------------------------------------------------------
 
-# So strong a coupling leaves a part nothing; a stronger one is beyond numbers.
+# A part with so strong a coupling has the warp of the body; a stronger one overflows.
 _RIGID = 1e6
+
+
+def _warp_pattern_and_exemplars(warper, chosen):
+    """The body's warps of the pattern and its exemplars; the pattern keeps its own pace."""
+    times = warper.warps(warper.matcher.features.unit(chosen), np.s_[:])[1]
+    times[0] = np.arange(times.shape[1])
+    return times
 
 
 @dataclass(frozen=True, eq=False)
 class PartWarper(Warper):
-    """Warps some features to the same pattern, by way of the same exemplars, as the whole body.
+    """Warps some features to the pattern of the whole body, by way of its exemplars.
 
     Attributes
     ----------
     columns : ndarray of int
         The features.
     weight : float
-        Of the coupling, in squared features of a frame by the square of a frame.
+        Of the coupling, in squared features of a frame per squared frame.
     back : ndarray, shape (1 + n_exemplars, P)
-        The body's warps of the bases, inverted: what frame of the pattern their frames meet.
+        Inverse warps of the body from the bases: the frame of the pattern that each of their frames
+        meets.
     """
 
     columns: np.ndarray
@@ -414,8 +456,7 @@ class PartWarper(Warper):
             The training set, and the pattern and its exemplars in double precision: whole, at all
             positions, not in the unit.
         coupling : float
-            ``lambda``, in mean squared features of the part, by the square of a per cent of the
-            clock.
+            ``lambda``, in mean squared features of the part, per squared per cent of the clock.
         settings : dict
             As `Matcher.learn` takes them.
         """
@@ -455,14 +496,16 @@ class PartWarper(Warper):
             Whole performances at all positions, in double precision, not in the unit.
         rows : slice
         body : ndarray, shape (n_sequences, P)
-            The warps of their bodies.
+            The warps of the whole bodies.
         """
         own = self.matcher.features.unit(positions[rows][:, :, self.columns])
         return self.voted(own, self._coupling(body[rows]))
 
     def _coupling(self, body):
-        """What draws the paths from all bases: from the pattern to the body's warp, and from an
-        exemplar to the body's warp from there.
+        """The coupling of the paths from all bases.
+
+        A path from the pattern is coupled to the body's warp, and one from an exemplar to the
+        body's warp from there.
         """
         if not self.weight:
             return None

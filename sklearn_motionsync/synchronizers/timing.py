@@ -1,4 +1,4 @@
-"""TimingChannel: synchronised performances, with their timing as one feature more."""
+"""TimingChannel: synchronised performances with their timing as an additional feature."""
 
 from numbers import Real
 
@@ -18,43 +18,42 @@ from ..inputs.validation import restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from .base import Synchronizer
-from .match import UNITS, check_answer
+from .match import UNITS, check_match
 
 __all__ = ["TimingChannel"]
 
 
 class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseEstimator):
-    """Synchronised performances, with how they are timed as one feature more.
+    """Synchronised performances, with their timing as an additional feature.
 
-    Synchronising takes the differences in timing out of the curves. This puts them beside the
-    curves, so that whatever comes next, such as principal components, a test along the clock, or a
-    classifier, sees shape and timing.
+    Synchronisation removes differences in timing from the curves. Here they are appended to the
+    curves, so that later steps, such as principal components, a test along the clock, or a
+    classifier, use both shape and timing.
 
     Parameters
     ----------
     synchronizer : Synchronizer
         Such as ``DenseSynchronizer()``; a clone of it is fitted.
     channel : {"offset", "log_rate"}, default="offset"
-        What is appended: how much later than the pattern a performance is
+        The appended feature: how much later than the pattern a performance is
         (``Match.offsets_in(unit)``), or the log rate (``np.log(Match.rates)``), which has no unit
         and is positive where a performance is slower.
     unit : {"percent", "frames", "seconds"}, default="percent"
-        Of the offset: per cent of the clock, frames of the pattern, or seconds of each
+        Unit of the offset: per cent of the clock, frames of the pattern, or seconds of each
         performance.
     frame_rate : float, default=None
-        Frames a second of the performances, for seconds only.
+        Frames per second of the performances, for seconds only.
 
     Attributes
     ----------
     synchronizer_ : Synchronizer
-        Fitted.
-    pattern_ : ndarray, shape (P, n_features)
-        Of the synchronizer, without the channel, as are all that follow.
-    pattern_index_ : int or None
+        The fitted synchronizer.
     n_frames_ : int
+        ``P``, frames of the common clock.
     n_features_in_ : int
+        Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
-        Only if the input had names.
+        Names of the features; only if the input had names.
 
     See Also
     --------
@@ -63,12 +62,12 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
 
     Notes
     -----
-    The channel has a unit of its own. Scale the features before they are compared with it or
-    summed over, as in principal components.
+    The unit of the channel differs from those of the features. Scale them before they are combined,
+    as in principal components.
 
-    What the synchronizer takes besides, such as ``keyframes``, is given to ``fit`` and
-    ``transform`` by name; with scikit-learn's metadata routing as it asks for it, by
-    ``set_fit_request`` and ``set_transform_request`` of the synchronizer.
+    Metadata of the synchronizer, such as ``keyframes``, are arguments of ``fit`` and ``transform``;
+    with scikit-learn's metadata routing they are requested by ``set_fit_request`` and
+    ``set_transform_request`` of the synchronizer.
 
     Examples
     --------
@@ -108,30 +107,33 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Performances; the rows of a 2-D array are univariate ones.
-        y : ignored, but for synchronizers that use it
+        y : ignored
+            Passed to the ``fit`` of the synchronizer.
         **params : dict
-            What the ``fit`` of the synchronizer takes besides, such as ``keyframes``.
+            Metadata for the ``fit`` of the synchronizer, such as ``keyframes``.
 
         Returns
         -------
-        self
+        self : TimingChannel
+            The fitted transformer.
 
         Raises
         ------
         ValueError
-            If the frame rate for seconds is missing, or a feature is called as the channel would
-            be; and as from the ``fit`` of the synchronizer.
+            If the frame rate for seconds is missing, or a feature has the name of the channel; and
+            as from the ``fit`` of the synchronizer.
         """
         if self.channel == "offset" and self.unit == "seconds" and self.frame_rate is None:
-            raise ValueError("unit='seconds' needs frame_rate, frames a second of X.")
-        given = self._for_synchronizer("fit", params)
-        self.synchronizer_ = clone(self.synchronizer).fit(X, y, **given)
-        if self.channel in getattr(self, "feature_names_in_", ()):
+            raise ValueError("unit='seconds' needs frame_rate, frames per second of X.")
+        sync = clone(self.synchronizer).fit(X, y, **self._route("fit", params))
+        if self.channel in getattr(sync, "feature_names_in_", ()):
             raise ValueError(
-                f"A feature of X is called {self.channel!r}, as the channel would be: rename it, "
-                "or leave it out."
+                f"A feature of X has the name of the channel, {self.channel!r}: rename it."
             )
-        self._fitted_on_rows = self.synchronizer_.check_performances(X).kind == "rows"
+        self.synchronizer_ = sync
+        for name in ("n_frames_", "n_features_in_", "feature_names_in_", "_fitted_on_rows"):
+            if hasattr(sync, name):
+                setattr(self, name, getattr(sync, name))
         return self
 
     @atomic_fit
@@ -140,17 +142,23 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
 
         Parameters
         ----------
-        X, y, **params : as for ``fit``
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+        y : ignored
+            Passed to the ``fit`` of the synchronizer.
+        **params : dict
+            Metadata for ``fit`` and ``match`` of the synchronizer, such as ``keyframes``.
 
         Returns
         -------
-        As ``transform``
+        ndarray, shape (n_sequences, P, n_features + 1)
+            As from ``transform``.
         """
         if not _routes_metadata():
             return self.fit(X, y, **params).transform(X, **params)
         router = get_routing_for_object(self)
         fits, warps = (set(router.consumes(method, params)) for method in ("fit", "transform"))
-        # What nobody asks for is refused in fit.
+        # Metadata that no method requests are refused in fit.
         to_fit = {name: params[name] for name in params if name in fits or name not in warps}
         return self.fit(X, y, **to_fit).transform(X, **{name: params[name] for name in warps})
 
@@ -161,21 +169,29 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
         **params : dict
-            What the ``match`` of the synchronizer takes besides, such as ``keyframes``.
+            Metadata for the ``match`` of the synchronizer, such as ``keyframes``.
 
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features + 1)
-            The channel is the last feature. Of 2-D input ``(n_sequences, 2 P)``: each row is its
+            The channel is the last feature. For 2-D input ``(n_sequences, 2 P)``: each row is a
             curve, then its channel. A ``(performance, frame)`` frame under
             ``set_output(transform="pandas")``.
         """
-        performances = self.check_performances(X)
-        match = self.match(performances, **self._for_synchronizer("transform", params))
-        check_answer(match, len(performances), self.n_frames_, type(self.synchronizer_).__name__)
+        check_is_fitted(self)
+        sync, params = self.synchronizer_, self._route("transform", params)
+        performances = sync.check_performances(X)
+        match = sync.match(performances, **params)
+        check_match(match, len(performances), self.n_frames_, type(sync).__name__)
         curves = match.warp(performances)
-        channel = self._channel(match, performances).astype(curves.dtype)
+        if self.channel == "log_rate":
+            channel = np.log(match.rates)
+        else:
+            lengths = [len(x) for x in performances]
+            channel = match.offsets_in(self.unit, lengths, self.frame_rate)
+        channel = channel.astype(curves.dtype)
         if performances.kind == "rows":
             return np.concatenate([curves[:, :, 0], channel], axis=1)
         out = np.concatenate([curves, channel[:, :, np.newaxis]], axis=2)
@@ -187,44 +203,17 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
         **params : dict
-            What the ``match`` of the synchronizer takes besides, such as ``keyframes``.
+            Metadata for the ``match`` of the synchronizer, such as ``keyframes``.
 
         Returns
         -------
         Match
+            The warps of X.
         """
         check_is_fitted(self)
         return self.synchronizer_.match(X, **params)
-
-    def normalize(self, X):
-        """Normalise performances linearly to the clock of the pattern (Eq. 7).
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-
-        Returns
-        -------
-        ndarray, shape (n_sequences, P, n_features)
-            Without the channel.
-        """
-        check_is_fitted(self)
-        return self.synchronizer_.normalize(X)
-
-    def check_performances(self, X):
-        """Check performances as the synchronizer does.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-
-        Returns
-        -------
-        sequence of ndarray (n_frames_i, n_features)
-        """
-        check_is_fitted(self)
-        return self.synchronizer_.check_performances(X)
 
     def get_feature_names_out(self, input_features=None):
         """Names of the outputs: those of the synchronizer, and ``"offset"`` or ``"log_rate"``.
@@ -237,7 +226,7 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         Returns
         -------
         ndarray of str
-            For 2-D input one name a frame of the curve, then one a frame of the channel.
+            For 2-D input a name for each frame of the curve, then for each of the channel.
         """
         check_is_fitted(self)
         names = self.synchronizer_.get_feature_names_out(input_features)
@@ -247,11 +236,12 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         return np.concatenate([names, np.asarray(own, dtype=object)])
 
     def get_metadata_routing(self):
-        """What is handed on to the synchronizer.
+        """Metadata routing of this object.
 
         Returns
         -------
         MetadataRouter
+            Metadata of ``fit`` and ``transform`` are those of the same methods of the synchronizer.
         """
         mapping = MethodMapping()
         for method in ("fit", "transform"):
@@ -259,42 +249,17 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         router = MetadataRouter(owner=type(self).__name__)
         return router.add(synchronizer=self.synchronizer, method_mapping=mapping)
 
-    @property
-    def pattern_(self):
-        return self.synchronizer_.pattern_
-
-    @property
-    def pattern_index_(self):
-        return self.synchronizer_.pattern_index_
-
-    @property
-    def n_frames_(self):
-        return self.synchronizer_.n_frames_
-
-    @property
-    def n_features_in_(self):
-        return self.synchronizer_.n_features_in_
-
-    @property
-    def feature_names_in_(self):
-        return self.synchronizer_.feature_names_in_
-
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.three_d_array = True
         tags.transformer_tags.preserves_dtype = ["float64", "float32"]
         return tags
 
-    def _for_synchronizer(self, method, params):
+    def _route(self, method, params):
+        """The metadata that a method of the synchronizer is given."""
         if not params or not _routes_metadata():
             return params
         return process_routing(self, method, **params).synchronizer[method]
-
-    def _channel(self, match, performances):
-        if self.channel == "log_rate":
-            return np.log(match.rates)
-        lengths = [len(x) for x in performances]
-        return match.offsets_in(self.unit, lengths, self.frame_rate)
 
 
 def _routes_metadata():

@@ -298,8 +298,9 @@ def _search(estimator, fits):
     """The steps before the first one that fits, and that one; None if there is none."""
     estimator = _fitted_estimator(estimator)
     if not isinstance(estimator, Pipeline):
-        inner = _unwrapped(estimator)
-        return (None, inner) if fits(inner) else None
+        return next(
+            ((None, step) for step in (_unwrapped(estimator), estimator) if fits(step)), None
+        )
     for i, (name, step) in enumerate(estimator.steps):
         found = _search(step, fits)
         if found is not None:

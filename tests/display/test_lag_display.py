@@ -4,7 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import DirectionCosines, Lags, PartSynchronizer
+from sklearn_motionsync import DenseSynchronizer, DirectionCosines, Lags, PartSynchronizer
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import LagDisplay
 
@@ -63,7 +63,8 @@ def test_one_performance_has_no_interval(lags):
 
 def test_of_a_pipeline_on_given_axes():
     bunch = make_bending(4, n_frames=30, random_state=0)
-    sync = PartSynchronizer(coupling=0.01, n_frames=30, metric=None, consensus=1)
+    body = DenseSynchronizer(n_frames=30, metric=None, consensus=1)
+    sync = PartSynchronizer(coupling=0.01, synchronizer=body)
     pipe = make_pipeline(DirectionCosines(bunch.skeleton), sync).fit(bunch.data)
     ax = plt.figure().subplots(1, 2)[1]
     display = LagDisplay.from_estimator(pipe, bunch.data, against="trunk", unit="frames", ax=ax)

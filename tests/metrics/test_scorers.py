@@ -162,7 +162,7 @@ def test_missing_key_frames_are_refused_with_advice(scorer, bunch, points):
     ):
         assert words in str(error.value)
     assert str(pickle.loads(pickle.dumps(error.value))) == str(error.value)
-    with pytest.raises(ValueError, match="one array a performance, 8; got 3"):
+    with pytest.raises(ValueError, match="list of 8 arrays"):
         scorer()(sync, points, keyframes=bunch.keyframes[:3])
 
 

@@ -1,4 +1,4 @@
-"""Parts of takes, and where they come from."""
+"""Performances that are cut out of takes."""
 
 import numpy as np
 import pandas as pd
@@ -13,20 +13,20 @@ TAKES = [np.arange(12.0).reshape(6, 2), np.arange(20, dtype=np.float32).reshape(
 
 
 def cut(X):
-    taken = check_performances(LinearSynchronizer(), X, reset=True, level="sequence")
-    return cut_takes(X, taken, ROWS)
+    takes = check_performances(LinearSynchronizer(), X, reset=True, level="sequence")
+    return cut_takes(X, takes, ROWS)
 
 
-def test_arrays_give_arrays():
-    parts, origin = cut(TAKES)
+def test_arrays_are_copied():
+    parts, locations = cut(TAKES)
     for part, (_, row) in zip(parts, ROWS.iterrows(), strict=True):
         take = TAKES[int(row["take"])]
         np.testing.assert_array_equal(part, take[int(row["start"]) : int(row["stop"])])
         assert not np.shares_memory(part, take)
-    pd.testing.assert_frame_equal(origin, ROWS)
+    pd.testing.assert_frame_equal(locations, ROWS)
 
 
-def test_tables_keep_columns_attrs_and_names():
+def test_tables_keep_columns_and_attrs():
     tables = [pd.DataFrame(x, columns=["hip", "knee"]) for x in TAKES]
     for table in tables:
         table.attrs["fps"] = 60
@@ -39,17 +39,17 @@ def test_tables_keep_columns_attrs_and_names():
     assert df.sort_index().loc[(1, 1)]["hip"].tolist() == [8, 10, 12, 14, 16]
 
 
-def test_parts_are_called_after_their_take():
+def test_performances_are_labelled_by_their_take():
     long = pd.concat({("ann", 1): pd.DataFrame(TAKES[0]), ("bob", 1): pd.DataFrame(TAKES[1])})
-    long.index.names = ["who", "trial", "frame"]
-    parts, origin = cut(to_sequences(long))
+    long.index.names = ["subject", "trial", "frame"]
+    parts, locations = cut(to_sequences(long))
     assert parts[0].attrs["performance"] == ("bob", 1, 1)
-    assert to_frame(parts).index.names == ["who", "trial", "part", "frame"]
-    assert origin["take"].tolist() == [("bob", 1), ("ann", 1), ("bob", 1)]
+    assert to_frame(parts).index.names == ["subject", "trial", "part", "frame"]
+    assert locations["take"].tolist() == [("bob", 1), ("ann", 1), ("bob", 1)]
 
 
-def test_nothing_is_cut_out_of_nothing():
-    taken = check_performances(LinearSynchronizer(), TAKES, reset=True, level="sequence")
-    parts, origin = cut_takes(TAKES, taken, ROWS[:0])
+def test_no_rows_give_no_performances():
+    takes = check_performances(LinearSynchronizer(), TAKES, reset=True, level="sequence")
+    parts, locations = cut_takes(TAKES, takes, ROWS[:0])
     assert parts == []
-    assert list(origin.columns) == list(ROWS.columns)
+    assert list(locations.columns) == list(ROWS.columns)

@@ -1,4 +1,4 @@
-"""Cycles of real people, of actors not seen; and takes that have none."""
+"""CycleSegmenter on recorded walking and jogging, and on actions without cycles."""
 
 import numpy as np
 import pytest
@@ -15,12 +15,12 @@ def read(cycles, real_data):
     return lambda archive, label: cycles.read(real_data, archive, label)
 
 
-def test_periods_are_those_of_the_feet(cycles, read):
+def test_periods_agree_with_foot_strikes(cycles, read):
     """On 95 % of the takes within 5 %."""
     good = []
     for archive, label in cycles.CYCLIC.items():
         bunch = read(archive, label)
-        periods = CycleSegmenter(bunch.skeleton).periods(bunch.data)
+        periods = CycleSegmenter(bunch.skeleton).report(bunch.data)["period"]
         for x, rate, period in zip(bunch.data, bunch.frame_rate, periods, strict=True):
             strikes = cycles.foot_strikes(x, bunch.skeleton, rate)
             good.append(abs(period / cycles.references(strikes)[0] - 1) < 0.05)
@@ -29,39 +29,39 @@ def test_periods_are_those_of_the_feet(cycles, read):
 
 
 def test_single_actions_are_not_cyclic(cycles, read):
-    """Bends, grabs, hops and others; what sneaks two steps holds one cycle."""
+    """Bends, grabs, hops and others; two sneaking steps hold one cycle."""
     for archive, labels in cycles.SINGLE.items():
         for label in labels:
             bunch = read(archive, label)
-            assert not CycleSegmenter(bunch.skeleton).is_cyclic(bunch.data).any(), label
+            assert not CycleSegmenter(bunch.skeleton).report(bunch.data)["cyclic"].any(), label
     bunch = read("hdm05", cycles.ONE_CYCLE)
-    with pytest.raises(ValueError, match=r"Take 0 (is not cyclic|holds)"):
+    with pytest.raises(ValueError, match=r"Performance 0: (not cyclic|holds)"):
         CycleSegmenter(bunch.skeleton).fit(bunch.data)
 
 
 @pytest.mark.parametrize("n_cycles", [1.5, 1.7])
-def test_cycles_that_are_too_few(n_cycles, read):
-    """Walks that are cut short, at 30 and at 60 frames a second."""
+def test_walks_of_too_few_cycles_are_rejected(n_cycles, read):
+    """Walks that are cut short, at 30 and at 60 frames per second."""
     bunch = read("cmu07_walk", "walk")
     segmenter = CycleSegmenter(bunch.skeleton)
-    periods = segmenter.periods(bunch.data)
+    periods = segmenter.report(bunch.data)["period"]
     short = [x[-round(n_cycles * p) :] for x, p in zip(bunch.data, periods, strict=True)]
     slow = [x[::2] for x in short]
     for X in (short, slow):
-        assert (segmenter.is_cyclic(X) == (n_cycles > 1.6)).mean() > 0.95
+        assert (segmenter.report(X)["cyclic"] == (n_cycles > 1.6)).mean() > 0.95
         if n_cycles < 1.6:
-            with pytest.raises(ValueError, match=r"Take 0 holds 1\.[45]\d cycles"):
+            with pytest.raises(ValueError, match=r"Performance 0: holds 1\.[45]\d cycles"):
                 segmenter.fit(X)
 
 
-def test_foot_strikes_deviate_less_from_a_phase_that_is_followed(cycles, read):
-    """Than from constant periods, on jogging, 3 actors giving the template for the fourth."""
+def test_matched_phases_of_foot_strikes_vary_less_than_at_constant_periods(cycles, read):
+    """On jogging; the template is that of the other three actors."""
     bunch = read("hdm05", cycles.CYCLIC["hdm05"])
     strikes = [
         cycles.foot_strikes(x, bunch.skeleton, rate)
         for x, rate in zip(bunch.data, bunch.frame_rate, strict=True)
     ]
-    periods = CycleSegmenter(bunch.skeleton).periods(bunch.data)
+    periods = CycleSegmenter(bunch.skeleton).report(bunch.data)["period"]
     constant = [np.arange(len(x)) / p for x, p in zip(bunch.data, periods, strict=True)]
     followed = cycles.phases_of_others(bunch)
     within = [cycles.deviations(phases, strikes)[0] for phases in (followed, constant)]

@@ -1,4 +1,4 @@
-"""Where in takes an action happens: planted movements, real recordings, and what is refused."""
+"""find_performances: planted movements, recordings, parameters and errors."""
 
 import tracemalloc
 
@@ -20,7 +20,7 @@ from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.model.similarity import learn_border
-from sklearn_motionsync.segmentation.search import Proposer, Unlikeness, chance_movements, scales
+from sklearn_motionsync.segmentation.search import Proposer, Unlikeness, chance_movements
 
 import oracle
 
@@ -47,15 +47,15 @@ def take_of(parts, n_frames=500, noise=0.02, seed=0):
     return take
 
 
-def spans(origin):
-    return origin[["start", "stop"]].to_numpy().tolist()
+def spans(locations):
+    return locations[["start", "stop"]].to_numpy().tolist()
 
 
-# Six people, two performances each, at paces of their own.
-PEOPLE = np.repeat(np.arange(6), 2)
+# Six subjects, two performances each, each subject at another pace.
+SUBJECTS = np.repeat(np.arange(6), 2)
 TRAINING = [
     movement(50 + 4 * person + trial, 0.85 + 0.06 * person, 1 + 0.05 * (trial - person / 3))
-    for trial, person in enumerate(PEOPLE)
+    for trial, person in enumerate(SUBJECTS)
 ]
 TAKE = take_of({60: movement(62, 1.05), 122: movement(55, 0.9), 300: movement(70), 400: other(60)})
 TRUE = [[60, 122], [122, 177], [300, 370]]
@@ -64,61 +64,61 @@ TRUE = [[60, 122], [122, 177], [300, 370]]
 @pytest.fixture(scope="module")
 def pipe():
     steps = DenseSynchronizer(40), ActionModel()
-    return make_pipeline(*steps).fit(TRAINING, actionmodel__groups=PEOPLE)
+    return make_pipeline(*steps).fit(TRAINING, actionmodel__groups=SUBJECTS)
 
 
-# -- what is found ---------------------------------------------------------------------------------
+# -- results ---------------------------------------------------------------------------------------
 
 
-def test_a_planted_pattern_is_found_where_it_is():
+def test_planted_patterns_are_found():
     pattern = movement(60)
     take = take_of({40: pattern, 100: pattern, 250: movement(45, 1.1), 350: movement(80)}, noise=0)
-    performances, origin = find_performances(pattern, take)
+    performances, locations = find_performances(pattern, take)
     np.testing.assert_allclose(
-        spans(origin), [[40, 100], [100, 160], [250, 295], [350, 430]], atol=2
+        spans(locations), [[40, 100], [100, 160], [250, 295], [350, 430]], atol=2
     )
-    assert spans(origin)[0] == [40, 100]
-    assert origin["score"].between(0.9, 1).all()
-    for part, (start, stop) in zip(performances, spans(origin), strict=True):
+    assert spans(locations)[0] == [40, 100]
+    assert locations["score"].between(0.9, 1).all()
+    for part, (start, stop) in zip(performances, spans(locations), strict=True):
         np.testing.assert_array_equal(part, take[start:stop])
 
 
-def test_performances_side_by_side_are_found_and_others_are_not(pipe):
-    _, origin = find_performances(pipe, TAKE)
-    np.testing.assert_allclose(spans(origin), TRUE, atol=6)
-    assert (origin["score"] >= origin["threshold"]).all()
+def test_adjacent_performances_are_found_and_other_movements_are_not(pipe):
+    _, locations = find_performances(pipe, TAKE)
+    np.testing.assert_allclose(spans(locations), TRUE, atol=6)
+    assert (locations["score"] >= locations["threshold"]).all()
     assert spans(find_performances(pipe, take_of({100: other(60), 300: other(90)}))[1]) == []
 
 
-def test_every_way_to_give_the_action_finds_it(pipe):
-    detector = ActionDetector(pipe).fit(TRAINING, groups=PEOPLE)
+def test_pipeline_detector_and_synchronizer_find_the_same(pipe):
+    detector = ActionDetector(pipe).fit(TRAINING, groups=SUBJECTS)
     expected = find_performances(pipe, TAKE)[1]
-    labels = pd.Series(PEOPLE, index=np.arange(len(PEOPLE)) + 7)
-    for estimator, groups in ((detector, None), (pipe[0], PEOPLE), (pipe[0], labels)):
+    labels = pd.Series(SUBJECTS, index=np.arange(len(SUBJECTS)) + 7)
+    for estimator, groups in ((detector, None), (pipe[0], SUBJECTS), (pipe[0], labels)):
         pd.testing.assert_frame_equal(
             find_performances(estimator, TAKE, groups=groups)[1], expected
         )
     linear = LinearSynchronizer(40).fit(TRAINING)
-    found = spans(find_performances(linear, TAKE, groups=PEOPLE)[1])
+    found = spans(find_performances(linear, TAKE, groups=SUBJECTS)[1])
     np.testing.assert_allclose(found, TRUE, atol=8)
 
 
-def test_the_best_window_is_that_of_brute_force():
+def test_best_window_is_that_of_an_exhaustive_search():
     pattern, shortest, longest = movement(12), 8, 18
     take = take_of({15: movement(13)}, 45, noise=0.1)
-    _, origin = find_performances(pattern, take, threshold=None, max_hits=1)
+    _, locations = find_performances(pattern, take, threshold=None, max_hits=1)
     scores = {
         (start, start + n): np.exp(-brute_unlikeness(take[start : start + n], pattern))
         for n in range(shortest, longest + 1)
         for start in range(len(take) - n + 1)
     }
     best = max(scores, key=scores.get)
-    assert spans(origin) == [list(best)]
-    np.testing.assert_allclose(origin["score"], scores[best], rtol=1e-9)
+    assert spans(locations) == [list(best)]
+    np.testing.assert_allclose(locations["score"], scores[best], rtol=1e-9)
 
 
 def brute_unlikeness(window, pattern):
-    """Of a window to a single pattern, by the formulas of the docstrings."""
+    """Dissimilarity of a window to a single pattern, by the formulas of the docstrings."""
     n = len(pattern)
     at = np.linspace(0, len(window) - 1, n)
     x = np.column_stack([np.interp(at, np.arange(len(window)), column) for column in window.T])
@@ -153,16 +153,7 @@ def test_proposals_are_the_best_paths_of_their_portions():
     assert {tuple(window) for window in proposer(take).tolist()} == expected
 
 
-def test_scales_go_from_the_shortest_to_the_longest():
-    assert scales(30, 30).tolist() == [30]
-    assert scales(10, 100)[[0, -1]].tolist() == [10, 100]
-    assert (np.diff(np.log(scales(10, 100))) < np.log(1.7)).all()
-
-
-# -- real people -----------------------------------------------------------------------------------
-
-
-def test_people_sit_down_in_recordings_of_actors_not_seen(real_data):
+def test_sitting_down_is_found_in_recordings_of_a_new_actor(real_data):
     bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
     file = np.load(real_data / "utkinect" / "utkinect_takes.npz")
     teach = np.flatnonzero((bunch.target == "sitDown") & ~np.isin(bunch.actor, ["s10"]))
@@ -171,7 +162,7 @@ def test_people_sit_down_in_recordings_of_actors_not_seen(real_data):
     ).fit([bunch.data[i] for i in teach], actionmodel__groups=bunch.actor[teach])
     searched = np.flatnonzero(np.isin(file["actor"], ["s10"]))
     frames = np.split(file["positions"].reshape(len(file["positions"]), -1), file["offsets"][1:-1])
-    _, origin = find_performances(pipe, [frames[i] for i in searched])
+    _, locations = find_performances(pipe, [frames[i] for i in searched])
     true = {
         int(take): (start, stop)
         for take, label, start, stop in zip(
@@ -180,34 +171,37 @@ def test_people_sit_down_in_recordings_of_actors_not_seen(real_data):
         if label == "sitDown"
     }
     right = 0
-    for take, start, stop in origin[["take", "start", "stop"]].to_numpy().astype(int):
+    for take, start, stop in locations[["take", "start", "stop"]].to_numpy().astype(int):
         first, last = true[searched[take]]
         shared = min(stop, last) - max(start, first)
         right += shared >= 0.5 * (stop - start + last - first - shared)
-    assert right == len(origin) == 2
+    assert right == len(locations) == 2
 
 
-# -- takes of every kind ---------------------------------------------------------------------------
+# -- kinds of input --------------------------------------------------------------------------------
 
 
-def test_takes_of_every_kind_give_the_same(pipe):
+def test_every_kind_of_collection_gives_equal_results(pipe):
     expected = find_performances(pipe, TAKE)[1]
     stacked = np.stack([TAKE, TAKE])
     several = np.empty(2, dtype=object)
     several[:] = [TAKE, TAKE[:350]]
+    row = np.sin(np.linspace(0, 9, 50))
+    take = np.concatenate([np.zeros(70), row, np.full(60, row[-1])])
+    assert spans(find_performances(row, take, max_hits=1)[1]) == [[70, 120]]
     for takes in (stacked, [TAKE, TAKE], several):
-        origin = find_performances(pipe, takes)[1]
-        first = origin[origin["take"] == 0]
+        locations = find_performances(pipe, takes)[1]
+        first = locations[locations["take"] == 0]
         pd.testing.assert_frame_equal(first, expected)
-        assert len(origin) == len(expected) + 3 - (takes is several)
+        assert len(locations) == len(expected) + 3 - (takes is several)
 
 
-def test_tables_keep_names_and_single_precision_stays(pipe):
+def test_tables_keep_names_and_float32_stays_float32(pipe):
     table = pd.DataFrame(TAKE, columns=["hip", "knee", "ankle"])
     named = [table.iloc[:250], table]
     sync = DenseSynchronizer(40).fit([pd.DataFrame(x, columns=table.columns) for x in TRAINING])
-    performances, origin = find_performances(sync, pd.concat(named, keys=["ann", "bob"]))
-    assert origin["take"].tolist() == ["ann"] * 2 + ["bob"] * 3
+    performances, locations = find_performances(sync, pd.concat(named, keys=["ann", "bob"]))
+    assert locations["take"].tolist() == ["ann"] * 2 + ["bob"] * 3
     assert performances[4].attrs["performance"] == ("bob", 2)
     assert list(performances[0].columns) == ["hip", "knee", "ankle"]
     with pytest.raises(ValueError, match=r"columns|names"):
@@ -217,76 +211,72 @@ def test_tables_keep_names_and_single_precision_stays(pipe):
     assert spans(there) == spans(find_performances(pipe, TAKE)[1])
 
 
-def test_one_feature_may_be_one_dimensional():
-    pattern = np.sin(np.linspace(0, 9, 50))
-    take = np.concatenate([np.zeros(70), pattern, np.full(60, pattern[-1])])
-    assert spans(find_performances(pattern, take, max_hits=1)[1]) == [[70, 120]]
-
-
-def test_the_unit_does_not_matter_and_nothing_is_written_to(pipe):
+def test_unit_does_not_matter_and_input_is_not_changed(pipe):
     expected = spans(find_performances(pipe, TAKE)[1])
     large = TAKE * 2.0**20
     large.setflags(write=False)
     sync = DenseSynchronizer(40).fit([x * 2.0**20 for x in TRAINING])
     before = sorted(vars(sync))
-    assert spans(find_performances(sync, large, groups=PEOPLE)[1]) == expected
+    assert spans(find_performances(sync, large, groups=SUBJECTS)[1]) == expected
     assert sorted(vars(sync)) == before
 
 
 @pytest.mark.parametrize("take", [np.ones((300, 3)), np.ones((4, 3)), movement(20)])
-def test_takes_without_the_action_give_nothing(pipe, take):
+def test_takes_without_the_action_give_no_hits(pipe, take):
     for pattern in (pipe, movement(60)):
-        performances, origin = find_performances(pattern, take)
+        performances, locations = find_performances(pattern, take)
         assert performances == []
-        assert list(origin.columns) == COLUMNS
-        assert origin[["start", "stop"]].dtypes.tolist() == [np.dtype(int)] * 2
+        assert list(locations.columns) == COLUMNS
+        assert locations[["start", "stop"]].dtypes.tolist() == [np.dtype(int)] * 2
 
 
-# -- how many --------------------------------------------------------------------------------------
+# -- threshold and number of hits ------------------------------------------------------------------
 
 
-def test_threshold_coverage_and_number(pipe):
-    origin = find_performances(pipe, TAKE, threshold=None)[1]
-    assert len(origin) > 3
-    assert (origin["stop"].to_numpy()[:-1] <= origin["start"].to_numpy()[1:]).all()
+def test_threshold_max_hits_and_durations_select_hits(pipe):
+    locations = find_performances(pipe, TAKE, threshold=None)[1]
+    assert len(locations) > 3
+    assert (locations["stop"].to_numpy()[:-1] <= locations["start"].to_numpy()[1:]).all()
     best = find_performances(pipe, TAKE, threshold=None, max_hits=2)[1]
-    assert sorted(best["score"]) == sorted(origin["score"])[-2:]
-    level = float(origin["score"].nlargest(2).min())
+    assert sorted(best["score"]) == sorted(locations["score"])[-2:]
+    level = float(locations["score"].nlargest(2).min())
     assert len(find_performances(pipe, TAKE, threshold=level)[1]) == 2
+    locations = find_performances(pipe, TAKE, durations=(20, 57), threshold=None)[1]
+    assert (locations["stop"] - locations["start"]).between(20, 57).all()
 
 
-def test_a_learnt_threshold_is_what_people_reach_of_each_other():
+def test_auto_threshold_falls_with_coverage():
     rng = np.random.default_rng(0)
     noisy = [x + 0.3 * rng.standard_normal(x.shape) for x in TRAINING]
     sync = DenseSynchronizer(40).fit(noisy)
     origins = [
-        find_performances(sync, noisy, coverage=share, groups=PEOPLE)[1]
+        find_performances(sync, noisy, coverage=share, groups=SUBJECTS)[1]
         for share in (0.3, 0.7, 0.95)
     ]
-    thresholds = [origin["threshold"].iloc[0] for origin in origins]
+    thresholds = [locations["threshold"].iloc[0] for locations in origins]
     assert 0.87 > thresholds[0] > thresholds[1] > thresholds[2] > 0.5
-    assert all((origin["score"] >= origin["threshold"]).all() for origin in origins)
+    assert all((locations["score"] >= locations["threshold"]).all() for locations in origins)
 
 
 def wander(n_frames, rng):
-    """Two features that forget within 20 frames: means of as many random numbers."""
+    """Moving averages over 20 frames of white noise in two features."""
     noise = rng.standard_normal((n_frames + 19, 2))
     return np.lib.stride_tricks.sliding_window_view(noise, 20, axis=0).sum(axis=2) / np.sqrt(20)
 
 
-def test_a_threshold_lets_movements_by_chance_in_hardly_ever():
+def test_auto_threshold_rejects_random_movements():
     rng = np.random.default_rng(0)
     bump = np.sin(np.linspace(0, np.pi, 20))[:, np.newaxis]
-    people = [bump * [1, 0.5 * (-1) ** k] + 0.8 * wander(20, rng) for k in range(12)]
-    unlikeness = Unlikeness(DenseSynchronizer(20).fit(people))
-    frames, take = np.concatenate(people), wander(4000, rng)
+    training = [bump * [1, 0.5 * (-1) ** k] + 0.8 * wander(20, rng) for k in range(12)]
+    unlikeness = Unlikeness(DenseSynchronizer(20).fit(training))
+    frames, take = np.concatenate(training), wander(4000, rng)
     windows = np.arange(0, 3980, 20)[:, np.newaxis] + [0, 20]
     chance = unlikeness(take * frames.std(axis=0) + frames.mean(axis=0), windows)
     assert (chance < unlikeness.border(0.6)).mean() < 0.02
     assert (chance < learn_border(unlikeness.known, 0.6)).mean() > 0.1
 
 
-def test_chance_wanders_about_the_postures_and_repeats_itself():
+def test_chance_movements_have_mean_covariance_and_autocorrelation_of_the_postures():
     positions = np.random.default_rng(0).standard_normal((30, 50, 3)) * [3, 1, 0] + [5, 0, 7]
     (some,) = chance_movements(positions, [2000])
     frames = some.reshape(-1, 3)
@@ -300,63 +290,48 @@ def test_chance_wanders_about_the_postures_and_repeats_itself():
     np.testing.assert_array_equal(some, next(chance_movements(positions, [2000])))
 
 
-def test_a_fine_clock_finds_the_same():
-    some = [x[:, :2] for x in TRAINING[::2]]
-    take = TAKE[:260, :2]
-    coarse, fine = (DenseSynchronizer(n, consensus=2).fit(some) for n in (60, 240))
-    first, second = (find_performances(sync, take)[1] for sync in (coarse, fine))
-    np.testing.assert_allclose(spans(first), spans(second), atol=3)
-    np.testing.assert_allclose(first["score"], second["score"], atol=0.005)
-
-
-def test_durations_bound_the_hits(pipe):
-    origin = find_performances(pipe, TAKE, durations=(20, 57), threshold=None)[1]
-    lengths = origin["stop"] - origin["start"]
-    assert lengths.between(20, 57).all()
-
-
-def test_many_training_performances_are_thinned_out():
+def test_large_training_sets_are_subsampled():
     many = [movement(30 + i % 7, 0.9 + i / 500, 1 + i / 300) for i in range(70)]
     sync = LinearSynchronizer(30).fit(many)
     assert len(sync.training_.kept) == 64
     assert len(sync.training_.durations) == 70
-    groups = [f"person {i // 8}" for i in range(70)]
-    _, origin = find_performances(sync, TAKE[:130], groups=groups, durations=(50, 75))
-    np.testing.assert_allclose(spans(origin), TRUE[:1], atol=8)
+    groups = [f"subject {i // 8}" for i in range(70)]
+    _, locations = find_performances(sync, TAKE[:130], groups=groups, durations=(50, 75))
+    np.testing.assert_allclose(spans(locations), TRUE[:1], atol=8)
     pipe = make_pipeline(sync, ActionModel()).fit(many, actionmodel__groups=groups)
-    with pytest.warns(UserWarning, match="keeps 64 of 70 .* Give groups"):
+    with pytest.warns(UserWarning, match="groups of 64 of 70 .* Give groups"):
         find_performances(pipe, TAKE[:60])
 
 
-def test_a_model_that_learnt_of_others_since_does_not_say_who_gave_these():
+def test_warns_if_the_model_was_updated_with_other_performances():
     many = [movement(30 + i, 0.9 + i / 20, 1) for i in range(6)]
     sync = LinearSynchronizer(30).fit(many)
     model = ActionModel().fit(sync.transform(many[:4]), groups=[0, 0, 1, 1])
     model.partial_fit(sync.transform(many[2:]), groups=[0, 0, 1, 1])
-    with pytest.warns(UserWarning, match="keeps 8 of 8 .* learnt of 6, .* Give groups"):
+    with pytest.warns(UserWarning, match="groups of 8 of 8 .* fitted on 6: .* Give groups"):
         find_performances(make_pipeline(sync, model), TAKE[:60])
 
 
-def test_time_and_memory_do_not_explode(pipe):
+def test_memory_does_not_grow_with_the_take(pipe):
     take = np.concatenate([TAKE] * 12)
     tracemalloc.start()
-    _, origin = find_performances(pipe, take)
+    _, locations = find_performances(pipe, take)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert len(origin) >= 36
+    assert len(locations) >= 36
     assert peak < 8e6
 
 
-# -- what is refused -------------------------------------------------------------------------------
+# -- errors ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"threshold": 1.5}, "threshold must be 'learned', a score from 0 to 1"),
-        ({"threshold": "auto"}, "threshold must be"),
-        ({"coverage": 1}, "coverage must be a share"),
-        ({"max_hits": 0}, "max_hits must be a whole number"),
+        ({"threshold": 1.5}, "The 'threshold' parameter"),
+        ({"threshold": "learned"}, "The 'threshold' parameter"),
+        ({"coverage": 1}, "The 'coverage' parameter"),
+        ({"max_hits": 0}, "The 'max_hits' parameter"),
         ({"durations": (9, 4)}, "durations must be two whole numbers"),
         ({"durations": 30}, "durations must be two whole numbers"),
         ({"groups": [0, 1]}, "groups has 2 labels, .* 12 performances"),
@@ -364,12 +339,12 @@ def test_time_and_memory_do_not_explode(pipe):
         ({"groups": 3}, "groups must be a list"),
     ],
 )
-def test_parameters_that_are_none(pipe, given, message):
+def test_refuses_invalid_parameters(pipe, given, message):
     with pytest.raises(ValueError, match=message):
         find_performances(pipe, TAKE, **given)
 
 
-def test_takes_and_patterns_that_are_none(pipe):
+def test_refuses_invalid_takes_and_patterns(pipe):
     gap = TAKE.copy()
     gap[7, 1] = np.nan
     with pytest.raises(ValueError, match=r"Performance 1.*frame 7"):
@@ -380,7 +355,7 @@ def test_takes_and_patterns_that_are_none(pipe):
         find_performances(pipe, TAKE[:1])
     with pytest.raises(ValueError, match="give one performance"):
         find_performances(movement(2), TAKE)
-    with pytest.raises(ValueError, match="an array is only one"):
+    with pytest.raises(ValueError, match="an array has none"):
         find_performances(movement(60), TAKE, groups=[1])
     with pytest.raises(ValueError, match="The pattern, frame 7"):
         find_performances(gap, TAKE)

@@ -13,26 +13,25 @@ from sklearn_motionsync import (
     KeyframeSynchronizer,
     LinearSynchronizer,
 )
-from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error
 from sklearn_motionsync.synchronizers.keyframes import curvature_keyframes
 
 from oracle import slow_filter
 
 
-def test_given_keyframes_meet(bending, bending_aspace):
+def test_given_keyframes_coincide(bending, bending_aspace):
     sync = KeyframeSynchronizer(100).fit(bending_aspace, keyframes=bending.keyframes)
     offsets, times, _ = sync.match(bending_aspace, keyframes=bending.keyframes)
     lengths = [len(x) for x in bending_aspace]
     pattern = bending.keyframes[sync.pattern_index_] * 99 / (lengths[sync.pattern_index_] - 1)
     np.testing.assert_allclose(sync.keyframes_, pattern)
-    # Frames are whole, key-frames are not: what is left is the bend between two frames.
+    # Key-frames lie between whole frames, where warps have a corner.
     assert keyframe_error(times, bending.keyframes, pattern, lengths) < 0.15
     assert not offsets[sync.pattern_index_].any()
     assert (np.diff(times) >= 0).all()
 
 
-def test_whole_keyframes_meet_exactly():
+def test_whole_keyframes_coincide_exactly():
     X = [np.arange(11.0)[:, None] ** 2, np.arange(21.0)[:, None]]
     sync = KeyframeSynchronizer(11, pattern=0).fit(X, keyframes=[[4, 6], [10, 16]])
     times = sync.match(X, keyframes=[[4, 6], [10, 16]]).times[1]
@@ -41,7 +40,7 @@ def test_whole_keyframes_meet_exactly():
     np.testing.assert_allclose(out[1][[0, 4, 6, 10], 0], [0, 10, 16, 20])
 
 
-def test_median_is_closest_to_all_once_keyframes_coincide(bending, bending_aspace):
+def test_pattern_is_the_median_after_matching_by_keyframes(bending, bending_aspace):
     X, K = bending_aspace[:6], bending.keyframes[:6]
     sync = KeyframeSynchronizer(60).fit(X, keyframes=K)
     knots = np.array([k * 59 / (len(x) - 1) for k, x in zip(K, X, strict=True)])
@@ -56,15 +55,7 @@ def test_median_is_closest_to_all_once_keyframes_coincide(bending, bending_aspac
     assert sync.pattern_index_ == np.argmin(np.sum(D, axis=1))
 
 
-def test_fit_transform_passes_keyframes_on(bending, bending_aspace):
-    K = list(bending.keyframes)
-    once = KeyframeSynchronizer(50).fit_transform(bending_aspace, keyframes=K)
-    sync = KeyframeSynchronizer(50).fit(bending_aspace, keyframes=K)
-    np.testing.assert_array_equal(once, sync.transform(bending_aspace, keyframes=K))
-
-
-def test_true_keyframes_bound_what_matching_can_reach(bending, bending_aspace):
-    """Between key-frames they are no truth: dense matching may be closer there, and is."""
+def test_timing_errors_of_given_and_found_keyframes(bending, bending_aspace):
     key = KeyframeSynchronizer(100).fit(bending_aspace, keyframes=bending.keyframes)
     times = {
         "keyframes": key.match(bending_aspace, keyframes=bending.keyframes).times,
@@ -78,16 +69,16 @@ def test_true_keyframes_bound_what_matching_can_reach(bending, bending_aspace):
     assert errors["found"] < errors["linear"]
 
 
-def test_curvature_finds_the_corners():
-    """A path along three sides of a box turns twice."""
+def test_curvature_keyframes_are_corners():
+    """A path along three edges of a box has two corners."""
     t = np.linspace(0, 3, 91)[:, None]
     path = np.hstack([np.clip(t, 0, 1), np.clip(t - 1, 0, 1), np.clip(t - 2, 0, 1)])
     np.testing.assert_allclose(curvature_keyframes(path, 2), [30, 60], atol=1)
 
 
 @pytest.mark.parametrize("n_frames", [20, 40, 101])
-def test_the_first_keyframe_is_where_the_path_bends_most(n_frames):
-    """sqrt(|v|^2 |a|^2 - (v.a)^2) / |v|^3, a tenth of the mean |v|^2 added where it stands."""
+def test_first_keyframe_has_the_largest_curvature(n_frames):
+    """sqrt(|v|^2 |a|^2 - (v.a)^2) / |v|^3, with a tenth of the mean |v|^2 added to |v|^2."""
     rng, t, cases = np.random.default_rng(n_frames), np.linspace(0, 1, n_frames), 0
     for _ in range(40):
         waves = np.sin(np.outer(t, rng.uniform(2, 20, 3)) + rng.uniform(0, 6, 3))
@@ -96,7 +87,7 @@ def test_the_first_keyframe_is_where_the_path_bends_most(n_frames):
         v, a = (slow_filter(path, 0.03 * (n_frames - 1), order) for order in (1, 2))
         vv = (v**2).sum(axis=1)
         bend = np.linalg.norm(np.cross(v, a), axis=1) / (vv + 0.1 * vv.mean()) ** 1.5
-        # Close to an end no key-frame is chosen.
+        # Key-frames keep a distance from both ends.
         if n_frames / 6 < bend.argmax() < n_frames - 1 - n_frames / 6:
             cases += 1
             sync = KeyframeSynchronizer(n_keyframes=1).fit([path])
@@ -105,8 +96,7 @@ def test_the_first_keyframe_is_where_the_path_bends_most(n_frames):
 
 
 @pytest.mark.parametrize("n_keyframes", [2, 5, 9])
-def test_a_movement_run_backwards_has_the_same_keyframes(n_keyframes):
-    """One end is as good as the other, to keep away from as well."""
+def test_reversed_path_has_the_same_keyframes(n_keyframes):
     rng = np.random.default_rng(0)
     for n_frames in range(30, 70):
         path = np.cumsum(rng.standard_normal((n_frames, 3)), axis=0)
@@ -118,8 +108,8 @@ def test_a_movement_run_backwards_has_the_same_keyframes(n_keyframes):
         np.testing.assert_array_equal(back, n_frames - 1 - there[::-1])
 
 
-def test_keyframes_that_look_alike_are_found_in_their_order():
-    """Twice around a triangle: each corner is passed again, early or late, and is another one."""
+def test_equal_postures_are_matched_in_order():
+    """Twice around a triangle: each corner is passed twice."""
     corners = np.array([[0.0, 0], [1, 0], [0.5, 0.8], [0, 0], [1, 0], [0.5, 0.8], [0, 0]])
     turns = [20, 40, 60, 80, 100], [24, 36, 66, 76, 98], [14, 40, 52, 88, 106]
     X = [
@@ -132,8 +122,8 @@ def test_keyframes_that_look_alike_are_found_in_their_order():
     np.testing.assert_allclose(times, turns, atol=4)
 
 
-def test_a_style_does_not_move_keyframes():
-    """Twice around an ellipse, elsewhere: its ends are where it bends, not where it is closest."""
+def test_shifted_path_has_the_same_keyframes():
+    """Twice around an ellipse that is shifted: key-frames are at the same ends."""
     t = np.linspace(0, 1, 121)
     phase = np.pi / 2 + 4 * np.pi * np.stack([t, t + 0.03 * np.sin(2 * np.pi * t)])
     pattern, other = np.stack([2 * np.cos(phase), np.sin(phase)], axis=2)
@@ -144,8 +134,7 @@ def test_a_style_does_not_move_keyframes():
     np.testing.assert_allclose(shown, [np.pi * np.arange(1, 5)] * 2, atol=0.15)
 
 
-def test_rest_has_no_keyframes():
-    """Who stands still trembles, which bends sharply; what counts is where the movement turns."""
+def test_tremor_at_rest_is_no_keyframe():
     t, rng = np.linspace(0, 3, 151)[:, None], np.random.default_rng(0)
     path = np.hstack([np.clip(t, 0, 1), np.clip(t - 1, 0, 1)])
     path[100:] += 0.003 * rng.standard_normal((51, 2))
@@ -153,27 +142,12 @@ def test_rest_has_no_keyframes():
     np.testing.assert_allclose(sync.keyframes_, [50], atol=1)
 
 
-def test_what_never_moves_bends_nowhere():
-    """No curvature of 0 / 0."""
-    X = [np.full((n, 2), float(n)) for n in (20, 30)]
-    sync = KeyframeSynchronizer(n_keyframes=3).fit(X)
-    assert len(sync.keyframes_) == 3
-    assert np.isfinite(sync.match(X).times).all()
-
-
 @pytest.mark.parametrize("n_frames", [3, 5, 9])
-def test_as_many_keyframes_as_there_are_frames_for(n_frames):
+def test_number_of_keyframes_is_limited_by_the_frames(n_frames):
     X = [np.random.default_rng(i).standard_normal((n_frames, 2)) for i in range(3)]
     sync = KeyframeSynchronizer(n_keyframes=20).fit(X)
     assert len(sync.keyframes_) == n_frames - 2
     np.testing.assert_allclose(sync.transform(X), X)
-
-
-def test_pattern_given_as_an_array(bending_aspace):
-    pattern = bending_aspace[3]
-    sync = KeyframeSynchronizer(pattern=pattern).fit(bending_aspace)
-    assert sync.pattern_index_ is None
-    np.testing.assert_allclose(sync.transform([pattern])[0], pattern)
 
 
 # -- metadata routing -------------------------------------------------------------------
@@ -185,7 +159,7 @@ def make_pipe(bunch):
     return make_pipeline(DirectionCosines(bunch.skeleton), ASpace(4), sync, ActionModel())
 
 
-def test_keyframes_reach_the_synchronizer_inside_a_pipeline(bending):
+def test_keyframes_are_routed_in_a_pipeline(bending):
     with config_context(enable_metadata_routing=True):
         pipe = make_pipe(bending).fit(bending.data, keyframes=bending.keyframes)
         points = pipe[:-2].transform(bending.data)
@@ -195,7 +169,7 @@ def test_keyframes_reach_the_synchronizer_inside_a_pipeline(bending):
         np.testing.assert_array_equal(out, direct)
 
 
-def test_keyframes_are_split_with_the_performances(bending):
+def test_keyframes_are_split_in_cross_validation(bending):
     with config_context(enable_metadata_routing=True):
         result = cross_validate(
             make_pipe(bending)[:-1],
@@ -214,7 +188,8 @@ def test_keyframes_are_split_with_the_performances(bending):
 @pytest.mark.parametrize(
     ("keyframes", "message"),
     [
-        ([[2, 5]], "one array a performance, 2; got 1"),
+        ([[2, 5]], r"list of 2 arrays .*; got \[\[2, 5\]\]"),
+        (3, "list of 2 arrays .*; got 3"),
         (
             [[2, 5], [5, 2]],
             r"Performance 1: key-frames must be 2 increasing frames between 0 and 9",
@@ -226,21 +201,15 @@ def test_keyframes_are_split_with_the_performances(bending):
         ([[2, 5], 3], "Performance 1: "),
     ],
 )
-def test_impossible_keyframes(keyframes, message):
+def test_fit_refuses_invalid_keyframes(keyframes, message):
     X = [np.arange(10.0)[:, None]] * 2
     with pytest.raises(ValueError, match=message):
         KeyframeSynchronizer().fit(X, keyframes=keyframes)
 
 
-def test_keyframes_must_be_given_again(bending):
+def test_transform_needs_keyframes_after_a_fit_with_them(bending):
     sync = KeyframeSynchronizer().fit(bending.data, keyframes=bending.keyframes)
     with pytest.raises(ValueError, match="give those of these performances too"):
         sync.transform(bending.data)
     with pytest.raises(ValueError, match="must be 5 increasing"):
         sync.transform(bending.data, keyframes=bending.keyframes[:, :4])
-
-
-def test_new_performances_with_keyframes():
-    bunch = make_bending(6, random_state=0)
-    sync = KeyframeSynchronizer(40).fit(bunch.data[:4], keyframes=bunch.keyframes[:4])
-    assert sync.transform(bunch.data[4:], keyframes=bunch.keyframes[4:]).shape == (2, 40, 45)

@@ -69,7 +69,7 @@ SYNCHRONIZERS = {
     "dense": DenseSynchronizer(15),
     "linear": LinearSynchronizer(15),
     "keyframes": KeyframeSynchronizer(15),
-    "parts": PartSynchronizer({"arm": [0]}, n_frames=15),
+    "parts": PartSynchronizer({"arm": [0]}, synchronizer=DenseSynchronizer(15)),
     "outside": ShiftSynchronizer(15),
 }
 
@@ -263,8 +263,8 @@ def test_a_pattern_that_is_given_is_in_the_sample(pattern):
 
 
 def test_parts_are_learnt_from_the_sample():
-    sync = PartSynchronizer({"arm": [0, 1]}, max_fit=9).fit(X)
-    expected = PartSynchronizer({"arm": [0, 1]}).fit(X[sync.sample_])
+    sync = PartSynchronizer({"arm": [0, 1]}, synchronizer=DenseSynchronizer(max_fit=9)).fit(X)
+    expected = PartSynchronizer({"arm": [0, 1]}).fit(X[sync.synchronizer_.sample_])
     np.testing.assert_array_equal(sync.transform(X), expected.transform(X))
 
 

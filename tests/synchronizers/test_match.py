@@ -1,4 +1,4 @@
-"""Match: warps of performances, and what they say of frames, seconds and other recordings."""
+"""Match: warps, frames and seconds, warping of other recordings, and timing."""
 
 import pickle
 
@@ -13,7 +13,6 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
-    KeyframeSynchronizer,
     Match,
     to_frame,
 )
@@ -26,12 +25,12 @@ def matched(bending):
     return points, synchronizer, synchronizer.match(points)
 
 
-def test_performances_are_warped_as_by_transform(matched):
+def test_warp_gives_the_same_as_transform(matched):
     points, synchronizer, match = matched
     np.testing.assert_array_equal(match.warp(points), synchronizer.transform(points))
 
 
-def test_other_recordings_at_another_rate(matched):
+def test_warp_takes_recordings_of_another_frame_rate(matched):
     points, _, match = matched
     rng = np.random.default_rng(0)
     forces = [rng.normal(size=(10 * len(x) - 3, 2)) for x in points]
@@ -42,15 +41,7 @@ def test_other_recordings_at_another_rate(matched):
         np.testing.assert_allclose(out, expected, atol=1e-12)
 
 
-def test_float32_is_kept_and_other_types_become_float64(matched):
-    points, _, match = matched
-    assert match.warp([x.astype(np.float32) for x in points]).dtype == np.float32
-    mixed = [points[0].astype(np.float32), *points[1:]]
-    assert match.warp(mixed).dtype == np.float64
-    assert match.warp([np.arange(4)[:, np.newaxis]] * 6).dtype == np.float64
-
-
-def test_what_cannot_be_warped(matched):
+def test_warp_refuses_other_sequences(matched):
     points, _, match = matched
     with pytest.raises(ValueError, match="6 matched performances, but 5 sequences"):
         match.warp(points[:5])
@@ -60,7 +51,7 @@ def test_what_cannot_be_warped(matched):
         match.warp(np.zeros((6, 9)))
 
 
-def test_what_a_match_holds(matched):
+def test_match_unpacks_and_pickles(matched):
     match = matched[2]
     assert match.times.shape == match.offsets.shape == (6, 40)
     np.testing.assert_array_equal(match.offsets, match.times - np.arange(40))
@@ -68,8 +59,6 @@ def test_what_a_match_holds(matched):
     np.testing.assert_array_equal(offsets, match.offsets)
     assert times is match.times
     assert distances is match.distances
-    assert not isinstance(match, tuple)
-    assert not {"count", "index"} & set(dir(match))
     copied = pickle.loads(pickle.dumps(match))
     for one, other in zip(copied, match, strict=True):
         np.testing.assert_array_equal(one, other)
@@ -81,17 +70,11 @@ def test_frames_and_seconds(matched):
     frames = match.frames(points)
     for x, times, own in zip(points, match.times, frames, strict=True):
         np.testing.assert_allclose(own, np.interp(times, [0, 39], [0, len(x) - 1]), atol=1e-12)
-    # What warp gives is what is there.
+    # warp samples at these frames.
     clocks = [np.arange(len(x), dtype=float)[:, np.newaxis] for x in points]
     np.testing.assert_allclose(match.warp(clocks)[:, :, 0], frames, atol=1e-12)
     lengths = [len(x) for x in points]
-    for X in (
-        lengths,
-        np.array(lengths, dtype=float),
-        tuple(lengths),
-        np.array(lengths),
-        pd.Series(lengths, index=list("abcdef")),
-    ):
+    for X in (lengths, np.array(lengths, dtype=float), pd.Series(lengths, index=list("abcdef"))):
         np.testing.assert_array_equal(match.frames(X), frames)
     frame = to_frame([pd.DataFrame(x) for x in points])
     np.testing.assert_array_equal(match.frames(frame), frames)
@@ -111,13 +94,12 @@ def test_frames_and_seconds(matched):
         (map(len, ["ab"] * 6), 1, "got map"),
         (5, 1, "single 2-D input"),
         ([40] * 6, 0, "frame_rate must be one number above 0"),
-        ([40] * 6, -5.0, "frame_rate must be one number above 0"),
         ([40] * 6, np.nan, "frame_rate must be one number above 0"),
-        ([40] * 6, [1, 2, 3, np.inf, 5, 6], "for performance 3"),
-        ([40] * 6, [1, 2], "6 matched performances, but 2 frame rates"),
+        ([40] * 6, [1, 2, 3, np.inf, 5, 6], r"inf.*: performance 3\."),
+        ([40] * 6, [1, 2], "for each of the 6 performances"),
     ],
 )
-def test_impossible_lengths_and_rates(matched, lengths, rate, message):
+def test_seconds_refuses_invalid_lengths_and_rates(matched, lengths, rate, message):
     with pytest.raises(ValueError, match=message):
         matched[2].seconds(lengths, rate)
 
@@ -133,12 +115,12 @@ def test_impossible_lengths_and_rates(matched, lengths, rate, message):
         ([[0.0, 1.0]], [1.0, 2.0], r"each of the 1 performances, got shape \(2,\)"),
     ],
 )
-def test_what_is_no_match(times, distances, message):
+def test_match_refuses_invalid_times_and_distances(times, distances, message):
     with pytest.raises(ValueError, match=message):
         Match(times, distances)
 
 
-def test_a_match_of_ones_own():
+def test_match_copies_given_times():
     match = Match([[0, 2, 2, 3]])
     assert match.times.dtype == np.float64
     assert match.offsets.tolist() == [[0, 1, 0, 0]]
@@ -146,10 +128,10 @@ def test_a_match_of_ones_own():
     times = np.array([[0.0, 1.0, 2.0]])
     match = Match(times)
     times[0, 1] = 9
-    assert not match.offsets.any(), "it does not change with what it was made of"
+    assert not match.offsets.any()
 
 
-def test_from_a_pipeline(bending):
+def test_from_estimator_of_pipelines_and_searches(bending):
     steps = DirectionCosines(bending.skeleton), ASpace(3), DenseSynchronizer(30), ActionModel()
     pipe = make_pipeline(*steps).fit(bending.data[:6])
     match = Match.from_estimator(pipe, bending.data[6:9])
@@ -168,15 +150,7 @@ def test_from_a_pipeline(bending):
         Match.from_estimator(DenseSynchronizer(), bending.data)
 
 
-def test_parameters_of_the_match_reach_it(bending):
-    X, keyframes = bending.data[:6], bending.keyframes[:6]
-    sync = KeyframeSynchronizer(30).fit(X, keyframes=keyframes)
-    match = Match.from_estimator(sync, X, keyframes=keyframes)
-    np.testing.assert_array_equal(match.times, sync.match(X, keyframes=keyframes).times)
-
-
-def test_every_kind_of_collection(matched):
-    """The contract for performances holds for what comes along with them; gaps stay."""
+def test_warp_takes_every_kind_of_collection(matched):
     points, _, match = matched
     expected = match.warp(points)
     names = ["a", "b", "c"]
@@ -196,7 +170,7 @@ def test_every_kind_of_collection(matched):
 @pytest.mark.parametrize("gap", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("frame", [0, 5, 8, 9])
 def test_gaps_stay_where_they_are(gap, frame):
-    """Where a frame is met exactly its neighbours have no say; between frames they have."""
+    """At whole frames only that frame counts; between frames both neighbours do."""
     x = np.arange(10.0)[:, np.newaxis].repeat(2, axis=1)
     x[frame, 1] = gap
     np.testing.assert_array_equal(Match([np.arange(10)]).warp([x])[0], x)
@@ -204,7 +178,7 @@ def test_gaps_stay_where_they_are(gap, frame):
     near = [k for k in range(10) if gap in (x[k, 1], x[min(k + 1, 9), 1]) or frame in (k, k + 1)]
     np.testing.assert_array_equal(np.flatnonzero(~np.isfinite(half[:, 1])), near)
     np.testing.assert_array_equal(half[near, 1], [gap] * len(near))
-    # A frame that no time is near leaves no trace.
+    # Frames away from all times have no influence.
     if 0 < frame < 9:
         skips = np.where(np.arange(10) < frame, frame - 1.0, frame + 1.0)
         assert np.isfinite(Match([skips]).warp([x])).all()
@@ -215,7 +189,7 @@ def test_gaps_stay_where_they_are(gap, frame):
 
 @pytest.fixture
 def late():
-    """The peak of the pattern, at frame 5 of 11, comes at frame 7 of one and at 4 of another."""
+    """Peaks at frames 7 and 4, where the pattern has its peak at frame 5 of 11."""
     return Match([np.interp(np.arange(11), [0, 5, 10], [0, peak, 10]) for peak in (7, 4)])
 
 
@@ -245,9 +219,7 @@ def test_offsets_in_units(late):
     ("call", "message"),
     [
         (lambda m: m.offsets_in("ms"), r"unit must be one of \['frames', .*got 'ms'"),
-        (lambda m: m.offsets_in(None), "got None"),
         (lambda m: m.offsets_in("seconds"), "needs X, .* and frame_rate"),
-        (lambda m: m.offsets_in("seconds", [5, 5]), "needs X, .* and frame_rate"),
         (lambda m: m.offsets_in("seconds", frame_rate=5), "needs X, .* and frame_rate"),
         (lambda m: m.offsets_in("seconds", [5], 5), "2 matched performances, but 1 lengths"),
         (lambda m: m.offsets_in("percent", [5]), "2 matched performances, but 1 lengths"),
@@ -256,7 +228,7 @@ def test_offsets_in_units(late):
         (lambda m: m.to_frame("hours"), "unit must be one of"),
     ],
 )
-def test_units_that_are_none(late, call, message):
+def test_refuses_invalid_units_and_labels(late, call, message):
     with pytest.raises(ValueError, match=message):
         call(late)
 
@@ -273,7 +245,7 @@ def test_rates_are_the_slope_of_the_warp(late):
     assert still[0, 0] == still.min() == 0.01
 
 
-def test_a_table_of_the_timing(late):
+def test_to_frame_gives_timing_with_labels(late):
     X = to_frame([np.zeros((21, 1)), np.zeros((41, 1))], performances=["ann", "bob"])
     table = late.to_frame("seconds", X, frame_rate=[10, 40])
     assert table.index.names == ["performance", "frame"]
@@ -297,9 +269,3 @@ def test_a_table_of_the_timing(late):
     for index in ([0, 1], [3, 3]):
         unnamed = pd.Series([21, 41], index=index)
         assert list(late.to_frame("seconds", unnamed, 10).index.unique(0)) == [0, 1]
-
-
-def test_a_match_of_two_frames():
-    match = Match([[0, 1], [0, 0.5]])
-    assert match.offsets_in("percent").tolist() == [[0, 0], [0, -50]]
-    assert match.rates.tolist() == [[1, 1], [0.5, 0.5]]

@@ -27,7 +27,7 @@ from shift_synchronizer import ShiftSynchronizer
 ESTIMATORS = [
     DenseSynchronizer(),
     DenseSynchronizer(n_jobs=2, consensus=2),
-    PartSynchronizer({"first": [0]}, n_frames=12, metric=None, consensus=1, refine=False),
+    PartSynchronizer({"first": [0]}, synchronizer=DenseSynchronizer(12, metric=None, consensus=1)),
     KeyframeSynchronizer(),
     LinearSynchronizer(),
     ShiftSynchronizer(),

@@ -1,4 +1,4 @@
-"""TimingChannel: curves and their timing side by side, through all that pipelines do."""
+"""TimingChannel: curves and their timing, by itself and in pipelines."""
 
 import numpy as np
 import pandas as pd
@@ -19,7 +19,6 @@ from sklearn_motionsync import (
     Match,
     TimingChannel,
     find_departures,
-    to_frame,
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import (
@@ -68,21 +67,19 @@ def test_the_channel_is_the_last_feature(points, params, expected):
     assert single.fit_transform([x.astype(np.float32) for x in points]).dtype == np.float32
 
 
-def test_what_is_asked_of_synchronizers(points):
+def test_match_is_that_of_the_synchronizer(points):
     channel = TimingChannel(DenseSynchronizer(30, pattern=2)).fit(points)
     inner = channel.synchronizer_
-    for name in ("pattern_", "pattern_index_", "n_frames_", "n_features_in_"):
-        np.testing.assert_array_equal(getattr(channel, name), getattr(inner, name))
     np.testing.assert_array_equal(channel.match(points).times, inner.match(points).times)
-    np.testing.assert_array_equal(channel.normalize(points), inner.normalize(points))
+    assert (channel.n_frames_, channel.n_features_in_) == (30, 3)
     assert not hasattr(channel, "feature_names_in_")
     assert channel.synchronizer is not inner
-    for method in ("match", "normalize", "check_performances", "transform"):
+    for method in ("match", "transform"):
         with pytest.raises(NotFittedError):
             getattr(TimingChannel(DenseSynchronizer()), method)(points)
 
 
-def test_rows_are_curves_and_then_their_channel(points):
+def test_rows_give_curves_followed_by_the_channel(points):
     rows = np.sin(np.linspace(0, 6, 25) + np.linspace(0, 1, 5)[:, np.newaxis])
     channel = TimingChannel(DenseSynchronizer(20)).set_output(transform="pandas").fit(rows)
     out, inner = channel.transform(rows), channel.synchronizer_
@@ -98,15 +95,7 @@ def test_rows_are_curves_and_then_their_channel(points):
     assert make_pipeline(channel, PCA(2)).fit_transform(rows).shape == (5, 2)
 
 
-def test_tables_keep_their_labels(points):
-    X = to_frame(points, performances=list("abcdefg"), columns=["p", "q", "r"])
-    out = TimingChannel(LinearSynchronizer(9)).set_output(transform="pandas").fit_transform(X)
-    assert list(out.columns) == ["p", "q", "r", "offset"]
-    assert list(out.index.unique(0)) == list("abcdefg")
-    assert (out["offset"] == 0).all()
-
-
-def test_key_frames_by_name_and_by_routing(bunch):
+def test_keyframes_are_routed_by_name_and_by_request(bunch):
     X, given = bunch.data, {"keyframes": bunch.keyframes}
     expected = KeyframeSynchronizer(30).fit(X, **given).match(X, **given)
     channel = TimingChannel(KeyframeSynchronizer(30)).fit(X, **given)
@@ -136,7 +125,7 @@ def test_key_frames_by_name_and_by_routing(bunch):
             TimingChannel(asking).fit_transform(X, moments=[1])
 
 
-def test_tools_of_pipelines_find_the_synchronizer(bunch):
+def test_scorers_displays_and_searches_find_the_synchronizer(bunch):
     pipe = steps(bunch, TimingChannel(DenseSynchronizer(30)), ActionModel()).fit(bunch.data)
     plain = steps(bunch, DenseSynchronizer(30), ActionModel()).fit(bunch.data)
     X = bunch.data
@@ -159,8 +148,7 @@ def test_tools_of_pipelines_find_the_synchronizer(bunch):
     assert search.fit(X).best_params_ == {"timingchannel__synchronizer__max_offset": 0.25}
 
 
-def test_models_of_postures_keep_the_channel(bunch):
-    """The model is taken back out of the aSpace, and the timing stays beside the postures."""
+def test_model_displays_show_the_channel_beside_postures(bunch):
     pipe = steps(bunch, TimingChannel(DenseSynchronizer(30)), ActionModel()).fit(bunch.data)
     display = ActionModelDisplay.from_estimator(pipe, bunch.data)
     assert display.feature_names == ["aspace0", "aspace1", "aspace2", "offset"]
@@ -195,16 +183,10 @@ def test_parameters_are_validated(points, params, message):
         TimingChannel(DenseSynchronizer()).set_params(**params).fit(points)
 
 
-def test_the_name_of_the_channel_is_free(points):
+def test_fit_refuses_a_feature_with_the_name_of_the_channel(points):
     frames = [pd.DataFrame(x, columns=["p", "offset", "r"]) for x in points]
-    with pytest.raises(ValueError, match="called 'offset', as the channel would be: rename it"):
+    with pytest.raises(ValueError, match="has the name of the channel, 'offset': rename it"):
         TimingChannel(LinearSynchronizer()).fit(frames)
     channel = TimingChannel(LinearSynchronizer(), channel="log_rate").fit(frames)
+    assert list(channel.feature_names_in_) == ["p", "offset", "r"]
     assert list(channel.get_feature_names_out()) == ["p", "offset", "r", "log_rate"]
-
-
-def test_frames_with_names(points):
-    frames = [pd.DataFrame(x, columns=["p", "q", "r"]) for x in points]
-    channel = TimingChannel(LinearSynchronizer()).fit(frames)
-    assert list(channel.feature_names_in_) == ["p", "q", "r"]
-    assert list(channel.get_feature_names_out()) == ["p", "q", "r", "offset"]
