@@ -14,8 +14,9 @@ from ..inputs.numbers import as_numbers, check_finite, check_names, check_square
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..utils.atomic import atomic_fit, atomic_partial_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.groups import encode_groups
 from .sampling import sample_performances, sample_postures
-from .similarity import Logs, Neighbours, as_codes, portions
+from .similarity import Logs, Neighbours, portions
 from .stream import PerformanceStream
 from .variation import mean_band, predictive_variance, simultaneous_factor
 
@@ -457,7 +458,7 @@ class ActionModel(DocumentedMixin, JudgingMixin, EnvelopeMixin, SequenceLevelMix
             raise ValueError(
                 "A model of how performances vary needs at least 2 performances, got n_samples = 1."
             )
-        as_codes(groups, len(performances))
+        encode_groups(groups, len(performances), at_least=2)
         self._learn(performances, groups, PerformanceStream())
         return self
 

@@ -14,6 +14,7 @@ from ..inputs.tables import index_of
 from ..inputs.validation import labels_as_given
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.groups import encode_groups
 from ..utils.pipelines import (
     MissingMetadata,
     find_step,
@@ -24,7 +25,7 @@ from ..utils.pipelines import (
     taken_by,
 )
 from .action_model import ActionModel
-from .similarity import Logs, Neighbours, as_codes, learn_reach
+from .similarity import Logs, Neighbours, learn_reach
 from .stream import spread_out
 
 __all__ = ["ActionDetector", "energies"]
@@ -270,7 +271,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
 
     def _learn(self, performances, synchronizer, groups):
         """What people differ in, of performances that reach the synchronizer."""
-        codes = as_codes(groups, len(performances))
+        codes, _ = encode_groups(groups, len(performances), at_least=2)
         on_clock = synchronizer.normalize(performances)
         energy, self._floor = energies(on_clock)
         coverage = 1 - (1 - self.coverage) / (4 if self.duration else 3)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 from scipy.stats import t as student
 
 from ..matching.filters import smooth
@@ -12,8 +11,6 @@ from ..utils.threads import on_one_thread
 __all__ = [
     "Logs",
     "Neighbours",
-    "as_codes",
-    "check_labels",
     "learn_border",
     "learn_reach",
     "portions",
@@ -33,8 +30,6 @@ _PRIOR_VARIANCE, _PRIOR_COUNT = 0.07, 3
 _LEAST = 1e-9
 # Who stands still is as unlike to people who move as 1; that is never accepted.
 _STANDS_STILL = 1 - 1e-6
-# Labels of NumPy that are equal to plain ones, as which they are kept.
-_PLAIN = np.str_, np.number, np.bool_
 # Performances that are multiplied at a time, always so many, so that no result depends on the
 # others; and those that are in memory at a time.
 _TILE, _PORTION = 8, 64
@@ -242,55 +237,6 @@ def _reach(n, squares, coverage, usual=_PRIOR_VARIANCE):
     freedom = n - 1 + _PRIOR_COUNT
     squares = squares + _PRIOR_COUNT * usual
     return float(student.ppf(coverage, freedom) * np.sqrt(squares / freedom * (1 + 1 / n)))
-
-
-def as_codes(groups, n_performances):
-    """Groups as whole numbers from 0; without any every performance is its own.
-
-    Raises
-    ------
-    ValueError
-        As from `check_labels`, and if there is only one in all.
-    """
-    if groups is None:
-        return np.arange(n_performances)
-    labels = check_labels(groups, n_performances, at_least=2)
-    code = {label: i for i, label in enumerate(dict.fromkeys(labels))}
-    return np.array([code[label] for label in labels])
-
-
-def check_labels(groups, n_performances, at_least=1):
-    """The labels of groups, one for each performance, as a list.
-
-    Raises
-    ------
-    ValueError
-        If there is not one for each performance, or one is missing, or there are too few different
-        ones.
-    """
-    if isinstance(groups, (str, bytes, dict)) or np.ndim(groups) != 1:
-        raise ValueError(
-            "groups must be a list with one label for each performance, such as who performed "
-            f"it; got {groups!r}."
-        )
-    if len(groups) != n_performances:
-        raise ValueError(
-            f"groups has {len(groups)} labels, and there are {n_performances} performances: give "
-            "one for each."
-        )
-    missing = [bool(np.ndim(label) == 0 and pd.isna(label)) for label in groups]
-    if any(missing):
-        raise ValueError(
-            f"groups does not say who gave performance {missing.index(True)}: it is missing. Give "
-            "everybody a label, or leave such performances out."
-        )
-    labels = [label.item() if isinstance(label, _PLAIN) else label for label in groups]
-    if len(set(labels)) < at_least:
-        raise ValueError(
-            f"All performances are of the group {labels[0]!r}: how groups differ cannot be learnt "
-            "of one. Give no groups, and every performance counts for itself."
-        )
-    return labels
 
 
 def _mean_of_smallest(ratios):

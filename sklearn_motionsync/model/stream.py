@@ -4,7 +4,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .similarity import Logs, check_labels, portions
+from ..utils.groups import encode_groups
+from .similarity import Logs, portions
 
 __all__ = ["PerformanceStream", "spread_out"]
 
@@ -118,12 +119,14 @@ class PerformanceStream:
         if groups is None:
             n_groups = self.n_groups + n
             return np.arange(self.n_groups, n_groups), self.labels, n_groups
-        given, labels, n_groups = check_labels(groups, n), dict(self.labels), self.n_groups
-        for label in dict.fromkeys(given):
+        codes, given = encode_groups(groups, n)
+        labels, n_groups = dict(self.labels), self.n_groups
+        for label in given:
             if label not in labels:
                 labels[label] = n_groups
                 n_groups += 1
-        return np.array([labels[label] for label in given]), tuple(labels.items()), n_groups
+        numbers = np.array([labels[label] for label in given])
+        return numbers[codes], tuple(labels.items()), n_groups
 
     def _add(self, performances):
         """Number, mean and variance by Welford's recurrence: one after the other, in doubles."""

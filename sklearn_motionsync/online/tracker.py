@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator, _fit_context, clone
-from sklearn.utils import check_consistent_length, check_random_state
+from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.validation import check_is_fitted
 
@@ -18,6 +18,7 @@ from ..synchronizers.dense import DenseSynchronizer
 from ..synchronizers.match import check_answer
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.groups import encode_groups
 from ..utils.threads import on_one_thread
 from .particle_filter import ParticleFilter, follow
 from .smoother import smooth
@@ -173,8 +174,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
             Performances; the rows of a 2-D array are univariate ones.
         y : ignored
         groups : array-like, shape (n_sequences,), default=None
-            Who performed: deviations are from the mean of other groups. By default, or if there is
-            only one, every performance counts for itself.
+            The subject of each performance: deviations are from the mean of other groups. By
+            default every performance is a group of its own.
 
         Returns
         -------
@@ -183,8 +184,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If the input breaks the contract, there is only one performance, or not one group for
-            each; or their unit is such that variances are beyond the precision.
+            If the input breaks the contract, there is only one performance or one group, or not one
+            group for each; or their unit is such that variances are beyond the precision.
         """
         performances = self._check_training_set(X)
         n = len(performances)
@@ -192,8 +193,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
             raise ValueError(
                 "A tracker learns how people vary from at least 2 performances, got n_samples = 1."
             )
-        if groups is not None:
-            check_consistent_length(performances, groups)
+        codes, _ = encode_groups(groups, n, at_least=2, sort=True)
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
         self.synchronizer_ = sync.fit(X)
         match = sync.match(X)
@@ -205,7 +205,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         rates = clock.duration / (lengths[:, np.newaxis] - 1) / match.rates
         with np.errstate(over="ignore", invalid="ignore"):
             check_squares(warped, float(warped.var(axis=(0, 1)).max()), "variances")
-        codes, settings = _as_codes(groups, n), (self.noise, self.tempering, self.n_particles)
+        settings = self.noise, self.tempering, self.n_particles
         known = warped.astype(np.float64), rates, codes, clock
         self._model = on_one_thread(learn, *known, *settings)
         self.mean_ = self._model.mean.astype(performances[0].dtype)
@@ -326,12 +326,6 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
             estimates = on_one_thread(method, model, self._seed, *take, projection[0])
             tracks.append(Track.of(estimates, self.mean_.dtype))
         return tracks[0] if single else tracks
-
-
-def _as_codes(groups, n):
-    """Groups counted from 0; every performance one of its own without any, or if all are one."""
-    codes = np.arange(n) if groups is None else np.unique(groups, return_inverse=True)[1].ravel()
-    return codes if codes.max() > 0 else np.arange(n)
 
 
 # -- track: what is known of a body at every frame of a take -----------------------------

@@ -9,19 +9,17 @@ import pandas as pd
 from scipy.special import softmax
 from sklearn.base import BaseEstimator, ClassifierMixin, _fit_context
 from sklearn.pipeline import Pipeline
-from sklearn.utils import assert_all_finite, check_consistent_length, column_or_1d
 from sklearn.utils._param_validation import Interval, StrOptions
-from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.validation import SequenceLevelMixin
 from ..matching.comparison import Comparison
 from ..matching.costs import COSTS
 from ..model.action_model import ActionModel
-from ..model.similarity import as_codes
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.groups import encode_classes, encode_groups
 from ..utils.parallel import LongWorkMixin, run
 from .distances import SETTINGS
 from .kernel import MotionKernel, deal, decide, learn, threshold
@@ -198,8 +196,10 @@ class ActionClassifier(
         """
         kernel = MotionKernel(self._comparisons(), self.gamma, self.summaries)
         performances = self._check_training_set(X)
-        self.classes_, codes = check_labels(type(self).__name__, performances, y)
-        people = None if groups is None else as_codes(groups, len(performances))
+        self.classes_, codes = encode_classes(y, performances, type(self).__name__)
+        people = None
+        if groups is not None:
+            people, _ = encode_groups(groups, len(performances), at_least=2)
         with self._progress(fits=True) as progress:
             known = kernel.learn(performances, n_jobs=self.n_jobs, progress=progress)
         n_folds = _FOLDS if people is None else min(_FOLDS, people.max() + 1)
@@ -430,42 +430,6 @@ def as_given(arrays, on_rows, names):
     if on_rows:
         return np.stack([x[:, 0] for x in arrays])
     return arrays if names is None else [pd.DataFrame(x, columns=names) for x in arrays]
-
-
-# -- labels of classes: whole numbers for the learning, and one for what is none of them -
-
-
-def check_labels(name, performances, y):
-    """The classes, and the class of every performance as a whole number from 0.
-
-    Parameters
-    ----------
-    name : str
-        Of the classifier, for messages.
-    performances : sequence
-    y : array-like, shape (n_sequences,)
-
-    Returns
-    -------
-    classes : ndarray, shape (n_classes,)
-    codes : ndarray of int, shape (n_sequences,)
-    """
-    if y is None:
-        raise ValueError(f"{name} requires y to be passed, but the target y is None.")
-    y = column_or_1d(y, warn=True)
-    check_consistent_length(performances, y)
-    assert_all_finite(y, input_name="y")
-    if (without := pd.isna(y)).any():
-        raise ValueError(f"y has no label for performance {int(without.argmax())}.")
-    check_classification_targets(y)
-    classes, codes = np.unique(y, return_inverse=True)
-    if len(classes) < 2:
-        raise ValueError(
-            f"{name} needs performances of at least 2 classes, got one class: "
-            f"{classes.tolist()[0]!r}. Whether performances are one action is what an "
-            "ActionDetector learns."
-        )
-    return classes, codes
 
 
 def label_of_unknown(label, classes):

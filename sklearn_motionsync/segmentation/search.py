@@ -22,8 +22,9 @@ from ..matching.trellis import Trellis
 from ..matching.warps import at_times, even_slices, normalise
 from ..model.action_model import ActionModel
 from ..model.detector import energies
-from ..model.similarity import as_codes, learn_border
+from ..model.similarity import learn_border
 from ..synchronizers.dense import DenseSynchronizer
+from ..utils.groups import encode_groups
 from ..utils.pipelines import find_synchronizer, flat_steps, reach_synchronizer
 from .cutting import cut_takes
 
@@ -264,10 +265,12 @@ def _check_lengths(given, takes):
 
 def _groups(pattern, reached, groups):
     training = reached.synchronizer.training_
-    if len(training.durations) < 2:
-        return None
+    n_performances = len(training.durations)
     if groups is not None:
-        return as_codes(groups, len(training.durations))[training.kept]
+        codes, _ = encode_groups(groups, n_performances, at_least=min(n_performances, 2))
+        return codes[training.kept]
+    if n_performances < 2:
+        return None
     models = [step for step in flat_steps(pattern) if isinstance(step, ActionModel)]
     fitted = [model for model in models if hasattr(model, "groups_")]
     if not fitted:
@@ -485,7 +488,7 @@ class Unlikeness:
         self._squares = [np.vecdot(view, view) for view in self._known]
         self._training, self.known = positions, np.empty(0)
         if count > 1:
-            self._groups = as_codes(groups, count)
+            self._groups, _ = encode_groups(groups, count, at_least=2)
             own = training.durations[training.kept]
             self.known = self._of(positions, own, self._groups)
 

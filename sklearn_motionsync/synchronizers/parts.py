@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from numbers import Real
 
 import numpy as np
-import pandas as pd
 from sklearn.utils._param_validation import Interval
 
 from ..body.parts import parts_of_names, parts_of_postures
@@ -17,6 +16,7 @@ from ..matching.rows import Coupling
 from ..matching.warper import Warper
 from ..matching.warps import follow, normalise
 from ..utils.atomic import snapshot
+from ..utils.groups import encode_groups
 from ..utils.parallel import run
 from .dense import DenseSynchronizer
 from .lags import Lags
@@ -227,7 +227,9 @@ n_features_in_, feature_names_in_
         """
         performances = self.check_performances(X)
         self._check_lags(against)
-        groups, people = people_of(groups, len(performances))
+        people = None
+        if groups is not None:
+            groups, people = encode_groups(groups, len(performances))
         body = self.match(performances)
         parts = self._match_parts(performances, body, "part")
         others = dict.fromkeys(parts, parts.get(against, body))
@@ -350,28 +352,6 @@ def choose_parts(parts, performances, names):
             owner[k] = part
         chosen[part] = np.array(indices, dtype=np.intp)
     return chosen
-
-
-def people_of(groups, n_sequences):
-    """The person of every performance counted from 0, and what they are called; None for none."""
-    if groups is None:
-        return None, None
-    given = (
-        groups if isinstance(groups, (pd.Series, pd.Index)) else np.asarray(groups, dtype=object)
-    )
-    if given.ndim != 1 or len(given) != n_sequences:
-        raise ValueError(
-            f"groups must be one for each of the {n_sequences} performances, got shape "
-            f"{np.shape(given)}."
-        )
-    codes, people = pd.factorize(given)
-    if (codes < 0).any():
-        i = int(np.argmin(codes))
-        raise ValueError(
-            f"Performance {i}: its group is missing, {list(given)[i]!r}. Say whose it is, or leave "
-            "it out."
-        )
-    return codes, list(people)
 
 
 # -- parts: some features of the body alone, with warps of their own that are drawn to the body's

@@ -427,13 +427,3 @@ def test_what_is_no_such_pipeline(estimator, message):
 def test_parameters_are_checked(params):
     with pytest.raises(ValueError, match=f"The '{next(iter(params))}' parameter"):
         make().set_params(**params).fit(X)
-
-
-def test_groups_are_checked():
-    with pytest.raises(ValueError, match="groups has 3 labels, and there are 20 performances"):
-        make().fit(X, groups=[1, 2, 3])
-    with pytest.raises(ValueError, match="All performances are of the group 'ann'"):
-        make().fit(X, groups=["ann"] * 20)
-    for groups in (np.array([1.0, np.nan] * 10), ["ann", None] * 10):
-        with pytest.raises(ValueError, match="who gave performance 1: it is missing"):
-            make().fit(X, groups=groups)

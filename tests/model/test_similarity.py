@@ -173,21 +173,6 @@ def test_groups_are_any_labels():
     assert ActionModel().fit(X, groups=range(6)).threshold_ == ActionModel().fit(X).threshold_
 
 
-@pytest.mark.parametrize(
-    ("groups", "message"),
-    [
-        (["a"] * 6, "All performances are of the group 'a'"),
-        (["a", "b"], "groups has 2 labels, and there are 6 performances"),
-        ("abcdef", "must be a list with one label for each performance"),
-        ([["a"]] * 6, "must be a list with one label for each performance"),
-        (3, "must be a list with one label for each performance"),
-    ],
-)
-def test_groups_that_are_none(groups, message):
-    with pytest.raises(ValueError, match=message):
-        ActionModel().fit(curves(6), groups=groups)
-
-
 # -- alone or together ------------------------------------------------------------------
 
 
