@@ -176,7 +176,7 @@ def _way_back(before, names, must):
     strange = [step for step in after if not hasattr(step, "match")]
     if strange and must:
         raise ValueError(
-            f"Between ASpace and ActionModel stands {strange[0]}: the model cannot be taken back "
-            f"to postures. Choose features of the model: {', '.join(names)}."
+            f"Between ASpace and ActionModel stands {strange[0]}, which has no inverse: choose "
+            f"features of the model, {', '.join(names)}."
         )
     return None if strange else _Way(before_aspace, aspace, after)

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..utils.groups import mean_of_others
 from .kalman import correct, squared_lengths, whitening
 from .velocity import Slopes
 
@@ -122,22 +123,6 @@ class Pace(NamedTuple):
         logs = np.log(np.clip(rates, 1 / _FASTEST, _FASTEST))
         spread = float(np.sqrt(np.square(logs).mean()))
         return cls(spread, _lag_of(logs[:, :, np.newaxis], np.exp(-1)) * step)
-
-
-def left_out(performances, groups):
-    """What every performance differs by from the mean of those of other groups.
-
-    Parameters
-    ----------
-    performances : ndarray, shape (n, P, n_features)
-    groups : ndarray of int, shape (n,)
-        At least two, counted from 0.
-    """
-    counts = np.bincount(groups)[:, np.newaxis, np.newaxis]
-    sums = np.zeros((len(counts), *performances.shape[1:]))
-    np.add.at(sums, groups, performances)
-    others = (sums.sum(axis=0) - sums) / (len(performances) - counts)
-    return performances - others[groups]
 
 
 def shrunk_covariance(deviations):
@@ -263,7 +248,7 @@ def learn(warped, rates, groups, clock, noise, tempering, n_particles):
     noise, tempering, n_particles :
         As of the tracker.
     """
-    deviations, step = left_out(warped, groups), 1 / clock.speed
+    deviations, step = warped - mean_of_others(warped, groups), 1 / clock.speed
     process, pace = Process.learn(deviations, step), Pace.learn(rates, step)
     slopes, unit_noise = _slopes(deviations, step, clock.window)
     velocities = shrunk_covariance(slopes)

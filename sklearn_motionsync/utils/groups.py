@@ -7,7 +7,13 @@ import pandas as pd
 from sklearn.utils import assert_all_finite, check_consistent_length, column_or_1d
 from sklearn.utils.multiclass import check_classification_targets
 
-__all__ = ["encode_classes", "encode_groups", "names_of_groups"]
+__all__ = [
+    "encode_classes",
+    "encode_groups",
+    "mean_of_others",
+    "names_of_groups",
+    "sums_of_groups",
+]
 
 # NumPy scalars that equal Python ones, as which they are kept.
 _SCALARS = np.str_, np.number, np.bool_
@@ -119,6 +125,20 @@ def encode_classes(y, performances, estimator_name):
             f"{classes.tolist()[0]!r}. An ActionDetector learns a single action."
         )
     return classes, codes
+
+
+def sums_of_groups(values, codes):
+    """Sums (n_groups, ...) of values (n, ...) by group, and the counts, of as many dimensions."""
+    counts = np.bincount(codes)
+    sums = np.zeros((len(counts), *values.shape[1:]))
+    np.add.at(sums, codes, values)
+    return sums, counts.reshape(-1, *[1] * (values.ndim - 1))
+
+
+def mean_of_others(values, codes):
+    """For each of the values (n, ...), the mean of those of all other groups."""
+    sums, counts = sums_of_groups(values, codes)
+    return ((sums.sum(axis=0) - sums) / (len(values) - counts))[codes]
 
 
 def _check_labels(labels, name):
