@@ -176,7 +176,7 @@ def outputs(estimator, X):
         answers += [estimator.score_samples(X), estimator.decision_function(X)]
         answers += [estimator.predict(X)]
     if hasattr(estimator, "predict_proba"):
-        answers += [estimator.predict_proba(X), estimator.novelty_scores(X), estimator.predict(X)]
+        answers += [estimator.predict_proba(X), estimator.score_samples(X), estimator.predict(X)]
     elif hasattr(estimator, "score"):
         answers += [np.array(estimator.score(X))]
     return answers
