@@ -87,6 +87,7 @@ REFUSED = [
     (list("abcde"), "{0} has 5 labels, and there are 6 performances"),
     ("abcdef", "{0} must be a list or 1-D array .* got 'abcdef'"),
     (dict.fromkeys(range(6)), "{0} must be a list or 1-D array .* got {{"),
+    (set(range(6)), "{0} must be a list or 1-D array .* got {{"),
     (3, "{0} must be a list or 1-D array .* got 3"),
     (np.zeros((6, 2)), r"{0} must be a list or 1-D array .* got shape \(6, 2\)"),
     ([["a"], ["b"]] * 3, r"{0}\[0\] is \['a'\]: a label is one"),
