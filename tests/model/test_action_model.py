@@ -153,9 +153,3 @@ def test_accepts_refuses_invalid_postures(model, postures):
 def test_sample_refuses_invalid_numbers(model, n):
     with pytest.raises(ValueError, match="whole number of samples"):
         model.sample(n)
-
-
-@pytest.mark.parametrize("n_std", [0, -1, "wide"])
-def test_fit_refuses_invalid_n_std(performances, n_std):
-    with pytest.raises(ValueError, match="'n_std' parameter"):
-        ActionModel(n_std).fit(performances)

@@ -18,23 +18,9 @@ from sklearn_motionsync.model.variation import (
     predictive_variance,
     simultaneous_factor,
 )
+from test_variation import people
 
-
-def people(n_people, n_times, seed):
-    """Smooth performances of two features, of people and about them, in two units."""
-    rng = np.random.default_rng(seed)
-    t = np.linspace(0, 1, 30)
-    shapes = np.stack([np.ones_like(t), t, t**2, np.sin(9 * t), np.cos(9 * t)], axis=1)
-
-    def vary(n, size):
-        return size * np.einsum("tk,nkf->ntf", shapes, rng.standard_normal((n, 5, 2)))
-
-    style = np.repeat(vary(n_people, 0.2), n_times, axis=0)
-    X = np.stack([np.sin(5 * t), t], axis=1) + style + vary(n_people * n_times, 0.1)
-    return X * [1, 100], np.repeat(np.arange(n_people), n_times)
-
-
-X, GROUPS = people(8, 3, 0)
+X, GROUPS = people([3] * 8, 2, n_frames=30)
 MODEL = ActionModel().fit(X, groups=GROUPS)
 
 
@@ -60,8 +46,6 @@ def test_bands_of_the_model_equal_those_of_the_functions():
 def test_standard_scores_divide_by_the_predicted_deviation():
     expected = (X - MODEL.mean_) / np.sqrt(MODEL.predictive_variance_)
     np.testing.assert_allclose(MODEL.standard_scores(X), expected)
-    with pytest.raises(ValueError, match="have 20 frames, the model 30"):
-        MODEL.standard_scores([np.zeros((20, 2))])
 
 
 # -- departures -------------------------------------------------------------------------
@@ -105,7 +89,7 @@ def test_departures_of_chosen_features_and_limits():
 
 
 def test_rare_departures_are_those_outside_the_simultaneous_band():
-    new, _ = people(200, 1, 77)
+    new, _ = people([1] * 200, 77, n_frames=30)
     table = find_departures(MODEL, new)
     assert (table["deviation"].abs() > 3).all()
     lower, upper = MODEL.envelope(simultaneous=True)

@@ -1,16 +1,12 @@
 """The detector: against loops, closed forms and real people."""
 
-import pickle
-
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import t as student
 from sklearn import clone, config_context
-from sklearn.exceptions import NotFittedError
-from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score, cross_validate
+from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.pipeline import Pipeline, make_pipeline
-from sklearn.utils import estimator_html_repr
 from sklearn_motionsync import (
     ActionDetector,
     ActionModel,
@@ -135,10 +131,8 @@ WRONG = {
 def test_report_gives_the_reason(reason, detector):
     assert detector.report([wave(), WRONG[reason]])["reason"].tolist() == ["", reason]
     assert detector.predict([wave(), WRONG[reason]]).tolist() == [1, -1]
-
-
-def test_the_model_alone_accepts_any_pace(detector):
-    assert detector.estimator_.predict([wave(120), wave(30)]).tolist() == [1, 1]
+    if reason in ("too long", "too short"):
+        assert detector.estimator_.predict([WRONG[reason]]).tolist() == [1]
 
 
 def test_duration_false_accepts_any_duration(detector):
@@ -198,7 +192,6 @@ def test_bends_of_a_new_person_are_accepted_and_altered_ones_rejected(bends):
 
 BUNCH = make_bending(12, n_frames=30, style=1, random_state=0)
 ACTORS = np.array([3, 1, 2, 1, 3, 2, 3, 1, 2, 1, 3, 2])
-CV = GroupKFold(3)
 GRID = {"actionmodel__n_std": [3.0]}
 
 
@@ -241,32 +234,6 @@ def test_groups_reach_the_model_and_the_detector():
     other = ActionDetector(pipe).fit(BUNCH.data, actionmodel__groups=ACTORS)
     assert detector.borders_ == other.borders_
     assert detector.borders_ != ActionDetector(pipe).fit(BUNCH.data).borders_
-
-
-@pytest.mark.parametrize("routed", [False, True])
-def test_cross_validation_with_groups(routed):
-    detector = ActionDetector(nestings(DenseSynchronizer(20))["flat"])
-    expected = [
-        clone(detector).fit([BUNCH.data[i] for i in train], groups=ACTORS[train]).borders_
-        for train, _ in CV.split(BUNCH.data, groups=ACTORS)
-    ]
-    with config_context(enable_metadata_routing=routed):
-        if routed:
-            detector.set_fit_request(groups=True)
-        found = cross_validate(
-            detector,
-            BUNCH.data,
-            np.ones(12),
-            cv=CV,
-            scoring="accuracy",
-            params={"groups": ACTORS},
-            return_estimator=True,
-            error_score="raise",
-            **({} if routed else {"groups": ACTORS}),
-        )
-    for one, borders in zip(found["estimator"], expected, strict=True):
-        assert one.borders_ == borders
-    assert 0.5 < found["test_score"].mean() <= 1
 
 
 def test_detector_in_cross_validation_with_wrong_performances(detector):
@@ -334,18 +301,6 @@ def test_report_does_not_depend_on_other_performances(detector):
         assert detector.report([new[i]]).iloc[0].tolist() == together.iloc[i].tolist()
 
 
-def test_detector_pickles_clones_and_has_a_repr(detector):
-    stored = pickle.loads(pickle.dumps(detector))
-    assert stored.report(X).equals(detector.report(X))
-    assert "ActionDetector(estimator=Pipeline(" in repr(detector)
-    assert "ActionModel" in estimator_html_repr(detector)
-    deep = detector.get_params()
-    assert deep["estimator__actionmodel__n_std"] == 3.0
-    assert deep["coverage"] == 0.95
-    with pytest.raises(NotFittedError):
-        clone(detector).predict(X)
-
-
 def test_coverage_of_the_pipeline_does_not_count(detector):
     own = make_pipeline(DenseSynchronizer(30), ActionModel(coverage=0.5)).fit(X, None)
     found = ActionDetector(clone(own)).fit(X, groups=GROUPS)
@@ -405,11 +360,3 @@ def test_energy_of_standing_still_is_the_floor():
 def test_detector_refuses_pipelines_without_model_or_synchronizer(estimator, message):
     with pytest.raises(ValueError, match=message):
         ActionDetector(estimator).fit(X)
-
-
-@pytest.mark.parametrize(
-    "params", [{"coverage": 1.0}, {"coverage": 0}, {"duration": "frames"}, {"estimator": "bends"}]
-)
-def test_detector_refuses_invalid_parameters(params):
-    with pytest.raises(ValueError, match=f"The '{next(iter(params))}' parameter"):
-        make().set_params(**params).fit(X)

@@ -138,12 +138,6 @@ def test_kept_performances_are_evenly_spread(groups):
     assert max(gaps) <= 2 * len(set(groups) if len(set(groups)) > 64 else groups) / 64
 
 
-def test_kept_performances_of_alternating_kinds_are_of_both():
-    for period in (2, 3, 4, 5, 8):
-        counts = np.bincount(kept_of(np.zeros(999, dtype=int)) % period)
-        assert counts.min() > 0.6 * 64 / period
-
-
 # -- the threshold ----------------------------------------------------------------------
 
 
@@ -171,18 +165,6 @@ def test_dropped_performances_keep_their_dissimilarity_in_the_threshold():
     np.testing.assert_allclose(model.threshold_, expected, rtol=0.1)
 
 
-def test_partial_fits_have_the_nominal_coverage():
-    new = curves(300, seed=5, n_frames=12)
-    accepted = [
-        (in_portions(curves(200, seed, n_frames=12), cuts=range(0, 200, 25)).predict(new) == 1)
-        for seed in range(6, 12)
-    ]
-    assert abs(np.mean(accepted) - 0.95) < 0.03
-
-
-# -- a single group ---------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("groups", [None, ["ann"] * 3])
 def test_a_single_group_gives_moments_only(groups):
     X = curves(9, n_frames=10)
@@ -191,21 +173,12 @@ def test_a_single_group_gives_moments_only(groups):
     check_is_fitted(model)
     np.testing.assert_allclose(model.mean_, X[:n].mean(axis=0))
     np.testing.assert_allclose(model.variance_, X[:n].var(axis=0), atol=1e-15)
-    questions = [
-        lambda: model.predict(X),
-        lambda: model.score_samples(X),
-        lambda: model.standard_scores(X),
-        lambda: model.threshold_at(0.5),
-        lambda: model.accepts(X[0, :2], 0),
-        lambda: model.envelope(),
-        lambda: model.mean_envelope(),
-        lambda: model.simultaneous_factor(),
-        lambda: model.sample(),
-        lambda: model.check_performances(X),
-    ]
-    for ask in questions:
+    methods = dict.fromkeys(["predict", "score_samples", "standard_scores"], (X,))
+    methods |= {"threshold_at": [0.5], "accepts": [X[0, :2], 0], "check_performances": [X]}
+    methods |= dict.fromkeys(["envelope", "mean_envelope", "simultaneous_factor", "sample"], ())
+    for name, arguments in methods.items():
         with pytest.raises(NotFittedError, match=f"2 performances, .* has seen {n}, of one"):
-            ask()
+            getattr(model, name)(*arguments)
     with pytest.raises(NotFittedError, match="not fitted yet"):
         find_departures(model, X)
     model.partial_fit(X[n:], groups=None if groups is None else ["bob"] * 6)
@@ -247,6 +220,10 @@ def test_a_refused_portion_does_not_change_the_model(X, groups, message):
     with pytest.raises(ValueError, match=message):
         model.partial_fit(X, groups=groups)
     assert pickle.dumps(model) == before
+    model = ActionModel()
+    with pytest.raises(ValueError, match="Performance 1 has 9 frames"):
+        model.partial_fit([np.zeros((10, 2)), np.zeros((9, 2))])
+    assert vars(model) == vars(ActionModel())
 
 
 def test_partial_fit_refuses_a_parameter_that_became_invalid():
@@ -255,15 +232,6 @@ def test_partial_fit_refuses_a_parameter_that_became_invalid():
     with pytest.raises(ValueError, match="'coverage' parameter of ActionModel must be"):
         model.partial_fit(curves(3, n_frames=10))
     assert model.n_samples_seen_ == 6
-
-
-def test_a_refused_first_portion_leaves_no_state():
-    model = ActionModel()
-    with pytest.raises(ValueError, match="Performance 1 has 9 frames"):
-        model.partial_fit([np.zeros((10, 2)), np.zeros((9, 2))])
-    assert vars(model) == vars(ActionModel())
-    with pytest.raises(NotFittedError, match="ActionModel instance is not fitted yet"):
-        _ = model.deviations_
 
 
 def test_partial_fits_in_threads_all_count():
@@ -305,9 +273,6 @@ def test_single_precision_becomes_double_with_the_first_double_portion():
     model = ActionModel().partial_fit(many[:76].astype("f4")).partial_fit(many[76:])
     assert_same_state(model, ActionModel().fit(many))
     assert 76 not in model.groups_
-
-
-# -- memory -----------------------------------------------------------------------------
 
 
 def test_memory_of_a_fit_does_not_grow_with_the_performances():

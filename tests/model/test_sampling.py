@@ -119,14 +119,6 @@ def test_samples_of_two_styles_avoid_their_mean():
     assert (np.abs(signs.sum(axis=1)) == 3).mean() > 0.95
 
 
-def test_mean_and_variance_are_those_of_all_where_few_are_kept():
-    mean, variance, deviations = moments(np.random.default_rng(0).standard_normal((40, 3)))
-    state = np.random.RandomState(0)
-    drawn = sample_postures(mean, 4 * variance, deviations + 0.5, 50_000, 40, state)
-    np.testing.assert_allclose(drawn.var(axis=0), 4 * variance, rtol=0.03)
-    np.testing.assert_allclose(drawn.mean(axis=0), mean, atol=0.03)
-
-
 # -- whole performances -----------------------------------------------------------------
 
 

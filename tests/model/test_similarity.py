@@ -150,18 +150,6 @@ def kept_of(groups):
     return np.flatnonzero(PerformanceStream.starting_at(X[0]).extend(X, groups)[2])
 
 
-def test_at_most_64_are_kept_with_one_of_every_group():
-    groups = np.repeat(np.arange(11), [1, 1, 500, 2, 3, 1, 1, 400, 1, 1, 90])
-    kept = kept_of(groups)
-    assert len(kept) == 64
-    assert set(groups[kept]) == set(range(11))
-    assert (np.diff(kept) > 0).all()
-    # The others in proportion.
-    assert abs((groups[kept] == 2).sum() - 0.5 * 64) < 8
-    assert len(kept_of(np.arange(1000))) == 64
-    np.testing.assert_array_equal(kept_of(np.arange(64)), np.arange(64))
-
-
 def test_a_model_of_many_performances_predicts_like_one_of_few():
     few, many = ActionModel().fit(curves(60)), ActionModel().fit(curves(600))
     assert many.deviations_.shape == (64, 40, 2)
@@ -183,14 +171,6 @@ def test_dissimilarity_does_not_depend_on_other_performances(n_features):
     alone = np.concatenate([model.dissimilarity([x]) for x in new])
     np.testing.assert_array_equal(alone, together)
     np.testing.assert_array_equal(model.dissimilarity(new[order]), together[order])
-
-
-def test_single_precision_changes_little():
-    X, new = curves(12), curves(20, seed=1, spread=0.4)
-    single = ActionModel().fit(X.astype(np.float32))
-    found = single.dissimilarity(new.astype(np.float32))
-    np.testing.assert_allclose(found, ActionModel().fit(X).dissimilarity(new), rtol=1e-4)
-    assert single.deviations_.dtype == np.float32
 
 
 # -- limits -----------------------------------------------------------------------------

@@ -147,18 +147,6 @@ def test_new_people_lie_in_the_simultaneous_band(sizes, coverage):
     assert coverage - 0.03 <= np.mean(shares) <= coverage + 0.05
 
 
-def test_without_groups_the_coverage_is_too_low():
-    """Without groups, how people repeat themselves is taken for how people differ."""
-    shares = []
-    for seed in range(30):
-        new = people([1] * 50, 1000 + seed, own=0.3)[0]
-        X, groups = people([6] * 4, seed, own=0.3)
-        shares.append([inside(new, X, g, 0.95) for g in (groups, np.arange(len(X)))])
-    named, unnamed = np.mean(shares, axis=0)
-    assert named > 0.92
-    assert unnamed < 0.8
-
-
 def test_the_mean_lies_in_its_band():
     """Of few people and many, who come once or often, or some more often than others."""
     shares = []
@@ -209,11 +197,3 @@ def test_bands_of_small_arrays_are_finite(shape, whose):
         assert (found > 0).all()
         assert np.isfinite(found).all()
     assert 1 < simultaneous_factor(X, groups, 0.95) < 100
-
-
-def test_performances_of_one_group_count_as_groups_of_their_own():
-    X, _ = people([1] * 5)
-    one, each = np.full(5, 3), np.arange(5)
-    np.testing.assert_array_equal(predictive_variance(X, one), predictive_variance(X, each))
-    assert simultaneous_factor(X, one, 0.9) == simultaneous_factor(X, each, 0.9)
-    np.testing.assert_array_equal(mean_band(X, one, 0.9, 0), mean_band(X, each, 0.9, 0))

@@ -76,23 +76,13 @@ def test_held_out_decisions_are_those_of_the_other_folds():
     assert np.isfinite(found[one_left == 0, 1:]).all()
 
 
-# -- folds ------------------------------------------------------------------------------
-
-
-def test_no_group_is_in_two_folds():
+def test_folds_do_not_divide_groups_and_divide_classes_evenly():
     groups = np.repeat(np.arange(7), [9, 1, 4, 4, 2, 8, 5])
     folds = assign_folds(np.zeros(len(groups), int), groups, 3)
     assert all(len(set(folds[groups == g])) == 1 for g in range(7))
     assert sorted(np.bincount(folds)) == [10, 11, 12]
-
-
-def test_without_groups_every_class_is_divided_evenly():
     codes = np.array([0, 1, 0, 0, 1, 0, 0, 2, 0, 0, 0])
-    folds = assign_folds(codes, None, 5)
-    assert folds.tolist() == [0, 0, 1, 2, 1, 3, 4, 0, 0, 1, 2]
-
-
-# -- temperature ------------------------------------------------------------------------
+    assert assign_folds(codes, None, 5).tolist() == [0, 0, 1, 2, 1, 3, 4, 0, 0, 1, 2]
 
 
 @pytest.mark.parametrize("temperature", [0.5, 4, 30])
