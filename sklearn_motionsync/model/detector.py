@@ -25,7 +25,7 @@ from ..utils.pipelines import (
     taken_by,
 )
 from .action_model import ActionModel
-from .similarity import energies, t_prediction_limit
+from .similarity import movement_energies, t_prediction_limit
 
 __all__ = ["ActionDetector"]
 
@@ -291,7 +291,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
             "course": (0.0, self._unaligned.threshold_),
         }
         measures = {"duration": _durations(performances)} if self.duration else {}
-        measures["energy"], self._energy_floor = energies(on_clock)
+        measures["energy"], self._energy_floor = movement_energies(on_clock)
         self._intervals = {
             name: LogPredictionInterval(values, codes, coverage)
             for name, values in measures.items()
@@ -317,7 +317,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         on_clock = reached.synchronizer.normalize(performances)
         measures = {
             "duration": _durations(performances),
-            "energy": energies(on_clock, self._energy_floor)[0],
+            "energy": movement_energies(on_clock, self._energy_floor)[0],
         }
         statistics = {
             "movement": model.dissimilarity(synchronised) / self.borders_["movement"][1],

@@ -16,8 +16,8 @@ __all__ = [
     "LogMoments",
     "Neighbours",
     "PerformanceStream",
-    "energies",
     "log_moments",
+    "movement_energies",
     "t_prediction_limit",
 ]
 
@@ -110,7 +110,7 @@ class Neighbours:
         self._groups, self._features, self._kernel = groups, features, kernel
         self._center = performances.mean(axis=(0, 1))
         self._known = self._parts(performances)
-        energy, floor = energies(performances)
+        energy, floor = movement_energies(performances)
         self.stand_still = bool(energy.max() <= floor)
         self._floor = floor * performances.shape[1]
 
@@ -178,7 +178,7 @@ class Neighbours:
         return np.hstack([moved, offset]), norms(moved), features, norms(features)
 
 
-def energies(on_clock, floor=None):
+def movement_energies(on_clock, floor=None):
     """Mean squared distance of a performance's postures from their own mean posture.
 
     Parameters

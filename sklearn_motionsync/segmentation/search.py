@@ -20,7 +20,7 @@ from ..matching.matcher import Features
 from ..matching.trellis import Trellis
 from ..matching.warps import at_times, even_slices, normalise
 from ..model.action_model import ActionModel
-from ..model.similarity import DIFFERENCES, LogMoments, Neighbours, energies, log_moments
+from ..model.similarity import DIFFERENCES, LogMoments, Neighbours, log_moments, movement_energies
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.groups import encode_groups
 from ..utils.pipelines import find_synchronizer, flat_steps, reach_synchronizer
@@ -469,7 +469,7 @@ class Unlikeness:
         self._usual_length = np.exp(np.log(training.durations).mean())
         count = len(training.kept)
         positions = self._positions(training.on_clock)
-        energy, self._floor = energies(positions)
+        energy, self._floor = movement_energies(positions)
         if energy.max() <= self._floor:
             raise ValueError(
                 "Nobody moves in what is looked for: all times of a take where somebody stands "
@@ -521,7 +521,7 @@ class Unlikeness:
 
     def _of(self, positions, lengths, groups=None):
         shape = self._neighbours.dissimilarity(positions, groups)
-        energy, _ = energies(positions, self._floor)
+        energy, _ = movement_energies(positions, self._floor)
         manner = np.square(self._energy(energy)) + np.square(self._length(lengths))
         return shape * np.exp(np.minimum(_SAY_OF_MANNER * manner, _MOST))
 

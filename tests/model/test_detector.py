@@ -22,7 +22,7 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.metrics import SpreadScorer
 from sklearn_motionsync.model.detector import LogPredictionInterval
-from sklearn_motionsync.model.similarity import energies
+from sklearn_motionsync.model.similarity import movement_energies
 
 TESTS = ["movement", "course", "duration", "energy"]
 
@@ -340,10 +340,10 @@ def test_detector_of_small_and_degenerate_training_sets(training, own):
 
 
 def test_energy_of_standing_still_is_the_floor():
-    energy, floor = energies(np.zeros((3, 5, 2)))
+    energy, floor = movement_energies(np.zeros((3, 5, 2)))
     assert floor > 0
     assert (energy == floor).all()
-    energy, floor = energies(np.stack([wave(20), 0 * wave(20)]))
+    energy, floor = movement_energies(np.stack([wave(20), 0 * wave(20)]))
     assert energy[1] == floor < 1e-8 * energy[0]
 
 
