@@ -212,13 +212,13 @@ def rejected_on_split(recordings, train, test):
     model, tried = ours.learnt(train), recordings.some(COSINES, test)
     border = -model.threshold_at(0.95)
     found = {kind: [spoil(x) for x in tried] for kind, spoil in {KNOWN: np.copy, **SPOILT}.items()}
-    found = {kind: [(model.novelty_scores(some), border)] for kind, some in found.items()}
+    found = {kind: [(-model.score_samples(some), border)] for kind, some in found.items()}
     actions = recordings.actions
     for action in np.unique(actions[train]):
         some = test[actions[test] == action]
         if len(some):
             model = ours.learnt(train[actions[train] != action])
-            novelties = model.novelty_scores(recordings.some(COSINES, some))
+            novelties = -model.score_samples(recordings.some(COSINES, some))
             found.setdefault(UNKNOWN, []).append((novelties, -model.threshold_at(0.95)))
     return found
 

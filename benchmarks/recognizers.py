@@ -84,7 +84,7 @@ class Classifier:
 
     def novelty(self, train, test):
         """The larger, the less like any class (n_test,)."""
-        return self.learnt(train).novelty_scores(self._recordings.some(self._view, test))
+        return -self.learnt(train).score_samples(self._recordings.some(self._view, test))
 
     def learnt(self, train):
         """The classifier of some of the recordings."""

@@ -124,7 +124,7 @@ def judge(performances):
             "said": classifier.predict(features),
             "most like": classifier.classes_[chances.argmax(axis=1)],
             "probability": chances.max(axis=1).round(2),
-            "novelty": classifier.novelty_scores(features).round(2),
+            "novelty": -classifier.score_samples(features).round(2),
         }
     )
 
@@ -175,7 +175,8 @@ def novelty_of_new_people(action):
         train = train[y[train] != action]
         four = ActionClassifier(n_frames=30)
         four.fit([postures[i] for i in train], y[train], groups=bunch.actor[train])
-        above[test] = four.novelty_scores([postures[i] for i in test]) + four.threshold_at(0.95)
+        scores = four.score_samples([postures[i] for i in test])
+        above[test] = four.threshold_at(0.95) - scores
     return above
 
 

@@ -4,8 +4,6 @@ from textwrap import fill
 
 import numpy as np
 
-from .given import as_names
-
 __all__ = [
     "COLORS",
     "curves",
@@ -245,7 +243,6 @@ def group_colors(groups, n_sequences):
     """The colour of every performance, and the colour of every group by its name."""
     if groups is None:
         return [COLORS["performance"]] * n_sequences, {}
-    groups = as_names(groups, n_sequences, "groups", "performances")
     names = list(dict.fromkeys(groups))
     palette = _GROUPS
     if len(names) > len(_GROUPS):

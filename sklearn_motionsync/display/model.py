@@ -7,6 +7,7 @@ from sklearn.base import clone
 
 from ..inputs.features import choose_features
 from ..model.views import view_of
+from ..utils.groups import names_of_groups
 from .drawing import (
     COLORS,
     curves,
@@ -478,11 +479,11 @@ class Groups:
     """
 
     def __init__(self, groups, people, n_sequences):
-        self.labels = as_names(groups, n_sequences, "groups", "performances")
+        self.labels = names_of_groups(groups, n_sequences)
         self.names = list(dict.fromkeys(self.labels))
         self.people = None
         if people is not None:
-            self.people = as_names(people, n_sequences, "people", "performances")
+            self.people = names_of_groups(people, n_sequences, name="people")
 
     def members(self, name):
         """The indices of the performances of a group."""

@@ -11,8 +11,7 @@ from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
 from ..inputs.tables import name_performance
 from ..model.action_model import ActionModel
-from ..model.classes import models_of_classes
-from ..model.views import view_of
+from ..model.views import models_of_classes, view_of
 from ..transformers.aspace import ASpace
 from ..utils.pipelines import (
     find_step,

@@ -6,6 +6,7 @@ from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import check_names
 from ..inputs.validation import read_collection
 from ..synchronizers.match import match_of_times
+from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .drawing import COLORS, curves, front_line, group_colors, group_lines, legend_above, panels
 from .given import as_drawn, as_names, mean_of_seen
@@ -13,7 +14,6 @@ from .time_axis import TimeAxis
 
 __all__ = ["SynchronizationDisplay"]
 
-_GROUPS = "groups", "performances"
 _WARPED = {
     "frames": "frame tau(p) of the performance,\nevenly stretched to the clock",
     "percent": "% of the performance",
@@ -98,7 +98,7 @@ class SynchronizationDisplay:
         if pattern is not None:
             self.pattern = as_drawn(pattern, "The pattern", (n_frames, n_shown))
         self.pattern_index = pattern_index
-        self.groups = None if groups is None else as_names(groups, n_sequences, *_GROUPS)
+        self.groups = None if groups is None else names_of_groups(groups, n_sequences)
         self.unit, self.frame_rate = unit, frame_rate
         lengths = [len(x) for x in self.before]
         self._axis = TimeAxis(unit, n_frames, lengths, frame_rate)

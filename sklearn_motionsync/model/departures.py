@@ -1,4 +1,4 @@
-"""Where a performance departs from what is expected: runs of frames beyond a limit."""
+"""Departures of performances from a model: runs of frames beyond a limit."""
 
 from numbers import Real
 from typing import NamedTuple
@@ -7,44 +7,44 @@ import numpy as np
 import pandas as pd
 
 from ..inputs.features import choose_features
-from .classes import models_of_classes
-from .views import view_of
+from .views import models_of_classes, view_of
 
-__all__ = ["Runs", "find_departures", "runs"]
+__all__ = ["find_departures"]
 
 
 def find_departures(estimator, X, *, features=None, limit=None, **params):
-    """Where performances leave what the action does: when, in which feature, and how far.
+    """Departures of performances from a model: when, in which feature, and how far.
 
-    A posture departs if it is further from the mean than what is expected of a *new person*, in
-    standard deviations that are learnt by leaving groups out (`ActionModel.standard_scores`).
-    Postures are taken whole, also with what an `ASpace` leaves out of them.
+    A posture departs if its deviation from the mean exceeds a limit, in the standard deviations
+    predicted for a *new person* (`ActionModel.standard_scores`). Postures include the residuals of
+    an `ASpace`.
 
     Parameters
     ----------
     estimator : ActionModel, ActionClassifier, or Pipeline with one
-        Fitted. Of a classifier each performance is seen by the model of the class it is given, also
-        if it is rejected; the models are fitted now (`ActionClassifier.model_of`).
-    X : performances, as the estimator takes them
+        Fitted. With a classifier, the model is that of the class that is predicted before any
+        rejection; these models are fitted by the call (`ActionClassifier.model_of`).
+    X : performances
+        As the estimator takes them.
     features : int, str or list of them, default=None
         Features of the model, or of the postures before its `ASpace`, by index or name. By default
         those of postures, if there is such an aSpace, otherwise all of the model.
     limit : float, default=None
-        Standard deviations from which on a posture departs; by default ``n_std`` of the model.
-        About half of all right performances go beyond 3 somewhere, few beyond it by much.
+        Largest deviation that is no departure, in standard deviations; by default ``n_std`` of the
+        model. About half of all correct performances exceed 3 somewhere, few by much.
     **params : dict
         What synchronizing X takes besides, such as ``keyframes``.
 
     Returns
     -------
     DataFrame
-        One row a run of frames, by performance and then the worst first: ``performance``, its
-        number or label, a tuple if several levels of an index name it; with a classifier
-        ``class``, the one it is given; ``feature``; ``first`` and ``last``, frames of the model,
-        counted from 0; ``peak``, the worst of them;
-        ``deviation``, standard deviations there, negative below the mean; ``rare``, whether a
-        share of ``coverage`` of the performances of new people goes so far at no frame and in no
-        feature (`ActionModel.simultaneous_factor`).
+        One row a run of frames, by performance and then the largest deviation first:
+        ``performance``, its number or label, a tuple if an index has several levels; with a
+        classifier ``class``, the predicted one; ``feature``; ``first`` and ``last``, frames of the
+        model, counted from 0; ``peak``, the frame of the largest deviation; ``deviation``, in
+        standard deviations, negative below the mean; ``rare``, whether it exceeds
+        `ActionModel.simultaneous_factor`, which a share of ``coverage`` of the performances of new
+        people does at no frame and in no feature.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
 
     See Also
     --------
-    SkeletonDisplay.from_departures : The same as stick figures.
+    SkeletonDisplay.from_departures : Draws them as stick figures.
 
     Examples
     --------
@@ -74,7 +74,7 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
     models = models_of_classes(estimator, X, params, caller)
     if models is None:
         return _departures(estimator, X, params, caller, features, limit)
-    # The steps before a classifier have taken their params, its models take none.
+    # Params are those of the steps before a classifier; its models take none.
     parts = [
         _departures(part.estimator, part.performances, {}, caller, features, limit, part)
         for part in models
@@ -87,7 +87,7 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
 
 
 def _departures(estimator, X, params, caller, features, limit, part=None):
-    """The table of one model; of the class of a classifier with the class, and indices in it."""
+    """The table of one model; of the model of a class with the class, and indices in it."""
     view = view_of(estimator, X, params, caller, features=features, postures=features is None)
     names, scores = view.names, view.scores
     if features is not None:
@@ -95,7 +95,7 @@ def _departures(estimator, X, params, caller, features, limit, part=None):
         names, scores = [names[i] for i in chosen], scores[:, :, chosen]
     found = runs(scores, view.model.n_std if limit is None else limit)
     labels = view.labels if part is None else part.labels
-    # A label may be a tuple, of which no array is made.
+    # A label may be a tuple, which an array would unpack.
     columns = {"performance": pd.Series([labels[i] for i in found.performance], dtype=object)}
     if part is not None:
         columns["class"] = np.full(len(found.first), part.label, dtype=object)
@@ -120,7 +120,7 @@ class Runs(NamedTuple):
     ----------
     performance, feature : ndarray of int, shape (n_runs,)
     first, last : ndarray of int, shape (n_runs,)
-        Frames, both of the run.
+        The first and the last frame of the run.
     peak : ndarray of int, shape (n_runs,)
         The frame of the largest score, the first of several.
     score : ndarray, shape (n_runs,)
@@ -136,14 +136,14 @@ class Runs(NamedTuple):
 
 
 def runs(scores, limit):
-    """Where scores are beyond a limit, in runs of consecutive frames of one feature.
+    """Runs of consecutive frames in which a feature's scores exceed a limit.
 
     Parameters
     ----------
     scores : ndarray, shape (n, P, n_features)
         Standard deviations from the mean.
     limit : float
-        Positive; a score is beyond if its absolute value is larger.
+        Positive, of absolute values.
 
     Returns
     -------
@@ -159,7 +159,7 @@ def runs(scores, limit):
     of = np.repeat(np.arange(len(first)), lengths)
     frames = np.arange(len(of)) - np.repeat(np.cumsum(lengths) - lengths - first, lengths)
     inside = size[performance[0][of], feature[0][of], frames]
-    # By run, the largest first, of equal ones the first frame.
+    # By run, the largest first, among equal ones the first frame.
     order = np.lexsort((frames, -inside, of))[np.cumsum(lengths) - lengths]
     peak = frames[order]
     score = scores[performance[0], feature[0], peak]

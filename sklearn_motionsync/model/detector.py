@@ -14,6 +14,7 @@ from ..inputs.tables import index_of
 from ..inputs.validation import labels_of_input
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.groups import encode_groups, sums_of_groups
 from ..utils.pipelines import (
     MissingMetadata,
     accepted_params,
@@ -24,12 +25,11 @@ from ..utils.pipelines import (
     steps_to_fit,
 )
 from .action_model import ActionModel
-from .similarity import Logs, Neighbours, as_codes, learn_reach
-from .stream import spread_out
+from .similarity import movement_energies, t_prediction_limit
 
-__all__ = ["ActionDetector", "energies"]
+__all__ = ["ActionDetector"]
 
-# What is said of a performance that is too low, or too high.
+# Reasons for the rejection of a performance below, or above, the accepted interval.
 _REASONS = {
     "movement": (None, "another movement"),
     "course": (None, "another course"),
@@ -39,29 +39,28 @@ _REASONS = {
 
 
 class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
-    """Whether performances are the action, seen as they were recorded.
+    """Whether performances are the action, including their timing and size.
 
-    After synchronisation nobody is slow, a movement that comes twice is nearly one that comes
-    once, and an `ActionModel` compares shapes more than sizes. The detector asks four questions of
-    a performance. Each is answered within what people of the other groups leave open, and all four
-    must be answered with yes.
+    Synchronisation removes differences of pace, and an `ActionModel` compares shapes more than
+    sizes. The detector makes four tests of a performance, each with an acceptance region that is
+    estimated from how people differ. A performance must pass all of them.
 
-    1. **movement**: how unlike it is to the model *after* synchronisation, as
+    1. **movement**: its dissimilarity to the model *after* synchronisation,
        `ActionModel.dissimilarity`.
-    2. **course**: the same after linear normalisation alone, where every part stays when it was.
-    3. **duration**: its number of frames, as a ratio to the usual one.
+    2. **course**: the same after linear normalisation alone, which keeps the timing of its parts.
+    3. **duration**: its number of frames, as a ratio to the geometric mean.
     4. **energy**: the mean squared distance of its postures from their own mean, as a ratio to the
-       usual one.
+       geometric mean.
 
     Parameters
     ----------
     estimator : Pipeline
-        Ends in an `ActionModel`, with a synchronizer before it. What reaches the synchronizer is
-        compared. It is cloned, not changed.
+        Ends in an `ActionModel`, with a synchronizer before it. The features that the synchronizer
+        gets are compared. It is cloned, not changed.
     coverage : float, default=0.95
-        Share of performances of people not seen that ``predict`` is to accept, between 0 and 1.
-        The share that is refused is divided evenly among the questions. It takes the place of
-        the model's own.
+        Share of performances of new people that ``predict`` is to accept, between 0 and 1.
+        The share that is rejected is divided evenly among the tests. It replaces the coverage
+        of the model.
     duration : bool, default=True
         Whether the number of frames counts. Frames are time only if all performances have one
         frame rate, in ``fit`` and after it, and are cut where the action begins and ends: else
@@ -71,11 +70,10 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
     ----------
     estimator_ : Pipeline
         The fitted clone.
-    borders_ : DataFrame, shape (n_questions, 2)
-        What is accepted, ``lower`` to ``upper``: dissimilarities, frames, and the unit of the
-        features squared.
+    borders_ : dict of str to (float, float)
+        The accepted interval of each test: of dissimilarities, frames, and squared features.
     offset_ : float
-        The border of ``score_samples``, -1.
+        The threshold of ``score_samples``, -1.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -83,13 +81,13 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
 
     See Also
     --------
-    ActionModel : Asks the first question only.
+    ActionModel : Makes the first test only.
 
     Notes
     -----
-    Give ``groups``, such as who performed, whenever people come more than once: the border is
-    then what differs between people. What people differ in by themselves is not refused: copies
-    at half or double speed are seen where people agree on how long the action takes.
+    Give ``groups``, such as subjects, whenever people come more than once: acceptance regions
+    are then those of differences between people. Variation between people is accepted: copies
+    at half or double speed are rejected only where people agree on the duration of the action.
 
     Examples
     --------
@@ -123,22 +121,26 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
     @atomic_fit
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X, y=None, groups=None, **params):
-        """Fit the pipeline, and learn what else people differ in.
+        """Fit the pipeline, and estimate the acceptance regions.
 
         Parameters
         ----------
-        X : performances, as the pipeline takes them
-        y : ignored, but for steps of the pipeline that use it
+        X : performances
+            As the pipeline takes them.
+        y : array-like, default=None
+            Passed to the pipeline; ignored by the detector.
         groups : array-like, shape (n_sequences,), default=None
-            Who performed, or what else makes performances resemble each other. The model of the
-            pipeline gets them, too. By default every performance counts for itself.
+            The subject of each performance, or what else makes performances resemble each other.
+            The model of the pipeline gets them, too. By default every performance is a group of
+            its own.
         **params : dict
             What the ``fit`` of the pipeline takes besides: by the names of steps, or routed
             metadata.
 
         Returns
         -------
-        self
+        self : ActionDetector
+            The fitted detector.
 
         Raises
         ------
@@ -168,75 +170,86 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : performances, as the pipeline takes them
+        X : performances
+            As the pipeline takes them.
         **params : dict
             What steps take besides in ``transform``, such as ``keyframes``.
 
         Returns
         -------
         ndarray of int, shape (n_sequences,)
-            1 it is, -1 it is not.
+            1 if all tests are passed, else -1.
         """
-        return np.where(self._worst(X, params, "predict") <= 1, 1, -1)
+        return np.where(self._largest_statistic(X, params, "predict") <= 1, 1, -1)
 
     @snapshot
     def decision_function(self, X, **params):
-        """How far within its border the question is that a performance answers worst.
+        """Distance of the largest test statistic of performances from its limit.
 
         Parameters
         ----------
-        X, **params : as for ``predict``
+        X : performances
+            As the pipeline takes them.
+        **params : dict
+            What steps take besides in ``transform``, such as ``keyframes``.
 
         Returns
         -------
         ndarray, shape (n_sequences,)
-            ``score_samples`` less ``offset_``: negative outside.
+            ``score_samples`` less ``offset_``: negative for performances that are rejected.
         """
-        return 1 - self._worst(X, params, "decision_function")
+        return 1 - self._largest_statistic(X, params, "decision_function")
 
     @snapshot
     def score_samples(self, X, **params):
-        """How well performances answer the question that they answer worst.
+        """The largest absolute test statistic of performances, negated.
 
         Parameters
         ----------
-        X, **params : as for ``predict``
+        X : performances
+            As the pipeline takes them.
+        **params : dict
+            What steps take besides in ``transform``, such as ``keyframes``.
 
         Returns
         -------
         ndarray, shape (n_sequences,)
-            The largest size among the columns of ``report``, negated.
+            At least ``offset_`` for performances that are accepted.
         """
-        return -self._worst(X, params, "score_samples")
+        return -self._largest_statistic(X, params, "score_samples")
 
     @snapshot
     def report(self, X, **params):
-        """What is said of performances, question by question.
+        """The test statistics of performances, and the reason for a rejection.
 
         Parameters
         ----------
-        X, **params : as for ``predict``
+        X : performances
+            As the pipeline takes them.
+        **params : dict
+            What steps take besides in ``transform``, such as ``keyframes``.
 
         Returns
         -------
         DataFrame, one row a performance
-            ``movement`` and ``course`` in units of their border: 0 is equal, up to 1 accepted.
-            ``duration`` (if it counts) and ``energy``: 0 is usual, -1 to 1 accepted, below are
-            those that are too short or too weak. ``reason`` says why a performance is refused,
-            such as "too long, too weak"; it is empty if it is accepted.
+            ``movement`` and ``course`` in units of their limit: 0 is equal, up to 1 accepted.
+            ``duration`` (if it counts) and ``energy``: 0 is the mean, -1 to 1 accepted, below are
+            those that are too short or too weak. ``reason`` of a rejection, such as "too long,
+            too weak"; empty if the performance is accepted.
         """
-        table, performances = self._ask(X, params, "report")
+        table, performances = self._test(X, params, "report")
         labels, levels = labels_of_input(X, performances)
         table = pd.DataFrame(table, index=index_of(labels, levels[:-1]))
         table["reason"] = [_reason(row) for row in table.to_dict("records")]
         return table
 
     def get_metadata_routing(self):
-        """What the detector asks for, and what it hands on to its pipeline.
+        """The metadata that the detector requests, and routes to its pipeline.
 
         Returns
         -------
         MetadataRouter
+            As scikit-learn's meta-estimators return it.
         """
         mapping = MethodMapping().add(caller="fit", callee="fit")
         for caller in ("predict", "decision_function"):
@@ -250,10 +263,8 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         tags.input_tags.three_d_array = True
         return tags
 
-    # -- what is learnt ---------------------------------------------------------------------
-
     def _check_steps(self):
-        """What the groups of the model are called in the ``fit`` of the clone."""
+        """The name of the model's groups in the ``fit`` of the clone."""
         steps = steps_to_fit(self.estimator_)
         prefix, last = steps[-1] if steps else ("", None)
         matching = any(hasattr(step, "match") for _, step in steps)
@@ -269,28 +280,27 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         return "groups"
 
     def _learn(self, performances, synchronizer, groups):
-        """What people differ in, of performances that reach the synchronizer."""
-        codes = as_codes(groups, len(performances))
+        """Estimate acceptance regions from performances as the synchronizer gets them."""
+        codes, _ = encode_groups(groups, len(performances), at_least=2)
         on_clock = synchronizer.normalize(performances)
-        energy, self._floor = energies(on_clock)
         coverage = 1 - (1 - self.coverage) / (4 if self.duration else 3)
         _, model = find_step(self.estimator_, ActionModel)
-        course = UnalignedDissimilarity(on_clock, codes, coverage)
-        self._questions = {"course": course}
+        self._unaligned = ActionModel(coverage=coverage).fit(on_clock, groups=codes)
         self.borders_ = {
             "movement": (0.0, model.threshold_at(coverage)),
-            "course": (0.0, course.border),
+            "course": (0.0, self._unaligned.threshold_),
         }
-        values = {"duration": _durations(performances)} if self.duration else {}
-        for name, some in (values | {"energy": energy}).items():
-            self._questions[name] = usual = LogPredictionInterval(some, codes, coverage)
-            self.borders_[name] = usual.lower, usual.upper
+        measures = {"duration": _durations(performances)} if self.duration else {}
+        measures["energy"], self._energy_floor = movement_energies(on_clock)
+        self._intervals = {
+            name: LogPredictionInterval(values, codes, coverage)
+            for name, values in measures.items()
+        }
+        self.borders_ |= {name: (i.lower, i.upper) for name, i in self._intervals.items()}
         self.offset_ = -1.0
 
-    # -- what is asked ----------------------------------------------------------------------
-
-    def _ask(self, X, params, method):
-        """The answers by question, (n_sequences,) each, and what reached the synchronizer."""
+    def _test(self, X, params, method):
+        """Test statistics by name, (n_sequences,) each, and the synchronizer's performances."""
         check_is_fitted(self)
         caller = f"ActionDetector.{method}"
         try:
@@ -307,18 +317,21 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
             raise MissingMetadata(reason, name, f"{caller}(X, {{name}}=[...])") from error
         _, model = find_step(self.estimator_, ActionModel)
         on_clock = reached.synchronizer.normalize(performances)
-        seen = {
-            "course": on_clock,
+        measures = {
             "duration": _durations(performances),
-            "energy": energies(on_clock, self._floor)[0],
+            "energy": movement_energies(on_clock, self._energy_floor)[0],
         }
-        answers = {name: asked(seen[name]) for name, asked in self._questions.items()}
-        moved = model.dissimilarity(synchronised) / self.borders_["movement"][1]
-        return {"movement": moved} | answers, performances
+        statistics = {
+            "movement": model.dissimilarity(synchronised) / self.borders_["movement"][1],
+            "course": self._unaligned.dissimilarity(on_clock) / self._unaligned.threshold_,
+        }
+        for name, interval in self._intervals.items():
+            statistics[name] = interval.standardize(measures[name])
+        return statistics, performances
 
-    def _worst(self, X, params, method):
-        table, _ = self._ask(X, params, method)
-        return np.max(np.abs(list(table.values())), axis=0)
+    def _largest_statistic(self, X, params, method):
+        statistics, _ = self._test(X, params, method)
+        return np.max(np.abs(list(statistics.values())), axis=0)
 
 
 def _durations(performances):
@@ -326,55 +339,21 @@ def _durations(performances):
 
 
 def _reason(row):
-    """Why a performance with these answers is refused."""
+    """The reason for the rejection of a performance with these statistics."""
     reasons = {
         name: _REASONS[name][int(value > 0)] for name, value in row.items() if abs(value) > 1
     }
     if "movement" in reasons:
-        # Then its course is another one, too, which says nothing more.
+        # Another movement has another course.
         reasons.pop("course", None)
     return ", ".join(reasons.values())
 
 
-# -- how a performance was recorded, which synchronisation hides: its course, duration and energy
-
-# Energies below this share of all are rounding, or none.
-_LEAST = 1e-9
-
-
-class UnalignedDissimilarity:
-    """How unlike performances are to those that were learnt, each in units of the border.
-
-    Parameters
-    ----------
-    performances : sequence of ndarray (P, n_features)
-        On one clock.
-    groups : ndarray of int (n_sequences,)
-    coverage : float
-        Share of new performances below 1.
-
-    Attributes
-    ----------
-    border : float
-        The dissimilarity that is 1.
-    """
-
-    def __init__(self, performances, groups, coverage):
-        kept = spread_out(groups)
-        known = np.stack([performances[i] for i in kept]).astype(np.float64)
-        self._neighbours = Neighbours(known, groups[kept])
-        unlike = Logs.of(self._neighbours.dissimilarity(performances, groups))
-        self.border = self._neighbours.border(unlike, coverage)
-
-    def __call__(self, performances):
-        return self._neighbours.dissimilarity(performances) / self.border
-
-
 class LogPredictionInterval:
-    """How far numbers above 0 are from what is usual, in units of what is allowed.
+    """Prediction interval of positive values of new people, by their logarithms.
 
-    Everything is said of logarithms: twice is as far as half. What is usual is the mean; how far
-    people may be from it is learnt from each performance and the mean of the other groups.
+    Its middle is the mean logarithm; its width follows from the deviations of values from the mean
+    of the other groups.
 
     Parameters
     ----------
@@ -383,56 +362,25 @@ class LogPredictionInterval:
     groups : ndarray of int (n_sequences,)
         From 0, at least two different ones.
     coverage : float
-        Share of new values between -1 and 1.
+        Share of new values in the interval.
 
     Attributes
     ----------
     lower, upper : float
-        The values that are -1 and 1.
     """
 
     def __init__(self, values, groups, coverage):
-        logs = np.log(values)
+        logs, n = np.log(values), len(values)
         self._mean = float(logs.mean())
-        apart, n = logs - _mean_of_others(logs, groups), len(logs)
-        # That the mean of the others is uncertain is in them, and must not be counted twice.
-        self._reach = learn_reach(apart * np.sqrt((n - 1) / (n + 1)), (1 + coverage) / 2)
-        with np.errstate(over="ignore"):
-            ends = np.exp([self._mean - self._reach, self._mean + self._reach])
+        # The uncertainty of the mean of the others is in the deviations, and in the limit.
+        sums, counts = sums_of_groups(logs, groups)
+        of_others = (logs.sum() - sums[groups]) / (n - counts[groups])
+        deviations = (logs - of_others) * np.sqrt((n - 1) / (n + 1))
+        squares = np.square(deviations).sum()
+        self._half_width = t_prediction_limit(n, squares, (1 + coverage) / 2)
+        ends = np.exp([self._mean - self._half_width, self._mean + self._half_width])
         self.lower, self.upper = map(float, ends)
 
-    def __call__(self, values):
-        return (np.log(values) - self._mean) / self._reach
-
-
-def energies(on_clock, floor=None):
-    """The mean squared distance of the postures of performances from their own mean posture.
-
-    Parameters
-    ----------
-    on_clock : ndarray (n_sequences, P, n_features)
-    floor : float, default=None
-        What standing still counts as; by default a tiny share of how much the postures of all
-        performances differ.
-
-    Returns
-    -------
-    ndarray (n_sequences,)
-        Above 0; infinite beyond any number.
-    floor : float
-    """
-    on_clock = np.asarray(on_clock, dtype=np.float64)
-    with np.errstate(over="ignore"):
-        squares = np.square(on_clock - on_clock.mean(axis=1, keepdims=True))
-        energy = squares.reshape(len(on_clock), -1).sum(axis=1) / on_clock.shape[1]
-    if floor is None:
-        about = np.square(on_clock - on_clock.mean(axis=(0, 1))).sum(axis=2).mean()
-        rounding = np.square(64 * np.finfo(float).eps * np.abs(on_clock).max())
-        floor = max(_LEAST * about, rounding * on_clock.shape[2], np.finfo(float).tiny)
-    return np.maximum(energy, floor), float(floor)
-
-
-def _mean_of_others(values, groups):
-    """For each value, the mean of those of other groups."""
-    total, count = np.bincount(groups, weights=values), np.bincount(groups)
-    return (values.sum() - total[groups]) / (len(values) - count[groups])
+    def standardize(self, values):
+        """Values on the scale on which the interval is -1 to 1."""
+        return (np.log(values) - self._mean) / self._half_width

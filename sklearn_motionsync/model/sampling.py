@@ -1,4 +1,4 @@
-"""Postures and performances like those that were learnt, drawn at random."""
+"""Random postures and performances with the moments of the training performances."""
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -8,23 +8,23 @@ from ..body.sphere import exp_map, log_map, mean_direction
 
 __all__ = ["PERFORMANCE", "POSTURE", "sample_performances", "sample_postures"]
 
-# Shares of the variance that a drawn posture owes to one training performance, to a mixture of
-# all, and to chance in every feature by itself; and a drawn performance to the first two. Chance
-# makes tangles; the first keeps bodies in one piece and styles apart (benchmarks/samples.py).
+# Shares of the variance of a sampled posture: of one training performance, of a mixture of all,
+# and of noise that is independent in every feature; a sampled performance has the first two. Noise
+# tangles limbs; the first keeps bodies in one piece and styles apart (benchmarks/samples.py).
 POSTURE = (0.84, 0.14, 0.02)
 PERFORMANCE = (0.64, 0.36)
-# In so many steps a performance that is outside is drawn in to its training performance.
+# A performance that is outside reaches its training performance in so many steps.
 _STEPS = 4
 
 
 def sample_postures(mean, variance, deviations, n, n_std, random_state, shares=POSTURE):
-    """Postures at a frame, inside the envelope there.
+    """Sample postures at a frame, inside the envelope there.
 
-    Each lies about the posture of a training performance chosen at random. As far as nothing is
-    cut off their mean is that of the training postures, their variance ``variance``, and their
-    covariance is that of the training postures, shrunk a little towards its diagonal (2 %). They
-    are cut off feature by feature, by the monotone function that makes a normal distribution one
-    that ends at ``n_std``: nothing is rejected, and what belongs together stays together.
+    Each is near the posture of a training performance chosen at random. Before truncation their
+    mean is that of the training postures, their variance ``variance``, and their
+    covariance is that of the training postures, shrunk a little towards its diagonal (2 %).
+    Each feature is truncated by the monotone function that makes a normal distribution a truncated
+    one: no sample is rejected, and features keep their correlations.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def sample_postures(mean, variance, deviations, n, n_std, random_state, shares=P
         Half-width of the envelope, in standard deviations.
     random_state : RandomState
     shares : tuple of 3 floats, default=(0.84, 0.14, 0.02)
-        Shares of the variance, of sum 1: one training performance's, a mixture's, chance's.
+        Shares of the variance, of sum 1: of one training performance, a mixture, and noise.
 
     Returns
     -------
@@ -48,26 +48,24 @@ def sample_postures(mean, variance, deviations, n, n_std, random_state, shares=P
     spread = deviations.std(axis=0)
     shapes = (deviations - deviations.mean(axis=0)) / np.where(spread > 0, spread, 1)
     own = random_state.randint(len(shapes), size=n)
-    one, mixed, chance = shares
+    one, mixed, noise = shares
     z = _mixtures(own, len(shapes), one, mixed, random_state) @ shapes
-    z += np.sqrt(chance) * random_state.standard_normal(z.shape)
-    with np.errstate(over="ignore"):
-        std = np.sqrt(variance)
-        lower, upper = mean - n_std * std, mean + n_std * std
-    postures = mean + _cut_off(z, n_std) * std
+    z += np.sqrt(noise) * random_state.standard_normal(z.shape)
+    std = np.sqrt(variance)
+    lower, upper = mean - n_std * std, mean + n_std * std
+    postures = mean + _truncate(z, n_std) * std
     return np.clip(postures.astype(mean.dtype), lower, upper)
 
 
 def sample_performances(
     mean, variance, deviations, n, dissimilarity, threshold, random_state, shares=PERFORMANCE
 ):
-    """Whole performances, none more unlike the training ones than a threshold.
+    """Sample whole performances, of a dissimilarity up to a threshold.
 
-    Each is a random mixture of the training performances' deviations, most of it one of them
-    that is inside itself, with the variance of all. One that comes out outside is drawn in to that
-    training performance, at last as far as it: the mean is no way out, it need not be inside.
-    Features that are directions are mixed on the sphere, as tangents at their mean, and keep the
-    length 1 (`directions_in`).
+    Each is a random mixture of the training performances' deviations, dominated by one that is
+    inside itself, with the variance of all. A sample outside moves in steps to that training
+    performance; not to the mean, which need not be inside. Features that are directions are mixed
+    in the tangent space of the sphere at their mean, and keep the length 1 (`directions_in`).
 
     Parameters
     ----------
@@ -78,73 +76,67 @@ def sample_performances(
     n : int
         How many.
     dissimilarity : callable
-        Of performances (m, P, n_features) gives m numbers, none depending on the others.
+        Of performances (m, P, n_features): m numbers, each independent of the others.
     threshold : float
-        What is inside has no larger one.
+        Largest dissimilarity inside.
     random_state : RandomState
     shares : tuple of 2 floats, default=(0.64, 0.36)
-        Shares of the variance, of sum 1: one training performance's, and a mixture's.
+        Shares of the variance, of sum 1: of one training performance, and a mixture.
 
     Returns
     -------
     ndarray, shape (n, P, n_features), of the mean's dtype
-        If no training performance is inside, some may be as unlike as the most typical one.
+        If no training performance is inside, their dissimilarity is up to that of the most
+        typical one.
     """
-    chart = Chart(mean, deviations)
-    known = chart.coordinates
-    unlike = dissimilarity(chart.performances(known))
-    inside = np.flatnonzero(unlike <= threshold)
-    homes = inside if len(inside) else np.array([np.argmin(unlike)])
-    own = homes[random_state.randint(len(homes), size=n)]
+    space = TangentSpace(mean, deviations)
+    known = space.coordinates
+    of_known = dissimilarity(space.performances(known))
+    inside = np.flatnonzero(of_known <= threshold)
+    centers = inside if len(inside) else np.array([np.argmin(of_known)])
+    own = centers[random_state.randint(len(centers), size=n)]
     weights = _mixtures(own, len(known), *shares, random_state)
     drawn = np.tensordot(weights, known - known.mean(axis=0), axes=1)
     drawn *= _scale(variance, deviations)
-    samples = chart.performances(drawn)
+    samples = space.performances(drawn)
     outside = np.arange(n)
     for step in range(1, _STEPS + 1):
-        # What is no number is not inside.
-        outside = outside[~(dissimilarity(samples[outside]) <= threshold)]
+        outside = outside[dissimilarity(samples[outside]) > threshold]
         if not len(outside):
             break
-        nearer = step / _STEPS
-        at = (1 - nearer) * drawn[outside] + nearer * known[own[outside]]
-        samples[outside] = chart.performances(at)
+        share = step / _STEPS
+        coordinates = (1 - share) * drawn[outside] + share * known[own[outside]]
+        samples[outside] = space.performances(coordinates)
     return samples
 
 
 def _mixtures(own, n_kept, one, mixed, random_state):
-    """Weights (n, n_kept) of sums with these shares of the variance: one's own, and all."""
+    """Weights (n, n_kept) of mixtures: shares of the variance of one performance, and of all."""
     weights = random_state.standard_normal((len(own), n_kept)) * np.sqrt(mixed / n_kept)
     weights[np.arange(len(own)), own] += np.sqrt(one)
     return weights
 
 
-def _cut_off(z, n_std):
-    """Standard normal numbers as ones between -n_std and n_std, in the same order."""
+def _truncate(z, n_std):
+    """Standard normal numbers as truncated normal ones, from -n_std to n_std, in the same order."""
     tail = ndtr(-n_std)
     below = tail + (1 - 2 * tail) * ndtr(-np.abs(z))
     return np.copysign(ndtri(np.maximum(below, np.finfo(float).tiny)), z)
 
 
 def _scale(variance, deviations):
-    """What gives mixtures of the kept deviations the variance of all of them.
-
-    At most twice or half: few that differ in a feature say little of how all do.
-    """
+    """The factor that gives mixtures of the kept deviations the variance of all: 0.5 to 2."""
     kept = deviations.var(axis=0)
-    with np.errstate(over="ignore"):
-        ratio = np.divide(variance, kept, out=np.ones_like(kept), where=kept > 0)
+    ratio = np.divide(variance, kept, out=np.ones_like(kept), where=kept > 0)
     return np.clip(np.sqrt(ratio), 0.5, 2)
 
 
-# -- coordinates in which performances are mixed: numbers as they are, directions on the sphere
-
-# Directions are of length 1. Warps that fall between frames shorten them, half of the time by less
-# than this, and where trackers leap nearly to nothing: to 0.06 among 190 performances of a Kinect.
-_USUALLY, _AT_LEAST, _AT_MOST = 0.99, 1e-3, 1 + 1e-3
+# Directions have the length 1. Interpolation between frames shortens them: the median stays above
+# the first; jumps of a tracker shorten some to 0.06 (190 performances of a Kinect).
+_MEDIAN_LENGTH, _MIN_LENGTH, _MAX_LENGTH = 0.99, 1e-3, 1 + 1e-3
 
 
-class Chart:
+class TangentSpace:
     """Coordinates of performances about a mean: tangents for directions, differences for numbers.
 
     Parameters
@@ -175,7 +167,7 @@ class Chart:
             self.coordinates[..., columns] = log_map(base, directions)
 
     def performances(self, coordinates):
-        """Performances (m, P, n_features) at coordinates: their directions have the length 1."""
+        """Performances (m, P, n_features) of coordinates: their directions have the length 1."""
         found = self.mean + coordinates
         for columns, base in zip(self.directions, self._bases, strict=True):
             tangents = coordinates[..., columns]
@@ -185,7 +177,7 @@ class Chart:
 
 
 def directions_in(performances):
-    """Which features are directions: three, or two, side by side, of length 1 in all performances.
+    """Features that are directions: three or two columns in a row, of length 1 at all frames.
 
     Parameters
     ----------
@@ -196,8 +188,7 @@ def directions_in(performances):
     list of slice
     """
     found, start = [], 0
-    with np.errstate(over="ignore"):
-        squares = np.square(performances.astype(np.float64))
+    squares = np.square(performances.astype(np.float64))
     while start < squares.shape[2]:
         for width in (3, 2):
             columns = slice(start, start + width)
@@ -210,5 +201,5 @@ def directions_in(performances):
 
 def _are_one(squares):
     lengths = np.sqrt(squares.sum(axis=-1))
-    in_bounds = lengths.min() > _AT_LEAST and lengths.max() < _AT_MOST
-    return in_bounds and np.median(lengths) > _USUALLY
+    in_bounds = lengths.min() > _MIN_LENGTH and lengths.max() < _MAX_LENGTH
+    return in_bounds and np.median(lengths) > _MEDIAN_LENGTH

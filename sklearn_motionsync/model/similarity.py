@@ -1,164 +1,215 @@
-"""How unlike a performance is to those that were learnt, and how unlike people may be."""
+"""Dissimilarity of performances to training performances, and which of these are kept."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from scipy.stats import t as student
 
 from ..matching.filters import smooth
+from ..matching.warps import even_slices
+from ..utils.groups import encode_groups
 from ..utils.threads import on_one_thread
 
 __all__ = [
-    "Logs",
+    "DIFFERENCES",
+    "LogMoments",
     "Neighbours",
-    "as_codes",
-    "check_labels",
-    "learn_border",
-    "learn_reach",
-    "portions",
-    "power_of_two",
+    "PerformanceStream",
+    "log_moments",
+    "movement_energies",
+    "t_prediction_limit",
 ]
 
-# Of the nearest ones, so many count: one alone may be a stray.
-_NEAREST = 2
-# Say of the mean posture: people stand differently, but a movement elsewhere is another one.
-_SAY_OF_MEAN = 0.1
-# Under which Gaussian velocities are taken, as a share of the clock.
-_SMOOTHING = 0.01
-# The variance of the logarithm over performances of one action, as found over 16 actions of
-# people; it counts like that of so many performances.
+# A dissimilarity is the mean over so many nearest neighbours: a single one may be an outlier.
+_N_NEAREST = 2
+# Weight of the mean posture: people stand differently, but an action elsewhere is another action.
+_MEAN_WEIGHT = 0.1
+# Standard deviation of the Gaussian under which velocities are estimated, as a share of the clock.
+_VELOCITY_SMOOTHING = 0.01
+# Variance of the logarithm over performances of one action (16 actions of people); it weighs as
+# much as that of so many performances.
 _PRIOR_VARIANCE, _PRIOR_COUNT = 0.07, 3
-# What is less is rounding, or nobody differs.
+# Smaller dissimilarities, and energies as a share of the total variance, are rounding.
 _LEAST = 1e-9
-# Who stands still is as unlike to people who move as 1; that is never accepted.
-_STANDS_STILL = 1 - 1e-6
-# Labels of NumPy that are equal to plain ones, as which they are kept.
-_PLAIN = np.str_, np.number, np.bool_
-# Performances that are multiplied at a time, always so many, so that no result depends on the
-# others; and those that are in memory at a time.
-_TILE, _PORTION = 8, 64
+# Standing still has the dissimilarity 1 and is never accepted.
+_STILL_LIMIT = 1 - 1e-6
+# Performances compared at a time: bounds the memory. Matrix products take rows in tiles of one
+# size, so that no result depends on the other performances.
+_BATCH, _TILE = 64, 8
+# Most performances that are kept: the time of a prediction is proportional to their number.
+_MAX_KEPT = 64
+# The golden ratio's fractional part in 64 bits: its multiples modulo 1 are evenly spread.
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+_LATER = np.uint64(1 << 63)
+
+
+class Kernel(NamedTuple):
+    """How squared norms (n,) of rows, and squared distances (n, n_known) between them, round."""
+
+    norms: object
+    distances: object
+
+
+def _norms_by_sums(a):
+    return np.square(a).sum(axis=1)
+
+
+def _distances_by_products(a, b):
+    squares = np.square(a).sum(axis=1)[:, np.newaxis] + np.square(b).sum(axis=1)
+    tiles = np.zeros((-(-len(a) // _TILE), _TILE, a.shape[1]))
+    tiles.reshape(-1, a.shape[1])[: len(a)] = a
+    # Products of eight rows are too small to be shared by threads.
+    products = on_one_thread(np.matmul, tiles, b.T).reshape(-1, len(b))[: len(a)]
+    return np.maximum(squares - 2 * products, 0)
+
+
+def _norms_by_dots(a):
+    return np.vecdot(a, a)
+
+
+def _distances_by_differences(a, b):
+    out = np.empty((len(a), len(b)))
+    for column, row in zip(out.T, b, strict=True):
+        column[:] = _norms_by_dots(a - row)
+    return out
+
+
+# The first is faster for many performances, the second is exact for near ones.
+PRODUCTS = Kernel(_norms_by_sums, _distances_by_products)
+DIFFERENCES = Kernel(_norms_by_dots, _distances_by_differences)
+
+
+def _velocities(performances):
+    return smooth(performances, _VELOCITY_SMOOTHING * (performances.shape[1] - 1), order=1)
 
 
 class Neighbours:
-    """Performances that others are compared with.
+    """Training performances that others are compared with.
+
+    The dissimilarity of two performances is the mean of ``|y - y_i|^2 / (|y|^2 + |y_i|^2)`` of
+    postures less their own mean over time, and of the same ratio of features: 0 for equal ones, 1
+    if one of them stands still, 2 for opposite ones. A tenth of the squared distance of the mean
+    postures is added to the first numerator.
 
     Parameters
     ----------
     performances : ndarray (n_kept, P, n_features), float64
     groups : ndarray of int (n_kept,)
+    features : callable, default=velocities
+        Makes features (n, P, n_compared) of performances (n, P, n_features).
+    kernel : Kernel, default=PRODUCTS
 
     Attributes
     ----------
     stand_still : bool
-        Whether nobody moves, so that only postures can be compared.
+        Whether no training performance moves: then only postures are compared.
     """
 
-    def __init__(self, performances, groups):
-        self._groups = groups
-        self._unit = power_of_two(performances)
-        performances = performances * self._unit
+    def __init__(self, performances, groups, features=_velocities, kernel=PRODUCTS):
+        self._groups, self._features, self._kernel = groups, features, kernel
         self._center = performances.mean(axis=(0, 1))
-        self._postures, self._energy = self._move(performances)
-        self._velocities = self._velocity(performances)
-        self._speed = np.square(self._velocities).sum(axis=1)
-        about = np.square(performances - self._center).sum(axis=(1, 2)).mean()
-        largest = np.abs(performances).max()
-        rounding = np.square(64 * np.finfo(float).eps * largest) * performances[0].size
-        self._scale = max(about, rounding, np.finfo(float).tiny)
-        self.stand_still = bool(self._energy.max() <= _LEAST * self._scale)
+        self._known = self._parts(performances)
+        energy, floor = movement_energies(performances)
+        self.stand_still = bool(energy.max() <= floor)
+        self._floor = floor * performances.shape[1]
 
     def dissimilarity(self, performances, groups=None):
-        """How unlike performances are to the most similar neighbours: the mean over these.
+        """Mean dissimilarity of performances to their nearest neighbours.
 
         Parameters
         ----------
         performances : sequence of ndarray (P, n_features)
         groups : ndarray of int (n,), default=None
-            Their groups; then only neighbours of other groups are asked.
+            Their groups: then only neighbours of other groups count.
 
         Returns
         -------
         ndarray (n,)
-            Infinite if no neighbour is a number away.
         """
-        # Products of eight rows are too small to be shared by threads.
-        return on_one_thread(self._compare, performances, groups)
+        found = np.empty(len(performances))
+        for rows in even_slices(len(performances), _BATCH):
+            ratios = self._ratios(np.asarray(performances[rows], dtype=np.float64))
+            if groups is not None:
+                ratios[groups[rows, np.newaxis] == self._groups] = np.inf
+            nearest = np.sort(ratios, axis=1)[:, :_N_NEAREST]
+            counts = np.isfinite(nearest)
+            found[rows] = np.where(counts, nearest, 0).sum(axis=1) / counts.sum(axis=1)
+        return found
 
-    def border(self, unlike, coverage):
-        """Up to how unlike somebody new is to be expected.
+    def limit(self, moments, coverage):
+        """Largest dissimilarity that a share of new performances is expected to have.
 
         Parameters
         ----------
-        unlike : Logs
+        moments : LogMoments
             Of the dissimilarities of performances to neighbours of other groups.
         coverage : float
-            Share of new performances within the border.
 
         Returns
         -------
         float
-            Less than standing still, unless nobody moves.
+            Below that of standing still, unless no training performance moves.
         """
-        border = unlike.border(coverage)
-        return border if self.stand_still else min(border, _STANDS_STILL)
-
-    def _compare(self, performances, groups):
-        found = np.empty(len(performances))
-        for rows, some in portions(performances):
-            ratios = self._ratios(some.astype(np.float64, copy=False))
-            if groups is not None:
-                ratios[groups[rows, np.newaxis] == self._groups] = np.inf
-            found[rows] = _mean_of_smallest(ratios)
-        return found
+        limit = moments.upper_limit(coverage)
+        return limit if self.stand_still else min(limit, _STILL_LIMIT)
 
     def _ratios(self, performances):
-        """How unlike performances (n, P, n_features) are to each of the neighbours (n, n_kept).
+        """Dissimilarities of performances (n, P, n_features) to each neighbour: (n, n_kept)."""
+        postures, energy, features, power = self._parts(performances)
+        known_postures, known_energy, known_features, known_power = self._known
+        apart = self._kernel.distances(postures, known_postures)
+        if self.stand_still:
+            return apart * _LEAST / self._floor
+        ratios = apart / np.maximum(energy[:, np.newaxis] + known_energy, self._floor)
+        # Where neither moves, the distance is 0, too.
+        sums = np.maximum(power[:, np.newaxis] + known_power, np.finfo(float).tiny)
+        ratios += self._kernel.distances(features, known_features) / sums
+        return ratios / 2
 
-        The mean of ``|y - y_i|^2 / (|y|^2 + |y_i|^2)`` of postures less their own mean over time,
-        and the same of velocities: 0 equal, 1 one of them stands still, 2 opposite. The distance
-        of the mean postures adds to the first, with a tenth of its weight.
-        """
-        # What is too far away for any number is nobody's neighbour.
-        with np.errstate(over="ignore", invalid="ignore"):
-            performances = performances * self._unit
-            postures, energy = self._move(performances)
-            apart = _squared_distances(postures, self._postures)
-            if self.stand_still:
-                return np.nan_to_num(apart / self._scale, nan=np.inf, posinf=np.inf)
-            velocities = self._velocity(performances)
-            hurried = _squared_distances(velocities, self._velocities)
-            speed = np.square(velocities).sum(axis=1)
-            ratio = apart / _sums(energy, self._energy) + hurried / _sums(speed, self._speed)
-        return np.nan_to_num(ratio / 2, nan=np.inf, posinf=np.inf)
-
-    def _move(self, performances):
-        """Postures less their mean over time, beside that mean; squares of the first alone."""
+    def _parts(self, performances):
+        """Centred postures beside their weighted mean, features, and the squared norms of both."""
         n, n_frames, _ = performances.shape
         mean = performances.mean(axis=1)
         moved = (performances - mean[:, np.newaxis]).reshape(n, -1)
-        stood = np.sqrt(_SAY_OF_MEAN * n_frames) * (mean - self._center)
-        return np.hstack([moved, stood]), np.square(moved).sum(axis=1)
-
-    def _velocity(self, performances):
-        n, n_frames, _ = performances.shape
-        if n_frames == 1:
-            return np.zeros((n, performances[0].size))
-        return smooth(performances, _SMOOTHING * (n_frames - 1), order=1).reshape(n, -1)
+        offset = np.sqrt(_MEAN_WEIGHT * n_frames) * (mean - self._center)
+        features = self._features(performances).reshape(n, -1)
+        norms = self._kernel.norms
+        return np.hstack([moved, offset]), norms(moved), features, norms(features)
 
 
-@dataclass(frozen=True)
-class Logs:
-    """The logarithms of dissimilarities, as far as a border depends on them; they can be added.
+def movement_energies(on_clock, floor=None):
+    """Mean squared distance of a performance's postures from their own mean posture.
 
     Parameters
     ----------
-    n : int, default=0
-        How many.
-    mean : float, default=0.0
-    squares : float, default=0.0
-        The sum of their squared deviations from the mean.
+    on_clock : ndarray (n_sequences, P, n_features)
+    floor : float, default=None
+        The energy of standing still; by default a billionth of the variance of all postures.
+
+    Returns
+    -------
+    ndarray (n_sequences,)
+        At least ``floor``.
+    floor : float
+        Above 0.
     """
+    on_clock = np.asarray(on_clock, dtype=np.float64)
+    squares = np.square(on_clock - on_clock.mean(axis=1, keepdims=True))
+    energy = squares.reshape(len(on_clock), -1).sum(axis=1) / on_clock.shape[1]
+    if floor is None:
+        variance = np.square(on_clock - on_clock.mean(axis=(0, 1))).sum(axis=2).mean()
+        rounding = np.square(64 * np.finfo(float).eps * np.abs(on_clock).max())
+        floor = max(_LEAST * variance, rounding * on_clock.shape[2], np.finfo(float).tiny)
+    return np.maximum(energy, floor), float(floor)
+
+
+# -- logarithms of positive measures, taken for normal ------------------------------------
+
+
+@dataclass(frozen=True)
+class LogMoments:
+    """Number, mean and sum of squared deviations of the logarithms of values; they add up."""
 
     n: int = 0
     mean: float = 0.0
@@ -166,10 +217,10 @@ class Logs:
 
     @classmethod
     def of(cls, values):
-        """Those of dissimilarities (n,), not negative."""
+        """Those of values (n,) above 0."""
         if not len(values):
             return cls()
-        logs = np.log(np.maximum(values, _LEAST))
+        logs = np.log(values)
         mean = logs.mean()
         return cls(len(logs), float(mean), float(np.square(logs - mean).sum()))
 
@@ -178,136 +229,166 @@ class Logs:
             return self if self.n else other
         n, apart = self.n + other.n, other.mean - self.mean
         squares = self.squares + other.squares + apart**2 * self.n * other.n / n
-        return Logs(n, self.mean + apart * other.n / n, squares)
+        return LogMoments(n, self.mean + apart * other.n / n, squares)
 
-    def border(self, coverage):
-        """What a new dissimilarity stays below with this probability; see `learn_border`."""
-        with np.errstate(over="ignore"):
-            return float(np.exp(self.mean + _reach(self.n, self.squares, coverage)))
+    def upper_limit(self, coverage):
+        """What a new value stays below with this probability."""
+        return float(np.exp(self.mean + t_prediction_limit(self.n, self.squares, coverage)))
 
-
-def portions(performances):
-    """Performances (n, P, n_features) by portions: pairs of a slice and an array."""
-    for start in range(0, len(performances), _PORTION):
-        rows = slice(start, start + _PORTION)
-        yield rows, np.asarray(performances[rows])
+    def standardize(self, values):
+        """Deviations of the logarithms of values from the mean, in standard deviations."""
+        squares = self.squares + _PRIOR_COUNT * _PRIOR_VARIANCE
+        return (np.log(values) - self.mean) / np.sqrt(squares / (self.n + _PRIOR_COUNT))
 
 
-def power_of_two(performances):
-    """What to multiply them by, for squares that are numbers; no bit is lost by it."""
-    largest = np.abs(performances).max()
-    return np.ldexp(1.0, -int(np.frexp(largest)[1])) if largest > 0 else 1.0
+def log_moments(dissimilarities):
+    """The `LogMoments` of dissimilarities, of which those below 1e-9 are rounding."""
+    return LogMoments.of(np.maximum(dissimilarities, _LEAST))
 
 
-def learn_border(values, coverage):
-    """Up to where values like these are to be expected of somebody new.
-
-    The logarithms are taken for normal, and their variance for known as well as if a few more
-    performances had shown the usual one: the bound of a new value is Student's.
+def t_prediction_limit(n, squares, coverage, prior_variance=_PRIOR_VARIANCE):
+    """Upper prediction limit of a new normal value, less the mean, by Student's t distribution.
 
     Parameters
     ----------
-    values : ndarray (n,)
-        Not negative.
+    n : int
+        Number of values.
+    squares : float
+        Sum of their squared deviations from the mean.
     coverage : float
-        Share of new values below the border.
+        Probability that a new value is below the limit.
+    prior_variance : float, default=0.07
+        Counts like the variance of three values.
 
     Returns
     -------
     float
     """
-    return Logs.of(values).border(coverage)
-
-
-def learn_reach(deviations, coverage, usual=_PRIOR_VARIANCE):
-    """How far a new logarithm may lie above what is usual.
-
-    Parameters
-    ----------
-    deviations : ndarray (n,)
-        Of the logarithms that are known, from what is usual.
-    coverage : float
-        Share of new values below it.
-    usual : float, default=0.07
-        Their usual variance, which counts like that of three of them.
-
-    Returns
-    -------
-    float
-    """
-    return _reach(len(deviations), np.square(deviations).sum(), coverage, usual)
-
-
-def _reach(n, squares, coverage, usual=_PRIOR_VARIANCE):
     freedom = n - 1 + _PRIOR_COUNT
-    squares = squares + _PRIOR_COUNT * usual
+    squares = squares + _PRIOR_COUNT * prior_variance
     return float(student.ppf(coverage, freedom) * np.sqrt(squares / freedom * (1 + 1 / n)))
 
 
-def as_codes(groups, n_performances):
-    """Groups as whole numbers from 0; without any every performance is its own.
+# -- performances that come one after the other: moments of all, and a sample of them --------
 
-    Raises
-    ------
-    ValueError
-        As from `check_labels`, and if there is only one in all.
+
+@dataclass(frozen=True, eq=False)
+class PerformanceStream:
+    """Mean and variance of performances, and a sample of at most 64 of them.
+
+    All but ``dropped`` is the same, to the last bit, however performances are divided into
+    portions.
+
+    Attributes
+    ----------
+    origin : ndarray, shape (P, n_features), float64
+        The first performance. Moments are those of differences from it, which are small.
+    mean_offset, squares : ndarray, shape (P, n_features), float64
+        Mean of all less the origin, and the sum of squared deviations from the mean.
+    kept : ndarray, shape (n_kept, P, n_features)
+        One of every group, then evenly spread; in order.
+    n, n_groups : int
+        Number of performances, and of their groups.
+    labels : tuple of pairs
+        Labels of groups, and their numbers from 0 in the order of first appearance.
+    groups : ndarray of int, shape (n_kept,)
+        The groups of the performances that are kept.
+    priorities : ndarray of uint64, shape (n_kept,)
+        Those with the lowest are kept.
+    dropped : LogMoments
+        Of the dissimilarities of performances that are no longer kept.
     """
-    if groups is None:
-        return np.arange(n_performances)
-    labels = check_labels(groups, n_performances, at_least=2)
-    code = {label: i for i, label in enumerate(dict.fromkeys(labels))}
-    return np.array([code[label] for label in labels])
 
+    origin: np.ndarray
+    mean_offset: np.ndarray
+    squares: np.ndarray
+    kept: np.ndarray
+    n: int = 0
+    n_groups: int = 0
+    labels: tuple = ()
+    groups: np.ndarray = field(default_factory=lambda: np.array([], dtype=np.intp))
+    priorities: np.ndarray = field(default_factory=lambda: np.array([], dtype=np.uint64))
+    dropped: LogMoments = field(default_factory=LogMoments)
 
-def check_labels(groups, n_performances, at_least=1):
-    """The labels of groups, one for each performance, as a list.
+    @classmethod
+    def starting_at(cls, first):
+        """An empty stream with a performance (P, n_features) as its origin."""
+        zeros = np.zeros(first.shape)
+        return cls(first.astype(np.float64), zeros, zeros, np.empty((0, *first.shape), first.dtype))
 
-    Raises
-    ------
-    ValueError
-        If there is not one for each performance, or one is missing, or there are too few different
-        ones.
-    """
-    if isinstance(groups, (str, bytes, dict)) or np.ndim(groups) != 1:
-        raise ValueError(
-            "groups must be a list with one label for each performance, such as who performed "
-            f"it; got {groups!r}."
-        )
-    if len(groups) != n_performances:
-        raise ValueError(
-            f"groups has {len(groups)} labels, and there are {n_performances} performances: give "
-            "one for each."
-        )
-    missing = [bool(np.ndim(label) == 0 and pd.isna(label)) for label in groups]
-    if any(missing):
-        raise ValueError(
-            f"groups does not say who gave performance {missing.index(True)}: it is missing. Give "
-            "everybody a label, or leave such performances out."
-        )
-    labels = [label.item() if isinstance(label, _PLAIN) else label for label in groups]
-    if len(set(labels)) < at_least:
-        raise ValueError(
-            f"All performances are of the group {labels[0]!r}: how groups differ cannot be learnt "
-            "of one. Give no groups, and every performance counts for itself."
-        )
-    return labels
+    @property
+    def mean(self):
+        """Of all performances, (P, n_features)."""
+        return self.origin + self.mean_offset
 
+    @property
+    def variance(self):
+        """Of all performances at every posture, (P, n_features), divided by their number."""
+        return self.squares / self.n
 
-def _mean_of_smallest(ratios):
-    nearest = np.sort(ratios, axis=1)[:, :_NEAREST]
-    counts = np.isfinite(nearest)
-    total = np.where(counts, nearest, 0).sum(axis=1)
-    return np.where(counts.any(axis=1), total / np.maximum(counts.sum(axis=1), 1), np.inf)
+    def extend(self, performances, groups=None):
+        """The stream after more performances.
 
+        Parameters
+        ----------
+        performances : sequence of ndarray (P, n_features)
+        groups : array-like (n_sequences,), default=None
+            None: each performance is a group of its own.
 
-def _squared_distances(a, b):
-    squares = np.square(a).sum(axis=1)[:, np.newaxis] + np.square(b).sum(axis=1)
-    tiles = np.zeros((-(-len(a) // _TILE), _TILE, a.shape[1]))
-    tiles.reshape(-1, a.shape[1])[: len(a)] = a
-    products = np.matmul(tiles, b.T).reshape(-1, len(b))[: len(a)]
-    return np.maximum(squares - 2 * products, 0)
+        Returns
+        -------
+        stream : PerformanceStream
+            With the same ``dropped``.
+        codes : ndarray of int, shape (n_sequences,)
+            Groups of the performances.
+        is_kept : ndarray of bool, shape (n_kept_before + n_sequences,)
+            Which of those kept before, and of these, are kept now.
+        """
+        codes, given = encode_groups(groups, len(performances))
+        labels, n_groups = dict(self.labels), self.n_groups
+        if groups is None:
+            codes, n_groups = codes + n_groups, n_groups + len(codes)
+        else:
+            for label in given:
+                labels.setdefault(label, len(labels) + n_groups - len(self.labels))
+            codes = np.array([labels[label] for label in given])[codes]
+            n_groups += len(labels) - len(self.labels)
+        priorities = np.concatenate([self.priorities, self._priorities(codes)])
+        chosen = np.sort(np.argsort(priorities, kind="stable")[:_MAX_KEPT])
+        is_kept, n_before = np.zeros(len(priorities), dtype=bool), len(self.kept)
+        is_kept[chosen] = True
+        moments = self._add(performances)
+        stream = replace(self, n_groups=n_groups, labels=tuple(labels.items()), **moments)
+        # Double precision as soon as any performance has it.
+        dtype = np.result_type(self.kept, performances[0])
+        if is_kept[n_before:].any() or self.kept.dtype != dtype:
+            old = [self.kept[i] for i in chosen[chosen < n_before]]
+            new = [performances[i - n_before] for i in chosen[chosen >= n_before]]
+            kept = np.stack(old + new).astype(dtype, copy=False)
+            groups = np.concatenate([self.groups, codes])[chosen]
+            stream = replace(stream, kept=kept, groups=groups, priorities=priorities[chosen])
+        return stream, codes, is_kept
 
+    def _priorities(self, codes):
+        """Priorities of new performances of these groups.
 
-def _sums(a, b):
-    """Sums of all pairs, none 0: where neither moves both are 0 apart."""
-    return np.maximum(a[:, np.newaxis] + b, np.finfo(float).tiny)
+        The first performance of every group has priority over all others. Firsts are spread over
+        the groups, others over all performances.
+        """
+        groups, first = np.unique(codes, return_index=True)
+        is_first = np.zeros(len(codes), dtype=bool)
+        is_first[first[groups >= self.n_groups]] = True
+        numbers = np.where(is_first, codes, np.arange(self.n, self.n + len(codes)))
+        priorities = numbers.astype(np.uint64) * _GOLDEN >> np.uint64(1)
+        return np.where(is_first, priorities, priorities | _LATER)
+
+    def _add(self, performances):
+        """Number, mean and squares with more performances, by Welford's recurrence."""
+        n, mean, squares = self.n, self.mean_offset.copy(), self.squares.copy()
+        for x in performances:
+            n += 1
+            offset = x - self.origin
+            step = offset - mean
+            mean += step / n
+            squares += step * (offset - mean)
+        return {"n": n, "mean_offset": mean, "squares": squares}

@@ -1,36 +1,37 @@
-"""What is to be expected of a new person, and of the mean: variances and bands that hold.
+"""Variance and simultaneous bands of new people, and a confidence band of the mean.
 
-Performances of one person are alike, so everything is learnt from how people differ from *other*
-people. Functions of plain arrays; features may have different units.
+Performances of one person resemble each other, so all is estimated from how people differ from
+*other* people. Functions of plain arrays; features may have different units.
 """
 
 import numpy as np
 from sklearn.utils import check_random_state
 
-from .similarity import learn_reach, power_of_two
+from ..utils.groups import mean_of_others, sums_of_groups
+from .similarity import t_prediction_limit
 
 __all__ = ["mean_band", "predictive_variance", "simultaneous_factor"]
 
-# A variance is drawn to its mean over the frames as if so many more performances had shown that.
-_FRAMES_SHARE = 5
-# The usual variance of the log of the largest deviation: it is 0.05 to 0.3 in the classes of HDM05
-# and UTKinect; and one for performances of which no variance can be left out.
-_TYPICAL, _UNKNOWN = 0.1, 1.0
-# A largest deviation below so many standard deviations, or by so much below the median one in the
-# log, says nothing of how large others are.
-_LEAST, _BELOW = 0.1, 1.0
-# Smallest variance, as a share of that of the feature over all frames and performances; features
-# that vary by less than such a share of the most varying one do not: its variance is theirs then.
-_FLOOR, _STILL = 1e-9, 1e-15
-# Draws of the bootstrap, and the fewest of those that cost more.
-_DRAWS, _FEWEST = 2000, 50
+# A variance is shrunk to its mean over the frames, which weighs as much as so many performances.
+_SHRINKAGE = 5
+# Prior variance of the logarithm of the largest deviation: it is 0.05 to 0.3 in the classes of
+# HDM05 and UTKinect; and that of two performances, where no variance can be left out.
+_PRIOR_VARIANCE, _VAGUE_VARIANCE = 0.1, 1.0
+# Lower bounds of a largest deviation: so many standard deviations, and so much below the median
+# in the logarithm.
+_LEAST, _BELOW_MEDIAN = 0.1, 1.0
+# Smallest variance, as a share of that of the feature over all frames and performances. A feature
+# is constant if it varies by less than a share of the most varying one, whose floor it gets.
+_FLOOR, _CONSTANT = 1e-9, 1e-15
+# Bootstrap samples, and the fewest of the group means among each other.
+_N_DRAWS, _MIN_DRAWS = 2000, 50
 
 
 def predictive_variance(performances, groups):
     """Variance of a new person's postures about the mean of the performances.
 
-    ``v = ((n - 1) s^2 + 5 mean(s^2)) / (n + 4) (1 + 1 / n)``, where ``s^2`` is the mean square of
-    what a performance differs by from the mean of all performances of *other* groups, and its mean
+    ``v = ((n - 1) s^2 + 5 mean(s^2)) / (n + 4) (1 + 1 / n)``, where ``s^2`` is the mean squared
+    deviation of performances from the mean of all performances of *other* groups, and its mean
     is that over the frames, feature by feature.
 
     Parameters
@@ -38,32 +39,27 @@ def predictive_variance(performances, groups):
     performances : ndarray, shape (n, P, n_features)
         At least 2.
     groups : ndarray of int, shape (n,)
-        Whose they are. If all are of one group, each is taken for a group of its own.
+        If all are of one group, each performance counts as a group of its own.
 
     Returns
     -------
     ndarray, shape (P, n_features)
-        Positive, also where nobody differed.
+        Positive, also where performances do not differ.
     """
-    n, unit = len(performances), power_of_two(performances)
-    performances = performances * unit
-    codes, sums, counts = _grouped(performances, groups)
-    others = (sums.sum(axis=0) - sums) / (n - counts)
-    squares = np.square(performances - others[codes]).mean(axis=0)
-    variance = np.maximum(_shrunk(squares, n) * (1 + 1 / n), _floor(performances))
-    with np.errstate(over="ignore"):
-        return variance / unit / unit
+    n, codes = len(performances), _at_least_two(groups)
+    squares = np.square(performances - mean_of_others(performances, codes)).mean(axis=0)
+    return np.maximum(_shrink(squares, n) * (1 + 1 / n), _floor(performances))
 
 
 def simultaneous_factor(performances, groups, coverage):
     """The c for which a share of whole performances of new people lies within mean +- c sqrt(v).
 
-    ``v`` is the predictive variance. Group by group is left out and held against the mean and the
-    variance of the others: the logs of the largest ``|z|`` of its performances, over all frames
-    and features, say where that of a new person's lies, by a Student t distribution. Their
-    variance is 3 performances' worth 0.1 from the start.
+    ``v`` is the predictive variance. Each group is left out in turn and compared with the mean and
+    the variance of the others. The logarithms of the largest ``|z|`` of its performances, over all
+    frames and features, predict that of a new person by a Student t distribution. Their
+    variance has a prior of 0.1, which weighs as much as 3 performances.
 
-    Of unseen people of HDM05 and UTKinect a band of nominal 95 % holds 94 to 97 % of the
+    Of new people of HDM05 and UTKinect a band of nominal 95 % holds 94 to 97 % of the
     performances in the aSpace and 97 to 100 % in postures, of 5 to 20 training ones; without
     groups, of 10 or more, 76 to 85 % of those of HDM05, where people came about six times.
 
@@ -78,35 +74,32 @@ def simultaneous_factor(performances, groups, coverage):
     -------
     float
     """
-    performances = performances * power_of_two(performances)
-    codes, sums, counts = _grouped(performances, groups)
-    largest = np.empty(len(performances))
-    typical = _TYPICAL
-    for group, count in enumerate(counts[:, 0, 0]):
-        left = codes != group
-        others = performances[left]
-        pair = others, codes[left]
-        if len(others) == 1:
-            # There is no variance of one: that of all must do, which knows what it is to judge.
-            pair, typical = (performances, codes), _UNKNOWN
-        mean = (sums.sum(axis=0) - sums[group]) / (len(performances) - count)
-        z = (performances[~left] - mean) / np.sqrt(predictive_variance(*pair))
-        largest[~left] = np.abs(z).max(axis=(1, 2))
+    codes, prior = _at_least_two(groups), _PRIOR_VARIANCE
+    largest, mean = np.empty(len(performances)), mean_of_others(performances, codes)
+    for group in range(codes.max() + 1):
+        out = codes == group
+        others = performances[~out], codes[~out]
+        if len(others[0]) == 1:
+            # A single performance has no variance: that of both takes its place.
+            others, prior = (performances, codes), _VAGUE_VARIANCE
+        z = (performances[out] - mean[out]) / np.sqrt(predictive_variance(*others))
+        largest[out] = np.abs(z).max(axis=(1, 2))
     logs = np.log(np.maximum(largest, _LEAST))
-    logs = np.maximum(logs, np.median(logs) - _BELOW)
-    return float(np.exp(logs.mean() + learn_reach(logs - logs.mean(), coverage, typical)))
+    logs = np.maximum(logs, np.median(logs) - _BELOW_MEDIAN)
+    squares = np.square(logs - logs.mean()).sum()
+    return float(np.exp(logs.mean() + t_prediction_limit(len(logs), squares, coverage, prior)))
 
 
 def mean_band(performances, groups, coverage, random_state=None):
-    """Half-widths of a band about the mean that holds the *population's* mean as a whole.
+    """Half-widths of a simultaneous confidence band of the *population's* mean.
 
-    The population's mean is that of a new person's performances: people are drawn at random, and
-    who has many performances is not different for it. The mean of the performances is an estimate
-    of that, in which a group weighs as much as it has performances. Its variance is that of the
-    jackknife by groups, shrunk towards its mean over the frames. The factor is the quantile of the
-    largest ``|t|`` over all frames and features when as many people with as many performances are
-    drawn anew from the normal distribution with the covariance of the group means, mean and
-    variance being estimated anew (a studentised bootstrap over groups).
+    The population's mean is that of a new person's performances, where people are a random sample
+    and do not depend on how many performances they have. Its estimate is the mean of the
+    performances, in which a group weighs as much as it has performances. Its variance is that of
+    the jackknife by groups, shrunk towards its mean over the frames. The factor is the quantile of
+    the largest ``|t|`` over all frames and features in a studentised bootstrap over groups: as many
+    groups with as many performances are drawn from the normal distribution with the covariance of
+    the group means, and mean and variance are estimated from each draw.
 
     In simulations with 4 to 20 people who come 1 to 5 times a band of nominal 95 % holds the mean
     in 92 to 99 % of the cases; one of nominal 80 % in 67 to 78 %.
@@ -124,25 +117,24 @@ def mean_band(performances, groups, coverage, random_state=None):
     ndarray, shape (P, n_features)
     """
     random_state = check_random_state(random_state)
-    _, sums, counts = _grouped(performances, groups)
-    n_groups = len(sums)
-    n, shape = len(performances), performances.shape[1:]
+    sums, counts = sums_of_groups(performances, _at_least_two(groups))
+    n_groups, n, shape = len(sums), len(performances), performances.shape[1:]
     weights = counts[:, 0, 0] / n
-    # Without group g the mean moves by w_g / (1 - w_g) (mean - mean_g).
-    moves = (1 - 1 / n_groups) * np.square(weights / (1 - weights))
+    # Without group g the mean changes by w_g / (1 - w_g) (mean - mean_g).
+    jackknife = (1 - 1 / n_groups) * np.square(weights / (1 - weights))
     floor = _floor(performances) / n
 
     def estimate(means):
         mean = weights @ means
-        squares = (moves @ np.square(means - mean)).reshape(shape)
-        return mean, np.sqrt(np.maximum(_shrunk(squares, n_groups), floor)).ravel()
+        squares = (jackknife @ np.square(means - mean)).reshape(shape)
+        return mean, np.sqrt(np.maximum(_shrink(squares, n_groups), floor)).ravel()
 
     means = (sums / counts).reshape(n_groups, -1)
     scatter = (means - means.mean(axis=0)) / np.sqrt(n_groups - 1)
-    # How drawn means lie to each other is independent of where they lie together: each of the
-    # former, which cost more, goes with several of the latter. Few groups vary most.
-    n_draws = max(_DRAWS // n_groups, _FEWEST)
-    largest = np.empty((n_draws, -(-_DRAWS // n_draws)))
+    # Drawn means about their average are independent of that average: each draw of the former,
+    # which takes longer, is combined with several of the latter. Few groups vary most.
+    n_draws = max(_N_DRAWS // n_groups, _MIN_DRAWS)
+    largest = np.empty((n_draws, -(-_N_DRAWS // n_draws)))
     for row in largest:
         drawn = random_state.standard_normal((n_groups, n_groups))
         off, error = estimate((drawn - drawn.mean(axis=0)) @ scatter)
@@ -151,27 +143,18 @@ def mean_band(performances, groups, coverage, random_state=None):
     return np.quantile(largest, coverage) * estimate(means)[1].reshape(shape)
 
 
-# -- helpers --------------------------------------------------------------------------------
-
-
-def _grouped(performances, groups):
-    """Codes 0, 1, ... of the groups, at least two; their sums and counts, one after the other."""
+def _at_least_two(groups):
+    """Codes of the groups; of a single group, every performance is one of its own."""
     codes = np.unique(groups, return_inverse=True)[1].ravel()
-    if codes.max() == 0:
-        codes = np.arange(len(performances))
-    counts = np.bincount(codes)
-    sums = np.zeros((len(counts), *performances.shape[1:]))
-    np.add.at(sums, codes, performances)
-    return codes, sums, counts[:, np.newaxis, np.newaxis]
+    return codes if codes.max() > 0 else np.arange(len(codes))
 
 
-def _shrunk(squares, n):
-    """Variances (P, n_features) drawn towards their mean over the frames."""
-    share = _FRAMES_SHARE
-    return ((n - 1) * squares + share * squares.mean(axis=0)) / (n - 1 + share)
+def _shrink(squares, n):
+    """Variances (P, n_features) shrunk towards their mean over the frames."""
+    return ((n - 1) * squares + _SHRINKAGE * squares.mean(axis=0)) / (n - 1 + _SHRINKAGE)
 
 
 def _floor(performances):
     spread = performances.var(axis=(0, 1))
     largest = spread.max() if spread.max() > 0 else 1.0
-    return _FLOOR * np.where(spread > _STILL * largest, spread, largest)
+    return _FLOOR * np.where(spread > _CONSTANT * largest, spread, largest)

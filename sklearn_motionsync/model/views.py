@@ -1,4 +1,4 @@
-"""A model seen in the features that are asked for: its own, or those of postures."""
+"""The models inside fitted estimators: in chosen features, and of each class of a classifier."""
 
 from typing import NamedTuple
 
@@ -14,22 +14,23 @@ from ..transformers.aspace import ASpace
 from ..utils.pipelines import (
     accepted_params,
     explain_missing,
+    find_classifier,
     find_step,
     flat_steps,
     transform_through,
 )
 from .action_model import ActionModel
 
-__all__ = ["View", "view_of"]
+__all__ = ["ClassModel", "View", "models_of_classes", "view_of"]
 
-# What an aSpace leaves out of a new person at a frame, in units of what it leaves out of the
-# training postures on average: with this 93 and 94 % of actors held out depart rarely nowhere
-# (HDM05, UTKinect; nominal 95 %), with 1 it was 80 and 84 %.
-_NEWCOMER = 4
+# Residual variance of a new person at a frame, in units of the mean residual variance of the
+# training postures after the aSpace: with this 93 and 94 % of held-out actors have no rare
+# departure (HDM05, UTKinect; nominal 95 %), with 1 it was 80 and 84 %.
+_RESIDUAL_FACTOR = 4
 
 
 class View(NamedTuple):
-    """A model in some features, and what reaches it.
+    """A model in chosen features, and the performances that reach it.
 
     Attributes
     ----------
@@ -38,18 +39,17 @@ class View(NamedTuple):
     names : list of str
         Its features.
     synchronised : ndarray (n_sequences, P, n_features) or None
-        Performances in these features, as the model sees them.
+        Performances in these features.
     whole : ndarray (n_sequences, P, n_features) or None
-        The same with what an aSpace leaves out.
+        The same with the residuals of an aSpace.
     labels : list
         Of these performances.
     own : ActionModel
         The model of the estimator, in its own features.
     given : sequence of ndarray (P, n_own_features) or None
-        Performances in those, checked: the methods of that model take them as they are.
-    left_out : ndarray (n_features,)
-        Variance to be expected of a new person that the model knows nothing of, as its aSpace
-        leaves it out.
+        Performances in those, checked.
+    residual_variance : ndarray (n_features,)
+        Variance of a new person outside the aSpace.
     """
 
     model: ActionModel
@@ -59,22 +59,21 @@ class View(NamedTuple):
     labels: list
     own: ActionModel
     given: tuple | None
-    left_out: np.ndarray
+    residual_variance: np.ndarray
 
     @property
     def scores(self):
-        """How far the whole performances are from the mean, in predicted standard deviations."""
-        with np.errstate(over="ignore"):
-            return (self.whole - self.model.mean_) / self.predicted
+        """Deviations of whole performances from the mean, in predicted standard deviations."""
+        return (self.whole - self.model.mean_) / self.predicted
 
     @property
     def predicted(self):
-        """The standard deviations to be expected of whole performances of a new person."""
-        return np.sqrt(self.model.predictive_variance_ + self.left_out)
+        """Predicted standard deviations of whole performances of a new person."""
+        return np.sqrt(self.model.predictive_variance_ + self.residual_variance)
 
 
 def view_of(estimator, X=None, params=None, caller="", *, features=None, postures=False):
-    """The model of an estimator in the features that are asked for.
+    """The model of an estimator in chosen features: its own, or those of postures.
 
     Parameters
     ----------
@@ -84,12 +83,12 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
     params : dict, default=None
         What synchronizing X takes besides, such as ``keyframes``.
     caller : str, default=""
-        Whom the user has called with (estimator, X), for messages.
+        The public function that the user called with (estimator, X), for messages.
     features : int, str or list of them, default=None
-        If one of them is no feature of the model, the model is taken back out of the `ASpace`
-        before it: fitted anew on its training performances, of which it keeps 64 at most.
+        If one of them is no feature of the model, the model is transformed back to the postures
+        before its `ASpace`, by a fit on its training performances there, at most 64.
     postures : bool, default=False
-        Take it back whenever there is such an aSpace.
+        Whether to do so whenever there is such an aSpace.
 
     Returns
     -------
@@ -98,58 +97,54 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
     Raises
     ------
     ValueError
-        If a step between them cannot be taken back.
+        If a step between them has no inverse.
     """
     before, model = find_step(estimator, ActionModel)
     check_is_fitted(model, "threshold_")
     names, params = names_of_features(before, model, model.mean_.shape[1]), params or {}
-    asked = any(isinstance(f, str) and f not in names for f in as_features(features))
-    way = None
-    if before is not None and (asked or postures):
-        way = _way_back(before, names, must=asked)
+    is_needed = any(isinstance(f, str) and f not in names for f in as_features(features))
+    inverse = None
+    if before is not None and (is_needed or postures):
+        inverse = _find_inverse(before, names, is_needed)
     given, points, whole, labels = None, None, None, []
     if X is not None:
-        if way is None:
+        if inverse is None:
             given = model.check_performances(transform_through(before, X, params, caller))
         else:
-            synchronised, whole = way.follow(X, params, caller)
+            synchronised, whole = inverse.synchronise(X, params, caller)
             given = model.check_performances(synchronised)
         points, labels = np.stack(given), labels_of_input(X, given)[0]
-    if way is None:
-        nothing = np.zeros(len(names))
-        return View(model, names, points, points, labels, model, given, nothing)
-    beside = names[len(way.aspace.components_) :]
-    names = [*names_of_features(way.before, way.aspace, way.aspace.n_features_in_), *beside]
-    seen = None if points is None else way.back(points)
-    left_out = np.append(_NEWCOMER * way.aspace.left_out_variance_, np.zeros(len(beside)))
-    return View(_seen(model, way.back), names, seen, whole, labels, model, given, left_out)
-
-
-def _seen(model, through):
-    """A model in features that are linear in its own, of the performances that it keeps."""
+    if inverse is None:
+        return View(model, names, points, points, labels, model, given, np.zeros(len(names)))
+    aspace = inverse.aspace
+    beside = names[len(aspace.components_) :]
+    names = [*names_of_features(inverse.before, aspace, aspace.n_features_in_), *beside]
+    variance = np.append(_RESIDUAL_FACTOR * aspace.left_out_variance_, np.zeros(len(beside)))
     # About the mean of all training performances, not of those that were kept.
     kept = model.mean_ + model.deviations_ - model.deviations_.mean(axis=0)
-    return clone(model).fit(through(kept), groups=model.groups_)
+    back = clone(model).fit(inverse.transform(kept), groups=model.groups_)
+    synchronised = None if points is None else inverse.transform(points)
+    return View(back, names, synchronised, whole, labels, model, given, variance)
 
 
-class _Way(NamedTuple):
+class _Inverse(NamedTuple):
     """The aSpace of a pipeline, the steps before it, and the synchronizers after it.
 
-    What these put beside the points of the aSpace, such as a `TimingChannel`, stays there.
+    Features that these append to the points of the aSpace, such as a `TimingChannel`, are kept.
     """
 
     before: Pipeline | None
     aspace: ASpace
     after: list
 
-    def back(self, points):
+    def transform(self, points):
         """Postures of points of the aSpace."""
         components, mean = self.aspace.components_, self.aspace.mean_
         points, beside = np.split(points, [len(components)], axis=2)
         return np.concatenate([points @ components + mean, beside], axis=2)
 
-    def follow(self, X, params, caller):
-        """What reaches the model, and the postures of it, whole, on the same clock."""
+    def synchronise(self, X, params, caller):
+        """The performances that reach the model, and their postures on the same clock."""
         takers = [method for step in self.after for method in (step.match, step.transform)]
         postures = transform_through(self.before, X, params, caller, also=takers)
         whole = check_performances(self.aspace, postures, reset=False, level="posture")
@@ -162,20 +157,88 @@ class _Way(NamedTuple):
         return points, np.concatenate([np.stack(whole), beside], axis=2)
 
 
-def _way_back(before, names, must):
-    """The way from a model back to postures; None if there is none and need be none."""
+def _find_inverse(before, names, is_needed):
+    """The inverse from a model to postures; None if there is none and it is not needed."""
     try:
         before_aspace, aspace = find_step(before, ASpace)
     except ValueError:
-        if must:
+        if is_needed:
             raise
         return None
     steps = flat_steps(before)
     after = steps[steps.index(aspace) + 1 :]
-    strange = [step for step in after if not hasattr(step, "match")]
-    if strange and must:
+    others = [step for step in after if not hasattr(step, "match")]
+    if others and is_needed:
         raise ValueError(
-            f"Between ASpace and ActionModel stands {strange[0]}: the model cannot be taken back "
-            f"to postures. Choose features of the model: {', '.join(names)}."
+            f"Between ASpace and ActionModel stands {others[0]}, which has no inverse: choose "
+            f"features of the model, {', '.join(names)}."
         )
-    return None if strange else _Way(before_aspace, aspace, after)
+    return None if others else _Inverse(before_aspace, aspace, after)
+
+
+# -- the models of a classifier ------------------------------------------------------------
+
+
+class ClassModel(NamedTuple):
+    """The model of a class, and the performances that are predicted to be of this class.
+
+    Attributes
+    ----------
+    label : label of the class
+    estimator : Pipeline
+        Fitted: the steps before the classifier, and those of ``model_of(label)``.
+    performances : performances, as the estimator takes them
+    indices : ndarray of int
+        Their indices among all.
+    labels : list
+        Their labels.
+    """
+
+    label: object
+    estimator: Pipeline
+    performances: object
+    indices: np.ndarray
+    labels: list
+
+
+def models_of_classes(estimator, X, params, caller, only=None):
+    """The models of the classes that a classifier predicts, before any rejection.
+
+    Parameters
+    ----------
+    estimator : estimator or Pipeline
+        Fitted.
+    X : performances, as the estimator takes them
+    params : dict
+        What the steps before the classifier take besides.
+    caller : str
+        The public function that the user called with (estimator, X), for messages.
+    only : callable, default=None
+        Gives the index of a single performance, of their number; by default all.
+
+    Returns
+    -------
+    list of ClassModel, or None
+        None if there is no classifier that has models.
+    """
+    found = find_classifier(estimator)
+    if found is None:
+        return None
+    before, classifier = found
+    features = transform_through(before, X, params, caller)
+    performances = classifier.check_performances(features)
+    chosen = np.arange(len(performances))
+    if only is not None:
+        chosen = chosen[[only(len(performances))]]
+    columns = classifier.predict_proba(performances.take(chosen)).argmax(axis=1)
+    collection, all_labels = as_collection(X), labels_of_input(X, performances)[0]
+    steps, models = [] if before is None else before.steps, []
+    for column in dict.fromkeys(columns.tolist()):
+        indices, label = chosen[columns == column], classifier.classes_[column]
+        if collection is not None:
+            some = [collection[i] for i in indices]
+        else:
+            some = X.iloc[indices] if hasattr(X, "iloc") else np.asarray(X)[indices]
+        pipe = Pipeline([*steps, *classifier.model_of(label).steps])
+        models.append(ClassModel(label, pipe, some, indices, [all_labels[i] for i in indices]))
+    return models

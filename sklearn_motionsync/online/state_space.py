@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.lapack import dtrtri
 
+from ..utils.groups import mean_of_others
+
 __all__ = [
     "CausalSlopes",
     "Clock",
@@ -82,7 +84,7 @@ class TrackerModel(NamedTuple):
         noise, tempering, n_particles :
             As of the tracker.
         """
-        deviations, step = deviations_from_others(warped, groups), 1 / clock.speed
+        deviations, step = warped - mean_of_others(warped, groups), 1 / clock.speed
         process, rates = MaternProcess.learn(deviations, step), RateProcess.learn(rates, step)
         slopes, unit_noise = _causal_slopes(deviations, step, clock.window)
         velocities = shrunk_covariance(slopes)
@@ -224,15 +226,6 @@ class RateProcess(NamedTuple):
         """Means of log rates after a time, and their standard deviation."""
         kept = np.exp(-dt / self.memory)
         return kept * log_rates, self.spread * np.sqrt(1 - kept**2)
-
-
-def deviations_from_others(performances, groups):
-    """Deviations of performances (n, P, n_features) from the mean of the other groups."""
-    counts = np.bincount(groups)[:, np.newaxis, np.newaxis]
-    sums = np.zeros((len(counts), *performances.shape[1:]))
-    np.add.at(sums, groups, performances)
-    others = (sums.sum(axis=0) - sums) / (len(performances) - counts)
-    return performances - others[groups]
 
 
 def shrunk_covariance(deviations):

@@ -4,7 +4,7 @@ from numbers import Integral, Real
 
 import numpy as np
 from sklearn.base import BaseEstimator, _fit_context, clone
-from sklearn.utils import check_consistent_length, check_random_state
+from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.validation import check_is_fitted
 
@@ -16,6 +16,7 @@ from ..synchronizers.dense import DenseSynchronizer
 from ..synchronizers.match import check_match
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.groups import encode_groups
 from ..utils.threads import on_one_thread
 from .particle_filter import ParticleFilter, Track, filter_take, smooth_take, stack_frames
 from .state_space import Clock, TrackerModel
@@ -175,8 +176,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         y : ignored
             Present for API consistency.
         groups : array-like, shape (n_sequences,), default=None
-            The subject of each performance: deviations are from the mean of the other subjects.
-            None, or a single group: every performance is a group of its own.
+            The subject of each performance: deviations are from the mean of other groups. By
+            default every performance is a group of its own.
 
         Returns
         -------
@@ -186,8 +187,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If the input breaks the contract, there is only one performance, or not one group for
-            each.
+            If the input breaks the contract, there is only one performance or one group, or not one
+            group for each.
         """
         performances = self._check_training_set(X)
         n = len(performances)
@@ -195,8 +196,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
             raise ValueError(
                 "A tracker learns how people vary from at least 2 performances, got n_samples = 1."
             )
-        if groups is not None:
-            check_consistent_length(performances, groups)
+        codes, _ = encode_groups(groups, n, at_least=2, sort=True)
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
         self.synchronizer_ = sync.fit(X)
         match = sync.match(X)
@@ -206,7 +206,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         self.n_frames_, self.duration_ = int(sync.n_frames_), float(durations.mean())
         clock = Clock(self.n_frames_ - 1.0, self.duration_)
         rates = clock.duration / durations[:, np.newaxis] / match.rates
-        codes, settings = _as_codes(groups, n), (self.noise, self.tempering, self.n_particles)
+        settings = self.noise, self.tempering, self.n_particles
         given = warped.astype(np.float64), rates, codes, clock
         self._model = on_one_thread(TrackerModel.learn, *given, *settings)
         self.mean_ = self._model.mean.astype(performances[0].dtype)
@@ -340,12 +340,6 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
             frames = on_one_thread(method, self._model, self._seed, *take)
             tracks.append(stack_frames(frames, self.mean_.dtype))
         return tracks[0] if single else tracks
-
-
-def _as_codes(groups, n):
-    """Groups counted from 0; every performance one of its own without any, or if all are one."""
-    codes = np.arange(n) if groups is None else np.unique(groups, return_inverse=True)[1].ravel()
-    return codes if codes.max() > 0 else np.arange(n)
 
 
 def check_projection(projection, n_features):

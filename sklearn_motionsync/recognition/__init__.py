@@ -1,4 +1,4 @@
-"""Which action it is: distances between performances, and a classifier that stands on them."""
+"""Recognition of actions: distances between performances, and a classifier."""
 
 from .classifier import ActionClassifier
 from .distances import synchronization_distances

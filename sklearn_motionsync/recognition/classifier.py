@@ -6,32 +6,44 @@ from numbers import Integral, Real
 
 import numpy as np
 import pandas as pd
-from scipy.special import softmax
+from scipy.linalg import eigh
+from scipy.optimize import minimize_scalar
+from scipy.spatial.distance import cdist
+from scipy.special import log_softmax, softmax
 from sklearn.base import BaseEstimator, ClassifierMixin, _fit_context
+from sklearn.linear_model import LogisticRegression
+from sklearn.model_selection import GroupKFold
 from sklearn.pipeline import Pipeline
-from sklearn.utils import assert_all_finite, check_consistent_length, column_or_1d
 from sklearn.utils._param_validation import Interval, StrOptions
-from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.validation import SequenceLevelMixin
 from ..matching.comparison import Comparison
 from ..matching.costs import COSTS
 from ..model.action_model import ActionModel
-from ..model.similarity import as_codes
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.groups import encode_classes, encode_groups
 from ..utils.parallel import LongWorkMixin, run
-from .distances import SETTINGS
-from .kernel import MotionKernel, deal, decide, learn, threshold
+from .distances import SETTINGS, normalise_time, pairwise_distances
 
 __all__ = ["ActionClassifier"]
 
-# Parts that performances are dealt out into, to learn of those held out.
-_FOLDS = 5
-# The share of performances of known actions that reject_below="auto" is to keep.
-_KEPT = 0.95
+# Folds of the cross-validation in a fit.
+_N_FOLDS = 5
+# The coverage of reject_below="auto".
+_COVERAGE = 0.95
+# Standard deviations below this share of the size of the data are rounding.
+_ROUNDING = 2.0**-44
+# Frames that are averaged for the start and the end of a performance.
+_N_END_FRAMES = 3
+# Eigenvalues below this share of the largest are rounding.
+_EIGENVALUE_ROUNDING = 1e-10
+_MOST_ITERATIONS, _TOLERANCE = 10_000, 1e-6
+# Prior temperature, and the standard deviation of its logarithm, which counts as one performance:
+# on UTKinect it is 3.3 to 4.4.
+_PRIOR_TEMPERATURE, _PRIOR_STD = 4.0, 1.0
 
 
 class ActionClassifier(
@@ -39,31 +51,33 @@ class ActionClassifier(
 ):
     """Which of several actions performances are, and whether they are any of them.
 
-    How alike two performances are is told by their synchronisation distances under all three
-    costs, each performance's own energy divided out of the velocities, and by what is seen of
-    them without any warp. These four kernels are averaged, and a multinomial logistic
-    regression in the space of the mean tells the classes apart. It does not warp performances to
-    the pattern of a class: that makes strangers look like it.
+    The similarity of two performances is the mean of four kernels: three of their synchronisation
+    distances, one a cost, with velocities normalised by each performance's own energy; and one of
+    summary statistics, without any warp. A multinomial logistic regression with this kernel
+    separates the classes. Performances are not warped to the pattern of a class: that makes
+    unknown actions resemble it.
 
     Parameters
     ----------
     costs : {"velocity", "elastic", "posture"} or list of them, default=all three
-        The costs of the distances, each once; none, if ``summaries``, takes away all warps.
+        The costs of the distances, each once. May be empty with ``summaries``: then nothing is
+        warped.
     C : float, default=10
         Inverse strength of the penalty of the regression.
     gamma : float, default=1
         A kernel is ``exp(-gamma D / median(D))``, the median over all training pairs.
     summaries : bool, default=True
-        Whether mean, standard deviation, smallest and largest value, start and end of every
-        feature make a kernel, too.
+        Whether mean, standard deviation, minimum, maximum, start and end of every feature make a
+        kernel, too.
     n_frames : int, default=50
         ``P``, frames of the common clock. Time grows with its square.
     velocity_smoothing : float, default=0.06
-        Standard deviation of the Gaussian under which velocities are taken, as a share of the clip.
+        Standard deviation of the Gaussian under which velocities are estimated, as a share of the
+        performance.
     max_offset : float, default=0.4
         Largest offset, as a share of the clock, in [0, 1].
     smoothness : float, default=0.003
-        Weight of changes of pace, in units of the mean squared norm of what is compared.
+        Weight of changes of pace, in units of the mean squared norm of the compared features.
     max_rate : float, default=4
         Largest local rate of a path.
     reject_below : float, "auto" or None, default=None
@@ -71,7 +85,7 @@ class ActionClassifier(
         nothing. ``"auto"`` is ``threshold_at(0.95)``. ``fit`` does not use it: it can be set
         afterwards.
     unknown_label : label, default=None
-        By default "unknown", if the classes are text, and -1, if they are numbers.
+        The label of rejected performances; by default "unknown" among text, -1 among numbers.
     n_jobs : int, default=None
         How many jobs share the comparisons, in ``fit`` and after it. None means 1 unless in a
         ``joblib.parallel_config`` context, -1 all cores. Results are the same to the last bit.
@@ -81,11 +95,12 @@ class ActionClassifier(
     Attributes
     ----------
     classes_ : ndarray, shape (n_classes,)
+        The classes, sorted.
     temperature_ : float
-        By what decision values are multiplied for probabilities, learnt of performances held out.
+        The factor of decision values in probabilities, estimated from held-out performances.
     held_out_ : ndarray, shape (n_sequences,)
-        The largest decision value of each training performance, when it and all of its group
-        (without groups a fifth of every class) were held out; NaN where too few were left.
+        The largest decision value of each training performance when it and all of its group
+        (without groups a fifth of every class) are held out; NaN where one class is left.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -94,20 +109,20 @@ class ActionClassifier(
     See Also
     --------
     synchronization_distances : One of the distances, for neighbours, clusters and maps.
-    ActionDetector : Whether performances are one action, learnt of that action alone.
+    ActionDetector : Whether performances are one action, fitted on that action alone.
     find_departures : Where performances depart from the class they were given.
 
     Notes
     -----
-    Give ``groups``, such as who performed, whenever people come more than once: probabilities
-    and thresholds are then those of people not seen. Under metadata routing
+    Give ``groups``, such as subjects, whenever people come more than once: probabilities
+    and thresholds are then those of new people. Under metadata routing
     ``set_fit_request(groups=True)``; otherwise a pipeline takes ``actionclassifier__groups``.
 
-    Training takes time and memory with the square of the number of performances.
+    Time and memory of a fit grow with the square of the number of performances.
 
     Examples
     --------
-    Bends and half bends, told apart in somebody whom it has not seen.
+    Bends and half bends of a new person.
 
     >>> import numpy as np
     >>> from sklearn.pipeline import make_pipeline
@@ -123,7 +138,7 @@ class ActionClassifier(
     >>> pipe.predict([new, new[:20], still]).tolist()
     ['bend', 'half', 'half']
 
-    Who does neither is still given the more likely class, unless unknown actions are rejected.
+    A performance of neither is given the more likely class, unless unknown actions are rejected.
 
     >>> pipe[-1].set_params(reject_below="auto").predict(
     ...     pipe[:-1].transform([new, new[:20], still])
@@ -175,40 +190,42 @@ class ActionClassifier(
     @atomic_fit
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X, y, groups=None):
-        """Learn the classes.
+        """Fit the kernel, the regression and the temperature.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Performances; the rows of a 2-D array are univariate ones.
         y : array-like, shape (n_sequences,)
-            What each is.
+            The class of each performance.
         groups : array-like, shape (n_sequences,), default=None
-            Who performed, or what else makes performances resemble each other.
+            The subject of each performance, or what else makes performances resemble each other.
 
         Returns
         -------
-        self
+        self : ActionClassifier
+            The fitted classifier.
 
         Raises
         ------
         ValueError
-            If the input breaks the contract, there are not two classes, there is not a label or
+            If the input breaks the contract, there are not two classes, there is not a class or
             group for each performance, or costs are unknown.
         """
         kernel = MotionKernel(self._comparisons(), self.gamma, self.summaries)
         performances = self._check_training_set(X)
-        self.classes_, codes = check_labels(type(self).__name__, performances, y)
-        people = None if groups is None else as_codes(groups, len(performances))
+        self.classes_, codes = encode_classes(y, performances, type(self).__name__)
+        if groups is not None:
+            groups, _ = encode_groups(groups, len(performances), at_least=2)
         with self._progress(fits=True) as progress:
-            known = kernel.learn(performances, n_jobs=self.n_jobs, progress=progress)
-        n_folds = _FOLDS if people is None else min(_FOLDS, people.max() + 1)
-        learnt_of = partial(learn, self.C, deal(codes, people, n_folds))
-        (learnt,) = run(learnt_of, [(known, codes)])
-        self._regression, self.temperature_, self.held_out_ = learnt
-        # Copies: what the user does with the arrays must not change what was learnt.
+            matrix = kernel.fit(performances, n_jobs=self.n_jobs, progress=progress)
+        fit_in_portion = partial(fit_regression, self.C, assign_folds(codes, groups))
+        ((self._regression, self.temperature_, self.held_out_),) = run(
+            fit_in_portion, [(matrix, codes)]
+        )
         self._kernel = kernel
-        self._training = [np.array(x) for x in performances], codes, people
+        # Copies, which do not change with the user's arrays.
+        self._training = [np.array(x) for x in performances], codes, groups
         return self
 
     @snapshot
@@ -218,24 +235,22 @@ class ActionClassifier(
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
         ndarray, shape (n_sequences,)
             Classes, and ``unknown_label`` for those that ``reject_below`` rejects.
         """
-        decisions = self._decide(X)
+        decisions = self._decisions(X)
         labels = self.classes_[decisions.argmax(axis=1)]
-        if self.reject_below is None:
+        threshold = self.reject_below
+        if threshold is None:
             return labels
-        border = self.reject_below
-        if isinstance(border, str):
-            border = self.threshold_at(_KEPT)
-        return np.where(
-            decisions.max(axis=1) < border,
-            label_of_unknown(self.unknown_label, self.classes_),
-            labels,
-        )
+        if isinstance(threshold, str):
+            threshold = self.threshold_at(_COVERAGE)
+        unknown = check_unknown_label(self.unknown_label, self.classes_)
+        return np.where(decisions.max(axis=1) < threshold, unknown, labels)
 
     @snapshot
     def predict_proba(self, X):
@@ -244,69 +259,57 @@ class ActionClassifier(
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
         ndarray, shape (n_sequences, n_classes)
             Columns as in ``classes_``.
         """
-        decisions = self._decide(X)
+        decisions = self._decisions(X)
         return softmax(self.temperature_ * decisions, axis=1)
 
     @snapshot
     def decision_function(self, X):
-        """How much each class speaks for itself.
+        """Decision values of the classes.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
         ndarray, shape (n_sequences, n_classes), or (n_sequences,) for two classes
             Values of all classes sum to 0. Of two classes their difference, above 0 for the second.
         """
-        decisions = self._decide(X)
+        decisions = self._decisions(X)
         return decisions if len(self.classes_) > 2 else decisions[:, 1] - decisions[:, 0]
 
     @snapshot
     def score_samples(self, X):
-        """How much performances are like any class: the largest decision value.
+        """The largest decision value of performances: their similarity to any class.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
         ndarray, shape (n_sequences,)
-            ``reject_below`` rejects what is below it. Pipelines that end here have it, too.
+            ``reject_below`` rejects performances below it.
         """
-        return self._decide(X).max(axis=1)
-
-    @snapshot
-    def novelty_scores(self, X):
-        """How little performances are like any class: ``score_samples``, negated.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-
-        Returns
-        -------
-        ndarray, shape (n_sequences,)
-            The larger, the less it is one of the classes.
-        """
-        return -self.score_samples(X)
+        return self._decisions(X).max(axis=1)
 
     @snapshot
     def threshold_at(self, coverage):
-        """What ``reject_below`` must be to keep a share of performances of the known actions.
+        """The ``reject_below`` that keeps a share of performances of the known actions.
 
         Parameters
         ----------
         coverage : float
-            The share, between 0 and 1, of performances of people not seen if groups were given.
+            The share, between 0 and 1, of performances; of new people if groups were given.
 
         Returns
         -------
@@ -316,28 +319,36 @@ class ActionClassifier(
         Raises
         ------
         ValueError
-            If it is no share, or nobody could be held out.
+            If it is no share, or no performance could be held out.
         """
         check_is_fitted(self)
         if not (isinstance(coverage, Real) and 0 < coverage < 1):
             raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
-        return threshold(self.held_out_, coverage)
+        known = np.sort(self.held_out_[np.isfinite(self.held_out_)])
+        if not len(known):
+            raise ValueError(
+                "There is no threshold, as no performance could be held out: give at least two "
+                "performances, and two groups, of two classes, or a number as reject_below."
+            )
+        rank = int((1 - coverage) * (len(known) + 1))
+        return float(known[max(rank - 1, 0)])
 
     @snapshot
     def model_of(self, label):
-        """What performances of a class have in common: a pipeline, fitted on them now.
+        """Fit a model of a class, to explain a prediction.
 
-        It explains, and does not decide: performances of other classes that are synchronised
-        to its pattern look like it.
+        It does not decide: performances of other classes that are synchronised to its pattern
+        resemble it.
 
         Parameters
         ----------
-        label : one of ``classes_``
+        label : str or number
+            One of ``classes_``.
 
         Returns
         -------
         Pipeline
-            A `DenseSynchronizer` and an `ActionModel`.
+            A `DenseSynchronizer` and an `ActionModel`, fitted on the performances of the class.
 
         Raises
         ------
@@ -345,31 +356,39 @@ class ActionClassifier(
             If there is no such class, or it has one performance only.
         """
         check_is_fitted(self)
-        performances, codes, people = self._training
+        performances, codes, groups = self._training
         match = np.flatnonzero(self.classes_ == label)
         if not len(match):
             raise ValueError(
                 f"There is no class {label!r}; the classes are {self.classes_.tolist()}."
             )
-        mine = np.flatnonzero(codes == match[0])
-        if len(mine) < 2:
+        members = np.flatnonzero(codes == match[0])
+        if len(members) < 2:
             raise ValueError(
-                f"The class {label!r} has one performance: what varies in it is not known."
+                f"The class {label!r} has one performance: a model needs at least two."
             )
-        groups = None if people is None else people[mine]
-        names = None if self._fitted_on_rows else getattr(self, "feature_names_in_", None)
-        mine = as_given([performances[i] for i in mine], self._fitted_on_rows, names)
-        return learn_model(mine, groups, self.n_frames, self.n_jobs)
+        own, names = [performances[i] for i in members], getattr(self, "feature_names_in_", None)
+        if self._fitted_on_rows:
+            own = np.stack([x[:, 0] for x in own])
+        elif names is not None:
+            own = [pd.DataFrame(x, columns=names) for x in own]
+        if groups is not None:
+            groups = groups[members] if len(np.unique(groups[members])) > 1 else None
+        synchronizer = DenseSynchronizer(self.n_frames, n_jobs=self.n_jobs)
+        with warnings.catch_warnings():
+            # One class may move one feature only; units are a matter of all classes.
+            warnings.filterwarnings("ignore", ".* of the energy that is compared", UserWarning)
+            synchronised = synchronizer.fit_transform(own)
+        model = ActionModel().fit(synchronised, groups=groups)
+        return Pipeline([("densesynchronizer", synchronizer), ("actionmodel", model)])
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.three_d_array = True
         return tags
 
-    # -- steps of a fit ---------------------------------------------------------------------
-
     def _comparisons(self):
-        """How performances are compared, by every cost."""
+        """The comparison of each cost."""
         costs = [self.costs] if isinstance(self.costs, str) else list(self.costs)
         unknown = [cost for cost in costs if cost not in COSTS]
         if unknown or len(set(costs)) < len(costs) or not (costs or self.summaries):
@@ -380,96 +399,19 @@ class ActionClassifier(
         names = "velocity_smoothing", "max_offset", "smoothness", "max_rate"
         settings = {name: getattr(self, name) for name in names}
         settings["n_frames"] = int(self.n_frames)
-        # Where the body is, is compared as it is, in one unit for all.
+        # Postures keep the unit of the training set.
         return [Comparison(c, normalize=c != "posture", **settings) for c in costs]
 
-    # -- what is decided --------------------------------------------------------------------
-
-    def _decide(self, X):
-        """(n_sequences, n_classes)"""
+    def _decisions(self, X):
+        """Decision values of performances: (n_sequences, n_classes)."""
         performances = self.check_performances(X)
         with self._progress(fits=False) as progress:
             kernel = self._kernel(performances, n_jobs=self.n_jobs, progress=progress)
-        return decide(kernel, *self._regression)
+        return decision_values(kernel, *self._regression)
 
 
-# -- what performances of a class have in common, for those who ask why ------------------
-
-
-def learn_model(performances, groups, n_frames, n_jobs):
-    """A synchronizer and a model of performances that belong together.
-
-    Parameters
-    ----------
-    performances : list of arrays or tables, or 2-D array
-        At least two.
-    groups : ndarray of int, shape (n_sequences,), or None
-        How they differ is only learnt of several groups.
-    n_frames : int
-        Of their clock.
-    n_jobs : int or None
-
-    Returns
-    -------
-    Pipeline
-        Fitted.
-    """
-    if groups is not None and len(np.unique(groups)) < 2:
-        groups = None
-    synchronizer, model = DenseSynchronizer(n_frames, n_jobs=n_jobs), ActionModel()
-    with warnings.catch_warnings():
-        # One class may move one feature only; units are a matter of all classes.
-        warnings.filterwarnings("ignore", ".* of the energy that is compared", UserWarning)
-        synchronized = synchronizer.fit_transform(performances)
-    model.fit(synchronized, groups=groups)
-    return Pipeline([("densesynchronizer", synchronizer), ("actionmodel", model)])
-
-
-def as_given(arrays, on_rows, names):
-    """Performances as they were given, for estimators that have not seen any."""
-    if on_rows:
-        return np.stack([x[:, 0] for x in arrays])
-    return arrays if names is None else [pd.DataFrame(x, columns=names) for x in arrays]
-
-
-# -- labels of classes: whole numbers for the learning, and one for what is none of them -
-
-
-def check_labels(name, performances, y):
-    """The classes, and the class of every performance as a whole number from 0.
-
-    Parameters
-    ----------
-    name : str
-        Of the classifier, for messages.
-    performances : sequence
-    y : array-like, shape (n_sequences,)
-
-    Returns
-    -------
-    classes : ndarray, shape (n_classes,)
-    codes : ndarray of int, shape (n_sequences,)
-    """
-    if y is None:
-        raise ValueError(f"{name} requires y to be passed, but the target y is None.")
-    y = column_or_1d(y, warn=True)
-    check_consistent_length(performances, y)
-    assert_all_finite(y, input_name="y")
-    if (without := pd.isna(y)).any():
-        raise ValueError(f"y has no label for performance {int(without.argmax())}.")
-    check_classification_targets(y)
-    classes, codes = np.unique(y, return_inverse=True)
-    if len(classes) < 2:
-        raise ValueError(
-            f"{name} needs performances of at least 2 classes, got one class: "
-            f"{classes.tolist()[0]!r}. Whether performances are one action is what an "
-            "ActionDetector learns."
-        )
-    return classes, codes
-
-
-def label_of_unknown(label, classes):
-    """What performances are called that are none of the classes: of the same type as these.
+def check_unknown_label(label, classes):
+    """The label of rejected performances, of the same type as the classes.
 
     Parameters
     ----------
@@ -483,8 +425,8 @@ def label_of_unknown(label, classes):
         label = "unknown" if is_text else -1
     if label in classes.tolist():
         raise ValueError(
-            f"unknown_label={label!r} is one of the classes: choose another label for those that "
-            "are rejected."
+            f"unknown_label={label!r} is one of the classes: choose another label for rejected "
+            "performances."
         )
     if is_text != isinstance(label, str):
         raise ValueError(
@@ -492,3 +434,212 @@ def label_of_unknown(label, classes):
             f"classes {classes.tolist()}."
         )
     return np.array(label, dtype=object) if kind == "O" else label
+
+
+class MotionKernel:
+    """The mean of kernels ``exp(-gamma D / median(D))``, medians over the training pairs.
+
+    One ``D`` a comparison is that of its synchronisation distances. The last is the squared
+    Euclidean distance of the `summary_statistics`, in standard deviations of the training set.
+
+    Parameters
+    ----------
+    comparisons : list of Comparison
+    gamma : float
+    summaries : bool
+        Whether the last one is there.
+    """
+
+    def __init__(self, comparisons, gamma, summaries):
+        self.comparisons, self.gamma, self.summaries = comparisons, gamma, summaries
+
+    def fit(self, performances, **jobs):
+        """Estimate units and medians from the training set, and return its kernel: (n, n).
+
+        Parameters
+        ----------
+        performances : sequence of ndarray (n_frames_i, n_features)
+        **jobs : dict
+            ``n_jobs`` and ``progress``.
+        """
+        frames = [x.astype(np.float64, copy=False) for x in performances]
+        self._center = np.concatenate(frames).mean(axis=0)
+        variances = [np.square(x - self._center).sum(axis=1).mean() for x in frames]
+        self._unit = np.sqrt(np.mean(variances)) or 1.0
+        scaled = self._scale(performances)
+        self._features = self._compared(scaled)
+        distances = [
+            pairwise_distances(c, features, name=f" by {c.cost}", **jobs)
+            for c, features in zip(self.comparisons, self._features, strict=True)
+        ]
+        if self.summaries:
+            statistics = np.array([summary_statistics(x) for x in scaled])
+            self._mean, std = statistics.mean(axis=0), statistics.std(axis=0)
+            # Statistics that are constant in the training set have no weight.
+            rounding = _ROUNDING * max(1.0, np.abs(self._center).max() / self._unit)
+            self._std = np.where(std > rounding, std, np.inf)
+            self._statistics = (statistics - self._mean) / self._std
+            distances.append(cdist(self._statistics, self._statistics, "sqeuclidean"))
+        pairs = np.triu_indices(len(scaled), 1)
+        self._medians = [_positive_median(d[pairs]) for d in distances]
+        return self._mean_kernel(distances)
+
+    def __call__(self, performances, **jobs):
+        """The kernel of other performances and the training set: (n_other, n)."""
+        scaled = self._scale(performances)
+        distances = [
+            pairwise_distances(c, new, known, name=f" by {c.cost}", **jobs)
+            for c, new, known in zip(
+                self.comparisons, self._compared(scaled), self._features, strict=True
+            )
+        ]
+        if self.summaries:
+            statistics = np.array([summary_statistics(x) for x in scaled])
+            statistics = (statistics - self._mean) / self._std
+            distances.append(cdist(statistics, self._statistics, "sqeuclidean"))
+        return self._mean_kernel(distances)
+
+    def _scale(self, performances):
+        """Performances about the mean posture, in the unit of the training set."""
+        return [(x.astype(np.float64) - self._center) / self._unit for x in performances]
+
+    def _compared(self, scaled):
+        """The features that each comparison compares."""
+        if not self.comparisons:
+            return []
+        on_clock = normalise_time(scaled, self.comparisons[0].n_frames)
+        return [c.features(on_clock) for c in self.comparisons]
+
+    def _mean_kernel(self, distances):
+        kernels = (
+            np.exp(-self.gamma * d / median)
+            for d, median in zip(distances, self._medians, strict=True)
+        )
+        return sum(kernels) / len(distances)
+
+
+def summary_statistics(x):
+    """Mean, standard deviation, extremes and ends of a performance (n_frames, n_features)."""
+    ends = x[:_N_END_FRAMES].mean(axis=0), x[-_N_END_FRAMES:].mean(axis=0)
+    parts = [x.mean(axis=0), x.std(axis=0), x.min(axis=0), x.max(axis=0), *ends]
+    return np.concatenate(parts)
+
+
+def _positive_median(distances):
+    """The median; if that is 0, the mean, and if that is, 1."""
+    if not distances.size:
+        return 1.0
+    return float(np.median(distances)) or float(distances.mean()) or 1.0
+
+
+class KernelRegression:
+    """Multinomial logistic regression, ``f = K A + b``, with one column a class that sum to 0.
+
+    Parameters
+    ----------
+    kernel : ndarray, shape (n, n)
+        Of the training set, positive semidefinite but for rounding.
+    C : float
+        Inverse strength of the penalty ``|f|^2 / 2``, for all of them.
+    """
+
+    def __init__(self, kernel, C):
+        self.C = C
+        values, vectors = eigh(kernel)
+        kept = values > _EIGENVALUE_ROUNDING * max(values[-1], 0)
+        roots = np.sqrt(values[kept])
+        # K = Z Z', and f = Z w.
+        self._z, self._back = vectors[:, kept] * roots, vectors[:, kept] / roots
+
+    def fit(self, codes, rows=slice(None)):
+        """Fit to the classes (n,), integers from 0, of some performances.
+
+        Returns
+        -------
+        A : ndarray, shape (n, n_classes)
+        b : ndarray, shape (n_classes,)
+            Minus infinity for classes that none of them has.
+        """
+        n_classes = codes.max() + 1
+        # The same penalty, relative to the mean loss, as for all.
+        C = self.C * len(codes) / len(codes[rows])
+        model = LogisticRegression(C=C, max_iter=_MOST_ITERATIONS, tol=_TOLERANCE)
+        model.fit(self._z[rows], codes[rows])
+        weights, intercepts = model.coef_, model.intercept_
+        if len(weights) == 1:
+            # Of two classes scikit-learn fits the difference.
+            weights = np.concatenate([-weights, weights]) / 2
+            intercepts = np.concatenate([-intercepts, intercepts]) / 2
+        A, b = np.zeros((len(codes), n_classes)), np.full(n_classes, -np.inf)
+        A[:, model.classes_] = self._back @ weights.T
+        b[model.classes_] = intercepts
+        return A, b
+
+
+def decision_values(kernel, A, b):
+    """Decision values (m, n_classes) of a kernel (m, n), each row by itself."""
+    return np.vecdot(kernel[:, np.newaxis], A.T) + b
+
+
+def assign_folds(codes, groups, n_folds=_N_FOLDS):
+    """The fold of each performance, with no group in two folds.
+
+    Without groups the performances of each class are divided evenly, in order.
+    """
+    folds = np.empty(len(codes), dtype=np.intp)
+    if groups is None:
+        order = np.argsort(codes, kind="stable")
+        starts = np.searchsorted(codes[order], codes[order])
+        folds[order] = (np.arange(len(codes)) - starts) % n_folds
+        return folds
+    splits = GroupKFold(min(n_folds, groups.max() + 1)).split(codes, groups=groups)
+    for fold, (_, out) in enumerate(splits):
+        folds[out] = fold
+    return folds
+
+
+def held_out_decisions(regression, kernel, codes, folds):
+    """Decision values (n, n_classes) of each performance, fitted on the other folds.
+
+    NaN where these have fewer than two classes, and minus infinity for classes they do not have.
+    """
+    found = np.full((len(codes), codes.max() + 1), np.nan)
+    for fold in np.unique(folds):
+        out = folds == fold
+        if len(np.unique(codes[~out])) > 1:
+            found[out] = decision_values(kernel[out], *regression.fit(codes, ~out))
+    return found
+
+
+def fit_temperature(decisions, codes):
+    """The factor of decision values with the largest posterior density (temperature scaling).
+
+    Parameters
+    ----------
+    decisions : ndarray, shape (n, n_classes)
+        Of held-out performances, as `held_out_decisions` returns them.
+    codes : ndarray of int, shape (n,)
+
+    Returns
+    -------
+    float
+    """
+    known = np.isfinite(decisions[np.arange(len(codes)), codes])
+    decisions, codes = decisions[known], codes[known]
+
+    def loss(log_ratio):
+        logs = log_softmax(_PRIOR_TEMPERATURE * np.exp(log_ratio) * decisions, axis=1)
+        own = logs[np.arange(len(codes)), codes]
+        return (log_ratio / _PRIOR_STD) ** 2 / 2 - own.sum()
+
+    found = minimize_scalar(loss, bounds=(-5, 5), method="bounded", options={"xatol": 1e-6})
+    return float(_PRIOR_TEMPERATURE * np.exp(found.x))
+
+
+def fit_regression(C, folds, kernel, codes):
+    """The regression (A, b), its temperature, and the largest held-out decision values (n,)."""
+    regression = KernelRegression(kernel, C)
+    decisions = held_out_decisions(regression, kernel, codes, folds)
+    A, b = regression.fit(codes)
+    temperature = fit_temperature(decisions, codes)
+    return (np.ascontiguousarray(A.T).T, b), temperature, decisions.max(axis=1)

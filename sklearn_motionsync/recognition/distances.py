@@ -5,18 +5,17 @@ from numbers import Integral, Real
 
 import numpy as np
 from sklearn.base import BaseEstimator
-from sklearn.utils._param_validation import Interval, Options, StrOptions
+from sklearn.utils._param_validation import Interval, StrOptions, validate_params
 
 from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..matching.comparison import BLOCK, Comparison
 from ..matching.costs import COSTS
-from ..matching.units import exponent_of
 from ..matching.warps import normalise
 from ..utils.parallel import Progress, SharedArgument, run
 
-__all__ = ["SETTINGS", "distances_of", "on_clock", "synchronization_distances"]
+__all__ = ["SETTINGS", "normalise_time", "pairwise_distances", "synchronization_distances"]
 
-# What performances are compared with, and what is accepted.
+# Parameters of the comparison, and their constraints.
 SETTINGS: dict = {
     "n_frames": [Interval(Integral, 2, None, closed="left")],
     "velocity_smoothing": [Interval(Real, 0, 1, closed="both")],
@@ -26,10 +25,19 @@ SETTINGS: dict = {
     "n_jobs": [Integral, None],
     "verbose": ["verbose"],
 }
-# Blocks of a portion: worth sending away, and few enough to be shared out.
+# Blocks of a job's portion: enough to outweigh its overhead, and few enough for many jobs.
 _PORTION_BLOCKS = 32
 
 
+@validate_params(
+    {
+        "cost": [StrOptions(set(COSTS))],
+        "normalize": ["boolean"],
+        "symmetric": ["boolean"],
+        **SETTINGS,
+    },
+    prefer_skip_nested_validation=True,
+)
 def synchronization_distances(
     X,
     Y=None,
@@ -45,31 +53,32 @@ def synchronization_distances(
     n_jobs=None,
     verbose=0,
 ):
-    """Synchronisation distances between performances (Eq. 12), the matrix of all pairs.
+    """Synchronisation distances between all pairs of performances (Eq. 12).
 
-    How much two performances differ once each moment of one is compared with the best moment of
-    the other: a number for neighbours, kernels, clusters and maps. Each distance is that of
-    the pair alone, to the last bit, whatever else is in the lists.
+    A distance is the difference of two performances after one is warped to the other: for nearest
+    neighbours, kernels, clusters and embeddings. It depends on the pair alone, to the last bit,
+    not on the other performances.
 
     Parameters
     ----------
     X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
         Performances; the rows of a 2-D array are univariate ones.
-    Y : the same, default=None
-        Others, with the same features. By default distances within X, of 0 on the diagonal.
+    Y : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array, default=None
+        Other performances, with the same features. By default X, with 0 on the diagonal.
     cost : {"elastic", "velocity", "posture"}, default="elastic"
-        What is compared, as in `DenseSynchronizer`.
+        The features that are compared, as in `DenseSynchronizer`.
     normalize : bool, default=True
-        Whether what is compared of each performance is divided by its own root mean square:
-        then it does not matter who moves more, nor in which unit. A performance that stands still
-        has nothing in common with any that moves: they are ``2 * n_frames`` apart.
+        Whether the compared features of each performance are divided by their own root mean
+        square, which removes amplitude and unit. A performance that stands still is
+        ``2 * n_frames`` away from any that moves.
     symmetric : bool, default=True
         Whether to average both directions. Otherwise the rows are the performances whose
         clock is kept, ``n`` of ``D_{n,m}``, and the columns those that are warped, ``m``.
     n_frames : int, default=50
         ``P``, frames of the common clock. The distance is a sum over them.
     velocity_smoothing : float, default=0.06
-        Standard deviation of the Gaussian under which velocities are taken, as a share of the clip.
+        Standard deviation of the Gaussian under which velocities are estimated, as a share of the
+        performance.
     max_offset : float, default=0.25
         Largest offset, as a share of the clock, in [0, 1].
     smoothness : float, default=0.003
@@ -88,14 +97,14 @@ def synchronization_distances(
     -------
     ndarray, shape (n_X, n_Y)
         0 or more, in double precision: squares of the features, summed over the clock, and ``mu``
-        times the penalties of the path. With ``normalize`` performances with nothing in common
-        are ``2 * n_frames`` apart, and the opposite movement up to twice that.
+        times the penalties of the path. With ``normalize`` uncorrelated performances are
+        ``2 * n_frames`` apart, and opposite ones up to twice that.
 
     Raises
     ------
     ValueError
         If the input breaks the contract, the performances of Y have other features than X, or a
-        parameter is none of those that are accepted.
+        parameter is invalid.
 
     See Also
     --------
@@ -124,49 +133,33 @@ def synchronization_distances(
     ['slow', 'fast', 'fast']
     """
     settings = {
-        "n_frames": n_frames,
+        "n_frames": int(n_frames),
         "velocity_smoothing": velocity_smoothing,
         "max_offset": max_offset,
         "smoothness": smoothness,
         "max_rate": max_rate,
     }
-    _check(cost=cost, normalize=normalize, symmetric=symmetric, **settings)
-    settings["n_frames"] = int(n_frames)
     reader = type("synchronization_distances", (SequenceLevelMixin, BaseEstimator), {})()
     both = [check_performances(reader, X, reset=True, level="sequence")]
     if Y is not None:
         on_rows = both[0].kind == "rows"
         given = {"reset": False, "level": "sequence", "on_rows": on_rows}
         both.append(check_performances(reader, Y, **given))
-    exponent = max(exponent_of(x) for performances in both for x in performances)
-    exponent += exponent % 2
-    comparison = Comparison(cost, normalize=normalize, exponent=exponent, **settings)
-    features = [comparison.features(on_clock(some, int(n_frames))) for some in both]
+    comparison = Comparison(cost, normalize=normalize, **settings)
+    features = [comparison.features(normalise_time(some, comparison.n_frames)) for some in both]
     progress = Progress(reader, verbose)
-    return distances_of(
+    return pairwise_distances(
         comparison, *features, symmetric=symmetric, n_jobs=n_jobs, progress=progress
     )
 
 
-def _check(**given):
-    flag = Options(bool, {True, False})
-    accepted = {"cost": [StrOptions(set(COSTS))], "normalize": [flag], "symmetric": [flag]}
-    accepted |= SETTINGS
-    for name, value in given.items():
-        if not any(constraint.is_satisfied_by(value) for constraint in accepted[name]):
-            raise ValueError(
-                f"The {name!r} parameter of synchronization_distances must be "
-                f"{' or '.join(map(str, accepted[name]))}. Got {value!r} instead."
-            )
-
-
-def on_clock(performances, n_frames):
-    """Performances linearly normalised (Eq. 7), in double precision."""
+def normalise_time(performances, n_frames):
+    """Performances linearly normalised in time (Eq. 7), in double precision."""
     return normalise([np.asarray(x, dtype=np.float64) for x in performances], n_frames)
 
 
-def distances_of(comparison, X, Y=None, *, symmetric=True, n_jobs=None, progress, name=""):
-    """Distances between performances, of which these are the features to be compared.
+def pairwise_distances(comparison, X, Y=None, *, symmetric=True, n_jobs=None, progress, name=""):
+    """Distances between performances, given the features that are compared.
 
     Parameters
     ----------
@@ -177,28 +170,27 @@ def distances_of(comparison, X, Y=None, *, symmetric=True, n_jobs=None, progress
     n_jobs : int, default=None
     progress : Progress
     name : str, default=""
-        What is said of them in the progress.
+        Appended to the message of the progress.
 
     Returns
     -------
     ndarray, shape (n_X, n_Y)
     """
     shared = {"n_jobs": n_jobs, "progress": progress, "name": name}
-    there = _ordered(comparison, X, X if Y is None else Y, **shared)
+    there = _directed(comparison, X, X if Y is None else Y, **shared)
     if not symmetric:
         return there
-    back = there if Y is None else _ordered(comparison, Y, X, **shared)
+    back = there if Y is None else _directed(comparison, Y, X, **shared)
     return there / 2 + back.T / 2
 
 
-def _ordered(comparison, bases, moving, *, n_jobs, progress, name):
+def _directed(comparison, bases, moving, *, n_jobs, progress, name):
     rows, columns = (
         [slice(i, i + BLOCK) for i in range(0, len(some), BLOCK)] for some in (bases, moving)
     )
     blocks = list(itertools.product(rows, columns))
     portions = [(blocks[i : i + _PORTION_BLOCKS],) for i in range(0, len(blocks), _PORTION_BLOCKS)]
     stage = f"comparing {len(bases)} with {len(moving)} performances{name}"
-    # Blocks are too small for threads, which wait for each other between them.
     jobs = {"n_jobs": n_jobs, "step": progress.stage(stage, len(portions))}
     out = np.empty((len(bases), len(moving)))
     common = (SharedArgument((comparison, bases, moving)),)

@@ -18,13 +18,12 @@ from ..inputs.tables import as_pandas
 from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..matching.filters import SMOOTHING, smooth
 from ..matching.matcher import Features
-from ..matching.metric import without_mean
 from ..matching.trellis import Trellis
 from ..matching.warps import at_times, even_slices, normalise
 from ..model.action_model import ActionModel
-from ..model.detector import energies
-from ..model.similarity import as_codes, learn_border
+from ..model.similarity import DIFFERENCES, LogMoments, Neighbours, log_moments, movement_energies
 from ..synchronizers.dense import DenseSynchronizer
+from ..utils.groups import encode_groups
 from ..utils.pipelines import find_synchronizer, flat_steps, route_to_synchronizer
 from .cutting import as_takes, cut_takes
 
@@ -251,10 +250,11 @@ def _training_groups(pattern, reached, groups):
     """Codes of the groups of the training performances that the synchronizer keeps, or None."""
     training = reached.synchronizer.training_
     count = len(training.durations)
+    if groups is not None:
+        codes, _ = encode_groups(groups, count, at_least=min(count, 2))
+        return codes[training.kept]
     if count < 2:
         return None
-    if groups is not None:
-        return as_codes(groups, count)[training.kept]
     models = [step for step in flat_steps(pattern) if isinstance(step, ActionModel)]
     if not models or not hasattr(models[0], "groups_"):
         return None
@@ -376,16 +376,10 @@ def scales(shortest, longest):
 
 # -- how unlike windows of a take are to performances that were learnt, and how unlike they may be
 
-# Of the nearest performances so many count: one alone may be a stray.
-_NEAREST = 2
-# Say of the mean posture, as in `ActionModel`.
-_SAY_OF_MEAN = 0.1
 # Say of length and energy: of the sum of their squared standard deviations.
 _SAY_OF_MANNER = 0.05
 # They make nothing more unlike than e to this.
 _MOST = 3.0
-# The variance of both logarithms that is usual of people; it counts like so many values.
-_USUAL_VARIANCE, _USUAL_COUNT = 0.07, 3
 # Who stands still is as unlike as 1. What is not clearly more alike is not the action, however
 # unlike people are; and takes are noisier than clips, and windows begin at whole frames.
 _MOST_BORDER, _LEAST_BORDER = 0.7, 0.15
@@ -427,25 +421,23 @@ class Unlikeness:
     def __init__(self, synchronizer, groups=None, length=True):
         training = synchronizer.training_
         self._set_clock(training.features, synchronizer.n_frames_)
-        self._length = _Usual(training.durations) if length else np.zeros_like
+        moments = LogMoments.of(training.durations)
+        self._length = moments.standardize if length else np.zeros_like
         self._usual_length = np.exp(np.log(training.durations).mean())
         count = len(training.kept)
         positions = self._positions(training.on_clock)
-        self._center = positions.mean(axis=(0, 1))
-        energy, self._floor = energies(positions)
+        energy, self._floor = movement_energies(positions)
         if energy.max() <= self._floor:
             raise ValueError(
                 "Nobody moves in what is looked for: all times of a take where somebody stands "
                 "are alike. Give a pattern, or fit on performances, that move."
             )
-        self._energy = _Usual(energy)
-        self._known = self._views(positions)
-        self._squares = [np.vecdot(view, view) for view in self._known]
+        self._energy = LogMoments.of(energy).standardize
+        codes, _ = encode_groups(groups, count, at_least=min(count, 2))
+        self._neighbours = Neighbours(positions, codes, self._features, DIFFERENCES)
         self._training, self.known = positions, np.empty(0)
         if count > 1:
-            self._groups = as_codes(groups, count)
-            own = training.durations[training.kept]
-            self.known = self._of(positions, own, self._groups)
+            self.known = self._of(positions, training.durations[training.kept], codes)
 
     def border(self, coverage):
         """Up to how unlike a share of the performances of new people is expected to be.
@@ -454,7 +446,7 @@ class Unlikeness:
         """
         if not len(self.known):
             return _BORDER_OF_ONE
-        learnt = min(learn_border(self.known, coverage), _MOST_BORDER)
+        learnt = min(log_moments(self.known).upper_limit(coverage), _MOST_BORDER)
         return max(min(learnt, self._chance()), _LEAST_BORDER)
 
     def __call__(self, take, windows):
@@ -484,49 +476,11 @@ class Unlikeness:
         arrays = [np.asarray(x, dtype=np.float64) for x in performances]
         return self._features.unit(normalise(arrays, self._n_positions))
 
-    def _views(self, positions):
-        """What is compared of performances: postures beside their mean, and features, as rows."""
-        n, n_positions, _ = positions.shape
-        stood = np.sqrt(_SAY_OF_MEAN * n_positions) * (positions.mean(axis=1) - self._center)
-        moved = without_mean(positions).reshape(n, -1)
-        return np.hstack([moved, stood]), moved, self._features(positions).reshape(n, -1)
-
     def _of(self, positions, lengths, groups=None):
-        ratios = self._ratios(positions)
-        if groups is not None:
-            ratios[groups[:, np.newaxis] == self._groups] = np.inf
-        nearest = np.sort(ratios, axis=1)[:, :_NEAREST]
-        counts = np.isfinite(nearest)
-        shape = np.where(counts, nearest, 0).sum(axis=1) / counts.sum(axis=1)
-        energy, _ = energies(positions, self._floor)
+        shape = self._neighbours.dissimilarity(positions, groups)
+        energy, _ = movement_energies(positions, self._floor)
         manner = np.square(self._energy(energy)) + np.square(self._length(lengths))
         return shape * np.exp(np.minimum(_SAY_OF_MANNER * manner, _MOST))
-
-    def _ratios(self, positions):
-        """How unlike performances are to each of those that are known: (n, n_kept)."""
-        stood, moved, compared = self._views(positions)
-        squares = np.vecdot(moved, moved), np.vecdot(compared, compared)
-        out = np.empty((len(positions), len(self._known[0])))
-        tiny = np.finfo(np.float64).tiny
-        # Row by row, so that no result depends on the others.
-        for i, column in enumerate(out.T):
-            posture, feature = stood - self._known[0][i], compared - self._known[2][i]
-            column[:] = np.vecdot(posture, posture) / (squares[0] + self._squares[1][i] + tiny)
-            column += np.vecdot(feature, feature) / (squares[1] + self._squares[2][i] + tiny)
-        return out / 2
-
-
-class _Usual:
-    """How many standard deviations the logarithms of numbers are from those that are usual."""
-
-    def __init__(self, values):
-        logs = np.log(values)
-        self._mean = logs.mean()
-        squares = np.square(logs - self._mean).sum() + _USUAL_COUNT * _USUAL_VARIANCE
-        self._std = np.sqrt(squares / (len(logs) + _USUAL_COUNT))
-
-    def __call__(self, values):
-        return (np.log(values) - self._mean) / self._std
 
 
 # -- movements by chance: what a take may hold that is like an action without being it ---

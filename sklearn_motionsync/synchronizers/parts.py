@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from numbers import Real
 
 import numpy as np
-import pandas as pd
 from sklearn.base import _fit_context, clone
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
@@ -19,6 +18,7 @@ from ..matching.rows import Coupling
 from ..matching.warper import Warper
 from ..matching.warps import follow, normalise
 from ..utils.atomic import atomic_fit, snapshot
+from ..utils.groups import encode_groups
 from ..utils.parallel import Progress, run
 from .base import Synchronizer
 from .dense import DenseSynchronizer
@@ -386,26 +386,6 @@ def choose_parts(parts, performances, names):
             owner[k] = part
         chosen[part] = np.array(indices, dtype=np.intp)
     return chosen
-
-
-def encode_groups(groups, n_sequences):
-    """The group of every performance as an integer from 0, and the labels of the groups."""
-    given = (
-        groups if isinstance(groups, (pd.Series, pd.Index)) else np.asarray(groups, dtype=object)
-    )
-    if given.ndim != 1 or len(given) != n_sequences:
-        raise ValueError(
-            f"groups must be one for each of the {n_sequences} performances, got shape "
-            f"{np.shape(given)}."
-        )
-    codes, names = pd.factorize(given)
-    if (codes < 0).any():
-        i = int(np.argmin(codes))
-        raise ValueError(
-            f"Performance {i}: its group is missing, {list(given)[i]!r}. Give its label, or leave "
-            "the performance out."
-        )
-    return codes, list(names)
 
 
 # -- the warper of a part -----------------------------------------------------------------

@@ -81,8 +81,6 @@ def test_groups_color_the_performances(bunch, pipe):
         assert same == [[a == b for b in groups] for a in groups]
     legend = display.axes_[0].get_legend()
     assert [text.get_text() for text in legend.get_texts()] == ["a", "b", "c"]
-    with pytest.raises(ValueError, match=r"each of the 7 performances, got 2"):
-        SynchronizationDisplay.from_estimator(pipe, bunch.data, groups=["a", "b"])
 
 
 def test_many_groups_all_have_a_color(bunch, pipe):

@@ -78,11 +78,6 @@ def drawn(**given):
         ({"feature_names": [["a"], ["b"], ["c"]]}, "feature_names must be a list of text"),
         ({"feature_names": 3}, "feature_names must be a list of text.* got 3"),
         ({"feature_names": list("aab"), "features": "a"}, "'a' comes 2 times"),
-        ({"groups": ["a"]}, "groups .* each of the 4 performances, got 1"),
-        ({"groups": list("abcde")}, "groups .* each of the 4 performances, got 5"),
-        ({"groups": "abcd"}, "groups must be a list of text.* got 'abcd'"),
-        ({"groups": 4}, "groups must be a list of text.* got 4"),
-        ({"groups": set("abcd")}, "groups must be a list of text"),
         *(({"features": bad}, "There is no feature .*there are 3: x0, x1, x2")
           for bad in (3, -1, 1.0, True, "knee", [0, "x3"], [[0, 1]], None.__class__, {"x9": 1})),
         ({"features": []}, "at least one feature"),

@@ -24,15 +24,15 @@ def slow_runs(scores, limit):
 
 @pytest.mark.parametrize("limit", [0.5, 1.0, 2.0, 3.0])
 @pytest.mark.parametrize("shape", [(4, 30, 3), (1, 1, 1), (3, 1, 2), (1, 50, 1), (2, 7, 40)])
-def test_runs_are_those_of_a_loop(shape, limit):
+def test_runs_equal_those_of_a_loop(shape, limit):
     scores = np.random.default_rng(0).standard_normal(shape) * 1.5
-    # Whole numbers: peaks that are reached twice, scores that are the limit itself.
+    # Integers: equal peaks, scores equal to the limit.
     for z in (scores, np.round(scores), np.sort(scores, axis=1)):
         found = runs(z, limit)
         assert list(zip(*found, strict=True)) == slow_runs(z, limit)
 
 
-def test_a_run_may_change_sides():
+def test_runs_may_change_sign():
     z = np.array([0, 4, -5, 0, 0, np.inf, -3.5, 3])[np.newaxis, :, np.newaxis]
     found = runs(z, 3)
     assert found.first.tolist() == [1, 5]
@@ -41,7 +41,7 @@ def test_a_run_may_change_sides():
     assert found.score.tolist() == [-5, np.inf]
 
 
-def test_none_and_everything():
+def test_no_run_and_one_long_run():
     z = np.ones((2, 6, 3))
     assert [len(column) for column in runs(z, 1)] == [0] * 6
     assert all(column.dtype == int for column in runs(z, 1)[:5])

@@ -1,4 +1,4 @@
-"""The classifier of actions: its kernel written out, few performances, strangers, and people."""
+"""The classifier: against its kernel written out, of few performances, of unknown actions."""
 
 import json
 import pickle
@@ -9,15 +9,12 @@ import pandas as pd
 import pytest
 from scipy.special import softmax
 from sklearn import config_context
-from sklearn.calibration import CalibratedClassifierCV
 from sklearn.ensemble import StackingClassifier
-from sklearn.exceptions import NotFittedError
 from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import log_loss, roc_auc_score
 from sklearn.model_selection import (
     GridSearchCV,
     GroupKFold,
-    cross_val_predict,
     cross_val_score,
     cross_validate,
 )
@@ -34,7 +31,11 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import load_performances, make_bending
 from sklearn_motionsync.display import SkeletonDisplay
-from sklearn_motionsync.recognition.kernel import KernelRegression, deal, decide
+from sklearn_motionsync.recognition.classifier import (
+    KernelRegression,
+    assign_folds,
+    decision_values,
+)
 
 KINDS = ("wave", "rise", "turn")
 
@@ -74,7 +75,7 @@ def few(X, y, n):
     return [X[i] for i in chosen], y[chosen]
 
 
-# -- what is decided, written out -------------------------------------------------------
+# -- the kernel, written out -----------------------------------------------------------
 
 
 def slow_kernel(X, new, gamma):
@@ -104,16 +105,16 @@ def slow_kernel(X, new, gamma):
 
 
 @pytest.mark.parametrize("gamma", [1, 0.3])
-def test_decisions_are_those_of_the_kernels_written_out(known, new, gamma):
+def test_decisions_equal_those_of_slow_kernels(known, new, gamma):
     X, y, people = known
     codes = np.unique(y, return_inverse=True)[1]
     classifier = ActionClassifier(n_frames=30, gamma=gamma, C=3).fit(X, y, groups=people)
     A, b = KernelRegression(slow_kernel(X, X, gamma), 3).fit(codes)
-    expected = decide(slow_kernel(X, new[0], gamma), A, b)
+    expected = decision_values(slow_kernel(X, new[0], gamma), A, b)
     np.testing.assert_allclose(classifier.decision_function(new[0]), expected, atol=2e-4)
 
 
-def test_what_is_said_agrees(fitted, new):
+def test_predictions_agree_with_each_other(fitted, new):
     X, y, _ = new
     decisions = fitted.decision_function(X)
     assert fitted.classes_.tolist() == sorted(KINDS)
@@ -122,11 +123,10 @@ def test_what_is_said_agrees(fitted, new):
     expected = softmax(fitted.temperature_ * decisions, axis=1)
     np.testing.assert_allclose(fitted.predict_proba(X), expected)
     np.testing.assert_array_equal(fitted.score_samples(X), decisions.max(axis=1))
-    np.testing.assert_array_equal(fitted.novelty_scores(X), -decisions.max(axis=1))
     assert fitted.score(X, y) == 1
 
 
-def test_of_two_classes_the_difference_decides(known, new):
+def test_two_classes_have_one_decision_value(known, new):
     X, y, _ = known
     two = y != "turn"
     classifier = ActionClassifier(n_frames=20).fit([X[i] for i in np.flatnonzero(two)], y[two])
@@ -136,11 +136,10 @@ def test_of_two_classes_the_difference_decides(known, new):
     np.testing.assert_array_equal(classifier.predict(new[0]), expected)
     wave = classifier.predict_proba(new[0])[:, 1]
     np.testing.assert_allclose(wave, 1 / (1 + np.exp(-classifier.temperature_ * decisions)))
-    np.testing.assert_allclose(classifier.novelty_scores(new[0]), -np.abs(decisions) / 2)
+    np.testing.assert_allclose(classifier.score_samples(new[0]), np.abs(decisions) / 2)
 
 
-def test_people_held_out_tell_how_sure_to_be(known, fitted):
-    """Who is among the others is recognised too well to know how well strangers are."""
+def test_groups_lower_temperature_threshold_and_held_out_values(known, fitted):
     X, y, _ = movements(noise=0.4)
     people = np.arange(30) % 10 // 2
     X = [x + 2 * np.sin(5 * p) for x, p in zip(X, people, strict=True)]
@@ -150,20 +149,19 @@ def test_people_held_out_tell_how_sure_to_be(known, fitted):
     assert named.threshold_at(0.9) < unnamed.threshold_at(0.9)
     assert named.held_out_.mean() < 0.95 * unnamed.held_out_.mean()
     X, y, people = known
-    # Of many people several are held out at a time, one fold of five.
+    # Of many groups several are held out at a time, one fold of five.
     many = np.arange(30) % 7
-    dealt = deal(np.unique(y, return_inverse=True)[1], many, 5)
-    both = [ActionClassifier(n_frames=8).fit(X, y, groups=g) for g in (many, dealt)]
+    folds = assign_folds(np.unique(y, return_inverse=True)[1], many, 5)
+    both = [ActionClassifier(n_frames=8).fit(X, y, groups=g) for g in (many, folds)]
     np.testing.assert_array_equal(both[0].held_out_, both[1].held_out_)
-    # Labels of groups are labels.
     again = ActionClassifier(n_frames=30).fit(X, y, groups=np.array(list("edcba"))[people])
     assert again.temperature_ == pytest.approx(fitted.temperature_)
 
 
-# -- nothing else counts ----------------------------------------------------------------
+# -- invariances ------------------------------------------------------------------------
 
 
-def test_alone_or_together_and_by_any_number_of_jobs(known, fitted, new):
+def test_decisions_do_not_depend_on_other_performances_or_jobs(known, fitted, new):
     decisions = fitted.decision_function(new[0])
     for i in (0, 5):
         np.testing.assert_array_equal(fitted.decision_function([new[0][i]])[0], decisions[i])
@@ -176,24 +174,18 @@ def test_alone_or_together_and_by_any_number_of_jobs(known, fitted, new):
     np.testing.assert_array_equal(again.decision_function(new[0]), decisions)
 
 
-@pytest.mark.parametrize("scale", [2.0**-400, 2.0**30])
-def test_the_unit_does_not_count(known, fitted, new, scale):
+@pytest.mark.parametrize("scale", [2.0**-26, 2.0**25])
+def test_decisions_do_not_depend_on_unit_or_origin(known, fitted, new, scale):
     X, y, people = known
     other = ActionClassifier(n_frames=30).fit([scale * x for x in X], y, groups=people)
     found = other.decision_function([scale * x for x in new[0]])
     np.testing.assert_array_equal(found, fitted.decision_function(new[0]))
-    with pytest.raises(ValueError, match=r"Performance 1 is more than 1e\+30 times as large"):
-        other.predict([scale * X[0], scale * X[1] * 1e40])
-
-
-def test_a_place_elsewhere_does_not_count(known, fitted, new):
-    X, y, people = known
-    other = ActionClassifier(n_frames=30).fit([x + 1000 for x in X], y, groups=people)
+    other.fit([x + 1000 for x in X], y, groups=people)
     found = other.decision_function([x + 1000 for x in new[0]])
     np.testing.assert_allclose(found, fitted.decision_function(new[0]), atol=1e-3)
 
 
-def test_what_the_user_does_afterwards_does_not_count(known):
+def test_fitted_classifier_does_not_share_the_training_arrays(known):
     X, y, _ = known
     mine = [x.copy() for x in X]
     classifier = ActionClassifier(n_frames=20).fit(mine, y)
@@ -204,19 +196,19 @@ def test_what_the_user_does_afterwards_does_not_count(known):
     np.testing.assert_array_equal(classifier.predict_proba(X), before[1])
 
 
-# -- strangers --------------------------------------------------------------------------
+# -- unknown actions ---------------------------------------------------------------------
 
 
-def test_what_is_none_of_the_classes_is_rejected(fitted, new):
+def test_unknown_actions_are_rejected(fitted, new):
     X, y, _ = new
     rng = np.random.default_rng(0)
     still = [np.full((30, 2), 0.3), np.full((9, 2), -1.0)]
     shaking = [rng.standard_normal((40, 2)) for _ in range(4)]
-    strangers = [*still, *shaking, *(x[::-1] for x in X[8:])]
-    assert fitted.novelty_scores(strangers).min() > fitted.novelty_scores(X).max()
+    unknown = [*still, *shaking, *(x[::-1] for x in X[8:])]
+    assert fitted.score_samples(unknown).max() < fitted.score_samples(X).min()
     careful = ActionClassifier(**fitted.get_params()).set_params(reject_below="auto")
     vars(careful).update({k: v for k, v in vars(fitted).items() if k not in fitted.get_params()})
-    assert (careful.predict(strangers) == "unknown").mean() > 0.8
+    assert (careful.predict(unknown) == "unknown").mean() > 0.8
     assert (careful.predict(X) == y).all()
     # Rejecting changes no probability, and only what is below.
     np.testing.assert_array_equal(careful.predict_proba(X), fitted.predict_proba(X))
@@ -226,7 +218,7 @@ def test_what_is_none_of_the_classes_is_rejected(fitted, new):
     np.testing.assert_array_equal(careful.predict(X) == "?", largest < border)
 
 
-def test_the_threshold_keeps_the_share_it_says():
+def test_threshold_keeps_its_coverage():
     X, y, people = movements(15, noise=0.5)
     classifier = ActionClassifier(n_frames=15).fit(X, y, groups=people)
     assert classifier.held_out_.shape == (45,)
@@ -253,7 +245,7 @@ def test_the_threshold_keeps_the_share_it_says():
         (np.array(["a", "a much longer name"]), None, "unknown"),
     ],
 )
-def test_the_label_of_strangers_is_of_the_same_type(known, labels, unknown, expected):
+def test_unknown_label_has_the_type_of_the_classes(known, labels, unknown, expected):
     X = known[0][:10] + known[0][20:]
     y = np.repeat(labels, 10)
     classifier = ActionClassifier(n_frames=8, reject_below=1e9, unknown_label=unknown).fit(X, y)
@@ -271,14 +263,14 @@ def test_the_label_of_strangers_is_of_the_same_type(known, labels, unknown, expe
         ([1, 2], "new", "unknown_label='new' must be a number, like the classes"),
     ],
 )
-def test_a_label_that_cannot_be_told_apart(known, labels, unknown, message):
+def test_unknown_label_is_checked(known, labels, unknown, message):
     X = known[0][:10] + known[0][20:]
     classifier = ActionClassifier(n_frames=8, reject_below="auto", unknown_label=unknown)
     with pytest.raises(ValueError, match=message):
         classifier.fit(X, np.repeat(labels, 10)).predict(X)
 
 
-# -- few, short, odd --------------------------------------------------------------------
+# -- small training sets ---------------------------------------------------------------
 
 
 def test_one_performance_a_class(known, new):
@@ -286,38 +278,22 @@ def test_one_performance_a_class(known, new):
     classifier = ActionClassifier(n_frames=30).fit(X, y)
     assert classifier.score(new[0], new[1]) > 0.9
     assert np.isfinite(classifier.predict_proba(new[0])).all()
-    with pytest.raises(ValueError, match="The class 'rise' has one performance: what varies"):
+    with pytest.raises(ValueError, match="The class 'rise' has one performance: a model needs"):
         classifier.model_of("rise")
     two = ActionClassifier(n_frames=8).fit(X[:2], y[:2])
     assert two.temperature_ == pytest.approx(4)
-    with pytest.raises(ValueError, match="No threshold can be learnt, as nobody could be held"):
+    with pytest.raises(ValueError, match="There is no threshold, as no performance could be held"):
         two.threshold_at(0.95)
 
 
-def test_unfitted():
-    for ask in (lambda c: c.model_of("wave"), lambda c: c.threshold_at(0.9)):
-        with pytest.raises(NotFittedError):
-            ask(ActionClassifier())
-
-
-def test_clips_of_three_frames_and_of_two(known, new):
-    for n in (3, 2):
-        X, tried = (
-            [x[np.linspace(0, len(x) - 1, n).astype(int)] for x in some[0]] for some in (known, new)
-        )
-        classifier = ActionClassifier(n_frames=9).fit(X, known[1], groups=known[2])
-        assert classifier.score(tried, new[1]) > 0.7
-        assert np.isfinite(classifier.predict_proba(tried)).all()
-
-
-def test_a_class_that_only_one_person_does(known, new):
+def test_a_class_of_one_group_is_held_out(known, new):
     X, y, _ = known
     people = np.where(y == "turn", 0, np.arange(30) % 3)
     classifier = ActionClassifier(n_frames=20).fit(X, y, groups=people)
     assert classifier.score(new[0], new[1]) == 1
-    # Nobody knows it when that person is held out; the others are told apart.
+    # The class is unknown when that group is held out; the others are not.
     assert np.isfinite(classifier.held_out_).all()
-    # One class each: nothing can be learnt without either of them.
+    # Two groups of one class each: without either there is one class.
     two = y != "rise"
     X = [X[i] for i in np.flatnonzero(two)]
     classifier = ActionClassifier(n_frames=20).fit(X, y[two], groups=y[two])
@@ -325,17 +301,14 @@ def test_a_class_that_only_one_person_does(known, new):
     assert classifier.temperature_ == pytest.approx(4)
 
 
-def test_all_alike(known):
-    X = [known[0][0]] * 4
-    classifier = ActionClassifier(n_frames=8).fit(X, [0, 0, 1, 1])
-    np.testing.assert_allclose(classifier.predict_proba(X), 0.5, atol=1e-3)
-    X = [np.full((5, 2), 3.0)] * 4
-    classifier = ActionClassifier(n_frames=8).fit(X, [0, 0, 1, 1])
-    np.testing.assert_allclose(classifier.predict_proba(X), 0.5, atol=1e-3)
+def test_identical_performances_have_equal_probabilities(known):
+    for X in ([known[0][0]] * 4, [np.full((5, 2), 3.0)] * 4):
+        classifier = ActionClassifier(n_frames=8).fit(X, [0, 0, 1, 1])
+        np.testing.assert_allclose(classifier.predict_proba(X), 0.5, atol=1e-3)
 
 
 @pytest.mark.parametrize("constant", [0.1, -1e6 / 3])
-def test_a_constant_feature_does_not_count(known, fitted, new, constant):
+def test_constant_features_have_no_weight(known, fitted, new, constant):
     def wider(X):
         return [np.column_stack([x, np.full(len(x), constant)]) for x in X]
 
@@ -345,7 +318,7 @@ def test_a_constant_feature_does_not_count(known, fitted, new, constant):
     np.testing.assert_allclose(found, fitted.decision_function(new[0]), atol=1e-3)
 
 
-def test_costs_one_by_one_and_none(known, new):
+def test_any_costs_separate_the_classes(known, new):
     X, y, _ = known
     for costs in ("elastic", ("posture", "velocity"), np.array(["velocity"]), []):
         classifier = ActionClassifier(costs, n_frames=15).fit(X, y)
@@ -360,25 +333,20 @@ def test_costs_one_by_one_and_none(known, new):
         ({"costs": ["speed"]}, None, None, r"costs must be some of \['velocity', 'elastic', 'p"),
         ({"costs": ["elastic"] * 2}, None, None, "each once"),
         ({"costs": [], "summaries": False}, None, None, "at least one of them without summaries"),
-        ({"C": 0}, None, None, "'C' parameter of ActionClassifier"),
-        ({"reject_below": "never"}, None, None, "'reject_below' parameter"),
-        ({}, ["a"] * 30, None, "at least 2 classes, got one class: 'a'.* ActionDetector learns"),
+        ({}, ["a"] * 30, None, "at least 2 classes, got one class: 'a'.* ActionDetector"),
         ({}, ["a"] * 29, None, "inconsistent numbers of samples"),
-        ({}, [*["a", None] * 15], None, "y has no label for performance 1"),
         ({}, np.linspace(0, 1, 30), None, "Unknown label type: continuous"),
         ({}, [[1, 2]] * 30, None, "1d array"),
-        ({}, None, ["x"] * 30, "All performances are of the group 'x'"),
-        ({}, None, ["x", "y"], "groups has 2 labels, and there are 30 performances"),
     ],
 )
-def test_what_is_refused(known, params, y, groups, message):
+def test_fit_refuses_invalid_input(known, params, y, groups, message):
     X, right, _ = known
     classifier = ActionClassifier(**{"n_frames": 8, **params})
     with pytest.raises(ValueError, match=message):
         classifier.fit(X, right if y is None else y, groups=groups)
 
 
-# -- among others of scikit-learn -------------------------------------------------------
+# -- with scikit-learn -----------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -390,13 +358,9 @@ def bends():
     return X, np.repeat(["bend", "half"], 12), np.tile(bunch.actor, 2), pipe
 
 
-def test_cross_validation_searches_and_ensembles(bends):
+def test_classifier_in_cross_validation_searches_and_ensembles(bends):
     X, y, people, pipe = bends
     assert cross_val_score(pipe, X, y, groups=people, cv=GroupKFold(4)).mean() > 0.9
-    proba = cross_val_predict(pipe, X, y, method="predict_proba", cv=3)
-    assert log_loss(y, proba) < 0.5
-    calibrated = CalibratedClassifierCV(pipe, cv=3).fit(X, y)
-    assert calibrated.score(X, y) > 0.9
     world = make_pipeline(DirectionCosines(pipe[0].skeleton, "world"), ActionClassifier(n_frames=8))
     stack = StackingClassifier([("a", pipe), ("b", world)], LogisticRegression(), cv=3)
     assert stack.fit(X, y).score(X, y) > 0.9
@@ -411,7 +375,7 @@ def test_cross_validation_searches_and_ensembles(bends):
         assert search.fit(X, y, groups=people).best_score_ > 0.9
 
 
-def test_tables_are_the_same(bends):
+def test_tables_give_the_same_probabilities(bends):
     X, y, _, pipe = bends
     expected = pipe.fit(X, y).predict_proba(X)
     table = to_frame(X, columns=pipe[0].skeleton.column_names)
@@ -419,12 +383,18 @@ def test_tables_are_the_same(bends):
     np.testing.assert_array_equal(framed.predict_proba(table), expected)
     assert list(framed[-1].feature_names_in_)[:2] == ["pelvis_height", "hip_x"]
     assert list(framed[-1].model_of("half")[0].feature_names_in_)[:1] == ["pelvis_height"]
+    new = to_frame(X[11:13], performances=list("pq"), columns=pipe[0].skeleton.column_names)
+    found = find_departures(framed, new, limit=1)
+    assert set(zip(found["performance"], found["class"], strict=True)) == {
+        ("p", "bend"),
+        ("q", "half"),
+    }
 
 
-# -- why --------------------------------------------------------------------------------
+# -- models of classes --------------------------------------------------------------------------
 
 
-def test_a_class_is_explained_by_its_own_performances(bends):
+def test_model_of_a_class_is_fitted_on_its_performances(bends):
     X, y, people, pipe = bends
     pipe.fit(X, y, actionclassifier__groups=people)
     mine = [X[i] for i in np.flatnonzero(y == "half")]
@@ -437,58 +407,32 @@ def test_a_class_is_explained_by_its_own_performances(bends):
         pipe[-1].model_of("jump")
 
 
-@pytest.mark.parametrize("kind", ["list", "table"])
-def test_departures_are_those_from_the_class_that_is_given(bends, kind):
+def test_departures_are_those_from_the_predicted_class(bends):
     X, y, people, pipe = bends
-    steps = pipe[0], ASpace(0.99), ActionClassifier(n_frames=15, reject_below=1e9)
-    columns = steps[0].skeleton.column_names
-    known = to_frame(X, columns=columns) if kind == "table" else X
-    output = "pandas" if kind == "table" else "default"
-    pipe = (
-        make_pipeline(*steps)
-        .set_output(transform=output)
-        .fit(known, y, actionclassifier__groups=people)
-    )
-    new = [X[13], X[0], X[14], X[1] + 0.0]
-    joints = new[0].reshape(len(new[0]), -1, 3)
-    wrist = steps[0].skeleton.index_of("left_wrist")
-    new[0] = joints.copy().reshape(len(joints), -1)
-    new[0][5:12, 3 * wrist + 1] += 0.4
-    given = new
-    if kind == "table":
-        given = to_frame(new, performances=list("pqrs"), columns=columns)
-    found = find_departures(pipe, given, limit=1)
-    labels = list("pqrs") if kind == "table" else [0, 1, 2, 3]
-    classes = found.groupby("performance", sort=False)["class"].unique()
-    assert {k: v.tolist() for k, v in classes.items()} == {
-        labels[0]: ["half"],
-        labels[1]: ["bend"],
-        labels[2]: ["half"],
-        labels[3]: ["bend"],
-    }
-    assert list(found["performance"]) == sorted(found["performance"])
-    worst = found[found["performance"] == labels[0]].iloc[0]
-    assert worst["feature"].startswith("left_forearm")
+    pipe = make_pipeline(pipe[0], ASpace(0.99), ActionClassifier(n_frames=15, reject_below=1e9))
+    pipe.fit(X, y, actionclassifier__groups=people)
+    new = [X[13].copy(), X[0], X[14], X[1]]
+    new[0][5:12, 3 * pipe[0].skeleton.index_of("left_wrist") + 1] += 0.4
+    found = find_departures(pipe, new, limit=1)
+    classes = found.groupby("performance")["class"].unique()
+    assert classes.explode().to_dict() == {0: "half", 1: "bend", 2: "half", 3: "bend"}
+    assert found["performance"].is_monotonic_increasing
+    assert found["feature"][0].startswith("left_forearm")
     half = make_pipeline(*pipe[:-1], *pipe[-1].model_of("half"))
-    mine = [new[0], new[2]]
-    mine = [pd.DataFrame(x, columns=columns) for x in mine] if kind == "table" else mine
-    expected = find_departures(half, mine, limit=1)
-    mine = found[found["class"] == "half"].drop(columns=["class", "performance"])
-    expected = expected.drop(columns="performance")
-    pd.testing.assert_frame_equal(mine.reset_index(drop=True), expected)
-    if kind == "table":
-        return
-    display = SkeletonDisplay.from_departures(pipe, given, performance=2, limit=1)
+    expected = find_departures(half, new[::2], limit=1).drop(columns="performance")
+    own = found[found["class"] == "half"].drop(columns=["class", "performance"])
+    pd.testing.assert_frame_equal(own.reset_index(drop=True), expected)
+    display = SkeletonDisplay.from_departures(pipe, new, performance=2, limit=1)
     assert display.heading.startswith("Performance 2, most like 'half', is accepted by the model")
     alone = SkeletonDisplay.from_departures(half, [new[2]], limit=1)
     assert display.titles == alone.titles
     np.testing.assert_allclose(np.array(display.scenes), np.array(alone.scenes))
     plt.close("all")
     with pytest.raises(ValueError, match="performance=7 is out of range: there are 4"):
-        SkeletonDisplay.from_departures(pipe, given, performance=7)
+        SkeletonDisplay.from_departures(pipe, new, performance=7)
 
 
-def test_departures_of_curves_and_of_params_nobody_takes(known, fitted):
+def test_departures_of_a_bare_classifier_and_unknown_params(known, fitted):
     x = known[0][3].copy()
     x[10:14, 1] += 4
     found = find_departures(fitted, [x])
@@ -503,7 +447,7 @@ def test_departures_of_curves_and_of_params_nobody_takes(known, fitted):
 # -- people -----------------------------------------------------------------------------
 
 
-def test_people_who_were_not_seen(real_data):
+def test_new_people_and_an_unknown_action(real_data):
     """The first of the published halves of ten people, an action left out, and what is rejected."""
     folder = real_data / "utkinect"
     bunch = load_performances(folder / "utkinect_positions.npz")
@@ -518,14 +462,14 @@ def test_people_who_were_not_seen(real_data):
         classifier.fit([X[i] for i in train], bunch.target[train], groups=number[train])
         new, truth = [X[i] for i in tried], bunch.target[tried]
         if left_out:
-            assert roc_auc_score(truth == left_out, classifier.novelty_scores(new)) > 0.85
+            assert roc_auc_score(truth != left_out, classifier.score_samples(new)) > 0.85
             continue
         proba = classifier.predict_proba(new)
         assert np.mean(classifier.classes_[proba.argmax(axis=1)] == truth) > 0.92
         assert log_loss(truth, proba) < 0.25
         kept = classifier.set_params(reject_below="auto").predict(new) != "unknown"
         assert kept.mean() > 0.9
-        still = classifier.novelty_scores([x[:1].repeat(len(x), axis=0) for x in new])
-        moving = classifier.novelty_scores(new)
-        strange = np.repeat([0, 1], [len(moving), len(still)])
-        assert roc_auc_score(strange, np.concatenate([moving, still])) > 0.95
+        still = classifier.score_samples([x[:1].repeat(len(x), axis=0) for x in new])
+        moving = classifier.score_samples(new)
+        is_known = np.repeat([1, 0], [len(moving), len(still)])
+        assert roc_auc_score(is_known, np.concatenate([moving, still])) > 0.95

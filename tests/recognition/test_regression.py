@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from scipy.special import logsumexp, softmax
-from sklearn_motionsync.recognition.kernel import (
+from sklearn_motionsync.recognition.classifier import (
     KernelRegression,
-    deal,
-    decide,
-    held_out,
-    learn_temperature,
+    assign_folds,
+    decision_values,
+    fit_temperature,
+    held_out_decisions,
 )
 
 
@@ -24,7 +24,7 @@ def points(n=24, n_classes=3, seed=0):
 
 @pytest.mark.parametrize("n_classes", [2, 3])
 @pytest.mark.parametrize("C", [0.3, 10])
-def test_the_regression_minimises_its_objective(n_classes, C):
+def test_regression_minimises_its_objective(n_classes, C):
     """Over f = K A + b: C times the log-loss and half the squared norm in the kernel's space."""
     K, codes = points(n_classes=n_classes)
     n = len(K)
@@ -44,72 +44,62 @@ def test_the_regression_minimises_its_objective(n_classes, C):
     best = minimize(objective, start, jac=True, options={"maxiter": 5000})
     A, b = KernelRegression(K, C).fit(codes)
     assert objective(np.r_[A.ravel(), b])[0] <= best.fun * (1 + 1e-6)
-    np.testing.assert_allclose(decide(K, A, b).sum(axis=1), 0, atol=1e-6)
+    np.testing.assert_allclose(decision_values(K, A, b).sum(axis=1), 0, atol=1e-6)
 
 
-def test_some_rows_are_learnt_as_if_there_were_no_others():
+def test_fit_of_some_rows_equals_a_fit_without_the_others():
     K, codes = points()
     some = np.arange(len(K)) % 4 != 0
     A, b = KernelRegression(K, 5).fit(codes, some)
     alone = KernelRegression(K[np.ix_(some, some)], 5 * 24 / 18).fit(codes[some])
-    expected = decide(K[:, some], *alone)
-    np.testing.assert_allclose(decide(K, A, b), expected, atol=2e-3)
+    expected = decision_values(K[:, some], *alone)
+    np.testing.assert_allclose(decision_values(K, A, b), expected, atol=2e-3)
 
 
-def test_held_out_is_what_the_others_say():
+def test_held_out_decisions_are_those_of_the_other_folds():
     K, codes = points()
     codes[codes == 2] = np.where(np.arange(8) < 4, 2, 1)
     folds = np.arange(24) % 5
     # The third class is in two of the folds only, all of one in the last.
     folds[codes == 2] = 1
     regression = KernelRegression(K, 5)
-    found = held_out(regression, K, codes, folds)
+    found = held_out_decisions(regression, K, codes, folds)
     for fold in range(5):
         out = folds == fold
-        expected = decide(K[out], *regression.fit(codes, ~out))
+        expected = decision_values(K[out], *regression.fit(codes, ~out))
         np.testing.assert_array_equal(found[out], expected)
     assert (found[folds == 1, 2] == -np.inf).all()
     assert np.isfinite(found[folds != 1]).all()
     one_left = np.where(codes == 0, 0, 1)
-    found = held_out(regression, K, codes, one_left)
+    found = held_out_decisions(regression, K, codes, one_left)
     assert np.isnan(found[one_left == 1]).all()
     assert np.isfinite(found[one_left == 0, 1:]).all()
 
 
-# -- folds ------------------------------------------------------------------------------
-
-
-def test_nobody_is_in_two_folds():
+def test_folds_do_not_divide_groups_and_divide_classes_evenly():
     groups = np.repeat(np.arange(7), [9, 1, 4, 4, 2, 8, 5])
-    folds = deal(np.zeros(len(groups), int), groups, 3)
+    folds = assign_folds(np.zeros(len(groups), int), groups, 3)
     assert all(len(set(folds[groups == g])) == 1 for g in range(7))
     assert sorted(np.bincount(folds)) == [10, 11, 12]
-
-
-def test_without_groups_every_class_is_dealt_out():
     codes = np.array([0, 1, 0, 0, 1, 0, 0, 2, 0, 0, 0])
-    folds = deal(codes, None, 5)
-    assert folds.tolist() == [0, 0, 1, 2, 1, 3, 4, 0, 0, 1, 2]
-
-
-# -- temperature ------------------------------------------------------------------------
+    assert assign_folds(codes, None, 5).tolist() == [0, 0, 1, 2, 1, 3, 4, 0, 0, 1, 2]
 
 
 @pytest.mark.parametrize("temperature", [0.5, 4, 30])
-def test_the_temperature_of_labels_drawn_with_it(temperature):
+def test_temperature_of_simulated_classes_is_recovered(temperature):
     rng = np.random.default_rng(0)
     f = rng.standard_normal((20_000, 4)) / temperature
     cumulated = softmax(temperature * f, axis=1).cumsum(axis=1)
     codes = (rng.uniform(size=(len(f), 1)) > cumulated).sum(axis=1)
-    assert learn_temperature(f, codes) == pytest.approx(temperature, rel=0.05)
+    assert fit_temperature(f, codes) == pytest.approx(temperature, rel=0.05)
     unknown = np.full((5, 4), np.nan)
     more = np.concatenate([f, unknown, np.tile([-np.inf, 0, 0, 0], (3, 1))])
     given = np.concatenate([codes, np.zeros(8, int)])
-    assert learn_temperature(more, given) == learn_temperature(f, codes)
+    assert fit_temperature(more, given) == fit_temperature(f, codes)
 
 
-def test_few_performances_and_perfect_ones_leave_it_near_what_is_usual():
-    assert learn_temperature(np.full((3, 2), np.nan), np.zeros(3, int)) == pytest.approx(4)
+def test_temperature_of_few_or_perfect_decisions_stays_near_the_prior():
+    assert fit_temperature(np.full((3, 2), np.nan), np.zeros(3, int)) == pytest.approx(4)
     right = np.tile([1.0, -1], (50, 1))
-    assert 4 < learn_temperature(right, np.zeros(50, int)) < 10
-    assert 0.5 < learn_temperature(right[:1], np.ones(1, int)) < 4
+    assert 4 < fit_temperature(right, np.zeros(50, int)) < 10
+    assert 0.5 < fit_temperature(right[:1], np.ones(1, int)) < 4

@@ -19,7 +19,7 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.trellis import Trellis
-from sklearn_motionsync.model.similarity import learn_border
+from sklearn_motionsync.model.similarity import log_moments
 from sklearn_motionsync.segmentation.search import Proposer, Unlikeness, chance_movements
 
 import oracle
@@ -273,7 +273,7 @@ def test_auto_threshold_rejects_random_movements():
     windows = np.arange(0, 3980, 20)[:, np.newaxis] + [0, 20]
     chance = unlikeness(take * frames.std(axis=0) + frames.mean(axis=0), windows)
     assert (chance < unlikeness.border(0.6)).mean() < 0.02
-    assert (chance < learn_border(unlikeness.known, 0.6)).mean() > 0.1
+    assert (chance < log_moments(unlikeness.known).upper_limit(0.6)).mean() > 0.1
 
 
 def test_chance_movements_have_mean_covariance_and_autocorrelation_of_the_postures():

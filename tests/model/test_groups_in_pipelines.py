@@ -1,4 +1,4 @@
-"""Who performed reaches the model: through pipelines, cross-validation and searches."""
+"""Groups reach the model through pipelines, cross-validation and searches."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def make(model=None):
 
 @pytest.fixture(scope="module")
 def expected():
-    """The borders of the folds, and of all: fitted by hand."""
+    """The thresholds of the folds, and of all: fitted by hand."""
     folds = [train for train, _ in CV.split(BUNCH.data, groups=GROUPS)]
     found = []
     for train in [*folds, range(12)]:
@@ -29,7 +29,7 @@ def expected():
     return found
 
 
-def test_groups_change_the_border(expected):
+def test_groups_change_the_threshold(expected):
     assert make().fit(BUNCH.data)[-1].threshold_ != expected[-1]
 
 

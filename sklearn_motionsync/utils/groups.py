@@ -1,0 +1,171 @@
+"""Groups and class labels of performances: the one place that checks and encodes them."""
+
+from collections.abc import Iterable, Mapping, Set, Sized
+
+import numpy as np
+import pandas as pd
+from sklearn.utils import assert_all_finite, check_consistent_length, column_or_1d
+from sklearn.utils.multiclass import check_classification_targets
+
+__all__ = [
+    "encode_classes",
+    "encode_groups",
+    "mean_of_others",
+    "names_of_groups",
+    "sums_of_groups",
+]
+
+# NumPy scalars that equal Python ones, as which they are kept.
+_SCALARS = np.str_, np.number, np.bool_
+_NOT_LISTS = str, bytes, Mapping, Set
+
+
+def encode_groups(groups, n_performances, *, name="groups", at_least=1, sort=False):
+    """Encode the group of each performance as an integer from 0.
+
+    Parameters
+    ----------
+    groups : array-like, shape (n_performances,), or None
+        Text, numbers or dates. None: each performance is a group of its own.
+    n_performances : int
+    name : str, default="groups"
+        The parameter's name, for messages.
+    at_least : int, default=1
+        Smallest number of different groups.
+    sort : bool, default=False
+        Whether codes follow the sorted labels; by default, the order of first appearance.
+
+    Returns
+    -------
+    codes : ndarray of int, shape (n_performances,)
+    labels : list
+        The label of each code. Without groups, the performances' indices.
+
+    Raises
+    ------
+    ValueError
+        If there is not one label for each performance, a label is missing, labels do not sort, or
+        there are too few different ones.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync.utils.groups import encode_groups
+    >>> encode_groups(["bob", "ann", "bob"], 3)
+    (array([0, 1, 0]), ['bob', 'ann'])
+    """
+    if groups is None:
+        return np.arange(n_performances), list(range(n_performances))
+    if (
+        not (isinstance(groups, Iterable) and isinstance(groups, Sized))
+        or isinstance(groups, _NOT_LISTS)
+        or getattr(groups, "ndim", 1) != 1
+    ):
+        got = f"shape {groups.shape}" if hasattr(groups, "shape") else repr(groups)
+        raise ValueError(
+            f"{name} must be a list or 1-D array with one label for each performance, such as its "
+            f"subject; got {got}."
+        )
+    if len(groups) != n_performances:
+        raise ValueError(
+            f"{name} has {len(groups)} labels, and there are {n_performances} performances: give "
+            "one label for each."
+        )
+    given = _check_labels(groups, name)
+    labels = list(dict.fromkeys(given))
+    if len(labels) < at_least:
+        raise ValueError(
+            f"{name}: all labels are equal ({labels[0]!r}): give at least two groups, or none."
+        )
+    if sort:
+        labels.sort()
+    code = {label: i for i, label in enumerate(labels)}
+    return np.array([code[label] for label in given]), labels
+
+
+def names_of_groups(groups, n_performances, *, name="groups"):
+    """The group of each performance as text, a list; refuses what `encode_groups` refuses."""
+    codes, labels = encode_groups(groups, n_performances, name=name)
+    return [str(labels[code]) for code in codes]
+
+
+def encode_classes(y, performances, estimator_name):
+    """Encode the class of each performance as an integer from 0.
+
+    Parameters
+    ----------
+    y : array-like, shape (n_sequences,)
+    performances : sequence
+    estimator_name : str
+        For messages.
+
+    Returns
+    -------
+    classes : ndarray, shape (n_classes,)
+        Sorted.
+    codes : ndarray of int, shape (n_sequences,)
+
+    Raises
+    ------
+    ValueError
+        If there is not one class for each performance, a class is missing, classes do not sort, or
+        all are equal.
+    """
+    if y is None:
+        raise ValueError(f"{estimator_name} requires y to be passed, but the target y is None.")
+    column = column_or_1d(y, warn=True)
+    check_consistent_length(performances, column)
+    # Of the input: an array of mixed types would be one of text.
+    _check_labels(np.asarray(y, dtype=object).ravel(), "y")
+    assert_all_finite(column, input_name="y")
+    check_classification_targets(column)
+    classes, codes = np.unique(column, return_inverse=True)
+    if len(classes) < 2:
+        raise ValueError(
+            f"{estimator_name} needs performances of at least 2 classes, got one class: "
+            f"{classes.tolist()[0]!r}. An ActionDetector learns a single action."
+        )
+    return classes, codes
+
+
+def sums_of_groups(values, codes):
+    """Sums (n_groups, ...) of values (n, ...) by group, and the counts, of as many dimensions."""
+    counts = np.bincount(codes)
+    sums = np.zeros((len(counts), *values.shape[1:]))
+    np.add.at(sums, codes, values)
+    return sums, counts.reshape(-1, *[1] * (values.ndim - 1))
+
+
+def mean_of_others(values, codes):
+    """For each of the values (n, ...), the mean of those of all other groups."""
+    sums, counts = sums_of_groups(values, codes)
+    return ((sums.sum(axis=0) - sums) / (len(values) - counts))[codes]
+
+
+def _check_labels(labels, name):
+    """The labels as Python objects: each is there, is one value, and sorts among the others."""
+    labels = [label.item() if isinstance(label, _SCALARS) else label for label in labels]
+    for i, label in enumerate(labels):
+        if np.ndim(label):
+            raise ValueError(f"{name}[{i}] is {label!r}: a label is one text, number or date.")
+        if pd.isna(label):
+            raise ValueError(
+                f"{name}[{i}] is missing, {label!r}: give performance {i} a label, or leave the "
+                "performance out."
+            )
+    try:
+        sorted(set(labels))
+    except TypeError as error:
+        i = next((i for i, label in enumerate(labels) if not _sorts(label, labels[0])), 0)
+        raise ValueError(
+            f"{name}[{i}] is {labels[i]!r}, {name}[0] is {labels[0]!r}: labels must be of one type "
+            "that can be sorted, such as text."
+        ) from error
+    return labels
+
+
+def _sorts(a, b):
+    try:
+        a < b  # noqa: B015
+    except TypeError:
+        return False
+    return True

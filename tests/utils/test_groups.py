@@ -1,0 +1,184 @@
+"""Groups and classes: every public method that takes them encodes and refuses the same."""
+
+import inspect
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionClassifier,
+    ActionDetector,
+    ActionModel,
+    ActionModelDisplay,
+    LagDisplay,
+    LinearSynchronizer,
+    MotionTracker,
+    PartSynchronizer,
+    SynchronizationDisplay,
+    datasets,
+    display,
+    find_performances,
+    io,
+    metrics,
+)
+from sklearn_motionsync.utils.groups import encode_classes, encode_groups, names_of_groups
+
+N, T = 6, np.linspace(0, 1, 20)
+X = np.stack([a * np.column_stack([np.sin(5 * T), T**2]) for a in (0.8, 0.9, 1.0, 1.1, 1.2, 1.3)])
+PARTS = PartSynchronizer({"arm": [0]}, n_frames=10).fit(X)
+SYNC = LinearSynchronizer(10).fit(X)
+PIPE = make_pipeline(LinearSynchronizer(10), ActionModel()).fit(X)
+BEFORE, AFTER, TIMES = [np.zeros((10, 1))] * N, np.zeros((N, 10, 1)), np.zeros((N, 10))
+
+
+def shown(groups, people=None):
+    band = np.zeros((1 if isinstance(groups, list) and groups == ["a"] * N else 2, 10, 1))
+    given = {"performances": AFTER, "groups": groups, "people": people}
+    return ActionModelDisplay(band, band, band, feature_names=["x"], **given)
+
+
+# What each method does with groups of the N performances; whether it needs two of them.
+METHODS = {
+    "ActionModel.fit(groups)": (lambda g: ActionModel().fit(X, groups=g), True),
+    "ActionModel.partial_fit(groups)": (lambda g: ActionModel().partial_fit(X, groups=g), False),
+    "ActionDetector.fit(groups)": (lambda g: ActionDetector(PIPE).fit(X, groups=g), True),
+    "ActionClassifier.fit(groups)": (
+        lambda g: ActionClassifier([], n_frames=10).fit(X, [0, 1] * 3, groups=g),
+        True,
+    ),
+    "ActionClassifier.fit(y)": (lambda y: ActionClassifier([], n_frames=10).fit(X, y), True),
+    "MotionTracker.fit(groups)": (lambda g: MotionTracker(SYNC, 20).fit(X, groups=g), True),
+    "PartSynchronizer.lags(groups)": (lambda g: PARTS.lags(X, groups=g), False),
+    "find_performances(groups)": (lambda g: find_performances(SYNC, X[0], groups=g), True),
+    "ActionModelDisplay.__init__(groups)": (shown, False),
+    "ActionModelDisplay.__init__(people)": (lambda p: shown(list("ab") * 3, p), False),
+    "ActionModelDisplay.from_estimator(groups)": (
+        lambda g: ActionModelDisplay.from_estimator(PIPE, X, groups=g),
+        False,
+    ),
+    "ActionModelDisplay.from_estimator(people)": (
+        lambda p: ActionModelDisplay.from_estimator(PIPE, X, groups=list("ab") * 3, people=p),
+        False,
+    ),
+    "LagDisplay.from_estimator(groups)": (
+        lambda g: LagDisplay.from_estimator(PARTS, X, groups=g),
+        False,
+    ),
+    "SynchronizationDisplay.__init__(groups)": (
+        lambda g: SynchronizationDisplay(BEFORE, AFTER, TIMES, feature_names=["x"], groups=g),
+        False,
+    ),
+    "SynchronizationDisplay.from_estimator(groups)": (
+        lambda g: SynchronizationDisplay.from_estimator(SYNC, X, groups=g),
+        False,
+    ),
+    "SynchronizationDisplay.from_predictions(groups)": (
+        lambda g: SynchronizationDisplay.from_predictions(X, SYNC.match(X).times, groups=g),
+        False,
+    ),
+}
+REFUSED = [
+    ([*"abcde", None], r"\[5\] is missing, None"),
+    (np.array([0, 1, np.nan, 3, 4, 5]), r"\[2\] is missing, nan"),
+    (pd.to_datetime(["2020-01-01"] * 4 + [None] * 2), r"\[4\] is missing, NaT"),
+    (pd.Series([1, 2, None] * 2, dtype="Int64"), r"\[2\] is missing, <NA>"),
+    ([1, 2, 3, "b", 5, 6], r"\[3\] is 'b', {0}\[0\] is 1: labels must be of one type"),
+    (list("abcde"), "{0} has 5 labels, and there are 6 performances"),
+    ("abcdef", "{0} must be a list or 1-D array .* got 'abcdef'"),
+    (dict.fromkeys(range(6)), "{0} must be a list or 1-D array .* got {{"),
+    (set(range(6)), "{0} must be a list or 1-D array .* got {{"),
+    (3, "{0} must be a list or 1-D array .* got 3"),
+    (np.zeros((6, 2)), r"{0} must be a list or 1-D array .* got shape \(6, 2\)"),
+    ([["a"], ["b"]] * 3, r"{0}\[0\] is \['a'\]: a label is one"),
+    ([0, 1, 2, 3, [4], 5], r"{0}\[4\] is \[4\]: a label is one"),
+]
+
+
+def public_methods():
+    """Public methods and functions with a parameter that holds groups, as METHODS names them."""
+    import sklearn_motionsync
+
+    for module in (sklearn_motionsync, datasets, display, io, metrics):
+        for name in module.__all__:
+            thing = getattr(module, name)
+            members = {"": thing}
+            if inspect.isclass(thing):
+                members = {
+                    f".{key}": value
+                    for key, value in inspect.getmembers(thing, inspect.isroutine)
+                    if key == "__init__" or not key.startswith(("_", "set_"))
+                }
+            for key, value in members.items():
+                try:
+                    parameters = inspect.signature(value).parameters
+                except (TypeError, ValueError):
+                    continue
+                for parameter in {"groups", "people"} & set(parameters):
+                    yield f"{name}{key}({parameter})"
+
+
+def test_every_public_method_with_groups_is_tested():
+    assert set(public_methods()) == set(METHODS) - {"ActionClassifier.fit(y)"}
+
+
+# The shape of y is checked as in scikit-learn.
+REFUSALS = [
+    (method, given, message)
+    for method in METHODS
+    for given, message in REFUSED
+    if not method.endswith("(y)") or "missing" in message or "one type" in message
+]
+
+
+@pytest.mark.parametrize(("method", "given", "message"), REFUSALS)
+def test_methods_refuse_what_is_no_label_for_each_performance(method, given, message):
+    fit, _ = METHODS[method]
+    with pytest.raises(ValueError, match=message.format(method.partition("(")[2].rstrip(")"))):
+        fit(given)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_methods_refuse_a_single_group_where_two_are_needed(method):
+    fit, needs_two = METHODS[method]
+    if needs_two:
+        message = r"all labels are equal \('a'\): give at least two groups, or none|one class: 'a'"
+        with pytest.raises(ValueError, match=message):
+            fit(["a"] * N)
+    else:
+        fit(["a"] * N)
+
+
+@pytest.mark.parametrize("method", [m for m in METHODS if m.endswith("groups)")])
+@pytest.mark.parametrize("labels", [[3, 1], ["u", "t"]])
+def test_methods_accept_lists_arrays_and_columns(method, labels):
+    fit, _ = METHODS[method]
+    for kind in (list, np.array, pd.Series, lambda g: np.array(g, dtype=object)):
+        fit(kind(labels * 3))
+
+
+def test_codes_follow_first_appearance_or_the_sorted_labels():
+    given = np.array(["c", "a", "c", "b"])
+    codes, labels = encode_groups(given, 4)
+    assert (codes.tolist(), labels) == ([0, 1, 0, 2], ["c", "a", "b"])
+    assert all(type(label) is str for label in labels)
+    codes, labels = encode_groups(given, 4, sort=True)
+    assert (codes.tolist(), labels) == ([2, 0, 2, 1], ["a", "b", "c"])
+    for given in (
+        [2.5, -1, True],
+        pd.Categorical(["u", "t", "s"]),
+        pd.date_range("2020", periods=3),
+    ):
+        assert encode_groups(given, 3)[0].tolist() == [0, 1, 2]
+    codes, labels = encode_groups(None, 3, at_least=2)
+    assert (codes.tolist(), labels) == ([0, 1, 2], [0, 1, 2])
+    assert names_of_groups([2, 1], 2) == ["2", "1"]
+
+
+@pytest.mark.parametrize("labels", [["b", "a"], [2, 1], [True, False], np.array([2, 1], np.int8)])
+def test_classes_keep_their_type_and_are_sorted(labels):
+    y = np.tile(labels, 2)
+    classes, codes = encode_classes(y, range(4), "Name")
+    np.testing.assert_array_equal(classes[codes], y)
+    assert classes.dtype == y.dtype
+    assert classes.tolist() == sorted(np.asarray(labels).tolist())
