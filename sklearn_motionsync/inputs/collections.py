@@ -95,7 +95,7 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
     finite : {True, False, "allow-nan"}, default=True
         As in scikit-learn. False: their magnitude is free, too.
     training : bool, default=True
-        Whether to refuse a set all of whose values are tiny; large ones always are.
+        Whether to refuse a set of tiny values only; large values are always refused.
     numbers : sequence of int, default=None
         The index of each in all that was given; by default 0, 1, ...
     dtype : dtype, default=None

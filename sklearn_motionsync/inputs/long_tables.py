@@ -183,8 +183,8 @@ def to_frame(sequences, *, performances=None, columns=None):
     sequences : list of 2-D arrays or DataFrames, or 3-D array
         Performances ``(n_frames_i, n_features)``.
     performances : sequence of length n_sequences, default=None
-        Labels, or an index of one level or several, whose names are taken; or the DataFrames of
-        `to_sequences`, whose labels and names are. By default those that the sequences have from
+        Labels; an index of one level or several; or the DataFrames of `to_sequences`. The last two
+        give the names of the levels, too. By default those that the sequences have from
         there, or 0, 1, ...
     columns : sequence of str, default=None
         Names of the features; by default those of the DataFrames, or 0, 1, ...

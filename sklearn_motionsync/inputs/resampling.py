@@ -21,7 +21,7 @@ __all__ = [
 _GAP = 1.9
 # Times this share of a step from even ones are even.
 _EVEN = 1e-6
-# So many times the recorded frames are a mistake in the unit.
+# More than so many times the recorded frames come from a mistake in the unit.
 _MOST = 100
 
 
@@ -90,10 +90,10 @@ def even_grid(times, frame_rate, what):
         # Rounding of the times is no reason to lose the last frame.
         n_steps = int((duration + slack) * frame_rate)
     if not 1 <= n_steps <= _MOST * len(times):
-        asked = "max_gap_time" if frame_rate is None else f"frame_rate={frame_rate:g}"
+        setting = "max_gap_time" if frame_rate is None else f"frame_rate={frame_rate:g}"
         raise ValueError(
             f"{what} has {len(times)} frames from {times[0]:.10g} to {times[-1]:.10g}, of which "
-            f"{asked} would make {n_steps + 1}: give it in units of the time column."
+            f"{setting} would make {n_steps + 1}: give it in units of the time column."
         )
     if frame_rate is None:
         return np.linspace(times[0], times[-1], n_steps + 1)
@@ -229,7 +229,7 @@ def _slack(times):
 
 
 def _is_even(times, slack):
-    """Whether even times, rounded like these, would be these."""
+    """Whether times are even but for rounding by ``slack``."""
     frames = np.arange(len(times)) - (len(times) - 1) / 2
     slope = frames @ times / max(frames @ frames, 1e-300)
     # Rounding moves a time by half a digit up or down.

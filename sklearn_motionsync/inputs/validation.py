@@ -54,7 +54,7 @@ class SequenceLevelMixin:
         -------
         sequence of ndarray (n_frames_i, n_features)
             All of one dtype, float32 or float64; not to be written to. Methods of this estimator
-            take it without checking again.
+            take it without checking again; its method ``take(indices)`` gives some of them.
 
         Raises
         ------
