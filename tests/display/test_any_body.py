@@ -1,6 +1,5 @@
-"""Stick figures of bodies as people record them: parts, means, pictures, and bare points."""
+"""Stick figures of parts of bodies, mean landmarks, pictures, and points without bones."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -21,12 +20,6 @@ BUNCH = make_bending(6, n_frames=40, random_state=1)
 LEGS = ["pelvis", *(f"{s}_{j}" for s in ("left", "right") for j in ("hip", "knee", "ankle"))]
 ARMS = ["neck", *(f"{s}_{j}" for s in ("left", "right") for j in ("shoulder", "elbow", "wrist"))]
 HALF = ["pelvis", "neck", *(j for j in PAPER.joints if j.startswith("left"))]
-
-
-@pytest.fixture(autouse=True)
-def closed():
-    yield
-    plt.close("all")
 
 
 def columns(joints, axes="xyz"):
@@ -57,7 +50,7 @@ def pipeline(skeleton):
     return make_pipeline(*steps)
 
 
-def test_legs_are_drawn_as_those_of_the_whole_body():
+def test_legs_alone_are_drawn_as_with_the_whole_body():
     X, legs = part_of(LEGS)
     whole = SkeletonDisplay.from_positions(BUNCH.data[0], PAPER, frames=[0, 20])
     some = SkeletonDisplay.from_positions(X[0], legs, frames=[0, 20])
@@ -70,7 +63,7 @@ def test_legs_are_drawn_as_those_of_the_whole_body():
 
 @pytest.mark.parametrize("joints", [LEGS, ARMS, HALF, [*ARMS, "head"]])
 @pytest.mark.parametrize("axes", ["xyz", "xy"])
-def test_any_part_is_drawn_and_moves(joints, axes):
+def test_any_part_is_drawn_and_animated(joints, axes):
     X, skeleton = part_of(joints, axes)
     n_bones = len(skeleton.bones)
     display = SkeletonDisplay.from_positions(X[0], skeleton, frames=3)
@@ -89,7 +82,7 @@ def test_any_part_is_drawn_and_moves(joints, axes):
 
 @pytest.mark.parametrize("joints", [LEGS, HALF, list(PAPER.joints)])
 @pytest.mark.parametrize("axes", ["xyz", "xy"])
-def test_models_and_departures_of_any_part(joints, axes):
+def test_model_and_departures_of_any_part(joints, axes):
     X, skeleton = part_of(joints, axes)
     pipe = pipeline(skeleton).fit(X)
     display = SkeletonDisplay.from_model(pipe, frames=[5], n_samples=4)
@@ -117,8 +110,8 @@ def test_departures_of_an_upper_body_are_above_the_floor(axes):
     assert min(x[..., 1].min() for scene in display.scenes + display.behind for x in scene) >= 0
 
 
-def test_a_picture_is_drawn_as_the_camera_saw_it():
-    """Whatever the azimuth; the lowest joint of all on the floor, the pelvis above the origin."""
+def test_positions_in_a_plane_are_not_turned():
+    """The azimuth has no effect; the lowest joint is on the floor, the pelvis above the origin."""
     skeleton = Skeleton.paper(n_dims=2, up="-y")
     seen = BUNCH.data[0].reshape(-1, 15, 3)[..., :2] * [100, -100] + [640, 300]
     X = seen.reshape(len(seen), -1)
@@ -148,13 +141,13 @@ def test_every_format_is_drawn(name, n_dims):
         assert sum(counts.values()) == len(skeleton.bones)
         assert counts["middle"] >= 1 + ("head" in skeleton.landmarks)
     else:
-        # The trunk is between the means, the face hangs on the nose; of 33, hands and feet.
+        # The trunk joins mean landmarks, the face the nose; MediaPipe has hands and feet.
         assert counts["left"] == 6 + 5 * (name == "mediapipe")
         assert counts["middle"] == 2 + {"coco": 4, "mediapipe": 9}[name]
     assert len(display.heads_[0].get_xdata()) == ("head" in skeleton.landmarks)
 
 
-def test_a_landmark_that_is_a_mean_is_drawn_in_the_middle():
+def test_a_mean_landmark_is_drawn_between_its_joints():
     landmarks = {**PAPER.landmarks, "head": ("left_wrist", "right_wrist")}
     skeleton = Skeleton(PAPER.joints, PAPER.parents, landmarks)
     display = SkeletonDisplay.from_positions(BUNCH.data[0], skeleton, frames=[3])
@@ -164,13 +157,13 @@ def test_a_landmark_that_is_a_mean_is_drawn_in_the_middle():
 
 
 def wrist(display, side):
-    """Where a wrist is drawn: at the end of its bone, which come in the skeleton's order."""
+    """The place of a wrist: the end of its bone; bones have the order of the skeleton."""
     bones = [b for b in PAPER.bones if PAPER.joints[b[1]].startswith(side)]
     place = [PAPER.joints[b] for _, b in bones].index(f"{side}_wrist")
     return lines(display, 0, side)[place, 1]
 
 
-def test_joints_that_nothing_joins_are_points_with_limbs_between_the_landmarks():
+def test_without_bones_joints_are_points_and_limbs_join_landmarks():
     table = pd.DataFrame(BUNCH.data[0], columns=PAPER.column_names)
     for axis in "xyz":
         table[f"marker_{axis}"] = table[f"head_{axis}"] + 0.1
@@ -189,7 +182,7 @@ def test_joints_that_nothing_joins_are_points_with_limbs_between_the_landmarks()
     assert len(shown.behind_[0].get_paths()) == 14
 
 
-def test_points_of_which_no_skeleton_is_known():
+def test_points_without_a_skeleton_have_two_or_three_axes():
     """In space, or in the plane if names or the number of columns say so."""
     x = np.random.default_rng(0).normal(size=(6, 12))
     assert len(SkeletonDisplay.from_positions(x, None, frames=[1]).heads_[0].get_xdata()) == 4
@@ -204,11 +197,3 @@ def test_points_of_which_no_skeleton_is_known():
     assert SkeletonDisplay.from_predictions([x[:, :8]], times, None).scenes[1][0].shape == (6, 4, 2)
     with pytest.raises(ValueError, match=r"positions of joints are \(n_frames, 3 \* n_joints\)"):
         SkeletonDisplay.from_positions(x[:, :7], None)
-
-
-def test_scenes_of_another_number_of_axes():
-    skeleton = Skeleton.paper(n_dims=2)
-    with pytest.raises(ValueError, match=r"shape \(n_frames, 15, 2\), got \(4, 15, 3\)"):
-        SkeletonDisplay([[np.ones((4, 15, 3))]], skeleton, ["a"])
-    with pytest.raises(ValueError, match=r"15 joints are \(n_frames, 30\)"):
-        SkeletonDisplay.from_positions(BUNCH.data[0], skeleton)
