@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from artists import bones_drawn
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
@@ -35,12 +36,6 @@ def part_of(joints, axes="xyz", of=BUNCH.data):
     return [df[columns(order, axes)] for df in tables], whole
 
 
-def lines(display, panel, side=None):
-    sides = [side] if side else list(display.bones_[panel])
-    paths = [p.vertices for s in sides for p in display.bones_[panel][s].get_paths()]
-    return np.array(paths).reshape(-1, 2, 2)
-
-
 def in_order(drawn):
     return np.array(sorted(drawn.round(9).tolist()))
 
@@ -55,9 +50,9 @@ def test_legs_alone_are_drawn_as_with_the_whole_body():
     whole = SkeletonDisplay.from_positions(BUNCH.data[0], PAPER, frames=[0, 20])
     some = SkeletonDisplay.from_positions(X[0], legs, frames=[0, 20])
     for panel in (0, 1):
-        assert len(lines(some, panel)) == 6
-        drawn = {tuple(np.ravel(line.round(9))) for line in lines(whole, panel)}
-        assert {tuple(np.ravel(line.round(9))) for line in lines(some, panel)} < drawn
+        assert len(bones_drawn(some, panel)) == 6
+        drawn = {tuple(np.ravel(line.round(9))) for line in bones_drawn(whole, panel)}
+        assert {tuple(np.ravel(line.round(9))) for line in bones_drawn(some, panel)} < drawn
     assert [len(x) for x in some.heads_[0].get_data()] == [0, 0]
 
 
@@ -67,15 +62,15 @@ def test_any_part_is_drawn_and_animated(joints, axes):
     X, skeleton = part_of(joints, axes)
     n_bones = len(skeleton.bones)
     display = SkeletonDisplay.from_positions(X[0], skeleton, frames=3)
-    assert [len(lines(display, panel)) for panel in range(3)] == [n_bones] * 3
+    assert [len(bones_drawn(display, panel)) for panel in range(3)] == [n_bones] * 3
     display = SkeletonDisplay.from_positions(np.stack([x[:30] for x in X]), skeleton, frames=[9])
-    assert len(lines(display, 0)) == 6 * n_bones
+    assert len(bones_drawn(display, 0)) == 6 * n_bones
     for first in (DirectionCosines, JointPositions):
         pipe = make_pipeline(first(skeleton), DenseSynchronizer(30)).fit(X)
         display = SkeletonDisplay.from_estimator(pipe, X, performances=[0, 1, 2])
         assert display.scenes[1][0].shape == (30, len(skeleton.joints), len(axes))
         display.plot(at=0.7)
-        assert len(lines(display, 1)) == 3 * n_bones
+        assert len(bones_drawn(display, 1)) == 3 * n_bones
     animation = display.animate(seconds=0.5, fps=4)
     assert animation.to_jshtml().count("data:image/png;base64") == 2
 
@@ -87,11 +82,11 @@ def test_model_and_departures_of_any_part(joints, axes):
     pipe = pipeline(skeleton).fit(X)
     display = SkeletonDisplay.from_model(pipe, frames=[5], n_samples=4)
     assert display.skeleton == skeleton
-    mean = lines(display, 0)
+    mean = bones_drawn(display, 0)
     assert len(mean) == len(skeleton.bones)
     assert np.isfinite(mean).all()
     display = SkeletonDisplay.from_postures(pipe[0].transform(X[0]), pipe[0], frames=2)
-    assert len(lines(display, 1)) == len(skeleton.bones)
+    assert len(bones_drawn(display, 1)) == len(skeleton.bones)
     still = np.repeat(X[0].to_numpy()[:1], 40, axis=0)
     still = pd.DataFrame(still, columns=X[0].columns)
     display = SkeletonDisplay.from_departures(
@@ -100,7 +95,7 @@ def test_model_and_departures_of_any_part(joints, axes):
     assert display.skeleton == skeleton
     marked = {skeleton.joints[joint] for of_panel in display.marked for _, joint in of_panel}
     assert marked & {"left_knee", "left_ankle", "left_hip", "neck", "left_elbow"}
-    assert sum(len(lines(display, k)) for k in range(3)) == 3 * len(skeleton.bones)
+    assert sum(len(bones_drawn(display, k)) for k in range(3)) == 3 * len(skeleton.bones)
 
 
 @pytest.mark.parametrize("axes", ["xyz", "xy"])
@@ -122,7 +117,7 @@ def test_positions_in_a_plane_are_not_turned():
     body = body - [body[0, 0], floor]
     expected = [[body[a], body[b]] for a, b in skeleton.bones]
     for display in pictures:
-        np.testing.assert_allclose(in_order(lines(display, 0)), in_order(np.array(expected)))
+        np.testing.assert_allclose(in_order(bones_drawn(display, 0)), in_order(np.array(expected)))
         head = np.ravel(display.heads_[0].get_data())
         np.testing.assert_allclose(head, body[PAPER.joints.index("head")])
 
@@ -135,7 +130,7 @@ def test_every_format_is_drawn(name, n_dims):
     rng = np.random.default_rng(0)
     X = rng.normal(size=(5, n_dims * len(skeleton.joints)))
     display = SkeletonDisplay.from_positions(X, skeleton, frames=[2])
-    counts = {side: len(lines(display, 0, side)) for side in ("left", "middle", "right")}
+    counts = {side: len(bones_drawn(display, 0, side)) for side in ("left", "middle", "right")}
     assert counts["left"] == counts["right"] > 0
     if name not in ("coco", "mediapipe"):
         assert sum(counts.values()) == len(skeleton.bones)
@@ -160,7 +155,7 @@ def wrist(display, side):
     """The place of a wrist: the end of its bone; bones have the order of the skeleton."""
     bones = [b for b in PAPER.bones if PAPER.joints[b[1]].startswith(side)]
     place = [PAPER.joints[b] for _, b in bones].index(f"{side}_wrist")
-    return lines(display, 0, side)[place, 1]
+    return bones_drawn(display, 0, side)[place, 1]
 
 
 def test_without_bones_joints_are_points_and_limbs_join_landmarks():
@@ -174,7 +169,8 @@ def test_without_bones_joints_are_points_and_limbs_join_landmarks():
     for panel in (0, 1):
         for side in ("left", "middle", "right"):
             np.testing.assert_allclose(
-                in_order(lines(display, panel, side)), in_order(lines(whole, panel, side))
+                in_order(bones_drawn(display, panel, side)),
+                in_order(bones_drawn(whole, panel, side)),
             )
         assert len(display.heads_[panel].get_xdata()) == 16
     shown = SkeletonDisplay([[np.zeros((2, 16, 3)) + np.arange(3)]], bare, ["a"],

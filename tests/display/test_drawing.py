@@ -1,11 +1,13 @@
-"""Colours for colour-blind people, and the parts of curves outside a band."""
+"""Colours for colour-blind people, curves outside a band, and the import of matplotlib."""
 
 import itertools
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
-from sklearn_motionsync.display.drawing import COLORS, group_colors, parts_outside
+from sklearn_motionsync.display.drawing import COLORS, group_colors, parts_outside, pyplot
 
 # Colours as seen without one kind of cones: Machado, Oliveira and Fernandes, "A
 # physiologically-based model for simulation of color vision deficiency", 2009, severity 1.
@@ -91,3 +93,14 @@ def test_parts_outside_of_a_curve_that_crosses_the_band():
     order = np.argsort(xs[:, 0])
     np.testing.assert_allclose(xs[order], [[0, 1 / 3], [2 / 3, 1]])
     np.testing.assert_allclose(ys[order], [[3, 1], [-1, -3]])
+
+
+def test_matplotlib_is_imported_on_drawing_only():
+    code = "import sys, sklearn_motionsync; assert 'matplotlib' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_missing_matplotlib_is_explained(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
+    with pytest.raises(ImportError, match="Drawing needs matplotlib: pip install matplotlib"):
+        pyplot()
