@@ -21,7 +21,7 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
     ----------
     display : display with ``plot``
     show : callable
-        ``show(k, last)`` draws picture k, from 0 to ``last``, and returns its artists.
+        ``show(k, last)`` draws picture k, from 0 to ``last``.
     ax : Axes or array-like of Axes, or None
         By default the axes on which the display was drawn last. Then the figure is closed after the
         notebook has shown the animation.

@@ -1,5 +1,6 @@
 """Panels, colours, curves and legends that several displays draw."""
 
+from itertools import cycle
 from textwrap import fill
 
 import numpy as np
@@ -9,8 +10,7 @@ __all__ = [
     "bone_lines",
     "curves",
     "front_line",
-    "group_colors",
-    "group_lines",
+    "group_styles",
     "legend_above",
     "nanmean",
     "panels",
@@ -80,10 +80,8 @@ def panels(ax, cells, n_rows, n_cols, size, drawn=()):
         grid = figure.add_gridspec(n_rows, n_cols)
         return figure, [figure.add_subplot(grid[cell]) for cell in cells]
     axes = list(np.ravel(np.asarray(ax, dtype=object)))
-    wrong = [type(a).__name__ for a in axes if not isinstance(a, plt.Axes)]
-    if wrong or not axes:
-        got = wrong[0] if wrong else "none of them"
-        raise ValueError(f"ax must be Axes of matplotlib, got {got}.")
+    if not axes or not all(isinstance(a, plt.Axes) for a in axes):
+        raise ValueError(f"ax must be Axes of matplotlib, got {ax!r:.80}.")
     figure = axes[0].figure
     if len(axes) == len(cells):
         for axis in axes:
@@ -253,16 +251,11 @@ def nanmean(values, axis):
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
-def group_colors(groups):
-    """The colour of each group by its name, in the order of first appearance."""
+def group_styles(groups):
+    """The colour and the line style of each group by its name, in order of first appearance."""
     names = list(dict.fromkeys(groups))
-    palette = _GROUPS
+    palette, lines = _GROUPS, _LINES[:1]
     if len(names) > len(_GROUPS):
-        palette = pyplot().colormaps["viridis"](np.linspace(0, 0.95, len(names)))
-    return dict(zip(names, palette, strict=False))
-
-
-def group_lines(n_groups):
-    """The line style of the mean of each of ``n_groups`` groups."""
-    lines = _LINES if n_groups > len(_GROUPS) else _LINES[:1]
-    return [lines[k % len(lines)] for k in range(n_groups)]
+        palette, lines = pyplot().colormaps["viridis"](np.linspace(0, 0.95, len(names))), _LINES
+    pairs = zip(palette, cycle(lines), strict=False)
+    return dict(zip(names, pairs, strict=False))

@@ -14,8 +14,7 @@ from ..utils.pipelines import flat_steps
 from .arguments import as_frames
 
 __all__ = [
-    "Limbs",
-    "bones_of_limb",
+    "bones_of_limbs",
     "departs_outside_aspace",
     "limb_departures",
     "limb_of",
@@ -65,8 +64,7 @@ def limb_departures(scores, features, frames, limit, skeleton):
         worst, peak = limbs[int(peaks.argmax())], peaks.max()
         text = f"{worst} {peak:.{0 if peak >= 10 else 1}f} std" if departing else "no limb departs"
         titles.append(f"frame {frame}\n{text}")
-        bones = [bone for limb in departing for bone in bones_of_limb(limb, skeleton)]
-        marked.append(list(dict.fromkeys(bones)))
+        marked.append(bones_of_limbs(departing, skeleton))
     return shown, titles, marked
 
 
@@ -92,8 +90,13 @@ def limb_of(feature):
     return feature if feature == _HEIGHT else feature.rpartition("_")[0]
 
 
-def bones_of_limb(limb, skeleton):
-    """The bones of a skeleton that represent a limb."""
+def bones_of_limbs(limbs, skeleton):
+    """The bones of a skeleton that represent limbs, each once."""
+    bones = [bone for limb in limbs for bone in _bones_of_limb(limb, skeleton)]
+    return list(dict.fromkeys(bones))
+
+
+def _bones_of_limb(limb, skeleton):
     ends = LIMBS[_PELVIS if limb == _HEIGHT else limb][:2]
     ends = tuple(skeleton.joints.index(name) for name in ends if name in skeleton.joints)
     # The hips, and the shoulders, are two bones each, from their middle.

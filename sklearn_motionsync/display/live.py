@@ -271,12 +271,6 @@ class PhaseDisplay:
         ValueError
             If phases are of another class, or there is no such frame.
         """
-        listed = phases if isinstance(phases, (list, tuple)) else [phases]
-        if not (isinstance(phases, LivePhase) or all(isinstance(p, LivePhase) for p in listed)):
-            raise ValueError(
-                "phases must be a LivePhase of arrays, such as live.history, or a list of them, "
-                f"such as live.follow(X) gives; got {phases!r:.80}."
-            )
         return cls(phases, n_frames, **known).plot(ax, frame=frame, azimuth=azimuth)
 
     def plot(self, ax=None, *, frame=None, azimuth=-60):
@@ -355,17 +349,23 @@ class PhaseDisplay:
         return animate(self, lambda k, last: self._show(longest * k / last), ax, **view)
 
     def _show(self, time):
-        """Move all rows to a time; return the artists that changed."""
-        return [artist for row in self.rows_ for artist in row.show(time)]
+        """Move all rows to a time."""
+        for row in self.rows_:
+            row.show(time)
 
 
 def _as_list_of_phases(phases):
     """A list of LivePhase of arrays (n_frames_i,); streams side by side are separated."""
-    phases = [phases] if isinstance(phases, LivePhase) else list(phases)
-    if len(phases) == 1 and np.ndim(phases[0].phase) == 2:
-        streams = zip(*map(np.transpose, phases[0]), strict=True)
+    listed = [phases] if isinstance(phases, LivePhase) else phases
+    if not isinstance(listed, list) or not all(isinstance(of, LivePhase) for of in listed):
+        raise ValueError(
+            "phases must be a LivePhase of arrays, such as live.history, or a list of them, such "
+            f"as live.follow(X) gives; got {phases!r:.80}."
+        )
+    if len(listed) == 1 and np.ndim(listed[0].phase) == 2:
+        streams = zip(*map(np.transpose, listed[0]), strict=True)
         return [LivePhase(*stream) for stream in streams]
-    return phases
+    return listed
 
 
 def _as_floats(values):
@@ -513,22 +513,20 @@ class Row:
         axis.set_ylabel("%")
 
     def show(self, time):
-        """Move to a time; return the artists that changed."""
+        """Move to a time."""
         p, action = self._performance, self._action
         now = max(np.searchsorted(p.times, time, side="right") - 1, 0)
         phase, rate, confidence = (x[now] for x in (p.phase, p.rate, p.confidence))
         last, past = action.n_frames - 1, slice(now + 1)
         ahead, rest = action.phase_ahead(phase, rate), action.predict(phase, p.times[now])
-        artists = self.dial.show(phase / last, ahead / last, rate, confidence)
+        self.dial.show(phase / last, ahead / last, rate, confidence)
         self.phase.set_data(p.times[past], 100 / last * p.phase[past])
         _fill_area(self.confidence, p.times[past], 0, 100 * p.confidence[past])
         self.rest.set_data(rest[0], 100 / last * rest[1])
-        artists += [self.phase, self.confidence, self.rest]
         if self.body is not None:
-            artists += self.body.show(now, ahead)
+            self.body.show(now, ahead)
         for curve in self.curves:
-            artists += curve.show(now, *rest)
-        return artists
+            curve.show(now, *rest)
 
 
 class FeaturePanel:
@@ -572,7 +570,6 @@ class FeaturePanel:
             self.expected.set_data(times, mean)
         if spread is not None:
             _fill_area(self.band, times, mean - _BAND * spread, mean + _BAND * spread)
-        return [self.seen, self.now, self.expected, self.band]
 
 
 class BodyPanel:
@@ -595,17 +592,14 @@ class BodyPanel:
         stage(axis, "", *bounds(np.concatenate(places)))
 
     def show(self, now, ahead):
-        """Move to a frame, the mean body to a phase; return the artists."""
+        """Move to a frame, and the mean body to a phase."""
         body, mean = self._bodies[now], self._action.interpolate(ahead, self._mean)
         bones = [bone for of_side in self._bones.values() for bone in of_side]
         self.ahead.set_segments([mean[list(bone)] for bone in bones])
         for side, lines in self.bones.items():
             lines.set_segments([body[list(bone)] for bone in self._bones[side]])
-        artists = [self.ahead, *self.bones.values()]
         if self.head is not None:
             self.head.set_data(self._head[[now]].T)
-            artists.append(self.head)
-        return artists
 
 
 def _label(text, value):
@@ -683,7 +677,7 @@ class PhaseDial:
         self.state = axis.text(0, -1.62, "", ha="center", va="center", fontsize="small")
 
     def show(self, share, ahead, rate, confidence):
-        """Move the hand to a share of the action; return the artists."""
+        """Move the hand to a share of the action."""
         # Rounding may take a sum of probabilities above 1.
         confidence = min(confidence, 1)
         self.passed.set_theta1(90 - 360 * share)
@@ -696,7 +690,6 @@ class PhaseDial:
         self.hand.set_linewidth(1 + 4 * confidence)
         self.share.set_text(f"{100 * share:.0f} %")
         self.state.set_text(f"rate {rate:.1f}, confidence {confidence:.2f}")
-        return [self.passed, self.ahead, self.hand, self.share, self.state]
 
 
 def _on_circle(share, radius):

@@ -13,8 +13,7 @@ from .drawing import (
     COLORS,
     curves,
     front_line,
-    group_colors,
-    group_lines,
+    group_styles,
     legend_above,
     panels,
     parts_outside,
@@ -213,8 +212,9 @@ class ActionModelDisplay:
         if band not in list(_BAND_TITLES):
             raise ValueError(f"band must be one of {list(_BAND_TITLES)}, got {band!r}.")
         caller = f"{cls.__name__}.from_estimator"
-        if X is None and (params or groups is not None or people is not None):
-            names = [*params, *(["groups"] if groups is not None else [])] or ["people"]
+        named = params | {"groups": groups, "people": people}
+        names = [name for name, value in named.items() if value is not None]
+        if X is None and names:
             raise TypeError(f"{caller} takes {', '.join(names)} along with performances X only.")
         if people is not None and groups is None:
             raise TypeError(
@@ -284,11 +284,11 @@ class ActionModelDisplay:
         """All performances, or those of each group, with their mean and band."""
         if self.groups is None:
             return [Part(self.mean, self.lower, self.upper, self.performances)]
-        colors, lines = group_colors(self.groups.labels), group_lines(len(self.groups.names))
+        styles = group_styles(self.groups.labels).items()
         return [
-            Part(*bounds, self.performances[self.groups.members(name)], name, colors[name], line)
-            for *bounds, name, line in zip(
-                self.mean, self.lower, self.upper, self.groups.names, lines, strict=True
+            Part(*bounds, self.performances[self.groups.members(name)], name, *style)
+            for *bounds, (name, style) in zip(
+                self.mean, self.lower, self.upper, styles, strict=True
             )
         ]
 

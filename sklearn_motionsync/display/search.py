@@ -3,10 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from ..inputs.collections import as_collection
 from ..inputs.tables import labels_of
-from ..inputs.validation import read_collection
 from ..segmentation.search import find_performances
+from .arguments import as_performances
 from .drawing import COLORS, panels
 
 __all__ = ["SearchDisplay"]
@@ -76,19 +75,15 @@ class SearchDisplay:
         ax : Axes, or one for each take, default=None
             A subplot to be divided, or one axes a take. None makes a figure.
         **params : dict
-            Arguments of `find_performances`, without ``threshold``.
+            Arguments of `find_performances`, without ``threshold``: the figure shows the hits
+            above and below the automatic one.
 
         Returns
         -------
         SearchDisplay
             The display, drawn.
         """
-        if params.get("threshold", "learned") != "learned":
-            raise ValueError(
-                "SearchDisplay.from_estimator draws hits beside the learnt threshold; for another "
-                "one give what find_performances found to from_predictions."
-            )
-        _, origin = find_performances(pattern, X, **params | {"threshold": None})
+        _, origin = find_performances(pattern, X, threshold=None, **params)
         return cls.from_predictions(origin, X, segments=segments, ax=ax)
 
     @classmethod
@@ -116,10 +111,7 @@ class SearchDisplay:
         ValueError
             If hits or segments are of other takes.
         """
-        takes = as_collection(X)
-        takes = [X] if takes is None else takes
-        if as_collection(X) is not None:
-            read_collection(X)
+        takes = as_performances(X)
         lengths = dict(zip(labels_of(takes)[0], map(len, takes), strict=True))
         display = cls(origin, lengths, segments=segments)
         for name, table in (("origin", display.origin), ("segments", display.segments)):

@@ -291,9 +291,8 @@ class SkeletonDisplay:
         match = reached.match()
         pattern = index_of_pattern(reached.synchronizer, reached.performances)
         if performances is None:
-            others = [i for i in range(len(match.times)) if i != pattern]
-            performances = ([] if pattern is None else [pattern]) + others
-            performances = performances[:_N_PERFORMANCES]
+            pattern_first = sorted(range(len(match.times)), key=lambda i: i != pattern)
+            performances = pattern_first[:_N_PERFORMANCES]
         performances = as_indices(performances, len(match.times), "performances")
         return cls.from_predictions(
             [as_performances(X)[i] for i in performances],
@@ -590,12 +589,11 @@ class SkeletonDisplay:
         self.heads_ += axis.plot([], [], "o", **style)
 
     def _show(self, at):
-        """Move all stick figures to a share of the time; return the artists."""
+        """Move all stick figures to a share of the time."""
         durations = self.durations
         if durations is None:
             durations = [[len(x) - 1 for x in scene] for scene in self._drawn]
         longest = max(max(of_scene, default=0) for of_scene in durations)
-        artists = []
         for axis, title in zip(self.axes_, self.titles, strict=True) if longest > 0 else ():
             axis.set_title(f"{title}, at {100 * at:.0f} % of the time", fontsize="medium")
         for i, (scene, of_scene) in enumerate(zip(self._drawn, durations, strict=True)):
@@ -605,16 +603,12 @@ class SkeletonDisplay:
             ]
             for side, lines in self.bones_[i].items():
                 lines.set_segments(_segments(bodies, self._bones[i][side]))
-                artists.append(lines)
             dots = [self._dots(body) for body in bodies]
             self.heads_[i].set_data(np.concatenate(dots).T if dots else ([], []))
-            artists.append(self.heads_[i])
         for lines, scene in zip(self.behind_, self._behind, strict=bool(self.behind_)):
             bodies = [x[round(at * (len(x) - 1))] for x in scene]
             bones = [b for of_side in bones_by_side(self.skeleton).values() for b in of_side]
             lines.set_segments(_segments(bodies, bones))
-            artists.append(lines)
-        return artists
 
     def _dots(self, body):
         """The places of the dots of a body: its head, or all joints if there are no bones."""

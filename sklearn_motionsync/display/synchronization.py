@@ -12,8 +12,7 @@ from .drawing import (
     COLORS,
     curves,
     front_line,
-    group_colors,
-    group_lines,
+    group_styles,
     legend_above,
     nanmean,
     panels,
@@ -272,12 +271,12 @@ class SynchronizationDisplay:
         n_rows, n_cols = len(self.feature_names), 2 + bool(warps)
         cells = [(row, column) for row in range(n_rows) for column in (0, 1)]
         cells += [(slice(None), 2)] * bool(warps)
-        color_of = {} if self.groups is None else group_colors(self.groups)
-        colors = [color_of[group] for group in self.groups or ()] or COLORS["performance"]
-        n_lines = -(-len(color_of) // 3)
+        styles = {} if self.groups is None else group_styles(self.groups)
+        colors = [styles[group][0] for group in self.groups or ()] or COLORS["performance"]
+        n_lines = -(-len(styles) // 3)
         size = (3.2 * n_cols, max(2.6, 1.6 * n_rows + 0.8) + 0.2 * n_lines)
         self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, size)
-        style = {"colors": colors, "linewidths": 0.9, "alpha": 0.35 if color_of else 0.55}
+        style = {"colors": colors, "linewidths": 0.9, "alpha": 0.35 if styles else 0.55}
         clock, own = self._axis.clock, self._axis.performances()
         self.before_, self.after_, self.pattern_, self.group_means_ = [], [], [], []
         for row, name in enumerate(self.feature_names):
@@ -285,22 +284,22 @@ class SynchronizationDisplay:
             self.before_.append(curves(left, own, [x[:, row] for x in self.before], **style))
             after = self.after[:, :, row]
             self.after_.append(curves(right, [clock] * len(after), after, **style))
-            self.group_means_.append(self._draw_means(right, clock, row, color_of))
+            self.group_means_.append(self._draw_means(right, clock, row, styles))
             self.pattern_.append(self._draw_pattern(right, clock, row))
             left.set_ylabel(name)
             right.sharey(left)
             right.autoscale_view()
             if row == 0:
                 left.set_title(f"as recorded\n{len(self.before)} performances")
-                means = ", thick: means of groups" if color_of else ""
+                means = ", thick: means of groups" if styles else ""
                 right.set_title(f"synchronised{means}\n{self._describe_pattern()}")
         left.set_xlabel(self._axis.performance_label)
         right.set_xlabel(self._axis.label)
         self.warps_ = self._draw_warps(self.axes_[-1], clock, style) if warps else None
         for axis in self.axes_:
             axis.set_title(axis.get_title(), fontsize="medium")
-        if color_of:
-            handles, labels = self.group_means_[0], list(color_of)
+        if styles:
+            handles, labels = self.group_means_[0], list(styles)
             legend_above(self.axes_, handles, labels, below=self.axes_[:2])
         return self
 
@@ -310,10 +309,10 @@ class SynchronizationDisplay:
         which = "" if self.pattern_index is None else f", performance {self.pattern_index}"
         return f"black: the pattern{which}"
 
-    def _draw_means(self, axis, clock, row, color_of):
+    def _draw_means(self, axis, clock, row, styles):
         """Draw the mean of each group in front of its performances."""
-        means, lines = [], group_lines(len(color_of))
-        for (name, color), line in zip(color_of.items(), lines, strict=True):
+        means = []
+        for name, (color, line) in styles.items():
             members = np.array(self.groups) == name
             curve = nanmean(self.after[members, :, row], axis=0)
             means.append(front_line(axis, clock, curve, color=color, linestyle=line))

@@ -11,7 +11,7 @@ from ..online.tracker import MotionTracker, Track
 from .arguments import TIME_LABELS, Takes, as_frames, as_index, as_names, one_each, times_from_zero
 from .bodies import invert_postures
 from .drawing import COLORS, legend_above, panels
-from .limb_departures import bones_of_limb, limb_of
+from .limb_departures import bones_of_limbs, limb_of
 from .stick_figures import SkeletonDisplay, postures_at
 
 __all__ = ["TrackingDisplay"]
@@ -291,16 +291,7 @@ class TrackingDisplay:
         skeleton, estimate, truth = self._bodies(cosines)
         shown = as_frames(frames, len(estimate))
         limbs = np.array([limb_of(name) for name in cosines.get_feature_names_out()])
-        marked = [
-            list(
-                dict.fromkeys(
-                    bone
-                    for limb in dict.fromkeys(limbs[self.hidden[frame]])
-                    for bone in bones_of_limb(limb, skeleton)
-                )
-            )
-            for frame in shown
-        ]
+        marked = [bones_of_limbs(limbs[self.hidden[frame]], skeleton) for frame in shown]
         titles = [f"frame {k}" for k in shown]
         if self.unit == "seconds":
             titles = [f"{self.times[k]:.1f} s" for k in shown]

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 from sklearn_motionsync import (
@@ -11,11 +12,14 @@ from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
     LinearSynchronizer,
+    MotionTracker,
+    OnlineSynchronizer,
+    PartSynchronizer,
     Skeleton,
+    display,
 )
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import (
-    ActionModelDisplay,
     MetricDisplay,
     SkeletonDisplay,
     SynchronizationDisplay,
@@ -30,6 +34,19 @@ X = [x[:, :3] for x in POSITIONS]
 TIMES = np.tile(np.linspace(0, 9, 10), (4, 1))
 BACKWARDS = np.vstack([TIMES[:3], TIMES[:1, ::-1]])
 PATTERN = np.zeros((10, 3))
+# The kind of estimator that each display draws. A search needs no fit, nor does a segmenter.
+ESTIMATORS = {
+    "ActionModelDisplay": ActionModel(),
+    "CycleDisplay": None,
+    "LagDisplay": PartSynchronizer(),
+    "MetricDisplay": DenseSynchronizer(),
+    "PhaseDisplay": OnlineSynchronizer(),
+    "SearchDisplay": None,
+    "SkeletonDisplay": make_pipeline(DirectionCosines(PAPER), DenseSynchronizer()),
+    "SynchronizationDisplay": DenseSynchronizer(),
+    "TrackingDisplay": MotionTracker(),
+    "TrellisDisplay": DenseSynchronizer(),
+}
 
 
 def with_one(x, value, at=(3, 1)):
@@ -79,8 +96,8 @@ def draw_synchronization(**arguments):
         ({"features": []}, "at least one feature"),
         ({"pattern": PATTERN[:9]}, r"must have the shape \(10, 3\), got \(9, 3\)"),
         ({"pattern": masked(PATTERN)}, "The pattern has masked values"),
-        ({"ax": []}, "ax must be Axes of matplotlib, got none of them"),
-        ({"ax": "left"}, "ax must be Axes of matplotlib, got str"),
+        ({"ax": []}, r"ax must be Axes of matplotlib, got \[\]"),
+        ({"ax": "left"}, "ax must be Axes of matplotlib, got 'left'"),
     ],
 )  # fmt: skip
 def test_synchronization_from_predictions_refuses(arguments, message):
@@ -91,8 +108,8 @@ def test_pattern_columns_must_have_the_order_of_the_performances():
     frames = [pd.DataFrame(x, columns=list("abc")) for x in X]
     pattern = pd.DataFrame(PATTERN, columns=list("cab"))
     refuses(lambda: draw_synchronization(X=frames, pattern=pattern), "The pattern has the columns")
-    display = draw_synchronization(X=frames, pattern=pattern[list("abc")])
-    assert display.feature_names == list("abc")
+    drawn = draw_synchronization(X=frames, pattern=pattern[list("abc")])
+    assert drawn.feature_names == list("abc")
 
 
 def test_nan_is_drawn_as_a_gap():
@@ -128,10 +145,15 @@ def test_trellis_refuses_unknown_performance(pipe, performance):
     )
 
 
-@pytest.mark.parametrize("display", [ActionModelDisplay, SynchronizationDisplay, TrellisDisplay])
-@pytest.mark.parametrize("estimator", [None, "dense", 3])
-def test_from_estimator_refuses_what_is_no_estimator(display, estimator):
-    refuses(lambda: display.from_estimator(estimator, X), "There is no ")
+@pytest.mark.parametrize("name", display.__all__)
+def test_from_estimator_refuses_other_and_unfitted_estimators(name):
+    from_estimator = getattr(display, name).from_estimator
+    performances = [] if name == "MetricDisplay" else [POSITIONS]
+    if name != "SearchDisplay":
+        refuses(lambda: from_estimator(3, *performances), "got int|There is no .* in int")
+    if ESTIMATORS[name] is not None:
+        with pytest.raises(NotFittedError):
+            from_estimator(ESTIMATORS[name], *performances)
 
 
 # -- stick figures --------------------------------------------------------------------------

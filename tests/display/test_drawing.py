@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
-from sklearn_motionsync.display.drawing import COLORS, group_colors, parts_outside, pyplot
+from sklearn_motionsync.display.drawing import COLORS, group_styles, parts_outside, pyplot
 
 # Colours as seen without one kind of cones: Machado, Oliveira and Fernandes, "A
 # physiologically-based model for simulation of color vision deficiency", 2009, severity 1.
@@ -60,8 +60,8 @@ def test_colors_of_one_figure_differ(seen_by):
 
 @pytest.mark.parametrize("seen_by", SEEN_BY)
 def test_colors_of_four_groups_differ(seen_by):
-    color_of = group_colors("abcd")
-    for one, other in itertools.combinations(color_of.values(), 2):
+    colors = [color for color, _ in group_styles("abcd").values()]
+    for one, other in itertools.combinations(colors, 2):
         assert np.linalg.norm(lab(one, seen_by) - lab(other, seen_by)) > 15
 
 

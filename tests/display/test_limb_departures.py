@@ -189,7 +189,7 @@ def test_a_pipeline_without_aspace_on_axes_of_the_user(bunch):
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("arguments", "message"),
     [
         *(({"performance": bad}, "performance must be from 0 to 7, got")
           for bad in (8, -1, 1.5, True)),
@@ -201,9 +201,9 @@ def test_a_pipeline_without_aspace_on_axes_of_the_user(bunch):
         ({"frames": [40]}, "frames must be from 0 to 39"),
     ],
 )  # fmt: skip
-def test_from_departures_refuses(bunch, pipe, given, message):
+def test_from_departures_refuses(bunch, pipe, arguments, message):
     with pytest.raises(ValueError, match=message):
-        SkeletonDisplay.from_departures(pipe, bunch.data, **given)
+        SkeletonDisplay.from_departures(pipe, bunch.data, **arguments)
 
 
 def test_from_departures_refuses_pipelines_without_limbs(bunch, pipe):

@@ -9,7 +9,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay
-from sklearn_motionsync.display.drawing import group_colors
+from sklearn_motionsync.display.drawing import group_styles
 
 GROUPS = ["young", "old", "young", "old", "young", "old", "young", "old", "one"]
 PEOPLE = ["a", "b", "c", "d", "a", "b", "e", "d", "f"]
@@ -204,7 +204,7 @@ def test_legend_counts_departures_from_the_band_of_the_own_group(bunch, pipe):
 
 
 @pytest.mark.parametrize(
-    ("given", "error", "message"),
+    ("arguments", "error", "message"),
     [
         ({"groups": ["a"]}, ValueError, "groups must be .* each of the 9 performances, got 1"),
         ({"groups": GROUPS, "people": [1]}, ValueError, "people must be .* each of the 9"),
@@ -220,9 +220,9 @@ def test_legend_counts_departures_from_the_band_of_the_own_group(bunch, pipe):
         ({"unit": "seconds", "frame_rate": [1, 2]}, ValueError, "each of the 9 .* got 2"),
     ],
 )
-def test_action_model_display_refuses(bunch, pipe, given, error, message):
+def test_action_model_display_refuses(bunch, pipe, arguments, error, message):
     with pytest.raises(error, match=message):
-        ActionModelDisplay.from_estimator(pipe, **{"X": bunch.data} | given)
+        ActionModelDisplay.from_estimator(pipe, **{"X": bunch.data} | arguments)
 
 
 def test_many_groups_differ_in_color_or_line_style(bunch, pipe):
@@ -237,9 +237,9 @@ def test_many_groups_differ_in_color_or_line_style(bunch, pipe):
     assert len({line.get_linestyle() for line in before.group_means_[0]}) == 4
     # Black is the pattern.
     for count in (6, 7, 20):
-        color_of = group_colors(range(count))
-        assert len({to_rgba(c) for c in color_of.values()}) == count
-        assert to_rgba("black") not in {to_rgba(c) for c in color_of.values()}
+        colors = {to_rgba(color) for color, _ in group_styles(range(count)).values()}
+        assert len(colors) == count
+        assert to_rgba("black") not in colors
 
 
 @pytest.mark.parametrize("groups", [None, GROUPS])

@@ -44,5 +44,5 @@ def test_a_search_without_hits_is_drawn():
 def test_unknown_takes_and_thresholds_are_refused():
     with pytest.raises(ValueError, match=r"segments names the take 3; the takes are \[0\]"):
         SearchDisplay.from_estimator(WAVE, TAKE, segments=[(3, 0, 9)])
-    with pytest.raises(ValueError, match="from_predictions"):
+    with pytest.raises(TypeError, match="threshold"):
         SearchDisplay.from_estimator(WAVE, TAKE, threshold=0.5)

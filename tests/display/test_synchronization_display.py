@@ -7,17 +7,15 @@ import pytest
 from artists import segments, texts, ys
 from matplotlib.colors import to_rgba
 from sklearn.base import clone
-from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 from sklearn_motionsync import (
     ActionModel,
     DenseSynchronizer,
-    DirectionCosines,
     LinearSynchronizer,
     to_frame,
 )
-from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay, TrellisDisplay
+from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay
 
 GROUPS = ["young", "old", "young", "old", "young", "old", "young", "old", "one"]
 P = 30
@@ -169,10 +167,3 @@ def test_units_of_the_synchronization_display(bunch, pipe):
         assert {"frames": "frame of", "percent": "% of", "seconds": "(s)"}[unit] in labels
     with pytest.raises(ValueError, match="needs frame_rate"):
         SynchronizationDisplay.from_estimator(pipe, bunch.data, unit="seconds")
-
-
-@pytest.mark.parametrize("display", [SynchronizationDisplay, TrellisDisplay, ActionModelDisplay])
-def test_unfitted_estimator_is_refused(bunch, display):
-    steps = DirectionCosines(bunch.skeleton), DenseSynchronizer(), ActionModel()
-    with pytest.raises(NotFittedError):
-        display.from_estimator(make_pipeline(*steps), bunch.data)
