@@ -56,7 +56,7 @@ class TrellisDisplay:
     """
 
     def __init__(self, frames, offsets, costs, path, warp, *, names=("pattern", "performance")):
-        self.frames, self.offsets = np.asarray(frames), np.asarray(offsets)
+        self.frames, self.offsets = np.asarray(frames, dtype=np.float64), np.asarray(offsets)
         self.costs, self.path, self.warp = np.asarray(costs), np.asarray(path), np.asarray(warp)
         self.names = names
 
