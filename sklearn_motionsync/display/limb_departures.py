@@ -103,7 +103,7 @@ def _bones_of_limb(limb, skeleton):
     return [ends] if ends in skeleton.bones else [b for b in skeleton.bones if b[1] in ends]
 
 
-class Limbs(NamedTuple):
+class LimbColumns(NamedTuple):
     """The direction cosines among the features of a view, and the way back to them.
 
     Attributes
@@ -157,7 +157,7 @@ def view_of_limbs(before, parts, estimator, X, params, caller):
             f"are {', '.join(view.names[:4])}, ..., by way of "
             f"{[type(step).__name__ for step in steps]}."
         )
-    return view, Limbs(cosines[0], columns, after)
+    return view, LimbColumns(cosines[0], columns, after)
 
 
 def departs_outside_aspace(view, i, columns):

@@ -308,7 +308,9 @@ class PhaseDisplay:
         end = max(self._action.end_of(p) for p in self._performances)
         by_row = np.array(self.axes_, dtype=object).reshape(n_rows, -1)
         self.rows_ = [
-            Row(axes, p, self._action, self.skeleton, self.features, 1.02 * end or 1.0, azimuth)
+            PerformanceRow(
+                axes, p, self._action, self.skeleton, self.features, 1.02 * end or 1.0, azimuth
+            )
             for axes, p in zip(by_row, self._performances, strict=True)
         ]
         for axes, name in zip(by_row, self.names, strict=True):
@@ -467,7 +469,7 @@ class RunningPerformance(NamedTuple):
     body: np.ndarray | None = None
 
 
-class Row:
+class PerformanceRow:
     """The panels of one performance: a body if there is one, a dial, the phase, curves.
 
     Parameters

@@ -120,7 +120,9 @@ class ActionModelDisplay:
         self.feature_names, self.n_std = feature_names, n_std
         self.performances = None if performances is None else np.asarray(performances)
         self.band, self.coverage, self.departures = band, coverage, departures
-        self.groups = None if groups is None else Groups(groups, people, len(self.performances))
+        self.groups = (
+            None if groups is None else SubjectGroups(groups, people, len(self.performances))
+        )
         self.unit, self.frame_rate = unit, frame_rate
         self._axis = TimeAxis(unit, self.mean.shape[-2], None, frame_rate)
 
@@ -228,7 +230,7 @@ class ActionModelDisplay:
         if groups is None:
             mean, (lower, upper, n_std) = view.model.mean_, _bounds(view, band)
         else:
-            groups_of = Groups(groups, people, len(shown))
+            groups_of = SubjectGroups(groups, people, len(shown))
             mean, lower, upper = bands_of_groups(view.model, shown, groups_of, band)
         if unit == "seconds" and X is not None:
             clock = TimeAxis(unit, mean.shape[-2], _lengths(X), frame_rate).clock
@@ -283,10 +285,10 @@ class ActionModelDisplay:
     def _parts(self):
         """All performances, or those of each group, with their mean and band."""
         if self.groups is None:
-            return [Part(self.mean, self.lower, self.upper, self.performances)]
+            return [GroupCurves(self.mean, self.lower, self.upper, self.performances)]
         styles = group_styles(self.groups.labels).items()
         return [
-            Part(*bounds, self.performances[self.groups.members(name)], name, *style)
+            GroupCurves(*bounds, self.performances[self.groups.members(name)], name, *style)
             for *bounds, (name, style) in zip(
                 self.mean, self.lower, self.upper, styles, strict=True
             )
@@ -353,7 +355,7 @@ def _bounds(view, band):
     return mean - reach, mean + reach, factor
 
 
-class Part(NamedTuple):
+class GroupCurves(NamedTuple):
     """The mean, the band and the performances of all, or of one group.
 
     Attributes
@@ -425,7 +427,7 @@ class Part(NamedTuple):
         return line
 
 
-class Groups:
+class SubjectGroups:
     """The groups and the subjects of performances.
 
     Parameters
@@ -481,7 +483,7 @@ def bands_of_groups(model, performances, groups, band):
         Its clones are fitted.
     performances : ndarray, shape (n_sequences, P, n_features)
         Synchronised to one pattern.
-    groups : Groups
+    groups : SubjectGroups
     band : {"points", "performances", "mean"}
 
     Returns
