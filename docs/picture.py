@@ -39,7 +39,9 @@ def main():
         pipe, bunch.data, performances=[0, 2, 7, 9, 15], at=AT, ax=people[:2]
     )
     _, apart = plt.subplots(1, 8)
-    samples = SkeletonDisplay.from_model(pipe, frames=(0.05, 0.3, 0.45, 0.65), ax=apart)
+    samples = SkeletonDisplay.from_model(
+        pipe, frames=(0.05, 0.3, 0.45, 0.65), random_state=0, ax=apart
+    )
     moments = SkeletonDisplay(samples.scenes[1::2], samples.skeleton, [""] * 4).plot(people[2])
     for axis in moments.axes_:
         axis.set_ylim(people[0].get_ylim())

@@ -234,7 +234,7 @@ for axis in shown.axes_:
 # Each lies about a posture that somebody was in at that frame, within three standard deviations of
 # the mean.
 
-postures = SkeletonDisplay.from_model(pipe, frames=(0.1, 0.4, 0.6)).figure_
+postures = SkeletonDisplay.from_model(pipe, frames=(0.1, 0.4, 0.6), random_state=0).figure_
 
 # %%
 

@@ -1,8 +1,8 @@
-"""Displays of what synchronizers and models did: compute once, draw as often as you like.
+"""Displays of synchronizers, models and trackers: computed once, drawn any number of times.
 
-As in scikit-learn, ``from_estimator`` and ``from_predictions`` compute and draw, ``plot`` draws
-again, and the artists stay on the display as attributes that end in an underscore.
-matplotlib, in the extra ``plot``, is imported only when something is drawn.
+As in scikit-learn, ``from_estimator`` and ``from_predictions`` check their arguments, compute and
+draw. Constructors store their arguments without checks, and ``plot`` draws again. The artists are
+attributes with a trailing underscore. matplotlib, in the extra ``plot``, is imported on drawing.
 """
 
 from .cycles import CycleDisplay

@@ -1,29 +1,33 @@
-"""Animations that a notebook plays without further ado."""
+"""Animations of displays, played in a notebook without a network connection."""
 
 import re
 
+import numpy as np
+
 from .drawing import pyplot
 
-__all__ = ["playable"]
+__all__ = ["animate"]
 
-# Resolution of moving pictures: every one of them is kept in the notebook.
+# Resolution of the pictures: the notebook stores all of them.
 _DPI = 64
+# The largest number of pictures: about half an hour at 15 a second.
+_MAX_PICTURES = 25_000
 
 
-def playable(figure, show, count, fps, *, closes):
-    """An animation of a figure, which a notebook plays as the last value of a cell.
+def animate(display, show, ax, *, seconds, fps, azimuth):
+    """Draw a display and return its animation.
 
     Parameters
     ----------
-    figure : Figure
+    display : display with ``plot``
     show : callable
-        ``show(k)`` draws picture k, of ``count``, and returns its artists.
-    count : int
-    fps : float
-        Pictures a second.
-    closes : bool
-        Whether the figure is closed once it plays; else the notebook shows it once more, standing
-        still.
+        ``show(k, last)`` draws picture k, from 0 to ``last``.
+    ax : Axes or array-like of Axes, or None
+        By default the axes on which the display was drawn last. Then the figure is closed after the
+        notebook has shown the animation.
+    seconds, fps : float
+        Duration of the animation, and pictures a second.
+    azimuth : float
 
     Returns
     -------
@@ -31,49 +35,60 @@ def playable(figure, show, count, fps, *, closes):
     """
     from matplotlib.animation import FuncAnimation
 
-    # Known beforehand: nothing is imported any more while Python ends.
-    still_there = pyplot().fignum_exists
+    if not (0 < seconds < np.inf and 0 < fps < np.inf):
+        raise ValueError(f"seconds and fps must be above 0, got {seconds!r} and {fps!r}.")
+    if seconds * fps > _MAX_PICTURES:
+        raise ValueError(
+            f"seconds={seconds!r} at fps={fps!r} are {seconds * fps:.3g} pictures, more than "
+            f"{_MAX_PICTURES}; choose fewer."
+        )
+    count = max(2, round(seconds * fps))
+    display.plot(getattr(display, "axes_", None) if ax is None else ax, azimuth=azimuth)
+    figure = display.figure_.canvas.figure
+    # Looked up here: nothing can be imported while Python shuts down.
+    figure_exists = pyplot().fignum_exists
 
-    class Playable(FuncAnimation):
-        """Its places stay, its pictures are small, and it fetches nothing."""
+    class NotebookAnimation(FuncAnimation):
+        """An animation that computes the layout once and needs no network."""
 
         def to_jshtml(self, *args, **kwargs):
-            # To find the places of the panels costs more than to draw; and while they may be
-            # sought, every picture is drawn twice.
+            # The layout takes longer than the drawing, and each picture would repeat it.
             layout = figure.get_layout_engine()
             figure.draw_without_rendering()
-            figure.get_layout_engine = _nothing
-            # Pictures are saved; drawn on the canvas before, they would take twice as long.
-            figure.canvas.draw_idle = _nothing
+            figure.get_layout_engine = _do_nothing
+            # Saving a picture draws it; drawing it on the canvas before would double the time.
+            figure.canvas.draw_idle = _do_nothing
             try:
                 with pyplot().rc_context({"savefig.dpi": _DPI}):
-                    return with_own_buttons(super().to_jshtml(*args, **kwargs))
+                    return embed_buttons(super().to_jshtml(*args, **kwargs))
             finally:
                 del figure.canvas.draw_idle, figure.get_layout_engine
                 figure.set_layout_engine(layout)
 
         def __del__(self):
-            # Who has closed the figure does not wait for it.
-            if still_there(getattr(figure, "number", None)):
+            # Matplotlib warns of an animation that was not shown, unless its figure is closed.
+            if figure_exists(getattr(figure, "number", None)):
                 super().__del__()
 
         def _repr_html_(self):
             html = self.to_jshtml()
-            if closes:
+            if ax is None:
                 pyplot().close(figure)
             return html
 
-    return Playable(figure, show, frames=count, interval=1000 / fps, blit=False)
+    return NotebookAnimation(
+        figure, lambda k: show(k, count - 1), frames=count, interval=1000 / fps, blit=False
+    )
 
 
-def _nothing(*args, **kwargs):
-    """Draw nothing."""
+def _do_nothing(*args, **kwargs):
+    """Replaces a method for a while."""
 
 
-# -- buttons of a player of animations that are drawn without a network ------------------
+# -- the buttons of the player -----------------------------------------------------------
 
-# Outlines of the pictures on the buttons, on 14 by 12 units, by Matplotlib's names of them.
-_OUTLINES = {
+# SVG paths of the icons in a box of 14 by 12, by Matplotlib's names.
+_ICON_PATHS = {
     "minus": "M1 5h12v2H1z",
     "fast-backward": "M0 0h2v12H0zM8 0v12L2 6zM14 0v12L8 6z",
     "step-backward": "M1 0h3v12H1zM13 0v12L5 6z",
@@ -84,25 +99,25 @@ _OUTLINES = {
     "fast-forward": "M0 0l6 6-6 6zM6 0l6 6-6 6zM12 0h2v12h-2z",
     "plus": "M1 5h5V0h2v5h5v2H8v5H6V7H1z",
 }
-_FETCHED = re.compile(r"<link[^>]*font-awesome[^>]*>")
+_FONT_LINK = re.compile(r"<link[^>]*font-awesome[^>]*>")
 _ICON = re.compile(r'<i class="fa fa-([^"]*)"></i>')
 
 
-def _draw(icon):
-    outline = _OUTLINES.get(icon[1])
-    if outline is None:
-        return icon[0]
-    # The size is said in style as well: style sheets of notebooks stretch pictures.
-    return (
-        '<svg viewBox="0 0 14 12" width="14" height="12" style="width: 14px; height: 12px" '
-        f'aria-hidden="true"><path fill="currentColor" d="{outline}"/></svg>'
-    )
+def embed_buttons(html):
+    """Matplotlib's player with its icon font, which it downloads, replaced by SVG icons.
 
-
-def with_own_buttons(html):
-    """Matplotlib's player, which fetches a font for its buttons, with pictures of its own instead.
-
-    >>> with_own_buttons('<i class="fa fa-play"></i>')[:40]
+    >>> embed_buttons('<i class="fa fa-play"></i>')[:40]
     '<svg viewBox="0 0 14 12" width="14" heig'
     """
-    return _ICON.sub(_draw, _FETCHED.sub("", html))
+    return _ICON.sub(_icon_as_svg, _FONT_LINK.sub("", html))
+
+
+def _icon_as_svg(icon):
+    path = _ICON_PATHS.get(icon[1])
+    if path is None:
+        return icon[0]
+    # The style repeats the size: style sheets of notebooks stretch pictures.
+    return (
+        '<svg viewBox="0 0 14 12" width="14" height="12" style="width: 14px; height: 12px" '
+        f'aria-hidden="true"><path fill="currentColor" d="{path}"/></svg>'
+    )

@@ -1,101 +1,104 @@
-"""Bodies to be drawn: put upright, turned the same way, seen from a side."""
+"""Joint positions for stick figures: vertical, turned to one heading, and projected."""
+
+from copy import copy
 
 import numpy as np
 
 from ..body.axes import heading_axes, to_y_up
+from ..body.direction_cosines import DirectionCosines
 from ..body.limbs import unit_vectors
-from ..body.skeleton import check_columns
-from ..inputs.numbers import as_numbers, column_names
-from .given import mean_of_seen
+from ..body.skeleton import Skeleton, check_columns
+from ..inputs.numbers import as_numbers, check_finite, column_names
+from .drawing import nanmean
 
 __all__ = [
-    "bodies_of",
-    "bodies_of_postures",
     "bones_by_side",
-    "limits",
-    "on_screen",
-    "place_of",
-    "placed",
-    "upright",
-    "with_landmarks",
+    "bounds",
+    "invert_postures",
+    "landmark_track",
+    "place_on_floor",
+    "project",
+    "read_positions",
 ]
 
-# How far people may walk, in their heights, before the picture follows them.
+# The picture follows a body that walks farther than this, in heights of the body.
 _FAR = 0.75
-# Pictures are at least so high and wide, as a share of the other.
+# The smallest ratio of the sides of a picture.
 _FLAT = 0.05
-# What squares and products of coordinates bear.
-_LARGEST = 1e150
 
 
-def upright(x, skeleton, i):
-    """(n_frames, n_joints, n_dims) of (n_frames, n_dims * n_joints), the second axis vertical.
+def read_positions(x, skeleton, i):
+    """Positions (n_frames, n_joints, n_dims) of one performance, the second axis vertical.
 
-    Without a skeleton the second axis is taken for vertical, and three axes are unless the names of
-    the columns or their number say two.
+    Parameters
+    ----------
+    x : array-like, shape (n_frames, n_dims * n_joints)
+        NaN where a joint was not seen.
+    skeleton : Skeleton or None
+        Without a skeleton the second axis is vertical. There are three axes, or two if the names of
+        the columns or their number imply it.
+    i : int
+        The index of the performance, for messages.
     """
+    if skeleton is not None and not isinstance(skeleton, Skeleton):
+        raise ValueError(
+            "skeleton must be a Skeleton, such as Skeleton.paper() or bunch.skeleton, or None for "
+            f"points without bones; got {type(skeleton).__name__}."
+        )
     what = f"Performance {i}"
     if skeleton is not None:
         check_columns(x, skeleton, what)
         n_dims, n_joints = skeleton.n_dims, len(skeleton.joints)
+        expected = f"the skeleton's {n_joints} joints are (n_frames, {n_dims * n_joints})"
     names = column_names(x) or ()
     x = as_numbers(x, what, dtype=np.float64)
     if skeleton is None:
         width = x.shape[-1] if x.ndim > 0 else 0
-        named = [str(name)[-2:] for name in names] == ["_x", "_y"] * (len(names) // 2)
-        n_dims = 2 if width % 2 == 0 and (width % 3 or (names and named)) else 3
+        in_plane = [str(name)[-2:] for name in names] == ["_x", "_y"] * (len(names) // 2)
+        n_dims = 2 if width % 2 == 0 and (width % 3 or (names and in_plane)) else 3
         n_joints = width // n_dims
+        expected = "joints are (n_frames, 3 * n_joints)"
     if x.ndim != 2 or x.shape[1] != n_dims * n_joints or x.size == 0:
-        whose, width = "joints", "3 * n_joints"
-        if skeleton is not None:
-            whose, width = f"the skeleton's {n_joints} joints", n_dims * n_joints
-        raise ValueError(
-            f"{what} has shape {x.shape}, but the positions of {whose} are (n_frames, {width})."
-        )
-    wrong = np.abs(x) > _LARGEST
-    if wrong.any():
-        frame, column = np.argwhere(wrong)[0]
-        size = "infinite" if np.isinf(x[frame, column]) else "too large to draw"
-        raise ValueError(
-            f"{what}, frame {frame}, column {column} is {size}; make it NaN to leave a gap."
-        )
+        raise ValueError(f"{what} has shape {x.shape}, but the positions of {expected}.")
+    check_finite(x, f"{what}, frame", allow_nan=True)
     points = x.reshape(len(x), -1, n_dims)
     return points if skeleton is None else to_y_up(points, skeleton)
 
 
-def placed(x, skeleton, *, follow=False):
-    """A performance turned to face forward at first, above the origin, its lowest joint at 0.
+def place_on_floor(x, skeleton, *, follow=False):
+    """Positions turned to face forward in the first frame, the lowest joint of all frames at 0.
 
-    With ``follow``, or if it leads far away, the pelvis stays above the origin all the time.
-    Without a skeleton nothing is turned, and the middle of the joints stands for the pelvis. Who
-    has no hips faces as the shoulders do; nobody is turned in a picture.
+    The pelvis is above the origin in the first frame; with ``follow``, or if the body walks far,
+    in all frames. Without a skeleton the positions are not turned, and the mean of the joints
+    replaces the pelvis. Without hips the shoulders determine the heading. Positions in a plane are
+    never turned.
     """
     n_dims = x.shape[2]
-    turn = np.eye(n_dims)
-    across = None if skeleton is None or n_dims == 2 else _side_by_side(skeleton)
-    if across is not None:
-        left, right = (place_of(x, skeleton, f"{side}_{across}") for side in ("left", "right"))
-        turn = heading_axes(unit_vectors(_known(left - right, f"{across}s")[:1]))[0]
+    rotation = np.eye(n_dims)
+    pair = None if skeleton is None or n_dims == 2 else _heading_pair(skeleton)
+    if pair is not None:
+        left, right = (landmark_track(x, skeleton, f"{side}_{pair}") for side in ("left", "right"))
+        rotation = heading_axes(unit_vectors(_fill_gaps(left - right, f"{pair}s")[:1]))[0]
     if skeleton is not None and "pelvis" in skeleton.landmarks:
-        way = _known(place_of(x, skeleton, "pelvis"), "pelvis")
+        track = _fill_gaps(landmark_track(x, skeleton, "pelvis"), "pelvis")
     else:
-        way = _known(mean_of_seen(x, axis=1), "joints")
+        track = _fill_gaps(nanmean(x, axis=1), "joints")
     floor, top = np.nanmin(x[..., 1]), np.nanmax(x[..., 1])
     # Over the ground, or across the picture.
-    walked = np.ptp(np.delete(way, 1, axis=1), axis=0).max()
+    walked = np.ptp(np.delete(track, 1, axis=1), axis=0).max()
     follow = follow or walked > _FAR * (top - floor)
-    origin = way if follow else np.repeat(way[:1], len(x), axis=0)
+    origin = track if follow else np.repeat(track[:1], len(x), axis=0)
     origin[:, 1] = floor
-    return (x - origin[:, np.newaxis]) @ turn.T
+    return (x - origin[:, np.newaxis]) @ rotation.T
 
 
-def place_of(x, skeleton, landmark):
-    """Where a landmark is: (n_frames, n_dims)."""
+def landmark_track(x, skeleton, landmark):
+    """Positions (n_frames, n_dims) of a landmark."""
     return x[:, list(skeleton.indices_of(landmark))].mean(axis=1)
 
 
-def _side_by_side(skeleton):
-    """The landmarks of both sides that tell how a body faces; None if there are none."""
+def _heading_pair(skeleton):
+    """The paired landmarks that determine the heading; None if the skeleton has no such pair."""
     pairs = [
         part
         for part in ("hip", "shoulder")
@@ -104,22 +107,24 @@ def _side_by_side(skeleton):
     return pairs[0] if pairs else None
 
 
-def _known(track, what):
-    """A track (n_frames, 3) with its gaps bridged."""
+def _fill_gaps(track, what):
+    """A track (n_frames, n_dims) with its gaps interpolated."""
     seen = np.flatnonzero(np.isfinite(track).all(axis=1))
     if len(seen) == 0:
         raise ValueError(
-            f"No frame shows the {what}, so there is no telling where people stand and face."
+            f"No frame shows the {what}, so the place and the heading of the body are unknown."
         )
     frames = np.arange(len(track))
     return np.column_stack([np.interp(frames, seen, column[seen]) for column in track.T])
 
 
-def on_screen(x, azimuth):
-    """(n_frames, n_joints, 2) places across and up, as seen from far away at eye level.
+def project(x, skeleton, azimuth):
+    """Positions (n_frames, n_points, 2) on the screen, seen from far away at eye level.
 
-    A picture is seen as it is.
+    Positions in a plane are used as they are. The points are the joints and, if limbs are drawn
+    between landmarks, these after the joints.
     """
+    x = _with_landmarks(x, skeleton)
     if x.shape[-1] == 2:
         return x
     a = np.deg2rad(azimuth)
@@ -127,52 +132,53 @@ def on_screen(x, azimuth):
     return np.stack([across, x[..., 1]], axis=-1)
 
 
-def with_landmarks(x, skeleton):
-    """The joints, and after them the landmarks, if limbs are drawn between these."""
-    if skeleton is None or not _has_limbs_of_its_own(skeleton):
+def _with_landmarks(x, skeleton):
+    """The joints and, if limbs are drawn between landmarks, these after the joints."""
+    if skeleton is None or not _joins_landmarks(skeleton):
         return x
-    landmarks = [place_of(x, skeleton, name) for name in skeleton.body().joints]
+    landmarks = [landmark_track(x, skeleton, name) for name in skeleton.body().joints]
     return np.concatenate([x, np.stack(landmarks, axis=1)], axis=1)
 
 
-def _has_limbs_of_its_own(skeleton):
-    """Whether bones do not show the limbs: there are none, or a landmark is a mean of joints."""
+def _joins_landmarks(skeleton):
+    """Whether limbs are drawn between landmarks: a landmark is a mean, or there are no bones."""
     means = any(len(skeleton.indices_of(name)) > 1 for name in skeleton.landmarks)
     return means or not skeleton.bones
 
 
 def bones_by_side(skeleton):
-    """Bones by the side of the body they hang on: below a hip or shoulder, or in the middle.
+    """Bones by the side of the body: below a hip or shoulder, or in the middle.
 
-    Limbs of their own are between the landmarks after the joints, in place of bones between these.
+    Limbs between landmarks, which follow the joints, replace the bones between joints that stand
+    for landmarks.
     """
     bones = {"left": [], "middle": [], "right": []}
     if skeleton is None:
         return bones
     own = skeleton.bones
-    if _has_limbs_of_its_own(skeleton):
+    if _joins_landmarks(skeleton):
         body, count = skeleton.body(), len(skeleton.joints)
         for side, of_side in bones_by_side(body).items() if body.bones else ():
             bones[side] += [(a + count, b + count) for a, b in of_side]
         joints = {j for name in skeleton.landmarks for j in skeleton.indices_of(name)}
         own = [bone for bone in own if not set(bone) <= joints]
     side_of = {}
-    # Knees and elbows, for whoever has no hips and shoulders.
+    # The lower joints serve skeletons without hips and shoulders.
     for part in ("hip", "shoulder", "knee", "elbow", "ankle", "wrist"):
         for side in ("left", "right"):
             if f"{side}_{part}" in skeleton.landmarks:
                 for joint in skeleton.indices_of(f"{side}_{part}"):
                     side_of.setdefault(joint, side)
     for parent, joint in own:
-        sides = [_side_above(j, skeleton, side_of) for j in (parent, joint)]
-        # What goes from one side to the other is on none.
+        sides = [_side_of(j, skeleton, side_of) for j in (parent, joint)]
+        # A bone from one side to the other belongs to the middle.
         crosses = None not in sides and sides[0] != sides[1]
         bones["middle" if crosses or sides[1] is None else sides[1]].append((parent, joint))
     return bones
 
 
-def _side_above(joint, skeleton, side_of):
-    """The side of a joint, or of the nearest above it that has one."""
+def _side_of(joint, skeleton, side_of):
+    """The side of a joint, or of its nearest ancestor that has one."""
     while joint >= 0:
         if joint in side_of:
             return side_of[joint]
@@ -180,38 +186,30 @@ def _side_above(joint, skeleton, side_of):
     return None
 
 
-def bodies_of(space, mean, n_dims):
-    """A function from points of a space to bodies (n, n_landmarks, n_dims) on the mean's floor.
+def invert_postures(x, inverse, skeleton):
+    """Positions (n_frames, n_joints, n_dims) of postures; NaN where they are unknown.
 
-    A performance of its own would be put on a floor of its own.
+    Parameters
+    ----------
+    x : array-like, shape (n_frames, n_features)
+        NaN where a feature was not observed.
+    inverse : DirectionCosines, or Pipeline with ``inverse_transform``
+        Cosines leave out the limbs with NaN; a pipeline leaves out the whole body.
+    skeleton : Skeleton
+        The skeleton of the positions.
     """
-    if not hasattr(space, "inverse_transform"):
-        names = [type(step).__name__ for _, step in space.steps]
-        raise ValueError(
-            "Stick figures of a model need steps with inverse_transform before the synchronizer; "
-            f"they are {names}. Use from_postures with postures of your own."
-        )
-
-    def bodies(points):
-        together = np.asarray(space.inverse_transform(np.concatenate([mean, points])))
-        return together[len(mean) :].reshape(len(points), -1, n_dims)
-
-    return bodies
+    x = np.asarray(x)
+    known = ~np.isnan(x).any(axis=1)
+    if isinstance(inverse, DirectionCosines):
+        inverse, known = copy(inverse).set_params(hidden="nan"), np.ones(len(x), dtype=bool)
+    positions = np.full((len(x), len(skeleton.joints) * skeleton.n_dims), np.nan)
+    if known.any():
+        positions[known] = np.asarray(inverse.inverse_transform(x[known]))
+    return positions.reshape(len(x), -1, skeleton.n_dims)
 
 
-def bodies_of_postures(performances, cosines):
-    """Joint positions of performances given by direction cosines."""
-    if not hasattr(cosines, "inverse_transform"):
-        got = type(cosines).__name__
-        raise ValueError(f"cosines must be a fitted DirectionCosines, got {got}.")
-    # Single postures over each other are no set of performances.
-    if len(performances) > 1 and all(len(x) > 1 for x in performances):
-        return cosines.inverse_transform(performances)
-    return [cosines.inverse_transform(x) for x in performances]
-
-
-def limits(places):
-    """The lowest and the highest coordinate (2,) of places, some way apart."""
+def bounds(places):
+    """The lowest and the highest coordinates (2,) of places, apart by a smallest distance."""
     low, high = np.nanmin(places, axis=0), np.nanmax(places, axis=0)
     least = _FLAT * (high - low).max() or 1.0
     lacking = np.maximum(least - (high - low), 0) / 2

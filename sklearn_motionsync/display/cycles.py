@@ -1,10 +1,9 @@
-"""CycleDisplay: the self-correlation of a take, and where it is cut into cycles."""
+"""CycleDisplay: the self-correlation of a take, and the cuts between its cycles."""
 
 import numpy as np
 
 from ..body.formats import SIDES
 from ..inputs.features import choose_features
-from ..inputs.numbers import is_integer
 from ..segmentation.cycles import (
     CycleSegmenter,
     check_takes,
@@ -13,42 +12,50 @@ from ..segmentation.cycles import (
     start_curves,
 )
 from ..segmentation.self_correlation import required_strength
+from .arguments import as_index
 from .drawing import COLORS, panels
-from .given import as_drawn, as_index, is_number
 from .time_axis import TimeAxis
 
 __all__ = ["CycleDisplay"]
 
 
 class CycleDisplay:
-    """Whether a take repeats, after which time, and where it is cut.
+    """The self-correlation of a take, its period, and the cuts between its cycles.
 
     Above the self-correlation over the lag: its peaks, the period, and the threshold. Below a curve
     of the take, with its cuts. Use `from_estimator`.
 
     Parameters
     ----------
-    correlation : ndarray, shape (n_lags,)
+    correlation : array-like, shape (n_lags,)
+        The self-correlation at each lag in frames.
     peaks : array-like of int
-        Lags of its peaks.
-    curve : ndarray, shape (n_frames,)
+        The lags of its peaks.
+    curve : array-like, shape (n_frames,)
+        A curve of the take.
     cuts : array-like of int, default=()
-        Frames in which cycles begin and end.
+        The frames at which cycles begin and end.
     threshold : float, default=0.4
+        The self-correlation that a cyclic take needs.
     period : float, default=None
-        Frames of a cycle; None if there is none.
-    name, reason : str, default=""
-        What the curve shows, and why the take cannot be segmented.
+        The length of a cycle in frames; None if there is none.
+    name : str, default=""
+        The name of the curve.
+    reason : str, default=""
+        Why the take cannot be segmented.
 
     Attributes
     ----------
     figure_ : Figure
+        The figure of the last plot.
     axes_ : list of Axes
-        Of the self-correlation, and of the take.
-    correlation_, curve_, peaks_ : Line2D
-    threshold_ : Line2D
+        The panels of the self-correlation and of the take.
+    correlation_, curve_, peaks_, threshold_ : Line2D
+        The curves, the markers at the peaks, and the threshold.
     period_ : Line2D or None
+        The line at the period.
     cuts_ : LineCollection
+        The lines at the cuts.
 
     Examples
     --------
@@ -64,19 +71,9 @@ class CycleDisplay:
     def __init__(
         self, correlation, peaks, curve, cuts=(), *, threshold=0.4, period=None, name="", reason=""
     ):
-        self.correlation = as_drawn(correlation, "The correlation", ("n_lags",))
-        self.curve = as_drawn(curve, "The curve", ("n_frames",))
-        self.peaks = _indices(peaks, len(self.correlation), "peaks")
-        self.cuts = _indices(cuts, len(self.curve), "cuts")
-        if not is_number(threshold):
-            raise ValueError(f"threshold must be a number, got {threshold!r}.")
-        if period is not None and not is_number(period, 0, len(self.correlation) - 1):
-            raise ValueError(
-                f"period must be a lag from 0 to {len(self.correlation) - 1}, or None if there is "
-                f"none; got {period!r}."
-            )
-        self.threshold, self.period = float(threshold), period
-        self.name, self.reason = str(name), str(reason)
+        self.correlation, self.curve = np.asarray(correlation), np.asarray(curve)
+        self.peaks, self.cuts = np.asarray(peaks, dtype=int), np.asarray(cuts, dtype=int)
+        self.threshold, self.period, self.name, self.reason = threshold, period, name, reason
 
     def __repr__(self):
         return f"CycleDisplay({len(self.curve)} frames, {self._describe()})"
@@ -85,27 +82,30 @@ class CycleDisplay:
     def from_estimator(
         cls, estimator, X, *, take=0, feature=None, unit="frames", frame_rate=None, ax=None
     ):
-        """Draw what a segmenter makes of a take.
+        """Draw the self-correlation and the cuts of a take.
 
         Parameters
         ----------
         estimator : CycleSegmenter
-            Without a fit no cuts are drawn, but why there may be none.
-        X : takes, as the estimator takes them
+            Before a fit the self-correlation is drawn without cuts.
+        X : takes
+            As the estimator takes them.
         take : int, default=0
-            Which of them.
+            The index of the take.
         feature : int or str, default=None
-            A feature of what is compared, by index or name. By default the curve that begins a
-            cycle: a foot ahead of the pelvis, in leg lengths, or a feature.
+            A compared feature, by index or name. By default the curve that defines the beginning
+            of a cycle: the distance of a foot ahead of the pelvis in leg lengths, or a feature.
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time; ``"percent"`` is of the take.
         frame_rate : float, default=None
             Frames a second, for seconds.
         ax : Axes, or two of them, default=None
+            A subplot to be divided, or one axes a panel. None makes a figure.
 
         Returns
         -------
         CycleDisplay
+            The display, drawn.
 
         Raises
         ------
@@ -145,15 +145,19 @@ class CycleDisplay:
         Parameters
         ----------
         ax : Axes, or two of them, default=None
+            A subplot to be divided, or one axes a panel. None makes a figure.
         unit : {"frames", "percent", "seconds"}, default="frames"
+            The unit of time; ``"percent"`` is of the take.
         frame_rate : float, default=None
+            Frames a second, for seconds.
 
         Returns
         -------
-        self
+        CycleDisplay
+            The display itself.
         """
         axis = TimeAxis(unit, len(self.curve), [len(self.curve)], frame_rate)
-        (times,), label = axis.own(), axis.label_of_performances.replace("performance", "take")
+        (times,) = axis.performances()
         self.figure_, self.axes_ = panels(ax, [0, 1], 2, 1, (7, 5))
         upper, lower = self.axes_
         lags = times[: len(self.correlation)]
@@ -161,7 +165,7 @@ class CycleDisplay:
         (self.correlation_,) = upper.plot(lags, self.correlation, color=blue)
         at, values = lags[self.peaks], self.correlation[self.peaks]
         (self.peaks_,) = upper.plot(at, values, "o", color=blue, fillstyle="none", label="peaks")
-        # More is asked of takes of less than two cycles; of narrow movements it is already.
+        # The threshold is higher at lags of which a take holds less than two.
         cycles = len(self.curve) / np.arange(1, len(lags))
         asked = required_strength(cycles, np.inf, self.threshold)
         (self.threshold_,) = upper.plot(
@@ -184,7 +188,7 @@ class CycleDisplay:
             times[self.cuts], 0, 1, transform=lower.get_xaxis_transform(), color=black, linewidth=1
         )
         lower.set_xlim(0, times[-1])
-        lower.set_xlabel(label)
+        lower.set_xlabel(axis.performance_label.replace("performance", "take"))
         lower.set_ylabel(self.name)
         return self
 
@@ -195,15 +199,8 @@ class CycleDisplay:
         return ", ".join(filter(None, [self.reason, found, cut])) or "no period"
 
 
-def _indices(indices, count, what):
-    listed = list(np.ravel(np.asarray(indices)))
-    if not all(is_integer(i) and 0 <= i < count for i in listed):
-        raise ValueError(f"{what} must be whole numbers from 0 to {count - 1}, got {listed!r}.")
-    return np.array(listed, dtype=int)
-
-
 def _curve_of(segmenter, fitted, take, x, feature):
-    """What is drawn of a take, and what to call it."""
+    """The name and the values of the curve of a take."""
     names = compared_names(segmenter)
     if feature is None:
         start = segmenter.start if fitted is None else fitted.start_

@@ -1,25 +1,26 @@
-"""One way to draw: the panels, colours and curves that all displays share."""
+"""Panels, colours, curves and legends that several displays draw."""
 
+from itertools import cycle
 from textwrap import fill
 
 import numpy as np
 
 __all__ = [
     "COLORS",
+    "bone_lines",
     "curves",
     "front_line",
-    "group_colors",
-    "group_lines",
+    "group_styles",
     "legend_above",
+    "nanmean",
     "panels",
     "parts_outside",
     "pyplot",
     "stage",
-    "sticks",
 ]
 
-# Okabe and Ito's colours and a violet, told apart by colour-blind people. One role each, in every
-# figure.
+# Okabe and Ito's colours and a violet, which colour-blind people can distinguish. Each has one
+# meaning in all figures.
 COLORS = {
     "performance": "#0072B2",
     "pattern": "#000000",
@@ -28,18 +29,18 @@ COLORS = {
     "left": "#0072B2",
     "middle": "#4D4D4D",
     "right": "#D55E00",
-    # Where something departs from the action, all else is grey.
+    # Beside departures all else is grey.
     "departure": "#A000F0",
     "quiet": "#808080",
     "shadow": "#D9D9D9",
 }
-# Black is the pattern.
+# Colours of groups, without black, which is the pattern.
 _GROUPS = ["#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"]
-# Of more groups the colours are alike, and their means are told apart by lines.
+# Line styles of the means of more groups, whose colours are similar.
 _LINES = ["-", "--", ":", "-."]
 # Points between a legend and a title above it.
 _GAP = 6
-# Sizes of a legend's letters: the largest is taken with which nothing is lost above the figure.
+# Font sizes of a legend; the largest with which the legend fits into the figure is used.
 _SIZES = ["small", "x-small", "xx-small"]
 
 
@@ -52,19 +53,21 @@ def pyplot():
     return plt
 
 
-def panels(ax, spots, n_rows, n_cols, size):
-    """A figure and its axes at some spots of a grid.
+def panels(ax, cells, n_rows, n_cols, size, drawn=()):
+    """A figure and its axes in some cells of a grid.
 
     Parameters
     ----------
     ax : None, Axes, or array-like of Axes
-        None makes a figure. As many axes as spots are used as they are. A single one is
+        None makes a figure. As many axes as cells are used as they are. A single subplot is
         divided: the panels take its place.
-    spots : list
+    cells : list
         Indices into the grid, one a panel.
     n_rows, n_cols : int
     size : (float, float)
-        Inches of a new figure.
+        Width and height of a new figure in inches.
+    drawn : list of Axes, default=()
+        Axes that the display has drawn before; they are cleared.
 
     Returns
     -------
@@ -75,27 +78,28 @@ def panels(ax, spots, n_rows, n_cols, size):
     if ax is None:
         figure = plt.figure(figsize=size, layout="constrained")
         grid = figure.add_gridspec(n_rows, n_cols)
-        return figure, [figure.add_subplot(grid[spot]) for spot in spots]
-    given = list(np.ravel(np.asarray(ax, dtype=object)))
-    strange = [type(a).__name__ for a in given if not isinstance(a, plt.Axes)]
-    if strange or not given:
-        got = strange[0] if strange else "none of them"
-        raise ValueError(f"ax must be Axes of matplotlib, got {got}.")
-    figure = given[0].figure
-    if len(given) == len(spots):
-        return figure, given
-    if len(given) != 1 or given[0].get_subplotspec() is None:
+        return figure, [figure.add_subplot(grid[cell]) for cell in cells]
+    axes = list(np.ravel(np.asarray(ax, dtype=object)))
+    if not axes or not all(isinstance(a, plt.Axes) for a in axes):
+        raise ValueError(f"ax must be Axes of matplotlib, got {ax!r:.80}.")
+    figure = axes[0].figure
+    if len(axes) == len(cells):
+        for axis in axes:
+            if axis in drawn:
+                axis.clear()
+        return figure, axes
+    if len(axes) != 1 or axes[0].get_subplotspec() is None:
         raise ValueError(
-            f"ax must be one of a figure's subplots, to be divided, or {len(spots)} axes, one a "
-            f"panel; got {len(given)}."
+            f"ax must be one of a figure's subplots, to be divided, or {len(cells)} axes, one a "
+            f"panel; got {len(axes)}."
         )
-    given[0].set_axis_off()
-    grid = given[0].get_subplotspec().subgridspec(n_rows, n_cols)
-    return figure, [figure.add_subplot(grid[spot]) for spot in spots]
+    axes[0].set_axis_off()
+    grid = axes[0].get_subplotspec().subgridspec(n_rows, n_cols)
+    return figure, [figure.add_subplot(grid[cell]) for cell in cells]
 
 
 def stage(axis, title, low, high):
-    """Axes as a stage for bodies that move between two corners (2,): a floor, and no scales."""
+    """Prepare axes for stick figures between two corners (2,): a floor, and no scales."""
     margin = 0.05 * (high - low)
     axis.set_xlim(low[0] - margin[0], high[0] + margin[0])
     axis.set_ylim(low[1] - margin[1], high[1] + margin[1])
@@ -110,7 +114,7 @@ def stage(axis, title, low, high):
 
 
 def curves(axis, xs, ys, **style):
-    """Many curves as one artist, in the data limits of the axes."""
+    """Draw many curves as one artist."""
     from matplotlib.collections import LineCollection
 
     lines = LineCollection([np.column_stack(xy) for xy in zip(xs, ys, strict=True)], **style)
@@ -120,7 +124,7 @@ def curves(axis, xs, ys, **style):
 
 
 def front_line(axis, xs, ys, **style):
-    """A curve in front of others, with a white rim so that it is seen among them."""
+    """Draw a curve in front of others, with a white outline."""
     from matplotlib.patheffects import Normal, Stroke
 
     style = {"linewidth": 1.8, "zorder": 4} | style
@@ -130,29 +134,29 @@ def front_line(axis, xs, ys, **style):
 
 
 def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
-    """A legend between panels and their titles, where it hides no curve.
+    """Draw a legend between panels and their titles, where it hides no curve.
 
-    Panels of a figure without a layout engine become lower by as much. Letters become smaller where
-    it would be higher than half of them and what is above.
+    Panels of a figure without a layout engine become lower to make room. The font becomes smaller
+    if the legend does not fit above the middle of the panels.
 
     Parameters
     ----------
     top : list of Axes
-        Panels, the first of them on the left. Titles of those beside it, which must be there
-        already, move up.
+        Panels, the first of them on the left. The titles of panels in the same row, which must be
+        set already, move up.
     handles : list of Artist
     labels : list of str
     title : str, default=None
     below : list of Axes, default=None
-        Those that it may reach over, of which it begins above the first; by default all.
+        Panels over which the legend may extend, beginning above the first; by default all.
     n_cols : int, default=6
-        Columns at most.
+        The largest number of columns.
 
     Returns
     -------
     Legend
     """
-    axis, labels = top[0], [_plain(label) for label in labels]
+    axis, labels = top[0], [_escape(label) for label in labels]
     extents = [a.get_window_extent() for a in (below or top)]
     room = max(e.x1 for e in extents) - extents[0].x0
     height = axis.figure.bbox.y1 - (extents[0].y0 + extents[0].y1) / 2
@@ -160,21 +164,21 @@ def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
         legend, box = _legend(axis, handles, labels, title, n_cols, room, size)
         if box.height <= height:
             break
-    beside = [a for a in top if abs(a.get_window_extent().y1 - extents[0].y1) < 1]
-    if any(a.get_title() for a in beside):
-        # The titles keep the room.
+    in_row = [a for a in top if abs(a.get_window_extent().y1 - extents[0].y1) < 1]
+    if any(a.get_title() for a in in_row):
+        # The padding of the titles reserves the space.
         legend.set_in_layout(False)
         pad = box.height * 72 / axis.figure.dpi + _GAP
-        for a in beside:
+        for a in in_row:
             a.set_title(a.get_title(), fontsize=a.title.get_fontsize(), pad=pad)
     if axis.figure.get_layout_engine() is None:
-        for a in beside:
+        for a in in_row:
             _lower(a, box.height)
     return legend
 
 
 def _legend(axis, handles, labels, title, n_cols, room, size):
-    """A legend in as many columns as there is room for, in letters of a size, and its extent."""
+    """A legend with as many columns as fit, in a font size, and its extent."""
     style = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
     style |= {"fontsize": size, "title_fontsize": size, "alignment": "left"}
     for count in range(min(len(labels), n_cols), 0, -1):
@@ -189,21 +193,21 @@ def _legend(axis, handles, labels, title, n_cols, room, size):
 
 
 def _lower(axis, height):
-    """Take so many pixels off the top of axes, of half of them at most."""
+    """Make axes lower at the top by some pixels, by half of their height at most."""
     spec, figure = axis.get_subplotspec(), axis.figure
-    place = axis.get_position() if spec is None else spec.get_position(figure)
-    height = min(height / figure.bbox.height, place.height / 2)
-    axis.set_position([place.x0, place.y0, place.width, place.height - height])
+    box = axis.get_position() if spec is None else spec.get_position(figure)
+    height = min(height / figure.bbox.height, box.height / 2)
+    axis.set_position([box.x0, box.y0, box.width, box.height - height])
 
 
-def _plain(label):
-    """Text that matplotlib neither takes for mathematics nor leaves out of a legend."""
+def _escape(label):
+    """Text that matplotlib neither reads as mathematics nor leaves out of a legend."""
     label = label.replace("$", r"\$")
     return f" {label}" if label.startswith("_") else label
 
 
-def sticks(axis, color, width, alpha=1.0, zorder=2):
-    """An empty artist for the bones of bodies."""
+def bone_lines(axis, color, width, alpha=1.0, zorder=2):
+    """An empty artist for the bones of stick figures."""
     from matplotlib.collections import LineCollection
 
     style = {"colors": color, "linewidths": width, "alpha": alpha, "zorder": zorder}
@@ -213,7 +217,7 @@ def sticks(axis, color, width, alpha=1.0, zorder=2):
 
 
 def parts_outside(ys, lower, upper):
-    """Pieces of polylines beyond two others, up to where they cross.
+    """The pieces of polylines outside a band, cut where they cross a bound.
 
     Parameters
     ----------
@@ -224,7 +228,7 @@ def parts_outside(ys, lower, upper):
     Returns
     -------
     xs, ys : ndarray, shape (n_pieces, 2)
-        Both ends of straight pieces, of which none is longer than a frame.
+        Both ends of straight pieces, each at most one frame long.
     """
     pieces = []
     for beyond in (ys - upper, lower - ys):
@@ -239,19 +243,19 @@ def parts_outside(ys, lower, upper):
     return tuple(np.concatenate(of_both) for of_both in zip(*pieces, strict=True))
 
 
-def group_colors(groups, n_sequences):
-    """The colour of every performance, and the colour of every group by its name."""
-    if groups is None:
-        return [COLORS["performance"]] * n_sequences, {}
+def nanmean(values, axis):
+    """The mean of the values that are not NaN; NaN, without a warning, if all are."""
+    seen = np.isfinite(values)
+    count = seen.sum(axis=axis)
+    total = np.where(seen, values, 0).sum(axis=axis)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def group_styles(groups):
+    """The colour and the line style of each group by its name, in order of first appearance."""
     names = list(dict.fromkeys(groups))
-    palette = _GROUPS
+    palette, lines = _GROUPS, _LINES[:1]
     if len(names) > len(_GROUPS):
-        palette = pyplot().colormaps["viridis"](np.linspace(0, 0.95, len(names)))
-    color_of = dict(zip(names, palette, strict=False))
-    return [color_of[group] for group in groups], color_of
-
-
-def group_lines(n_groups):
-    """The line of the mean of every group, of so many."""
-    lines = _LINES if n_groups > len(_GROUPS) else _LINES[:1]
-    return [lines[k % len(lines)] for k in range(n_groups)]
+        palette, lines = pyplot().colormaps["viridis"](np.linspace(0, 0.95, len(names))), _LINES
+    pairs = zip(palette, cycle(lines), strict=False)
+    return dict(zip(names, pairs, strict=False))

@@ -1,4 +1,4 @@
-"""LagDisplay: by what parts of the body lag behind the rest, and how far that is to be believed."""
+"""LagDisplay: the lags of parts of the body, with their confidence intervals."""
 
 import numpy as np
 
@@ -11,35 +11,41 @@ from .time_axis import TimeAxis
 __all__ = ["LagDisplay"]
 
 _UNITS = {"frames": "frames", "percent": "% of clock", "seconds": "s"}
-_BEHIND = {"rest": "the rest of the body", "body": "the whole body"}
+_REFERENCES = {"rest": "the rest of the body", "body": "the whole body"}
 
 
 class LagDisplay:
-    """A map of lags, part by time, above the curves of every part with their spread.
+    """A map of lags, part by time, above the curves of the parts with their spread.
 
-    The map shows the mean; it is hatched where the 95 % interval of the mean holds 0, so that a lag
-    cannot be told from none. The curves show the same mean and interval, and broken lines a
-    standard deviation of performances beside it: a mean that is sure is no habit yet. Use
-    `from_estimator`.
+    The map shows the mean lag. It is hatched where the 95 % confidence interval of the mean
+    contains 0. The curves show the mean and the interval; broken lines are one standard deviation
+    of performances from the mean. Use `from_estimator`.
 
     Parameters
     ----------
     lags : Lags
-        What `PartSynchronizer.lags` reports.
+        The result of `PartSynchronizer.lags`.
 
     Attributes
     ----------
     figure_ : Figure
+        The figure of the last plot.
     map_ax_ : Axes
+        The panel of the map.
     axes_ : list of Axes
-        Of the curves, one a part.
+        The panels of the curves, one a part.
     map_ : QuadMesh
+        The mean lags.
     unsure_ : list of PolyCollection
-        The hatched stretches of every part.
+        The hatched stretches of each part.
     means_ : list of Line2D
+        The mean of each part.
     intervals_ : list of FillBetweenPolyCollection
+        The confidence interval of each part.
     spreads_ : list of LineCollection
+        The standard deviation of each part.
     colorbar_ : Colorbar or None
+        The scale of the map.
 
     Examples
     --------
@@ -54,11 +60,6 @@ class LagDisplay:
     """
 
     def __init__(self, lags):
-        if not isinstance(lags, Lags):
-            raise ValueError(
-                "lags must be a report of lags, PartSynchronizer.lags(X); got "
-                f"{type(lags).__name__}."
-            )
         self.lags = lags
 
     def __repr__(self):
@@ -84,17 +85,21 @@ class LagDisplay:
         ----------
         estimator : PartSynchronizer, or Pipeline with one
             Fitted.
-        X : performances, as the estimator takes them
+        X : performances
+            As the estimator takes them.
         groups, against, unit, frame_rate
             As in ``PartSynchronizer.lags``.
         ax : Axes, or one for the map and one for each part, default=None
+            A subplot to be divided, or one axes a panel. None makes a figure.
         colorbar : bool, default=True
+            Whether to draw a scale of the map.
         **params : dict
-            What steps before take besides.
+            Further arguments of the steps before the synchronizer.
 
         Returns
         -------
         LagDisplay
+            The display, drawn.
         """
         caller = f"{cls.__name__}.from_estimator"
         reached = route_to_synchronizer(estimator, X, params, caller, kind=PartSynchronizer)
@@ -104,18 +109,31 @@ class LagDisplay:
 
     @classmethod
     def from_predictions(cls, lags, *, ax=None, colorbar=True):
-        """Draw a report of lags.
+        """Draw lags that are known already.
 
         Parameters
         ----------
         lags : Lags
+            The result of `PartSynchronizer.lags`.
         ax : Axes, or one for the map and one for each part, default=None
+            A subplot to be divided, or one axes a panel. None makes a figure.
         colorbar : bool, default=True
+            Whether to draw a scale of the map.
 
         Returns
         -------
         LagDisplay
+            The display, drawn.
+
+        Raises
+        ------
+        ValueError
+            If ``lags`` is not of class `Lags`.
         """
+        if not isinstance(lags, Lags):
+            raise ValueError(
+                f"lags must be the result of PartSynchronizer.lags; got {type(lags).__name__}."
+            )
         return cls(lags).plot(ax, colorbar=colorbar)
 
     def plot(self, ax=None, *, colorbar=True):
@@ -124,16 +142,19 @@ class LagDisplay:
         Parameters
         ----------
         ax : Axes, or one for the map and one for each part, default=None
+            A subplot to be divided, or one axes a panel. None makes a figure.
         colorbar : bool, default=True
+            Whether to draw a scale of the map.
 
         Returns
         -------
-        self
+        LagDisplay
+            The display itself.
         """
         n_parts, n_frames = self.lags.values.shape[1:]
-        spots = [(0, slice(None)), *((1, i) for i in range(n_parts))]
+        cells = [(0, slice(None)), *((1, i) for i in range(n_parts))]
         size = (max(5.0, 1.9 * n_parts), 3.4 + 0.25 * n_parts)
-        self.figure_, (self.map_ax_, *self.axes_) = panels(ax, spots, 2, n_parts, size)
+        self.figure_, (self.map_ax_, *self.axes_) = panels(ax, cells, 2, n_parts, size)
         axis = TimeAxis("frames" if self.lags.unit == "frames" else "percent", n_frames)
         table = self.lags.over_time()
         columns = {
@@ -157,7 +178,7 @@ class LagDisplay:
             shading="nearest",
             rasterized=True,
         )
-        # What is not known to be another lag than none is not told from it.
+        # NaN bounds, of a single performance, are unsure as well.
         unsure = ~((columns["low"] > 0) | (columns["high"] < 0))
         self.unsure_ = [
             top.fill_between(
@@ -204,17 +225,17 @@ class LagDisplay:
             if i:
                 ax.tick_params(labelleft=False)
         self.axes_[0].set_ylabel(f"late by, {_UNITS[self.lags.unit]}")
-        who = "performances" if self.lags.groups is None else "people"
+        units = "performances" if self.lags.groups is None else "people"
         handles = [self.means_[0], self.intervals_[0], self.spreads_[0]]
         labels = [
             "mean",
-            f"95 % interval of the mean, over {who}",
+            f"95 % interval of the mean, over {units}",
             "an SD of performances beside it",
         ]
         legend_above(self.axes_, handles, labels)
 
     def _names(self):
-        """Names of the parts, with their repeatability where it is known."""
+        """Names of the parts, with their repeatability (ICC) where it is known."""
         if self.lags.groups is None:
             return list(self.lags.parts)
         icc = self.lags.summary()["icc"]
@@ -222,7 +243,7 @@ class LagDisplay:
 
     def _describe(self):
         n_sequences, n_parts = self.lags.values.shape[:2]
-        behind = _BEHIND.get(self.lags.against, f"the {self.lags.against}")
+        behind = _REFERENCES.get(self.lags.against, f"the {self.lags.against}")
         parts = f"{n_parts} parts" if n_parts > 1 else self.lags.parts[0]
         people = ""
         if self.lags.groups is not None:

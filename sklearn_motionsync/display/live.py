@@ -1,95 +1,87 @@
-"""PhaseDisplay: where running performances are, and what is expected of the rest of them."""
+"""PhaseDisplay: the phase of running performances, and the predicted rest of them."""
 
-from copy import copy
 from itertools import pairwise
 from textwrap import fill
+from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
-from sklearn.utils.validation import check_is_fitted
 
 from ..body.direction_cosines import DirectionCosines
-from ..inputs.collections import as_collection
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.numbers import is_integer
-from ..inputs.tables import labels_of
-from ..online.stream import LivePhase, check_times
+from ..online.stream import LivePhase, time_left
 from ..online.synchronizer import OnlineSynchronizer
 from ..utils.pipelines import find_step
-from .animation import playable
-from .drawing import legend_above, panels
-from .given import (
-    as_drawn,
-    as_index,
-    as_indices,
-    as_names,
-    as_pictures,
-    as_skeleton,
-    check_view,
-    is_number,
-)
-from .live_rows import Action, Followed, Row
+from .animation import animate
+from .arguments import TIME_LABELS, Takes, as_index, as_indices, as_names, times_from_zero
+from .bodies import bones_by_side, bounds, invert_postures, landmark_track, project
+from .drawing import COLORS, bone_lines, front_line, legend_above, panels, stage
 
-__all__ = ["PhaseDisplay", "from_zero", "one_each", "taken", "times_of"]
+__all__ = ["PhaseDisplay"]
 
-# Performances below each other, if not chosen.
-_FEW_PERFORMANCES = 4
-# Columns of the grid that a panel takes: a body, a dial, the phase, a curve.
+# The number of performances by default.
+_N_PERFORMANCES = 4
+# The widths of panels in columns of the grid: a body, a dial, the phase, a curve.
 _BODY, _DIAL, _PHASE, _CURVE = 3, 3, 5, 5
-# Inches of a column, and of a row.
+# The width of a column and the height of a row in inches.
 _COLUMN, _ROW = 0.72, 2.35
-# Letters of a name in a line above a panel.
-_LETTERS = 24
-_UNITS = {"frames": "time (frames)", "seconds": "time (s)"}
+# Characters a line of a title or an axis label.
+_LINE_LENGTH = 24
+# The interval of the arc of a dial, as a share of the mean duration.
+_AHEAD = 0.1
+# Standard deviations on each side that contain 90 %.
+_BAND = 1.645
+# The number of points of a prediction.
+_N_POINTS = 60
 
 
 class PhaseDisplay:
-    """Running performances: where they are, how sure that is, and what will come.
+    """Running performances: their phase, its confidence, and a prediction.
 
-    A row for each performance: a dial of its phase, with an arc ahead that ends where it will be
-    after a tenth of the mean duration at the present rate; the phase over time with its confidence;
-    and features, as far as they were seen, with the predicted rest: the mean from the phase on, for
-    as long as `OnlineSynchronizer.time_left` guesses. With ``body`` also a stick figure, before the
-    mean one at the end of that arc. Make one with `from_estimator` or `from_predictions`.
+    A row for each performance: a dial of its phase, with an arc that ends at the phase after a
+    tenth of the mean duration at the present rate; the phase over time with its confidence; and
+    features, as far as they were observed, with the predicted rest: the mean from the phase on,
+    for as long as `OnlineSynchronizer.time_left` estimates. With ``body`` also a stick figure,
+    before the mean one at the end of that arc. Make one with `from_estimator` or
+    `from_predictions`.
 
     Parameters
     ----------
     phases : LivePhase, or list of LivePhase
         Of arrays (n_frames_i,); or of arrays (n_frames, n_streams).
     n_frames : int
-        Of the clock, ``P``.
+        The length of the clock, ``P``.
     times : list of array-like (n_frames_i,), default=None
-        When the frames came; by default one after the other.
+        The times of the frames; by default frame numbers.
     duration : float, default=None
-        Mean duration of the action in the unit of the times; None predicts nothing.
+        The mean duration of the action in the unit of the times; None predicts nothing.
     seen : list of array-like (n_frames_i, n_shown), default=None
-        Features that are drawn.
+        The observed features.
     mean, spread : array-like, shape (P, n_shown), default=None
-        What is expected of them, and its standard deviation.
+        The expected features, and their standard deviation.
     afterwards : list of array-like (n_frames_i,) or None, default=None
-        Phases as they are known when a performance is over.
+        The phases as they are known at the end of a performance.
     features : list of str, default=None
-        Names of what is drawn.
+        The names of the features.
     bodies : list of array-like (n_frames_i, n_joints, n_dims), default=None
-        Joint positions, y up; NaN where they were not seen.
+        Joint positions, y up; NaN where they were not observed.
     mean_body : array-like, shape (P, n_joints, n_dims), default=None
-        The mean of them; together with bodies.
+        The mean joint positions; together with bodies.
     skeleton : Skeleton, default=None
-        Of the bodies.
+        The skeleton of the bodies.
     names : list of str, default=None
-        Of the performances.
+        The names of the performances.
     unit : {"frames", "seconds"}, default="frames"
-        Of the times.
+        The unit of the times.
 
     Attributes
     ----------
     figure_ : Figure
+        The figure of the last plot.
     axes_ : list of Axes
         Row by row: a body if there are bodies, the dial, the phase, and one a feature.
     rows_ : list
-        What is drawn of each performance: ``row.dial.passed``, ``row.phase``, ``row.confidence``,
-        ``row.afterwards``, ``row.rest``, ``row.curves[k].seen``, ``row.curves[k].expected`` are
-        artists.
+        The artists of each performance: ``row.dial.passed``, ``row.phase``, ``row.confidence``,
+        ``row.afterwards``, ``row.rest``, ``row.curves[k].seen``, ``row.curves[k].expected``.
 
     Examples
     --------
@@ -124,37 +116,26 @@ class PhaseDisplay:
         names=None,
         unit="frames",
     ):
-        if not is_integer(n_frames) or n_frames < 2:
-            raise ValueError(f"n_frames must be frames of the clock, at least 2; got {n_frames!r}.")
-        if duration is not None and not (is_number(duration, 0) and duration > 0):
-            raise ValueError(f"duration must be a number above 0, or None; got {duration!r}.")
-        if unit not in list(_UNITS):
-            raise ValueError(f"unit must be one of {list(_UNITS)}, got {unit!r}.")
-        phases = as_phases(phases, n_frames)
-        count = len(phases)
-        names = [str(i) for i in range(count)] if names is None else names
-        self.names = as_names(names, count, "names", "performances")
-        self.unit, self.skeleton = unit, as_skeleton(skeleton)
-        lengths = [len(of.phase) for of in phases]
-        times = each_of(times, lengths, "times", ())
-        seen = each_of(seen, lengths, "seen", ("n_shown",))
-        afterwards = each_of(afterwards, lengths, "afterwards", (), gaps=True)
-        n_shown = 0 if seen[0] is None else seen[0].shape[1]
-        # All of them have the features of the first.
-        seen = each_of(None if seen[0] is None else seen, lengths, "seen", (n_shown,))
-        mean, spread = as_expected(mean, spread, n_frames, n_shown)
-        if features is None:
-            features = [f"x{k}" for k in range(n_shown)]
-        self.features = as_names(features, n_shown, "features", "features that are seen")
-        bodies, mean_body = as_moving(bodies, mean_body, lengths, n_frames, self.skeleton)
-        self.action = Action(int(n_frames), duration, mean, spread, mean_body)
-        self.followed = [
-            Followed(*phases[i], from_zero(times[i], n, i), self.names[i], *rest)
-            for i, (n, *rest) in enumerate(zip(lengths, seen, afterwards, bodies, strict=True))
+        phases = _as_list_of_phases(phases)
+        count, nothing = len(phases), [None] * len(phases)
+        self.names = list(map(str, range(count))) if names is None else names
+        self.unit, self.skeleton = unit, skeleton
+        n_shown = 0 if seen is None else np.shape(seen[0])[1]
+        self.features = [f"x{k}" for k in range(n_shown)] if features is None else features
+        self._action = LearntAction(n_frames, duration, *map(_as_floats, (mean, spread, mean_body)))
+        parts = (nothing if x is None else x for x in (times, seen, afterwards, bodies))
+        self._performances = [
+            RunningPerformance(
+                *map(_as_floats, phase),
+                times_from_zero(own_times, len(phase.phase)),
+                name,
+                *map(_as_floats, of_one),
+            )
+            for phase, name, own_times, *of_one in zip(phases, self.names, *parts, strict=True)
         ]
 
     def __repr__(self):
-        count = len(self.followed)
+        count = len(self._performances)
         return f"PhaseDisplay({count} performance{'s' * (count != 1)})"
 
     @classmethod
@@ -173,31 +154,39 @@ class PhaseDisplay:
         ax=None,
         azimuth=-60,
     ):
-        """Follow performances, and draw what was said of them.
+        """Follow performances, and draw their phases.
 
         Parameters
         ----------
         estimator : OnlineSynchronizer
-            Fitted. Nothing that it follows is changed.
-        X : performances, as ``estimator.track`` takes them; or one, array (n_frames, n_features)
+            Fitted. The performances that it follows live are not affected.
+        X : performances
+            As ``estimator.track`` takes them; or one, array (n_frames, n_features).
         times : list of array-like (n_frames_i,), default=None
             As ``estimator.track`` takes them; of one performance an array.
         performances : int or list of int, default=None
-            Which of them are drawn; by default the first four.
+            The indices of the performances that are drawn; by default the first four.
         features : int, str or list of them, default=None
             By index or name; by default the one that varies most in the mean performance.
-        training : the performances of ``fit``, default=None
-            Their spread about the mean is drawn as a band.
+        training : performances, default=None
+            Those of ``fit``. Their standard deviation from the mean is drawn as a band.
         body : DirectionCosines or Pipeline, default=None
-            Fitted; what made the features, with ``inverse_transform``. The body is then drawn, too;
-            limbs of which a cosine is NaN are not. In a pipeline one NaN hides the body.
+            The fitted transformer of the features, with ``inverse_transform``. The body is then
+            drawn, without the limbs that have a NaN cosine. In a pipeline one NaN hides the body.
         names : list of str, default=None
-            Of those that are drawn; by default their labels in X, or numbers.
-        frame, ax, azimuth : as for `plot`
+            The names of the performances that are drawn; by default their labels in X, or numbers.
+        frame : int, default=None
+            A frame of the longest performance; the others are drawn at the same time. By default
+            the last.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
+        azimuth : float, default=-60
+            The direction of the viewer of bodies in degrees, as in `SkeletonDisplay`.
 
         Returns
         -------
         PhaseDisplay
+            The display, drawn.
 
         Raises
         ------
@@ -209,20 +198,26 @@ class PhaseDisplay:
                 f"estimator must be an OnlineSynchronizer, got {type(estimator).__name__}."
             )
         live = estimator
-        given, arrays, labels, single = taken(live, X)
+        takes = Takes(live, X)
         if performances is None:
-            performances = range(min(_FEW_PERFORMANCES, len(arrays)))
-        chosen = as_indices(performances, len(arrays), "performances")
+            performances = range(min(_N_PERFORMANCES, len(takes.arrays)))
+        chosen = as_indices(performances, len(takes.arrays), "performances")
+        if names is None:
+            names = [takes.labels[i] for i in chosen]
+        names = as_names(names, len(chosen), "names", "performances")
         if times is not None:
-            times = times_of(live, [times] if single else times, chosen, arrays, labels)
-        phases = live.track(given(chosen), times)
-        seen = [np.asarray(arrays[i], dtype=np.float64) for i in chosen]
-        own = names_of_features(body, live, live.mean_.shape[1])
+            times = takes.select_times(times, chosen)
+        phases = live.track(takes.select(chosen), times)
+        seen = [np.asarray(takes.arrays[i], dtype=np.float64) for i in chosen]
+        feature_names = names_of_features(body, live, live.mean_.shape[1])
         if features is None:
             features = [int(live.mean_.var(axis=0).argmax())]
-        shown = choose_features(features, own)
+        shown = choose_features(features, feature_names)
         rate = 1.0 if live.frame_rate is None else live.frame_rate
-        bodies, mean_body, skeleton = bodies_of_features(body, seen, live.mean_)
+        bodies, mean_body, skeleton = None, None, None
+        if body is not None:
+            skeleton = find_step(body, DirectionCosines)[1].skeleton.body()
+            *bodies, mean_body = (invert_postures(x, body, skeleton) for x in (*seen, live.mean_))
         display = cls(
             phases,
             live.n_frames_,
@@ -230,41 +225,54 @@ class PhaseDisplay:
             duration=live.duration_ / rate,
             seen=[x[:, shown] for x in seen],
             mean=live.mean_[:, shown],
-            spread=None if training is None else spread_of(live, training)[:, shown],
+            spread=None if training is None else _spread(live, training)[:, shown],
             afterwards=[
-                None if np.isnan(x).any() else path_of(live, given([i]), len(x))
+                None if np.isnan(x).any() else _final_phases(live, takes.select([i]), len(x))
                 for i, x in zip(chosen, seen, strict=True)
             ],
-            features=[own[k] for k in shown],
+            features=[feature_names[k] for k in shown],
             bodies=bodies,
             mean_body=mean_body,
             skeleton=skeleton,
-            names=[labels[i] for i in chosen] if names is None else names,
+            names=names,
             unit="frames" if live.frame_rate is None else "seconds",
         )
         return display.plot(ax, frame=frame, azimuth=azimuth)
 
     @classmethod
     def from_predictions(cls, phases, n_frames, *, frame=None, ax=None, azimuth=-60, **known):
-        """Draw phases that are there already, such as ``live.history``.
+        """Draw phases that are known already, such as ``live.history``.
 
         Parameters
         ----------
         phases : LivePhase, or list of LivePhase
+            The phases of one performance or several.
         n_frames : int
-            Of the clock, ``live.n_frames_``.
-        frame, ax, azimuth : as for `plot`
+            The length of the clock, ``live.n_frames_``.
+        frame : int, default=None
+            A frame of the longest performance; the others are drawn at the same time. By default
+            the last.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
+        azimuth : float, default=-60
+            The direction of the viewer of bodies in degrees, as in `SkeletonDisplay`.
         **known : dict
-            What else is known of them: the parameters of the class.
+            Further parameters of the class.
 
         Returns
         -------
         PhaseDisplay
+            The display, drawn.
+
+        Raises
+        ------
+        ValueError
+            If phases are of another class, or there is no such frame.
         """
         return cls(phases, n_frames, **known).plot(ax, frame=frame, azimuth=azimuth)
 
     def plot(self, ax=None, *, frame=None, azimuth=-60):
-        """Draw how it was at a frame.
+        """Draw the state at a frame.
 
         Parameters
         ----------
@@ -272,238 +280,419 @@ class PhaseDisplay:
             One of a figure's subplots is divided into the panels; or one axes a panel. None
             makes a figure.
         frame : int, default=None
-            Of the longest performance; the others are where they were at that time. None: the last.
+            A frame of the longest performance; the others are drawn at the same time. By default
+            the last.
         azimuth : float, default=-60
-            From where bodies are seen, as in `SkeletonDisplay`.
+            The direction of the viewer of bodies in degrees, as in `SkeletonDisplay`.
 
         Returns
         -------
-        self
+        PhaseDisplay
+            The display itself.
         """
-        check_view(0, azimuth)
-        longest = max((of.times for of in self.followed), key=lambda times: times[-1])
+        longest = max((p.times for p in self._performances), key=lambda times: times[-1])
         if frame is None:
             frame = len(longest) - 1
         frame = as_index(frame, len(longest), "frame")
-        has_body = self.followed[0].bodies is not None
+        has_body = self._performances[0].body is not None
         widths = [_BODY] * has_body + [_DIAL, _PHASE] + [_CURVE] * len(self.features)
-        starts = np.cumsum([0, *widths])
-        columns = [slice(a, b) for a, b in pairwise(starts)]
-        n_rows, n_cols = len(self.followed), int(starts[-1])
-        spots = [(row, column) for row in range(n_rows) for column in columns]
+        edges = np.cumsum([0, *widths])
+        columns = [slice(a, b) for a, b in pairwise(edges)]
+        n_rows, n_cols = len(self._performances), int(edges[-1])
+        cells = [(row, column) for row in range(n_rows) for column in columns]
         size = n_cols * _COLUMN, n_rows * _ROW + 0.5
-        before = getattr(self, "axes_", [])
-        self.figure_, self.axes_ = panels(ax, spots, n_rows, n_cols, size)
-        for axis in self.axes_:
-            if axis in before:
-                axis.clear()
-        end = max(self.action.latest(of) for of in self.followed)
+        before = getattr(self, "axes_", ())
+        self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, size, before)
+        end = max(self._action.end_of(p) for p in self._performances)
         by_row = np.array(self.axes_, dtype=object).reshape(n_rows, -1)
         self.rows_ = [
-            Row(axes, of, self.action, self.skeleton, self.features, 1.02 * end or 1.0, azimuth)
-            for axes, of in zip(by_row, self.followed, strict=True)
+            PerformanceRow(
+                axes, p, self._action, self.skeleton, self.features, 1.02 * end or 1.0, azimuth
+            )
+            for axes, p in zip(by_row, self._performances, strict=True)
         ]
-        for row, of in zip(self.rows_, self.followed, strict=True):
-            row.axes[0].set_title(fill(of.name, _LETTERS), fontsize="medium", parse_math=False)
+        for axes, name in zip(by_row, self.names, strict=True):
+            axes[0].set_title(fill(name, _LINE_LENGTH), fontsize="medium", parse_math=False)
         for axis in by_row[:-1, has_body + 1 :].flat:
             axis.tick_params(labelbottom=False)
         for axis in by_row[-1, has_body + 1 :]:
-            axis.set_xlabel(_UNITS[self.unit])
+            axis.set_xlabel(TIME_LABELS[self.unit])
         self._show(longest[frame])
-        # Curves share the legend of the first.
+        # One legend for all curves.
         for axis in by_row[0, has_body + 1 : has_body + 3]:
             handles, labels = axis.get_legend_handles_labels()
             legend_above([axis], handles, labels, n_cols=2)
         return self
 
     def animate(self, ax=None, *, seconds=5.0, fps=15, azimuth=-60):
-        """The performances as they run, which a notebook plays.
+        """Animate the performances.
 
         Parameters
         ----------
         ax : Axes or array-like of Axes, default=None
-            As for `plot`; by default where the display was drawn last.
+            As for `plot`; by default the axes of the last plot.
         seconds : float, default=5.0
-            Until the longest performance ends.
+            The time until the longest performance ends.
         fps : int, default=15
             Pictures a second.
-        azimuth : as for `plot`
+        azimuth : float, default=-60
+            The direction of the viewer of bodies in degrees, as in `SkeletonDisplay`.
 
         Returns
         -------
         Animation
-            Shown by a notebook as its last value; ``to_jshtml()`` gives the HTML, ``save(path)``
-            a file.
+            A notebook plays it as the last value of a cell; ``to_jshtml()`` gives the HTML,
+            ``save(path)`` a file.
         """
-        count = as_pictures(seconds, fps)
-        self.plot(getattr(self, "axes_", None) if ax is None else ax, azimuth=azimuth)
-        longest = max(of.times[-1] for of in self.followed)
-        return playable(
-            self.figure_.canvas.figure,
-            lambda k: self._show(longest * k / (count - 1)),
-            count,
-            fps,
-            closes=ax is None,
-        )
+        longest = max(p.times[-1] for p in self._performances)
+        view = {"seconds": seconds, "fps": fps, "azimuth": azimuth}
+        return animate(self, lambda k, last: self._show(longest * k / last), ax, **view)
 
     def _show(self, time):
-        """Let it be so late in all performances; the artists that have changed."""
-        return [artist for row in self.rows_ for artist in row.show(time)]
+        """Move all rows to a time."""
+        for row in self.rows_:
+            row.show(time)
 
 
-# -- what `PhaseDisplay` is given, checked, and what it gets out of an estimator ---------
-
-_PARTS = "phase", "rate", "confidence"
-# By how much rounding may take a phase or a confidence beyond its bounds.
-_ROUNDING = 1e-9
-
-
-def as_phases(phases, n_frames):
-    """A list of LivePhase of checked arrays (n_frames_i,)."""
+def _as_list_of_phases(phases):
+    """A list of LivePhase of arrays (n_frames_i,); streams side by side are separated."""
     listed = [phases] if isinstance(phases, LivePhase) else phases
-    sound = isinstance(listed, (list, tuple)) and len(listed) > 0
-    if not sound or not all(isinstance(of, LivePhase) for of in listed):
+    if not isinstance(listed, list) or not all(isinstance(of, LivePhase) for of in listed):
         raise ValueError(
             "phases must be a LivePhase of arrays, such as live.history, or a list of them, such "
             f"as live.track(X) gives; got {phases!r:.80}."
         )
     if len(listed) == 1 and np.ndim(listed[0].phase) == 2:
-        listed = [
-            LivePhase(*streams) for streams in zip(*map(np.transpose, listed[0]), strict=True)
-        ]
-    checked = []
-    for i, of in enumerate(listed):
-        shape, arrays, bounds = ("n_frames",), [], (n_frames - 1, np.inf, 1)
-        for what, values, most in zip(_PARTS, of, bounds, strict=True):
-            array = as_drawn(values, f"Performance {i}: the {what}", shape)
-            if not ((array >= -_ROUNDING) & (array <= most + _ROUNDING)).all():
-                raise ValueError(f"Performance {i}: the {what} must be from 0 to {most}.")
-            arrays.append(np.clip(array.astype(np.float64), 0, most))
-            shape = array.shape
-        checked.append(LivePhase(*arrays))
-    return checked
+        streams = zip(*map(np.transpose, listed[0]), strict=True)
+        return [LivePhase(*stream) for stream in streams]
+    return listed
 
 
-def one_each(values, count, what, each="performances"):
-    """A list with something for each of so many performances."""
-    if not hasattr(values, "__len__") or isinstance(values, str) or len(values) != count:
-        got = len(values) if hasattr(values, "__len__") else repr(values)
-        raise ValueError(
-            f"There are {count} {each}, but {what} of {got}: give a list with one for each."
-        )
-    return list(values)
+def _as_floats(values):
+    return None if values is None else np.asarray(values, dtype=np.float64)
 
 
-def each_of(values, lengths, what, shape, gaps=False):
-    """Something of each performance, of this shape after its frames; None where it is not known."""
-    if values is None:
-        return [None] * len(lengths)
-    return [
-        None
-        if gaps and x is None
-        else as_drawn(x, f"Performance {i}: {what}", (n, *shape)).astype(np.float64)
-        for i, (x, n) in enumerate(zip(one_each(values, len(lengths), what), lengths, strict=True))
-    ]
-
-
-def as_expected(mean, spread, n_frames, n_shown):
-    """Mean and spread (P, n_shown) of what is shown, checked, or None."""
-    for what, given, needs, there in (
-        ("mean", mean, "seen", n_shown > 0),
-        ("spread", spread, "mean", mean is not None),
-    ):
-        if given is not None and not there:
-            raise ValueError(f"{what} is of what is drawn; give {needs}, too.")
-    mean, spread = (
-        x if x is None else as_drawn(x, what, (n_frames, n_shown))
-        for x, what in ((mean, "The mean"), (spread, "The spread"))
-    )
-    if spread is not None and (spread < 0).any():
-        raise ValueError("The spread must be a standard deviation, of at least 0.")
-    return mean, spread
-
-
-def as_moving(bodies, mean_body, lengths, n_frames, skeleton):
-    """The body of each performance, and the mean one, checked; None without bodies."""
-    if bodies is None:
-        return [None] * len(lengths), None
-    if mean_body is None or skeleton is None:
-        raise ValueError("Bodies are drawn before the mean one: give mean_body and skeleton, too.")
-    shape = len(skeleton.joints), skeleton.n_dims
-    bodies = each_of(bodies, lengths, "bodies", shape)
-    return bodies, as_drawn(mean_body, "The mean body", (n_frames, *shape))
-
-
-def from_zero(times, n, i):
-    """Time since the first frame, which increases."""
-    if times is None:
-        return np.arange(float(n))
-    if not (np.diff(times) > 0).all():
-        raise ValueError(f"Performance {i}: times must increase from frame to frame, got {times}.")
-    return times - times[0]
-
-
-def taken(live, X, what="X"):
-    """How to choose of X what ``track`` takes, its arrays, their labels; if it is a single one."""
-    check_is_fitted(live)
-    collection = as_collection(X)
-    if collection is not None and len(collection) == 0:
-        raise ValueError("Found 0 performances (n_samples=0); there is nothing to draw.")
-    if collection is None and np.ndim(X) != 2:
-        raise ValueError(
-            f"{what} must be performances, or one of them, 2-D; got an array of shape "
-            f"{np.shape(X)}."
-        )
-    on_rows = live.mean_.shape[1] != live.n_features_in_
-    if collection is None and on_rows:
-        rows = np.asarray(X)
-        arrays = list(rows[:, :, np.newaxis])
-        names = X.index if isinstance(X, pd.DataFrame) else range(len(rows))
-        return (lambda chosen: rows[chosen]), arrays, list(map(str, names)), False
-    members = [X] if collection is None else collection
-    names = [", ".join(map(str, n)) if isinstance(n, tuple) else n for n in labels_of(members)[0]]
-    return (lambda chosen: [members[i] for i in chosen]), members, names, collection is None
-
-
-def times_of(live, times, chosen, arrays, labels, each="performances"):
-    """Of those that are chosen the times, which the estimator takes."""
-    listed = one_each(times, len(arrays), "times", each)
-    for i in chosen:
-        check_times(listed[i], len(arrays[i]), live.frame_rate, f"Performance {labels[i]}")
-    return [listed[i] for i in chosen]
-
-
-def path_of(live, X, n):
-    """The phases of the n frames of one performance that is over."""
+def _final_phases(live, X, n_frames):
+    """The phases of the frames of one performance as they are known at its end."""
     (tau,) = live.synchronizer_.match(X).times
     clock = np.arange(live.n_frames_)
-    # Where tau stands still, any phase of that while is as right.
-    return np.interp(np.linspace(0, clock[-1], n), tau + 1e-9 * clock, clock)
+    # Where tau is constant, all phases in between are equally right.
+    return np.interp(np.linspace(0, clock[-1], n_frames), tau + 1e-9 * clock, clock)
 
 
-def spread_of(live, training):
-    """The standard deviation of the training performances about their mean, (P, n_features)."""
+def _spread(live, training):
+    """The standard deviation (P, n_features) of the training performances from their mean."""
     match = live.synchronizer_.match(training)
-    warped = match.warp(taken(live, training)[1])
+    warped = match.warp(Takes(live, training).arrays)
     return np.asarray(warped).reshape(len(warped), *live.mean_.shape).std(axis=0)
 
 
-def bodies_of_features(body, seen, mean):
-    """Joint positions of what is seen and of the mean, and whose they are."""
-    if body is None:
-        return None, None, None
-    skeleton = find_step(body, DirectionCosines)[1].skeleton.body()
-    *bodies, mean_body = (_positions(body, x, skeleton) for x in (*seen, mean))
-    return bodies, mean_body, skeleton
+# -- what is drawn -----------------------------------------------------------------------
 
 
-def _positions(body, x, skeleton):
-    """Joint positions (n_frames, n_joints, n_dims), NaN where nothing is known of them."""
-    whole = ~np.isnan(x).any(axis=1)
-    if isinstance(body, DirectionCosines):
-        # Limbs are hidden one by one.
-        body, whole = copy(body).set_params(hidden="nan"), np.ones(len(x), dtype=bool)
-    found = np.full((len(x), len(skeleton.joints) * skeleton.n_dims), np.nan)
-    if whole.any():
-        found[whole] = np.asarray(body.inverse_transform(x[whole]))
-    return found.reshape(len(x), -1, skeleton.n_dims)
+class LearntAction(NamedTuple):
+    """The learnt action, and what it predicts of a running performance.
+
+    Attributes
+    ----------
+    n_frames : int
+        The length of the clock.
+    duration : float or None
+        The mean duration in the unit of the times.
+    mean, spread : ndarray (P, n_shown), or None
+    body : ndarray (P, n_joints, n_dims), or None
+        The mean body.
+    """
+
+    n_frames: int
+    duration: float | None = None
+    mean: np.ndarray | None = None
+    spread: np.ndarray | None = None
+    body: np.ndarray | None = None
+
+    def interpolate(self, phase, values):
+        """Values at the frames of the clock, interpolated to phases."""
+        clock = np.arange(self.n_frames)
+        flat = values.reshape(self.n_frames, -1)
+        found = np.stack([np.interp(phase, clock, column) for column in flat.T], axis=-1)
+        return found.reshape(*np.shape(phase), *values.shape[1:])
+
+    def phase_ahead(self, phase, rate):
+        """The phase a tenth of the duration later at this rate."""
+        last = self.n_frames - 1
+        return min(phase + _AHEAD * last * rate, last)
+
+    def time_left(self, phase, elapsed):
+        """The remaining time, as `OnlineSynchronizer.time_left` estimates it."""
+        return time_left(phase / (self.n_frames - 1), elapsed, self.duration)
+
+    def end_of(self, performance):
+        """The latest time observed or predicted of a performance."""
+        phase, times = performance.phase, performance.times
+        if self.duration is None:
+            return times[-1]
+        expected = times + np.where(phase < self.n_frames - 1, self.time_left(phase, times), 0)
+        return max(times[-1], expected.max())
+
+    def predict(self, phase, elapsed):
+        """The times and the phases of the rest, (n_points,) each; empty at the end."""
+        last = self.n_frames - 1
+        if self.duration is None or phase >= last:
+            return np.empty((2, 0))
+        left = self.time_left(phase, elapsed)
+        return elapsed + np.linspace(0, left, _N_POINTS), np.linspace(phase, last, _N_POINTS)
+
+
+class RunningPerformance(NamedTuple):
+    """A performance with its phases.
+
+    Attributes
+    ----------
+    phase, rate, confidence, times : ndarray, shape (n_frames,)
+        The first time is 0.
+    name : str
+    seen : ndarray (n_frames, n_shown), or None
+    afterwards : ndarray (n_frames,), or None
+        The phases as they are known at the end.
+    body : ndarray (n_frames, n_joints, n_dims), or None
+    """
+
+    phase: np.ndarray
+    rate: np.ndarray
+    confidence: np.ndarray
+    times: np.ndarray
+    name: str
+    seen: np.ndarray | None = None
+    afterwards: np.ndarray | None = None
+    body: np.ndarray | None = None
+
+
+class PerformanceRow:
+    """The panels of one performance: a body if there is one, a dial, the phase, curves.
+
+    Parameters
+    ----------
+    axes : list of Axes
+    performance : RunningPerformance
+    action : LearntAction
+    skeleton : Skeleton or None
+        The skeleton of the bodies.
+    features : list of str
+        The names of the curves.
+    end : float
+        The end of the time axis.
+    azimuth : float
+    """
+
+    def __init__(self, axes, performance, action, skeleton, features, end, azimuth):
+        self.axes, self._performance, self._action = list(axes), performance, action
+        axes, self.body = list(axes), None
+        if performance.body is not None:
+            self.body = BodyPanel(axes.pop(0), performance, action, skeleton, azimuth)
+        self.dial = PhaseDial(axes.pop(0))
+        self._draw_phase(axes[0], end)
+        self.curves = [
+            FeaturePanel(axis, performance, action, k, name, end)
+            for k, (axis, name) in enumerate(zip(axes[1:], features, strict=True))
+        ]
+
+    def _draw_phase(self, axis, end):
+        grey, blue, orange = (COLORS[k] for k in ("shadow", "performance", "mean"))
+        self.confidence = _empty_area(axis, grey, 0.75, "confidence")
+        self.afterwards = None
+        performance, percent = self._performance, 100 / (self._action.n_frames - 1)
+        if performance.afterwards is not None:
+            style = {"color": COLORS["pattern"], "linewidth": 0.9, "linestyle": "--"}
+            ys = percent * performance.afterwards
+            (self.afterwards,) = axis.plot(performance.times, ys, label="afterwards", **style)
+        label = _label("guess", self._action.duration)
+        (self.rest,) = axis.plot([], [], color=orange, linestyle=":", label=label)
+        self.phase = front_line(axis, [], [], color=blue, label="phase, live")
+        axis.set_xlim(0, end)
+        axis.set_ylim(0, 105)
+        axis.set_ylabel("%")
+
+    def show(self, time):
+        """Move to a time."""
+        p, action = self._performance, self._action
+        now = max(np.searchsorted(p.times, time, side="right") - 1, 0)
+        phase, rate, confidence = (x[now] for x in (p.phase, p.rate, p.confidence))
+        last, past = action.n_frames - 1, slice(now + 1)
+        ahead, rest = action.phase_ahead(phase, rate), action.predict(phase, p.times[now])
+        self.dial.show(phase / last, ahead / last, rate, confidence)
+        self.phase.set_data(p.times[past], 100 / last * p.phase[past])
+        _fill_area(self.confidence, p.times[past], 0, 100 * p.confidence[past])
+        self.rest.set_data(rest[0], 100 / last * rest[1])
+        if self.body is not None:
+            self.body.show(now, ahead)
+        for curve in self.curves:
+            curve.show(now, *rest)
+
+
+class FeaturePanel:
+    """A feature as it was observed, and its prediction."""
+
+    def __init__(self, axis, performance, action, k, name, end):
+        self._times, self._seen = performance.times, performance.seen[:, k]
+        self._action, self._k = action, k
+        blue, orange = COLORS["performance"], COLORS["mean"]
+        self.band = _empty_area(axis, COLORS["envelope"], 0.35, _label("90 % band", action.spread))
+        style = {"color": blue, "linewidth": 1, "linestyle": "--", "alpha": 0.6}
+        (self.to_come,) = axis.plot(self._times, self._seen, label="what came", **style)
+        style = {"color": orange, "linewidth": 2, "label": _label("predicted", action.mean)}
+        (self.expected,) = axis.plot([], [], **style)
+        self.seen = front_line(axis, [], [], color=blue, label="seen")
+        (self.now,) = axis.plot([], [], "o", color=blue, markersize=5, zorder=5)
+        values = [self._seen]
+        if action.mean is not None:
+            mean, half_width = action.mean[:, k], 0
+            if action.spread is not None:
+                half_width = _BAND * action.spread[:, k]
+            values += [mean - half_width, mean + half_width]
+        values = np.concatenate(values)
+        values = values[np.isfinite(values)]
+        low, high = (values.min(), values.max()) if len(values) else (0.0, 0.0)
+        margin = 0.06 * (high - low) or 1.0
+        axis.set_ylim(low - margin, high + margin)
+        axis.set_xlim(0, end)
+        axis.set_ylabel(fill(name, _LINE_LENGTH))
+
+    def show(self, now, times, phases):
+        """Move to a frame, with the times and the phases of the predicted rest."""
+        past = slice(now + 1)
+        self.seen.set_data(self._times[past], self._seen[past])
+        self.now.set_data([self._times[now]], [self._seen[now]])
+        mean, spread = (
+            None if x is None else self._action.interpolate(phases, x[:, self._k])
+            for x in (self._action.mean, self._action.spread)
+        )
+        if mean is not None:
+            self.expected.set_data(times, mean)
+        if spread is not None:
+            _fill_area(self.band, times, mean - _BAND * spread, mean + _BAND * spread)
+
+
+class BodyPanel:
+    """The observed body, before the mean body at the phase ahead."""
+
+    def __init__(self, axis, performance, action, skeleton, azimuth):
+        self._action, self._bones = action, bones_by_side(skeleton)
+        self._bodies, self._mean = (
+            project(x, skeleton, azimuth) for x in (performance.body, action.body)
+        )
+        self.ahead = bone_lines(axis, COLORS["shadow"], 5, zorder=1)
+        self.bones = {
+            side: bone_lines(axis, COLORS[side], 2) for side in ("middle", "left", "right")
+        }
+        self.head, self._head = None, None
+        if "head" in skeleton.landmarks:
+            self._head = landmark_track(self._bodies, skeleton, "head")
+            (self.head,) = axis.plot([], [], "o", color=COLORS["middle"], markersize=5)
+        places = [x.reshape(-1, 2) for x in (self._bodies, self._mean)]
+        stage(axis, "", *bounds(np.concatenate(places)))
+
+    def show(self, now, ahead):
+        """Move to a frame, and the mean body to a phase."""
+        body, mean = self._bodies[now], self._action.interpolate(ahead, self._mean)
+        bones = [bone for of_side in self._bones.values() for bone in of_side]
+        self.ahead.set_segments([mean[list(bone)] for bone in bones])
+        for side, lines in self.bones.items():
+            lines.set_segments([body[list(bone)] for bone in self._bones[side]])
+        if self.head is not None:
+            self.head.set_data(self._head[[now]].T)
+
+
+def _label(text, value):
+    """A label in a legend; none for an unknown value."""
+    return text if value is not None else "_nolegend_"
+
+
+def _empty_area(axis, color, alpha, label):
+    from matplotlib.collections import PolyCollection
+
+    area = PolyCollection([], facecolor=color, alpha=alpha, linewidth=0, zorder=1, label=label)
+    return axis.add_collection(area, autolim=False)
+
+
+def _fill_area(area, xs, lower, upper):
+    """Fill the area between two curves."""
+    if len(xs) == 0:
+        area.set_verts([])
+        return
+    lower, upper = np.broadcast_to(lower, xs.shape), np.broadcast_to(upper, xs.shape)
+    there, back = np.column_stack([xs, upper]), np.column_stack([xs, lower])[::-1]
+    area.set_verts([np.concatenate([there, back])])
+
+
+# -- the dial ----------------------------------------------------------------------------
+
+# Inner and outer radius of the ring and of the arc around it; the radius of the numbers, and the
+# inner radius of the hand.
+_RING, _ARC, _NUMBERS, _HAND = (0.78, 1.0), (1.05, 1.13), 1.28, 0.62
+# The opacity of the ring at confidence 0.
+_MIN_OPACITY = 0.12
+
+
+class PhaseDial:
+    """A ring from 0 % at the top clockwise to 100 %.
+
+    Parameters
+    ----------
+    axis : Axes
+
+    Attributes
+    ----------
+    passed : Wedge
+        From 0 to the phase; the opacity shows the confidence.
+    ahead : Wedge
+        From the phase to the phase ahead.
+    hand : Line2D
+        The line width shows the confidence.
+    share, state : Text
+        The phase in per cent; rate and confidence.
+    """
+
+    def __init__(self, axis):
+        from matplotlib.patches import Wedge
+
+        axis.set_aspect("equal")
+        axis.set_xlim(-1.5, 1.5)
+        axis.set_ylim(-1.75, 1.45)
+        axis.axis("off")
+
+        def ring(color, radii, zorder, end=90):
+            style = {"width": radii[1] - radii[0], "facecolor": color, "linewidth": 0}
+            return axis.add_patch(Wedge((0, 0), radii[1], end, 90, zorder=zorder, **style))
+
+        ring(COLORS["shadow"], _RING, 1, end=-270)
+        self.passed = ring(COLORS["performance"], _RING, 2)
+        self.ahead = ring(COLORS["mean"], _ARC, 3)
+        style = {"color": COLORS["pattern"], "solid_capstyle": "round", "zorder": 4}
+        (self.hand,) = axis.plot([], [], **style)
+        style = {"ha": "center", "va": "center", "color": "0.35", "fontsize": "x-small"}
+        for quarter, text in enumerate(("0 %", "25", "50", "75")):
+            x, y = _on_circle(quarter / 4, _NUMBERS + 0.02 * (quarter % 2))
+            axis.text(x, y, text, **style)
+        self.share = axis.text(0, 0, "", ha="center", va="center", fontsize="large")
+        self.state = axis.text(0, -1.62, "", ha="center", va="center", fontsize="small")
+
+    def show(self, share, ahead, rate, confidence):
+        """Move the hand to a share of the action."""
+        # Rounding may take a sum of probabilities above 1.
+        confidence = min(confidence, 1)
+        self.passed.set_theta1(90 - 360 * share)
+        self.passed.set_alpha(_MIN_OPACITY + (1 - _MIN_OPACITY) * confidence)
+        self.ahead.set_theta1(90 - 360 * ahead)
+        self.ahead.set_theta2(90 - 360 * share)
+        # A wedge of no length would be drawn as a whole ring.
+        self.ahead.set_visible(ahead > share)
+        self.hand.set_data(*np.transpose([_on_circle(share, _HAND), _on_circle(share, _RING[1])]))
+        self.hand.set_linewidth(1 + 4 * confidence)
+        self.share.set_text(f"{100 * share:.0f} %")
+        self.state.set_text(f"rate {rate:.1f}, confidence {confidence:.2f}")
+
+
+def _on_circle(share, radius):
+    """The point at a share of a circle, clockwise from the top."""
+    angle = 2 * np.pi * share
+    return radius * np.sin(angle), radius * np.cos(angle)

@@ -1,48 +1,49 @@
-"""MetricDisplay: which features the learnt metric listens to, and which it takes for noise."""
+"""MetricDisplay: the weight of each feature in the learnt metric."""
 
 import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.numbers import is_integer
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import find_step
 from .drawing import COLORS, panels
-from .given import as_drawn, as_names
 
 __all__ = ["MetricDisplay"]
 
-# Rows that can be read at one glance.
-_MOST_ROWS = 20
+# The largest number of rows.
+_MAX_ROWS = 20
 
 
 class MetricDisplay:
-    """What the learnt metric makes of every feature, beside its part in the plain velocities.
+    """The weight of each feature in the learnt metric, beside its share of the plain velocities.
 
-    A feature whose dark bar is far shorter than its light one moves much and tells little: noise,
-    or the style of a person. Use `from_estimator`.
+    A feature with a short dark bar and a long light one moves much and says little about time: it
+    is noise, or the style of a subject. Use `from_estimator`.
 
     Parameters
     ----------
-    share : ndarray, shape (n_shown,)
-        The part of every feature, or of several together, in what is compared; that of noise is
-        about 0, and may be a little below.
-    energy : ndarray, shape (n_shown,)
-        Its part in the plain velocities, which are compared without a metric.
+    share : array-like, shape (n_shown,)
+        The share of each feature, or of several together, in the learnt metric; about 0, or
+        slightly below, for noise.
+    energy : array-like, shape (n_shown,)
+        Its share in the velocities, which are compared without a metric.
     feature_names : list of str
+        One name a row.
     n_performances : int, default=None
-        From how many performances the metric was learnt, for the title.
+        The number of performances from which the metric was learnt, for the title.
 
     Attributes
     ----------
     figure_ : Figure
+        The figure of the last plot.
     ax_ : Axes
+        The axes of the last plot.
     share_, energy_ : BarContainer
         Dark and light bars, from the top.
 
     Examples
     --------
-    Most of all that moves is a column of noise, and it is hardly listened to.
+    A column of noise moves most and has hardly any weight.
 
     >>> import numpy as np
     >>> from sklearn_motionsync import DenseSynchronizer, DirectionCosines
@@ -57,17 +58,8 @@ class MetricDisplay:
     """
 
     def __init__(self, share, energy, *, feature_names, n_performances=None):
-        self.share = as_drawn(share, "The share", ("n_shown",))
-        self.energy = as_drawn(energy, "The energy", self.share.shape)
-        self.feature_names = as_names(
-            feature_names, len(self.share), "feature_names", "features shown"
-        )
-        if n_performances is not None and not (is_integer(n_performances) and n_performances > 0):
-            raise ValueError(
-                "n_performances must be a whole number above 0, or None for a title without it; "
-                f"got {n_performances!r}."
-            )
-        self.n_performances = n_performances
+        self.share, self.energy = np.asarray(share), np.asarray(energy)
+        self.feature_names, self.n_performances = feature_names, n_performances
 
     def __repr__(self):
         return f"MetricDisplay({len(self.feature_names)} rows, {self._describe()})"
@@ -79,16 +71,18 @@ class MetricDisplay:
         Parameters
         ----------
         estimator : DenseSynchronizer, or Pipeline with one
-            Fitted. Its performances are not needed again.
+            Fitted. The performances are not needed again.
         features : int, str or list of them, default=None
-            Which features to draw, by index or name: those that reach the synchronizer, which
-            may be dimensions of the aSpace. By default all, the largest of either share first;
-            of more than 20 the smallest are drawn as one row.
+            Features by index or name, as they reach the synchronizer, such as dimensions of the
+            aSpace. By default all, in the order of the larger of the two shares; of more than 20
+            the smallest are summed in one row.
         ax : Axes, default=None
+            Axes to draw on. None makes a figure.
 
         Returns
         -------
         MetricDisplay
+            The display, drawn.
 
         Raises
         ------
@@ -99,11 +93,11 @@ class MetricDisplay:
         check_is_fitted(synchronizer)
         metric = synchronizer.metric_
         if metric is None:
-            raise ValueError(_why_none(synchronizer))
+            raise ValueError(_explain_missing(synchronizer))
         names = names_of_features(before, synchronizer, len(metric.share))
         shares = np.column_stack([metric.share, metric.energy])
         if features is None:
-            names, shares = _largest(names, shares)
+            names, shares = _sort_and_sum(names, shares)
         else:
             chosen = choose_features(features, names)
             names, shares = [names[i] for i in chosen], shares[chosen]
@@ -116,10 +110,12 @@ class MetricDisplay:
         Parameters
         ----------
         ax : Axes, default=None
+            Axes to draw on. None makes a figure.
 
         Returns
         -------
-        self
+        MetricDisplay
+            The display itself.
         """
         rows = np.arange(len(self.share))
         size = (7, max(2.2, 0.27 * len(rows) + 1.3))
@@ -132,7 +128,7 @@ class MetricDisplay:
             alpha=0.6,
             label="of plain velocities, without a metric",
         )
-        # Thinner and in front, so that both show, whichever is longer.
+        # Narrower and in front: both bars are visible, whichever is longer.
         self.share_ = self.ax_.barh(
             rows,
             self.share,
@@ -155,24 +151,25 @@ class MetricDisplay:
         return f"metric learnt from {self.n_performances} performances"
 
 
-def _largest(names, shares):
-    """Features by the larger of their two shares; the last of many as one row."""
+def _sort_and_sum(names, shares):
+    """Features in the order of the larger share; the smallest of many are summed."""
     order = np.argsort(-shares.max(axis=1), kind="stable")
     names, shares = [names[i] for i in order], shares[order]
-    if len(names) <= _MOST_ROWS:
+    if len(names) <= _MAX_ROWS:
         return names, shares
-    rest = len(names) - (_MOST_ROWS - 1)
+    rest = len(names) - (_MAX_ROWS - 1)
     names = [*names[:-rest], f"{rest} others"]
     return names, np.vstack([shares[:-rest], shares[-rest:].sum(axis=0)])
 
 
-def _why_none(synchronizer):
-    """What a metric needs, and what the synchronizer has of it."""
+def _explain_missing(synchronizer):
+    """An error message: the conditions for a metric, and those of the synchronizer."""
     n = len(synchronizer.global_distances_)
-    has = {name: getattr(synchronizer, name) for name in ("metric", "cost", "consensus")}
+    values = {name: getattr(synchronizer, name) for name in ("metric", "cost", "consensus")}
     return (
         "There is no metric to draw, metric_ is None: DenseSynchronizer learns one with "
         "metric='learned', cost='velocity' and consensus above 0, from at least 3 performances "
-        f"in which something moves. It has {', '.join(f'{k}={v!r}' for k, v in has.items())} and "
-        f"was fitted to {n} performance{'s' * (n != 1)}; change what is missing and fit it again."
+        f"in which something moves. It has {', '.join(f'{k}={v!r}' for k, v in values.items())} "
+        f"and was fitted to {n} performance{'s' * (n != 1)}; change what is missing and fit it "
+        "again."
     )

@@ -1,10 +1,11 @@
-"""ActionModelDisplay: the mean of a learnt action, a band about it, who leaves it (Fig. 3d)."""
+"""ActionModelDisplay: the mean of a learnt action, a band, and departures from it (Fig. 3d)."""
 
 from typing import NamedTuple
 
 import numpy as np
 from sklearn.base import clone
 
+from ..inputs.collections import as_collection
 from ..inputs.features import choose_features
 from ..model.views import view_of
 from ..utils.groups import names_of_groups
@@ -12,76 +13,77 @@ from .drawing import (
     COLORS,
     curves,
     front_line,
-    group_colors,
-    group_lines,
+    group_styles,
     legend_above,
     panels,
     parts_outside,
 )
-from .given import as_drawn, as_names, is_number
-from .time_axis import TimeAxis, lengths_of
+from .time_axis import TimeAxis
 
 __all__ = ["ActionModelDisplay"]
 
-# What each band holds, said above the legend.
-_HOLDS = {
+# Titles of the legend, without and with groups.
+_BAND_TITLES = {
     "points": "band holds single postures, not performances",
     "performances": "band holds {share:.3g} % of new people's performances",
     "mean": "band holds the mean of all people, {share:.3g} % sure",
 }
-# The same of groups.
-_HOLD = {
+_GROUP_BAND_TITLES = {
     "points": "bands hold single postures, not performances",
     "performances": "bands hold {share:.3g} % of new people's performances",
     "mean": "bands hold the mean of all people, {share:.3g} % sure",
 }
+# Rounding of the largest bound, in units of the last place.
+_ROUNDING = 64
 
 
 class ActionModelDisplay:
-    """The learnt action: mean, a band about it, and the performances behind (Fig. 3d).
+    """A learnt action: its mean, a band about it, and the performances behind (Fig. 3d).
 
     Use `from_estimator`.
 
     Parameters
     ----------
-    mean, lower, upper : ndarray, shape (P, n_shown)
-        With groups (n_groups, P, n_shown), in the order in which they come; bounds are NaN where a
-        group has no band.
+    mean, lower, upper : array-like, shape (P, n_shown)
+        With groups (n_groups, P, n_shown), in the order of their first appearance; NaN are the
+        bounds of a group without a band.
     feature_names : list of str
+        The names of the features.
     n_std : float, default=None
-        Half-width of the band, in standard deviations; None only of the band of the mean, and of
+        Half-width of the band in standard deviations. None for the band of the mean, and with
         groups.
-    performances : ndarray, shape (n_sequences, P, n_shown), default=None
+    performances : array-like, shape (n_sequences, P, n_shown), default=None
         Synchronised performances, drawn behind.
     band : {"points", "performances", "mean"}, default="points"
-        What the band holds, for the legend: see `from_estimator`.
+        The meaning of the band, for the legend: see `from_estimator`.
     coverage : float, default=None
-        The share that it holds, between 0 and 1; None only of the band of points.
+        The probability of the band, between 0 and 1. None for the band of points.
     departures : bool, default=True
-        Whether parts of performances outside the band are violet. They never are when the band is
-        that of the mean, which nobody needs to keep to.
+        Whether the parts of performances outside the band are violet. The band of the mean shows
+        no departures, since single performances need not stay in it.
     groups : sequence of length n_sequences, default=None
-        The group of every performance.
+        The group of each performance.
     people : sequence of length n_sequences, default=None
-        Who gave it, for the legend.
+        The subject of each performance, for the legend.
     unit : {"frames", "percent", "seconds"}, default="frames"
-        Of the axis of time.
+        The unit of time.
     frame_rate : float, default=None
         Frames of the clock a second, for seconds.
 
     Attributes
     ----------
     figure_ : Figure
+        The figure of the last plot.
     axes_ : list of Axes
-        One a feature.
+        The panels, one a feature.
     mean_ : list of Line2D
-        One a feature; with groups one a group, feature by feature.
+        The means, one a feature; with groups one a group, feature by feature.
     envelope_ : list of FillBetweenPolyCollection
-        The same, without groups that have no band.
+        The bands, in the same order; groups without a band are left out.
     performances_ : list of LineCollection
-        As ``mean_``; empty without performances.
+        The performances, in the order of ``mean_``; empty without performances.
     departures_ : list of LineCollection
-        What of them is outside the band; empty where that is not drawn.
+        The parts of performances outside the band; empty if they are not drawn.
 
     Examples
     --------
@@ -114,31 +116,15 @@ class ActionModelDisplay:
         unit="frames",
         frame_rate=None,
     ):
-        self.groups, of_each = None, ()
-        if groups is not None:
-            if performances is None:
-                raise ValueError("groups are those of performances: give these, too.")
-            self.groups = Groups(groups, people, len(performances))
-            of_each = (len(self.groups.names),)
-        self.mean = as_drawn(mean, "The mean", (*of_each, "P", "n_shown"))
-        self.lower = as_drawn(lower, "The lower bound", self.mean.shape)
-        self.upper = as_drawn(upper, "The upper bound", self.mean.shape)
-        n_frames, n_shown = self.mean.shape[-2:]
-        self.feature_names = as_names(feature_names, n_shown, "feature_names", "features")
-        self.band = _as_band(band)
-        optional = band == "mean" or groups is not None
-        if not (is_number(n_std, 0) or (n_std is None and optional)):
-            raise ValueError(f"n_std must be a number of at least 0, got {n_std!r}.")
-        if not (is_number(coverage, 0, 1) or (coverage is None and band == "points")):
-            raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
-        self.n_std, self.coverage = n_std, coverage
-        self.departures = bool(departures)
-        self.performances = None
-        if performances is not None:
-            shape = ("n_sequences", *self.mean.shape[-2:])
-            self.performances = as_drawn(performances, "What is drawn behind", shape)
+        self.mean, self.lower, self.upper = np.asarray(mean), np.asarray(lower), np.asarray(upper)
+        self.feature_names, self.n_std = feature_names, n_std
+        self.performances = None if performances is None else np.asarray(performances)
+        self.band, self.coverage, self.departures = band, coverage, departures
+        self.groups = (
+            None if groups is None else SubjectGroups(groups, people, len(self.performances))
+        )
         self.unit, self.frame_rate = unit, frame_rate
-        self._axis = TimeAxis(unit, n_frames, None, frame_rate)
+        self._axis = TimeAxis(unit, self.mean.shape[-2], None, frame_rate)
 
     def __repr__(self):
         return f"ActionModelDisplay({self.feature_names})"
@@ -165,66 +151,77 @@ class ActionModelDisplay:
         ----------
         estimator : ActionModel, or Pipeline with one
             Fitted.
-        X : performances, as the estimator takes them, default=None
-            Drawn behind, as they reach the model.
+        X : performances, default=None
+            As the estimator takes them; drawn behind, as they reach the model.
         features : int, str or list of them, default=None
             Features of the model, by index or name. In a pipeline with an `ASpace` they may also
             be features of the postures, such as ``"pelvis_height"`` or ``"left_leg_y"``: the
-            model is then taken back out of the aSpace, fitted anew on the postures of the
-            performances that it keeps. By default the first four of the model.
+            model is then fitted again on the postures of the performances that it keeps. By default
+            the first four of the model.
         band : {"points", "performances", "mean"}, default=None
-            Which band is drawn about the mean, and named in the legend; by default that of points,
-            with groups that of performances:
+            The band about the mean, named in the legend; by default ``"points"``, with groups
+            ``"performances"``:
 
-            - ``"points"``: ``model.envelope()``, ``n_std`` standard deviations at every frame by
-              itself. It holds most postures of new people, but few of their performances from
-              the first frame to the last;
-            - ``"performances"``: ``model.envelope(simultaneous=True)``, which holds the share
-              ``coverage`` of whole performances of new people, in all features and at all frames.
-              In features of postures it allows for what the `ASpace` leaves out, and performances
-              are drawn with that;
-            - ``"mean"``: ``model.mean_envelope()``, which holds the mean of all people with
-              probability ``coverage``: how well the mean is known.
+            - ``"points"``: ``model.envelope()``, ``n_std`` standard deviations at each frame. It
+              holds most postures of new subjects, but few of their performances from the first
+              frame to the last;
+            - ``"performances"``: ``model.envelope(simultaneous=True)``, which holds whole
+              performances of new subjects, in all features and at all frames, with probability
+              ``coverage``. In features of postures it includes what the `ASpace` leaves out, as do
+              the performances;
+            - ``"mean"``: ``model.mean_envelope()``, which holds the mean of the population with
+              probability ``coverage``.
         departures : bool, default=True
-            Whether the parts of performances that leave the band are drawn violet; they are not
-            when the band is that of the mean.
+            Whether the parts of performances outside the band are violet; they never are with the
+            band of the mean.
         groups : sequence of length n_sequences, default=None
-            The group of every performance of X. Mean and band are then drawn for each group, of a
-            model of its own that is fitted now on the performances of the group, all on the clock
-            of the one pattern. A single performance has no band, nor have those of a single person,
-            unless the band is that of points.
+            The group of each performance of X. Mean and band are then those of a model of each
+            group, fitted to its performances; all are on the clock of the same pattern. A group of
+            one performance has no band, nor has a group of one subject, except ``"points"``.
         people : sequence of length n_sequences, default=None
-            Who gave each performance of X, as ``ActionModel.fit(groups=...)`` takes it: bands of
-            performances and means of groups are then learnt from how people differ. By default
-            each is of another person; give it whenever people come more than once.
+            The subject of each performance of X, as in ``ActionModel.fit(groups=...)``: bands of
+            performances and of means then estimate the differences between subjects. By default
+            each performance is of another subject; give it if subjects come more than once.
         unit : {"frames", "percent", "seconds"}, default="frames"
-            Of the axis of time: frames or per cent of the pattern, or seconds, in which the clock
-            takes as long as the median performance of X.
+            The unit of time: frames or per cent of the pattern, or seconds; the clock then lasts
+            as long as the median performance of X.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames a second of X as recorded, for seconds; without X those of the clock.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
-            What synchronizing X takes besides, such as ``keyframes``.
+            Further arguments of the synchronizer, such as ``keyframes``.
 
         Returns
         -------
         ActionModelDisplay
+            The display, drawn.
+
+        Raises
+        ------
+        ValueError
+            If there is no such feature or band, or groups do not fit the performances.
+        TypeError
+            If groups, people or further arguments come without performances, or people without
+            groups.
 
         See Also
         --------
-        SkeletonDisplay.from_departures : Which limbs depart, on stick figures.
+        SkeletonDisplay.from_departures : The limbs that depart, on stick figures.
         """
-        by_default = "points" if groups is None else "performances"
-        band = _as_band(by_default if band is None else band)
+        if band is None:
+            band = "points" if groups is None else "performances"
+        if band not in list(_BAND_TITLES):
+            raise ValueError(f"band must be one of {list(_BAND_TITLES)}, got {band!r}.")
         caller = f"{cls.__name__}.from_estimator"
-        if X is None and (params or groups is not None or people is not None):
-            given = [*params, *(["groups"] if groups is not None else [])] or ["people"]
-            raise TypeError(f"{caller} takes {', '.join(given)} along with performances X only.")
+        named = params | {"groups": groups, "people": people}
+        names = [name for name, value in named.items() if value is not None]
+        if X is None and names:
+            raise TypeError(f"{caller} takes {', '.join(names)} along with performances X only.")
         if people is not None and groups is None:
             raise TypeError(
-                f"{caller} takes people along with groups only: a model that is fitted already "
-                "knows its people, by fit(X, groups=people)."
+                f"{caller} takes people along with groups only: a fitted model has learnt its "
+                "people by fit(X, groups=people)."
             )
         view = view_of(estimator, X, params, caller, features=features)
         chosen = choose_features(features, view.names)
@@ -233,10 +230,10 @@ class ActionModelDisplay:
         if groups is None:
             mean, (lower, upper, n_std) = view.model.mean_, _bounds(view, band)
         else:
-            of_groups = Groups(groups, people, len(shown))
-            mean, lower, upper = bands_of_groups(view.model, shown, of_groups, band)
+            groups_of = SubjectGroups(groups, people, len(shown))
+            mean, lower, upper = bands_of_groups(view.model, shown, groups_of, band)
         if unit == "seconds" and X is not None:
-            clock = TimeAxis(unit, mean.shape[-2], lengths_of(X), frame_rate).clock
+            clock = TimeAxis(unit, mean.shape[-2], _lengths(X), frame_rate).clock
             frame_rate = (len(clock) - 1) / clock[-1]
         display = cls(
             mean[..., chosen],
@@ -266,76 +263,90 @@ class ActionModelDisplay:
 
         Returns
         -------
-        self
+        ActionModelDisplay
+            The display itself.
         """
         count = len(self.feature_names)
         n_cols = 1 if count == 1 else 2
         n_rows = -(-count // n_cols)
-        spots = [divmod(i, n_cols) for i in range(count)]
-        layers = layers_of(self.mean, self.lower, self.upper, self.performances, self.groups)
-        height = max(3, 2.2 * n_rows + 0.6) + 0.2 * max(len(layers) - 3, 0)
-        self.figure_, self.axes_ = panels(ax, spots, n_rows, n_cols, (5 * n_cols, height))
+        cells = [divmod(i, n_cols) for i in range(count)]
+        parts = self._parts()
+        height = max(3, 2.2 * n_rows + 0.6) + 0.2 * max(len(parts) - 3, 0)
+        self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, (5 * n_cols, height))
         self.mean_, self.envelope_, self.performances_, self.departures_ = [], [], [], []
         for i, (axis, name) in enumerate(zip(self.axes_, self.feature_names, strict=True)):
-            self._draw(axis, layers, i)
+            self._draw_feature(axis, parts, i)
             axis.set_ylabel(name)
             if i + n_cols >= count:
                 axis.set_xlabel(self._axis.label)
-        self._explain(layers)
+        self._draw_legend(parts)
         return self
 
-    def _draw(self, axis, layers, i):
-        """One feature: bands, performances in front of them, what departs, and the means."""
-        clock = self._axis.clock
-        banded = [layer for layer in layers if layer.has_band]
-        self.envelope_ += [layer.draw_band(axis, clock, i) for layer in banded]
-        if self.performances is not None:
-            self.performances_ += [layer.draw_performances(axis, clock, i) for layer in layers]
-            if self.departures and self.band != "mean":
-                self.departures_ += [layer.draw_departures(axis, self._axis, i) for layer in banded]
-        self.mean_ += [layer.draw_mean(axis, clock, i) for layer in layers]
-
-    def _label(self):
-        if self.n_std is None:
-            return "where the mean may be"
-        predicted = "predicted " if self.band == "performances" else ""
-        return f"mean ± {self.n_std:.3g} {predicted}standard deviations"
-
-    def _explain(self, layers):
-        """A legend, with what the band holds as its title; above the panels it hides nothing."""
+    def _parts(self):
+        """All performances, or those of each group, with their mean and band."""
         if self.groups is None:
-            handles, labels = [self.envelope_[0]], [self._label()]
+            return [GroupCurves(self.mean, self.lower, self.upper, self.performances)]
+        styles = group_styles(self.groups.labels).items()
+        return [
+            GroupCurves(*bounds, self.performances[self.groups.members(name)], name, *style)
+            for *bounds, (name, style) in zip(
+                self.mean, self.lower, self.upper, styles, strict=True
+            )
+        ]
+
+    def _draw_feature(self, axis, parts, i):
+        """Draw the bands of a feature, then performances, departures, and means."""
+        clock = self._axis.clock
+        banded = [part for part in parts if part.has_band]
+        self.envelope_ += [part.draw_band(axis, clock, i) for part in banded]
+        if self.performances is not None:
+            self.performances_ += [part.draw_performances(axis, clock, i) for part in parts]
+            if self.departures and self.band != "mean":
+                self.departures_ += [part.draw_departures(axis, self._axis, i) for part in banded]
+        self.mean_ += [part.draw_mean(axis, clock, i) for part in parts]
+
+    def _draw_legend(self, parts):
+        """Draw a legend above the panels, with the meaning of the band as its title."""
+        if self.groups is None:
+            label = "where the mean may be"
+            if self.n_std is not None:
+                predicted = "predicted " if self.band == "performances" else ""
+                label = f"mean ± {self.n_std:.3g} {predicted}standard deviations"
+            handles, labels = [self.envelope_[0]], [label]
             if self.performances is not None:
                 handles.append(self.performances_[0])
                 labels.append(f"{len(self.performances)} performances")
         else:
             handles, labels = [], []
             bands = iter(self.envelope_)
-            for layer, line in zip(layers, self.mean_, strict=False):
-                handles.append((next(bands), line) if layer.has_band else line)
-                labels.append(self.groups.describe(layer.group, layer.has_band))
+            for part, line in zip(parts, self.mean_, strict=False):
+                handles.append((next(bands), line) if part.has_band else line)
+                labels.append(self.groups.describe(part.group, part.has_band))
         if self.departures_:
+            count = sum(part.count_outside() for part in parts if part.has_band)
             handles.append(self.departures_[0])
             of_group = "" if self.groups is None else " of its group"
-            labels.append(f"outside the band{of_group}: {count_outside(layers)} of them")
+            labels.append(f"outside the band{of_group}: {count} of them")
         if self.groups is None:
             handles.append(self.mean_[0])
             labels.append("mean performance")
-        what = _HOLDS[self.band] if self.groups is None else _HOLD[self.band]
-        title = what.format(share=100 * (self.coverage or 0))
+        titles = _BAND_TITLES if self.groups is None else _GROUP_BAND_TITLES
+        title = titles[self.band].format(share=100 * (self.coverage or 0))
         legend_above(self.axes_, handles, labels, title, below=self.axes_[:1], n_cols=1)
 
 
-def _as_band(band):
-    if not (isinstance(band, str) and band in _HOLDS):
-        raise ValueError(f"band must be one of {list(_HOLDS)}, got {band!r}.")
-    return band
+def _lengths(X):
+    """The numbers of frames of performances, or of univariate rows."""
+    collection = as_collection(X)
+    if collection is None:
+        n_sequences, n_frames = np.shape(X)
+        return [n_frames] * n_sequences
+    return [len(x) for x in collection]
 
 
 def _bounds(view, band):
-    """Lower and upper bound of a band, and its half-width in standard deviations."""
+    """The lower and the upper bound of a band, and its half-width in standard deviations."""
     if band == "mean":
-        # The same picture every time.
         return *view.model.mean_envelope(random_state=0), None
     if band == "points":
         return *view.model.envelope(), view.model.n_std
@@ -344,23 +355,17 @@ def _bounds(view, band):
     return mean - reach, mean + reach, factor
 
 
-# -- what `ActionModelDisplay` draws over each other: one model, or that of every group --
-
-# Of the largest bound, how much beyond it is rounding, in units of the last place.
-_ROUNDING = 64
-
-
-class Layer(NamedTuple):
-    """A mean, a band about it and the performances behind, of all or of one group.
+class GroupCurves(NamedTuple):
+    """The mean, the band and the performances of all, or of one group.
 
     Attributes
     ----------
     mean, lower, upper : ndarray, shape (P, n_shown)
-        Bounds are NaN without a band.
+        The bounds are NaN without a band.
     performances : ndarray (n, P, n_shown), or None
     group : str or None
     color, line : str
-        Of the mean.
+        The colour and the line style of the mean.
     """
 
     mean: np.ndarray
@@ -375,16 +380,21 @@ class Layer(NamedTuple):
     def has_band(self):
         return not np.isnan(self.lower).all()
 
-    @property
-    def just_outside(self):
-        """The bounds, so much farther out that rounding does not count."""
+    def outer_bounds(self):
+        """The bounds with a margin for rounding."""
         largest = [np.nanmax(np.abs(b), axis=0, initial=0) for b in (self.lower, self.upper)]
         eps = np.finfo(np.result_type(self.mean, np.float32)).eps
         margin = _ROUNDING * eps * np.maximum(*largest)
         return self.lower - margin, self.upper + margin
 
+    def count_outside(self):
+        """The number of performances that leave the band in a drawn feature."""
+        lower, upper = self.outer_bounds()
+        outside = (self.performances < lower) | (self.performances > upper)
+        return int(outside.any(axis=(1, 2)).sum())
+
     def draw_band(self, axis, clock, i):
-        """The band of feature i, in grey or pale in the colour of the group."""
+        """Draw the band of feature i, in grey or in the pale colour of the group."""
         lower, upper = self.lower[:, i], self.upper[:, i]
         color, edge, alpha = COLORS["envelope"], COLORS["pattern"], 0.35
         if self.group is not None:
@@ -395,19 +405,21 @@ class Layer(NamedTuple):
         return band
 
     def draw_performances(self, axis, clock, i):
+        """Draw feature i of the performances."""
         behind = self.performances[:, :, i]
         color = COLORS["performance"] if self.group is None else self.color
         style = {"linewidths": 0.7, "linestyles": "dashed", "alpha": 0.55, "colors": color}
         return curves(axis, [clock] * len(behind), behind, **style)
 
     def draw_departures(self, axis, time_axis, i):
-        """Those parts of performances that are outside the band."""
-        bounds = (bound[:, i] for bound in self.just_outside)
+        """Draw the parts of feature i outside the band."""
+        bounds = (bound[:, i] for bound in self.outer_bounds())
         xs, ys = parts_outside(self.performances[:, :, i], *bounds)
         style = {"colors": COLORS["departure"], "linewidths": 1.4, "zorder": 3}
-        return curves(axis, time_axis.of_clock(xs), ys, **style)
+        return curves(axis, time_axis.convert(xs), ys, **style)
 
     def draw_mean(self, axis, clock, i):
+        """Draw the mean of feature i."""
         style = {"color": self.color, "linewidth": 2, "linestyle": self.line}
         if self.group is not None:
             return front_line(axis, clock, self.mean[:, i], **style)
@@ -415,66 +427,22 @@ class Layer(NamedTuple):
         return line
 
 
-def layers_of(mean, lower, upper, performances, groups):
-    """The layers of a display.
-
-    Parameters
-    ----------
-    mean, lower, upper : ndarray, shape (P, n_shown), or (n_groups, P, n_shown)
-    performances : ndarray (n_sequences, P, n_shown), or None
-    groups : Groups or None
-
-    Returns
-    -------
-    list of Layer
-    """
-    if groups is None:
-        return [Layer(mean, lower, upper, performances)]
-    _, color_of = group_colors(groups.labels, len(groups.labels))
-    lines = group_lines(len(color_of))
-    return [
-        Layer(
-            mean[k],
-            lower[k],
-            upper[k],
-            performances[groups.members(name)],
-            name,
-            color_of[name],
-            lines[k],
-        )
-        for k, name in enumerate(groups.names)
-    ]
-
-
-def count_outside(layers):
-    """How many performances leave the band of their layer in a feature that is shown."""
-    count = 0
-    for layer in layers:
-        if layer.has_band:
-            lower, upper = layer.just_outside
-            outside = (layer.performances < lower) | (layer.performances > upper)
-            count += int(outside.any(axis=(1, 2)).sum())
-    return count
-
-
-# -- bands of groups of people: a model of each group, on the one clock that all share ---
-
-
-class Groups:
-    """Which performances are in which group, and who gave them.
+class SubjectGroups:
+    """The groups and the subjects of performances.
 
     Parameters
     ----------
     groups : sequence of length n_sequences
     people : sequence of length n_sequences, or None
+        The subject of each performance; by default each is of another subject.
     n_sequences : int
 
     Attributes
     ----------
     labels : list of str
-        The group of every performance.
+        The group of each performance.
     names : list of str
-        The groups, in the order in which they come.
+        The groups in the order of first appearance.
     people : list of str or None
     """
 
@@ -490,12 +458,12 @@ class Groups:
         return np.flatnonzero(np.array(self.labels) == name)
 
     def people_of(self, name):
-        """Who gave the performances of a group, one each; by default as many people."""
+        """The subject of each performance of a group."""
         members = self.members(name)
         return members if self.people is None else np.array(self.people)[members]
 
     def describe(self, name, has_band):
-        """A line for the legend: how many performances of how many people, and if none is known."""
+        """The entry of a group in the legend: its performances and subjects."""
         count, people = len(self.members(name)), len(set(self.people_of(name)))
         text = f"{name}: {count} performance{'s' * (count != 1)}"
         if self.people is not None:
@@ -503,24 +471,11 @@ class Groups:
         return text if has_band else f"{text}, no band"
 
 
-class Bands(NamedTuple):
-    """Means and bounds of groups, NaN where there is no band.
-
-    Attributes
-    ----------
-    mean, lower, upper : ndarray, shape (n_groups, P, n_features)
-    """
-
-    mean: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-
-
 def bands_of_groups(model, performances, groups, band):
-    """The mean and the band of every group, by a model of its performances alone.
+    """The mean and the band of each group, by a model of its performances alone.
 
-    A single performance has no band. Neither has a single person, unless the band is that of
-    points: nothing tells how others would differ.
+    A group of one performance has no band. A group of one subject has none either, except for
+    points: it does not show the differences between subjects.
 
     Parameters
     ----------
@@ -528,12 +483,13 @@ def bands_of_groups(model, performances, groups, band):
         Its clones are fitted.
     performances : ndarray, shape (n_sequences, P, n_features)
         Synchronised to one pattern.
-    groups : Groups
+    groups : SubjectGroups
     band : {"points", "performances", "mean"}
 
     Returns
     -------
-    Bands
+    mean, lower, upper : ndarray, shape (n_groups, P, n_features)
+        The bounds are NaN where there is no band.
     """
     means, bounds = [], []
     for name in groups.names:
@@ -545,8 +501,7 @@ def bands_of_groups(model, performances, groups, band):
             continue
         own = clone(model).fit(some, groups=None if band == "points" else people)
         if band == "mean":
-            # The same picture every time.
             bounds.append(own.mean_envelope(random_state=0))
         else:
             bounds.append(own.envelope(simultaneous=band == "performances"))
-    return Bands(np.stack(means), *np.stack(bounds, axis=1))
+    return np.stack(means), *np.stack(bounds, axis=1)

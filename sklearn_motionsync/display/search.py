@@ -1,41 +1,41 @@
-"""SearchDisplay: hits along takes, with their scores, and what is known to be there."""
+"""SearchDisplay: the hits of a search along takes, with their scores and the true segments."""
 
 import numpy as np
 import pandas as pd
 
-from ..inputs.collections import as_collection
 from ..inputs.tables import labels_of
-from ..inputs.validation import read_collection
 from ..segmentation.search import find_performances
+from .arguments import as_performances
 from .drawing import COLORS, panels
 
 __all__ = ["SearchDisplay"]
 
-# Below this score nothing is told apart, so that the axis begins here; true parts lie below it.
+# The lowest score of the axis, and the height of the strip of true segments below it.
 _BOTTOM, _STRIP = 0.3, 0.06
-# Panels of one figure.
-_MOST = 12
+# The largest number of panels.
+_MAX_PANELS = 12
 
 
 class SearchDisplay:
-    """Hits along takes: when, with which score, and above or below the threshold.
+    """The hits of a search along takes: their times, scores, and the threshold.
 
-    Use `from_estimator`, or `from_predictions` with what `find_performances` gave.
+    Use `from_estimator`, or `from_predictions` with the result of `find_performances`.
 
     Parameters
     ----------
     origin : DataFrame
-        ``take``, ``start``, ``stop``, ``score`` and ``threshold`` of hits.
+        ``take``, ``start``, ``stop``, ``score`` and ``threshold`` of the hits.
     lengths : dict
-        Frames of each take, by its label: one panel each.
+        The number of frames of each take, by its label: one panel each.
     segments : DataFrame or list of (take, start, stop), default=None
-        Where the action is known to happen.
+        True segments of the action.
 
     Attributes
     ----------
     figure_ : Figure
+        The figure of the last plot.
     axes_ : list of Axes
-        One a take.
+        The panels, one a take.
     hits_ : list of PatchCollection
         The hits of each take; grey are those below the threshold.
 
@@ -52,15 +52,9 @@ class SearchDisplay:
     """
 
     def __init__(self, origin, lengths, *, segments=None):
-        self.origin, self.lengths = _as_table(origin, "origin"), dict(lengths)
-        self.segments = None if segments is None else _as_table(segments, "segments")
-        for name, table in (("origin", self.origin), ("segments", self.segments)):
-            strange = [] if table is None else [t for t in table["take"] if t not in self.lengths]
-            if strange:
-                raise ValueError(
-                    f"{name} names the take {strange[0]!r}, which is none of those that are "
-                    f"drawn: {list(self.lengths)[:8]}."
-                )
+        self.origin, self.lengths, self.segments = origin, dict(lengths), None
+        if segments is not None:
+            self.segments = pd.DataFrame(segments, columns=["take", "start", "stop"])
 
     def __repr__(self):
         count, takes = int(self._accepted().sum()), len(self.lengths)
@@ -68,49 +62,65 @@ class SearchDisplay:
 
     @classmethod
     def from_estimator(cls, pattern, X, *, segments=None, ax=None, **params):
-        """Find performances, and draw them and what comes near the threshold.
+        """Search takes, and draw the hits above and below the threshold.
 
         Parameters
         ----------
-        pattern, X : as for `find_performances`
+        pattern : performances, or estimator
+            The pattern of `find_performances`.
+        X : takes
+            The takes of `find_performances`.
         segments : DataFrame or list of (take, start, stop), default=None
-            Where the action is known to happen; takes by label or index.
+            True segments of the action, by the labels of the takes.
         ax : Axes, or one for each take, default=None
+            A subplot to be divided, or one axes a take. None makes a figure.
         **params : dict
-            Of `find_performances`, but ``threshold``.
+            Arguments of `find_performances`, without ``threshold``: the figure shows the hits
+            above and below the automatic one.
 
         Returns
         -------
         SearchDisplay
+            The display, drawn.
         """
-        if params.get("threshold", "auto") != "auto":
-            raise ValueError(
-                "SearchDisplay.from_estimator draws hits beside the learnt threshold; for another "
-                "one give what find_performances found to from_predictions."
-            )
-        _, origin = find_performances(pattern, X, **params | {"threshold": None})
+        _, origin = find_performances(pattern, X, threshold=None, **params)
         return cls.from_predictions(origin, X, segments=segments, ax=ax)
 
     @classmethod
     def from_predictions(cls, origin, X, *, segments=None, ax=None):
-        """Draw what `find_performances` gave.
+        """Draw the result of `find_performances`.
 
         Parameters
         ----------
         origin : DataFrame
-        X : the takes that were searched
-        segments, ax : as for `from_estimator`
+            The second result of `find_performances`.
+        X : takes
+            The takes that were searched.
+        segments : DataFrame or list of (take, start, stop), default=None
+            True segments of the action, by the labels of the takes.
+        ax : Axes, or one for each take, default=None
+            A subplot to be divided, or one axes a take. None makes a figure.
 
         Returns
         -------
         SearchDisplay
+            The display, drawn.
+
+        Raises
+        ------
+        ValueError
+            If hits or segments are of other takes.
         """
-        takes = as_collection(X)
-        takes = [X] if takes is None else takes
-        if as_collection(X) is not None:
-            read_collection(X)
+        takes = as_performances(X)
         lengths = dict(zip(labels_of(takes)[0], map(len, takes), strict=True))
-        return cls(origin, lengths, segments=segments).plot(ax)
+        display = cls(origin, lengths, segments=segments)
+        for name, table in (("origin", display.origin), ("segments", display.segments)):
+            unknown = [] if table is None else [t for t in table["take"] if t not in lengths]
+            if unknown:
+                raise ValueError(
+                    f"{name} names the take {unknown[0]!r}; the takes are {list(lengths)[:8]}."
+                )
+        return display.plot(ax)
 
     def plot(self, ax=None):
         """Draw.
@@ -118,32 +128,34 @@ class SearchDisplay:
         Parameters
         ----------
         ax : Axes, or one for each take, default=None
+            A subplot to be divided, or one axes a take. None makes a figure.
 
         Returns
         -------
-        self
+        SearchDisplay
+            The display itself.
         """
         from matplotlib.collections import PatchCollection
         from matplotlib.patches import Rectangle
 
-        shown = list(self.lengths)[:_MOST]
-        spots = [(i, 0) for i in range(len(shown))]
+        shown = list(self.lengths)[:_MAX_PANELS]
+        cells = [(i, 0) for i in range(len(shown))]
         size = (8, 1.1 + 1.3 * len(shown))
-        self.figure_, self.axes_ = panels(ax, spots, len(shown), 1, size)
+        self.figure_, self.axes_ = panels(ax, cells, len(shown), 1, size)
         accepted, self.hits_ = self._accepted(), []
         for axis, take in zip(self.axes_, shown, strict=True):
-            mine = (self.origin["take"] == take).to_numpy()
+            in_take = (self.origin["take"] == take).to_numpy()
             boxes, colors = [], []
-            rows = self.origin[mine]
-            for start, stop, score, good in zip(
-                rows["start"], rows["stop"], rows["score"], accepted[mine], strict=True
+            rows = self.origin[in_take]
+            for start, stop, score, is_hit in zip(
+                rows["start"], rows["stop"], rows["score"], accepted[in_take], strict=True
             ):
                 height = max(score - _BOTTOM, 0)
                 boxes.append(Rectangle((start, _BOTTOM), stop - start, height))
-                colors.append(COLORS["performance"] if good else COLORS["shadow"])
+                colors.append(COLORS["performance"] if is_hit else COLORS["shadow"])
             self.hits_.append(PatchCollection(boxes, facecolors=colors, edgecolors="white"))
             axis.add_collection(self.hits_[-1])
-            self._draw_known(axis, take)
+            self._draw_segments(axis, take)
             for level in rows["threshold"].unique():
                 axis.axhline(level, color=COLORS["mean"], linestyle="--", linewidth=1)
             axis.set_xlim(0, self.lengths[take])
@@ -152,14 +164,14 @@ class SearchDisplay:
             title = f"take {take}" if len(self.lengths) > 1 else ""
             axis.set_title(title, fontsize="medium", loc="left")
         self.axes_[-1].set_xlabel("frame of the take")
-        self._explain()
+        self._draw_legend()
         return self
 
     def _accepted(self):
         return (self.origin["score"] >= self.origin["threshold"]).to_numpy(dtype=bool)
 
-    def _draw_known(self, axis, take):
-        """The true parts as a strip below the hits."""
+    def _draw_segments(self, axis, take):
+        """Draw the true segments as a strip below the hits."""
         if self.segments is None:
             return
         rows = self.segments[(self.segments["take"] == take).to_numpy()]
@@ -167,7 +179,7 @@ class SearchDisplay:
         strip = _BOTTOM - _STRIP, 0.8 * _STRIP
         axis.broken_barh(spans, strip, facecolors=COLORS["pattern"], edgecolors="white")
 
-    def _explain(self):
+    def _draw_legend(self):
         from matplotlib.lines import Line2D
         from matplotlib.patches import Patch
 
@@ -187,18 +199,3 @@ class SearchDisplay:
             frameon=False,
             borderaxespad=0.2,
         )
-
-
-def _as_table(rows, name):
-    """Rows with the columns take, start and stop; hits have score and threshold, too."""
-    needed = ["take", "start", "stop"] + ["score", "threshold"] * (name == "origin")
-    if not isinstance(rows, pd.DataFrame):
-        rows = [tuple(row) for row in rows]
-        wrong = [row for row in rows if len(row) != len(needed)]
-        if wrong:
-            raise ValueError(f"{name} needs rows ({', '.join(needed)}), got {wrong[0]!r}.")
-        rows = pd.DataFrame(rows, columns=needed)
-    missing = [column for column in needed if column not in rows.columns]
-    if missing:
-        raise ValueError(f"{name} needs the columns {needed}; {missing} are missing.")
-    return rows

@@ -1,94 +1,109 @@
-"""Stick figures: strips of postures, samples of a model (Fig. 4), and people moving in step."""
+"""SkeletonDisplay: stick figures of postures, models (Fig. 4), and performances in motion."""
+
+from functools import partial
+from numbers import Real
 
 import numpy as np
+from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.tables import labels_of
+from ..body.base import PositionsTransformer
+from ..body.direction_cosines import DirectionCosines
+from ..inputs.tables import name_performance
+from ..model.action_model import ActionModel
+from ..model.views import models_of_classes
 from ..synchronizers.match import match_of_times
-from .animation import playable
-from .bodies import (
-    bodies_of_postures,
-    bones_by_side,
-    limits,
-    on_screen,
-    place_of,
-    placed,
-    upright,
-    with_landmarks,
+from ..utils.pipelines import (
+    find_step,
+    find_synchronizer,
+    flat_steps,
+    index_of_pattern,
+    route_to_synchronizer,
+    union_transformers,
 )
-from .drawing import COLORS, panels, stage, sticks
-from .given import (
-    as_behind,
-    as_durations,
+from .animation import animate
+from .arguments import (
     as_frames,
-    as_labels,
-    as_marked,
+    as_index,
+    as_indices,
     as_names,
     as_performances,
-    as_pictures,
-    as_scenes,
-    as_skeleton,
-    check_view,
+    labels_as_text,
 )
-from .pipeline_figures import PipelineFigures
+from .bodies import (
+    bones_by_side,
+    bounds,
+    landmark_track,
+    place_on_floor,
+    project,
+    read_positions,
+)
+from .drawing import COLORS, bone_lines, panels, stage
+from .limb_departures import departs_outside_aspace, limb_departures, view_of_limbs
 
-__all__ = ["SkeletonDisplay"]
+__all__ = ["SkeletonDisplay", "postures_at"]
 
-# Panels in one row of a strip.
+# The largest number of panels in a row.
 _PANELS_A_ROW = 6
-# Inches across that a heading needs, and up.
+# The width and the height of a heading in inches.
 _HEADING = 7.8, 0.4
-# Between two stick figures, in heights of the tallest.
+# The distance of bodies side by side, in heights of the tallest.
 _SPACING = 0.7
+# The number of performances by default.
+_N_PERFORMANCES = 6
 
 
-class SkeletonDisplay(PipelineFigures):
-    """Stick figures of joint positions: strips of postures, or performances in motion.
+class SkeletonDisplay:
+    """Stick figures of joint positions: postures side by side, or performances in motion.
 
-    Make one with `from_positions`, `from_postures` (strips), `from_model` (Fig. 4),
-    `from_departures` (what is wrong with a performance), `from_performances`, `from_estimator` or
-    `from_predictions` (performances, also before and after synchronisation, to `animate`). Left
-    limbs are blue, right ones orange; limbs that depart from an action are violet, and then all
-    others grey. People are turned to face the same way at first. Their lowest joint ever is on the
-    floor; the pictures of a strip, and those of people who walk away, go with the pelvis.
+    Make one with `from_positions` or `from_postures` (postures), `from_model` (Fig. 4),
+    `from_departures` (departures of a performance from an action), `from_performances`,
+    `from_estimator` or `from_predictions` (performances, also before and after synchronisation, to
+    `animate`). Left limbs are blue, right ones orange. Where limbs depart from an action these are
+    violet and all others grey. Bodies face the same way in the first frame, and their lowest joint
+    of all frames is on the floor. The view follows the pelvis of single postures, and of a body
+    that walks far.
 
     A skeleton may lack landmarks. Where a landmark is the mean of joints, limbs are drawn between
-    the landmarks; a skeleton that joins nothing is drawn as its joints, too. Key-points of a
-    picture are drawn as the camera saw them, from where it stood: ``azimuth`` has no meaning then.
+    the landmarks; the joints of a skeleton without bones are drawn as points. Positions in a plane
+    are drawn as the camera saw them, whatever the ``azimuth``.
 
     Parameters
     ----------
     scenes : list of list of ndarray (n_frames_i, n_joints, n_dims)
-        For each panel its performances: joint positions in axes of which the second is vertical.
+        The performances of each panel: joint positions in axes of which the second is vertical.
     skeleton : Skeleton or None
         Joints and bones; None draws all joints as points, without bones.
     titles : list of str
         One a panel.
     durations : list of list of float, default=None
-        How long each performance of each panel takes, in frames; by default as many frames
-        as it has, less one.
+        The duration of each performance of each panel in frames; by default its number of frames
+        less one.
     labels : list of str, default=None
-        Names under the performances of a panel, which then stand side by side instead of in one
+        Names under the performances of a panel, which are then side by side instead of in one
         place.
     marked : list of list of (int, int), default=None
-        For each panel the bones to be seen at once, such as those of limbs that depart from the
-        action: pairs of ``skeleton.bones``. They are violet, all others grey.
+        The violet bones of each panel, such as those of limbs that depart from the action: pairs
+        of ``skeleton.bones``. All others are grey.
     behind : list of list of ndarray (n_frames_i, n_joints, n_dims), default=None
-        For each panel performances that stand behind as pale shadows, such as the mean.
+        Performances of each panel that are drawn behind as pale shadows, such as the mean.
     heading : str, default=None
-        What stands above all panels, if the figure is the display's own.
+        The heading of a figure that the display makes.
 
     Attributes
     ----------
     figure_ : Figure
+        The figure of the last plot.
     axes_ : list of Axes
+        The panels.
     bones_ : list of dict
         For each panel the LineCollections of the ``"left"``, ``"middle"`` and ``"right"`` bones,
         and of the ``"departing"`` ones if bones are marked.
     heads_ : list of Line2D
-        Without a skeleton, or without bones, all joints.
+        The heads, one line a panel; without a skeleton, or without bones, all joints.
     behind_ : list of LineCollection
-        One a panel, if something stands behind.
+        The shadows, one collection a panel; empty without them.
     heading_ : Text or None
+        The heading.
 
     Examples
     --------
@@ -112,32 +127,26 @@ class SkeletonDisplay(PipelineFigures):
         behind=None,
         heading=None,
     ):
-        self.skeleton = as_skeleton(skeleton)
-        self.scenes = as_scenes(scenes, skeleton)
-        self.titles = as_names(titles, len(self.scenes), "titles", "panels")
-        self.durations = None if durations is None else as_durations(durations, self.scenes)
-        self.labels = None if labels is None else as_labels(labels, self.scenes)
-        n_panels = len(self.scenes)
-        self.marked = None if marked is None else as_marked(marked, n_panels, skeleton)
-        self.behind = None if behind is None else as_behind(behind, n_panels, skeleton)
-        self.heading = None if heading is None else str(heading)
+        self.scenes, self.skeleton, self.titles = scenes, skeleton, titles
+        self.durations, self.labels, self.heading = durations, labels, heading
+        self.marked, self.behind = marked, behind
 
     def __repr__(self):
         return f"SkeletonDisplay({len(self.scenes)} panels)"
 
     @classmethod
     def from_positions(cls, X, skeleton, *, frames=6, ax=None, **view):
-        """Draw a strip of postures of one performance, or of synchronised ones over each other.
+        """Draw postures of one performance, or of synchronised ones over each other.
 
         Parameters
         ----------
         X : array-like, shape (n_frames, n_dims * n_joints), or (n_sequences, n_frames, ...)
             Joint positions.
         skeleton : Skeleton or None
-            None draws the joints as points without bones, turned as they are, y up. They have
-            three axes, or two if columns are called so (``_x``, ``_y``) or are no triples.
+            None draws the joints as points without bones, y up. They have three axes, or two if
+            their number is no multiple of three or columns are named ``_x``, ``_y``.
         frames : int or list of int, default=6
-            How many, evenly spaced from the first to the last, or which ones.
+            The number of frames, evenly spaced from the first to the last, or their indices.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **view : at, azimuth
@@ -146,38 +155,77 @@ class SkeletonDisplay(PipelineFigures):
         Returns
         -------
         SkeletonDisplay
+            The display, drawn.
         """
-        as_skeleton(skeleton)
-        performances = [upright(x, skeleton, i) for i, x in enumerate(as_performances(X))]
-        n_frames = min(len(x) for x in performances)
-        frames = as_frames(frames, n_frames)
-        standing = [placed(x, skeleton, follow=True) for x in performances]
-        scenes = [[x[[frame]] for x in standing] for frame in frames]
+        bodies = [
+            place_on_floor(read_positions(x, skeleton, i), skeleton, follow=True)
+            for i, x in enumerate(as_performances(X))
+        ]
+        frames = as_frames(frames, min(map(len, bodies)))
         titles = [f"frame {frame}" for frame in frames]
-        return cls(scenes, skeleton, titles).plot(ax, **view)
+        return cls(postures_at(frames, *bodies), skeleton, titles).plot(ax, **view)
 
     @classmethod
     def from_postures(cls, X, cosines, *, frames=6, ax=None, **view):
-        """Draw a strip of postures given by their direction cosines.
+        """Draw postures given by their direction cosines.
 
         Parameters
         ----------
         X : array-like, shape (n_frames, n_features), or (n_sequences, n_frames, n_features)
             Postures.
         cosines : DirectionCosines
-            Fitted; knows how long the limbs are.
-        frames, ax, **view : as for `from_positions`
+            Fitted: with the lengths of the limbs.
+        frames : int or list of int, default=6
+            The number of frames, evenly spaced from the first to the last, or their indices.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
+        **view : at, azimuth
+            See `plot`.
 
         Returns
         -------
         SkeletonDisplay
+            The display, drawn.
         """
-        positions = bodies_of_postures(as_performances(X), cosines)
-        return cls.from_positions(positions, cosines.skeleton.body(), frames=frames, ax=ax, **view)
+        if not hasattr(cosines, "inverse_transform"):
+            got = type(cosines).__name__
+            raise ValueError(f"cosines must be a fitted DirectionCosines, got {got}.")
+        X = as_performances(X)
+        if len(X) > 1 and all(len(x) > 1 for x in X):
+            X = cosines.inverse_transform(X)
+        else:
+            # Single postures are not accepted as a set of performances.
+            X = [cosines.inverse_transform(x) for x in X]
+        return cls.from_positions(X, cosines.skeleton.body(), frames=frames, ax=ax, **view)
+
+    @classmethod
+    def from_performances(cls, X, skeleton, *, names=None, ax=None, **view):
+        """Draw performances side by side, each at its own pace, such as two subjects and a blend.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_dims * n_joints)
+            Joint positions.
+        skeleton : Skeleton or None
+            None draws the joints as points without bones, y up.
+        names : list of str, default=None
+            The names under the performances; by default their labels in X, or numbers.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
+        **view : at, azimuth
+            See `plot`.
+
+        Returns
+        -------
+        SkeletonDisplay
+            The display, drawn at the beginning; see `animate`.
+        """
+        bodies, labels = _side_by_side(X, skeleton, names)
+        return cls([bodies], skeleton, ["each at its own pace"], labels=labels).plot(ax, **view)
 
     @classmethod
     def from_predictions(cls, X, times, skeleton, *, names=None, ax=None, **view):
-        """The same for warps that are there already, whoever made them.
+        """Draw performances as recorded above the same ones synchronised by known warps.
 
         Parameters
         ----------
@@ -186,44 +234,247 @@ class SkeletonDisplay(PipelineFigures):
         times : array-like, shape (n_sequences, P)
             tau(p) from 0 to P - 1, such as ``synchronizer.match(points).times``.
         skeleton : Skeleton or None
-            None draws the joints as points without bones, turned as they are, y up.
+            None draws the joints as points without bones, y up.
         names : list of str, default=None
-            What stands under the performances; by default their labels in X, or numbers.
-        ax, **view : as for `plot`
+            The names under the performances; by default their labels in X, or numbers.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
+        **view : at, azimuth
+            See `plot`.
 
         Returns
         -------
         SkeletonDisplay
+            The display, drawn at the beginning; see `animate`.
         """
-        raw, labels = _beside_each_other(X, skeleton, names)
-        match = match_of_times(times, len(raw))
-        flat = [x.reshape(len(x), -1) for x in raw]
-        warped = match.warp(flat)
-        warped = warped.reshape(*warped.shape[:2], *raw[0].shape[1:])
-        lengths = [len(x) - 1 for x in raw]
+        bodies, labels = _side_by_side(X, skeleton, names)
+        warped = match_of_times(times, len(bodies)).warp([x.reshape(len(x), -1) for x in bodies])
+        warped = warped.reshape(*warped.shape[:2], *bodies[0].shape[1:])
+        durations = [len(x) - 1 for x in bodies]
         return cls(
-            [raw, list(warped)],
+            [bodies, list(warped)],
             skeleton,
             ["as recorded: each at its own pace", "synchronised: all on one clock"],
-            durations=[lengths, [float(np.median(lengths))] * len(raw)],
+            durations=[durations, [float(np.median(durations))] * len(bodies)],
             labels=labels,
         ).plot(ax, **view)
 
     @classmethod
-    def from_performances(cls, X, skeleton, *, names=None, ax=None, **view):
-        """Performances beside each other, each at its own pace: two people and their blend.
+    def from_estimator(
+        cls, estimator, X, *, performances=None, ax=None, at=0.0, azimuth=-60, **params
+    ):
+        """Draw performances as recorded above the same ones synchronised by a pipeline.
 
         Parameters
         ----------
-        X, skeleton, names, ax, **view : as for `from_predictions`
+        estimator : Pipeline
+            Fitted, from `DirectionCosines`, `JointPositions` or both to a synchronizer or further.
+        X : list of arrays (n_frames_i, n_dims * n_joints)
+            Joint positions.
+        performances : list of int, default=None
+            The indices of the performances; by default the pattern, if it is one of them, and
+            others up to six in all.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
+        at, azimuth : float
+            See `plot`.
+        **params : dict
+            Further arguments of the ``match`` of the synchronizer, such as ``keyframes``.
 
         Returns
         -------
         SkeletonDisplay
-            At the beginning; see `animate`.
+            The display, drawn at the beginning; see `animate`.
         """
-        raw, labels = _beside_each_other(X, skeleton, names)
-        return cls([raw], skeleton, ["each at its own pace"], labels=labels).plot(ax, **view)
+        _, views = _split_at_synchronizer(estimator)
+        reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
+        match = reached.match()
+        pattern = index_of_pattern(reached.synchronizer, reached.performances)
+        if performances is None:
+            pattern_first = sorted(range(len(match.times)), key=lambda i: i != pattern)
+            performances = pattern_first[:_N_PERFORMANCES]
+        performances = as_indices(performances, len(match.times), "performances")
+        return cls.from_predictions(
+            [as_performances(X)[i] for i in performances],
+            match.times[performances],
+            views[0].skeleton,
+            names=[f"{i} (pattern)" if i == pattern else str(i) for i in performances],
+            ax=ax,
+            at=at,
+            azimuth=azimuth,
+        )
+
+    @classmethod
+    def from_model(
+        cls, estimator, *, frames=(0.1, 0.4), n_samples=12, random_state=None, ax=None, **view
+    ):
+        """Draw mean postures of a model, and random postures that it accepts (Fig. 4).
+
+        Parameters
+        ----------
+        estimator : Pipeline
+            Fitted, from `DirectionCosines` to an `ActionModel`; the steps before the
+            synchronizer need ``inverse_transform``.
+        frames : list of int or float, default=(0.1, 0.4)
+            Frames of the model; fractions below 1 are shares of the action.
+        n_samples : int, default=12
+            The number of random postures at each frame; those that the model accepts are drawn.
+        random_state : int, RandomState instance or None, default=None
+            Determines the random postures; None draws others each time.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
+        **view : at, azimuth
+            See `plot`.
+
+        Returns
+        -------
+        SkeletonDisplay
+            The display, drawn.
+        """
+        _, model = find_step(estimator, ActionModel)
+        before, views = _split_at_synchronizer(estimator)
+        check_is_fitted(model)
+        if not hasattr(before, "inverse_transform"):
+            raise ValueError(
+                "Stick figures of a model need steps with inverse_transform before the "
+                f"synchronizer; they are {[type(step).__name__ for _, step in before.steps]}. Use "
+                "from_postures with postures of your own."
+            )
+        skeleton = views[0].skeleton.body()
+        # Features that a synchronizer adds are not part of a posture.
+        width = find_synchronizer(estimator)[1].pattern_.shape[1]
+        mean = model.mean_[:, :width]
+
+        def bodies_of(points):
+            # Together with the mean: the inverse puts the lowest joint of all frames on the floor.
+            bodies = np.asarray(before.inverse_transform(np.concatenate([mean, points])))
+            return bodies[len(mean) :].reshape(len(points), -1, skeleton.n_dims)
+
+        floor = np.zeros(skeleton.n_dims)
+        floor[1] = bodies_of(mean)[..., 1].min()
+        scenes, titles = [], []
+        for frame in _frames_of_model(frames, model.n_frames_):
+            samples = model.sample(n_samples, frame=frame, random_state=random_state)
+            accepted = model.accepts(samples, frame)
+            for points in (mean[[frame]], samples[accepted, :width]):
+                scenes.append([x[np.newaxis] - floor for x in bodies_of(points)])
+            titles += [f"frame {frame}\nmean posture", f"frame {frame}\n{sum(accepted)} samples"]
+        return cls(scenes, skeleton, titles).plot(ax, **view)
+
+    @classmethod
+    def from_departures(
+        cls,
+        estimator,
+        X,
+        *,
+        performance=0,
+        frames=6,
+        limit=None,
+        ax=None,
+        at=0.0,
+        azimuth=-60,
+        **params,
+    ):
+        """Draw when a performance departs from an action, and with which limbs.
+
+        The figure shows postures of the performance on the clock of the model, before pale shadows
+        of the mean performance. Limbs that depart are violet: one of their cosines is farther from
+        the mean than ``limit``; for the height of the pelvis the hips are marked. Titles name the
+        limb that departs most. The heading says whether the model accepts the performance; it may
+        do so although limbs depart, because it evaluates only what the `ASpace` keeps, and the
+        heading then says so.
+
+        Parameters
+        ----------
+        estimator : Pipeline
+            Fitted, from `DirectionCosines` to an `ActionModel`, with an `ASpace` or without; or to
+            an `ActionClassifier`, whose model of the predicted class is used. The cosines may be
+            one part of a union, whose other features count for the decision and are not drawn.
+        X : list of arrays (n_frames_i, n_dims * n_joints)
+            Joint positions.
+        performance : int, default=0
+            The index of the performance.
+        frames : int or list of int, default=6
+            A number cuts the clock into as many equal parts, each shown at the frame of its largest
+            departure, or in its middle without one. A list gives frames of the model, each of which
+            represents the frames that are nearest to it, up to a twelfth of the clock away. A limb
+            is marked if it departs anywhere in its part.
+        limit : float, default=None
+            In standard deviations predicted for a new subject; by default ``n_std`` of the model.
+            Correct performances exceed 3 occasionally; the heading names the deviation that is
+            rare (`ActionModel.simultaneous_factor`).
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
+        at, azimuth : float
+            See `plot`.
+        **params : dict
+            Further arguments of the synchronizer, such as ``keyframes``.
+
+        Returns
+        -------
+        SkeletonDisplay
+            The display, drawn.
+
+        Raises
+        ------
+        ValueError
+            If there is no such performance or frame, ``limit`` is not above 0, or the features of
+            the model cannot be inverted to those of `DirectionCosines`.
+
+        See Also
+        --------
+        find_departures : The departures as a table.
+        ActionModelDisplay : The curves of the performance, and the band that they leave.
+        """
+        caller = f"{cls.__name__}.from_departures"
+        index = partial(as_index, performance, what="performance")
+        models = models_of_classes(estimator, X, params, caller, index)
+        if models is not None:
+            (model,) = models
+            estimator, X, params = model.estimator, model.performances, {}
+        before, parts = _split_at_synchronizer(estimator)
+        view, limbs = view_of_limbs(before, parts, estimator, X, params, caller)
+        if models is None:
+            i, note = index(len(view.given)), ""
+            name = name_performance(i, view.labels[i])
+        else:
+            i, note = 0, " by the model of that class"
+            name = name_performance(int(model.indices[0]), model.labels[0])
+            name = f"{name}, most like {str(model.label)!r},"
+        limit = view.model.n_std if limit is None else limit
+        if not limit > 0:
+            raise ValueError(
+                f"limit must be a number of standard deviations above 0, or None; got {limit!r}."
+            )
+        features = list(limbs.cosines.get_feature_names_out())
+        skeleton = limbs.cosines.skeleton.body()
+        scores = view.scores[i][:, limbs.columns]
+        shown, titles, marked = limb_departures(scores, features, frames, limit, skeleton)
+        bodies, shadows = (
+            np.asarray(limbs.cosines.inverse_transform(limbs.invert(x)))
+            for x in (view.whole[i], view.model.mean_)
+        )
+        bodies, shadows = (x.reshape(len(x), -1, skeleton.n_dims) for x in (bodies, shadows))
+        if not skeleton.has_height:
+            # Without a height of the pelvis both have the same floor.
+            floor = min(bodies[..., 1].min(), shadows[..., 1].min())
+            bodies[..., 1] -= floor
+            shadows[..., 1] -= floor
+        verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
+        if verdict == "accepted" and departs_outside_aspace(view, i, limbs.columns):
+            note += ": the model sees what the aSpace keeps,\n"
+            note += "which leaves out how far some limbs depart"
+        display = cls(
+            postures_at(shown, bodies),
+            skeleton,
+            titles,
+            marked=marked,
+            behind=postures_at(shown, shadows),
+            heading=f"{name} is {verdict}{note}.\nViolet: limbs more than {limit:.3g} standard "
+            "deviations from what is expected of a new person, at or around\nthat frame; beyond "
+            f"{view.model.simultaneous_factor():.2g} is rare. Pale: the mean performance.",
+        )
+        return display.plot(ax, at=at, azimuth=azimuth)
 
     def plot(self, ax=None, *, at=0.0, azimuth=-60):
         """Draw.
@@ -234,24 +485,21 @@ class SkeletonDisplay(PipelineFigures):
             One of a figure's subplots is divided into the panels; or one axes a panel. None
             makes a figure.
         at : float in [0, 1], default=0.0
-            When, as a share of the time until the longest performance ends.
+            The time, as a share of the longest duration.
         azimuth : float, default=-60
-            Where the viewer stands, in degrees: 0 before the people, who face the viewer, 90 on
-            their left, -90 on their right.
+            The direction of the viewer in degrees: 0 in front of the bodies, 90 on their left, -90
+            on their right.
 
         Returns
         -------
-        self
+        SkeletonDisplay
+            The display itself.
         """
-        check_view(at, azimuth)
-        n_panels = len(self.scenes)
-        behind = [[] for _ in range(n_panels)] if self.behind is None else self.behind
+        if not 0 <= at <= 1:
+            raise ValueError(f"at must be a share of the time from 0 to 1, got {at!r}.")
         drawn, behind = (
-            [
-                [on_screen(with_landmarks(x, self.skeleton), azimuth) for x in scene]
-                for scene in scenes
-            ]
-            for scenes in (self.scenes, behind)
+            [[project(x, self.skeleton, azimuth) for x in scene] for scene in scenes]
+            for scenes in (self.scenes, self.behind or [[] for _ in self.scenes])
         )
         places = None
         if self.labels is not None:
@@ -263,64 +511,56 @@ class SkeletonDisplay(PipelineFigures):
             )
         n_cols = 1 if self.labels is not None else min(len(drawn), _PANELS_A_ROW)
         n_rows = -(-len(drawn) // n_cols)
-        everything = np.concatenate([x.reshape(-1, 2) for scene in drawn + behind for x in scene])
-        low, high = limits(everything)
+        low, high = bounds(
+            np.concatenate([x.reshape(-1, 2) for scene in drawn + behind for x in scene])
+        )
         width, height = high - low
-        # All panels have one scale, which makes figures of about 10 inches.
+        # All panels have one scale; a figure is about 10 inches wide.
         scale = min(9.5 / (1.1 * n_cols * width), 3 / height)
         size = n_cols * (1.1 * width * scale + 0.15), n_rows * (1.1 * height * scale + 0.75)
         if self.heading is not None:
             size = max(size[0], _HEADING[0]), size[1] + _HEADING[1]
-        spots = [divmod(i, n_cols) for i in range(len(drawn))]
-        before = getattr(self, "axes_", [])
-        self.figure_, self.axes_ = panels(ax, spots, n_rows, n_cols, size)
-        for axis in self.axes_:
-            if axis in before:
-                axis.clear()
+        cells = [divmod(i, n_cols) for i in range(len(drawn))]
+        before = getattr(self, "axes_", ())
+        self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, size, before)
         self.heading_ = None
         if ax is None and self.heading is not None:
             self.heading_ = self.figure_.suptitle(self.heading, fontsize="medium")
-        self._drawn, self._behind, self.bones_, self.heads_ = drawn, behind, [], []
-        self.behind_ = []
-        self._bones = self._sorted_bones()
+        self._drawn, self._behind, self._bones = drawn, behind, self._bones_of_panels()
+        self.bones_, self.heads_, self.behind_ = [], [], []
         for axis, title, scene in zip(self.axes_, self.titles, drawn, strict=True):
-            self._prepare(axis, title, len(scene), low, high)
+            self._prepare(axis, len(scene))
+            stage(axis, title, low, high)
             if places is not None:
                 axis.set_xticks(places, self.labels)
         self._show(at)
         return self
 
     def animate(self, ax=None, *, seconds=5.0, fps=15, azimuth=-60):
-        """The performances in motion, which a notebook plays.
+        """Animate the performances.
 
         Parameters
         ----------
         ax : Axes or array-like of Axes, default=None
-            As for `plot`; by default where the display was drawn last.
+            As for `plot`; by default the axes of the last plot.
         seconds : float, default=5.0
-            Until the longest performance ends.
+            The time until the longest performance ends.
         fps : int, default=15
             Pictures a second; each takes some 70 kB of a notebook.
-        azimuth : as for `plot`
+        azimuth : float, default=-60
+            The direction of the viewer in degrees, as in `plot`.
 
         Returns
         -------
         Animation
-            Shown by a notebook as its last value; ``to_jshtml()`` gives the HTML, ``save(path)``
-            a file.
+            A notebook plays it as the last value of a cell; ``to_jshtml()`` gives the HTML,
+            ``save(path)`` a file.
         """
-        count = as_pictures(seconds, fps)
-        self.plot(getattr(self, "axes_", None) if ax is None else ax, azimuth=azimuth)
-        return playable(
-            self.figure_.canvas.figure,
-            lambda k: self._show(k / (count - 1)),
-            count,
-            fps,
-            closes=ax is None,
-        )
+        view = {"seconds": seconds, "fps": fps, "azimuth": azimuth}
+        return animate(self, lambda k, last: self._show(k / last), ax, **view)
 
-    def _sorted_bones(self):
-        """For each panel the bones of each side of the body, and the marked ones apart."""
+    def _bones_of_panels(self):
+        """For each panel the bones of each side of the body, and the marked ones."""
         by_side = bones_by_side(self.skeleton)
         if self.marked is None:
             return [by_side] * len(self.scenes)
@@ -330,69 +570,95 @@ class SkeletonDisplay(PipelineFigures):
             for marked in self.marked
         ]
 
-    def _prepare(self, axis, title, n_bodies, low, high):
+    def _prepare(self, axis, n_bodies):
+        """Create the artists of a panel."""
         alpha = 1.0 if self.labels is not None or n_bodies == 1 else 0.45
         width = 2.2 if alpha == 1 else 1.1
         colors = {side: COLORS[side] for side in ("middle", "left", "right")}
         if self.marked is not None:
             colors = dict.fromkeys(colors, COLORS["quiet"])
-        drawn = {side: sticks(axis, color, width, alpha) for side, color in colors.items()}
+        bones = {side: bone_lines(axis, color, width, alpha) for side, color in colors.items()}
         if self.marked is not None:
-            drawn["departing"] = sticks(axis, COLORS["departure"], 2 * width, alpha, zorder=3)
-        self.bones_.append(drawn)
+            bones["departing"] = bone_lines(axis, COLORS["departure"], 2 * width, alpha, zorder=3)
+        self.bones_.append(bones)
         if self.behind is not None:
-            self.behind_.append(sticks(axis, COLORS["shadow"], 3 * width, zorder=1))
+            self.behind_.append(bone_lines(axis, COLORS["shadow"], 3 * width, zorder=1))
         joined = self.skeleton is not None and self.skeleton.bones
         size = 3 * width if joined else 1.5 * width
         style = {"color": colors["middle"], "alpha": alpha, "markersize": size}
         self.heads_ += axis.plot([], [], "o", **style)
-        stage(axis, title, low, high)
 
     def _show(self, at):
-        """Put all stick figures where they are after a share of the time; the artists."""
+        """Move all stick figures to a share of the time."""
         durations = self.durations
         if durations is None:
             durations = [[len(x) - 1 for x in scene] for scene in self._drawn]
         longest = max(max(of_scene, default=0) for of_scene in durations)
-        artists = []
         for axis, title in zip(self.axes_, self.titles, strict=True) if longest > 0 else ():
             axis.set_title(f"{title}, at {100 * at:.0f} % of the time", fontsize="medium")
-        for i, (scene, taking) in enumerate(zip(self._drawn, durations, strict=True)):
-            shares = [min(1.0, at * longest / d) if d > 0 else 0.0 for d in taking]
+        for i, (scene, of_scene) in enumerate(zip(self._drawn, durations, strict=True)):
+            shares = [min(1.0, at * longest / d) if d > 0 else 0.0 for d in of_scene]
             bodies = [
                 x[round(share * (len(x) - 1))] for x, share in zip(scene, shares, strict=True)
             ]
             for side, lines in self.bones_[i].items():
                 lines.set_segments(_segments(bodies, self._bones[i][side]))
-                artists.append(lines)
-            dots = [self._dots_of(body) for body in bodies]
+            dots = [self._dots(body) for body in bodies]
             self.heads_[i].set_data(np.concatenate(dots).T if dots else ([], []))
-            artists.append(self.heads_[i])
         for lines, scene in zip(self.behind_, self._behind, strict=bool(self.behind_)):
             bodies = [x[round(at * (len(x) - 1))] for x in scene]
-            everywhere = [b for bones in bones_by_side(self.skeleton).values() for b in bones]
-            lines.set_segments(_segments(bodies, everywhere))
-            artists.append(lines)
-        return artists
+            bones = [b for of_side in bones_by_side(self.skeleton).values() for b in of_side]
+            lines.set_segments(_segments(bodies, bones))
 
-    def _dots_of(self, body):
-        """Where dots are: at the head, or at all joints if nothing joins them."""
+    def _dots(self, body):
+        """The places of the dots of a body: its head, or all joints if there are no bones."""
         skeleton = self.skeleton
         if skeleton is None or not skeleton.bones:
             return body if skeleton is None else body[: len(skeleton.joints)]
         if "head" not in skeleton.landmarks:
             return body[:0]
-        return place_of(body[np.newaxis], skeleton, "head")
+        return landmark_track(body[np.newaxis], skeleton, "head")
 
 
-def _beside_each_other(X, skeleton, names):
-    """Performances that are put on the floor, facing forward, and what they are called."""
-    X, skeleton = as_performances(X), as_skeleton(skeleton)
-    raw = [placed(upright(x, skeleton, i), skeleton) for i, x in enumerate(X)]
-    if names is None:
-        names = [", ".join(map(str, n)) if isinstance(n, tuple) else n for n in labels_of(X)[0]]
-    return raw, as_names(names, len(X), "names", "performances")
+def postures_at(frames, *performances):
+    """Scenes of single postures: for each frame a panel with those of all performances."""
+    return [[x[[frame]] for x in performances] for frame in frames]
+
+
+def _side_by_side(X, skeleton, names):
+    """Bodies on the floor that face forward, and their names."""
+    X = as_performances(X)
+    bodies = [place_on_floor(read_positions(x, skeleton, i), skeleton) for i, x in enumerate(X)]
+    names = labels_as_text(X) if names is None else names
+    return bodies, as_names(names, len(X), "names", "performances")
 
 
 def _segments(bodies, bones):
     return [body[list(bone)] for body in bodies for bone in bones]
+
+
+def _frames_of_model(frames, n_frames):
+    """Frames by index, or as shares of the action between 0 and 1."""
+    listed = [frames] if isinstance(frames, Real) else frames
+    if isinstance(listed, (list, tuple, np.ndarray)):
+        listed = [
+            round(f * (n_frames - 1)) if isinstance(f, Real) and 0 < f < 1 else f for f in listed
+        ]
+    what = "frames, those that are no shares between 0 and 1,"
+    return as_indices(listed, n_frames, what)
+
+
+def _split_at_synchronizer(estimator):
+    """The steps of a pipeline before its synchronizer, and those of them with a skeleton."""
+    before, _ = find_synchronizer(estimator)
+    if before is None:
+        raise ValueError(
+            "Stick figures need a pipeline that begins with DirectionCosines; for a synchronizer "
+            "by itself use from_predictions with the joint positions."
+        )
+    parts = [part for step in flat_steps(before) for part in union_transformers(step)]
+    views = [part for part in parts if isinstance(part, PositionsTransformer)]
+    if not views:
+        # Raises an error that names the steps.
+        find_step(before, DirectionCosines)
+    return before, views

@@ -1,20 +1,29 @@
-"""SynchronizationDisplay: features before and after, and the warps (Figs. 1 and 3)."""
+"""SynchronizationDisplay: features before and after synchronisation, and the warps (Figs. 1, 3)."""
 
 import numpy as np
 
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.numbers import check_names
+from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.validation import read_collection
 from ..synchronizers.match import match_of_times
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
-from .drawing import COLORS, curves, front_line, group_colors, group_lines, legend_above, panels
-from .given import as_drawn, as_names, mean_of_seen
+from .arguments import as_names
+from .drawing import (
+    COLORS,
+    curves,
+    front_line,
+    group_styles,
+    legend_above,
+    nanmean,
+    panels,
+)
 from .time_axis import TimeAxis
 
 __all__ = ["SynchronizationDisplay"]
 
-_WARPED = {
+# Labels of the vertical axis of the warps.
+_WARP_LABELS = {
     "frames": "frame tau(p) of the performance,\nevenly stretched to the clock",
     "percent": "% of the performance",
     "seconds": "time of the performance (s),\nevenly stretched to the clock",
@@ -28,35 +37,39 @@ class SynchronizationDisplay:
 
     Parameters
     ----------
-    before : list of ndarray (n_frames_i, n_shown)
-        The shown features of the performances, at their own frames; NaN where there is a gap.
-    after : ndarray, shape (n_sequences, P, n_shown)
-        The same on the clock of the pattern.
-    times : ndarray, shape (n_sequences, P)
+    before : list of array-like (n_frames_i, n_shown)
+        The features of the performances at their own frames; NaN in gaps.
+    after : array-like, shape (n_sequences, P, n_shown)
+        The features on the clock of the pattern.
+    times : array-like, shape (n_sequences, P)
         tau(p), in frames of the pattern.
     feature_names : list of str
-    pattern : ndarray, shape (P, n_shown), default=None
-        Drawn in front; the mean if None.
+        The names of the features.
+    pattern : array-like, shape (P, n_shown), default=None
+        Drawn in front; by default the mean of the synchronised performances.
     pattern_index : int, default=None
-        Which of the performances is the pattern.
-    groups : sequence of str, default=None
-        The group of every performance, by which it is coloured: actors, sessions, ...
+        The index of the pattern among the performances.
+    groups : sequence of length n_sequences, default=None
+        The group of each performance, which determines its colour.
     unit : {"frames", "percent", "seconds"}, default="frames"
-        Of the axes of time.
+        The unit of time.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames a second of the performances, for seconds.
 
     Attributes
     ----------
     figure_ : Figure
+        The figure of the last plot.
     axes_ : list of Axes
         For each feature the panels before and after, then that of the warps.
     before_, after_ : list of LineCollection
-        The performances of each feature.
+        The performances, one collection a feature.
     pattern_ : list of Line2D
+        The pattern, one line a feature.
     group_means_ : list of list of Line2D
-        For each feature the mean of every group; empty without groups.
+        For each feature the mean of each group; empty without groups.
     warps_ : LineCollection or None
+        The warps.
 
     Examples
     --------
@@ -85,23 +98,14 @@ class SynchronizationDisplay:
         unit="frames",
         frame_rate=None,
     ):
-        before, _ = read_collection(before)
-        self.times = match_of_times(times, len(before)).times
-        n_sequences, n_frames = self.times.shape
-        n_shown = np.shape(after)[-1] if np.ndim(after) else 0
-        self.feature_names = as_names(feature_names, n_shown, "feature_names", "features")
-        self.before = [
-            as_drawn(x, f"Performance {i}", ("n_frames", n_shown)) for i, x in enumerate(before)
-        ]
-        self.after = as_drawn(after, "What is synchronised", (n_sequences, n_frames, n_shown))
-        self.pattern = None
-        if pattern is not None:
-            self.pattern = as_drawn(pattern, "The pattern", (n_frames, n_shown))
-        self.pattern_index = pattern_index
-        self.groups = None if groups is None else names_of_groups(groups, n_sequences)
-        self.unit, self.frame_rate = unit, frame_rate
+        self.before = [np.asarray(x) for x in before]
+        self.after, self.times = np.asarray(after), np.asarray(times)
+        self.feature_names = feature_names
+        self.pattern = None if pattern is None else np.asarray(pattern)
+        self.pattern_index, self.unit, self.frame_rate = pattern_index, unit, frame_rate
+        self.groups = None if groups is None else list(map(str, groups))
         lengths = [len(x) for x in self.before]
-        self._axis = TimeAxis(unit, n_frames, lengths, frame_rate)
+        self._axis = TimeAxis(unit, self.times.shape[1], lengths, frame_rate)
 
     def __repr__(self):
         return f"SynchronizationDisplay({len(self.before)} performances, {self.feature_names})"
@@ -120,22 +124,23 @@ class SynchronizationDisplay:
         ax=None,
         **params,
     ):
-        """Draw what a fitted synchronizer, or a pipeline with one, does to performances.
+        """Draw performances before and after synchronisation.
 
         Parameters
         ----------
         estimator : synchronizer, or Pipeline with one
             Fitted.
-        X : performances, as the estimator takes them
+        X : performances
+            As the estimator takes them.
         features : int, str or list of them, default=None
-            Which features to draw, by index or name: those that reach the synchronizer, which
-            may be dimensions of the aSpace. By default the first four.
+            Features by index or name, as they reach the synchronizer, such as dimensions of the
+            aSpace. By default the first four.
         groups : sequence of length n_sequences, default=None
-            Colours performances by group, such as ``bunch.actor``, and draws the mean of each
-            group; all of them are on the clock of the one pattern.
+            The group of each performance, such as ``bunch.actor``. Groups have different colours,
+            and their means are drawn; all are on the clock of the same pattern.
         unit : {"frames", "percent", "seconds"}, default="frames"
-            Of the axes of time: frames; per cent of a performance, and of the pattern; or seconds
-            of the performances as recorded, on the clock those of the median performance.
+            The unit of time: frames; per cent of a performance, and of the pattern; or seconds of
+            the performances as recorded, and of the median performance on the clock.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames a second of X, for seconds.
         warps : bool, default=True
@@ -143,16 +148,18 @@ class SynchronizationDisplay:
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
-            What the ``match`` of the synchronizer takes besides, such as ``keyframes``.
+            Further arguments of the ``match`` of the synchronizer, such as ``keyframes``.
 
         Returns
         -------
         SynchronizationDisplay
+            The display, drawn.
         """
         reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
         before, synchronizer, performances = reached[:3]
         names = names_of_features(before, synchronizer, performances[0].shape[1])
         chosen = choose_features(features, names)
+        groups = None if groups is None else names_of_groups(groups, len(performances))
         match, shown = reached.match(), [x[:, chosen] for x in performances]
         display = cls(
             shown,
@@ -182,39 +189,56 @@ class SynchronizationDisplay:
         warps=True,
         ax=None,
     ):
-        """Draw performances and warps that are there already, whoever made them.
+        """Draw performances and warps that are known already.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or (performance, frame) frame
+            Performances, with NaN in gaps.
         times : array-like, shape (n_sequences, P)
             tau(p) from 0 to P - 1, such as ``synchronizer.match(X).times``.
         pattern : array-like, shape (P, n_features), default=None
             Drawn in front, with the features of X; by default the mean of the synchronised
             performances.
         features : int, str or list of them, default=None
+            Features by index or name; by default the first four.
         feature_names : sequence of str, default=None
-            By default the names of the columns, or x0, x1, ...
-        groups, unit, frame_rate, warps, ax : as for `from_estimator`
+            The names of all features; by default those of the columns, or x0, x1, ...
+        groups : sequence of length n_sequences, default=None
+            The group of each performance, which determines its colour.
+        unit : {"frames", "percent", "seconds"}, default="frames"
+            The unit of time.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            Frames a second of X, for seconds.
+        warps : bool, default=True
+            Whether to draw tau(p) against the diagonal.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
 
         Returns
         -------
         SynchronizationDisplay
+            The display, drawn.
 
         Raises
         ------
         ValueError
-            If there is not one row of times a performance, a pattern of another shape, another
-            number of names, a feature that does not exist, or something infinite.
+            If there is not one row of times a performance, the pattern has another shape, the
+            number of names differs, there is no such feature, or a value is infinite.
         """
         arrays, names = read_collection(X)
         match, width = match_of_times(times, len(arrays)), arrays[0].shape[1]
         if feature_names is None:
             feature_names = names or [f"x{i}" for i in range(width)]
         feature_names = as_names(feature_names, width, "feature_names", "features")
+        groups = None if groups is None else names_of_groups(groups, len(arrays))
+        for i, x in enumerate(arrays):
+            check_finite(x, f"Performance {i}, frame", allow_nan=True)
         if pattern is not None:
             check_names(pattern, names, "The pattern")
-            pattern = as_drawn(pattern, "The pattern", (match.times.shape[1], width))
+            pattern, shape = as_numbers(pattern, "The pattern"), (match.times.shape[1], width)
+            if pattern.shape != shape:
+                raise ValueError(f"The pattern must have the shape {shape}, got {pattern.shape}.")
         chosen = choose_features(features, feature_names)
         shown = [x[:, chosen] for x in arrays]
         display = cls(
@@ -242,38 +266,41 @@ class SynchronizationDisplay:
 
         Returns
         -------
-        self
+        SynchronizationDisplay
+            The display itself.
         """
         n_rows, n_cols = len(self.feature_names), 2 + bool(warps)
-        spots = [(row, column) for row in range(n_rows) for column in (0, 1)]
-        spots += [(slice(None), 2)] * bool(warps)
-        colors, color_of = group_colors(self.groups, len(self.before))
-        n_lines = -(-len(color_of) // 3)
+        cells = [(row, column) for row in range(n_rows) for column in (0, 1)]
+        cells += [(slice(None), 2)] * bool(warps)
+        styles = {} if self.groups is None else group_styles(self.groups)
+        colors = [styles[group][0] for group in self.groups or ()] or COLORS["performance"]
+        n_lines = -(-len(styles) // 3)
         size = (3.2 * n_cols, max(2.6, 1.6 * n_rows + 0.8) + 0.2 * n_lines)
-        self.figure_, self.axes_ = panels(ax, spots, n_rows, n_cols, size)
-        style = {"colors": colors, "linewidths": 0.9, "alpha": 0.35 if color_of else 0.55}
-        clock, own = self._axis.clock, self._axis.own()
+        self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, size)
+        style = {"colors": colors, "linewidths": 0.9, "alpha": 0.35 if styles else 0.55}
+        clock, own = self._axis.clock, self._axis.performances()
         self.before_, self.after_, self.pattern_, self.group_means_ = [], [], [], []
         for row, name in enumerate(self.feature_names):
             left, right = self.axes_[2 * row : 2 * row + 2]
             self.before_.append(curves(left, own, [x[:, row] for x in self.before], **style))
             after = self.after[:, :, row]
             self.after_.append(curves(right, [clock] * len(after), after, **style))
-            self.group_means_.append(self._draw_means(right, clock, row, color_of))
+            self.group_means_.append(self._draw_means(right, clock, row, styles))
             self.pattern_.append(self._draw_pattern(right, clock, row))
             left.set_ylabel(name)
             right.sharey(left)
             right.autoscale_view()
             if row == 0:
                 left.set_title(f"as recorded\n{len(self.before)} performances")
-                means = ", thick: means of groups" if color_of else ""
+                means = ", thick: means of groups" if styles else ""
                 right.set_title(f"synchronised{means}\n{self._describe_pattern()}")
-        left.set_xlabel(self._axis.label_of_performances)
+        left.set_xlabel(self._axis.performance_label)
         right.set_xlabel(self._axis.label)
         self.warps_ = self._draw_warps(self.axes_[-1], clock, style) if warps else None
-        _small_titles(self.axes_)
-        if color_of:
-            handles, labels = self.group_means_[0], list(color_of)
+        for axis in self.axes_:
+            axis.set_title(axis.get_title(), fontsize="medium")
+        if styles:
+            handles, labels = self.group_means_[0], list(styles)
             legend_above(self.axes_, handles, labels, below=self.axes_[:2])
         return self
 
@@ -283,17 +310,17 @@ class SynchronizationDisplay:
         which = "" if self.pattern_index is None else f", performance {self.pattern_index}"
         return f"black: the pattern{which}"
 
-    def _draw_means(self, axis, clock, row, color_of):
-        """The mean of every group, in front of its performances."""
-        means, lines = [], group_lines(len(color_of))
-        for (name, color), line in zip(color_of.items(), lines, strict=True):
+    def _draw_means(self, axis, clock, row, styles):
+        """Draw the mean of each group in front of its performances."""
+        means = []
+        for name, (color, line) in styles.items():
             members = np.array(self.groups) == name
-            curve = mean_of_seen(self.after[members, :, row], axis=0)
+            curve = nanmean(self.after[members, :, row], axis=0)
             means.append(front_line(axis, clock, curve, color=color, linestyle=line))
         return means
 
     def _draw_pattern(self, axis, clock, row):
-        curve = mean_of_seen(self.after[:, :, row], axis=0)
+        curve = nanmean(self.after[:, :, row], axis=0)
         if self.pattern is not None:
             curve = self.pattern[:, row]
         style = {"linestyle": "--", "linewidth": 1.2} if self.groups else {"linewidth": 1.6}
@@ -301,18 +328,13 @@ class SynchronizationDisplay:
         return line
 
     def _draw_warps(self, axis, clock, style):
-        times = self._axis.of_clock(self.times)
+        times = self._axis.convert(self.times)
         lines = curves(axis, [clock] * len(times), times, **style)
         axis.plot(clock, clock, "--", color=COLORS["pattern"], linewidth=1)
         axis.set_title("warps\ndashed: an even pace")
         axis.set_xlabel(self._axis.label)
-        axis.set_ylabel(_WARPED[self.unit])
+        axis.set_ylabel(_WARP_LABELS[self.unit])
         place = {"transform": axis.transAxes, "fontsize": "small", "color": "0.3"}
         axis.text(0.04, 0.96, "later than\nthe pattern", va="top", **place)
         axis.text(0.96, 0.04, "earlier than\nthe pattern", ha="right", **place)
         return lines
-
-
-def _small_titles(axes):
-    for axis in axes:
-        axis.set_title(axis.get_title(), fontsize="medium")

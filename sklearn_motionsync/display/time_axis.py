@@ -1,19 +1,18 @@
-"""The axis of time of a display: frames, per cent or seconds, of performances and of the clock."""
+"""Time axes of performances and of the clock: frames, per cent or seconds."""
 
 import numpy as np
 
-from ..inputs.collections import as_collection
 from ..inputs.resampling import as_frame_rates
 from ..synchronizers.match import check_unit
 
-__all__ = ["TimeAxis", "lengths_of"]
+__all__ = ["TimeAxis"]
 
-_OF_PERFORMANCES = {
+_PERFORMANCE_LABELS = {
     "frames": "frame of the performance",
     "percent": "% of the performance",
     "seconds": "time of the performance (s)",
 }
-_OF_CLOCK = {
+_CLOCK_LABELS = {
     "frames": "frame of the pattern",
     "percent": "% of the pattern",
     "seconds": "time (s), of median duration",
@@ -21,16 +20,16 @@ _OF_CLOCK = {
 
 
 class TimeAxis:
-    """Where frames are on an axis of time.
+    """The times of frames in a unit.
 
     Parameters
     ----------
     unit : {"frames", "percent", "seconds"}
     n_frames : int
-        Of the clock.
+        The length of the clock.
     lengths : sequence of int, default=None
-        How many frames each performance has; None if they are not known, and then ``frame_rate``
-        is that of the clock.
+        The number of frames of each performance. None if unknown; ``frame_rate`` is then that of
+        the clock.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames a second, for seconds only.
 
@@ -38,25 +37,27 @@ class TimeAxis:
     ----------
     unit : str
     clock : ndarray, shape (P,)
-        Where the frames of the clock are. In seconds it takes as long as the median performance.
-    label, label_of_performances : str
+        The times of the frames of the clock. In seconds the clock lasts as long as the median
+        performance.
+    label, performance_label : str
+        Axis labels of the clock and of the performances.
     """
 
     def __init__(self, unit, n_frames, lengths=None, frame_rate=None):
         self.unit = check_unit(unit)
-        self.label, self.label_of_performances = _OF_CLOCK[unit], _OF_PERFORMANCES[unit]
+        self.label, self.performance_label = _CLOCK_LABELS[unit], _PERFORMANCE_LABELS[unit]
         self._lengths, self._rates = lengths, None
         clock = np.arange(n_frames)
         self.clock = clock
         if unit == "percent":
             self.clock = 100 * clock / (n_frames - 1)
         if unit == "seconds":
-            self._rates = _rates(frame_rate, lengths)
+            self._rates = _frame_rates(frame_rate, lengths)
             durations = (np.array(lengths or [n_frames]) - 1) / self._rates
             self.clock = np.median(durations) * clock / (n_frames - 1)
 
-    def own(self):
-        """Where the frames of each performance are: list of ndarray (n_frames_i,)."""
+    def performances(self):
+        """The times of the frames of each performance: list of ndarray (n_frames_i,)."""
         frames = [np.arange(n) for n in self._lengths]
         if self.unit == "percent":
             return [100 * f / f[-1] for f in frames]
@@ -64,23 +65,14 @@ class TimeAxis:
             return [f / rate for f, rate in zip(frames, self._rates, strict=True)]
         return frames
 
-    def of_clock(self, times):
-        """Where times are that are in frames of the clock."""
+    def convert(self, frames):
+        """Frames of the clock, whole or not, in the unit."""
         scale = self.clock[-1] / (len(self.clock) - 1)
-        return times if self.unit == "frames" else times * scale
+        return frames if self.unit == "frames" else frames * scale
 
 
-def lengths_of(X):
-    """How many frames performances have, of any input that estimators take."""
-    collection = as_collection(X)
-    if collection is None:
-        n_sequences, n_frames = np.shape(X)
-        return [n_frames] * n_sequences
-    return [len(x) for x in collection]
-
-
-def _rates(frame_rate, lengths):
-    """One frame rate a performance; of the clock alone if there are none."""
+def _frame_rates(frame_rate, lengths):
+    """A frame rate for each performance; one for the clock without performances."""
     count = 1 if lengths is None else len(lengths)
     if frame_rate is None:
         raise ValueError("unit='seconds' needs frame_rate, frames a second of the performances.")

@@ -1,70 +1,70 @@
-"""TrackingDisplay: what was seen of a body, what is known of the rest, and how well."""
+"""TrackingDisplay: the estimated postures of a tracked body, and what was observed of it."""
 
-from copy import copy
 from textwrap import fill
 
 import numpy as np
 
 from ..body.direction_cosines import DirectionCosines
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.numbers import is_integer
 from ..online.particle_filter import Track
 from ..online.tracker import MotionTracker
-from .departing import bones_of, limb_of
+from .arguments import TIME_LABELS, Takes, as_frames, as_index, as_names, one_each, times_from_zero
+from .bodies import invert_postures
 from .drawing import COLORS, legend_above, panels
-from .given import as_drawn, as_frames, as_index, as_names
-from .live import from_zero, one_each, taken, times_of
-from .stick_figures import SkeletonDisplay
+from .limb_departures import bones_of_limbs, limb_of
+from .stick_figures import SkeletonDisplay, postures_at
 
 __all__ = ["TrackingDisplay"]
 
-# Features below each other, if not chosen.
-_FEW_FEATURES = 4
-# Standard deviations to each side that leave out a tenth.
+# The number of features by default.
+_N_FEATURES = 4
+# Standard deviations on each side that contain 90 %.
 _BAND = 1.645
-_UNITS = {"frames": "time (frames)", "seconds": "time (s)"}
-# Inches of a panel, and of all.
+# The height of a panel and the width of the figure in inches.
 _PANEL, _WIDTH = 1.15, 8.5
-# Letters of a name beside a panel.
-_LETTERS = 18
+# Characters a line of an axis label.
+_LINE_LENGTH = 18
 
 
 class TrackingDisplay:
-    """A body that is followed while parts of it are hidden: estimate and band, truth beside.
+    """A tracked body with hidden parts: the estimate with its band, and the true course.
 
-    Features one below the other: what was seen, the estimate with the band that holds 90 %, and
-    the truth if it is known. Grey is when a feature was hidden, hatched when the tracker was lost.
-    Below them phase and rate. Make one with `from_estimator` or `from_predictions`; `strip` and
-    `side_by_side` show the bodies.
+    One panel a feature: what was observed, the estimate with the band that contains 90 %, and the
+    true course if it is known. Grey are times at which the feature was hidden, hatched those at
+    which the tracker was lost. Below are phase and rate. Make one with `from_estimator` or
+    `from_predictions`; `strip` and `side_by_side` draw the bodies.
 
     Parameters
     ----------
     track : Track
-        Of one take.
+        The track of one take.
     truth : array-like, shape (n_frames, n_features), default=None
+        The true features.
     observed : array-like, shape (n_frames, n_features), default=None
-        What was seen, NaN where nothing was.
+        The observed features, NaN where they were hidden.
     times : array-like, shape (n_frames,), default=None
-        When; by default one frame after the other.
+        The times of the frames; by default frame numbers.
     n_frames : int, default=None
-        Of the clock; phases are then in per cent of it.
+        The length of the clock. The phase is then in per cent, otherwise in frames.
     names : list of str, default=None
-        Of all features.
+        The names of all features.
     unit : {"frames", "seconds"}, default="frames"
-        Of the times.
+        The unit of the times.
 
     Attributes
     ----------
     figure_ : Figure
+        The figure of the last plot.
     axes_ : list of Axes
-        One a feature, then that of the phase and that of the rate.
+        One a feature, then those of the phase and the rate.
     estimates_, truths_, observed_ : list of Line2D
-        One a feature; empty for what is not known.
+        One a feature; empty if unknown.
     bands_ : list of PolyCollection
         One a feature.
     hidden_, lost_ : list of list of Polygon
-        For each panel the spans in which a feature was hidden, and the body lost.
+        For each panel the intervals in which a feature was hidden, and the body lost.
     phase_, rate_ : Line2D
+        The phase and the rate.
 
     Examples
     --------
@@ -91,27 +91,12 @@ class TrackingDisplay:
         names=None,
         unit="frames",
     ):
-        if not isinstance(track, Track) or np.ndim(track.postures) != 2:
-            got = "that of one frame" if isinstance(track, Track) else type(track).__name__
-            raise ValueError(
-                f"track must be the Track of one take, as from MotionTracker.track; got {got}. Of "
-                "a list of them give one."
-            )
-        if n_frames is not None and (not is_integer(n_frames) or n_frames < 2):
-            raise ValueError(f"n_frames must be frames of the clock, at least 2; got {n_frames!r}.")
-        if unit not in list(_UNITS):
-            raise ValueError(f"unit must be one of {list(_UNITS)}, got {unit!r}.")
         shape = np.shape(track.postures)
         self.track, self.n_frames, self.unit = track, n_frames, unit
-        self.truth, self.observed = (
-            None if x is None else as_drawn(x, what, shape)
-            for x, what in ((truth, "The truth"), (observed, "What was observed"))
-        )
-        if times is not None:
-            times = as_drawn(times, "times", shape[:1]).astype(np.float64)
-        self.times = from_zero(times, shape[0], 0)
-        names = [f"x{k}" for k in range(shape[1])] if names is None else names
-        self.names = as_names(names, shape[1], "names", "features")
+        self.truth = None if truth is None else np.asarray(truth, dtype=np.float64)
+        self.observed = None if observed is None else np.asarray(observed, dtype=np.float64)
+        self.times = times_from_zero(times, shape[0])
+        self.names = [f"x{k}" for k in range(shape[1])] if names is None else names
         self.hidden = np.zeros(shape, dtype=bool)
         if self.observed is not None:
             self.hidden = np.isnan(self.observed)
@@ -139,28 +124,35 @@ class TrackingDisplay:
         names=None,
         ax=None,
     ):
-        """Follow a take, and draw what is known of it.
+        """Track a take, and draw the estimate.
 
         Parameters
         ----------
         estimator : MotionTracker
             Fitted.
-        X : array-like (n_frames, n_observed), or takes, as ``estimator.track`` takes them
-        truth : array-like (n_frames, n_features), or as many as takes, as X, default=None
+        X : array-like (n_frames, n_observed), or takes
+            As ``estimator.track`` takes them.
+        truth : array-like (n_frames, n_features), or as many as takes, default=None
+            The true features, in the form of X.
         smooth : bool, default=False
-            Whether ``estimator.smooth`` answers, which knows all of the take at every frame.
+            Whether to use ``estimator.smooth``, whose estimates depend on the whole take.
         times : array-like (n_frames,), or as many as takes, default=None
-        projection : as for ``estimator.track``, default=None
-            What is observed is then not drawn: it is no feature.
+            The times of the frames, in seconds if the estimator has a frame rate.
+        projection : array-like, default=None
+            As for ``estimator.track``. The observations are then not drawn: they are no features.
         take : int, default=0
-            Which of several takes.
-        features, ax : as for `plot`
+            The index of the take.
+        features : int, str or list of them, default=None
+            See `plot`.
         names : list of str, default=None
-            Of all features; by default those of ``fit``.
+            The names of all features; by default those of ``fit``.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
 
         Returns
         -------
         TrackingDisplay
+            The display, drawn.
 
         Raises
         ------
@@ -169,45 +161,65 @@ class TrackingDisplay:
         """
         if not isinstance(estimator, MotionTracker):
             raise ValueError(f"Give a MotionTracker, got {type(estimator).__name__}.")
-        given, arrays, labels, single = taken(estimator, X)
-        i = as_index(take, len(arrays), "take")
+        takes = Takes(estimator, X)
+        i = as_index(take, len(takes.arrays), "take")
         if times is not None:
-            of_all = [times] if single else times
-            (times,) = times_of(estimator, of_all, [i], arrays, labels, "takes")
+            (times,) = takes.select_times(times, [i], "takes")
         if truth is not None:
-            truth = one_each(
-                taken(estimator, truth, "The truth")[1], len(arrays), "truth", "takes"
-            )[i]
+            truth = Takes(estimator, truth, "The truth").arrays
+            truth = one_each(truth, len(takes.arrays), "truth", "takes")[i]
         method = estimator.smooth if smooth else estimator.track
-        (track,) = method(given([i]), None if times is None else [times], projection)
+        (track,) = method(takes.select([i]), None if times is None else [times], projection)
+        n_frames, n_features = track.postures.shape
+        if truth is not None and np.shape(truth) != (n_frames, n_features):
+            raise ValueError(
+                f"The truth must have the shape {(n_frames, n_features)}, got {np.shape(truth)}."
+            )
         rate = 1.0 if estimator.frame_rate is None else estimator.frame_rate
         if names is None:
-            names = names_of_features(None, estimator, track.postures.shape[1])
-        return cls(
+            names = names_of_features(None, estimator, n_features)
+        display = cls(
             track,
             truth=truth,
-            observed=arrays[i] if projection is None else None,
-            times=np.arange(len(track.phases)) / rate if times is None else times,
+            observed=takes.arrays[i] if projection is None else None,
+            times=np.arange(n_frames) / rate if times is None else times,
             n_frames=estimator.n_frames_,
-            names=names,
+            names=as_names(names, n_features, "names", "features"),
             unit="frames" if estimator.frame_rate is None else "seconds",
-        ).plot(ax, features=features)
+        )
+        return display.plot(ax, features=features)
 
     @classmethod
     def from_predictions(cls, track, *, features=None, ax=None, **known):
-        """Draw a track that is there already.
+        """Draw a track that is known already.
 
         Parameters
         ----------
         track : Track
-        features, ax : as for `plot`
+            The track of one take.
+        features : int, str or list of them, default=None
+            See `plot`.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
         **known : dict
-            What else is known of it: the parameters of the class.
+            Further parameters of the class.
 
         Returns
         -------
         TrackingDisplay
+            The display, drawn.
+
+        Raises
+        ------
+        ValueError
+            If ``track`` is not the track of one take.
         """
+        if not isinstance(track, Track) or np.ndim(track.postures) != 2:
+            got = "that of one frame" if isinstance(track, Track) else type(track).__name__
+            raise ValueError(
+                f"track must be the Track of one take, as from MotionTracker.track; got {got}. Of "
+                "a list of them give one."
+            )
         return cls(track, **known).plot(ax, features=features)
 
     def plot(self, ax=None, *, features=None):
@@ -219,21 +231,19 @@ class TrackingDisplay:
             One of a figure's subplots is divided into the panels; or one axes a panel. None
             makes a figure.
         features : int, str or list of them, default=None
-            By index or name; by default those that vary most in the estimate, at most four, of
-            those that were hidden at any time, or of all if none was.
+            By index or name; by default those of the features hidden at any time, or of all if
+            none was, whose estimates vary most, at most four.
 
         Returns
         -------
-        self
+        TrackingDisplay
+            The display itself.
         """
         shown = self._most_varied() if features is None else choose_features(features, self.names)
         count = len(shown) + 2
         size = _WIDTH, _PANEL * count + 0.6
-        before = getattr(self, "axes_", [])
-        self.figure_, self.axes_ = panels(ax, [(i, 0) for i in range(count)], count, 1, size)
-        for axis in self.axes_:
-            if axis in before:
-                axis.clear()
+        cells, before = [(i, 0) for i in range(count)], getattr(self, "axes_", ())
+        self.figure_, self.axes_ = panels(ax, cells, count, 1, size, before)
         self.estimates_, self.bands_, self.truths_, self.observed_ = [], [], [], []
         for axis, k in zip(self.axes_, shown, strict=False):
             self._draw_feature(axis, k)
@@ -252,7 +262,7 @@ class TrackingDisplay:
         for axis in self.axes_:
             axis.set_xlim(0, self.times[-1] or 1.0)
             axis.tick_params(labelbottom=axis is self.axes_[-1])
-        self.axes_[-1].set_xlabel(_UNITS[self.unit])
+        self.axes_[-1].set_xlabel(TIME_LABELS[self.unit])
         self.figure_.align_ylabels(self.axes_)
         handles, labels = self.axes_[0].get_legend_handles_labels()
         of_label = dict(zip(labels, handles, strict=True))
@@ -260,81 +270,78 @@ class TrackingDisplay:
         return self
 
     def strip(self, cosines, *, frames=6, ax=None, **view):
-        """Estimated bodies at a few moments, before the true ones; violet are hidden limbs.
+        """Draw estimated bodies at some frames, before the true ones; hidden limbs are violet.
 
         Parameters
         ----------
         cosines : DirectionCosines
-            Fitted; what made the features.
+            The fitted transformer of the features.
         frames : int or list of int, default=6
-            How many, evenly spaced from the first to the last, or which ones.
-        ax, **view : as for `SkeletonDisplay.plot`
+            The number of frames, evenly spaced from the first to the last, or their indices.
+        ax : Axes or array-like of Axes, default=None
+            As for `SkeletonDisplay.plot`.
+        **view : at, azimuth
+            As for `SkeletonDisplay.plot`.
 
         Returns
         -------
         SkeletonDisplay
+            The display of the bodies, drawn.
         """
         skeleton, estimate, truth = self._bodies(cosines)
         shown = as_frames(frames, len(estimate))
         limbs = np.array([limb_of(name) for name in cosines.get_feature_names_out()])
-        marked = [
-            dict.fromkeys(
-                bone
-                for limb in dict.fromkeys(limbs[self.hidden[frame]])
-                for bone in bones_of(limb, skeleton)
-            )
-            for frame in shown
-        ]
-        unit = " s" if self.unit == "seconds" else ""
-        titles = [f"{self.times[k]:.1f}{unit}" if unit else f"frame {k}" for k in shown]
+        marked = [bones_of_limbs(limbs[self.hidden[frame]], skeleton) for frame in shown]
+        titles = [f"frame {k}" for k in shown]
+        if self.unit == "seconds":
+            titles = [f"{self.times[k]:.1f} s" for k in shown]
         return SkeletonDisplay(
-            [[estimate[[frame]]] for frame in shown],
+            postures_at(shown, estimate),
             skeleton,
             titles,
-            marked=[list(bones) for bones in marked],
-            behind=None if truth is None else [[truth[[frame]]] for frame in shown],
+            marked=marked,
+            behind=None if truth is None else postures_at(shown, truth),
         ).plot(ax, **view)
 
     def side_by_side(self, cosines, *, ax=None, **view):
-        """Bodies beside each other, to `SkeletonDisplay.animate`: what was seen, estimate, truth.
+        """Draw the observed, the estimated and the true body side by side.
 
         Parameters
         ----------
         cosines : DirectionCosines
-            Fitted; what made the features.
-        ax, **view : as for `SkeletonDisplay.plot`
+            The fitted transformer of the features.
+        ax : Axes or array-like of Axes, default=None
+            As for `SkeletonDisplay.plot`.
+        **view : at, azimuth
+            As for `SkeletonDisplay.plot`.
 
         Returns
         -------
         SkeletonDisplay
-            At the beginning.
+            The display of the bodies, drawn at the beginning; see `SkeletonDisplay.animate`.
         """
         skeleton, estimate, truth = self._bodies(cosines)
-        people = {"estimate": estimate, "truth": truth}
+        bodies = {"estimate": estimate, "truth": truth}
         if self.observed is not None:
-            gaps = copy(cosines).set_params(hidden="nan")
-            people = {"seen": _positions(gaps, self.observed, skeleton)} | people
-        people = {name: x for name, x in people.items() if x is not None}
+            bodies = {"seen": invert_postures(self.observed, cosines, skeleton)} | bodies
+        bodies = {name: x for name, x in bodies.items() if x is not None}
         title = ["what is known of a body"]
-        return SkeletonDisplay([list(people.values())], skeleton, title, labels=list(people)).plot(
-            ax, **view
-        )
-
-    # -- what is drawn ------------------------------------------------------------------------
+        display = SkeletonDisplay([list(bodies.values())], skeleton, title, labels=list(bodies))
+        return display.plot(ax, **view)
 
     def _most_varied(self):
-        """The features that move most, of those that were hidden."""
+        """The features of largest variance among those that were hidden."""
         variance = np.var(self.track.postures, axis=0)
         hidden = self.hidden.any(axis=0)
         candidates = np.flatnonzero(hidden if hidden.any() else ~hidden)
-        return candidates[np.argsort(-variance[candidates], kind="stable")][:_FEW_FEATURES]
+        return candidates[np.argsort(-variance[candidates], kind="stable")][:_N_FEATURES]
 
     def _draw_feature(self, axis, k):
         estimate = self.track.postures[:, k]
-        wide = _BAND * np.sqrt(np.maximum(self.track.covariances[:, k, k], 0))
-        blue = COLORS["performance"]
+        half_width = _BAND * np.sqrt(np.maximum(self.track.covariances[:, k, k], 0))
+        band, blue = (estimate - half_width, estimate + half_width), COLORS["performance"]
         style = {"color": blue, "alpha": 0.25, "linewidth": 0, "label": "90 %"}
-        self.bands_.append(axis.fill_between(self.times, estimate - wide, estimate + wide, **style))
+        self.bands_.append(axis.fill_between(self.times, *band, **style))
         if self.truth is not None:
             style = {"color": COLORS["mean"], "linewidth": 1.2, "label": "truth"}
             self.truths_ += axis.plot(self.times, self.truth[:, k], **style)
@@ -343,7 +350,7 @@ class TrackingDisplay:
         if self.observed is not None:
             style = {"color": COLORS["pattern"], "markersize": 2.5, "label": "seen"}
             self.observed_ += axis.plot(self.times, self.observed[:, k], ".", **style)
-        axis.set_ylabel(fill(self.names[k], _LETTERS), fontsize="small")
+        axis.set_ylabel(fill(self.names[k], _LINE_LENGTH), fontsize="small")
 
     def _draw_progress(self, upper, lower):
         phases, label = self.track.phases, "phase (frame)"
@@ -355,30 +362,24 @@ class TrackingDisplay:
         upper.set_ylabel(label, fontsize="small")
         lower.axhline(1, color=COLORS["envelope"], linewidth=1, linestyle="--")
         (self.rate_,) = lower.plot(self.times, self.track.rates, color=blue)
-        # The axis of another display may be shared.
+        # The axis may be shared with another display.
         lower.set_ylim(0, max(lower.get_ylim()[1], 1.1 * max(1, *self.track.rates)))
         lower.set_ylabel("rate", fontsize="small")
 
     def _spans(self, axis, mask, **style):
-        """Shade the time of frames, each of them until half-way to the next."""
+        """Shade the times of frames, up to the middle between frames."""
         edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
         middles = (self.times[1:] + self.times[:-1]) / 2
         bounds = np.concatenate([self.times[:1], middles, self.times[-1:]])
         return [axis.axvspan(bounds[a], bounds[b], **style) for a, b in edges.reshape(-1, 2)]
 
     def _bodies(self, cosines):
-        """The skeleton of bodies, the estimated ones, and the true ones or None."""
+        """The skeleton, the estimated bodies, and the true ones or None."""
         if not isinstance(cosines, DirectionCosines):
             raise ValueError(f"cosines must be DirectionCosines, got {type(cosines).__name__}.")
         skeleton = cosines.skeleton.body()
         estimate, truth = (
-            None if x is None else _positions(cosines, x, skeleton)
+            None if x is None else invert_postures(x, cosines, skeleton)
             for x in (self.track.postures, self.truth)
         )
         return skeleton, estimate, truth
-
-
-def _positions(cosines, postures, skeleton):
-    """Joint positions (n_frames, n_joints, n_dims) of postures."""
-    found = np.asarray(cosines.inverse_transform(np.asarray(postures)))
-    return found.reshape(len(postures), len(skeleton.joints), skeleton.n_dims)

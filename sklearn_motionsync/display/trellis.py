@@ -5,7 +5,6 @@ import numpy as np
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .drawing import COLORS, panels
-from .given import as_drawn, as_names
 
 __all__ = ["TrellisDisplay"]
 
@@ -17,27 +16,32 @@ class TrellisDisplay:
 
     Parameters
     ----------
-    frames : ndarray, shape (n_frames,)
-        p, all frames of the pattern or, of long takes, evenly spaced ones.
-    offsets : ndarray, shape (n_offsets,)
-        d, in frames of the pattern; evenly spaced ones of long takes.
-    costs : ndarray, shape (n_frames, n_offsets)
-        E(p, d): how much the posture (or velocity) of the pattern at p differs from that of the
-        performance at p + d; NaN where no path that obeys Eqs. 9 and 13 can pass.
-    path : ndarray, shape (P,)
-        The offsets of the best path, straight from the pattern to the performance.
-    warp : ndarray, shape (P,)
-        The offsets Delta(p) in the end, after vote, smoothing and refinement.
+    frames : array-like, shape (n_frames,)
+        Frames p of the pattern: all of them or, of long takes, evenly spaced ones.
+    offsets : array-like, shape (n_offsets,)
+        Offsets d in frames of the pattern, evenly spaced.
+    costs : array-like, shape (n_frames, n_offsets)
+        E(p, d), the difference between the pattern at p and the performance at p + d; NaN where no
+        path that obeys Eqs. 9 and 13 can pass.
+    path : array-like, shape (P,)
+        The offsets of the best path between the pattern and the performance.
+    warp : array-like, shape (P,)
+        The final offsets Delta(p), after consensus, smoothing and refinement.
     names : (str, str), default=("pattern", "performance")
-        What the pattern and the performance are called.
+        Names of the pattern and of the performance.
 
     Attributes
     ----------
     figure_ : Figure
+        The figure of the last plot.
     ax_ : Axes
+        The axes of the last plot.
     image_ : AxesImage
+        The costs.
     path_, warp_ : Line2D
+        The best path, and the final warp.
     colorbar_ : Colorbar or None
+        The scale of the costs.
 
     Examples
     --------
@@ -52,13 +56,9 @@ class TrellisDisplay:
     """
 
     def __init__(self, frames, offsets, costs, path, warp, *, names=("pattern", "performance")):
-        self.frames = as_drawn(frames, "The frames", ("n_frames",))
-        self.offsets = as_drawn(offsets, "The offsets", ("n_offsets",))
-        shape = len(self.frames), len(self.offsets)
-        self.costs = as_drawn(costs, "The costs", shape)
-        self.path = as_drawn(path, "The path", ("P",))
-        self.warp = as_drawn(warp, "The warp", self.path.shape)
-        self.names = as_names(names, 2, "names", "performances, the pattern and the other")
+        self.frames, self.offsets = np.asarray(frames, dtype=np.float64), np.asarray(offsets)
+        self.costs, self.path, self.warp = np.asarray(costs), np.asarray(path), np.asarray(warp)
+        self.names = names
 
     def __repr__(self):
         return f"TrellisDisplay({self.names[1]} matched to {self.names[0]})"
@@ -71,17 +71,21 @@ class TrellisDisplay:
         ----------
         estimator : DenseSynchronizer, or Pipeline with one
             Fitted.
-        X : performances, as the estimator takes them
+        X : performances
+            As the estimator takes them.
         performance : int, default=0
-            Which of them is matched to the pattern.
+            The index of the performance that is matched to the pattern.
         ax : Axes, default=None
+            Axes to draw on. None makes a figure.
         colorbar : bool, default=True
+            Whether to draw a scale of the costs.
         **params : dict
-            What steps before take besides, such as ``keyframes``.
+            Further arguments of the steps before the synchronizer, such as ``keyframes``.
 
         Returns
         -------
         TrellisDisplay
+            The display, drawn.
         """
         caller = f"{cls.__name__}.from_estimator"
         reached = route_to_synchronizer(estimator, X, params, caller, kind=DenseSynchronizer)
@@ -98,11 +102,14 @@ class TrellisDisplay:
         Parameters
         ----------
         ax : Axes, default=None
+            Axes to draw on. None makes a figure.
         colorbar : bool, default=True
+            Whether to draw a scale of the costs.
 
         Returns
         -------
-        self
+        TrellisDisplay
+            The display itself.
         """
         from matplotlib.colors import PowerNorm
         from matplotlib.patches import Patch
@@ -110,7 +117,7 @@ class TrellisDisplay:
 
         self.figure_, (self.ax_,) = panels(ax, [(0, 0)], 1, 1, (7, 4))
         frames = np.arange(len(self.path))
-        # Dark where the two are alike; the square root shows differences among the small ones.
+        # Low costs are dark; the square root resolves differences among them.
         self.image_ = self.ax_.imshow(
             np.ma.masked_invalid(self.costs.T),
             origin="lower",
@@ -139,7 +146,7 @@ class TrellisDisplay:
         self.ax_.set_ylabel(f"offset d of {self.names[1]}, frames")
         outside = Patch(facecolor="0.85", edgecolor="0.6", label="no path can pass")
         handles = [self.path_, self.warp_, outside]
-        # On top of an image, whatever the style says of legends and grids.
+        # A frame and no grid, whatever the style: the legend covers an image.
         self.ax_.legend(handles=handles, loc="best", fontsize="small", frameon=True)
         self.ax_.grid(False)
         self.colorbar_ = None
@@ -150,6 +157,6 @@ class TrellisDisplay:
 
 
 def _edges(centres):
-    """Where cells around evenly spaced centres begin and end."""
+    """The outer edges of cells around evenly spaced centres."""
     half = (centres[1] - centres[0]) / 2 if len(centres) > 1 else 0.5
     return centres[0] - half, centres[-1] + half

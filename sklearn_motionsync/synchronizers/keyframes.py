@@ -191,7 +191,7 @@ class KeyframeSynchronizer(Synchronizer):
             knots = self._check_keyframes(performances, keyframes, len(self.keyframes_))
         distances, times = np.empty(len(performances)), []
         for rows in even_slices(len(performances), _BATCH):
-            some = performances[rows]
+            some = performances.take(rows)
             if keyframes is None:
                 on_clock = self.normalize(some)
                 own = [match_keyframes(self.pattern_, self.keyframes_, x) for x in on_clock]

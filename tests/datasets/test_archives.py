@@ -81,7 +81,7 @@ def test_compression_order_and_types_do_not_matter(tmp_path):
             for parent in (0.5, np.nan, 20, -2, 2**40)
         ),
         ({"parents": ["0"] * 20}, "parents must be indices"),
-        (replaced("parents", 1, 2), "lead to a root .*, but from joint 'Spine' they run in a cir"),
+        (replaced("parents", 1, 2), "lead to a root .*, but from joint 'Spine' they form a cyc"),
         ({"joints": ["a"] * 2 + list("bcdefghijklmnopqrs")}, r"different names, got \['a', 'a'"),
         ({"joints": np.arange(20)}, "joints must be text, got int64"),
         *(({"fps": [30, f]}, "fps must be frames per second, above 0") for f in (0, -1, np.inf)),

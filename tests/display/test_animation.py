@@ -1,4 +1,4 @@
-"""The player of animations: its buttons are there, with and without a network."""
+"""Animations: the player in a notebook needs no network and draws each picture once."""
 
 import gc
 import re
@@ -15,11 +15,11 @@ def player(bending):
     return display.animate(seconds=0.2, fps=10).to_jshtml()
 
 
-def test_a_player_fetches_nothing(player):
+def test_player_loads_nothing_from_a_network(player):
     assert not re.search(r"<link|@import|url\(|(src|href)=.https?:", player)
 
 
-def test_every_button_has_a_picture_and_a_name(player):
+def test_every_button_has_an_icon_and_a_title(player):
     buttons = re.findall(r"<button ([^>]*)>(.*?)</button>", player, re.DOTALL)
     assert len(buttons) == 9
     assert all(re.search('title="[^"]+"', attributes) for attributes, _ in buttons)
@@ -28,7 +28,7 @@ def test_every_button_has_a_picture_and_a_name(player):
     assert len(set(pictures)) == 9
 
 
-def test_who_closes_the_figure_is_not_warned(bending):
+def test_closing_the_figure_prevents_the_warning(bending):
     display = SkeletonDisplay.from_positions(bending.data[0], bending.skeleton)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -41,12 +41,12 @@ def test_who_closes_the_figure_is_not_warned(bending):
             assert len(caught) == 1, closes
 
 
-def test_every_picture_is_drawn_once_and_places_stay(bending):
+def test_every_picture_is_drawn_once_and_the_layout_remains(bending):
     display = SkeletonDisplay.from_positions(bending.data[0], bending.skeleton)
     layout, axis = display.figure_.get_layout_engine(), display.axes_[0]
     drawn = []
     axis.draw = lambda renderer: drawn.append(type(axis).draw(axis, renderer))
     display.animate(seconds=0.3, fps=10).to_jshtml()
-    # And once before them, to find the places.
+    # The first time for the layout.
     assert len(drawn) == 1 + 3
     assert display.figure_.get_layout_engine() is layout

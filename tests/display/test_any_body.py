@@ -1,9 +1,9 @@
-"""Stick figures of bodies as people record them: parts, means, pictures, and bare points."""
+"""Stick figures of parts of bodies, mean landmarks, pictures, and points without bones."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from artists import bones_drawn
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
@@ -23,12 +23,6 @@ ARMS = ["neck", *(f"{s}_{j}" for s in ("left", "right") for j in ("shoulder", "e
 HALF = ["pelvis", "neck", *(j for j in PAPER.joints if j.startswith("left"))]
 
 
-@pytest.fixture(autouse=True)
-def closed():
-    yield
-    plt.close("all")
-
-
 def columns(joints, axes="xyz"):
     return [f"{joint}_{axis}" for joint in joints for axis in axes]
 
@@ -42,12 +36,6 @@ def part_of(joints, axes="xyz", of=BUNCH.data):
     return [df[columns(order, axes)] for df in tables], whole
 
 
-def lines(display, panel, side=None):
-    sides = [side] if side else list(display.bones_[panel])
-    paths = [p.vertices for s in sides for p in display.bones_[panel][s].get_paths()]
-    return np.array(paths).reshape(-1, 2, 2)
-
-
 def in_order(drawn):
     return np.array(sorted(drawn.round(9).tolist()))
 
@@ -57,48 +45,48 @@ def pipeline(skeleton):
     return make_pipeline(*steps)
 
 
-def test_legs_are_drawn_as_those_of_the_whole_body():
+def test_legs_alone_are_drawn_as_with_the_whole_body():
     X, legs = part_of(LEGS)
     whole = SkeletonDisplay.from_positions(BUNCH.data[0], PAPER, frames=[0, 20])
     some = SkeletonDisplay.from_positions(X[0], legs, frames=[0, 20])
     for panel in (0, 1):
-        assert len(lines(some, panel)) == 6
-        drawn = {tuple(np.ravel(line.round(9))) for line in lines(whole, panel)}
-        assert {tuple(np.ravel(line.round(9))) for line in lines(some, panel)} < drawn
+        assert len(bones_drawn(some, panel)) == 6
+        drawn = {tuple(np.ravel(line.round(9))) for line in bones_drawn(whole, panel)}
+        assert {tuple(np.ravel(line.round(9))) for line in bones_drawn(some, panel)} < drawn
     assert [len(x) for x in some.heads_[0].get_data()] == [0, 0]
 
 
 @pytest.mark.parametrize("joints", [LEGS, ARMS, HALF, [*ARMS, "head"]])
 @pytest.mark.parametrize("axes", ["xyz", "xy"])
-def test_any_part_is_drawn_and_moves(joints, axes):
+def test_any_part_is_drawn_and_animated(joints, axes):
     X, skeleton = part_of(joints, axes)
     n_bones = len(skeleton.bones)
     display = SkeletonDisplay.from_positions(X[0], skeleton, frames=3)
-    assert [len(lines(display, panel)) for panel in range(3)] == [n_bones] * 3
+    assert [len(bones_drawn(display, panel)) for panel in range(3)] == [n_bones] * 3
     display = SkeletonDisplay.from_positions(np.stack([x[:30] for x in X]), skeleton, frames=[9])
-    assert len(lines(display, 0)) == 6 * n_bones
+    assert len(bones_drawn(display, 0)) == 6 * n_bones
     for first in (DirectionCosines, JointPositions):
         pipe = make_pipeline(first(skeleton), DenseSynchronizer(30)).fit(X)
         display = SkeletonDisplay.from_estimator(pipe, X, performances=[0, 1, 2])
         assert display.scenes[1][0].shape == (30, len(skeleton.joints), len(axes))
         display.plot(at=0.7)
-        assert len(lines(display, 1)) == 3 * n_bones
+        assert len(bones_drawn(display, 1)) == 3 * n_bones
     animation = display.animate(seconds=0.5, fps=4)
     assert animation.to_jshtml().count("data:image/png;base64") == 2
 
 
 @pytest.mark.parametrize("joints", [LEGS, HALF, list(PAPER.joints)])
 @pytest.mark.parametrize("axes", ["xyz", "xy"])
-def test_models_and_departures_of_any_part(joints, axes):
+def test_model_and_departures_of_any_part(joints, axes):
     X, skeleton = part_of(joints, axes)
     pipe = pipeline(skeleton).fit(X)
     display = SkeletonDisplay.from_model(pipe, frames=[5], n_samples=4)
     assert display.skeleton == skeleton
-    mean = lines(display, 0)
+    mean = bones_drawn(display, 0)
     assert len(mean) == len(skeleton.bones)
     assert np.isfinite(mean).all()
     display = SkeletonDisplay.from_postures(pipe[0].transform(X[0]), pipe[0], frames=2)
-    assert len(lines(display, 1)) == len(skeleton.bones)
+    assert len(bones_drawn(display, 1)) == len(skeleton.bones)
     still = np.repeat(X[0].to_numpy()[:1], 40, axis=0)
     still = pd.DataFrame(still, columns=X[0].columns)
     display = SkeletonDisplay.from_departures(
@@ -107,7 +95,7 @@ def test_models_and_departures_of_any_part(joints, axes):
     assert display.skeleton == skeleton
     marked = {skeleton.joints[joint] for of_panel in display.marked for _, joint in of_panel}
     assert marked & {"left_knee", "left_ankle", "left_hip", "neck", "left_elbow"}
-    assert sum(len(lines(display, k)) for k in range(3)) == 3 * len(skeleton.bones)
+    assert sum(len(bones_drawn(display, k)) for k in range(3)) == 3 * len(skeleton.bones)
 
 
 @pytest.mark.parametrize("axes", ["xyz", "xy"])
@@ -117,8 +105,8 @@ def test_departures_of_an_upper_body_are_above_the_floor(axes):
     assert min(x[..., 1].min() for scene in display.scenes + display.behind for x in scene) >= 0
 
 
-def test_a_picture_is_drawn_as_the_camera_saw_it():
-    """Whatever the azimuth; the lowest joint of all on the floor, the pelvis above the origin."""
+def test_positions_in_a_plane_are_not_turned():
+    """The azimuth has no effect; the lowest joint is on the floor, the pelvis above the origin."""
     skeleton = Skeleton.paper(n_dims=2, up="-y")
     seen = BUNCH.data[0].reshape(-1, 15, 3)[..., :2] * [100, -100] + [640, 300]
     X = seen.reshape(len(seen), -1)
@@ -129,7 +117,7 @@ def test_a_picture_is_drawn_as_the_camera_saw_it():
     body = body - [body[0, 0], floor]
     expected = [[body[a], body[b]] for a, b in skeleton.bones]
     for display in pictures:
-        np.testing.assert_allclose(in_order(lines(display, 0)), in_order(np.array(expected)))
+        np.testing.assert_allclose(in_order(bones_drawn(display, 0)), in_order(np.array(expected)))
         head = np.ravel(display.heads_[0].get_data())
         np.testing.assert_allclose(head, body[PAPER.joints.index("head")])
 
@@ -142,19 +130,19 @@ def test_every_format_is_drawn(name, n_dims):
     rng = np.random.default_rng(0)
     X = rng.normal(size=(5, n_dims * len(skeleton.joints)))
     display = SkeletonDisplay.from_positions(X, skeleton, frames=[2])
-    counts = {side: len(lines(display, 0, side)) for side in ("left", "middle", "right")}
+    counts = {side: len(bones_drawn(display, 0, side)) for side in ("left", "middle", "right")}
     assert counts["left"] == counts["right"] > 0
     if name not in ("coco", "mediapipe"):
         assert sum(counts.values()) == len(skeleton.bones)
         assert counts["middle"] >= 1 + ("head" in skeleton.landmarks)
     else:
-        # The trunk is between the means, the face hangs on the nose; of 33, hands and feet.
+        # The trunk joins mean landmarks, the face the nose; MediaPipe has hands and feet.
         assert counts["left"] == 6 + 5 * (name == "mediapipe")
         assert counts["middle"] == 2 + {"coco": 4, "mediapipe": 9}[name]
     assert len(display.heads_[0].get_xdata()) == ("head" in skeleton.landmarks)
 
 
-def test_a_landmark_that_is_a_mean_is_drawn_in_the_middle():
+def test_a_mean_landmark_is_drawn_between_its_joints():
     landmarks = {**PAPER.landmarks, "head": ("left_wrist", "right_wrist")}
     skeleton = Skeleton(PAPER.joints, PAPER.parents, landmarks)
     display = SkeletonDisplay.from_positions(BUNCH.data[0], skeleton, frames=[3])
@@ -164,13 +152,13 @@ def test_a_landmark_that_is_a_mean_is_drawn_in_the_middle():
 
 
 def wrist(display, side):
-    """Where a wrist is drawn: at the end of its bone, which come in the skeleton's order."""
+    """The place of a wrist: the end of its bone; bones have the order of the skeleton."""
     bones = [b for b in PAPER.bones if PAPER.joints[b[1]].startswith(side)]
     place = [PAPER.joints[b] for _, b in bones].index(f"{side}_wrist")
-    return lines(display, 0, side)[place, 1]
+    return bones_drawn(display, 0, side)[place, 1]
 
 
-def test_joints_that_nothing_joins_are_points_with_limbs_between_the_landmarks():
+def test_without_bones_joints_are_points_and_limbs_join_landmarks():
     table = pd.DataFrame(BUNCH.data[0], columns=PAPER.column_names)
     for axis in "xyz":
         table[f"marker_{axis}"] = table[f"head_{axis}"] + 0.1
@@ -181,7 +169,8 @@ def test_joints_that_nothing_joins_are_points_with_limbs_between_the_landmarks()
     for panel in (0, 1):
         for side in ("left", "middle", "right"):
             np.testing.assert_allclose(
-                in_order(lines(display, panel, side)), in_order(lines(whole, panel, side))
+                in_order(bones_drawn(display, panel, side)),
+                in_order(bones_drawn(whole, panel, side)),
             )
         assert len(display.heads_[panel].get_xdata()) == 16
     shown = SkeletonDisplay([[np.zeros((2, 16, 3)) + np.arange(3)]], bare, ["a"],
@@ -189,7 +178,7 @@ def test_joints_that_nothing_joins_are_points_with_limbs_between_the_landmarks()
     assert len(shown.behind_[0].get_paths()) == 14
 
 
-def test_points_of_which_no_skeleton_is_known():
+def test_points_without_a_skeleton_have_two_or_three_axes():
     """In space, or in the plane if names or the number of columns say so."""
     x = np.random.default_rng(0).normal(size=(6, 12))
     assert len(SkeletonDisplay.from_positions(x, None, frames=[1]).heads_[0].get_xdata()) == 4
@@ -204,11 +193,3 @@ def test_points_of_which_no_skeleton_is_known():
     assert SkeletonDisplay.from_predictions([x[:, :8]], times, None).scenes[1][0].shape == (6, 4, 2)
     with pytest.raises(ValueError, match=r"positions of joints are \(n_frames, 3 \* n_joints\)"):
         SkeletonDisplay.from_positions(x[:, :7], None)
-
-
-def test_scenes_of_another_number_of_axes():
-    skeleton = Skeleton.paper(n_dims=2)
-    with pytest.raises(ValueError, match=r"shape \(n_frames, 15, 2\), got \(4, 15, 3\)"):
-        SkeletonDisplay([[np.ones((4, 15, 3))]], skeleton, ["a"])
-    with pytest.raises(ValueError, match=r"15 joints are \(n_frames, 30\)"):
-        SkeletonDisplay.from_positions(BUNCH.data[0], skeleton)

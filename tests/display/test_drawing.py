@@ -1,16 +1,18 @@
-"""Colours that everybody can tell apart."""
+"""Colours for colour-blind people, curves outside a band, and the import of matplotlib."""
 
 import itertools
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
-from sklearn_motionsync.display.drawing import COLORS, group_colors, parts_outside
+from sklearn_motionsync.display.drawing import COLORS, group_styles, parts_outside, pyplot
 
-# How colours look to people who lack one kind of cones: Machado, Oliveira and Fernandes, "A
+# Colours as seen without one kind of cones: Machado, Oliveira and Fernandes, "A
 # physiologically-based model for simulation of color vision deficiency", 2009, severity 1.
 SEEN_BY = {
-    "everybody else": np.eye(3),
+    "normal vision": np.eye(3),
     "protanopes": [
         [0.152286, 1.052583, -0.204868],
         [0.114503, 0.786281, 0.099216],
@@ -40,7 +42,7 @@ TOGETHER = [
 
 
 def lab(color, seen_by):
-    """CIE L*a*b* of a colour, as somebody sees it."""
+    """CIE L*a*b* of a colour as it is seen."""
     rgb = np.array(to_rgb(color))
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     linear = np.clip(np.asarray(SEEN_BY[seen_by]) @ linear, 0, 1)
@@ -50,20 +52,20 @@ def lab(color, seen_by):
 
 
 @pytest.mark.parametrize("seen_by", SEEN_BY)
-def test_colors_that_stand_together_are_told_apart(seen_by):
+def test_colors_of_one_figure_differ(seen_by):
     for one, other in TOGETHER:
         apart = np.linalg.norm(lab(COLORS[one], seen_by) - lab(COLORS[other], seen_by))
         assert apart > 20, (one, other)
 
 
 @pytest.mark.parametrize("seen_by", SEEN_BY)
-def test_the_colors_of_a_few_groups_are_told_apart(seen_by):
-    _, color_of = group_colors(list("abcd"), 4)
-    for one, other in itertools.combinations(color_of.values(), 2):
+def test_colors_of_four_groups_differ(seen_by):
+    colors = [color for color, _ in group_styles("abcd").values()]
+    for one, other in itertools.combinations(colors, 2):
         assert np.linalg.norm(lab(one, seen_by) - lab(other, seen_by)) > 15
 
 
-def test_what_of_a_curve_is_outside_a_band():
+def test_parts_outside_a_band_have_the_right_length():
     rng = np.random.default_rng(0)
     ys, center = rng.normal(size=(5, 12)).cumsum(axis=1), rng.normal(size=12)
     ys[1, 4], ys[2] = np.nan, center
@@ -82,12 +84,23 @@ def test_what_of_a_curve_is_outside_a_band():
         drawn[np.isnan(y[np.floor(fine).astype(int)] + y[np.ceil(fine).astype(int)])] = np.nan
         outside += ((drawn < at["lower"]) | (drawn > at["upper"])).sum() / 400
     np.testing.assert_allclose(np.diff(xs).sum(), outside, atol=0.05)
-    # Nothing is outside of a band that only touches.
+    # A curve on the bounds is inside.
     assert len(parts_outside(ys[2:3], center, center)[0]) == 0
 
 
-def test_a_curve_from_above_a_band_to_below_it():
+def test_parts_outside_of_a_curve_that_crosses_the_band():
     xs, ys = parts_outside(np.array([[3.0, -3.0]]), np.full(2, -1.0), np.full(2, 1.0))
     order = np.argsort(xs[:, 0])
     np.testing.assert_allclose(xs[order], [[0, 1 / 3], [2 / 3, 1]])
     np.testing.assert_allclose(ys[order], [[3, 1], [-1, -3]])
+
+
+def test_matplotlib_is_imported_on_drawing_only():
+    code = "import sys, sklearn_motionsync; assert 'matplotlib' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_missing_matplotlib_is_explained(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
+    with pytest.raises(ImportError, match="Drawing needs matplotlib: pip install matplotlib"):
+        pyplot()

@@ -1,4 +1,4 @@
-"""What the display of lags draws, read back from its map and curves."""
+"""LagDisplay: its artists agree with the tables of the lags."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,14 +13,14 @@ N_FRAMES = 21
 
 @pytest.fixture(scope="module")
 def lags():
-    """Of twelve performances of four people; the arm is late in the second half, the leg never."""
+    """Twelve performances of four subjects; the arm is late in the second half, the leg never."""
     rng, groups = np.random.default_rng(0), np.repeat(range(4), 3)
     values = rng.normal(0, 0.3, (12, 2, N_FRAMES))
     values[:, 0, 11:] += 5
     return Lags(values, ["arm", "leg"], "rest", "frames", groups, list("abcd"))
 
 
-def test_the_map_shows_the_mean_and_where_it_is_not_told_from_none(lags):
+def test_map_shows_the_mean_and_hatches_intervals_around_zero(lags):
     display = LagDisplay.from_predictions(lags)
     table = lags.over_time()
     np.testing.assert_array_equal(display.map_.get_array().ravel(), table["mean"])
@@ -37,7 +37,7 @@ def test_the_map_shows_the_mean_and_where_it_is_not_told_from_none(lags):
     assert names == [f"arm (ICC {icc['arm']:.2f})", f"leg (ICC {icc['leg']:.2f})"]
 
 
-def test_the_curves_show_the_spread(lags):
+def test_curves_show_mean_interval_and_standard_deviation(lags):
     display = LagDisplay.from_predictions(lags, colorbar=False)
     assert display.colorbar_ is None
     for i, part in enumerate(["arm", "leg"]):
@@ -54,14 +54,14 @@ def test_the_curves_show_the_spread(lags):
     assert "over people" in display.axes_[0].get_legend().get_texts()[1].get_text()
 
 
-def test_one_performance_has_no_interval(lags):
+def test_a_single_performance_has_no_interval(lags):
     display = LagDisplay.from_predictions(Lags(lags.values[:1], lags.parts, "leg", "percent"))
     assert display.map_ax_.get_title() == "2 parts behind the leg, 1 performance"
     assert display.unsure_[0].get_paths()
     assert display.map_ax_.get_xlim() == (0, 100)
 
 
-def test_of_a_pipeline_on_given_axes():
+def test_from_estimator_of_a_pipeline_on_axes_of_the_user():
     bunch = make_bending(4, n_frames=30, random_state=0)
     body = DenseSynchronizer(n_frames=30, metric=None, consensus=1)
     sync = PartSynchronizer(coupling=0.01, synchronizer=body)
@@ -74,6 +74,6 @@ def test_of_a_pipeline_on_given_axes():
     assert [a.get_title() for a in display.axes_] == display.lags.parts
 
 
-def test_what_is_no_report_is_refused(lags):
-    with pytest.raises(ValueError, match=r"lags must be a report of lags.*got ndarray"):
-        LagDisplay(lags.values)
+def test_from_predictions_refuses_other_classes(lags):
+    with pytest.raises(ValueError, match=r"lags must be the result.*got ndarray"):
+        LagDisplay.from_predictions(lags.values)

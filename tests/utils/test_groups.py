@@ -10,32 +10,25 @@ from sklearn_motionsync import (
     ActionClassifier,
     ActionDetector,
     ActionModel,
-    ActionModelDisplay,
-    LagDisplay,
+    DenseSynchronizer,
     LinearSynchronizer,
     MotionTracker,
     PartSynchronizer,
-    SynchronizationDisplay,
     datasets,
     display,
     find_performances,
     io,
     metrics,
 )
+from sklearn_motionsync.display import ActionModelDisplay, LagDisplay, SynchronizationDisplay
 from sklearn_motionsync.utils.groups import encode_classes, encode_groups, names_of_groups
 
 N, T = 6, np.linspace(0, 1, 20)
 X = np.stack([a * np.column_stack([np.sin(5 * T), T**2]) for a in (0.8, 0.9, 1.0, 1.1, 1.2, 1.3)])
-PARTS = PartSynchronizer({"arm": [0]}, n_frames=10).fit(X)
+PARTS = PartSynchronizer({"arm": [0]}, synchronizer=DenseSynchronizer(10)).fit(X)
 SYNC = LinearSynchronizer(10).fit(X)
 PIPE = make_pipeline(LinearSynchronizer(10), ActionModel()).fit(X)
 BEFORE, AFTER, TIMES = [np.zeros((10, 1))] * N, np.zeros((N, 10, 1)), np.zeros((N, 10))
-
-
-def shown(groups, people=None):
-    band = np.zeros((1 if isinstance(groups, list) and groups == ["a"] * N else 2, 10, 1))
-    given = {"performances": AFTER, "groups": groups, "people": people}
-    return ActionModelDisplay(band, band, band, feature_names=["x"], **given)
 
 
 # What each method does with groups of the N performances; whether it needs two of them.
@@ -51,8 +44,6 @@ METHODS = {
     "MotionTracker.fit(groups)": (lambda g: MotionTracker(SYNC, 20).fit(X, groups=g), True),
     "PartSynchronizer.lags(groups)": (lambda g: PARTS.lags(X, groups=g), False),
     "find_performances(groups)": (lambda g: find_performances(SYNC, X[0], groups=g), True),
-    "ActionModelDisplay.__init__(groups)": (shown, False),
-    "ActionModelDisplay.__init__(people)": (lambda p: shown(list("ab") * 3, p), False),
     "ActionModelDisplay.from_estimator(groups)": (
         lambda g: ActionModelDisplay.from_estimator(PIPE, X, groups=g),
         False,
@@ -63,10 +54,6 @@ METHODS = {
     ),
     "LagDisplay.from_estimator(groups)": (
         lambda g: LagDisplay.from_estimator(PARTS, X, groups=g),
-        False,
-    ),
-    "SynchronizationDisplay.__init__(groups)": (
-        lambda g: SynchronizationDisplay(BEFORE, AFTER, TIMES, feature_names=["x"], groups=g),
         False,
     ),
     "SynchronizationDisplay.from_estimator(groups)": (
@@ -107,7 +94,7 @@ def public_methods():
                 members = {
                     f".{key}": value
                     for key, value in inspect.getmembers(thing, inspect.isroutine)
-                    if key == "__init__" or not key.startswith(("_", "set_"))
+                    if not key.startswith(("_", "set_"))
                 }
             for key, value in members.items():
                 try:

@@ -1,0 +1,180 @@
+"""Arguments that several displays take: names, indices, frames, performances, and live takes."""
+
+from collections.abc import Iterable, Mapping, Set
+from numbers import Real
+
+import numpy as np
+import pandas as pd
+from sklearn.utils.validation import check_is_fitted
+
+from ..inputs.collections import as_collection
+from ..inputs.numbers import is_integer
+from ..inputs.tables import labels_of
+from ..online.stream import check_times
+
+__all__ = [
+    "TIME_LABELS",
+    "Takes",
+    "as_frames",
+    "as_index",
+    "as_indices",
+    "as_names",
+    "as_performances",
+    "labels_as_text",
+    "one_each",
+    "times_from_zero",
+]
+
+# Labels of the time axis of live takes, by unit.
+TIME_LABELS = {"frames": "time (frames)", "seconds": "time (s)"}
+# The largest number of panels.
+_MAX_PANELS = 1000
+
+
+def as_names(names, count, what, each):
+    """Names as a list of text, one for each of ``count`` things.
+
+    Parameters
+    ----------
+    names : sequence
+        Values of any type but NaN and None.
+    count : int
+    what, each : str
+        The name of the argument, and what its entries belong to.
+    """
+    listed = _as_list(names)
+    if listed is None or len(listed) != count or any(np.ndim(name) > 0 for name in listed):
+        got = repr(names) if listed is None else f"{len(listed)}: {listed[:6]}"
+        raise ValueError(
+            f"{what} must be a list of text, one for each of the {count} {each}, got {got}."
+        )
+    for i, name in enumerate(listed):
+        if pd.isna(name):
+            raise ValueError(
+                f"{what} must be text for each of the {count} {each}, but entry {i} is {name!r}, "
+                "a missing value: give it a name, such as 'unknown', or leave it out."
+            )
+    return [str(name) for name in listed]
+
+
+def as_indices(indices, count, what):
+    """One index or several from 0 to ``count - 1``, as a list."""
+    listed = [indices] if isinstance(indices, Real) else _as_list(indices)
+    if not listed or not all(is_integer(i) and 0 <= i < count for i in listed):
+        raise ValueError(
+            f"{what} must be from 0 to {count - 1}, got "
+            f"{indices if listed is None else listed!r}: give whole numbers."
+        )
+    return [int(i) for i in listed]
+
+
+def as_index(index, count, what):
+    """One index from 0 to ``count - 1``."""
+    if not isinstance(index, Real):
+        raise ValueError(f"{what} must be one number from 0 to {count - 1}, got {index!r}.")
+    return as_indices(index, count, what)[0]
+
+
+def as_frames(frames, n_frames):
+    """Frames by index, or a number of evenly spaced frames from the first to the last."""
+    if not isinstance(frames, Real):
+        return as_indices(frames, n_frames, "frames")
+    if not (is_integer(frames) and 1 <= frames <= _MAX_PANELS):
+        raise ValueError(
+            f"frames must be how many, a whole number from 1 to {_MAX_PANELS}, or a list of frames "
+            f"from 0 to {n_frames - 1}; got {frames!r}."
+        )
+    return np.linspace(0, n_frames - 1, int(frames)).round().astype(int).tolist()
+
+
+def as_performances(X):
+    """The performances of a collection, or a single one as a list."""
+    collection = as_collection(X)
+    if collection is not None and len(collection) == 0:
+        raise ValueError("Found 0 performances (n_samples=0); there is nothing to draw.")
+    return [X] if collection is None else collection
+
+
+def labels_as_text(performances):
+    """Labels of performances, the levels of a label joined by commas."""
+    labels = labels_of(performances)[0]
+    return [", ".join(map(str, n)) if isinstance(n, tuple) else str(n) for n in labels]
+
+
+def one_each(values, count, what, each="performances"):
+    """A list with one entry for each of ``count`` things."""
+    if not hasattr(values, "__len__") or isinstance(values, str) or len(values) != count:
+        got = len(values) if hasattr(values, "__len__") else repr(values)
+        raise ValueError(
+            f"There are {count} {each}, but {what} of {got}: give a list with one for each."
+        )
+    return list(values)
+
+
+def times_from_zero(times, n_frames):
+    """Times since the first frame; frame numbers if there are no times."""
+    if times is None:
+        return np.arange(float(n_frames))
+    times = np.asarray(times, dtype=np.float64)
+    return times - times[0]
+
+
+class Takes:
+    """Takes as an online estimator accepts them: one array, several, or univariate rows.
+
+    Parameters
+    ----------
+    estimator : OnlineSynchronizer or MotionTracker
+        Fitted.
+    X : takes
+    what : str, default="X"
+        The name of the argument, for messages.
+
+    Attributes
+    ----------
+    arrays : sequence of arrays (n_frames_i, n_features)
+    labels : list of str
+    is_single : bool
+        Whether X is one take instead of a collection.
+    """
+
+    def __init__(self, estimator, X, what="X"):
+        check_is_fitted(estimator)
+        self._estimator, self._rows, self.is_single = estimator, None, False
+        is_univariate = estimator.mean_.shape[1] != estimator.n_features_in_
+        if as_collection(X) is not None:
+            self.arrays = as_performances(X)
+        elif np.ndim(X) != 2:
+            raise ValueError(
+                f"{what} must be performances, or one of them, 2-D; got an array of shape "
+                f"{np.shape(X)}."
+            )
+        elif is_univariate:
+            self._rows = np.asarray(X)
+            self.arrays = list(self._rows[:, :, np.newaxis])
+            rows = X.index if isinstance(X, pd.DataFrame) else range(len(self._rows))
+            self.labels = list(map(str, rows))
+            return
+        else:
+            self.arrays, self.is_single = [X], True
+        self.labels = labels_as_text(self.arrays)
+
+    def select(self, indices):
+        """Some of the takes, as the methods of the estimator accept them."""
+        return [self.arrays[i] for i in indices] if self._rows is None else self._rows[indices]
+
+    def select_times(self, times, indices, each="performances"):
+        """The checked time stamps of some of the takes."""
+        times = [times] if self.is_single else times
+        listed, rate = one_each(times, len(self.arrays), "times", each), self._estimator.frame_rate
+        for i in indices:
+            what = f"Performance {self.labels[i]}"
+            check_times(listed[i], len(self.arrays[i]), rate, what)
+        return [listed[i] for i in indices]
+
+
+def _as_list(values):
+    """A list of ordered values; None for text, sets, mappings and scalars."""
+    if isinstance(values, (str, bytes, Set, Mapping)) or not isinstance(values, Iterable):
+        return None
+    return None if getattr(values, "ndim", 1) != 1 else list(values)

@@ -1,0 +1,25 @@
+"""What artists of displays show."""
+
+import numpy as np
+
+
+def segments(collection):
+    """The points (n, 2) of each curve of a collection."""
+    return [np.asarray(path.vertices) for path in collection.get_paths()]
+
+
+def ys(collection):
+    """The heights of curves of equal length, (n_curves, n)."""
+    return np.array([xy[:, 1] for xy in segments(collection)])
+
+
+def texts(axis):
+    """The labels of the legend."""
+    return [text.get_text() for text in axis.get_legend().get_texts()]
+
+
+def bones_drawn(display, panel, side=None):
+    """The ends (n_bones, 2, 2) of bones of stick figures, of one side or all."""
+    sides = [side] if side else list(display.bones_[panel])
+    ends = [xy for s in sides for xy in segments(display.bones_[panel][s])]
+    return np.array(ends).reshape(-1, 2, 2)

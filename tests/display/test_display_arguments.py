@@ -1,0 +1,279 @@
+"""Arguments of displays: those that are refused name the argument, its value, and what is valid."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.exceptions import NotFittedError
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    MotionTracker,
+    OnlineSynchronizer,
+    PartSynchronizer,
+    Skeleton,
+    display,
+)
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import (
+    MetricDisplay,
+    SkeletonDisplay,
+    SynchronizationDisplay,
+    TrellisDisplay,
+)
+
+PAPER = Skeleton.paper()
+NAMES = PAPER.column_names
+BUNCH = make_bending(4, n_frames=20, random_state=2)
+POSITIONS = BUNCH.data
+X = [x[:, :3] for x in POSITIONS]
+TIMES = np.tile(np.linspace(0, 9, 10), (4, 1))
+BACKWARDS = np.vstack([TIMES[:3], TIMES[:1, ::-1]])
+PATTERN = np.zeros((10, 3))
+# The kind of estimator that each display draws. A search needs no fit, nor does a segmenter.
+ESTIMATORS = {
+    "ActionModelDisplay": ActionModel(),
+    "CycleDisplay": None,
+    "LagDisplay": PartSynchronizer(),
+    "MetricDisplay": DenseSynchronizer(),
+    "PhaseDisplay": OnlineSynchronizer(),
+    "SearchDisplay": None,
+    "SkeletonDisplay": make_pipeline(DirectionCosines(PAPER), DenseSynchronizer()),
+    "SynchronizationDisplay": DenseSynchronizer(),
+    "TrackingDisplay": MotionTracker(),
+    "TrellisDisplay": DenseSynchronizer(),
+}
+
+
+def with_one(x, value, at=(3, 1)):
+    x = np.array(x)
+    x[at] = value
+    return x
+
+
+def masked(x):
+    return np.ma.array(x, mask=np.arange(np.size(x)).reshape(np.shape(x)) == 4)
+
+
+@pytest.fixture(scope="module")
+def pipe():
+    steps = DirectionCosines(BUNCH.skeleton), ASpace(3), DenseSynchronizer(20), ActionModel()
+    return make_pipeline(*steps).fit(POSITIONS)
+
+
+def refuses(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def draw_synchronization(**arguments):
+    return SynchronizationDisplay.from_predictions(**({"X": X, "times": TIMES} | arguments))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"X": []}, "Found 0 performances"),
+        ({"X": X[0]}, r"single 2-D input\. Wrap one performance as \[X\]"),
+        ({"X": [*X[:3], masked(X[3])]}, "Performance 3 has masked values"),
+        ({"X": [*X[:3], with_one(X[3], np.inf)]}, "Performance 3, frame 3, feature 1 is infinity"),
+        ({"times": TIMES[:2]}, r"each of the 4 performances; got \(2, 10\)"),
+        ({"times": TIMES + 1}, "times must be from 0 to P - 1 = 9"),
+        ({"times": BACKWARDS}, "times"),
+        ({"feature_names": list("abcd")}, "feature_names .* each of the 3 features, got 4"),
+        *(({"feature_names": bad}, "feature_names must be a list of text")
+          for bad in ("abc", 3, [["a"], ["b"], ["c"]])),
+        ({"feature_names": list("aab"), "features": "a"}, "'a' comes 2 times"),
+        *(({"features": bad}, "There is no feature .*there are 3: x0, x1, x2")
+          for bad in (3, -1, 1.5, True, "knee", [0, "x3"])),
+        ({"features": []}, "at least one feature"),
+        ({"pattern": PATTERN[:9]}, r"must have the shape \(10, 3\), got \(9, 3\)"),
+        ({"pattern": masked(PATTERN)}, "The pattern has masked values"),
+        ({"ax": []}, r"ax must be Axes of matplotlib, got \[\]"),
+        ({"ax": "left"}, "ax must be Axes of matplotlib, got 'left'"),
+    ],
+)  # fmt: skip
+def test_synchronization_from_predictions_refuses(arguments, message):
+    refuses(lambda: draw_synchronization(**arguments), message)
+
+
+def test_pattern_columns_must_have_the_order_of_the_performances():
+    frames = [pd.DataFrame(x, columns=list("abc")) for x in X]
+    pattern = pd.DataFrame(PATTERN, columns=list("cab"))
+    refuses(lambda: draw_synchronization(X=frames, pattern=pattern), "The pattern has the columns")
+    drawn = draw_synchronization(X=frames, pattern=pattern[list("abc")])
+    assert drawn.feature_names == list("abc")
+
+
+def test_nan_is_drawn_as_a_gap():
+    gaps = [with_one(X[0], np.nan, slice(0, 4)), *X[1:]]
+    display = draw_synchronization(X=gaps)
+    assert np.isnan(display.after[0, 0]).all()
+    mean = display.pattern_[0].get_ydata()
+    np.testing.assert_allclose(mean, np.nanmean(display.after[:, :, 0], axis=0))
+    nothing = draw_synchronization(X=[np.full_like(x, np.nan) for x in X])
+    assert np.isnan(nothing.pattern_[0].get_ydata()).all()
+    nothing.figure_.canvas.draw()
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda pipe, **features: MetricDisplay.from_estimator(pipe, **features),
+        lambda pipe, **features: SynchronizationDisplay.from_estimator(pipe, POSITIONS, **features),
+    ],
+)
+def test_unknown_feature_is_refused(pipe, draw):
+    for bad in (3, -1, 1.5, True, "aspace9", [0, "x1"]):
+        message = "There is no feature .*there are 3: aspace0, aspace1, aspace2"
+        refuses(lambda features=bad: draw(pipe, features=features), message)
+    refuses(lambda: draw(pipe, features=[]), "at least one feature")
+
+
+@pytest.mark.parametrize("performance", [4, -1, 1.5, "1", None])
+def test_trellis_refuses_unknown_performance(pipe, performance):
+    message = "is out of range: there are 4 performances"
+    refuses(
+        lambda: TrellisDisplay.from_estimator(pipe, POSITIONS, performance=performance), message
+    )
+
+
+@pytest.mark.parametrize("name", display.__all__)
+def test_from_estimator_refuses_other_and_unfitted_estimators(name):
+    from_estimator = getattr(display, name).from_estimator
+    performances = [] if name == "MetricDisplay" else [POSITIONS]
+    if name != "SearchDisplay":
+        refuses(lambda: from_estimator(3, *performances), "got int|There is no .* in int")
+    if ESTIMATORS[name] is not None:
+        with pytest.raises(NotFittedError):
+            from_estimator(ESTIMATORS[name], *performances)
+
+
+# -- stick figures --------------------------------------------------------------------------
+
+
+def draw_positions(x=POSITIONS[0], skeleton=PAPER, **arguments):
+    return SkeletonDisplay.from_positions(x, skeleton, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"x": []}, "Found 0 performances"),
+        ({"x": None}, r"Performance 0 has shape \(\)"),
+        ({"x": "walk.bvh"}, "A set of performances"),
+        ({"x": POSITIONS[0][:, :6]}, r"15 joints are \(n_frames, 45\)"),
+        ({"x": POSITIONS[0][:0]}, r"shape \(0, 45\)"),
+        ({"x": [POSITIONS[0], masked(POSITIONS[1])]}, "Performance 1 has masked values"),
+        ({"x": with_one(POSITIONS[0], np.inf)}, "Performance 0, frame 3, feature 1 is infinity"),
+        ({"x": POSITIONS[0] * np.nan}, "No frame shows the hips"),
+        ({"x": pd.DataFrame(POSITIONS[0], columns=NAMES[::-1])}, "column 0 is 'right_ankle_z'"),
+        ({"skeleton": "paper"}, "skeleton must be a Skeleton, .* or None .*; got str"),
+        ({"skeleton": None, "x": POSITIONS[0][:, :7]}, r"joints are \(n_frames, 3 \* n_joints\)"),
+        ({"skeleton": None, "x": POSITIONS[0] * np.nan}, "No frame shows the joints"),
+        ({"skeleton": Skeleton.paper(n_dims=2)}, r"15 joints are \(n_frames, 30\)"),
+        *(({"frames": bad}, "frames must be how many, a whole number from 1 to 1000")
+          for bad in (0, 2.5, True, np.nan, 10**9)),
+        *(({"frames": bad}, r"frames must be from 0 to \d+, got")
+          for bad in ([-1], [99], [0.5], [], "03", [True], None, ["1"], [[1]], {3})),
+        *(({"at": bad}, "at must be a share of the time from 0 to 1, got")
+          for bad in (-0.1, 1.5, np.nan)),
+    ],
+)  # fmt: skip
+def test_from_positions_refuses(arguments, message):
+    refuses(lambda: draw_positions(**arguments), message)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"names": ["a"]}, "names .* each of the 4 performances, got 1"),
+        ({"times": TIMES[:2]}, r"each of the 4 performances; got \(2, 10\)"),
+        ({"times": BACKWARDS}, "times"),
+        ({"skeleton": 15}, "skeleton must be a Skeleton"),
+        ({"X": [x[:, :9] for x in POSITIONS]}, "15 joints are"),
+    ],
+)
+def test_skeleton_from_predictions_refuses(arguments, message):
+    arguments = {"X": POSITIONS, "times": TIMES, "skeleton": PAPER} | arguments
+    refuses(lambda: SkeletonDisplay.from_predictions(**arguments), message)
+
+
+@pytest.mark.parametrize("performances", [[99], [-1], [0.5], [], "01", [True], [None], 4, {0}])
+def test_from_estimator_refuses_unknown_performances(pipe, performances):
+    refuses(
+        lambda: SkeletonDisplay.from_estimator(pipe, POSITIONS, performances=performances),
+        "performances must be from 0 to 3, got",
+    )
+
+
+@pytest.mark.parametrize("frames", [[-1], [20], [1.5], "ab", [], [np.nan], [True], None])
+def test_from_model_refuses_unknown_frames(pipe, frames):
+    refuses(lambda: SkeletonDisplay.from_model(pipe, frames=frames), "frames, .* from 0 to 19")
+
+
+def test_from_model_accepts_frames_and_shares(pipe):
+    for frames in (0.5, [0.5], np.float32([0.5]), 10, [10.0]):
+        titles = SkeletonDisplay.from_model(pipe, frames=frames, n_samples=2).titles
+        assert titles[0] == "frame 10\nmean posture"
+
+
+def test_from_model_needs_inverse_transform():
+    some = FunctionTransformer(lambda X: [x[:, :5] for x in X])
+    steps = DirectionCosines(PAPER), some, LinearSynchronizer(9), ActionModel()
+    pipe = make_pipeline(*steps).fit(POSITIONS)
+    pipe.steps[1] = ("some", type("OneWay", (), {"transform": None})())
+    message = r"steps with inverse_transform .* they are \['DirectionCosines', 'OneWay'\]"
+    refuses(lambda: SkeletonDisplay.from_model(pipe), message)
+
+
+def test_from_postures_accepts_tables_and_single_postures():
+    cosines = DirectionCosines(PAPER).set_output(transform="pandas")
+    table = cosines.fit_transform(pd.DataFrame(POSITIONS[0], columns=NAMES))
+    refuses(lambda: SkeletonDisplay.from_postures(table, None), "cosines must be a fitted")
+    faulty = np.array(table)
+    faulty[2, 1:4] = 0
+    refuses(
+        lambda: SkeletonDisplay.from_postures([np.array(table), faulty], cosines),
+        "Performance 1, frame 2: the limb 'hip' has no direction",
+    )
+    assert len(SkeletonDisplay.from_postures(np.array(table)[:3, None], cosines).axes_) == 6
+
+
+@pytest.mark.parametrize("arguments", [{"seconds": 0}, {"seconds": np.nan}, {"fps": -1}])
+def test_animate_refuses_impossible_durations(arguments):
+    refuses(lambda: draw_positions().animate(**arguments), "seconds and fps must be above 0")
+    refuses(lambda: draw_positions().animate(seconds=1e9), r"are 1.5e\+10 pictures, more than")
+
+
+# -- without a skeleton ---------------------------------------------------------------------
+
+
+def test_joints_without_a_skeleton_are_points():
+    """They are moved to the floor and not turned."""
+    x = POSITIONS[0] + np.tile([5.0, 3.0, -2.0], 15)
+    display = draw_positions(x, None, frames=[4], azimuth=0)
+    assert all(len(lines.get_paths()) == 0 for lines in display.bones_[0].values())
+    points = x.reshape(-1, 15, 3)
+    expected = points[4, :, :2] - [points[4, :, 0].mean(), points[..., 1].min()]
+    np.testing.assert_allclose(np.transpose(display.heads_[0].get_data()), expected)
+    for joint in (0, 7):
+        markers = np.delete(points, joint, axis=1).reshape(len(x), -1)
+        assert len(draw_positions(markers, None, frames=1).heads_[0].get_xdata()) == 14
+
+
+def test_points_without_a_skeleton_are_synchronised_and_animated():
+    display = SkeletonDisplay.from_predictions(POSITIONS, TIMES, None, at=0.5)
+    assert [len(dots.get_xdata()) for dots in display.heads_] == [60, 60]
+    assert display.animate(seconds=1, fps=2).to_jshtml().count("data:image/png") == 2
+
+
+@pytest.mark.parametrize("path", [[[0.0, 1, 0]] * 5, [[0.0, t, 0] for t in range(5)]])
+def test_a_single_marker_is_drawn(path):
+    draw_positions(np.array(path), None, frames=2).figure_.canvas.draw()
+    hidden = with_one(path, np.nan, 1)
+    assert len(draw_positions(hidden, None, frames=[0, 1]).axes_) == 2

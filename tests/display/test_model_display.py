@@ -1,0 +1,319 @@
+"""ActionModelDisplay: its artists agree with the model, also of groups and in any unit."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from artists import segments, texts, ys
+from matplotlib.colors import to_rgba
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
+from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
+from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay
+from sklearn_motionsync.display.drawing import group_styles
+
+GROUPS = ["young", "old", "young", "old", "young", "old", "young", "old", "one"]
+PEOPLE = ["a", "b", "c", "d", "a", "b", "e", "d", "f"]
+P = 30
+
+
+def test_mean_envelope_and_performances(bunch, pipe):
+    display = ActionModelDisplay.from_estimator(pipe, bunch.data, features=["aspace1", 0])
+    model = pipe[-1]
+    lower, upper = model.envelope()
+    warped = pipe[:3].transform(bunch.data)
+    for i, feature in enumerate([1, 0]):
+        np.testing.assert_array_equal(display.mean_[i].get_ydata(), model.mean_[:, feature])
+        corners = display.envelope_[i].get_paths()[0].vertices
+        for p in range(30):
+            heights = corners[corners[:, 0] == p, 1]
+            np.testing.assert_allclose(heights.min(), lower[p, feature])
+            np.testing.assert_allclose(heights.max(), upper[p, feature])
+        np.testing.assert_array_equal(ys(display.performances_[i]), warped[:, :, feature])
+    assert {"mean ± 3 standard deviations", "9 performances"} < set(texts(display.axes_[0]))
+
+
+def test_model_in_features_of_postures(bunch, pipe):
+    display = ActionModelDisplay.from_estimator(pipe, features=["left_leg_y", "pelvis_height"])
+    names = list(pipe[0].get_feature_names_out())
+    chosen = [names.index("left_leg_y"), names.index("pelvis_height")]
+    postures = pipe[1].inverse_transform(pipe[-1].mean_)[:, chosen]
+    np.testing.assert_allclose(display.mean, postures, atol=1e-12)
+    assert display.performances_ == display.departures_ == []
+    # The variance is that of postures: dimensions of the aSpace are correlated.
+    postures = pipe[1].inverse_transform(pipe[:3].transform(bunch.data))[:, :, chosen]
+    std = postures.std(axis=0)
+    np.testing.assert_allclose(display.upper - display.mean, 3 * std, atol=1e-9)
+    np.testing.assert_allclose(display.mean - display.lower, 3 * std, atol=1e-9)
+
+
+def legend_of(display):
+    """The title of the legend, its first label, and the number of performances that leave."""
+    labels = texts(display.axes_[0])
+    outside = [
+        int(label.split(": ")[1].split()[0])
+        for label in labels
+        if label.startswith("outside the band")
+    ]
+    return display.axes_[0].get_legend().get_title().get_text(), labels[0], *outside
+
+
+def test_each_band_has_its_bounds_and_legend(bunch, pipe):
+    model = ActionModel(n_std=2, coverage=0.9).fit(pipe[:3].transform(bunch.data))
+    factor = model.simultaneous_factor()
+    expected = {
+        "points": (model.envelope(), "single postures", "mean ± 2 standard deviations"),
+        "performances": (
+            model.envelope(simultaneous=True),
+            "90 % of new people's performances",
+            f"mean ± {factor:.3g} predicted standard deviations",
+        ),
+        "mean": (
+            model.mean_envelope(random_state=0),
+            "the mean of all people, 90 % sure",
+            "where the mean may be",
+        ),
+    }
+    for band, ((lower, upper), holds, label) in expected.items():
+        display = ActionModelDisplay.from_estimator(model, features=[1], band=band)
+        np.testing.assert_array_equal(display.lower, lower[:, [1]])
+        np.testing.assert_array_equal(display.upper, upper[:, [1]])
+        title, text = legend_of(display)
+        assert holds in title
+        assert text == label
+    for features in ("torso_z", "aspace0"):
+        wide, narrow = (
+            ActionModelDisplay.from_estimator(pipe, features=features, band=band)
+            for band in ("performances", "mean")
+        )
+        assert (wide.upper > narrow.upper).all()
+        assert (wide.lower < narrow.lower).all()
+
+
+@pytest.mark.parametrize("band", ["points", "performances"])
+def test_departures_are_the_parts_outside_the_band(bunch, pipe, band):
+    still = np.repeat(bunch.data[0][:1], 40, axis=0)
+    people, features = [*bunch.data[:3], still], ["pelvis_height", "torso_z"]
+    display = ActionModelDisplay.from_estimator(pipe, people, features=features, band=band)
+    outside = (display.performances < display.lower) | (display.performances > display.upper)
+    assert outside[3].any()
+    assert legend_of(display)[2] == outside.any(axis=(1, 2)).sum()
+    for i, departures in enumerate(display.departures_):
+        assert tuple(departures.get_colors()[0]) != tuple(display.performances_[i].get_colors()[0])
+        drawn = {(x, y) for piece in segments(departures) for x, y in piece.round(9) if x % 1 == 0}
+        seen = np.argwhere(outside[:, :, i])
+        assert drawn == {(p, display.performances[n, p, i].round(9)) for n, p in seen}
+    for options in ({"departures": False, "band": band}, {"band": "mean"}):
+        assert ActionModelDisplay.from_estimator(pipe, people, **options).departures_ == []
+
+
+def test_rounding_is_no_departure():
+    """Performances do not differ in a feature, except by rounding."""
+    X = np.tile(np.random.default_rng(0).normal(size=(9, 2)), (3, 1, 1)).astype(np.float32)
+    X[:, :, 0] += np.array([0, 0.1, 0.3], dtype=np.float32)[:, np.newaxis]
+    for band in ("points", "performances"):
+        display = ActionModelDisplay.from_estimator(ActionModel().fit(X), X, band=band)
+        assert legend_of(display)[2] == 0
+
+
+def test_features_of_postures_need_an_invertible_pipeline(bunch):
+    double = FunctionTransformer(lambda X: [2 * x for x in X])
+    steps = DirectionCosines(bunch.skeleton), ASpace(3), double, DenseSynchronizer(20)
+    pipe = make_pipeline(*steps, ActionModel()).fit(bunch.data)
+    with pytest.raises(ValueError, match="Between ASpace and ActionModel stands FunctionTrans"):
+        ActionModelDisplay.from_estimator(pipe, features="pelvis_height")
+
+
+def test_model_without_a_pipeline(bunch, pipe):
+    warped = pipe[:3].transform(bunch.data)
+    model = ActionModel(n_std=2).fit(warped)
+    display = ActionModelDisplay.from_estimator(model, warped[:2])
+    assert display.feature_names == ["x0", "x1", "x2"]
+    assert display.performances.shape == (2, 30, 3)
+    with pytest.raises(ValueError, match="no feature 'pelvis_height'"):
+        ActionModelDisplay.from_estimator(model, features="pelvis_height")
+    with pytest.raises(ValueError, match="no feature 'knee'; there are 37: pelvis_height"):
+        ActionModelDisplay.from_estimator(pipe, features=["knee"])
+
+
+@pytest.mark.parametrize("band", ["points", "performances", "mean"])
+def test_mean_and_band_of_each_group_are_those_of_its_own_model(bunch, pipe, band):
+    display = ActionModelDisplay.from_estimator(
+        pipe, bunch.data, groups=GROUPS, people=PEOPLE, band=band, features=[1, 0]
+    )
+    warped = pipe[:3].transform(bunch.data)
+    for k, name in enumerate(["young", "old"]):
+        of = [i for i, group in enumerate(GROUPS) if group == name]
+        people = None if band == "points" else [PEOPLE[i] for i in of]
+        model = ActionModel().fit(warped[of], groups=people)
+        lower, upper = {
+            "points": model.envelope(),
+            "performances": model.envelope(simultaneous=True),
+            "mean": model.mean_envelope(random_state=0),
+        }[band]
+        for drawn, expected in (
+            (display.mean, model.mean_),
+            (display.lower, lower),
+            (display.upper, upper),
+        ):
+            np.testing.assert_allclose(drawn[k], expected[:, [1, 0]], atol=1e-12)
+        # The means are sorted by feature, then by group.
+        np.testing.assert_array_equal(display.mean_[3 + k].get_ydata(), display.mean[k, :, 1])
+    np.testing.assert_array_equal(display.mean[2], warped[8][:, [1, 0]])
+    assert np.isnan(display.lower[2]).all()
+    assert len(display.mean_) == len(display.performances_) == 6
+    assert len(display.envelope_) == 4
+    assert texts(display.axes_[0])[:3] == [
+        "young: 4 performances of 3 people",
+        "old: 4 performances of 2 people",
+        "one: 1 performance of 1 person, no band",
+    ]
+
+
+def test_default_band_of_groups_is_that_of_performances(bunch, pipe):
+    alike = ActionModelDisplay.from_estimator(pipe, bunch.data, groups=["all"] * 9)
+    assert alike.band == "performances"
+    assert "95 % of new people's performances" in legend_of(alike)[0]
+    plain = ActionModelDisplay.from_estimator(
+        pipe[-1], pipe[:3].transform(bunch.data), band="performances"
+    )
+    np.testing.assert_allclose(alike.upper[0], plain.upper)
+    assert ActionModelDisplay.from_estimator(pipe).band == "points"
+
+
+def test_a_group_of_one_subject_has_no_band_of_performances(bunch, pipe):
+    groups, people = ["a"] * 5 + ["b"] * 4, [1, 2, 3, 4, 5, 6, 6, 6, 6]
+    given = {"groups": groups, "people": people, "features": [0]}
+    display = ActionModelDisplay.from_estimator(pipe, bunch.data, **given)
+    assert "b: 4 performances of 1 person, no band" in texts(display.axes_[0])
+    display = ActionModelDisplay.from_estimator(pipe, bunch.data, band="points", **given)
+    assert "b: 4 performances of 1 person" in texts(display.axes_[0])
+
+
+def test_legend_counts_departures_from_the_band_of_the_own_group(bunch, pipe):
+    X, groups = [*bunch.data, bunch.data[0][::-1]], [*GROUPS[:8], "old", "young"]
+    display = ActionModelDisplay.from_estimator(
+        pipe, X, groups=groups, band="points", features=["torso_z", "pelvis_height"]
+    )
+    own = [["young", "old"].index(group) for group in groups]
+    of_young = display.performances[[group == "young" for group in groups]]
+    np.testing.assert_allclose(display.mean[0], of_young.mean(axis=0))
+    out = display.performances > display.upper[own]
+    out |= display.performances < display.lower[own]
+    label = f"outside the band of its group: {out.any(axis=(1, 2)).sum()} of them"
+    assert label in texts(display.axes_[0])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"band": "all"}, ValueError, "band must be one of .*got 'all'"),
+        ({"band": ["mean"]}, ValueError, "band must be one of"),
+        ({"people": PEOPLE}, TypeError, "takes people along with groups only"),
+        ({"groups": GROUPS, "X": None}, TypeError, "takes groups along with performances X"),
+        ({"people": PEOPLE, "X": None}, TypeError, "takes people along with performances X"),
+        ({"unit": "ms"}, ValueError, "unit must be one of .*got 'ms'"),
+        ({"unit": "seconds"}, ValueError, "needs frame_rate"),
+        ({"unit": "seconds", "frame_rate": 0}, ValueError, "frame_rate must be one number above"),
+        ({"unit": "seconds", "frame_rate": [1, 2]}, ValueError, "each of the 9 .* got 2"),
+    ],
+)
+def test_action_model_display_refuses(bunch, pipe, arguments, error, message):
+    with pytest.raises(error, match=message):
+        ActionModelDisplay.from_estimator(pipe, **{"X": bunch.data} | arguments)
+
+
+def test_many_groups_differ_in_color_or_line_style(bunch, pipe):
+    names = [f"_${i}" for i in range(9)]
+    display = ActionModelDisplay.from_estimator(pipe, bunch.data, groups=names, features=[0])
+    assert len({(line.get_color().__str__(), line.get_linestyle()) for line in display.mean_}) == 9
+    display.figure_.canvas.draw()
+    assert [text.strip().replace("\\", "") for text in texts(display.axes_[0])] == [
+        f"{name}: 1 performance, no band" for name in names
+    ]
+    before = SynchronizationDisplay.from_estimator(pipe, bunch.data, groups=names, features=[0])
+    assert len({line.get_linestyle() for line in before.group_means_[0]}) == 4
+    # Black is the pattern.
+    for count in (6, 7, 20):
+        colors = {to_rgba(color) for color, _ in group_styles(range(count)).values()}
+        assert len(colors) == count
+        assert to_rgba("black") not in colors
+
+
+@pytest.mark.parametrize("groups", [None, GROUPS])
+def test_units_of_the_action_model_display(bunch, pipe, groups):
+    still = np.repeat(bunch.data[0][:1], 40, axis=0)
+    X = [*bunch.data[:8], still]
+    median = np.median([len(x) - 1 for x in X]) / 50
+    for unit, last in (("frames", P - 1), ("percent", 100), ("seconds", median)):
+        display = ActionModelDisplay.from_estimator(
+            pipe, X, features=[0], unit=unit, frame_rate=50, groups=groups, band="points"
+        )
+        np.testing.assert_allclose(display.mean_[0].get_xdata(), np.linspace(0, last, P))
+        for artist in (*display.performances_, *display.departures_):
+            for path in artist.get_paths():
+                assert path.vertices[:, 0].max() <= last * (1 + 1e-9)
+    # Without performances the frame rate is that of the clock.
+    display = ActionModelDisplay.from_estimator(pipe, features=[0], unit="seconds", frame_rate=10)
+    np.testing.assert_allclose(display.mean_[0].get_xdata(), np.arange(P) / 10)
+
+
+def test_a_model_of_univariate_rows_in_seconds():
+    rows = np.random.default_rng(0).normal(size=(6, 21))
+    given = {"unit": "seconds", "frame_rate": 10, "groups": list("aabbab")}
+    display = ActionModelDisplay.from_estimator(ActionModel().fit(rows), rows, **given)
+    assert (display.feature_names, texts(display.axes_[0])[0]) == (["x0"], "a: 3 performances")
+    np.testing.assert_allclose(display.mean_[0].get_xdata(), np.arange(21) / 10)
+
+
+@pytest.mark.parametrize("kind", ["model", "model of groups", "synchronization"])
+@pytest.mark.parametrize(
+    ("size", "layout"),
+    [
+        (None, None),  # a new figure
+        *((size, layout) for size in ((4.2, 3), (9, 5)) for layout in (None, "constrained")),
+    ],
+)
+def test_legends_are_above_the_panels(bunch, pipe, layout, size, kind):
+    axes = None if size is None else plt.figure(figsize=size, layout=layout).add_subplot()
+    if kind == "synchronization":
+        display = SynchronizationDisplay.from_estimator(
+            pipe, bunch.data, groups=[f"group {g}" for g in range(9)], features=[0], ax=axes
+        )
+    else:
+        groups = GROUPS if "groups" in kind else None
+        display = ActionModelDisplay.from_estimator(
+            pipe, bunch.data, groups=groups, features=[0], ax=axes
+        )
+    display.figure_.canvas.draw()
+    box = display.axes_[0].get_legend().get_window_extent()
+    for axis in display.axes_:
+        panel = axis.get_window_extent()
+        assert box.y0 >= panel.y1 - 1 or box.x1 < panel.x0
+        assert panel.height > 20
+        if axis.get_title() and kind == "synchronization":
+            assert axis.title.get_window_extent().y0 >= box.y1 - 1
+    if size != (4.2, 3):
+        assert box.y1 <= display.figure_.bbox.height + 1
+
+
+@pytest.mark.parametrize("layout", [None, "constrained"])
+def test_legend_of_many_groups_fits_on_small_axes(layout):
+    rng = np.random.default_rng(0)
+    X = np.sin(np.linspace(0, 3, 40)) + rng.normal(size=(16, 1))
+    axes = plt.figure(figsize=(4, 3), layout=layout).add_subplot()
+    display = ActionModelDisplay.from_estimator(
+        ActionModel().fit(X), X, groups=[f"group {i // 2}" for i in range(16)], ax=axes
+    )
+    display.figure_.canvas.draw()
+    legend = display.axes_[0].get_legend()
+    assert sum(text.startswith("group") for text in texts(display.axes_[0])) == 8
+    assert legend.get_window_extent().y1 <= display.figure_.bbox.height
+    assert display.axes_[0].get_window_extent().height > 100
+
+
+def test_plotting_again_keeps_the_height_of_the_axes(bunch, pipe):
+    _, ax = plt.subplots()
+    display = ActionModelDisplay.from_estimator(pipe, bunch.data, features=[0], ax=ax)
+    height = ax.get_position().height
+    display.plot(ax)
+    np.testing.assert_allclose(ax.get_position().height, height)

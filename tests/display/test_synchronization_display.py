@@ -1,0 +1,169 @@
+"""SynchronizationDisplay: its artists agree with the synchronizer."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+from artists import segments, texts, ys
+from matplotlib.colors import to_rgba
+from sklearn.base import clone
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
+from sklearn_motionsync import (
+    ActionModel,
+    DenseSynchronizer,
+    LinearSynchronizer,
+    to_frame,
+)
+from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay
+
+GROUPS = ["young", "old", "young", "old", "young", "old", "young", "old", "one"]
+P = 30
+
+
+def test_features_before_and_after_and_warps(bunch, pipe):
+    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, features=[2, "aspace0"])
+    points, synchronizer = pipe[:2].transform(bunch.data), pipe[2]
+    warped = synchronizer.transform(points)
+    assert len(display.axes_) == 5
+    for row, feature in enumerate([2, 0]):
+        for xy, x in zip(segments(display.before_[row]), points, strict=True):
+            np.testing.assert_array_equal(xy, np.column_stack([np.arange(len(x)), x[:, feature]]))
+        np.testing.assert_array_equal(ys(display.after_[row]), warped[:, :, feature])
+        line = display.pattern_[row]
+        np.testing.assert_array_equal(line.get_ydata(), synchronizer.pattern_[:, feature])
+        assert display.axes_[2 * row].get_ylabel() == f"aspace{feature}"
+        assert line.get_zorder() >= display.after_[row].get_zorder()
+    np.testing.assert_array_equal(ys(display.warps_), synchronizer.match(points).times)
+    low, high = display.axes_[0].get_ylim()
+    assert low <= min(x[:, 2].min() for x in points) <= max(x[:, 2].max() for x in points) <= high
+
+
+def test_title_names_the_pattern(bunch, pipe):
+    display = SynchronizationDisplay.from_estimator(pipe, bunch.data)
+    assert f"performance {pipe[2].pattern_index_}" in display.axes_[1].get_title()
+    assert display.group_means_ == [[], [], []]
+    others = [x for i, x in enumerate(bunch.data) if i != pipe[2].pattern_index_]
+    title = SynchronizationDisplay.from_estimator(pipe, others).axes_[1].get_title()
+    assert "pattern" in title
+    assert "performance" not in title
+
+
+def test_the_mean_of_each_group_is_in_front(bunch, pipe):
+    display = SynchronizationDisplay.from_estimator(
+        pipe, bunch.data, groups=np.array(GROUPS), features=[0, 2]
+    )
+    warped = pipe[:3].transform(bunch.data)
+    for row, feature in enumerate([0, 2]):
+        for name, line in zip(["young", "old", "one"], display.group_means_[row], strict=True):
+            of = np.array(GROUPS) == name
+            np.testing.assert_allclose(line.get_ydata(), warped[of][:, :, feature].mean(axis=0))
+            assert line.get_zorder() > display.after_[row].get_zorder()
+            for artist in (display.before_[row], display.after_[row], display.warps_):
+                colors = artist.get_colors()[of][:, :3]
+                assert (colors == to_rgba(line.get_color())[:3]).all()
+    assert texts(display.axes_[0]) == ["young", "old", "one"]
+
+
+def test_univariate_rows_and_tables_are_accepted(bunch):
+    rows = np.sin(np.linspace(0, 6, 25) + np.linspace(0, 1, 5)[:, np.newaxis])
+    display = SynchronizationDisplay.from_estimator(DenseSynchronizer(20).fit(rows), rows)
+    assert display.after.shape == (5, 20, 1)
+    frames = [pd.DataFrame(x[:, :2], columns=["knee", "hip"]) for x in bunch.data]
+    linear = LinearSynchronizer(20).fit(frames)
+    times = linear.match(frames).times
+    for X in (frames, to_frame(frames)):
+        for display in (
+            SynchronizationDisplay.from_estimator(linear, X, features="hip"),
+            SynchronizationDisplay.from_predictions(X, times, features="hip"),
+        ):
+            assert display.feature_names == ["hip"]
+            np.testing.assert_array_equal(display.before[2][:, 0], frames[2]["hip"])
+            np.testing.assert_array_equal(display.after[0, :, 0], linear.transform(frames)[0, :, 1])
+
+
+def test_pandas_output_is_drawn_as_arrays_are(bunch, pipe):
+    framed = clone(pipe).set_output(transform="pandas").fit(bunch.data)
+    one = SynchronizationDisplay.from_estimator(pipe, bunch.data)
+    other = SynchronizationDisplay.from_estimator(framed, bunch.data)
+    np.testing.assert_allclose(ys(one.after_[1]), ys(other.after_[1]), atol=1e-12)
+    for features in (None, ["pelvis_height"]):
+        one = ActionModelDisplay.from_estimator(pipe, bunch.data, features=features)
+        other = ActionModelDisplay.from_estimator(framed, bunch.data, features=features)
+        np.testing.assert_allclose(one.performances, other.performances, atol=1e-12)
+
+
+def test_from_predictions_draws_what_from_estimator_does(bunch, pipe):
+    points = pipe[:2].transform(bunch.data)
+    one = SynchronizationDisplay.from_estimator(pipe, bunch.data, features=1)
+    times = pipe[2].match(points).times
+    other = SynchronizationDisplay.from_predictions(
+        points, times, pattern=pipe[2].pattern_, features=1
+    )
+    np.testing.assert_array_equal(ys(one.after_[0]), ys(other.after_[0]))
+    np.testing.assert_array_equal(ys(one.warps_), ys(other.warps_))
+    np.testing.assert_array_equal(one.pattern_[0].get_ydata(), other.pattern_[0].get_ydata())
+    without = SynchronizationDisplay.from_predictions(points, times)
+    np.testing.assert_allclose(
+        without.pattern_[0].get_ydata(), pipe[2].transform(points)[:, :, 0].mean(axis=0)
+    )
+    assert "mean" in without.axes_[1].get_title()
+
+
+def test_unnamed_features_are_numbered(bunch):
+    some = FunctionTransformer(lambda X: [x[:, :3] for x in X])
+    pipe = make_pipeline(some, DenseSynchronizer(20), ActionModel()).fit(bunch.data)
+    assert SynchronizationDisplay.from_estimator(pipe, bunch.data).feature_names[0] == "x0"
+    assert ActionModelDisplay.from_estimator(pipe).feature_names == ["x0", "x1", "x2"]
+
+
+def test_axes_of_the_user(bunch, pipe):
+    figure, axes = plt.subplots(2, 2)
+    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, features=0, ax=axes[0, 1])
+    assert display.figure_ is figure
+    assert len(display.axes_) == 3
+    assert not axes[0, 1].axison
+    # The panels take the place of the divided axes.
+    figure.canvas.draw()
+    box = axes[0, 1].get_position()
+    for axis in display.axes_:
+        assert box.x0 - 1e-9 <= axis.get_position().x0 <= axis.get_position().x1 <= box.x1 + 1e-9
+    _, axes = plt.subplots(2, 1)
+    display.plot(axes, warps=False)
+    assert display.axes_ == list(axes)
+    assert display.warps_ is None
+    with pytest.raises(ValueError, match="or 3 axes, one a panel; got 2"):
+        display.plot(axes)
+    with pytest.raises(ValueError, match="one of a figure's subplots"):
+        display.plot(plt.figure().add_axes([0, 0, 1, 1]))
+
+
+def test_estimator_without_synchronizer_is_refused(bunch, pipe):
+    with pytest.raises(ValueError, match=r"no synchronizer in Pipeline; its steps are \['Dir"):
+        SynchronizationDisplay.from_estimator(pipe[:2], bunch.data)
+
+
+def test_units_of_the_synchronization_display(bunch, pipe):
+    lengths = np.array([len(x) for x in bunch.data])
+    times = pipe[2].match(pipe[:2].transform(bunch.data)).times
+    rates = np.linspace(20, 100, 9)
+    for unit, rate, ends, last in (
+        ("frames", None, lengths - 1, P - 1),
+        ("percent", None, np.full(9, 100), 100),
+        ("seconds", 50, (lengths - 1) / 50, np.median(lengths - 1) / 50),
+        ("seconds", rates, (lengths - 1) / rates, np.median((lengths - 1) / rates)),
+    ):
+        display = SynchronizationDisplay.from_estimator(
+            pipe, bunch.data, features=[0], unit=unit, frame_rate=rate
+        )
+        for path, n, end in zip(display.before_[0].get_paths(), lengths, ends, strict=True):
+            np.testing.assert_allclose(path.vertices[:, 0], np.linspace(0, end, n))
+        clock = np.linspace(0, last, P)
+        np.testing.assert_allclose(display.pattern_[0].get_xdata(), clock)
+        for path, tau in zip(display.warps_.get_paths(), times, strict=True):
+            np.testing.assert_allclose(path.vertices[:, 0], clock)
+            np.testing.assert_allclose(path.vertices[:, 1], tau * last / (P - 1))
+        labels = " ".join(axis.get_xlabel() for axis in display.axes_)
+        assert {"frames": "frame of", "percent": "% of", "seconds": "(s)"}[unit] in labels
+    with pytest.raises(ValueError, match="needs frame_rate"):
+        SynchronizationDisplay.from_estimator(pipe, bunch.data, unit="seconds")

@@ -1,0 +1,97 @@
+"""TrellisDisplay: the disparity space agrees with brute force, the image with both."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
+from sklearn_motionsync.display import TrellisDisplay
+
+
+def reachable(n_frames, width, steps, sub):
+    """The (p, d) that pinned paths within the band pass, by enumeration."""
+    forward = [{0}]
+    for _ in range(n_frames - 1):
+        forward.append(
+            {d + s - sub for d in forward[-1] for s in steps if abs(d + s - sub) <= width}
+        )
+    passed = [{0}]
+    for before in forward[-2::-1]:
+        passed.append({d for d in before if any(d + s - sub in passed[-1] for s in steps)})
+    return passed[::-1]
+
+
+@pytest.mark.parametrize(("max_rate", "sub"), [(2, 1), (3, 1), (2, 2)])
+def test_disparity_space_agrees_with_brute_force(bunch, pipe, max_rate, sub):
+    points = pipe[:2].transform(bunch.data)
+    dense = DenseSynchronizer(
+        16, cost="posture", max_rate=max_rate, subframes=sub, consensus=0, pattern=2
+    ).fit(points)
+    display = TrellisDisplay.from_estimator(dense, points, performance=5)
+    grid = np.arange((16 - 1) * sub + 1) / sub
+    base, moving = (
+        np.array([np.interp(grid, np.linspace(0, 15, len(x)), k) for k in x.T]).T
+        for x in (points[2], points[5])
+    )
+    passed = reachable(16, 4 * sub, range(max_rate * sub + 1), sub)
+    expected = np.full((16, 8 * sub + 1), np.nan)
+    for p, offsets in enumerate(passed):
+        for d in offsets:
+            difference = base[p * sub] - moving[p * sub + d]
+            expected[p, d + 4 * sub] = difference @ difference
+    np.testing.assert_allclose(display.costs, expected, atol=1e-12)
+    np.testing.assert_array_equal(display.offsets, np.arange(-4 * sub, 4 * sub + 1) / sub)
+    # The image is the space, the best path its cheapest way through, as match tells.
+    np.testing.assert_array_equal(display.image_.get_array().T.filled(np.nan), display.costs)
+    path = display.path_.get_ydata()
+    at = ((path + 4) * sub).round().astype(int)
+    rates = np.diff(np.arange(16) + path)
+    total = display.costs[np.arange(16), at].sum() + dense.mu_ * np.abs(rates - 1).sum()
+    match = dense.match([points[5]])
+    np.testing.assert_allclose(total, match.distances[0])
+    np.testing.assert_array_equal(display.warp_.get_ydata(), match.offsets[0])
+    np.testing.assert_array_equal(display.warp_.get_ydata(), path)
+
+
+def test_cells_of_the_image_are_centred_on_offsets(bunch, pipe):
+    display = TrellisDisplay.from_estimator(pipe, bunch.data, performance=1)
+    left, right, bottom, top = display.image_.get_extent()
+    assert (left, right) == (-0.5, 29.5)
+    assert (bottom, top) == (display.offsets[0] - 0.5, display.offsets[-1] + 0.5)
+    assert f"pattern {pipe[2].pattern_index_}" in display.ax_.get_xlabel()
+    assert "performance 1" in display.ax_.get_title()
+    points = pipe[:2].transform(bunch.data)
+    np.testing.assert_array_equal(display.warp_.get_ydata(), pipe[2].match(points).offsets[1])
+
+
+def test_trellis_of_the_second_synchronizer(bunch):
+    """The performances are those that the first synchronizer returns."""
+    X = [x[:, :3] for x in bunch.data]
+    linear, dense = LinearSynchronizer(25), DenseSynchronizer(20)
+    pipe = make_pipeline(linear, dense).fit(X)
+    display = TrellisDisplay.from_estimator(pipe, X, performance=4)
+    expected = TrellisDisplay.from_estimator(dense, linear.transform(X), performance=4)
+    np.testing.assert_array_equal(display.costs, expected.costs)
+    np.testing.assert_array_equal(display.warp_.get_ydata(), expected.warp_.get_ydata())
+
+
+def test_disparity_space_of_long_takes_is_subsampled(bunch, pipe, monkeypatch):
+    points = pipe[:2].transform(bunch.data)
+    whole = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
+    monkeypatch.setattr("sklearn_motionsync.matching.warper.DRAWN_CELLS", whole.costs.size // 7)
+    thin = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
+    np.testing.assert_array_equal(thin.frames, np.arange(0, 30, 3))
+    np.testing.assert_array_equal(thin.offsets, np.arange(-12, 13, 3))
+    columns = np.searchsorted(whole.offsets, thin.offsets)
+    np.testing.assert_array_equal(thin.costs, whole.costs[::3, columns])
+    np.testing.assert_array_equal(thin.path_.get_xydata(), whole.path_.get_xydata())
+    assert thin.image_.get_extent() == [-1.5, 28.5, -13.5, 13.5]
+
+
+def test_trellis_on_axes_of_the_user(bunch, pipe):
+    _, ax = plt.subplots()
+    display = TrellisDisplay.from_estimator(pipe, bunch.data, ax=ax, colorbar=False)
+    assert display.ax_ is ax
+    assert display.colorbar_ is None
+    with pytest.raises(ValueError, match="no DenseSynchronizer in LinearSynchronizer"):
+        TrellisDisplay.from_estimator(LinearSynchronizer(9).fit(bunch.data), bunch.data)
