@@ -37,7 +37,7 @@ def read(path):
 
 
 def name_of(path):
-    """sklearn_motionsync/matching/rows.py: matching.rows."""
+    """sklearn_motionsync/matching/costs.py: matching.costs."""
     parts = path.relative_to(PACKAGE).with_suffix("").parts
     return ".".join(part for part in parts if part != "__init__")
 

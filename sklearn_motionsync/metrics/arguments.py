@@ -7,7 +7,6 @@ import pandas as pd
 
 from ..inputs.collections import as_collection
 from ..inputs.numbers import as_numbers, check_finite
-from ..matching.units import exponent_of
 
 __all__ = [
     "Movements",
@@ -251,5 +250,5 @@ def _in_own_unit(array):
     exact = np.finfo(np.float64).eps
     rounding = 4 * (np.finfo(array.dtype).eps + len(array) * exact)
     values = array.astype(np.float64)
-    exponent = exponent_of(values)
+    exponent = int(np.frexp(np.abs(values).max(initial=0))[1])
     return Movements(np.ldexp(values, -exponent), exponent, rounding)

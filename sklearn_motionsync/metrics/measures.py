@@ -6,7 +6,7 @@ common clock. They may step back, as warps that others made do by rounding, or a
 
 import numpy as np
 
-from ..matching.warps import follow
+from ..matching.warps import evaluate_warps
 from .arguments import (
     as_frame_rates,
     as_keyframes,
@@ -153,7 +153,7 @@ def keyframe_error(
     lengths = as_lengths(n_frames, n_sequences)
     keyframes, pattern_keyframes = as_keyframes(keyframes, pattern_keyframes, lengths, P)
     own = (lengths[:, np.newaxis] - 1) / (P - 1)
-    landed = follow(times, np.tile(pattern_keyframes, (n_sequences, 1)))
+    landed = evaluate_warps(times, np.tile(pattern_keyframes, (n_sequences, 1)))
     errors = np.abs(landed - keyframes / own)
     if frame_rate is not None:
         with np.errstate(over="ignore"):
@@ -246,7 +246,7 @@ def inverse_consistency(times, back):
     """
     times, back = as_times(times), as_times(back, "back")
     check_same_shape(times, back, "back")
-    return float(np.abs(follow(back, times) - np.arange(times.shape[1])).mean())
+    return float(np.abs(evaluate_warps(back, times) - np.arange(times.shape[1])).mean())
 
 
 # -- helpers --------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..matching.causal import causal_velocity
-from ..matching.costs import COSTS
+from ..matching.matcher import cost_features
 from ..matching.metric import Metric, compressed
 from ..matching.warps import normalise
 
@@ -112,5 +112,5 @@ class _Part(NamedTuple):
     def compare(self, velocity, postures):
         velocity, postures = velocity[:, self.columns], postures[:, self.columns]
         if self.metric is None:
-            return COSTS[self.cost].features(postures, lambda _: velocity)
+            return cost_features(postures, self.cost, velocity=velocity)
         return self.metric.of_parts(compressed(velocity, self.metric.energy), postures)

@@ -283,7 +283,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
 
     def _course(self, mean, calibration=UNKNOWN):
         """What is followed with this mean."""
-        features = self.synchronizer_.training_.features
+        features = self.synchronizer_.features_
         width = self.smoothing * (self.n_frames_ - 1)
         compared = LiveFeatures(features, mean, _SUBFRAMES, width)
         mu = self.smoothness * float(np.square(compared.moving).sum(axis=1).mean())

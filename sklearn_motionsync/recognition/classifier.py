@@ -15,8 +15,8 @@ from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.validation import SequenceLevelMixin
-from ..matching.comparison import Comparison
 from ..matching.costs import COSTS
+from ..matching.pairwise import PairwiseDistance
 from ..model.action_model import ActionModel
 from ..model.similarity import as_codes
 from ..synchronizers.dense import DenseSynchronizer
@@ -381,7 +381,7 @@ class ActionClassifier(
         settings = {name: getattr(self, name) for name in names}
         settings["n_frames"] = int(self.n_frames)
         # Where the body is, is compared as it is, in one unit for all.
-        return [Comparison(c, normalize=c != "posture", **settings) for c in costs]
+        return [PairwiseDistance(c, normalize=c != "posture", **settings) for c in costs]
 
     # -- what is decided --------------------------------------------------------------------
 

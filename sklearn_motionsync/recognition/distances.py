@@ -8,9 +8,8 @@ from sklearn.base import BaseEstimator
 from sklearn.utils._param_validation import Interval, Options, StrOptions
 
 from ..inputs.validation import SequenceLevelMixin, check_performances
-from ..matching.comparison import BLOCK, Comparison
 from ..matching.costs import COSTS
-from ..matching.units import exponent_of
+from ..matching.pairwise import BLOCK, PairwiseDistance
 from ..matching.warps import normalise
 from ..utils.parallel import Common, Progress, run
 
@@ -138,9 +137,7 @@ def synchronization_distances(
         on_rows = both[0].kind == "rows"
         given = {"reset": False, "level": "sequence", "on_rows": on_rows}
         both.append(check_performances(reader, Y, **given))
-    exponent = max(exponent_of(x) for performances in both for x in performances)
-    exponent += exponent % 2
-    comparison = Comparison(cost, normalize=normalize, exponent=exponent, **settings)
+    comparison = PairwiseDistance(cost, normalize=normalize, **settings)
     features = [comparison.features(on_clock(some, int(n_frames))) for some in both]
     progress = Progress(reader, verbose)
     return distances_of(
@@ -170,7 +167,7 @@ def distances_of(comparison, X, Y=None, *, symmetric=True, n_jobs=None, progress
 
     Parameters
     ----------
-    comparison : Comparison
+    comparison : PairwiseDistance
     X, Y : ndarray, shape (n, P, n_features)
         Without Y, within X.
     symmetric : bool, default=True

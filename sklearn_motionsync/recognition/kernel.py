@@ -8,7 +8,6 @@ from scipy.special import log_softmax
 from sklearn.linear_model import LogisticRegression
 from sklearn.model_selection import GroupKFold
 
-from ..matching.units import exponent_of
 from .distances import distances_of, on_clock
 
 __all__ = ["MotionKernel", "deal", "decide", "learn", "threshold"]
@@ -30,7 +29,7 @@ class MotionKernel:
 
     Parameters
     ----------
-    comparisons : list of Comparison
+    comparisons : list of PairwiseDistance
     gamma : float
     summaries : bool
         Whether the last one is there.
@@ -48,8 +47,7 @@ class MotionKernel:
         **work : dict
             ``n_jobs`` and ``progress``.
         """
-        self._exponent = max(map(exponent_of, performances))
-        frames = [np.ldexp(x.astype(np.float64), -self._exponent) for x in performances]
+        frames = [x.astype(np.float64) for x in performances]
         self._centre = np.concatenate(frames).mean(axis=0)
         spread = [np.square(x - self._centre).sum(axis=1).mean() for x in frames]
         # About 1 on average, clip by clip; what does not move at all has no unit.
@@ -90,8 +88,7 @@ class MotionKernel:
         scaled = []
         for i, x in enumerate(performances):
             with np.errstate(over="ignore"):
-                x = np.ldexp(x.astype(np.float64), -self._exponent)
-                x = (x - self._centre) / self._unit
+                x = (x.astype(np.float64) - self._centre) / self._unit
             if not np.abs(x).max() < _FAR:
                 raise ValueError(
                     f"Performance {i} is more than {_FAR:.0e} times as large as the training set: "

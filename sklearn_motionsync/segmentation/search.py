@@ -245,7 +245,7 @@ def _as_pattern(pattern):
 
 def _check_synchronizer(synchronizer):
     check_is_fitted(synchronizer)
-    if synchronizer.training_.on_clock.shape[2] != synchronizer.n_features_in_:
+    if synchronizer.examples_.shape[2] != synchronizer.n_features_in_:
         raise ValueError(
             f"{type(synchronizer).__name__} was fitted on the rows of a 2-D array, all of one "
             "length, and hits differ in theirs: fit it on [row[:, np.newaxis] for row in X]."
@@ -263,23 +263,25 @@ def _check_lengths(given, takes):
 
 
 def _groups(pattern, reached, groups):
-    training = reached.synchronizer.training_
-    if len(training.durations) < 2:
+    n = len(reached.synchronizer.lengths_)
+    if n < 2:
         return None
     if groups is not None:
-        return as_codes(groups, len(training.durations))[training.kept]
+        # Those of the examples, which are evenly spaced.
+        some = np.linspace(0, n - 1, len(reached.synchronizer.examples_)).round()
+        return as_codes(groups, n)[some.astype(np.intp)]
     models = [step for step in flat_steps(pattern) if isinstance(step, ActionModel)]
     fitted = [model for model in models if hasattr(model, "groups_")]
     if not fitted:
         return None
     known, n_seen = fitted[0].groups_, fitted[0].n_samples_seen_
     # A model may have learnt of others since.
-    if len(known) == n_seen == len(training.durations):
+    if len(known) == n_seen == n:
         return known
     if len(np.unique(known)) < len(known):
         warnings.warn(
             f"The model keeps {len(known)} of {n_seen} performances, the synchronizer learnt of "
-            f"{len(training.durations)}, so that who gave these is not known, and each counts for "
+            f"{n}, so that who gave these is not known, and each counts for "
             "itself: the threshold will be too high. Give groups, one for each performance.",
             UserWarning,
             stacklevel=4,
@@ -289,7 +291,7 @@ def _groups(pattern, reached, groups):
 
 def _durations(synchronizer, durations):
     """The shortest and the longest window."""
-    known = synchronizer.training_.durations
+    known = synchronizer.lengths_
     if durations is not None:
         return max(int(durations[0]), 2), int(durations[1])
     margin = _MARGIN if len(known) > 1 else _MARGIN_OF_ONE
@@ -372,7 +374,7 @@ class Proposer(NamedTuple):
     def of(cls, synchronizer, shortest, longest):
         """The proposer of the pattern of a synchronizer, for windows of so many frames."""
         n_frames = min(synchronizer.n_frames_, _CLOCK_FRAMES)
-        features = synchronizer.training_.features.at_pace(1)
+        features = synchronizer.features_.at_pace(1)
         pattern = synchronizer.pattern_.astype(np.float64)
         base = features(features.positions([pattern], n_frames))
         how = {"max_offset": _SHARE, "max_rate": _MAX_RATE, "free": True}
@@ -467,12 +469,12 @@ class Unlikeness:
     """
 
     def __init__(self, synchronizer, groups=None, length=True):
-        training = synchronizer.training_
-        self._set_clock(training.features, synchronizer.n_frames_)
-        self._length = _Usual(training.durations) if length else np.zeros_like
-        self._usual_length = np.exp(np.log(training.durations).mean())
-        count = len(training.kept)
-        positions = self._positions(training.on_clock)
+        lengths, examples = synchronizer.lengths_, synchronizer.examples_
+        self._set_clock(synchronizer.features_, synchronizer.n_frames_)
+        self._length = _Usual(lengths) if length else np.zeros_like
+        self._usual_length = np.exp(np.log(lengths).mean())
+        count = len(examples)
+        positions = self._positions(examples)
         self._center = positions.mean(axis=(0, 1))
         energy, self._floor = energies(positions)
         if energy.max() <= self._floor:
@@ -486,7 +488,7 @@ class Unlikeness:
         self._training, self.known = positions, np.empty(0)
         if count > 1:
             self._groups = as_codes(groups, count)
-            own = training.durations[training.kept]
+            own = lengths[np.linspace(0, len(lengths) - 1, count).round().astype(np.intp)]
             self.known = self._of(positions, own, self._groups)
 
     def border(self, coverage):

@@ -2,16 +2,15 @@
 
 import numpy as np
 
-from ..matching.units import squared_distances
-from ..matching.warps import even_slices
+from ..matching.warps import normalise
 from ..utils.atomic import snapshot
 from .base import Synchronizer
 from .match import Match
 
 __all__ = ["LinearSynchronizer"]
 
-# Performances that are handled together.
-_AT_ONCE = 256
+# Performances processed at a time: bounds the memory of intermediate arrays.
+_BATCH = 256
 
 
 class LinearSynchronizer(Synchronizer):
@@ -62,9 +61,10 @@ class LinearSynchronizer(Synchronizer):
         return self._match_in_parts(X)
 
     def _match(self, performances):
-        distances = np.empty(len(performances))
-        for rows in even_slices(len(performances), _AT_ONCE):
-            on_clock = self.normalize(performances[rows])
-            distances[rows] = squared_distances(on_clock, self.pattern_)
+        arrays, distances = list(performances), np.empty(len(performances))
+        for start in range(0, len(arrays), _BATCH):
+            rows = slice(start, start + _BATCH)
+            differences = normalise(arrays[rows], self.n_frames_) - self.pattern_
+            distances[rows] = np.square(differences).sum(axis=(1, 2), dtype=np.float64)
         clock = np.arange(self.n_frames_, dtype=np.float64)
-        return Match(np.tile(clock, (len(performances), 1)), distances)
+        return Match(np.tile(clock, (len(arrays), 1)), distances)

@@ -12,10 +12,9 @@ from sklearn.utils._param_validation import Interval
 from ..body.parts import parts_of_names, parts_of_postures
 from ..inputs.features import choose_features
 from ..inputs.validation import names_of_input
-from ..matching.matcher import Matcher
-from ..matching.rows import Coupling
-from ..matching.warper import Warper
-from ..matching.warps import follow, normalise
+from ..matching.matcher import Matcher, Warper
+from ..matching.trellis import Coupling
+from ..matching.warps import evaluate_warps, normalise
 from ..utils.atomic import snapshot
 from ..utils.parallel import run
 from .dense import DenseSynchronizer
@@ -304,7 +303,7 @@ n_features_in_, feature_names_in_
 
 def _warps_of_bodies(warper, chosen):
     """The body's warps of the pattern and its exemplars, of which the first keeps its own pace."""
-    times = warper.warps(warper.matcher.features.unit(chosen), np.s_[:])[1]
+    times = warper.warps(warper.matcher.features.unit(chosen))[1]
     times[0] = np.arange(times.shape[1])
     return times
 
@@ -446,19 +445,18 @@ class PartWarper(Warper):
         arrays = [x.astype(np.float64, copy=False) for x in arrays]
         return normalise(arrays, len(self.pattern), self.matcher.features.subframes)
 
-    def warps(self, positions, rows, body):
+    def warps(self, positions, body):
         """Distances of the direct paths to the pattern, and times ``tau``, of some performances.
 
         Parameters
         ----------
         positions : ndarray, shape (n_sequences, Q, n_features)
             Whole performances at all positions, in double precision, not in the unit.
-        rows : slice
         body : ndarray, shape (n_sequences, P)
             The warps of their bodies.
         """
-        own = self.matcher.features.unit(positions[rows][:, :, self.columns])
-        return self.voted(own, self._coupling(body[rows]))
+        own = self.matcher.features.unit(positions[:, :, self.columns])
+        return super().warps(own, self._coupling(body))
 
     def _coupling(self, body):
         """What draws the paths from all bases: from the pattern to the body's warp, and from an
@@ -467,5 +465,5 @@ class PartWarper(Warper):
         if not self.weight:
             return None
         at = np.broadcast_to(self.back[:, np.newaxis], (len(self.back), *body.shape))
-        from_bases = follow(np.broadcast_to(body, at.shape), at)
+        from_bases = evaluate_warps(np.broadcast_to(body, at.shape), at)
         return Coupling(self.weight, from_bases - np.arange(body.shape[1]))

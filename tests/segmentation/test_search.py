@@ -318,8 +318,8 @@ def test_durations_bound_the_hits(pipe):
 def test_many_training_performances_are_thinned_out():
     many = [movement(30 + i % 7, 0.9 + i / 500, 1 + i / 300) for i in range(70)]
     sync = LinearSynchronizer(30).fit(many)
-    assert len(sync.training_.kept) == 64
-    assert len(sync.training_.durations) == 70
+    assert len(sync.examples_) == 64
+    assert len(sync.lengths_) == 70
     groups = [f"person {i // 8}" for i in range(70)]
     _, origin = find_performances(sync, TAKE[:130], groups=groups, durations=(50, 75))
     np.testing.assert_allclose(spans(origin), TRUE[:1], atol=8)

@@ -5,9 +5,10 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import load_performances
-from sklearn_motionsync.matching.costs import cost_features, step_table
-from sklearn_motionsync.matching.filters import smooth
-from sklearn_motionsync.matching.refinement import choose_smoothing, curvature
+from sklearn_motionsync.matching.costs import step_table
+from sklearn_motionsync.matching.filters import choose_smoothing, smooth
+from sklearn_motionsync.matching.matcher import cost_features
+from sklearn_motionsync.matching.refinement import curvature
 from sklearn_motionsync.matching.trellis import Trellis
 
 from oracle import brute_force, plain_loops

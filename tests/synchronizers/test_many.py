@@ -18,8 +18,8 @@ from sklearn_motionsync import (
     to_frame,
 )
 from sklearn_motionsync.inputs import validation as reading
-from sklearn_motionsync.synchronizers import portions as compared
-from sklearn_motionsync.synchronizers.subsample import typical_share
+from sklearn_motionsync.synchronizers import portions
+from sklearn_motionsync.synchronizers.dense import typical_share
 
 from shift_synchronizer import ShiftSynchronizer
 
@@ -97,7 +97,7 @@ def peak_of(call):
 def test_features_that_are_not_kept_change_nothing(monkeypatch, settings, n_jobs):
     X = walks(110, 20, dtype=np.float32)
     kept = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
-    monkeypatch.setattr(compared, "KEPT_BYTES", 1000)
+    monkeypatch.setattr(portions, "CACHE_BYTES", 1000)
     made = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
     assert made.pattern_index_ == kept.pattern_index_
     assert made.mu_ == pytest.approx(kept.mu_, rel=1e-12)
@@ -107,7 +107,7 @@ def test_features_that_are_not_kept_change_nothing(monkeypatch, settings, n_jobs
 
 
 def test_a_fit_holds_one_copy_and_a_transform_its_result(monkeypatch):
-    monkeypatch.setattr(compared, "KEPT_BYTES", 1 << 20)
+    monkeypatch.setattr(portions, "CACHE_BYTES", 1 << 20)
     X = walks(4000, 20, 32, dtype=np.float32)
     sync = DenseSynchronizer(pattern=0, metric=None, refine=False, max_offset=0.05, consensus=1)
     assert peak_of(lambda: sync.fit(X)) < 2.6 * X.nbytes
@@ -163,7 +163,6 @@ def test_tables_come_out_as_from_a_list():
 BAD = {
     "gap": (np.where(np.arange(20)[:, None] == 5, np.nan, X[11]), "frame 5, feature 0 is NaN"),
     "width": (X[11][:, :2], "has 2 features a frame"),
-    "unit": (1e40 * X[11], "more than 1e\\+30 times as large"),
     "text": ([["a"] * 3] * 9, "is not a numeric array"),
     "ragged": ([[1.0, 2.0, 3.0], [1.0, 2.0]], "is not a numeric array"),
 }

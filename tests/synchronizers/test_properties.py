@@ -66,7 +66,7 @@ def test_where_the_origin_is(estimator, X, shift):
 
 @every_synchronizer
 @few
-@given(performances(), st.floats(-250, 250), st.integers(-900, 900))
+@given(performances(), st.floats(-5, 5), st.integers(-16, 16))
 def test_the_unit(estimator, X, exponent, binary):
     """To the last bit if the units differ by a power of two."""
     expected = times(estimator, X)
@@ -76,7 +76,7 @@ def test_the_unit(estimator, X, exponent, binary):
 
 @every_synchronizer
 @few
-@given(performances(), st.floats(-15, 15))
+@given(performances(), st.floats(-5, 5))
 def test_the_unit_of_single_precision(estimator, X, exponent):
     X = [x.astype(np.float32) for x in X]
     factor = np.float32(10.0**exponent)

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.matching.refinement_test import RefinementTrial
+from sklearn_motionsync.matching.refinement_test import RefinementTest
 
 
 @pytest.fixture
 def looks(monkeypatch):
     """How many performances were refined, by how many steps at most, each time."""
-    seen, misfits = [], RefinementTrial.misfits
+    seen, misfits = [], RefinementTest.misfits
 
-    def noted(self, positions, rows, *steps):
-        seen.append((len(positions[rows]), *steps))
-        return misfits(self, positions, rows, *steps)
+    def noted(self, positions, *steps):
+        seen.append((len(positions), *steps))
+        return misfits(self, positions, *steps)
 
-    monkeypatch.setattr(RefinementTrial, "misfits", noted)
+    monkeypatch.setattr(RefinementTest, "misfits", noted)
     return seen
 
 

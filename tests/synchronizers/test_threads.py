@@ -65,7 +65,7 @@ def state(estimator):
 def as_bytes(value):
     if hasattr(value, "get_params"):
         return state(value)
-    return repr(value) if isinstance(value, dict) else np.asarray(value).tobytes()
+    return repr(value) if isinstance(value, (dict, tuple)) else np.asarray(value).tobytes()
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
