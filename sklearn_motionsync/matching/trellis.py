@@ -48,7 +48,7 @@ TILE_BASES = 48
 # Fewer bases than this make thin products: a single one is better, if its row is long.
 _FEW_BASES, LONG_ROW = 8, 1024
 # Paths whose costs are added up together: intermediate arrays stay in the cache.
-_COST_BATCH = 32
+_COST_BATCH = 20
 # Samples of a single base that share one product.
 PRODUCT_ROWS = 16
 # Costs of paths that differ by less than this share of all energy are ties. Rounding to
@@ -246,7 +246,7 @@ class Trellis:
         n_rows = min(cells, TILE_BASES)
         if min(n_rows, n_bases) < _FEW_BASES and band * min(cells, n_moving) >= LONG_ROW:
             n_rows = 1
-        if n_bases <= n_rows and n_bases * n_moving <= cells:
+        if n_bases <= n_rows and 0 < n_bases * n_moving <= cells:
             return [(slice(0, n_bases), slice(0, n_moving))]
         return [
             (rows, columns)

@@ -130,6 +130,9 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         ],
     }
 
+    # Advice of the error if the training set does not fit into memory.
+    _SMALLER = "fewer frames or performances"
+
     def __init__(self, n_frames=None, pattern="median"):
         self.n_frames = n_frames
         self.pattern = pattern
@@ -137,17 +140,19 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
     @atomic_fit
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X, y=None):
-        """Choose the pattern, the performance whose clock all others will follow.
+        """Choose the pattern, the performance to whose clock all others are warped.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Performances; the rows of a 2-D array are univariate ones.
         y : ignored
+            Present for API consistency.
 
         Returns
         -------
-        self
+        self : Synchronizer
+            The fitted synchronizer.
 
         Raises
         ------
@@ -166,8 +171,8 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Memory maps, and what gives performances by index, are read in parts, once each; rows of
-            a matrix are taken into memory.
+            Performances. Memory maps, and collections that give performances by index, are read in
+            parts, once each; rows of a matrix are loaded into memory.
 
         Returns
         -------
@@ -183,12 +188,13 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
         Match
             ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
-            the pattern, both on performances linearly normalised to its length (Eq. 7), and
+            the pattern, both of performances linearly normalised to its length (Eq. 7), and
             ``distances``, shape (n_sequences,). tau is non-decreasing, ``tau(0) = 0``,
             ``tau(P-1) = P-1``.
         """
@@ -203,6 +209,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
@@ -222,6 +229,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         Returns
         -------
         ndarray of str
+            As many as the columns of the pandas output.
         """
         check_is_fitted(self)
         names = OneToOneFeatureMixin.get_feature_names_out(self, input_features)
@@ -299,8 +307,11 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
     def _number_as_given(self):
         """Number performances as given, if the fit is to a sample."""
 
-    def _set_clock(self, performances):
-        """Set the number of frames of the clock; the performances on it."""
+    def _set_clock(self, performances, subframes=1):
+        """Set the number of frames of the clock; the performances on it.
+
+        A subclass may need ``subframes`` positions a frame.
+        """
         given = self._given_pattern(performances)
         self.lengths_ = np.array([len(x) for x in performances])
         if self.n_frames is not None:
@@ -308,10 +319,11 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         else:
             self.n_frames_ = int(np.median(self.lengths_)) if given is None else len(given)
         n, width = len(performances), performances[0].shape[1]
-        n_bytes = 8 * n * self._n_positions * width
+        n_positions = (self.n_frames_ - 1) * subframes + 1
+        n_bytes = 8 * n * n_positions * width
         if n_bytes > MOST_BYTES:
             raise ValueError(
-                f"{n} performances at {self._n_positions} positions of a clock of "
+                f"{n} performances at {n_positions} positions of a clock of "
                 f"{self.n_frames_} frames take {n_bytes / 2**30:.0f} GB several times over; "
                 f"{MOST_BYTES / 2**30:.0f} GB is the limit. Use {self._SMALLER}."
             )
@@ -321,14 +333,6 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         self.examples_ = on_clock[some]
         self.features_ = Features("velocity", 1, SMOOTHING, unit)
         return TrainingSet(performances, unit, unit(on_clock, out=on_clock), given)
-
-    # Ways to a smaller training set on the clock.
-    _SMALLER = "fewer frames or performances"
-
-    @property
-    def _n_positions(self):
-        """Positions of the clock."""
-        return self.n_frames_
 
     def _given_pattern(self, performances):
         """The pattern as an array, if that is what was given; indices are checked."""

@@ -61,32 +61,31 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     """Synchronise performances by dense matching to the median one.
 
     1. Normalise all performances linearly to ``P`` frames (Eq. 7).
-    2. Learn the metric: which features, and which combinations of them, tell the moments of the
-       action in these performances, and which are noise or style (see ``metric``).
+    2. Learn the metric: weights of features, and of combinations of them, by how reliably they
+       identify a moment of the action in these performances (see ``metric``).
     3. Match ordered pairs: dynamic programming finds the offsets Delta(p) that
        minimise the synchronisation distance ``D_{n,m}`` (Eqs. 12-17)::
 
            sum_p |x_n(p) - x_m(p + Delta(p))|^2 + mu sum_p phi(rate)
 
        with both ends pinned and the local rate between 0 and ``max_rate``. By default
-       velocities and postures in the learnt metric stand in for the points x (see ``cost``).
+       the points x are velocities and postures in the learnt metric (see ``cost``).
     4. The pattern has the smallest global distance ``C_n = sum_m D_{n,m}`` (Eq. 19): it is the
        "median" performance, among more than 100 found by a part of all matches (see ``search``).
-    5. Consensus: the time of the pattern reaches a performance straight, or by way of
-       one of ``consensus`` exemplars, typical performances of the training set; the median
-       of these routes, weighted by how alike the performances along them are, outvotes a path
+    5. Consensus: the time of the pattern reaches a performance directly, or by way of
+       one of ``consensus`` exemplars, typical performances of the training set. The median
+       of these routes, weighted by the similarity of the performances along them, outvotes a path
        that took a wrong valley. It is then smoothed.
     6. Refinement: if it helps, as it does for repeated trials of a single source, whose postures
        agree but for noise and gain, Gauss-Newton steps place every moment to a fraction of a frame.
     7. ``transform`` samples performances at ``tau(p) = p + Delta(p)`` (Eq. 18).
 
-    Most data need nothing turned. Three parameters, among the first, are worth a thought:
-    ``n_frames``, the resolution of the clock; ``refine=True``, if all are trials of a single
-    source; ``max_offset``, how far apart they can be. ``pattern`` keeps a clock that is there
-    already. The seven from ``metric`` to ``subframes`` are there for the record: they were measured
-    and set, and make it the paper's exact method,
+    The defaults suit most data. Three parameters depend on them: ``n_frames``, the resolution of
+    the clock; ``refine=True``, for trials of a single source; ``max_offset``, the largest
+    difference in timing. ``pattern`` keeps an existing clock. The defaults of the seven from
+    ``metric`` to ``subframes`` were set by measurements; the paper's exact method is
     ``DenseSynchronizer(cost="posture", max_rate=2, subframes=1, consensus=0)``. The
-    last four are for many performances and long jobs.
+    last five are for many performances and long jobs.
 
     Parameters
     ----------
@@ -99,33 +98,33 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     velocity_smoothing : "auto" or float, default="auto"
         Standard deviation of the Gaussian under which velocities are taken, as a share of the
         clip, so that it does not depend on the frame rate; beyond its ends a clip is
-        continued by its point reflection. ``"auto"``: 0.02 with a learnt metric, which knows what
-        is noise, and 0.03 without.
+        continued by its point reflection. ``"auto"``: 0.02 with a learnt metric, which weights
+        noise down, and 0.03 without.
     refine : "auto" or bool, default="auto"
-        Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and it
-        helps: on features of the training set that had no part in it (see ``refinement_``).
-        A single feature, or several that say the same, cannot tell.
+        Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and a test on
+        the training set shows that it helps, by features that had no part in it (see
+        ``refinement_``). A single feature, or correlated ones, cannot be tested.
     max_offset : "auto" or float, default="auto"
         Largest offset, as a share of ``n_frames``, in [0, 1]. ``"auto"``: 0.4 with a learnt
         metric, 0.25 without, where a wider band leads paths astray.
     metric : "learned" or None, default="learned"
-        What the velocity cost compares. ``"learned"``: velocities, compressed, and postures less
-        their own mean, weighted by how well they agree at the same moment; learnt in ``fit`` from
+        The metric of the velocity cost. ``"learned"``: of compressed velocities, and postures less
+        their own mean, weighted by their agreement at the same moment; learnt in ``fit`` from
         3 to 20 performances, and off without a vote (``consensus=0``). Distances are then pure
-        numbers. None: velocities, all directions alike. Other costs are compared as they are.
+        numbers. None: of velocities, with equal weights. Other costs have no metric.
     consensus : int, default=8
-        How many exemplars vote on a warp; 0 for the direct path only, as in the paper, which
+        Number of exemplars that vote on a warp; 0 for the direct path only, as in the paper, which
         is then neither smoothed nor, unless ``refine=True``, refined.
     warp_smoothing : float, default=0.02
         Standard deviation of the Gaussian under which the offsets are smoothed after the
-        vote, as a share of the clip. More makes smoother synchronised movements and hits
-        key moments less closely.
+        vote, as a share of the clip. A larger value gives smoother synchronised movements and
+        less accurate key moments.
     cost : {"velocity", "elastic", "posture"}, default="velocity"
-        What is compared. ``"velocity"``: how the point moves; at the local rate rho,
-        ``v_n`` with ``(0.8 + 0.2 rho) v_m``. ``"elastic"``: its velocity
-        divided by the square root of its speed, with weights that make the distance (of
-        Fisher and Rao) independent of how either sequence is timed. ``"posture"``: where the
-        point is, as in the paper.
+        The features that are compared. ``"velocity"``: the velocity of the point; at the local
+        rate rho, ``v_n`` with ``(0.8 + 0.2 rho) v_m``. ``"elastic"``: the velocity
+        divided by the square root of the speed, with weights that make the distance (of
+        Fisher and Rao) independent of the timing of either sequence. ``"posture"``: the
+        point, as in the paper.
     smoothness : float, default=0.003
         Weight of the changes of pace, a pure number: ``mu`` is ``smoothness`` times the
         mean squared norm of the compared features over the training set.
@@ -136,23 +135,23 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         Positions a frame at which a path may stand. More than 1 serves direct paths
         (``consensus=0``); the vote, its smoothing and the refinement are finer anyway.
     search : {"auto", "exhaustive", "sampled"}, default="auto"
-        How the median is found: by all matches, or by those with random references, as few as it
-        takes to be sure (see ``search_``). ``"auto"``: by all up to 100 performances.
+        The search for the median: by all matches, or by a sequential test on matches with random
+        references (see ``search_``). ``"auto"``: by all matches of up to 100 performances.
     max_fit : int, default=None
-        Of how many performances, at least 2 and drawn at random, ``fit`` learns everything: clock,
-        metric, pattern, exemplars, whether to refine. The others are not looked at, nor read if
-        ``X`` gives performances by index: a fit takes the same time and memory however many there
-        are. A pattern that is told by its index is among them. None: of all. See
+        Size of a random sample, at least 2, from which ``fit`` learns everything: clock,
+        metric, pattern, exemplars, whether to refine. The others are not checked, nor read if
+        ``X`` gives performances by index: time and memory of a fit do not depend on their number.
+        A pattern given by its index is in the sample. None: all performances. See
         ``typical_share_``.
     random_state : int, RandomState instance or None, default=0
-        Draws the references of a sampled search, and who is learnt from. The default makes equal
-        input give equal results.
+        Draws the references of a sampled search, and the sample of ``max_fit``. With the default
+        equal input gives equal results.
     n_jobs : int, default=None
-        How many jobs share the matches, in ``fit``, ``transform`` and ``match``. None means 1
+        Number of parallel jobs in ``fit``, ``transform`` and ``match``. None means 1
         unless in a ``joblib.parallel_config`` context, -1 all cores. Results are the same to the
         last bit.
     verbose : int, default=0
-        Above 0, print how far a long job is, at most once a second.
+        Above 0, print the progress of a long job, at most once a second.
 
     Attributes
     ----------
@@ -163,58 +162,60 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     n_frames_ : int
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
-        ``C_n`` of Eq. 19 of those who met all: of every performance after an exhaustive search, of
-        the best few after a sampled one; NaN for the others, and if nobody needed them. With a
-        learnt metric the search compares, where ``P`` is 1.5 times as many or more, at as many
-        frames as the smoothing of velocities leaves independent (51 by default; more for a
-        narrow band), in single precision if that tells the typical ones apart, or the data have
-        no other; sums are scaled to ``P``. Sums of the ``distances`` of `match`, at all frames, are
-        within 12 % of them on ten actions of people, and smallest for the same performance; the
-        precision makes 2e-7.
+        ``C_n`` of Eq. 19 by all matches: of every performance after an exhaustive search, of
+        the best few after a sampled one; else NaN. With a
+        learnt metric the search compares only as many frames as the smoothing of velocities leaves
+        independent (51 by default; more for a narrow band), if ``P`` is at least 1.5 times as many,
+        and in single precision, if that tells the most typical ones apart; sums are scaled to
+        ``P``. Sums of the ``distances`` of `match`, at all frames, are within 12 % of them on ten
+        actions of people, and smallest for the same performance; the precision makes 2e-7.
     certified_ : bool
-        Whether the pattern is the median of Eq. 19, as the search compares: known from all matches,
-        or because paired tests, which err with a probability of 1 % all together, rejected every
-        other performance. False if the pattern was given, or a search has spent its 150 matches a
-        performance. After a fit to a sample: whether nobody else of the sample may be more typical
-        of all.
+        Whether the pattern is the median of Eq. 19: by all matches, or because paired tests, with a
+        family-wise error rate of 1 %, rejected every other performance. False if the pattern was
+        given, or a search has spent its 150 matches a performance. After a fit to a sample: whether
+        no other performance of the sample may be more typical of all.
     n_matches_ : int
-        Matches by which the pattern and the exemplars were chosen.
+        Number of matches to choose the pattern and the exemplars.
     search_ : Bunch
-        ``n_matches``, ``certified``, as above; ``in_doubt``, how many others no test rejected;
-        ``excess``: with a probability of 99 % the pattern's ``C_n`` is at most ``1 + excess``
-        times the smallest. All are in doubt, the excess is NaN, if the pattern was given.
+        ``n_matches``, ``certified``, as above; ``in_doubt``, the number of others that no test
+        rejected; ``excess``: with a probability of 99 % the pattern's ``C_n`` is at most
+        ``1 + excess`` times the smallest. If the pattern was given, all are in doubt and the excess
+        is NaN.
     sample_ : ndarray of int
-        Indices of the performances that were learnt from: all, or ``max_fit`` of them.
-        ``global_distances_`` are those to these, NaN for all others; ``training_`` is of these.
+        Indices of the training performances: all, or ``max_fit`` of them. ``global_distances_`` are
+        sums over these, and NaN for all others; ``lengths_`` and ``examples_`` are theirs.
     typical_share_ : float
-        At most this share of all performances is more typical than the pattern: has a smaller
-        global distance. 0 if that is the certified median of all. After a fit to a sample it holds
-        with a probability of 95 % (beside the 1 % of the search), if the sample stands for all:
-        with 500 that leave no doubt it is 0.006. Distances are those of this fit, in the metric
-        of the sample. NaN if the pattern was given.
+        Upper bound of the share of all performances that are more typical than the pattern, with a
+        smaller global distance in the metric of this fit. 0 if that is the certified median of
+        all. After a fit to a random sample its confidence is 95 % (beside the 1 % of the
+        search); it is 0.006 for a sample of 500 with none in doubt. NaN if the pattern was given.
     metric_ : Bunch or None
-        What was learnt: ``share``, the part of every feature in what is compared, about 0 for
-        noise; ``energy``, its part in the plain velocities, which would be compared without a
-        metric, above 0.95 of one of several a warning; ``performances``, the indices of those it
-        was learnt from. It is learnt in single precision. None if none was learnt.
+        The learnt metric: ``share``, the share of every feature in what is compared, about 0 for
+        noise; ``energy``, its share in the velocities, which are compared without a
+        metric: above 0.95 of one of several there is a warning; ``performances``, the indices of
+        those it was learnt from. It is learnt in single precision. None without a metric.
     mu_ : float
-        The absolute weight of the changes of pace, by the frames that the search compares: within
-        1 % of that by all.
+        Absolute weight of the changes of pace, by the frames that the search compares: within
+        1 % of that by all frames.
     exemplars_ : ndarray of int
         Indices of the performances that vote.
     misfit_ : float
-        Median share of the pattern's variance that matched postures leave, smoothed so that
-        noise hardly counts; NaN unless ``refine="auto"`` finds that refining may help.
+        Median share of the variance of the pattern in the smoothed residuals of matched postures;
+        NaN unless ``refine="auto"`` finds that refining may help.
     refinement_ : Bunch
-        What was found out by ``refine="auto"``, on features that had no part in the warps:
+        The test of ``refine="auto"``, by features that had no part in the warps:
         ``ratio``, their misfit after refining by the other features to that after matching by the
-        others alone; ``p_value``, of a t test that refining does not help; both after a first
-        look if that leaves no hope; ``ratio_to_all``, to the misfit after matching by all features,
-        if that is still asked. NaN where nothing tells.
+        others alone; ``p_value``, of a t test that refining does not help; both after the first
+        pass of the test if that rejects refining; ``ratio_to_all``, to the misfit after matching by
+        all features. NaN where there is no test.
     refines_ : bool
         Whether warps are refined.
-    training_ : Bunch
-        What `find_performances` goes by, as of `Synchronizer`.
+    lengths_ : ndarray of int, shape (n_samples_fit,)
+        Numbers of frames of the training performances.
+    examples_ : ndarray, shape (min(n_samples_fit, 64), P, n_features)
+        Training performances linearly normalised: all, or 64 of them, evenly spaced.
+    features_ : callable
+        Turns postures on the clock into the features that are compared.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -224,8 +225,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     --------
     LinearSynchronizer : The baseline without matching.
     KeyframeSynchronizer : Matching by key-frames.
-    ActionModel : What the synchronised performances have in common.
-    MetricDisplay : Draws what the metric listens to, and what it takes for noise.
+    ActionModel : Mean and variation of synchronised performances.
+    MetricDisplay : Draws the weights of the features in the metric.
 
     References
     ----------
@@ -234,7 +235,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
     Examples
     --------
-    A known warp is found again. The second performance is up to 8 frames ahead in its first
+    A known warp is recovered. The second performance is up to 8 frames ahead in its first
     half, and behind in its second.
 
     >>> import numpy as np
@@ -270,6 +271,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         "n_jobs": [Integral, None],
         "verbose": ["verbose"],
     }
+
+    _SMALLER = "fewer frames, subframes or performances. Or learn from some: max_fit=1000"
 
     def __init__(
         self,
@@ -312,6 +315,21 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
     @snapshot
     def match(self, X):
+        """Match performances to the pattern: the warps of ``transform`` (Eqs. 12-17).
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+            Read in parts as by ``transform``.
+
+        Returns
+        -------
+        Match
+            ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
+            the pattern, after vote, smoothing and refinement; ``distances``, shape
+            (n_sequences,), of the direct paths: ``D_{n,m}`` of Eq. 12.
+        """
         return self._match_in_parts(X)
 
     def _match(self, performances):
@@ -334,15 +352,16 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
         performance : int, default=0
-            Which of them.
+            The index of one of them.
 
         Returns
         -------
         Bunch
             ``frames`` p and ``offsets`` d, all of them or, of long takes, evenly spaced ones;
-            ``costs`` E(p, d) of Eq. 12 at the pattern's rate, shape (n_frames, n_offsets), NaN
-            where no path that obeys Eqs. 9 and 13 can pass; ``path``, the offsets of the best
+            ``costs`` E(p, d) of Eq. 12 at rate 1, shape (n_frames, n_offsets), NaN
+            where no path passes by Eqs. 9 and 13; ``path``, the offsets of the best
             path, shape (P,), before vote, smoothing and refinement.
 
         Raises
@@ -365,12 +384,6 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
     # -- steps of a fit ---------------------------------------------------------------------
 
-    @property
-    def _n_positions(self):
-        return (self.n_frames_ - 1) * self.subframes + 1
-
-    _SMALLER = "fewer frames, subframes or performances. Or learn from some: max_fit=1000"
-
     def _check_training_set(self, X):
         some, sample, population = subsample(X, self.max_fit, self.pattern, self.random_state)
         numbers = None if sample is None else sample.tolist()
@@ -391,7 +404,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
     def _learn(self, performances):
         with self._progress(fits=True) as progress:
-            training = self._set_clock(performances)
+            training = self._set_clock(performances, self.subframes)
             positions = training.scaled
             if self.subframes > 1:
                 positions = normalise(performances, self.n_frames_, self.subframes)
@@ -480,7 +493,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
     def _choose_median(self, compare, n, rounding):
         """The median (Eq. 19), by all matches or some; or only what chooses the exemplars."""
-        wanted, population = self._wants_median, self._population
+        wanted, population = isinstance(self.pattern, str), self._population
         if not wanted and (self.consensus == 0 or n <= self.consensus):
             # None or all of the performances are exemplars.
             median = Median.unknown(n)

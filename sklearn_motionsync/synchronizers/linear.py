@@ -16,8 +16,8 @@ _BATCH = 256
 class LinearSynchronizer(Synchronizer):
     """Linear normalisation (Eq. 7): the same number of frames, no matching.
 
-    The baseline that every other synchronizer is held against: each performance is
-    stretched evenly to ``n_frames``; the pattern only serves as reference.
+    The baseline of all other synchronizers: each performance is stretched evenly to
+    ``n_frames``; the pattern is only the reference of the distances.
 
     Parameters
     ----------
@@ -40,6 +40,12 @@ class LinearSynchronizer(Synchronizer):
         ``C_n`` of Eq. 19 for every performance; NaN if the pattern was given.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
+    lengths_ : ndarray of int, shape (n_sequences,)
+        Numbers of frames of the training performances.
+    examples_ : ndarray, shape (min(n_sequences, 64), P, n_features)
+        Training performances linearly normalised: all, or 64 of them, evenly spaced.
+    features_ : callable
+        Turns postures on the clock into the features that searches compare.
     feature_names_in_ : ndarray of str
         Names of the features; only if the input had names.
 
@@ -58,6 +64,18 @@ class LinearSynchronizer(Synchronizer):
 
     @snapshot
     def match(self, X):
+        """Match performances to the pattern without any warp.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+
+        Returns
+        -------
+        Match
+            Offsets of 0, and ``distances``, shape (n_sequences,): squared ones to the pattern.
+        """
         return self._match_in_parts(X)
 
     def _match(self, performances):

@@ -71,6 +71,10 @@ class TrainingPortions:
         portions = [(bases, moving, x) for x in self._batches(tiles, size, n_moving > n_bases)]
         name = f"comparing {n_bases} with {n_moving} performances"
         step = progress.stage(name, len(portions))
+        if len(portions) == 1:
+            yield from on_one_thread(self.distances, *portions[0])
+            step()
+            return
         jobs = {"n_jobs": n_jobs, "prefer": "threads", "step": step}
         for blocks in run(TrainingPortions.distances, portions, common=(self.common,), **jobs):
             yield from blocks
