@@ -144,7 +144,7 @@ def warp_in_portions(warper, arrays, *along, n_jobs, progress, name):
         found = on_one_thread(warper.warps, warper.positions(arrays), *along)
         step()
         return found
-    portions = _Portions(slices, lambda rows: (_Arrays(arrays[rows]), *(x[rows] for x in along)))
+    portions = [(_Arrays(arrays[rows]), *(x[rows] for x in along)) for rows in slices]
     distances, times = np.empty(len(arrays)), np.empty((len(arrays), len(warper.pattern)))
     results = run(_warps, portions, common=(Common(warper),), n_jobs=n_jobs, step=step)
     for rows, (lengths, warps) in zip(slices, results, strict=True):
@@ -152,21 +152,8 @@ def warp_in_portions(warper, arrays, *along, n_jobs, progress, name):
     return distances, times
 
 
-class _Portions:
-    """Portions that are made one after the other: not all of them are in memory at once."""
-
-    def __init__(self, slices, make):
-        self._slices, self._make = slices, make
-
-    def __len__(self):
-        return len(self._slices)
-
-    def __iter__(self):
-        return map(self._make, self._slices)
-
-
 class _Arrays(list):
-    """Arrays that are sent to another process as one."""
+    """Arrays that are sent to another process as one, made when they are sent."""
 
     def __reduce__(self):
         return _split, (np.concatenate(self), [len(x) for x in self])

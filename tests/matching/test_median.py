@@ -195,16 +195,6 @@ def test_excess_and_doubt_hold(kind):
         assert certified == 0
 
 
-def test_regression_on_coordinates_spares_matches():
-    n = 1000
-    for seed in range(3):
-        distances = cloud(n, np.random.default_rng(seed), size=3, noise=0.0)
-        median = search(distances, seed)
-        assert median.certified
-        assert median.index == distances.sum(axis=1).argmin()
-        assert median.n_matches < 36 * n
-
-
 # -- the paired tests ----------------------------------------------------------------------
 
 

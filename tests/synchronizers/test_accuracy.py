@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.costs import COSTS, step_table
-from sklearn_motionsync.matching.filters import choose_smoothing, smooth
+from sklearn_motionsync.matching.filters import choose_smoothing
 from sklearn_motionsync.matching.matcher import cost_features
 from sklearn_motionsync.matching.refinement import curvature
 from sklearn_motionsync.matching.trellis import Trellis
@@ -105,19 +105,6 @@ def test_elastic_distance_equals_fdasrsf():
     assert 0.97 * 0.7169 < found < 0.7169
 
 
-def test_velocity_does_not_depend_on_the_frame_rate():
-    t = [np.linspace(0, 1, n) for n in (100, 400)]
-    slow, fast = (LinearSynchronizer(100).fit_transform([curve(s)])[0] for s in t)
-    a, b = (cost_features(x[np.newaxis], "velocity") for x in (slow, fast))
-    np.testing.assert_allclose(a, b, atol=0.01 * np.abs(b).max())
-
-
-def test_velocity_at_the_ends_is_that_of_a_straight_line():
-    line = np.linspace(0, 50, 51)[np.newaxis, :, np.newaxis] * [1.0, -2.0]
-    np.testing.assert_allclose(cost_features(line, "velocity")[0], [[1, -2]] * 51, rtol=1e-3)
-    np.testing.assert_allclose(smooth(line, 2.0), line, atol=1e-10)
-
-
 @pytest.mark.parametrize("n_frames", [5, 6, 30])
 def test_curvature_equals_the_sum_of_squared_second_differences(n_frames):
     """With pinned ends: tau' A tau + 2 b' tau + a constant, A as an upper band."""
@@ -193,14 +180,6 @@ def test_smoothing_increases_with_the_noise():
 
 def test_people_of_little_style_are_refined(bending_aspace):
     assert DenseSynchronizer(P).fit(bending_aspace).refines_
-
-
-def test_two_trials_of_a_single_source_are_enough():
-    """One pair, no noise: the example of the docstring."""
-    t = np.linspace(0, 1, 101)
-    phase = t + 0.08 * np.sin(2 * np.pi * t)
-    X = [np.column_stack([np.cos(4 * s), np.sin(4 * s)]) for s in (t, phase)]
-    assert DenseSynchronizer(pattern=0).fit(X).refines_
 
 
 def test_correlated_features_are_not_refined():

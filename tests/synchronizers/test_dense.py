@@ -106,14 +106,6 @@ def test_pattern_by_index_or_array(estimator, warps):
     assert by_list.pattern_.shape == (20, 3)
 
 
-@pytest.mark.parametrize("estimator", BOTH)
-def test_one_performance_is_its_own_median(estimator, warps):
-    sync = estimator().fit(warps[:1])
-    assert sync.pattern_index_ == 0
-    np.testing.assert_allclose(sync.global_distances_, [0], atol=1e-9)
-    np.testing.assert_array_equal(sync.transform(warps[:1])[0], warps[0])
-
-
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_identical_performances(dtype):
     """Rounding must not decide between performances that are the same."""
