@@ -31,8 +31,8 @@ from sklearn_motionsync import (
     __version__,
 )
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.matching.costs import cost_features
 from sklearn_motionsync.matching.filters import SMOOTHING, smooth
+from sklearn_motionsync.matching.matcher import cost_features
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error, timing_error
 
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}

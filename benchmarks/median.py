@@ -16,7 +16,7 @@ import numpy as np
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import load_performances, make_bending
 from sklearn_motionsync.matching.matcher import Features, Matcher
-from sklearn_motionsync.matching.median import search_median
+from sklearn_motionsync.matching.median import sampled_median
 from sklearn_motionsync.matching.units import Unit
 
 PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0, "max_offset": 0.25}
@@ -117,7 +117,7 @@ def searched(distances):
         yield slice(None), slice(None), distances[np.ix_(bases, moving)]
 
     for seed in range(SEARCHES):
-        median = search_median(compare, n, 0.0, np.random.RandomState(seed))
+        median = sampled_median(compare, n, 0.0, np.random.RandomState(seed))
         hit, excess = median.index == sums.argmin(), sums[median.index] / sums.min() - 1
         wrong = median.certified and not hit
         matches = median.n_matches / n

@@ -31,8 +31,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.matching.costs import step_table
-from sklearn_motionsync.matching.rows import Bases
-from sklearn_motionsync.matching.trellis import Trellis
+from sklearn_motionsync.matching.trellis import Bases, Trellis
 
 HERE = Path(__file__).resolve().parent
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
@@ -120,8 +119,8 @@ class Recurrence:
 
 def products(trellis, X):
     """The matrix products of all pairs, and nothing else."""
-    for _, _, bundle in trellis.bundles(Bases(trellis, X), X):
-        for _ in bundle.costs_of_samples(0, X.shape[1], *trellis.windows(X.shape[1])):
+    for _, _, tile in trellis.tiles_of(Bases(trellis, X), X):
+        for _ in tile.costs_of_samples(0, X.shape[1], *trellis.windows(X.shape[1])):
             pass
 
 

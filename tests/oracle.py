@@ -5,6 +5,30 @@ import itertools
 
 import numpy as np
 
+# Of every cost of the package: b, g and phi of a step at the local rate rho, as in docs/method.md,
+# and the features at every position, given subframes and the width of the filter in positions.
+STEP_WEIGHTS = {
+    "posture": lambda rho: (1.0, 2.0, abs(rho - 1)),
+    "velocity": lambda rho: ((0.8 + 0.2 * rho) ** 2, 1.6 + 0.4 * rho, (rho - 1) ** 2),
+    "elastic": lambda rho: (rho, 2 * rho**0.5, (rho - 1) ** 2),
+}
+FEATURES = {
+    "posture": lambda x, subframes, sigma: x,
+    "velocity": lambda x, subframes, sigma: subframes * slow_filter(x, sigma, 1),
+    "elastic": lambda x, subframes, sigma: slow_roots(subframes * slow_filter(x, sigma, 1)),
+}
+
+
+def slow_roots(velocity):
+    """q = v / sqrt(|v|)."""
+    return np.array([v / np.sqrt(np.linalg.norm(v)) for v in velocity])
+
+
+def step_costs(cost, max_rate, subframes):
+    """(b, g, phi) of every admissible step."""
+    steps = range(int(max_rate * subframes) + 1)
+    return {s: STEP_WEIGHTS[cost](s / subframes) for s in steps}
+
 
 def path_cost(x, y, path, costs, mu, subframes):
     """Cost of one path of positions: the sum as it stands in the paper (Eq. 12)."""

@@ -1,23 +1,22 @@
-"""Velocities of sequences of which only the past is known.
+"""Causal matching of running sequences: velocities from the past, and rows sample by sample.
 
-A difference of two samples under two exponential filters: no sample after it has a say. It comes
-late by twice the width of a filter; what it is compared with goes through the same, and is as late.
+A velocity is the difference of two samples under two exponential filters, delayed by twice the
+width of a filter. The sequence it is compared with goes through the same filters, with the same
+delay.
 """
 
 import numpy as np
 
-from .rows import TIE, Bases, Bundle, right_factor
+from .trellis import TIE, Bases, Tile, right_factor
 
 __all__ = ["CausalDerivative", "CausalTrellis", "causal_velocity"]
 
-# Gaps longer than this, in widths of the filter, are not bridged: the filter begins anew.
+# Gaps longer than this, in widths of the filter, are not bridged: the filter restarts.
 _BRIDGED = 3
 
 
 class CausalDerivative:
-    """The velocity of streams at their last sample, sample by sample.
-
-    Before its first sample a stream has been at rest.
+    """The velocity of streams at their last sample; before their first sample they are at rest.
 
     Parameters
     ----------
@@ -30,39 +29,36 @@ class CausalDerivative:
         self._keep = float(np.exp(-1 / width)) if width > 0 else 0.0
         self._longest = max(1.0, _BRIDGED * width)
         self._last = np.full(shape, np.nan)
-        # Samples since the last was seen; what each filter holds, and of how much weight that is.
-        # Steady: everything was seen in the last sample, and has been for long.
+        # Samples since the last observation; states of both filters, and their observed weights.
+        # Steady: all features were observed in the last sample, and long enough before.
         self._steady = False
         self._age = np.zeros(shape)
-        self._held = np.zeros((2, *shape))
+        self._filtered = np.zeros((2, *shape))
         self._weight = np.ones((2, *shape))
 
     def restart(self, stream):
-        """Forget what one stream has done."""
+        """Forget the past of one stream."""
         self._last[stream], self._age[stream] = np.nan, 0
-        self._held[:, stream], self._weight[:, stream] = 0, 1
+        self._filtered[:, stream], self._weight[:, stream] = 0, 1
         self._steady = False
 
     def step(self, sample):
-        """Velocity by the sample, NaN where it is not known: (n_streams, n_features).
+        """Velocity by the sample, NaN where it is unknown: (n_streams, n_features).
 
         Parameters
         ----------
         sample : ndarray, shape (n_streams, n_features)
-            NaN where nothing was seen. Across a short gap a movement is taken to be even; after a
-            long one the filter begins with the second sample.
+            NaN where nothing was observed. Across a short gap the velocity is taken as constant;
+            after a long one the filter restarts with the second sample.
         """
         if self._steady and not np.isnan(sample).any():
             velocity = sample - self._last
-            for held in self._held:
-                held += (1 - self._keep) * (velocity - held)
-                velocity = held.copy()
+            for filtered in self._filtered:
+                filtered += (1 - self._keep) * (velocity - filtered)
+                velocity = filtered.copy()
             self._last = np.array(sample)
             return velocity
-        return self._step(sample)
-
-    def _step(self, sample):
-        """The same where something is not seen, or was not."""
+        # Some features are or were not observed.
         self._age += 1
         seen = ~np.isnan(sample)
         lost = seen & (self._age > self._longest) & ~np.isnan(self._last)
@@ -73,14 +69,13 @@ class CausalDerivative:
         difference = np.where(known & ~first, sample - self._last, 0) / gap
         keep = np.where(known, self._keep**gap, 1)
         velocity = difference
-        for held, weight in zip(self._held, self._weight, strict=True):
+        for filtered, weight in zip(self._filtered, self._weight, strict=True):
             weight *= keep
             weight += 1 - keep
-            # The mean of what has been seen; what had no weight is replaced.
-            held += np.where(weight > 0, (1 - keep) / np.where(weight > 0, weight, 1), 0) * (
-                velocity - held
-            )
-            velocity = held.copy()
+            # The weighted mean of all observations.
+            gain = np.where(weight > 0, (1 - keep) / np.where(weight > 0, weight, 1), 0)
+            filtered += gain * (velocity - filtered)
+            velocity = filtered.copy()
         self._last = np.where(seen, sample, self._last)
         self._age[seen] = 0
         self._steady = bool(seen.all() and (self._weight > 1 - 1e-12).all())
@@ -88,13 +83,13 @@ class CausalDerivative:
 
 
 def causal_velocity(positions, subframes, width):
-    """The same of a whole sequence, at every position, by the frame.
+    """Causal velocity of a whole sequence, at every position, by the frame.
 
     Parameters
     ----------
     positions : ndarray, shape (Q, n_features)
         ``subframes`` positions a frame. Every position is filtered with those whole frames before
-        it, as the samples of a stream at its pace are.
+        it, as samples of a stream are.
     subframes : int
     width : float
         Time constant in frames.
@@ -105,7 +100,7 @@ def causal_velocity(positions, subframes, width):
     """
     n_frames = -(-(len(positions) - 1) // subframes)
     behind = np.arange(n_frames + 1)[:, np.newaxis] * subframes - np.arange(subframes)
-    # Column k is k positions before whole frames; before the first position the sequence rests.
+    # Column k is k positions before whole frames; before the first position is rest.
     lanes = positions[np.clip(behind, 0, len(positions) - 1)]
     derivative = CausalDerivative(width, lanes.shape[1:])
     found = np.stack([derivative.step(sample) for sample in lanes])
@@ -115,11 +110,11 @@ def causal_velocity(positions, subframes, width):
     return out
 
 
-# -- sequences that are still running: the rows of the trellis as their samples come (Eqs. 16, 17)
+# -- the rows of the trellis, sample by sample (Eqs. 16, 17) -----------------------------------
 
 
 class CausalTrellis:
-    """Streams that are matched to a moving sequence while they run, all at the same samples.
+    """The trellis of streams against one moving sequence, row by row.
 
     Parameters
     ----------
@@ -131,20 +126,20 @@ class CausalTrellis:
     Attributes
     ----------
     n_samples : int
-        How many samples have been taken.
+        Samples so far.
     """
 
     def __init__(self, trellis, moving, n_streams=1):
         self.trellis, self.n_samples = trellis, 0
-        nothing = np.empty((n_streams, 0, moving.shape[1]), dtype=moving.dtype)
-        self._bundle = Bundle(trellis, Bases(trellis, nothing), right_factor(moving[np.newaxis]))
-        self._states = self._bundle.states(2)
-        self._energy = np.full(n_streams, self._bundle.right[:, 0, -2].sum())
+        empty = np.empty((n_streams, 0, moving.shape[1]), dtype=moving.dtype)
+        self._tile = Tile(Bases(trellis, empty), right_factor(moving[np.newaxis]))
+        self._states = self._tile.states(2)
+        self._energy = np.full(n_streams, self._tile.right[:, 0, -2].sum())
         self._rank = TIE[moving.dtype] * np.arange(trellis.width + 1.0)[:, np.newaxis]
         self._begins = np.zeros(n_streams, dtype=bool)
 
     def restart(self, stream):
-        """Let the path of one stream begin anew at its next sample."""
+        """Start a new path of one stream at its next sample."""
         self._begins[stream] = True
 
     def advance(self, samples, own=None):
@@ -154,23 +149,23 @@ class CausalTrellis:
         ----------
         samples : ndarray, shape (n_streams, n_features)
         own : dict of {tuple of int: (ndarray (n, n_features'), ndarray (Q, n_features'))}
-            Streams that see only a part of the features: of these, what is compared of the
-            sample and of the moving sequence; None where nothing is seen.
+            For streams with missing features: the observed features of their samples and of
+            the moving sequence; None where all are missing.
         """
-        bundle, p = self._bundle, self.n_samples
+        tile, p = self._tile, self.n_samples
         high = int(min(self.trellis.width, self.trellis.slopes.max() * p))
-        local = bundle.costs_of_sample(p, self._left(samples), 0, high)
+        local = tile.costs_of_sample(p, self._left(samples), 0, high)
         by_stream = local.reshape(len(local), high + 1, -1)
         self._energy += np.vecdot(samples, samples)
         for streams, parts in (own or {}).items():
             by_stream[:, :, streams] = self._costs_of_part(parts, len(streams), high)
-        bundle.take_row(self._states, p, local, 0, high)
+        tile.take_row(self._states, p, local, 0, high)
         if self._begins.any():
             unit = self.trellis.unit_group
             row = self._states[p % 2].reshape(-1, len(self._begins))
             row[:, self._begins] = np.inf
             first = by_stream[unit, 0, self._begins] - self.trellis.groups[unit].penalty
-            row[bundle.centre, self._begins] = first
+            row[self.trellis.centre, self._begins] = first
             self._begins[:] = False
         self.n_samples += 1
 
@@ -190,19 +185,17 @@ class CausalTrellis:
 
     def _last_row(self):
         row = self._states[(self.n_samples - 1) % 2].reshape(-1, len(self._energy))
-        return row[self._bundle.centre : self._bundle.centre + self.trellis.width + 1]
+        return row[self.trellis.centre : self.trellis.centre + self.trellis.width + 1]
 
     def _left(self, samples):
         return Bases(self.trellis, samples[:, np.newaxis]).by_group()[0]
 
     def _costs_of_part(self, parts, n_streams, high):
         if parts is None:
-            # Every pace is as likely as before: what is left are the penalties.
-            penalties = [group.penalty for group in self.trellis.groups]
-            return np.broadcast_to(
-                np.array(penalties)[:, np.newaxis, np.newaxis],
-                (len(penalties), high + 1, n_streams),
-            )
+            # Without an observation only the penalties remain.
+            penalties = np.array([group.penalty for group in self.trellis.groups])
+            shape = len(penalties), high + 1, n_streams
+            return np.broadcast_to(penalties[:, np.newaxis, np.newaxis], shape)
         samples, moving = parts
         right = right_factor(moving[np.newaxis])[: high + 1, 0]
         return right @ self._left(samples)

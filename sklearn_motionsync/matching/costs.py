@@ -1,13 +1,11 @@
-"""Costs: what each of them compares, and what a step of a path costs under it (Eqs. 12 and 16)."""
+"""Costs: the features that are compared, and the weights of the steps of a path (Eqs. 12, 16)."""
 
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from .filters import SMOOTHING, smooth
-
-__all__ = ["COSTS", "RATE_WEIGHT", "Cost", "StepTable", "cost_features", "step_table"]
+__all__ = ["COSTS", "RATE_WEIGHT", "Cost", "StepTable", "step_table"]
 
 # w of the velocity cost, from the measurement in docs/method.md.
 RATE_WEIGHT = 0.2
@@ -18,22 +16,25 @@ class Cost(NamedTuple):
 
     Attributes
     ----------
-    features : callable
-        ``features(postures, derive)``: what is compared at every position. ``derive(postures)``
-        are their velocities, by the frame; they are a new array.
+    of_velocity : bool
+        Whether velocities are compared: smoothed derivatives of the postures, by the frame.
+    transform : callable or None
+        Function of postures, or velocities, (n_sequences, Q, n_features) that gives the features;
+        None for the same.
     weights : callable
         ``weights(rates)``: ``b``, ``g`` and ``phi`` of `StepTable` at local rates.
     degree : int
-        With which power of the unit of the data squares of the features grow.
+        Power of the unit of the data in squares of the features.
     """
 
-    features: Callable
+    of_velocity: bool
+    transform: Callable | None
     weights: Callable
     degree: int
 
 
 class StepTable(NamedTuple):
-    """What every admissible step costs: the difference between one cost and another.
+    """The cost of every admissible step.
 
     Attributes
     ----------
@@ -56,34 +57,6 @@ class StepTable(NamedTuple):
     inner: np.ndarray
     penalty: np.ndarray
     subframes: int
-
-
-def cost_features(on_clock, cost, subframes=1, smoothing=SMOOTHING):
-    """Features of normalised sequences that a cost compares.
-
-    Parameters
-    ----------
-    on_clock : ndarray, shape (n_sequences, Q, n_features)
-        Linearly normalised sequences, ``subframes`` positions a frame.
-    cost : {"posture", "velocity", "elastic"}
-        ``"posture"``: the points themselves. ``"velocity"``: their derivative by the frame,
-        smoothed. ``"elastic"``: the velocity divided by the square root of its length, whose
-        squared distance is the Fisher-Rao distance.
-    subframes : int, default=1
-    smoothing : float, default=0.03
-        Width of the smoothing, as a share of the clip.
-
-    Returns
-    -------
-    ndarray, shape (n_sequences, Q, n_features)
-    """
-
-    def derive(postures):
-        velocity = smooth(postures, smoothing * (postures.shape[1] - 1), order=1)
-        velocity *= subframes
-        return velocity
-
-    return COSTS[cost].features(on_clock, derive)
 
 
 def step_table(cost="posture", max_rate=2, subframes=1):
@@ -125,17 +98,9 @@ def step_table(cost="posture", max_rate=2, subframes=1):
 # -- the costs ------------------------------------------------------------------------------
 
 
-def _postures(postures, derive):
-    return postures
-
-
 def _posture_weights(rates):
     ones = np.ones(len(rates))
     return ones, 2 * ones, np.abs(rates - 1)
-
-
-def _velocities(postures, derive):
-    return derive(postures)
 
 
 def _velocity_weights(rates):
@@ -143,8 +108,7 @@ def _velocity_weights(rates):
     return omega**2, 2 * omega, np.square(rates - 1)
 
 
-def _square_roots(postures, derive):
-    velocity = derive(postures)
+def _square_root_velocity(velocity):
     speed = np.linalg.norm(velocity, axis=-1, keepdims=True)
     return velocity / np.sqrt(np.maximum(speed, np.finfo(speed.dtype).tiny))
 
@@ -154,7 +118,7 @@ def _elastic_weights(rates):
 
 
 COSTS = {
-    "velocity": Cost(_velocities, _velocity_weights, 2),
-    "elastic": Cost(_square_roots, _elastic_weights, 1),
-    "posture": Cost(_postures, _posture_weights, 2),
+    "velocity": Cost(True, None, _velocity_weights, 2),
+    "elastic": Cost(True, _square_root_velocity, _elastic_weights, 1),
+    "posture": Cost(False, None, _posture_weights, 2),
 }

@@ -1,11 +1,12 @@
-"""The median performance (Eq. 19): by all matches, or by as few as it takes to be sure.
+"""The median performance (Eq. 19): by all matches, or by a sequential test on few of them.
 
-Searching among many: every performance is compared with the same few references, drawn at random;
-whoever is worse than the leader beyond doubt is out; the others meet twice as many references,
-and so on until one is left or all references are used. Differences to the leader
-are taken reference by reference, so that a reference that is far from everybody does not
-count (Baharav and Tse, "Ultra fast medoid identification via correlated sequential halving"), and
-adjusted for where the references happen to stand.
+Sequential search among many: every performance is matched with the same few references, drawn at
+random; performances that are significantly worse than the leader are rejected; the others are
+matched with twice as many references, and so on until one is left or all references are used.
+Tests are paired: differences to the leader are taken reference by reference, so that a
+reference that is far from all performances does not count (Baharav and Tse, "Ultra fast medoid
+identification via correlated sequential halving"), and adjusted by regression on the places of the
+references.
 """
 
 from typing import NamedTuple
@@ -18,23 +19,23 @@ from .warps import even_slices
 __all__ = [
     "Median",
     "estimate_distances",
+    "exhaustive_median",
     "first_smallest",
-    "median_of",
-    "rounding_of",
-    "search_median",
-    "sum_all",
+    "linear_median",
+    "rounding_bound",
+    "sampled_median",
 ]
 
-# What rounding may be of the smallest global distance.
-_SHARP = 0.01
-# Sequences that are looked at together.
-_AT_ONCE = 256
-# References of the first round: enough for a paired t test of anybody against the leader, and to
-# know where everybody stands.
+# Largest rounding, as a share of the smallest global distance, that tells distances apart.
+_LARGEST_ROUNDING = 0.01
+# Sequences processed at a time.
+_BATCH = 256
+# References of the first round: enough for a paired t test against the leader, and for the
+# coordinates of all performances.
 _REFERENCES = 32
-# Probability, at most, that any rejection in a search is an error.
+# Family-wise error rate of the rejections of a search.
 _ERROR = 0.01
-# Matches a search may spend, a performance; of them the last two, who meet all, need two.
+# Matches a search may spend, a performance; the last two performances, matched with all, need two.
 _BUDGET, _LAST = 150, 2
 
 
@@ -44,21 +45,22 @@ class Median(NamedTuple):
     Attributes
     ----------
     index : int or None
-        None if only distances were wanted.
+        None if only distances were estimated.
     distances : ndarray, shape (n_sequences,)
         ``C_n`` of Eq. 19 where all matches were made, else NaN.
     estimates : ndarray, shape (n_sequences,)
         ``C_n``, or its estimate from the matches that were made.
     certified : bool
-        Whether this is the median of Eq. 19: by all matches, or because every other performance
-        was worse in a paired test, all tests together erring with 1 % probability.
+        Whether this is the median of Eq. 19: by all matches, or because paired tests, with a
+        family-wise error rate of 1 %, rejected every other performance.
     n_matches : int
     in_doubt : int
-        How many other performances no test rejected: 0 if certified. Of a population, how many
-        may be better in all of it.
+        Number of other performances that no test rejected: 0 if certified. For a sample, of those
+        that may be more typical of the population.
     excess : float
         With 99 % probability the global distance is at most ``1 + excess`` times that of
-        the true median (of a population: in it, of the best of these); 0 if certified.
+        the true median (for a sample: in the population, of the best of the sample); 0 if
+        certified.
     """
 
     index: int | None
@@ -71,44 +73,38 @@ class Median(NamedTuple):
 
     @classmethod
     def unknown(cls, n, n_matches=0):
-        """Nobody asked which of n performances is the median."""
-        nothing = np.full(n, np.nan)
-        return cls(None, nothing, nothing, False, n_matches, n, np.nan)
+        """The result for n performances if the median is not searched for."""
+        unknown = np.full(n, np.nan)
+        return cls(None, unknown, unknown, False, n_matches, n, np.nan)
 
     def is_blurred(self, rounding):
-        """Whether rounding is as large as what tells the typical ones apart."""
-        return bool(rounding > _SHARP * self.estimates.min())
-
-    @property
-    def achieved(self):
-        """What can be said of the choice, by name."""
-        names = "n_matches", "certified", "in_doubt", "excess"
-        return {name: getattr(self, name) for name in names}
+        """Whether rounding is too large to tell the most typical performances apart."""
+        return bool(rounding > _LARGEST_ROUNDING * self.estimates.min())
 
 
-def median_of(sequences):
+def linear_median(sequences):
     """The median by squared distances of sequences on one clock, without matching.
 
     ``sum_m |x_n - x_m|^2`` is ``N |x_n - mean|^2`` and a constant, so no pair is compared.
     """
     typical, centre = sequences.mean(axis=0), sequences.mean(axis=(0, 1))
     squares, energy = np.empty(len(sequences)), 0.0
-    for rows in even_slices(len(sequences), _AT_ONCE):
+    for rows in even_slices(len(sequences), _BATCH):
         deviations = (sequences[rows] - typical).reshape(rows.stop - rows.start, -1)
         squares[rows] = np.einsum("ij,ij->i", deviations, deviations, dtype=np.float64)
         energy += np.square(sequences[rows] - centre).sum(dtype=np.float64)
     sums = len(sequences) * squares + squares.sum()
-    index = first_smallest(sums, rounding_of(sequences.dtype, energy))
+    index = first_smallest(sums, rounding_bound(sequences.dtype, energy))
     return Median(index, sums, sums, True, 0, 0, 0.0)
 
 
-def rounding_of(dtype, energy):
-    """How far rounding can move a global distance of sequences, given the sum of their squares."""
+def rounding_bound(dtype, energy):
+    """Largest rounding of a global distance of sequences, given the sum of their squares."""
     return 8 * np.finfo(dtype).eps * energy
 
 
-def sum_all(compare, n, rounding, population=None):
-    """The median by all matches.
+def exhaustive_median(compare, n, rounding, population=None):
+    """The median by all matches (Eq. 19).
 
     Parameters
     ----------
@@ -118,19 +114,19 @@ def sum_all(compare, n, rounding, population=None):
     n : int
         Number of performances.
     rounding : float
-        How far rounding can move a global distance.
+        Largest rounding of a global distance.
     population : int, default=None
-        Of how many these were drawn at random; by default these are all. Who of them is the most
-        typical of a larger one is a matter of tests, for which all distances are kept.
+        Size of the population of which these are a random sample; by default these are all. The
+        median of a larger population needs tests, for which all distances are stored.
     """
     if population is not None and population > n:
-        everybody = np.arange(n)
-        table = _matrix(compare, everybody, everybody)
-        race = _Race(table[:, :_REFERENCES], everybody, rounding, population)
-        race.leave(everybody, table)
+        all_indices = np.arange(n)
+        table = _matrix(compare, all_indices, all_indices)
+        search = _SequentialTests(table[:, :_REFERENCES], all_indices, rounding, population)
+        search.postpone(all_indices, table)
         sums = table.sum(axis=1)
         index = first_smallest(sums, rounding)
-        return Median(index, sums, sums, *race.outcome(index, table[index], n * n))
+        return Median(index, sums, sums, *search.outcome(index, table[index], n * n))
     sums = np.zeros(n)
     for rows, _, block in compare(np.arange(n), np.arange(n)):
         sums[rows] += block.sum(axis=1, dtype=np.float64)
@@ -138,33 +134,32 @@ def sum_all(compare, n, rounding, population=None):
 
 
 def estimate_distances(compare, n, random_state):
-    """Global distances by a few references, as for ``sum_all``; no median is chosen."""
+    """Estimates of global distances from a few references; arguments as of `exhaustive_median`."""
     references = random_state.permutation(n)[:_REFERENCES]
     table = _matrix(compare, np.arange(n), references)
-    itself = (references, np.arange(len(references)))
-    table[itself] = 0
-    met = np.full(n, len(references))
-    met[references] -= 1
-    estimates = (n - 1) * table.sum(axis=1) / np.maximum(met, 1)
+    table[references, np.arange(len(references))] = 0
+    counts = np.full(n, len(references))
+    counts[references] -= 1
+    estimates = (n - 1) * table.sum(axis=1) / np.maximum(counts, 1)
     return Median(None, np.full(n, np.nan), estimates, False, table.size, n, np.nan)
 
 
-def search_median(compare, n, rounding, random_state, population=None):
-    """The median by as few matches as it takes; parameters as for ``sum_all``."""
+def sampled_median(compare, n, rounding, random_state, population=None):
+    """The median by a sequential search; arguments as of `exhaustive_median`."""
     references = random_state.permutation(n)
     alive, seen = np.arange(n), min(_REFERENCES, n)
     table = _matrix(compare, alive, references[:seen])
-    race = _Race(table, references, rounding, population or n)
+    search = _SequentialTests(table, references, rounding, population or n)
     estimates, distances, spent = np.zeros(n), np.full(n, np.nan), table.size
     while seen < n:
-        means = race.means(alive, table)
+        means = search.means(alive, table)
         estimates[alive] = (n - 1) * means
-        keep = race.may_win(means.argmin(), alive, table)
-        # Half of what is left for one round; what the last one needs is never touched.
+        keep = search.is_in_doubt(means.argmin(), alive, table)
+        # Half of the remaining budget for one round, without the reserve of the last one.
         affordable = int(((_BUDGET - _LAST) * n - spent) / (2 * min(seen, n - seen)))
         if keep.sum() > max(affordable, _LAST):
             best = _best(np.where(keep, means, np.inf), max(affordable, _LAST), rounding / n)
-            race.leave(alive[keep & ~best], table[keep & ~best])
+            search.postpone(alive[keep & ~best], table[keep & ~best])
             keep = best
         alive, table = alive[keep], table[keep]
         more = references[seen:] if len(alive) == 1 else references[seen : 2 * seen]
@@ -172,13 +167,14 @@ def search_median(compare, n, rounding, random_state, population=None):
         spent += len(alive) * len(more)
     distances[alive] = estimates[alive] = table.sum(axis=1)
     first = first_smallest(distances[alive], rounding)
-    race.finish(alive, table)
+    if population is not None and population > n:
+        search.postpone(alive, table)
     index = int(alive[first])
-    return Median(index, distances, estimates, *race.outcome(index, table[first], spent))
+    return Median(index, distances, estimates, *search.outcome(index, table[first], spent))
 
 
 def first_smallest(values, rounding):
-    """The first index whose value is the smallest but for rounding."""
+    """The first index whose value is within rounding of the smallest."""
     return int(np.flatnonzero(values <= values.min() + rounding)[0])
 
 
@@ -190,26 +186,26 @@ def _matrix(compare, bases, moving):
 
 
 def _best(values, count, rounding):
-    """Which values are the smallest; of those that differ by rounding only the first ones."""
+    """Mask of the ``count`` smallest values; of those within rounding the first ones."""
     order = np.argsort(np.maximum(values, values.min() + rounding), kind="stable")
     return np.isin(np.arange(len(values)), order[:count])
 
 
-class _Race:
-    """Who is out, and who left undecided.
+class _SequentialTests:
+    """Rejections of a search for the median.
 
-    A test is of one of ``n`` performances, by the references of one of the rounds, against whoever
-    leads: no more than ``n`` times the rounds can harm the median, and so many share the error.
+    Tests are of one of ``n`` performances, by the references of one round, against the leader: the
+    error rate is divided (Bonferroni) by ``n`` times the number of rounds.
 
     Parameters
     ----------
     table : ndarray, shape (n, n_landmarks)
         Distances of all to the first references.
     references : ndarray of int, shape (n,)
-        In the order in which they are met.
+        In the order of their use.
     rounding : float
     population : int
-        Whose median is sought; these n are all of them, or drawn at random.
+        Size of the population; the n performances are all of it, or a random sample.
     """
 
     def __init__(self, table, references, rounding, population):
@@ -224,30 +220,25 @@ class _Race:
         """Mean distances to all others, estimated."""
         return self._tests.means(table, alive, self._references[: table.shape[1]])
 
-    def may_win(self, leader, alive, table):
-        """Which performances may still be the median of these n; the leader is a row's number."""
+    def is_in_doubt(self, leader, alive, table):
+        """Which performances may be the median of these n; the leader is a row of the table."""
         n = len(self._references)
-        out = self._least(alive[leader], table[leader], alive, table, n) > 0
+        rejected = self._lower_bounds(alive[leader], table[leader], alive, table, n) > 0
         if self._population > n:
-            self.leave(alive[out], table[out])
-        return ~out
+            self.postpone(alive[rejected], table[rejected])
+        return ~rejected
 
-    def leave(self, alive, table):
-        """These go, though nothing is proven yet."""
+    def postpone(self, alive, table):
+        """Test these performances against the median, in the population, once it is chosen."""
         self._undecided.append((alive, table))
 
-    def finish(self, alive, table):
-        """These have met all references: who is the best of them is no matter of tests."""
-        if self._population > len(self._references):
-            self.leave(alive, table)
-
     def outcome(self, index, row, n_matches):
-        """The last fields of the `Median`: how sure it is after the tests of all who left.
+        """The last fields of the `Median`, after the postponed tests.
 
         Parameters
         ----------
         index : int
-            The one that was chosen.
+            The median.
         row : ndarray, shape (n,)
             Its distances to all references.
         n_matches : int
@@ -256,59 +247,57 @@ class _Race:
         -------
         tuple (certified, n_matches, in_doubt, excess)
         """
-        least = [np.empty(0)]
+        bounds = [np.empty(0)]
         for alive, table in self._undecided:
-            others = alive != index
-            least.append(self._least(index, row, alive[others], table[others], self._population))
-        least = np.concatenate(least)
-        in_doubt, gap = int((least <= 0).sum()), max(0.0, -least.min(initial=0))
-        return in_doubt == 0, n_matches, in_doubt, self._excess(gap, row[self._references != index])
-
-    def _excess(self, gap, distances):
-        """What a gap is of the mean distance that remains if it is taken off."""
+            keep = alive != index
+            some = alive[keep], table[keep], self._population
+            bounds.append(self._lower_bounds(index, row, *some))
+        bounds = np.concatenate(bounds)
+        in_doubt, gap = int((bounds <= 0).sum()), max(0.0, -bounds.min(initial=0))
         if gap == 0:
-            return 0.0
+            return in_doubt == 0, n_matches, in_doubt, 0.0
+        distances = row[self._references != index]
         n, mean = len(self._references), distances.mean()
         if self._population > n:
             error = distances.std() * np.sqrt(1 / n - 1 / self._population)
             mean -= stdtrit(max(n - 2, 1), 1 - self._error) * error
-        return float(gap / (mean - gap)) if gap < mean else np.inf
+        excess = float(gap / (mean - gap)) if gap < mean else np.inf
+        return in_doubt == 0, n_matches, in_doubt, excess
 
-    def _least(self, leader, row, alive, table, population):
-        """By how much, at least, performances are farther from the others than the leader."""
+    def _lower_bounds(self, leader, row, alive, table, population):
+        """Lower confidence bounds of the mean differences of performances to the leader."""
         seen = table.shape[1]
-        met = self._references[:seen]
-        found = self._tests.against(leader, row[:seen], table, alive, met, population)
-        doubt = stdtrit(found.freedom, 1 - self._error) * found.error
-        return found.mean - doubt - self._rounding
+        references = self._references[:seen]
+        found = self._tests.against(leader, row[:seen], table, alive, references, population)
+        return found.mean - stdtrit(found.freedom, 1 - self._error) * found.error - self._rounding
 
 
-# -- paired tests of performances by what a few references say, and what is known of all others
+# -- paired tests by a few references, adjusted by regression on coordinates of all performances
 
-# Where a performance stands: at most so many coordinates, and so many references for each.
+# Most coordinates of a performance, and references for each of them.
 _COORDINATES, _EACH = 16, 8
 # Coordinates of less than this share of the largest are rounding.
 _SMALLEST = 1e-4
-# Beyond quartiles by so many times what lies between them, distances count as equally far.
+# Distances are clipped at so many interquartile ranges beyond the quartiles.
 _FENCE = 3
-# References that vary by less than this share of all tell nothing of a coordinate.
+# Smallest variation of a coordinate among the references, as a share of that among all.
 _VARIES = 0.1
-# What a residual tells of the doubt where the fit is free to go through the point.
-_FREE = 1e-3
-# Where performances stand tells nothing if some are so much farther away than the references
-# (mean squares): too few of them are met.
+# Smallest 1 - leverage of a residual.
+_LEAST_FREE = 1e-3
+# Coordinates are not used if the mean square distance of all performances is so many times that of
+# the references: too few of the distant ones are among these.
 _BEYOND = 2
-# Performances that are tested together: what is kept meanwhile stays small.
+# Performances tested at a time: bounds the memory of intermediate arrays.
 _ROWS = 1024
 
 
-class PairedComparison(NamedTuple):
-    """How much farther performances are from all others than the leader is.
+class PairedDifferences(NamedTuple):
+    """Differences of the mean distances of performances to that of the leader.
 
     Attributes
     ----------
     mean : ndarray, shape (n_alive,)
-        Mean difference to the leader over all others, estimated.
+        Estimated mean difference over all others.
     error : ndarray, shape (n_alive,)
         Its standard error; infinite if there are too few references.
     freedom : ndarray of int, shape (n_alive,)
@@ -328,21 +317,20 @@ class PairedTests:
     table : ndarray, shape (n, n_landmarks)
         Distances of all performances to some of them.
     landmarks : ndarray of int, shape (n_landmarks,)
-        Which ones, drawn at random; they are the first references, too.
+        Their indices, drawn at random; they are the first references, too.
     """
 
     def __init__(self, table, landmarks):
         self.n = len(table)
-        self.places = _places(table, landmarks)
-        # How far performances are from the others, squared: so large differences can be.
+        self.places = _coordinates(table, landmarks)
         self.sizes = np.square(table).mean(axis=1)
 
     def means(self, table, alive, references):
-        """Mean distance of performances to all n but themselves, estimated; arguments as below."""
-        return self._compared(table, alive, references)[0]
+        """Estimated mean distance of performances to all others; arguments as of `against`."""
+        return self._estimate(table, alive, references)[0]
 
     def against(self, leader, row, table, alive, references, population):
-        """Performances against a leader, all differences taken reference by reference.
+        """Estimate the differences of performances to a leader, reference by reference.
 
         Parameters
         ----------
@@ -352,35 +340,34 @@ class PairedTests:
         table : ndarray, shape (n_alive, n_references)
             Those of the performances.
         alive : ndarray of int, shape (n_alive,)
-            Which performances.
+            Indices of the performances.
         references : ndarray of int, shape (n_references,)
-            Which references, drawn at random without replacement. Neither the leader nor a
+            Indices of the references, drawn at random without replacement. Neither the leader nor a
             performance is its own reference.
         population : int
-            The others they are compared with: all n, or more, of which these n were drawn.
+            Size of the population: n, or more if the n are a random sample.
 
         Returns
         -------
-        Comparison
+        PairedDifferences
         """
         others = references != leader
         differences = table[:, others] - row[others]
-        return PairedComparison(
-            *self._compared(differences, alive, references[others], leader, population)
-        )
+        found = self._estimate(differences, alive, references[others], leader, population)
+        return PairedDifferences(*found)
 
-    def _compared(self, table, alive, references, leader=None, population=None):
+    def _estimate(self, table, alive, references, leader=None, population=None):
         if len(references) < 3 or len(alive) == 0:
             few = len(alive)
             return np.zeros(few), np.full(few, np.inf), np.ones(few, dtype=int)
-        # The doubt grows if the references happen to be less far from the others than all are.
+        # The variance is larger if the references happen to be nearer to the others than all are.
         beyond = max(1, self.sizes.mean() / (self.sizes[references].mean() or 1))
         fit = _Fit(self.places if beyond < _BEYOND else self.places[:, :0], references, leader)
         parts = [fit(table[rows], alive[rows]) for rows in even_slices(len(alive), _ROWS)]
         mean, variance, gain, spread, freedom = (
             np.concatenate(x) for x in zip(*parts, strict=True)
         )
-        # First what the references leave of the n, then what the n leave of the population.
+        # The variance of drawing the references from the n, then of the n from the population.
         variance = beyond * variance * np.maximum(gain - 1 / fit.n_targets, 0)
         variance += spread * (1 / self.n - 1 / (population or self.n))
         error = np.where(freedom < 1, np.inf, np.sqrt(variance))
@@ -388,7 +375,7 @@ class PairedTests:
 
 
 class _Fit:
-    """A regression on where references stand, the same for all rows of a table."""
+    """A regression on the coordinates of the references, the same for all rows of a table."""
 
     def __init__(self, places, references, leader):
         n, count = len(places), len(references)
@@ -397,11 +384,11 @@ class _Fit:
         of = places[references]
         centre = of.mean(axis=0)
         left, size, right = np.linalg.svd(of - centre, full_matrices=False)
-        kept = size > _VARIES * np.sqrt(count)
+        used = size > _VARIES * np.sqrt(count)
         # An orthonormal basis over the references, and the coordinates of all others in it.
-        self.basis = np.column_stack([np.full(count, count**-0.5), left[:, kept]])
+        self.basis = np.column_stack([np.full(count, count**-0.5), left[:, used]])
         self.leverage = np.square(self.basis).sum(axis=1)
-        place = (places - centre) @ (right[kept].T / size[kept])
+        place = (places - centre) @ (right[used].T / size[used])
         place = np.column_stack([np.full(n, count**-0.5), place])
         total, self.n_targets = place.sum(axis=0), n - 1
         if leader is not None:
@@ -416,46 +403,46 @@ class _Fit:
         rows, columns = rows[columns >= 0], columns[columns >= 0]
         target = (self._total - self._place[alive]) / self.n_targets
         known, table = table[rows, columns], table.copy()
-        basis, left = self.basis[columns], np.maximum(1 - self.leverage[columns], _FREE)
-        found = table @ self.basis
-        # Nobody is a reference of itself: what the fit to the others says stands there.
-        fitted = np.einsum("ij,ij->i", found[rows], basis)
+        basis, left = self.basis[columns], np.maximum(1 - self.leverage[columns], _LEAST_FREE)
+        coefficients = table @ self.basis
+        # No performance is a reference of itself: there stands the fit to the other references.
+        fitted = np.einsum("ij,ij->i", coefficients[rows], basis)
         missing = known + (fitted - known) / left
-        found[rows] += (missing - known)[:, np.newaxis] * basis
+        coefficients[rows] += (missing - known)[:, np.newaxis] * basis
         table[rows, columns] = missing
         own = np.zeros(len(alive), dtype=int)
         own[rows] = 1
         freedom = self.count - self.basis.shape[1] - own
-        mean = np.einsum("ij,ij->i", target, found)
+        mean = np.einsum("ij,ij->i", target, coefficients)
         gain = np.einsum("ij,ij->i", target, target)
         gain[rows] += np.square(np.einsum("ij,ij->i", target[rows], basis)) / left
-        deviations = table - found[:, :1] * self.basis[0, 0]
+        deviations = table - coefficients[:, :1] * self.basis[0, 0]
         spread = np.square(deviations).sum(axis=1) / np.maximum(self.count - 1 - own, 1)
-        squares = np.square(table - found @ self.basis.T)
+        squares = np.square(table - coefficients @ self.basis.T)
         plain = squares.sum(axis=1) / np.maximum(freedom, 1)
         # The weights of the references in the mean, and residuals as if each were left out.
         weights = np.square(self.basis @ target.mean(axis=0))
-        outer = squares @ (weights / np.square(np.maximum(1 - self.leverage, _FREE)))
+        outer = squares @ (weights / np.square(np.maximum(1 - self.leverage, _LEAST_FREE)))
         robust = outer / weights.sum() * self.count / (self.count - own)
         return mean, np.maximum(plain, robust), gain, spread, freedom
 
 
-def _places(table, landmarks):
-    """Where performances stand: coordinates of mean 0 and variance 1, the principal ones first."""
+def _coordinates(table, landmarks):
+    """Principal coordinates of performances, of mean 0 and variance 1."""
     n, count = table.shape
     low, middle, high = np.quantile(table, [0.25, 0.5, 0.75], axis=0)
     reach = _FENCE * (high - low)
     far = np.clip(table, low - reach, high + reach) - middle
     own, columns = (landmarks, np.arange(count)), np.arange(min(count // 4, n - 1))
-    # What a landmark would be from another one at its own place: the others tell, twice over.
+    # The distance of a landmark to itself is imputed from the others, iteratively.
     far[own] = 0
     for _ in range(3):
         far -= far.mean(axis=0)
         energy, axes = np.linalg.eigh(far.T @ far)
         energy, axes = energy[::-1], axes[:, ::-1]
         far[own] = ((far[landmarks] @ axes[:, columns]) * axes[:, columns]).sum(axis=1)
-    kept = np.flatnonzero(energy > _SMALLEST**2 * max(energy[0], np.finfo(float).tiny))
-    axes = axes[:, kept[:_COORDINATES]]
+    used = np.flatnonzero(energy > _SMALLEST**2 * max(energy[0], np.finfo(float).tiny))
+    axes = axes[:, used[:_COORDINATES]]
     places = (far - far.mean(axis=0)) @ axes
     size = np.sqrt(np.square(places).mean(axis=0))
     return places / np.where(size > 0, size, 1)

@@ -1,89 +1,58 @@
 """Refinement: from a good warp to the best one for sequences of a single source.
 
-Repeated trials of one source (a machine, a neuron, one trained athlete) show the same
+Repeated trials of one source (a machine, a neuron, one trained athlete) have the same
 postures but for noise and gain, so postures can place a moment to a fraction of a frame.
-Different people do not: their postures differ by style, and following them misleads.
-``holdout`` tells which is the case.
+The postures of different people differ by style, and refining by them makes warps worse.
+``refinement_test`` decides which is the case.
 
-A feature that never moves says nothing, and one that is there twice nothing new: what is
-averaged over features is weighted by what they do, so that neither counts.
+Averages over features are weighted by their variance, and copies are discounted, so that neither
+constant features nor copies change a result.
 """
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
 
-from .filters import SMOOTHING, smooth
-from .warps import follow
+from .filters import LEAST_SIGMA, SMOOTHING, smooth
+from .warps import evaluate_warps
 
 __all__ = [
-    "MOST_STEPS",
-    "choose_smoothing",
+    "MAX_STEPS",
     "curvature",
-    "independent_frames",
-    "match_postures",
     "refine_warps",
     "slow_energy",
     "typical_energy",
 ]
 
-# How much a rate is expected to change over the whole clip, in units of the mean rate.
+# Expected change of the rate over the whole clip, in units of the mean rate.
 _RATE_CHANGE = 2.0
 # Steps end when no frame moves by more than a hundredth of one.
-MOST_STEPS = 20
+MAX_STEPS = 20
 _LONGEST_STEP = 1.5
 _SHORTEST_STEP = 0.01
-# Gains are drawn towards 1 with this share of the energy of a typical feature.
+# Gains are shrunk towards 1 by this share of the energy of a typical feature.
 _RIDGE = 0.003
-# Narrowest Gaussian that is one on a grid of frames.
-_LEAST_SIGMA = 0.35
-# The noise is measured on at most so many sequences.
-_SAMPLE = 256
-_SMOOTHINGS = (0.0, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04)
 
 
-def choose_smoothing(on_clock):
-    """Width of the smoothing that suits the noise, by generalised cross-validation.
+def slow_energy(base, moving, times):
+    """Energy of the residuals of matched postures at low frequencies: (n_sequences,).
+
+    After fitting a gain and an offset to every feature, and smoothing, which removes most noise.
 
     Parameters
     ----------
-    on_clock : ndarray, shape (n_sequences, P, n_features)
-
-    Returns
-    -------
-    float
-        Standard deviation of a Gaussian, in frames; 0 for none.
+    base : ndarray, shape (P, n_features)
+    moving : ndarray, shape (n_sequences, P, n_features)
+    times : ndarray, shape (n_sequences, P)
+        Their warps.
     """
-    n_frames = on_clock.shape[1]
-    on_clock = on_clock[:: -(-len(on_clock) // _SAMPLE)]
-    best, chosen = np.inf, 0.0
-    for sigma in (share * (n_frames - 1) for share in _SMOOTHINGS):
-        # No smoothing at all leaves no residual to judge by: a little stands in for it.
-        used = max(sigma, _LEAST_SIGMA)
-        residual = np.square(on_clock - smooth(on_clock, used)).sum(dtype=np.float64)
-        score = residual / (1 - _gaussian(used).max()) ** 2
-        if score < best:
-            best, chosen = score, sigma
-    return chosen
-
-
-def match_postures(moving, times):
-    """Postures at the times of warps: (n_sequences, P, n_features)."""
-    return follow(moving.swapaxes(1, 2), times[:, np.newaxis]).swapaxes(1, 2)
-
-
-def slow_energy(base, matched):
-    """What matched postures leave of the base's, as far as it is slow: (n_sequences,).
-
-    The energy of the residuals, after fitting a gain and an offset to every feature and smoothing:
-    noise is mostly gone.
-    """
+    matched = evaluate_warps(moving.swapaxes(1, 2), times[:, np.newaxis]).swapaxes(1, 2)
     residuals = base - _fit_gain(base[np.newaxis], matched)[0]
-    sigma = max(SMOOTHING * (len(base) - 1), _LEAST_SIGMA)
+    sigma = max(SMOOTHING * (len(base) - 1), LEAST_SIGMA)
     return np.square(smooth(residuals, sigma)).sum(axis=(1, 2))
 
 
-def refine_warps(base, moving, times, reach, noise_width=0.0, steps=MOST_STEPS):
+def refine_warps(base, moving, times, reach, noise_width=0.0, steps=MAX_STEPS):
     """Gauss-Newton steps along the tangent that bring matched postures together.
 
     Each step solves for the whole warp at once::
@@ -98,16 +67,16 @@ def refine_warps(base, moving, times, reach, noise_width=0.0, steps=MOST_STEPS):
     Parameters
     ----------
     base : ndarray, shape (P, n_features) or (n_sequences, P, n_features)
-        One for all, or one for each. Features that are 0 have no say.
+        One for all, or one for each. Features that are 0 do not count.
     moving : ndarray, shape (n_sequences, P, n_features)
     times : ndarray, shape (n_sequences, P)
-        Warps to begin with.
+        Initial warps.
     reach : float
         Largest offset, in frames.
     noise_width : float, default=0.0
-        How wide the postures were smoothed, in frames.
+        Width of the smoothing of the postures, in frames.
     steps : int, default=20
-        At most so many.
+        Largest number of steps.
 
     Returns
     -------
@@ -122,9 +91,10 @@ def refine_warps(base, moving, times, reach, noise_width=0.0, steps=MOST_STEPS):
     rounding = np.square(16 * np.finfo(base.dtype).eps) * energy / n_frames
     splines = CubicSpline(frames, moving, axis=1).c.astype(moving.dtype, copy=False)
     splines = np.ascontiguousarray(splines.transpose(2, 1, 0, 3))
-    independent = independent_frames(n_frames, noise_width)
+    # Frames of white noise that estimate a covariance as well as these under a Gaussian filter.
+    independent = n_frames / max(1, np.sqrt(2 * np.pi) * noise_width)
     refined = times.astype(np.float64)
-    active = np.arange(len(moving))
+    active, (band, border) = np.arange(len(moving)), curvature(n_frames)
     for _ in range(steps):
         own = slice(None) if len(base) == 1 else active
         values, tangents = _evaluate(splines, active, refined[active])
@@ -138,8 +108,13 @@ def refine_warps(base, moving, times, reach, noise_width=0.0, steps=MOST_STEPS):
             break
         push = np.vecdot(slope, residual)[going, 1:-1]
         stiffness = np.maximum(noise * (n_frames / _RATE_CHANGE) ** 2, 1e-9 * pull.mean(axis=1))
-        step = _solve(refined[active, 1:-1], pull, push, stiffness)
         tau = refined[active]
+        # The systems of all warps, one below the other, are a single banded one.
+        system = band[:, np.newaxis] * stiffness[:, np.newaxis]
+        system[-1] += pull
+        target = pull * tau[:, 1:-1] + push - stiffness[:, np.newaxis] * border
+        solved = solveh_banded(system.reshape(3, -1), target.ravel())
+        step = solved.reshape(pull.shape) - tau[:, 1:-1]
         tau[:, 1:-1] += np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
         refined[active] = np.maximum.accumulate(np.clip(tau, low, high), axis=1)
         active = active[np.abs(step).max(axis=1) >= _SHORTEST_STEP]
@@ -168,28 +143,12 @@ def _evaluate(splines, active, times):
     return values, tangents
 
 
-def _solve(inner, pull, push, stiffness):
-    """Steps of all warps: their systems, one below the other, are a single banded one."""
-    n_frames = inner.shape[1] + 2
-    band, border = curvature(n_frames)
-    system = band[:, np.newaxis] * stiffness[:, np.newaxis]
-    system[-1] += pull
-    target = pull * inner + push - stiffness[:, np.newaxis] * border
-    solved = solveh_banded(system.reshape(3, -1), target.ravel())
-    return solved.reshape(inner.shape) - inner
-
-
-def independent_frames(n_frames, width):
-    """So many frames tell as much of a covariance as white noise does that a Gaussian smoothed."""
-    return n_frames / max(1, np.sqrt(2 * np.pi) * width)
-
-
 def typical_energy(curves, independent=np.inf):
     """The energy of a typical feature of centred curves (n_sequences, P, n_features).
 
-    All their energy, shared among as many features as vary on their own: ``tr(C)^2 / tr(C^2)`` of
-    their covariance C. A covariance from few independent frames seems to tie features together:
-    what that adds to ``tr(C^2)`` is taken off.
+    Their total energy divided by the effective number of independent features, ``tr(C)^2 /
+    tr(C^2)`` of their covariance C. The bias of ``tr(C^2)`` from few independent frames is
+    removed.
     """
     energy = np.square(curves).sum(axis=(1, 2))
     together = np.square(np.matmul(curves.swapaxes(1, 2), curves)).sum(axis=(1, 2))
@@ -198,15 +157,8 @@ def typical_energy(curves, independent=np.inf):
     return np.maximum(unbiased, typical / 4)
 
 
-def _gaussian(sigma):
-    """Weights of a Gaussian filter."""
-    reach = int(np.ceil(4 * sigma))
-    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
-    return weights / weights.sum()
-
-
 def _fit_gain(base, matched):
-    """``g * matched + o``, and ``g``: least squares, gains drawn a little towards 1.
+    """``g * matched + o``, and ``g``: ridge regression, gains shrunk towards 1.
 
     Base and ``matched`` are (n_sequences, P, n_features), ``g`` (n_sequences, 1, n_features).
     """
@@ -214,14 +166,14 @@ def _fit_gain(base, matched):
     x, y = base - middle, matched - matched.mean(axis=1, keepdims=True)
     energy = np.square(y).sum(axis=1, keepdims=True)
     ridge = _RIDGE * typical_energy(y)[:, np.newaxis, np.newaxis]
-    # Nothing moves: any gain fits.
+    # Constant postures fit with any gain.
     ridge[ridge == 0] = 1
     gain = ((x * y).sum(axis=1, keepdims=True) + ridge) / (energy + ridge)
     return gain * y + middle, gain
 
 
 def curvature(n_frames):
-    """``sum (tau'')^2`` for free inner frames: upper band, and what the pinned ends add."""
+    """``sum (tau'')^2`` of the inner frames: its upper band, and the terms of the pinned ends."""
     band = np.zeros((3, n_frames - 2))
     band[2] = 6
     band[2, [0, -1]] = 5

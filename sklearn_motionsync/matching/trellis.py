@@ -1,6 +1,6 @@
 """Dense matching of two sequences by dynamic programming (Eqs. 12-17).
 
-NumPy only; nothing here knows scikit-learn. All sequences are already linearly
+All sequences are already linearly
 normalised (Eq. 7): a *base* ``n`` has ``P`` samples, a *moving* sequence ``m``
 has ``Q = (P - 1) * subframes + 1`` of them on the same interval. Sample ``p`` of
 the base meets position ``q = p * subframes + d`` of the moving sequence; ``d``
@@ -9,32 +9,36 @@ local rate being ``rho = s / subframes``, and costs::
 
     sum_p  |x_n(p)|^2 + b_s |x_m(q)|^2 - g_s <x_n(p), x_m(q)> + mu phi(rho)
 
-Invariants the code relies on:
+Invariants of the code:
 
 - Both ends are pinned (Eq. 9) and no step is negative. A path that leaves
   ``0 <= q < Q`` can therefore never come back, so Eq. 14's infinite cost outside
-  needs no test: whatever finite number stands there is never on a winning path.
+  needs no test: the finite numbers there are never on a winning path.
 - With free ends a path begins and ends at any disparity. The moving sequence then goes on for
   ``width`` positions at both ends, so that every cell of the band is inside: Q is
   ``(P - 1) * subframes + 1 + 2 * width``, and p meets ``q = width + p * subframes + d``.
 - A base that is still running has no clock yet: its row holds all positions of the moving
-  sequence, ``q = d`` at every p. Its begin is pinned, its end is anywhere.
-- A step looks only at the row before it. A row has no dependency inside
-  itself and is computed for all bases, disparities and moving sequences at once.
-- The sequence index is stored last, so that every window of ``q`` is one
-  contiguous slice for all moving sequences together.
+  sequence, ``q = d`` at every p. Its begin is pinned, its end is free.
+- A row ``S(p, .)`` depends on the row before it only. It is computed for all bases, disparities
+  and moving sequences of a tile at once.
+- Rows are flat, the disparity first and the pair last: the predecessors of all cells by one step
+  are one contiguous slice.
+- Local costs are matrix products of a left factor (the bases) and a right factor (the moving
+  sequences), one for each group of steps of equal weights.
 """
 
+import functools
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
+from sklearn import get_config
 
 from .costs import step_table
-from .rows import Bases, Bundle, group_steps, right_factor
 from .warps import even_slices
 
-__all__ = ["Trellis"]
+__all__ = ["TIE", "Bases", "Coupling", "Tile", "Trellis", "right_factor"]
 
 # Sizes of one tile of pairs: the matrix product of a row stays below the size from which OpenBLAS
 # packs its operands (1.0 against 0.7 ns a cell), and has enough columns. Constants, so that no
@@ -43,8 +47,42 @@ TILE_PRODUCT = 1_000_000
 TILE_BASES = 48
 # Fewer bases than this make thin products: a single one is better, if its row is long.
 _FEW_BASES, LONG_ROW = 8, 1024
-# Paths whose costs are added up together: what stands in between stays in the cache.
-_SUMMED_AT_ONCE = 32
+# Paths whose costs are added up together: intermediate arrays stay in the cache.
+_COST_BATCH = 20
+# Samples of a single base that share one product.
+PRODUCT_ROWS = 16
+# Costs of paths that differ by less than this share of all energy are ties. Rounding to
+# double precision moves them by a thousandth of it; in single precision there is no room between
+# rounding and data, so that rounding decides.
+TIE = {np.dtype(np.float64): 2.0**-40, np.dtype(np.float32): 0.0}
+# Bytes, for each group of steps, of all step costs of a tile that is small: of one base
+# and of several, whose rows take longer; and at most for all groups. Measured with one group of
+# three steps and five of one, on 68 and 100 frames: level at 1.2 MB for one base, 4 for several.
+SMALL_BYTES = 1_300_000, 3_000_000
+_MOST_BYTES = 15_000_000
+# Up to so many pairs back-tracking in Python is faster than in NumPy.
+_FEW_PAIRS = 4
+
+
+class Coupling(NamedTuple):
+    """A penalty on the distance to given offsets: the local cost of a cell grows by
+    ``weight * (d - d_given)^2``.
+
+    Attributes
+    ----------
+    weight : float
+        In squared features of a frame, by the square of a frame.
+    offsets : ndarray, shape (n_bases, n_moving, P)
+        ``d_given`` of every pair, in frames.
+    """
+
+    weight: float
+    offsets: np.ndarray
+
+    def cost(self, times):
+        """Penalties (n_bases, n_moving) of warps ``tau`` of all pairs, (n_bases, n_moving, P)."""
+        deviations = times - np.arange(times.shape[-1]) - self.offsets
+        return self.weight * np.square(deviations).sum(axis=-1)
 
 
 class Trellis:
@@ -58,8 +96,8 @@ class Trellis:
     max_disparity : int
         ``D``, the largest offset, in frames.
     free : bool, default=False
-        Whether both ends are free. Neither then costs anything: what a path pays for is the
-        samples of the base and the steps between them.
+        Whether both ends are free, at no cost: a path then pays for the samples of the base and
+        the steps between them only.
     running : bool, default=False
         Whether bases may stop at any sample and end at any position of the moving sequence, which
         has ``max_disparity * subframes + 1`` of them.
@@ -69,14 +107,14 @@ class Trellis:
         self.table, self.mu, self.free, self.running = table, mu, free, running
         self.reach = max_disparity
         self.width = max_disparity * table.subframes
-        # Where sample 0 of the base meets the moving sequence, by how many positions it moves on
-        # from sample to sample, and where paths may end.
+        # The position that sample 0 of the base meets at disparity 0, the positions from sample to
+        # sample, and the disparities at which paths may end.
         self.lead = self.width if free else 0
         self.stride = 0 if running else table.subframes
         self.ends_at = np.arange(-self.lead, (self.width if running else self.lead) + 1)
-        # By how much a step changes the disparity.
+        # The change of disparity of every step.
         self.slopes = table.steps - self.stride
-        self.groups, group_of_step = group_steps(table, mu, self.slopes)
+        self.groups, group_of_step = _group_steps(table, mu, self.slopes)
         # Of every step: its penalty, and the weights of |x_m|^2 and of the inner product.
         self.of_step = np.stack([mu * table.penalty, table.moving, table.inner])
         weights = [(group.moving, group.inner, group.penalty) for group in self.groups]
@@ -85,8 +123,9 @@ class Trellis:
         self.penalty_by_step = mu * table.penalty[self.entry_of_step]
         self.scale_by_step = table.inner[self.entry_of_step] / 2
         self.scales = bool((self.scale_by_step != 1).any())
-        # So many cells at both ends of a row hold infinity.
+        # Cells at both ends of a row that hold infinity.
         self.pad = int(np.abs(self.slopes).max())
+        self.centre = self.width + self.pad
         self.unit_group = group_of_step[table.steps == table.subframes][0]
         self._windows = {}
 
@@ -111,47 +150,7 @@ class Trellis:
         -------
         ndarray, shape (n_bases, n_moving)
         """
-        out = np.empty((len(bases), len(moving)), dtype=bases.dtype)
-        for rows, columns, bundle in self.bundles(Bases(self, bases), moving):
-            out[rows, columns] = bundle.distances()
-        return out
-
-    def paths(self, bases, moving, max_bytes=1 << 29, coupling=None):
-        """Best path for every ordered pair.
-
-        Parameters
-        ----------
-        bases : Bases, or ndarray, shape (n_bases, P, n_features)
-        moving : ndarray, shape (n_moving, Q, n_features)
-        max_bytes : int, default=2 ** 29
-            Above this the rows of the trellis are not all kept but computed twice.
-        coupling : Coupling, default=None
-            What draws the paths towards others.
-
-        Returns
-        -------
-        ndarray of int32, shape (n_bases, n_moving, P)
-            ``d(p)`` in sub-positions; pinned ends make ``d(0) = d(P-1) = 0``. It depends on the
-            pair alone: what other pairs are given changes rounding, and in double precision
-            rounding decides nothing.
-        """
-        return self.paths_and_costs(bases, moving, max_bytes, coupling)[0]
-
-    def paths_and_costs(self, bases, moving, max_bytes=1 << 29, coupling=None):
-        """The same, and what the recurrence says that they cost: (n_bases, n_moving).
-
-        That is rounded as the tile is, and not as `costs` adds it up: enough to compare paths by.
-        """
-        if not isinstance(bases, Bases):
-            bases = Bases(self, bases)
-        shape = len(bases), len(moving), bases.sequences.shape[1]
-        disparities = np.empty(shape, dtype=np.int32)
-        costs = np.empty(shape[:2], dtype=bases.sequences.dtype)
-        for rows, columns, bundle in self.bundles(bases, moving, coupling):
-            few = is_narrow(bundle)
-            found = narrow_paths(bundle) if few else bundle.paths(max_bytes)
-            disparities[rows, columns], costs[rows, columns] = found
-        return disparities, costs
+        return self.ends(bases, moving).min(axis=2)
 
     def ends(self, bases, moving):
         """Cost of the best path to every end, for every ordered pair.
@@ -162,29 +161,48 @@ class Trellis:
             The disparities ``ends_at``.
         """
         out = np.empty((len(bases), len(moving), len(self.ends_at)), dtype=bases.dtype)
-        for rows, columns, bundle in self.bundles(Bases(self, bases), moving):
-            out[rows, columns] = bundle.ends()
+        for rows, columns, tile in self.tiles_of(Bases(self, bases), moving):
+            out[rows, columns] = tile.ends()
         return out
 
-    def paths_to(self, ends, bases, moving, max_bytes=1 << 29):
-        """Best path to each of some ends, for every ordered pair.
+    def paths(self, bases, moving, max_bytes=None, coupling=None):
+        """Best path for every ordered pair.
 
         Parameters
         ----------
-        ends : array-like of int, shape (n_ends,)
-            Disparities among ``ends_at``.
-        bases, moving, max_bytes
-            As in `paths`.
+        bases : Bases, or ndarray, shape (n_bases, P, n_features)
+        moving : ndarray, shape (n_moving, Q, n_features)
+        max_bytes : int, default=None
+            Above this the rows of the trellis are not all kept but computed twice; by default half
+            of scikit-learn's ``working_memory``.
+        coupling : Coupling, default=None
 
         Returns
         -------
-        ndarray of int32, shape (n_bases, n_moving, n_ends, P)
+        ndarray of int32, shape (n_bases, n_moving, P)
+            ``d(p)`` in sub-positions; pinned ends make ``d(0) = d(P-1) = 0``. It depends on the
+            pair alone: other pairs change rounding, and in double precision rounding decides
+            nothing.
         """
-        shape = len(bases), len(moving), len(ends), bases.shape[1]
-        disparities = np.empty(shape, dtype=np.int32)
-        for rows, columns, bundle in self.bundles(Bases(self, bases), moving):
-            disparities[rows, columns] = bundle.paths(max_bytes, ends)[0]
-        return disparities
+        return self.paths_and_costs(bases, moving, max_bytes, coupling)[0]
+
+    def paths_and_costs(self, bases, moving, max_bytes=None, coupling=None):
+        """Best paths as of `paths`, and their costs by the recurrence: (n_bases, n_moving).
+
+        These costs are rounded as the tile is, other than those of `costs`: they serve to compare
+        paths.
+        """
+        if max_bytes is None:
+            max_bytes = get_config()["working_memory"] * 2**20 // 2
+        if not isinstance(bases, Bases):
+            bases = Bases(self, bases)
+        n_bases, n_frames, _ = bases.sequences.shape
+        disparities = np.empty((n_bases, len(moving), n_frames), dtype=np.int32)
+        costs = np.empty((n_bases, len(moving)), dtype=bases.sequences.dtype)
+        for rows, columns, tile in self.tiles_of(bases, moving, coupling):
+            found = tile.small_paths() if tile.is_small else tile.paths(max_bytes)
+            disparities[rows, columns], costs[rows, columns] = found
+        return disparities, costs
 
     def costs(self, base, moving, disparities):
         """Cost of given paths from one base (Eq. 12), added up frame by frame, pair by pair.
@@ -200,170 +218,495 @@ class Trellis:
         ndarray, shape (n_moving,)
         """
         out = np.empty(len(moving), dtype=moving.dtype)
-        for rows in even_slices(len(moving), _SUMMED_AT_ONCE):
-            out[rows] = self._costs(base, moving[rows], disparities[rows])
+        n_positions, n_features = moving.shape[1:]
+        diagonal = self.lead + self.stride * np.arange(len(base))
+        for start in range(0, len(moving), _COST_BATCH):
+            rows = slice(start, start + _COST_BATCH)
+            q = disparities[rows] + diagonal
+            steps = np.full_like(q, self.table.subframes)
+            np.subtract(q[:, 1:], q[:, :-1], out=steps[:, 1:])
+            q += n_positions * np.arange(len(q))[:, np.newaxis]
+            differences = moving[rows].reshape(-1, n_features).take(q, axis=0)
+            if self.scales:
+                differences *= self.scale_by_step.take(steps)[:, :, np.newaxis]
+            differences -= base
+            differences = differences.reshape(len(q), -1)
+            penalties = self.penalty_by_step.take(steps[:, 1:]).sum(axis=1)
+            out[rows] = np.vecdot(differences, differences) + penalties.astype(out.dtype)
         return out
-
-    def _costs(self, base, moving, disparities):
-        n_moving, n_positions, n_features = moving.shape
-        q = disparities + (self.lead + self.stride * np.arange(len(base)))
-        steps = np.full_like(q, self.table.subframes)
-        np.subtract(q[:, 1:], q[:, :-1], out=steps[:, 1:])
-        q += n_positions * np.arange(n_moving)[:, np.newaxis]
-        differences = moving.reshape(-1, n_features).take(q, axis=0)
-        if self.scales:
-            differences *= self.scale_by_step.take(steps)[:, :, np.newaxis]
-        differences -= base
-        differences = differences.reshape(n_moving, -1)
-        local = np.vecdot(differences, differences)
-        return local + self.penalty_by_step.take(steps[:, 1:]).sum(axis=1).astype(local.dtype)
 
     def tiles(self, n_bases, n_moving, n_features):
         """Slices of bases and of moving sequences that cover all pairs.
 
-        What a pair costs depends in its last bit on the tile it is computed in: work is
-        to be divided between tiles only.
+        The cost of a pair depends in its last bit on the tile it is computed in: jobs must share
+        whole tiles only.
         """
         band = 2 * self.width + 1
         cells = max(1, TILE_PRODUCT // (band * (n_features + 2)))
         n_rows = min(cells, TILE_BASES)
         if min(n_rows, n_bases) < _FEW_BASES and band * min(cells, n_moving) >= LONG_ROW:
             n_rows = 1
-        for rows in even_slices(n_bases, n_rows):
-            for columns in even_slices(n_moving, max(1, cells // (rows.stop - rows.start))):
-                yield rows, columns
+        if n_bases <= n_rows and 0 < n_bases * n_moving <= cells:
+            return [(slice(0, n_bases), slice(0, n_moving))]
+        return [
+            (rows, columns)
+            for rows in even_slices(n_bases, n_rows)
+            for columns in even_slices(n_moving, max(1, cells // (rows.stop - rows.start)))
+        ]
 
-    def cells(self, moving):
-        """Cells of the trellis of one pair."""
-        return (moving.shape[1] // self.table.subframes) * (2 * self.width + 1)
-
-    def bundles(self, bases, moving, coupling=None):
-        """Yield the slices of every tile of pairs, and the bundle of its rows."""
-        for rows, columns in self.tiles(len(bases), *moving.shape[::2]):
-            right = right_factor(moving[columns])
-            drawn = None if coupling is None else coupling.part(rows, columns)
-            yield rows, columns, Bundle(self, bases.part(rows), right, drawn)
+    def tiles_of(self, bases, moving, coupling=None):
+        """Yield the slices of every tile of pairs, and the tile."""
+        n_bases, n_moving = len(bases.sequences), len(moving)
+        for rows, columns in self.tiles(n_bases, n_moving, moving.shape[2]):
+            part = bases
+            if rows != slice(0, n_bases):
+                part = Bases(self, bases.sequences[rows])
+            drawn = None
+            if coupling is not None:
+                drawn = Coupling(coupling.weight, coupling.offsets[rows, columns])
+            yield rows, columns, Tile(part, right_factor(moving[columns]), drawn)
 
     def windows(self, n_frames):
         """Lowest and highest disparity, at every sample, of a path in the band."""
         if self.free:
             return [-self.width] * n_frames, [self.width] * n_frames
-        if self.running:
-            highs = np.minimum(self.width, int(self.slopes.max()) * np.arange(n_frames))
-            return [0] * n_frames, highs.tolist()
-        known = self._windows.get(n_frames)
-        if known is not None:
-            return known
         p = np.arange(n_frames)
-        down, up = self.table.subframes * p, int(self.slopes.max()) * p
-        low = -np.minimum(self.width, np.minimum(down, up[::-1]))
-        high = np.minimum(self.width, np.minimum(up, down[::-1]))
-        windows = low.tolist(), high.tolist()
-        self._windows = {n_frames: windows}
-        return windows
+        up = int(self.slopes.max()) * p
+        if self.running:
+            return [0] * n_frames, np.minimum(self.width, up).tolist()
+        if n_frames not in self._windows:
+            down = self.table.subframes * p
+            low = -np.minimum(self.width, np.minimum(down, up[::-1]))
+            high = np.minimum(self.width, np.minimum(up, down[::-1]))
+            self._windows = {n_frames: (low.tolist(), high.tolist())}
+        return self._windows[n_frames]
 
 
-# -- the same rows for so few pairs that NumPy's calls cost more than its arithmetic (Eqs. 16, 17)
+class _Group(NamedTuple):
+    """Steps of equal weights; their smallest penalty is taken out of the levels."""
 
-# Bytes, for each group of steps, of all ways into the cells of a bundle that is narrow: of one base
-# and of several, whose rows take longer; and at most for all groups. Measured with one group of
-# three steps and five of one, on 68 and 100 frames: level at 1.2 MB for one base, 4 for several.
-NARROW_BYTES = 1_300_000, 3_000_000
-_MOST_BYTES = 15_000_000
-# Pairs so few that Python's steps cost less than NumPy's.
-_FEW_PAIRS = 4
+    moving: float
+    inner: float
+    penalty: float
+    levels: list
 
 
-def is_narrow(bundle):
-    """Whether all steps of all rows of a bundle may be laid out."""
-    trellis = bundle.trellis
-    n_steps = len(trellis.table.steps)
-    consecutive = n_steps == trellis.table.steps.max() + 1
-    cells = bundle.n_frames * (2 * trellis.width + 1) * bundle.pairs
-    room = min(NARROW_BYTES[bundle.n_bases > 1] * len(trellis.groups), _MOST_BYTES)
-    few = cells * n_steps * bundle.dtype.itemsize <= room
-    return consecutive and few and not (trellis.free or trellis.running)
+def _group_steps(table, mu, slopes):
+    """Groups of steps of equal weights, and the group of every step."""
+    weights = list(zip(table.moving.tolist(), table.inner.tolist(), strict=True))
+    unique = sorted(set(weights))
+    group_of_step = np.array([unique.index(pair) for pair in weights])
+    groups = []
+    for i, (moving, inner) in enumerate(unique):
+        members = group_of_step == i
+        penalties = mu * table.penalty[members]
+        least = penalties.min()
+        levels = [
+            (value - float(least), slopes[members][penalties == value].tolist())
+            for value in sorted(set(penalties.tolist()), reverse=True)
+        ]
+        groups.append(_Group(moving, inner, float(least), levels))
+    return groups, group_of_step
 
 
-def narrow_paths(bundle):
-    """Disparities of the best paths of a bundle, (n_bases, n_moving, P), and their costs."""
-    trellis, pairs = bundle.trellis, bundle.pairs
-    ways, states = _ways(bundle), bundle.states(bundle.n_frames)
-    edge, item = trellis.pad * pairs, states.itemsize
-    # S(p - 1, d - k) of every cell, step by step.
-    before = as_strided(
-        states[:, edge + trellis.table.subframes * pairs :],
-        shape=ways.shape,
-        strides=(states.strides[0], -pairs * item, item),
-        writeable=False,
-    )
-    rows = states[:, edge : states.shape[1] - edge]
-    middle = slice(trellis.width * pairs, (trellis.width + 1) * pairs)
-    rows[0, middle] = ways[0, trellis.table.subframes, middle]
-    add, smallest = np.add, np.minimum.reduce
-    for way, last, row in zip(ways[1:], before[:-1], rows[1:], strict=True):
-        smallest(add(way, last, way), 0, None, row)
-    costs = np.maximum(rows[-1, middle], 0).reshape(-1, bundle.n_bases).T
-    return _walk(bundle, ways), costs
+# -- the two factors whose product is the local costs (Eq. 12), as rows of the trellis ---------
 
 
-def _ways(bundle):
-    """Local costs, with the penalty, of every step to every cell: (P, n_steps, cells)."""
-    trellis, right = bundle.trellis, bundle.right
-    table, width = trellis.table, trellis.width
-    n_moving, n_factors = right.shape[1:]
-    padded = np.zeros((len(right) + 2 * width, n_moving, n_factors), right.dtype)
-    padded[width : width + len(right)] = right
-    windows = as_strided(
-        padded,
-        shape=(bundle.n_frames, 1, (2 * width + 1) * n_moving, n_factors),
-        strides=(table.subframes * padded.strides[0], 0, *padded.strides[1:]),
-        writeable=False,
-    )
-    ways = np.matmul(windows, bundle.bases.by_step)
-    ways = ways.reshape(bundle.n_frames, len(table.steps), -1)
-    # The first sample is reached by no step, so it pays no penalty.
-    ways[0] -= trellis.of_step[0, trellis.entry_of_step, np.newaxis]
-    if bundle.coupling is not None:
-        for p, way in enumerate(ways):
-            way += bundle.coupled(p, -width, width)
-    return ways
+class Bases:
+    """Base sequences, and the arrays that depend on them alone.
+
+    Parameters
+    ----------
+    trellis : Trellis
+    sequences : ndarray, shape (n_bases, P, n_features)
+    """
+
+    def __init__(self, trellis, sequences):
+        self.trellis, self.sequences = trellis, sequences
+
+    def __getstate__(self):
+        # Cached arrays are neither sent to other processes nor saved.
+        return {"trellis": self.trellis, "sequences": self.sequences}
+
+    @functools.cached_property
+    def energy(self):
+        """``sum_p |x_n(p)|^2``: (n_bases,)."""
+        return np.einsum("npk,npk->n", self.sequences, self.sequences)
+
+    def by_group(self):
+        """The left factor of every group of steps. It is large for long takes: not cached."""
+        return self._left_factor(*self.trellis.of_group)
+
+    @functools.cached_property
+    def by_step(self):
+        """The left factor of every step, in order of steps, for small tiles."""
+        penalty, moving, inner = self.trellis.of_step[:, self.trellis.entry_of_step]
+        return self._left_factor(moving, inner, penalty)
+
+    def _left_factor(self, moving, inner, penalty):
+        """(P, n_groups, n_features + 2, n_bases): times the right factor, the local costs.
+
+        Given the weights of |x_m|^2 and of the inner product, and the penalty, of every group.
+        """
+        n_bases, n_frames, n_features = self.sequences.shape
+        shape = n_frames, len(moving), n_features + 2, n_bases
+        left = np.empty(shape, dtype=self.sequences.dtype)
+        energy = np.einsum("npk,npk->pn", self.sequences, self.sequences)
+        moving, inner, penalty = np.asarray([moving, inner, penalty], dtype=left.dtype)
+        frames = self.sequences.transpose(1, 2, 0)[:, np.newaxis]
+        np.multiply(frames, -inner[:, np.newaxis, np.newaxis], out=left[:, :, :-2])
+        left[:, :, -2] = moving[:, np.newaxis]
+        np.add(energy[:, np.newaxis], penalty[:, np.newaxis], out=left[:, :, -1])
+        return left
 
 
-def _walk(bundle, ways):
-    """Disparities: at each sample the first of the best steps."""
-    trellis, pairs = bundle.trellis, bundle.pairs
-    order, (n_frames, _, n_cells) = trellis.table.steps, ways.shape
-    shift = trellis.slopes * pairs
-    here = trellis.width * pairs + np.arange(pairs)
-    if pairs <= _FEW_PAIRS:
+def right_factor(moving):
+    """(Q, n_moving, n_features + 2): x_m(q), |x_m(q)|^2 and 1."""
+    n_moving, n_positions, n_features = moving.shape
+    right = np.empty((n_positions, n_moving, n_features + 2), dtype=moving.dtype)
+    right[..., :-2] = moving.transpose(1, 0, 2)
+    right[..., -2] = np.einsum("mqk,mqk->mq", moving, moving).T
+    right[..., -1] = 1
+    return right
+
+
+# -- the rows of one tile (Eqs. 16 and 17): the inner loop of the matching -----------------------
+
+
+class Tile:
+    """The pairs of one tile, whose rows are computed together.
+
+    A row holds the disparities of all pairs, flat: (2 * (width + pad) + 1, n_moving,
+    n_bases), with ``pad`` cells at both sides for the steps that leave the band.
+
+    Parameters
+    ----------
+    bases : Bases
+    right : ndarray
+        The right factor of the moving sequences.
+    coupling : Coupling, default=None
+    """
+
+    def __init__(self, bases, right, coupling=None):
+        self.trellis, self.bases, self.right = bases.trellis, bases, right
+        self.coupling = coupling
+        self.n_bases, self.n_frames = bases.sequences.shape[:2]
+        self.dtype = bases.sequences.dtype
+        self.pairs = right.shape[1] * self.n_bases
+
+    @functools.cached_property
+    def left(self):
+        """The left factor of the bases."""
+        return self.bases.by_group()
+
+    @functools.cached_property
+    def tie_breakers(self):
+        """Extra costs of steps in the back-tracking: (n_steps, n_pairs).
+
+        They increase along the step table, so that the first of equal steps wins. Two tiles that
+        hold the same pair round differently, but both far less than this.
+        """
+        energy = self.right[..., -2].sum(axis=0)[:, np.newaxis] + self.bases.energy
+        rank = np.arange(len(self.trellis.slopes), dtype=self.dtype)[:, np.newaxis]
+        return TIE[self.dtype] * rank * energy.ravel()
+
+    def states(self, n_rows):
+        """Rows of cells that no path has reached."""
+        n_cells = (2 * self.trellis.centre + 1) * self.pairs
+        return np.full((n_rows, n_cells), np.inf, dtype=self.dtype)
+
+    def ends(self):
+        """Costs of the best paths to every end: (n_bases, n_moving, n_ends).
+
+        The ends are disparities, rising: 0 alone if they are pinned.
+        """
+        states = self.states(2)
+        for _ in self.advance(states):
+            pass
+        costs = np.maximum(self._last_row(states), 0)
+        return costs.reshape(len(costs), -1, self.n_bases).transpose(2, 1, 0)
+
+    def _last_row(self, states):
+        """``S(P - 1, d)`` of the disparities at which a path may end: (n_ends, pairs)."""
+        ends = self.trellis.ends_at + self.trellis.centre
+        cells = states[(self.n_frames - 1) % len(states)].reshape(-1, self.pairs)
+        return cells[ends[0] : ends[-1] + 1]
+
+    def _coupling_costs(self, p, low, high):
+        """Penalties of the coupling in a row, for the disparities from low to high, flat."""
+        offsets = np.arange(low, high + 1)[:, np.newaxis] / self.trellis.table.subframes
+        penalties = self.coupling.weight * np.square(offsets - self._coupled_to[p])
+        return penalties.astype(self.dtype).ravel()
+
+    @functools.cached_property
+    def _coupled_to(self):
+        """The offsets of the coupling, sample by sample: (P, pairs)."""
+        return self.coupling.offsets.transpose(2, 1, 0).reshape(self.n_frames, -1)
+
+    # -- forward: the recurrence, Eq. 16 --------------------------------------
+
+    def advance(self, states, first=0, last=None):
+        """Compute the rows ``S(p, .)`` from ``first`` on, before ``last``, in a ring of rows.
+
+        Yields every p when its row is there. If ``first`` is not 0 its row must be there already.
+        """
+        last = self.n_frames if last is None else last
+        # Products of blocks are rounded differently: a running base must not use them.
+        in_blocks = self.n_bases == 1 and not self.trellis.running
+        costs = self._costs_of_blocks if in_blocks else self.costs_of_samples
+        lows, highs = self.trellis.windows(self.n_frames)
+        for p, local in costs(first, last, lows, highs):
+            if p == 0 or p > first:
+                self.take_row(states, p, local, lows[p], highs[p])
+            yield p
+
+    def take_row(self, states, p, local, low, high):
+        """``S(p, .)`` of the row before it and the costs of its window, one flat array a group.
+
+        Cells that no path reaches stay infinite: the windows first only grow, over
+        cells never written, then only shrink, reading inside the row before.
+        """
+        pairs, n_rows, centre = self.pairs, len(states), self.trellis.centre
+        start, stop = (centre + low) * pairs, (centre + high + 1) * pairs
+        new, old = states[p % n_rows, start:stop], states[(p - 1) % n_rows]
+        if p == 0:
+            unit = self.trellis.unit_group
+            np.subtract(local[unit], self.trellis.groups[unit].penalty, out=new)
+        else:
+            first, *rest = self._levels
+            total, level = self._buffers[:, : stop - start]
+            best = _best_step(old, start, stop, first, new, level)
+            np.add(best, local[0], out=new)
+            for i, levels in enumerate(rest, 1):
+                best = _best_step(old, start, stop, levels, total, level)
+                np.minimum(new, np.add(best, local[i], out=total), out=new)
+        if self.coupling is not None:
+            new += self._coupling_costs(p, low, high)
+
+    @functools.cached_property
+    def _levels(self):
+        """Levels of all groups for flat rows; penalties as arrays spare NumPy a conversion."""
+        return [
+            [
+                (
+                    np.array(penalty, self.dtype) if penalty else None,
+                    [k * self.pairs for k in slopes],
+                )
+                for penalty, slopes in group.levels
+            ]
+            for group in self.trellis.groups
+        ]
+
+    @functools.cached_property
+    def _buffers(self):
+        return np.empty((2, (2 * self.trellis.width + 1) * self.pairs), dtype=self.dtype)
+
+    @functools.cached_property
+    def _cost_buffer(self):
+        n_cells = (2 * self.trellis.width + 1) * self.pairs
+        return np.empty(len(self.trellis.groups) * n_cells, dtype=self.dtype)
+
+    def costs_of_samples(self, first, last, lows, highs):
+        """Yield ``p`` and the costs of its window, one flat array a group: a product a sample."""
+        for p in range(first, last):
+            yield p, self.costs_of_sample(p, self.left[p], lows[p], highs[p])
+
+    def costs_of_sample(self, p, left, low, high):
+        """Costs of one sample, given its left factor (n_groups, n_features + 2, n_bases)."""
+        at = self.trellis.lead + p * self.trellis.stride
+        factor = self.right[at + low : at + high + 1].reshape(-1, self.right.shape[2])
+        costs = self._cost_buffer[: len(left) * len(factor) * self.n_bases]
+        costs = costs.reshape(len(left), -1)
+        np.matmul(factor, left, out=costs.reshape(len(left), -1, self.n_bases))
+        return costs
+
+    def _costs_of_blocks(self, first, last, lows, highs):
+        """The same for a single base: a product a block of samples."""
+        sub, n_groups = self.trellis.table.subframes, len(self.trellis.groups)
+        n_factors, lead = self.right.shape[2], self.trellis.lead
+        for start in range(first, last, PRODUCT_ROWS):
+            # Whole blocks even beyond the last sample: equal products, equal bits.
+            stop = min(start + PRODUCT_ROWS, self.n_frames)
+            # The ends of the windows never move back.
+            lowest = start * sub + lows[start]
+            highest = (stop - 1) * sub + highs[stop - 1]
+            factor = self.right[lead + lowest : lead + highest + 1].reshape(-1, n_factors)
+            left = self.left[start:stop].reshape(-1, n_factors)
+            costs = np.matmul(left, factor.T).reshape(stop - start, n_groups, -1)
+            for p, rows in zip(range(start, min(stop, last)), costs, strict=False):
+                at = p * sub - lowest
+                low, high = at + lows[p], at + highs[p] + 1
+                yield p, rows[:, low * self.pairs : high * self.pairs]
+
+    # -- backward: the path, Eq. 17 -------------------------------------------
+
+    def paths(self, max_bytes):
+        """Disparities of the best paths, (n_bases, n_moving, P), and their costs.
+
+        If not all rows may be kept, every ``length``-th is, and the rows between two of them
+        are computed again, from the last to the first.
+        """
+        trellis, pairs = self.trellis, self.pairs
+        n_frames, length = self.n_frames, self.n_frames
+        row_bytes = (2 * trellis.centre + 1) * pairs * self.dtype.itemsize
+        if row_bytes * n_frames > max_bytes:
+            length = PRODUCT_ROWS * math.ceil(math.sqrt(n_frames) / PRODUCT_ROWS)
+        states = self.states(n_frames if length >= n_frames else 2)
+        checkpoints = {}
+        for p in self.advance(states):
+            if length < n_frames and p % length == 0:
+                checkpoints[p] = states[p % 2].copy()
+        last_row = self._last_row(states)
+        ends = np.zeros(pairs, dtype=np.intp)
+        if len(trellis.ends_at) > 1:
+            # Of equal ends the nearest to the middle.
+            nearest = np.argsort(np.abs(trellis.ends_at), kind="stable")
+            costs = last_row[nearest]
+            costs += self.tie_breakers[1] * np.arange(len(nearest))[:, np.newaxis]
+            ends = trellis.ends_at[nearest[costs.argmin(axis=0)]]
+        costs = last_row[ends - trellis.ends_at[0], np.arange(pairs)]
         at = np.empty((n_frames, pairs), dtype=np.intp)
-        at[-1] = here
-        for pair, cell in enumerate(here.tolist()):
-            at[:-1, pair] = _walk_alone(ways, cell, order, shift, bundle.handicaps[:, pair])
-    else:
-        # The cell of every entry of the step table; that of the first tells where the path is.
-        cells = np.empty((n_frames, len(order), pairs), dtype=np.intp)
-        cells[-1] = here + (order * n_cells)[:, np.newaxis]
-        flat, handicaps, subtract = ways.reshape(n_frames, -1), bundle.handicaps, np.subtract
-        for way, there, before in zip(flat[:0:-1], cells[:0:-1], cells[-2::-1], strict=True):
-            value = way[there]
-            value += handicaps
-            subtract(there, shift[value.argmin(axis=0)], before)
-        at = cells[:, 0] - order[0] * n_cells
-    return bundle.disparities(at // pairs - trellis.width)
+        at[-1] = (ends + trellis.centre) * pairs + np.arange(pairs)
+        for first in range(0, n_frames, length)[::-1]:
+            last = min(first + length, n_frames)
+            if checkpoints:
+                states = self.states(length)
+                states[first % length] = checkpoints.pop(first)
+                for _ in self.advance(states, first, last):
+                    pass
+            self._backtrack(states, at, first, last)
+        disparities = self._by_pair(at // pairs - trellis.centre)
+        return disparities, np.maximum(costs, 0).reshape(-1, self.n_bases).T
+
+    def _backtrack(self, states, at, first, last):
+        """Follow the paths back from row ``last`` to ``first`` by their best steps."""
+        trellis, pairs = self.trellis, self.pairs
+        shift = trellis.slopes * pairs
+        back = shift[:, np.newaxis]
+        penalties, weight, inner = trellis.of_step.astype(states.dtype)[:, :, np.newaxis]
+        charges = penalties + self.tie_breakers
+        n_moving, n_factors = self.right.shape[1:]
+        positions = self.right.reshape(-1, n_factors)
+        start = min(last, self.n_frames - 1)
+        here = at[start]
+        for p in range(start, first, -1):
+            value = states[(p - 1) % len(states)].take(here - back)
+            value += charges
+            if len(trellis.groups) > 1:
+                q = trellis.lead + p * trellis.stride - trellis.centre
+                y = positions.take(here // self.n_bases + q * n_moving, axis=0)
+                value += weight * y[:, -2]
+                y = y.reshape(-1, self.n_bases, n_factors)[..., :-2]
+                products = np.einsum("mnk,nk->mn", y, self.bases.sequences[:, p])
+                value -= inner * products.ravel()
+            here = here - shift.take(value.argmin(axis=0))
+            at[p - 1] = here
+
+    def _by_pair(self, at):
+        """(n_bases, n_moving, P), from (P, pairs)."""
+        return at.T.reshape(-1, self.n_bases, self.n_frames).swapaxes(0, 1)
+
+    # -- both, for so few pairs that NumPy's calls cost more than its arithmetic ---------------
+
+    @property
+    def is_small(self):
+        """Whether the costs of all steps to all cells may be stored."""
+        trellis, n_steps = self.trellis, len(self.trellis.slopes)
+        if trellis.free or trellis.running or n_steps != trellis.table.steps.max() + 1:
+            return False
+        n_cells = self.n_frames * (2 * trellis.width + 1) * self.pairs
+        room = min(SMALL_BYTES[self.n_bases > 1] * len(trellis.groups), _MOST_BYTES)
+        return n_cells * n_steps * self.dtype.itemsize <= room
+
+    def small_paths(self):
+        """The same as `paths`, for a small tile: every row by all of its steps at once."""
+        trellis, right, pairs = self.trellis, self.right, self.pairs
+        sub, width, n_frames = trellis.table.subframes, trellis.width, self.n_frames
+        # Local costs, with the penalty, of every step to every cell: (P, n_steps, cells).
+        padded = np.zeros((len(right) + 2 * width, *right.shape[1:]), self.dtype)
+        padded[width : width + len(right)] = right
+        windows = as_strided(
+            padded,
+            shape=(n_frames, 1, (2 * width + 1) * right.shape[1], right.shape[2]),
+            strides=(sub * padded.strides[0], 0, *padded.strides[1:]),
+            writeable=False,
+        )
+        costs = np.matmul(windows, self.bases.by_step)
+        costs = costs.reshape(n_frames, len(trellis.slopes), -1)
+        # The first sample is reached by no step, so it pays no penalty.
+        costs[0] -= trellis.of_step[0, trellis.entry_of_step, np.newaxis]
+        if self.coupling is not None:
+            for p, row in enumerate(costs):
+                row += self._coupling_costs(p, -width, width)
+        states = self.states(n_frames)
+        edge, item = trellis.pad * pairs, states.itemsize
+        # S(p - 1, d - k) of every cell, step by step.
+        before = as_strided(
+            states[:, edge + sub * pairs :],
+            shape=costs.shape,
+            strides=(states.strides[0], -pairs * item, item),
+            writeable=False,
+        )
+        rows = states[:, edge : states.shape[1] - edge]
+        middle = slice(width * pairs, (width + 1) * pairs)
+        rows[0, middle] = costs[0, sub, middle]
+        add, smallest = np.add, np.minimum.reduce
+        for own, last, row in zip(costs[1:], before[:-1], rows[1:], strict=True):
+            smallest(add(own, last, own), 0, None, row)
+        lengths = np.maximum(rows[-1, middle], 0).reshape(-1, self.n_bases).T
+        walk = _backtrack_each if pairs <= _FEW_PAIRS else _backtrack_all
+        here = width * pairs + np.arange(pairs)
+        at = walk(costs, here, trellis.table.steps, trellis.slopes * pairs, self.tie_breakers)
+        return self._by_pair(at // pairs - width), lengths
 
 
-def _walk_alone(ways, cell, *steps):
-    """The cells of one path at all samples before the last."""
-    entries = list(zip(*(values.tolist() for values in steps), strict=True))
-    cost_of, cells = ways.item, []
-    for p in range(len(ways) - 1, 0, -1):
-        best, way = math.inf, 0
-        for step, moved, handicap in entries:
-            cost = cost_of(p, step, cell) + handicap
-            if cost < best:
-                best, way = cost, moved
-        cell -= way
-        cells.append(cell)
-    return cells[::-1]
+def _best_step(old, start, stop, levels, out, scratch):
+    """``min_s S(p-1, d - k_s) + mu phi_s`` over the steps of one group.
+
+    ``levels`` come by falling penalty, less their smallest. The result is in ``out``, or in
+    ``old`` itself where there is nothing to compute.
+    """
+    best = None
+    for penalty, (shift, *others) in levels:
+        view = old[start - shift : stop - shift]
+        target = out if best is None else scratch
+        for other in others:
+            view = np.minimum(view, old[start - other : stop - other], out=target)
+        if penalty is not None:
+            view = np.add(view, penalty, out=target)
+        best = view if best is None else np.minimum(best, view, out=out)
+    return best
+
+
+def _backtrack_each(totals, last_cells, steps, shift, tie_breakers):
+    """Cells of the best paths, (P, pairs), pair by pair; totals are (P, n_steps, cells)."""
+    at = np.empty((len(totals), len(last_cells)), dtype=np.intp)
+    at[-1] = last_cells
+    total_of, steps, shift = totals.item, steps.tolist(), shift.tolist()
+    for pair, cell in enumerate(last_cells.tolist()):
+        entries = list(zip(steps, shift, tie_breakers[:, pair].tolist(), strict=True))
+        cells = []
+        for p in range(len(totals) - 1, 0, -1):
+            best, moved = math.inf, 0
+            for step, move, extra in entries:
+                total = total_of(p, step, cell) + extra
+                if total < best:
+                    best, moved = total, move
+            cell -= moved
+            cells.append(cell)
+        at[:-1, pair] = cells[::-1]
+    return at
+
+
+def _backtrack_all(totals, last_cells, steps, shift, tie_breakers):
+    """The same for all pairs at once."""
+    n_frames, _, n_cells = totals.shape
+    # The cell of every entry of the step table; that of the first tells where the path is.
+    cells = np.empty((n_frames, len(steps), len(last_cells)), dtype=np.intp)
+    cells[-1] = last_cells + (steps * n_cells)[:, np.newaxis]
+    rows, subtract = totals.reshape(n_frames, -1), np.subtract
+    for row, here, before in zip(rows[:0:-1], cells[:0:-1], cells[-2::-1], strict=True):
+        value = row[here]
+        value += tie_breakers
+        subtract(here, shift[value.argmin(axis=0)], before)
+    return cells[:, 0] - steps[0] * n_cells

@@ -1,7 +1,6 @@
-"""Units: whatever the unit of the data, matching computes with numbers about 1.
+"""Unit: postures are centred and scaled to about 1 before they are compared.
 
-Powers of two are taken out, which costs no bit: nothing that is computed depends on the unit, and
-no square is too large or too small for the precision.
+The scale is a power of two, so it changes no bit: warps do not depend on the unit of the data.
 """
 
 from typing import NamedTuple
@@ -11,35 +10,33 @@ from scipy.sparse.csgraph import connected_components
 
 from .warps import even_slices
 
-__all__ = ["Unit", "exponent_of", "squared_distances"]
+__all__ = ["Unit"]
 
-# A feature whose values differ by less than this share of their size does not move, and features
-# that differ by less than this share of their energy are copies: the rest is rounding.
-_STILL = 2.0**-44
+# A feature whose range is less than this share of its magnitude is constant, and features that
+# differ by less than this share of their energy are copies: the rest is rounding.
+_CONSTANT = 2.0**-44
 _COPY = 2.0**-30
-# Up to this exponent a power of two is a plain number in single precision.
-_PLAIN = 100
-# Numbers that are looked at together: what stands in between is no copy of a large set.
-AT_ONCE = 1 << 20
+# Numbers processed at a time: bounds the memory of intermediate arrays.
+BATCH_SIZE = 1 << 20
 
 
 class Unit(NamedTuple):
-    """What is taken off and out of postures before they are compared.
+    """Centre and scale of a training set.
 
     Attributes
     ----------
     centre : ndarray, shape (n_features,)
         Mean posture of the training set, in the unit: centred features keep inner products small.
-    exponent : int
-        The unit is ``2 ** exponent``; even, so that its square root is a power of two, too.
+    size : float
+        The unit: a power of four, so that its square root is a power of two, too.
     rounding : ndarray, shape (n_features,)
-        Of features that are constant, how far rounding may take them from the centre; else 0.
+        Largest deviation of constant features from the centre due to rounding; else 0.
     copies : list of ndarray of int
-        Features that are copies of each other: the first one becomes their mean, the others 0.
+        Features that are copies of each other: the first becomes their mean, the others 0.
     """
 
     centre: np.ndarray
-    exponent: int
+    size: float
     rounding: np.ndarray
     copies: list
 
@@ -47,107 +44,61 @@ class Unit(NamedTuple):
     def of(cls, on_clock):
         """The unit of a training set on the clock: (n_sequences, P, n_features)."""
         low, high = on_clock.min(axis=(0, 1)), on_clock.max(axis=(0, 1))
-        size = exponent_of(np.stack([low, high]))
-        low, high = np.ldexp(low, -size), np.ldexp(high, -size)
-        centre = _centre(on_clock, size)
-        spread = np.maximum(high - centre, centre - low)
-        rounding = max(_STILL, 64 * float(np.finfo(on_clock.dtype).eps))
-        rounding = rounding * np.maximum(high, -low)
-        moves = spread > rounding
-        exponent = size + exponent_of(spread[moves])
-        exponent += exponent % 2
-        copies = _copies(lambda: _centred(on_clock, size, centre))
-        centre, rounding = (np.ldexp(x, size - exponent) for x in (centre, rounding))
-        return cls(centre, exponent, np.where(moves, 0, rounding), copies)
+        batches = even_slices(len(on_clock), max(1, BATCH_SIZE // max(1, on_clock[0].size)))
+        centre = on_clock[batches[0]].mean(axis=(0, 1))
+        if len(batches) > 1:
+            means = [centre, *(on_clock[rows].mean(axis=(0, 1)) for rows in batches[1:])]
+            weights = [rows.stop - rows.start for rows in batches]
+            centre = np.average(means, axis=0, weights=weights).astype(on_clock.dtype)
+        spread, magnitude = np.maximum(high - centre, centre - low), np.maximum(high, -low)
+        rounding = max(_CONSTANT, 64 * float(np.finfo(on_clock.dtype).eps)) * magnitude
+        varies = spread > rounding
+        largest = spread[varies].max() if varies.any() else np.abs(magnitude).max()
+        exponent = int(np.frexp(largest)[1])
+        size = 2.0 ** (exponent + exponent % 2)
+        copies = _find_copies(on_clock, batches, centre)
+        inverse = centre.dtype.type(1 / size)
+        return cls(centre * inverse, size, np.where(varies, 0, rounding * inverse), copies)
 
     def __call__(self, postures, out=None):
-        """Postures (..., n_features), centred, in this unit; what does not move is exactly 0."""
-        out = _scaled(postures, -self.exponent, out)
+        """Centred postures (..., n_features) in this unit; constant features are exactly 0."""
+        out = np.multiply(postures, postures.dtype.type(1 / self.size), out=out)
         out -= self.centre
-        still = np.flatnonzero(self.rounding)
-        if len(still):
-            part = out[..., still]
-            out[..., still] = np.where(np.abs(part) > self.rounding[still], part, 0)
+        constant = np.flatnonzero(self.rounding)
+        if len(constant):
+            part = out[..., constant]
+            out[..., constant] = np.where(np.abs(part) > self.rounding[constant], part, 0)
         for first, *others in self.copies:
-            kept = out[..., first]
-            # Nothing is added to what is equal to the last bit.
-            kept += (out[..., others] - kept[..., np.newaxis]).sum(axis=-1) / (1 + len(others))
+            mean = out[..., first]
+            # Copies that are equal to the last bit stay so.
+            mean += (out[..., others] - mean[..., np.newaxis]).sum(axis=-1) / (1 + len(others))
             out[..., others] = 0
         return out
 
-    def fill(self, on_clock):
-        """Take sequences (n_sequences, P, n_features) over into this unit, where they are."""
-        for rows in _portions(on_clock):
-            self(on_clock[rows], out=on_clock[rows])
-        return on_clock
-
-    def first_beyond(self, size, arrays):
-        """The index of the first array that holds a number of this size in the unit, or None."""
-        limit = float(self.back(size, 1))
-        near = (float(x.max()) < limit and -float(x.min()) < limit for x in arrays)
-        return next((i for i, is_near in enumerate(near) if not is_near), None)
-
     def part(self, columns):
-        """That of some features alone, by their indices."""
+        """The unit of some features, by their indices."""
         place = {int(column): i for i, column in enumerate(columns)}
         copies = [[place[k] for k in group.tolist() if k in place] for group in self.copies]
         copies = [np.array(group) for group in copies if len(group) > 1]
-        centre, rounding = self.centre[columns], self.rounding[columns]
-        return Unit(centre, self.exponent, rounding, copies)
+        return Unit(self.centre[columns], self.size, self.rounding[columns], copies)
 
     @property
-    def holders(self):
-        """For every feature, the one that holds what it does: itself, unless it is a copy."""
-        holders = np.arange(len(self.centre))
+    def originals(self):
+        """For every feature its own index, or that of the feature it is a copy of."""
+        originals = np.arange(len(self.centre))
         for first, *others in self.copies:
-            holders[others] = first
-        return holders
-
-    def back(self, values, degree=2):
-        """What grows as the unit to some degree, such as squares, in the unit of the data.
-
-        In double precision; infinite where that does not reach.
-        """
-        with np.errstate(over="ignore", under="ignore"):
-            return np.ldexp(np.asarray(values, dtype=np.float64), degree * self.exponent)
+            originals[others] = first
+        return originals
 
 
-def _scaled(values, exponent, out=None):
-    """``values * 2 ** exponent``, to the bit; ``ldexp`` takes twenty times as long."""
-    if abs(exponent) > _PLAIN:
-        return np.ldexp(values, exponent, out=out)
-    return np.multiply(values, values.dtype.type(2.0**exponent), out=out)
+def _find_copies(on_clock, batches, centre):
+    """Groups of equal columns, by their indices."""
 
+    def centred():
+        for rows in batches:
+            yield (on_clock[rows] - centre).reshape(-1, len(centre))
 
-def _portions(on_clock):
-    """Slices of sequences that are looked at together."""
-    return even_slices(len(on_clock), max(1, AT_ONCE // max(1, on_clock[0].size)))
-
-
-def _centre(on_clock, size):
-    """The mean posture, in ``2 ** size``."""
-    portions = _portions(on_clock)
-    means = [_scaled(on_clock[rows], -size).mean(axis=(0, 1)) for rows in portions]
-    if len(means) == 1:
-        return means[0]
-    weights = [rows.stop - rows.start for rows in portions]
-    return np.average(means, axis=0, weights=weights).astype(on_clock.dtype)
-
-
-def _centred(on_clock, size, centre):
-    """Yield portions of the frames, in ``2 ** size`` and about the centre: (n, n_features)."""
-    for rows in _portions(on_clock):
-        frames = _scaled(on_clock[rows], -size)
-        frames -= centre
-        yield frames.reshape(-1, len(centre))
-
-
-def _copies(portions):
-    """The columns of centred frames that are there more than once, copies together.
-
-    ``portions()`` yields the frames.
-    """
-    energy = sum(np.square(frames).sum(axis=0, dtype=np.float64) for frames in portions())
+    energy = sum(np.square(frames).sum(axis=0, dtype=np.float64) for frames in centred())
     order = np.argsort(energy, kind="stable")
     alike = np.diff(energy[order]) <= _COPY * energy[order[1:]]
     found = []
@@ -156,28 +107,10 @@ def _copies(portions):
         if len(run) == 1 or energy[run[0]] == 0:
             continue
         run = np.sort(run)
-        columns = (frames[:, run].astype(np.float64) for frames in portions())
+        columns = (frames[:, run].astype(np.float64) for frames in centred())
         products = sum(x.T @ x for x in columns)
         distances = energy[run][:, np.newaxis] + energy[run] - 2 * products
         count, group_of = connected_components(distances <= _COPY * energy[run[0]], directed=False)
         groups = [run[group_of == k] for k in range(count)]
         found.extend(group for group in groups if len(group) > 1)
     return found
-
-
-def exponent_of(values):
-    """The e of the largest of some numbers, ``2 ** (e - 1) <= |x| < 2 ** e``; 0 for none."""
-    largest = max(abs(float(values.max(initial=0))), abs(float(values.min(initial=0))))
-    return int(np.frexp(largest)[1])
-
-
-def squared_distances(sequences, other):
-    """``|x_i - y|^2`` of sequences (n_sequences, P, n_features) to another one, in any unit.
-
-    Infinite where double precision does not reach.
-    """
-    exponent = max(exponent_of(sequences), exponent_of(other))
-    differences = _scaled(sequences, -exponent) - _scaled(other, -exponent)
-    squares = np.square(differences).sum(axis=(1, 2), dtype=np.float64)
-    with np.errstate(over="ignore", under="ignore"):
-        return np.ldexp(squares, 2 * exponent)

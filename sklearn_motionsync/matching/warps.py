@@ -1,22 +1,22 @@
-"""Warps: sequences sampled along them (Eqs. 7 and 18), and warps read at other times."""
+"""Warps: sequences sampled along them (Eqs. 7 and 18), and warps evaluated at other times."""
 
 import itertools
 import math
 
 import numpy as np
 
-__all__ = ["at_times", "even_slices", "follow", "normalise", "sample"]
+__all__ = ["at_times", "evaluate_warps", "even_slices", "normalise", "sample"]
 
-# Sequences sampled together: bounds the memory of what stands in between.
-_SAMPLED_AT_ONCE = 64
+# Sequences sampled together: bounds the memory of intermediate arrays.
+_BATCH = 64
 
 
 def normalise(arrays, n_frames, subframes=1):
-    """Linear normalisation (Eq. 7): every sequence at the same times of its course.
+    """Linear time normalisation of sequences to a common number of frames (Eq. 7).
 
     Parameters
     ----------
-    arrays : list of ndarray (n_frames_i, n_features)
+    arrays : sequence of ndarray (n_frames_i, n_features)
     n_frames : int
         ``P``, frames of the clock.
     subframes : int, default=1
@@ -26,18 +26,21 @@ def normalise(arrays, n_frames, subframes=1):
     -------
     ndarray, shape (n_sequences, (P - 1) * subframes + 1, n_features)
     """
-    if subframes == 1 and all(len(x) == n_frames for x in arrays):
+    arrays = list(arrays)
+    if subframes == 1 and {len(x) for x in arrays} == {n_frames}:
         return np.concatenate(arrays).reshape(len(arrays), n_frames, -1)
     times = np.arange((n_frames - 1) * subframes + 1) / subframes
     return sample(arrays, np.broadcast_to(times, (len(arrays), len(times))), n_frames)
 
 
 def sample(arrays, times, n_frames):
-    """Sequences at times on a clock of ``n_frames``, the first and last frame being theirs too.
+    """Linear interpolation of sequences at times on a clock of ``n_frames``.
 
     Parameters
     ----------
-    arrays : list of ndarray (n_frames_i, n_features), or 3-D ndarray
+    arrays : sequence of ndarray (n_frames_i, n_features), or 3-D ndarray
+        Their first and last frames are those of the clock. NaN and inf affect only the times
+        between frames next to them.
     times : ndarray, shape (n_sequences, n_times)
         From 0 to ``n_frames - 1``.
     n_frames : int
@@ -46,47 +49,46 @@ def sample(arrays, times, n_frames):
     -------
     ndarray, shape (n_sequences, n_times, n_features)
     """
+    is_one = isinstance(arrays, np.ndarray)
+    arrays = arrays if is_one else list(arrays)
     out = np.empty((len(arrays), times.shape[1], arrays[0].shape[1]), dtype=arrays[0].dtype)
-    for rows in even_slices(len(arrays), _SAMPLED_AT_ONCE):
-        _sample(arrays[rows], times[rows], n_frames, out[rows])
+    for start in range(0, len(arrays), _BATCH):
+        rows = slice(start, start + _BATCH)
+        batch, target = arrays[rows], out[rows]
+        last = np.array([len(x) for x in batch])[:, np.newaxis] - 1
+        # In this order a whole number of frames stays whole.
+        at = times[rows] * last / (n_frames - 1)
+        left = np.minimum(at.astype(np.intp), last - 1)
+        weight = (at - left).astype(out.dtype)[:, :, np.newaxis]
+        frames = batch.reshape(-1, batch.shape[2]) if is_one else np.concatenate(batch)
+        left += np.cumsum(last + 1)[:, np.newaxis] - (last + 1)
+        with np.errstate(over="ignore", invalid="ignore"):
+            has_gaps = not np.isfinite(frames.sum())
+            # Indices are valid; mode="clip" only spares NumPy a copy of the result.
+            frames.take(left, axis=0, out=target, mode="clip")
+            target *= 1 - weight
+            left += 1
+            following = frames.take(left, axis=0)
+            following *= weight
+            target += following
+        if has_gaps:
+            # Where a time is a whole frame, its neighbour must not count: 0 * inf is NaN.
+            for at, is_exact in ((left - 1, weight == 0), (left, weight == 1)):
+                np.copyto(target, frames.take(at, axis=0), where=is_exact)
     return out
 
 
-def _sample(arrays, times, n_frames, out):
-    last = np.array([len(x) for x in arrays])[:, np.newaxis] - 1
-    # In this order a whole number of frames stays whole.
-    at = times * last / (n_frames - 1)
-    left = np.minimum(at.astype(np.intp), last - 1)
-    weight = (at - left).astype(out.dtype)[:, :, np.newaxis]
-    is_one = isinstance(arrays, np.ndarray)
-    frames = arrays.reshape(-1, arrays.shape[2]) if is_one else np.concatenate(arrays)
-    left += np.cumsum(last + 1)[:, np.newaxis] - (last + 1)
-    with np.errstate(over="ignore", invalid="ignore"):
-        has_gaps = not np.isfinite(frames.sum())
-        # All are there; looking twice whether they are takes a copy.
-        frames.take(left, axis=0, out=out, mode="clip")
-        out *= 1 - weight
-        left += 1
-        following = frames.take(left, axis=0)
-        following *= weight
-        out += following
-    if has_gaps:
-        # Where a frame is met its neighbours have no say: nothing times infinity is no number.
-        for at, met in ((left - 1, weight == 0), (left, weight == 1)):
-            np.copyto(out, frames.take(at, axis=0), where=met)
-
-
 def even_slices(n, size):
-    """Slices that cover ``n`` items: as few as can be of at most ``size``, of even sizes."""
+    """Slices that cover ``n`` items: as few as possible of at most ``size``, of even sizes."""
     count = -(-n // size)
     edges = [i * n // count for i in range(count + 1)] if count else []
     return [slice(start, stop) for start, stop in itertools.pairwise(edges)]
 
 
-def follow(warps, times):
-    """Piecewise-linear warps ``(..., P)`` read at times ``(..., P')`` in frames.
+def evaluate_warps(warps, times):
+    """Piecewise-linear warps ``(..., P)`` at times ``(..., P')`` in frames.
 
-    Both have as many axes; along all but the last the times are as many, or one for all.
+    Both have the same number of axes; all axes of the times but the last may be broadcast.
     """
     *shape, n_frames = warps.shape
     left = np.clip(times.astype(np.intp), 0, n_frames - 2)
@@ -100,7 +102,7 @@ def follow(warps, times):
 
 
 def at_times(sequence, times):
-    """A sequence at times in frames, on straight lines; beyond its ends it holds.
+    """Linear interpolation of one sequence at times in frames; constant beyond its ends.
 
     Parameters
     ----------

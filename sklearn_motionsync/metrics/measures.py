@@ -9,7 +9,7 @@ import pandas as pd
 
 from ..inputs.numbers import as_numbers
 from ..inputs.resampling import as_frame_rates
-from ..matching.warps import follow
+from ..matching.warps import evaluate_warps
 
 __all__ = [
     "group_timing_error",
@@ -152,7 +152,7 @@ def keyframe_error(
     lengths = _as_lengths(n_frames, n_sequences)
     keyframes, pattern_keyframes = _as_keyframes(keyframes, pattern_keyframes, lengths, P)
     own = (lengths[:, np.newaxis] - 1) / (P - 1)
-    matched = follow(times, np.tile(pattern_keyframes, (n_sequences, 1)))
+    matched = evaluate_warps(times, np.tile(pattern_keyframes, (n_sequences, 1)))
     errors = np.abs(matched - keyframes / own)
     if frame_rate is not None:
         errors = errors * own / as_frame_rates(frame_rate, n_sequences)
@@ -242,7 +242,7 @@ def inverse_consistency(times, back):
     0.5
     """
     times, back = _as_warps_of_one_shape(times, back, "back")
-    return float(np.abs(follow(back, times) - np.arange(times.shape[1])).mean())
+    return float(np.abs(evaluate_warps(back, times) - np.arange(times.shape[1])).mean())
 
 
 def _summary(errors, quantile):

@@ -10,8 +10,9 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
 from ..matching.causal import causal_velocity
-from ..matching.costs import COSTS, step_table
+from ..matching.costs import step_table
 from ..matching.filters import SMOOTHING
+from ..matching.matcher import cost_features
 from ..matching.metric import Metric, compressed
 from ..matching.trellis import Trellis
 from ..matching.warps import normalise
@@ -183,7 +184,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         settings = self.duration_, self.smoothness, self.velocity_smoothing, self.max_rate
 
         def reference_of(mean, *calibration):
-            return Reference(sync.training_.features, mean, *settings, *calibration)
+            return Reference(sync.features_, mean, *settings, *calibration)
 
         calibration = calibrate(reference_of, performances, warped, match.times)
         self._reference = reference_of(self.mean_, *calibration)
@@ -432,7 +433,7 @@ class FeatureSubset:
         velocity = velocity[:, self._columns]
         postures = (postures - self._centre)[:, self._columns]
         if self._metric is None:
-            return COSTS[self._cost].features(postures, lambda _: velocity)
+            return cost_features(postures, self._cost, velocity=velocity)
         return self._metric.of_parts(compressed(velocity, self._metric.energy), postures)
 
 

@@ -18,8 +18,8 @@ from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.validation import SequenceLevelMixin
-from ..matching.comparison import Comparison
 from ..matching.costs import COSTS
+from ..matching.pairwise import PairwiseDistance
 from ..model.action_model import ActionModel
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.atomic import atomic_fit, snapshot
@@ -400,7 +400,7 @@ class ActionClassifier(
         settings = {name: getattr(self, name) for name in names}
         settings["n_frames"] = int(self.n_frames)
         # Postures keep the unit of the training set.
-        return [Comparison(c, normalize=c != "posture", **settings) for c in costs]
+        return [PairwiseDistance(c, normalize=c != "posture", **settings) for c in costs]
 
     def _decisions(self, X):
         """Decision values of performances: (n_sequences, n_classes)."""

@@ -8,8 +8,8 @@ from sklearn.base import BaseEstimator
 from sklearn.utils._param_validation import Interval, StrOptions, validate_params
 
 from ..inputs.validation import SequenceLevelMixin, check_performances
-from ..matching.comparison import BLOCK, Comparison
 from ..matching.costs import COSTS
+from ..matching.pairwise import BLOCK, PairwiseDistance
 from ..matching.warps import normalise
 from ..utils.parallel import Progress, SharedArgument, run
 
@@ -145,7 +145,7 @@ def synchronization_distances(
         on_rows = both[0].kind == "rows"
         given = {"reset": False, "level": "sequence", "on_rows": on_rows}
         both.append(check_performances(reader, Y, **given))
-    comparison = Comparison(cost, normalize=normalize, **settings)
+    comparison = PairwiseDistance(cost, normalize=normalize, **settings)
     features = [comparison.features(normalise_time(some, comparison.n_frames)) for some in both]
     progress = Progress(reader, verbose)
     return pairwise_distances(
@@ -163,7 +163,7 @@ def pairwise_distances(comparison, X, Y=None, *, symmetric=True, n_jobs=None, pr
 
     Parameters
     ----------
-    comparison : Comparison
+    comparison : PairwiseDistance
     X, Y : ndarray, shape (n, P, n_features)
         Without Y, within X.
     symmetric : bool, default=True

@@ -217,7 +217,7 @@ def _reach(pattern, X, groups):
         return synchronizer, synchronizer.check_performances(X), None
     _, synchronizer = find_synchronizer(pattern)
     check_is_fitted(synchronizer)
-    if synchronizer.training_.on_clock.shape[2] != synchronizer.n_features_in_:
+    if synchronizer.examples_.shape[2] != synchronizer.n_features_in_:
         raise ValueError(
             f"{type(synchronizer).__name__} was fitted on the rows of a 2-D array, all of one "
             "length, but hits differ in length: fit it on [row[:, np.newaxis] for row in X]."
@@ -246,13 +246,19 @@ def _check_pattern(pattern):
     return pattern if isinstance(pattern, pd.DataFrame) else array
 
 
+def _example_indices(synchronizer):
+    """Indices in the training set of the examples that the synchronizer keeps, evenly spaced."""
+    n_performances, n_examples = len(synchronizer.lengths_), len(synchronizer.examples_)
+    return np.linspace(0, n_performances - 1, n_examples).round().astype(np.intp)
+
+
 def _training_groups(pattern, reached, groups):
     """Codes of the groups of the training performances that the synchronizer keeps, or None."""
-    training = reached.synchronizer.training_
-    count = len(training.durations)
+    synchronizer = reached.synchronizer
+    count = len(synchronizer.lengths_)
     if groups is not None:
         codes, _ = encode_groups(groups, count, at_least=min(count, 2))
-        return codes[training.kept]
+        return codes[_example_indices(synchronizer)]
     if count < 2:
         return None
     models = [step for step in flat_steps(pattern) if isinstance(step, ActionModel)]
@@ -276,7 +282,7 @@ def _training_groups(pattern, reached, groups):
 def _check_durations(synchronizer, durations):
     """The smallest and the largest number of frames of a window."""
     if durations is None:
-        known = synchronizer.training_.durations
+        known = synchronizer.lengths_
         margin = _MARGIN if len(known) > 1 else _MARGIN_OF_ONE
         return max(_SHORTEST, int(known.min() / margin)), int(np.ceil(known.max() * margin))
     pair = tuple(durations) if isinstance(durations, (tuple, list, np.ndarray)) else ()
@@ -330,7 +336,7 @@ class Proposer(NamedTuple):
     def of(cls, synchronizer, shortest, longest):
         """The proposer of the pattern of a synchronizer, for windows of so many frames."""
         n_frames = min(synchronizer.n_frames_, _CLOCK_FRAMES)
-        features = synchronizer.training_.features.at_pace(1)
+        features = synchronizer.features_.at_pace(1)
         pattern = synchronizer.pattern_.astype(np.float64)
         base = features(features.positions([pattern], n_frames))
         how = {"max_offset": _SHARE, "max_rate": _MAX_RATE, "free": True}
@@ -419,13 +425,13 @@ class Unlikeness:
     """
 
     def __init__(self, synchronizer, groups=None, length=True):
-        training = synchronizer.training_
-        self._set_clock(training.features, synchronizer.n_frames_)
-        moments = LogMoments.of(training.durations)
+        lengths, examples = synchronizer.lengths_, synchronizer.examples_
+        self._set_clock(synchronizer.features_, synchronizer.n_frames_)
+        moments = LogMoments.of(lengths)
         self._length = moments.standardize if length else np.zeros_like
-        self._usual_length = np.exp(np.log(training.durations).mean())
-        count = len(training.kept)
-        positions = self._positions(training.on_clock)
+        self._usual_length = np.exp(np.log(lengths).mean())
+        count = len(examples)
+        positions = self._positions(examples)
         energy, self._floor = movement_energies(positions)
         if energy.max() <= self._floor:
             raise ValueError(
@@ -437,7 +443,7 @@ class Unlikeness:
         self._neighbours = Neighbours(positions, codes, self._features, DIFFERENCES)
         self._training, self.known = positions, np.empty(0)
         if count > 1:
-            self.known = self._of(positions, training.durations[training.kept], codes)
+            self.known = self._of(positions, lengths[_example_indices(synchronizer)], codes)
 
     def border(self, coverage):
         """Up to how unlike a share of the performances of new people is expected to be.

@@ -4,8 +4,12 @@ from numbers import Integral
 from typing import NamedTuple
 
 import numpy as np
-from sklearn.base import BaseEstimator, TransformerMixin, _fit_context
-from sklearn.utils import Bunch
+from sklearn.base import (
+    BaseEstimator,
+    OneToOneFeatureMixin,
+    TransformerMixin,
+    _fit_context,
+)
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
@@ -20,7 +24,7 @@ from ..inputs.validation import (
 )
 from ..matching.filters import SMOOTHING
 from ..matching.matcher import Features
-from ..matching.median import Median, median_of
+from ..matching.median import Median, linear_median
 from ..matching.units import Unit
 from ..matching.warps import normalise
 from ..utils.atomic import atomic_fit, snapshot
@@ -29,24 +33,22 @@ from .match import Match, check_match
 
 __all__ = ["Synchronizer", "TrainingSet"]
 
-# So many times the training set, what differs in it is lost beside a performance.
-_FAR = 1e30
-# What one copy of a training set on the clock may take; a fit holds several.
+# Most bytes of a training set on the clock; a fit holds several copies.
 MOST_BYTES = 4 * 2**30
-# Of a training set so many performances are kept.
-_MOST_KEPT = 64
+# Most performances in ``examples_``.
+_MOST_EXAMPLES = 64
 
 
 class TrainingSet(NamedTuple):
-    """A training set, as it is and on the common clock.
+    """A training set, as given and on the common clock.
 
     Attributes
     ----------
     performances : Performances
     unit : Unit
-        In which they are about 1.
+        Their centre and scale.
     scaled : ndarray, shape (n_sequences, P, n_features)
-        Linearly normalised (Eq. 7), in this unit: the only copy of all of them.
+        Linearly normalised (Eq. 7), in this unit.
     given : ndarray, shape (n_frames, n_features), or None
         The pattern, if it was given as an array.
     """
@@ -58,13 +60,13 @@ class TrainingSet(NamedTuple):
 
 
 class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEstimator):
-    """Base of all synchronizers: a subclass only says how it matches.
+    """Base class of all synchronizers: a subclass defines ``match``.
 
-    Whoever adds ``match`` gets ``fit``, which chooses the pattern after linear normalisation,
+    It inherits ``fit``, which chooses the pattern after linear normalisation,
     ``transform``, pandas output, and what scorers and displays need. These call ``match`` with
-    performances that are checked already, a sequence of arrays; the user gives any collection.
-    ``normalize`` and ``check_performances`` take both. Parameters of one's own are taken by an
-    ``__init__`` of one's own, as in scikit-learn; it has ``n_frames`` and ``pattern``, too.
+    a sequence of checked arrays, users with any collection; ``normalize`` and
+    ``check_performances`` take both. A subclass with further parameters defines ``__init__``, as
+    in scikit-learn, with ``n_frames`` and ``pattern`` among them.
 
     Parameters
     ----------
@@ -86,10 +88,12 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
     global_distances_ : ndarray, shape (n_sequences,)
         Sum of the squared distances of each performance to all others; NaN if the pattern was
         given.
-    training_ : Bunch
-        What `find_performances` goes by: ``durations`` (n_sequences,), frames of the
-        performances; ``kept``, the indices of at most 64 of them, evenly spaced; those
-        linearly normalised, ``on_clock`` (n_kept, P, n_features); ``features``, what is compared.
+    lengths_ : ndarray of int, shape (n_sequences,)
+        Numbers of frames of the training performances.
+    examples_ : ndarray, shape (min(n_sequences, 64), P, n_features)
+        Training performances linearly normalised: all, or 64 of them, evenly spaced.
+    features_ : callable
+        Turns postures on the clock into the features that are compared.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -97,8 +101,8 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
 
     See Also
     --------
-    Match : What ``match`` gives.
-    DenseSynchronizer : The one to use.
+    Match : The result of ``match``.
+    DenseSynchronizer : The recommended synchronizer.
 
     Examples
     --------
@@ -126,6 +130,9 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         ],
     }
 
+    # Advice of the error if the training set does not fit into memory.
+    _SMALLER = "fewer frames or performances"
+
     def __init__(self, n_frames=None, pattern="median"):
         self.n_frames = n_frames
         self.pattern = pattern
@@ -133,17 +140,19 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
     @atomic_fit
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X, y=None):
-        """Choose the pattern, the performance whose clock all others will follow.
+        """Choose the pattern, the performance to whose clock all others are warped.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Performances; the rows of a 2-D array are univariate ones.
         y : ignored
+            Present for API consistency.
 
         Returns
         -------
-        self
+        self : Synchronizer
+            The fitted synchronizer.
 
         Raises
         ------
@@ -162,8 +171,8 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Memory maps, and what gives performances by index, are read in parts, once each; rows of
-            a matrix are taken into memory.
+            Performances. Memory maps, and collections that give performances by index, are read in
+            parts, once each; rows of a matrix are loaded into memory.
 
         Returns
         -------
@@ -179,18 +188,18 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
         Match
             ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
-            the pattern, both on performances linearly normalised to its length (Eq. 7), and
+            the pattern, both of performances linearly normalised to its length (Eq. 7), and
             ``distances``, shape (n_sequences,). tau is non-decreasing, ``tau(0) = 0``,
             ``tau(P-1) = P-1``.
         """
         raise NotImplementedError(
-            f"{type(self).__name__} does not say how it matches: give it match(self, X), which "
-            "returns a Match."
+            f"{type(self).__name__} does not define match(self, X), which returns a Match."
         )
 
     @snapshot
@@ -200,15 +209,14 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
 
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features)
             One feature for the rows of a 2-D array.
         """
-        performances = self.check_performances(X)
-        self._check_unit(performances)
-        return normalise(performances, self.n_frames_)
+        return normalise(self.check_performances(X), self.n_frames_)
 
     def get_feature_names_out(self, input_features=None):
         """Names of the outputs: the features of a frame; for 2-D input, one name a frame.
@@ -221,22 +229,12 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         Returns
         -------
         ndarray of str
+            As many as the columns of the pandas output.
         """
         check_is_fitted(self)
-        names = getattr(self, "feature_names_in_", None)
-        if input_features is not None:
-            if len(input_features) != self.n_features_in_:
-                raise ValueError(
-                    "input_features should have length equal to number of features "
-                    f"({self.n_features_in_}), got {len(input_features)}."
-                )
-            if names is not None and not np.array_equal(names, input_features):
-                raise ValueError("input_features is not equal to feature_names_in_.")
-            names = input_features
+        names = OneToOneFeatureMixin.get_feature_names_out(self, input_features)
         if self._fitted_on_rows:
             names = [f"{type(self).__name__.lower()}{p}" for p in range(self.n_frames_)]
-        elif names is None:
-            names = [f"x{i}" for i in range(self.n_features_in_)]
         return np.asarray(names, dtype=object)
 
     def __sklearn_tags__(self):
@@ -252,13 +250,13 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         return {**state, "pattern": pattern.to_numpy()} if hasattr(pattern, "columns") else state
 
     def _learn(self, performances):
-        """All that ``fit`` learns of checked performances."""
+        """Learn from checked performances."""
         training = self._set_clock(performances)
         self._set_pattern(training, self._plain_median(training.scaled))
 
     @snapshot
     def _warp(self, X, **params):
-        # What comes along with the performances comes for all of them at once.
+        # Further parameters are given for all performances at once.
         read = None if params else self._read_in_parts(X)
         if read is None:
             performances = self.check_performances(X)
@@ -270,12 +268,16 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         return restore(self, performances, out, frames=range(out.shape[1]))
 
     def _warp_part(self, performances, **params):
+        return self._match(performances, **params).warp(performances)
+
+    def _match(self, performances, **params):
+        """The match of checked performances."""
         match = self.match(performances, **params)
         check_match(match, len(performances), self.n_frames_, type(self).__name__)
-        return match.warp(performances)
+        return match
 
     def _warp_parts(self, n_sequences, parts):
-        """What is known of performances that are read in parts, and these warped."""
+        """Labels of performances that are read in parts, and these warped."""
         out, labels, levels = None, [], set()
         for part in parts:
             warped, start = self._warp_part(part), len(labels)
@@ -292,7 +294,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         return parts_of_source(self, X, self._read_rows_in_fit())
 
     def _match_in_parts(self, X):
-        """The match of performances by ``_match``, which is given those that are read in parts."""
+        """The match of performances, which may be read in parts."""
         read = self._read_in_parts(X)
         if read is None:
             return self._match(self.check_performances(X))
@@ -303,49 +305,34 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
     # -- steps of a fit ---------------------------------------------------------------------
 
     def _number_as_given(self):
-        """Performances were numbered as they were learnt from: now as they were given."""
+        """Number performances as given, if the fit is to a sample."""
 
-    def _set_clock(self, performances):
-        """How many frames the clock has, and the performances on it."""
+    def _set_clock(self, performances, subframes=1):
+        """Set the number of frames of the clock; the performances on it.
+
+        A subclass may need ``subframes`` positions a frame.
+        """
         given = self._given_pattern(performances)
+        self.lengths_ = np.array([len(x) for x in performances])
         if self.n_frames is not None:
             self.n_frames_ = int(self.n_frames)
         else:
-            self.n_frames_ = int(np.median([len(x) for x in performances]))
-            if given is not None:
-                self.n_frames_ = len(given)
-        self._check_size(performances)
+            self.n_frames_ = int(np.median(self.lengths_)) if given is None else len(given)
+        n, width = len(performances), performances[0].shape[1]
+        n_positions = (self.n_frames_ - 1) * subframes + 1
+        n_bytes = 8 * n * n_positions * width
+        if n_bytes > MOST_BYTES:
+            raise ValueError(
+                f"{n} performances at {n_positions} positions of a clock of "
+                f"{self.n_frames_} frames take {n_bytes / 2**30:.0f} GB several times over; "
+                f"{MOST_BYTES / 2**30:.0f} GB is the limit. Use {self._SMALLER}."
+            )
         on_clock = normalise(performances, self.n_frames_)
-        self._unit = unit = Unit.of(on_clock)
-        kept = np.unique(np.linspace(0, len(on_clock) - 1, _MOST_KEPT).round().astype(np.intp))
-        durations = np.array([len(x) for x in performances])
-        features = Features("velocity", 1, SMOOTHING, unit)
-        known = {"durations": durations, "kept": kept, "on_clock": on_clock[kept]}
-        self.training_ = Bunch(**known, features=features)
-        return TrainingSet(performances, unit, unit.fill(on_clock), given)
-
-    def _check_unit(self, performances, what=None):
-        """Refuse what is far beyond the training set."""
-        i = self._unit.first_beyond(_FAR, performances)
-        if i is not None:
-            raise ValueError(
-                f"{what or performances.called(i)} is more than {_FAR:.0e} times as large as the "
-                "training set: give it in the same unit."
-            )
-
-    def _check_size(self, performances):
-        """Say what a clock asks for before memory runs out."""
-        subframes = getattr(self, "subframes", 1)
-        positions = (self.n_frames_ - 1) * subframes + 1
-        asked = 8 * len(performances) * positions * performances[0].shape[1]
-        if asked > MOST_BYTES:
-            fewer = " Or learn from some: max_fit=1000." if hasattr(self, "max_fit") else ""
-            raise ValueError(
-                f"{len(performances)} performances at {positions} positions of the clock, for "
-                f"n_frames = {self.n_frames_} and subframes = {subframes}, ask for "
-                f"{asked / 2**30:.0f} GB several times over; {MOST_BYTES / 2**30:.0f} GB is the "
-                f"limit. Use fewer frames, subframes or performances.{fewer}"
-            )
+        unit = Unit.of(on_clock)
+        some = np.unique(np.linspace(0, n - 1, _MOST_EXAMPLES).round().astype(np.intp))
+        self.examples_ = on_clock[some]
+        self.features_ = Features("velocity", 1, SMOOTHING, unit)
+        return TrainingSet(performances, unit, unit(on_clock, out=on_clock), given)
 
     def _given_pattern(self, performances):
         """The pattern as an array, if that is what was given; indices are checked."""
@@ -378,17 +365,17 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         return isinstance(self.pattern, str)
 
     def _plain_median(self, sequences):
-        """The median (Eq. 19) of scaled sequences without matching; nothing if it is not wanted."""
+        """The median (Eq. 19) of scaled sequences without matching, if it is wanted."""
         if not self._wants_median:
             return Median.unknown(len(sequences))
-        return median_of(sequences)
+        return linear_median(sequences)
 
     def _set_pattern(self, training, median, degree=2):
-        """Take the median, or what was given, as the pattern; it is returned at its own pace.
+        """Set the pattern: the median, or as given. Returns it at its own pace.
 
         Distances are in the unit of the training set to this degree.
         """
-        self.global_distances_ = training.unit.back(median.distances, degree)
+        self.global_distances_ = median.distances * training.unit.size**degree
         self.pattern_index_ = median.index if self._wants_median else None
         if not self._wants_median and training.given is None:
             self.pattern_index_ = list(training.performances.numbers).index(self.pattern)
@@ -396,5 +383,4 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         if source is None:
             source = training.performances[self.pattern_index_]
         self.pattern_ = normalise([source], self.n_frames_)[0]
-        self._check_unit([self.pattern_], "The pattern")
         return source

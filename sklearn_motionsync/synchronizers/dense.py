@@ -1,202 +1,91 @@
 """DenseSynchronizer: dense matching to the median performance (Eqs. 7-19)."""
 
 import warnings
-from dataclasses import dataclass
 from functools import partial
 from numbers import Integral, Real
 
 import numpy as np
+import pandas as pd
+from scipy.special import betaincinv
 from sklearn.utils import Bunch, check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
 
+from ..inputs.collections import as_collection, as_source, count_of, gives_rows, select
+from ..inputs.tables import as_pandas
 from ..inputs.validation import names_of_input
 from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
-from ..matching.filters import SMOOTHING
-from ..matching.matcher import Features, Matcher
-from ..matching.median import Median, estimate_distances, rounding_of, search_median, sum_all
-from ..matching.refinement import choose_smoothing
-from ..matching.refinement_test import RefinementTrial, Verdict, deal_features
-from ..matching.warper import RefinedWarper, Warper
-from ..matching.warps import even_slices, normalise
+from ..matching.filters import SMOOTHING, choose_smoothing
+from ..matching.matcher import Features, Matcher, RefinedWarper, Warper
+from ..matching.median import (
+    Median,
+    estimate_distances,
+    exhaustive_median,
+    rounding_bound,
+    sampled_median,
+)
+from ..matching.refinement_test import RefinementTest, Verdict, split_features
+from ..matching.trellis import Trellis
+from ..matching.warps import even_slices, normalise, sample
 from ..utils.atomic import snapshot
-from ..utils.parallel import LongWorkMixin, run
+from ..utils.parallel import LongWorkMixin
+from ..utils.threads import on_one_thread
 from .base import Synchronizer
 from .match import Match
-from .portions import (
-    Compared,
-    compare_in_portions,
-    in_portions,
-    shared_training_set,
-    warp_in_portions,
-)
-from .subsample import draw, typical_share
+from .portions import FeatureStore, TrainingPortions, measure_in_portions, warp_in_portions
 
 __all__ = ["DenseSynchronizer"]
 
-# -- steps of a dense fit: clock, metric, median, exemplars, refinement, one after the other
-
-# Up to so many performances all pairs are compared: see docs/scaling.md.
+# max_offset="auto". A wide band leads paths astray without a learnt metric; with one, gestures
+# need it: docs/method.md.
+_NARROW, _WIDE = 0.25, 0.4
+# The largest offset while the metric is learnt: docs/method.md.
+_LEARNING_OFFSET = 0.2
+# velocity_smoothing="auto": a metric weights noise down; without one it is smoothed away.
+_SMOOTH, _SHARP = SMOOTHING, 0.02
+# Most steps of a path at a frame, all offsets together.
+_MOST_STEPS = 1e9
+# Numbers of performances a metric is learnt from. Two have no route but the
+# direct one: their differences cannot be told from a wrong path.
+_FEWEST, _MOST = 3, 20
+# Most performances for an exhaustive search: see docs/scaling.md.
 _EXHAUSTIVE = 100
-
-# Whether refining helps is tried on at most so many performances.
-_TRIED = 12
-
-
-class DenseSteps(LongWorkMixin, Synchronizer):
-    """How a `DenseSynchronizer` learns; the parameters are its own."""
-
-    def _check_training_set(self, X):
-        some, sample, population = draw(X, self.max_fit, self.pattern, self.random_state)
-        numbers = None if sample is None else sample.tolist()
-        performances = super()._check_training_set(some, numbers)
-        n = len(performances)
-        self.sample_ = np.arange(n) if sample is None else sample
-        self._population = n if sample is None else population
-        return performances
-
-    def _number_as_given(self):
-        sample, distances = self.sample_, np.full(self._population, np.nan)
-        distances[sample] = self.global_distances_
-        self.global_distances_, self.exemplars_ = distances, sample[self.exemplars_]
-        if self.pattern_index_ is not None:
-            self.pattern_index_ = int(sample[self.pattern_index_])
-        if self.metric_ is not None:
-            self.metric_.performances = sample[self.metric_.performances]
-
-    def _learn(self, performances):
-        with self._progress(fits=True) as progress:
-            training = self._set_clock(performances)
-            learns = self.metric == "learned" and self.cost == "velocity" and self.consensus > 0
-            Settings.of(self, learns).check(self.n_frames_, self.subframes)
-            positions, self.metric_ = self._positions(training), None
-            features = features_of(self, training.unit, learnt=False)
-            if learns:
-                features, self.metric_ = learn_metric(self, features, positions)
-            settings = self._settings()
-            searched = features.for_search(self.n_frames_, settings["max_offset"])
-            compared = Compared(searched, positions)
-            warn_of_one_feature(self, performances, compared)
-            searcher, shared, median = self._search(searched, compared, positions, progress)
-            matcher = searcher.at_all_frames(features, self.n_frames_, **settings)
-            self.training_.features = features
-            self.mu_ = float(features.back(matcher.trellis.mu))
-            source = self._set_pattern(training, median, features.degree)
-            # Sums over fewer frames, as if over all.
-            self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
-            warper = self._choose_exemplars(training, matcher, source, median.estimates)
-            warper = self._decide_on_refinement(training, warper, source, progress, shared)
-            self._warper = warper
-
-    def _positions(self, training):
-        """Performances of the training set at every sub-position of the clock, in the unit."""
-        if self.subframes == 1:
-            return training.scaled
-        performances = training.performances
-        return training.unit.fill(normalise(performances, self.n_frames_, self.subframes))
-
-    def _search(self, features, compared, positions, progress):
-        """The matcher that searches, what portions share of the training set, and the median."""
-        energy, shape = compared.energy(), features.shape(positions)
-        searcher = Matcher.of_energy(features, shape, energy, **self._settings())
-        shared = shared_training_set(searcher, positions, compared)
-        rounding = rounding_of(compared.like.dtype, energy)
-        median = self._choose_median(shared, len(positions), rounding, progress)
-        rounds = features.single and positions.dtype != compared.like.dtype
-        if not rounds or not median.is_blurred(rounding):
-            return searcher, shared, median
-        # Trials that are equal but for next to nothing: single precision does not tell them apart.
-        features = features.in_full()
-        return self._search(features, Compared(features, positions), positions, progress)
-
-    def _choose_median(self, shared, n, rounding, progress):
-        """The median (Eq. 19), by all matches or some; without it, what exemplars are chosen by."""
-        wanted, population = self._wants_median, self._population
-        compare = partial(compare_in_portions, shared, n_jobs=self.n_jobs, progress=progress)
-        if not wanted and (self.consensus == 0 or n <= self.consensus):
-            # None of them, or all, are exemplars.
-            median = Median.unknown(n)
-        elif self.search == "exhaustive" or (self.search == "auto" and n <= _EXHAUSTIVE):
-            median = sum_all(compare, n, rounding, population)
-        elif wanted:
-            random_state = check_random_state(self.random_state)
-            median = search_median(compare, n, rounding, random_state, population)
-        else:
-            median = estimate_distances(compare, n, check_random_state(self.random_state))
-        known = median if wanted else Median.unknown(n, median.n_matches)
-        self.n_matches_, self.certified_ = known.n_matches, known.certified
-        self.search_ = Bunch(**known.achieved)
-        self.typical_share_ = typical_share(known.in_doubt, n, population) if wanted else np.nan
-        return median
-
-    def _choose_exemplars(self, training, matcher, source, estimates):
-        """The exemplars, and the warper to the pattern by way of them."""
-        self.exemplars_ = np.empty(0, dtype=np.intp)
-        if self.consensus > 0:
-            self.exemplars_ = choose_exemplars(estimates, self.consensus, self.pattern_index_)
-        chosen = [source, *(training.performances[k] for k in self.exemplars_)]
-        # In double precision, as all that is warped.
-        chosen = [x.astype(np.float64, copy=False) for x in chosen]
-        positions = matcher.features.positions(chosen, self.n_frames_)
-        pattern = positions[0, :: self.subframes]
-        portion = matcher, pattern, positions, self.consensus > 0, self.warp_smoothing
-        (warper,) = run(Warper.to_pattern, [portion])
-        return warper
-
-    def _decide_on_refinement(self, training, warper, source, progress, shared):
-        """Whether warps are refined by postures, and the warper that does so or does not."""
-        verdict = Verdict()
-        if self.refine == "auto" and self.consensus > 0:
-            others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
-            some = others[:: -(-len(others) // _TRIED) or 1]
-            portions = {"n_jobs": self.n_jobs, "progress": progress}
-            shown = training.scaled, shared, some
-            # Those who are shown some features match without a metric.
-            settings = vars(Settings.of(self, learnt=False))
-            verdict = try_refinement(warper, source, *shown, settings, **portions)
-        names = "ratio", "p_value", "ratio_to_all"
-        self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
-        self.misfit_ = verdict.misfit
-        self.refines_ = bool(verdict.helps if self.refine == "auto" else self.refine)
-        if not self.refines_:
-            return warper
-        return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.scaled))
-
-    def _settings(self):
-        """What a `Matcher` learns with."""
-        return vars(Settings.of(self, self.metric_ is not None))
+# Most performances for the refinement test; fewer than the second number have no first pass, and
+# with twice as many it takes every second one.
+_TESTED, _SEVERAL = 12, 3
+# Confidence of ``typical_share_``.
+_CONFIDENCE = 0.95
 
 
-class DenseSynchronizer(DenseSteps):
+class DenseSynchronizer(LongWorkMixin, Synchronizer):
     """Synchronise performances by dense matching to the median one.
 
     1. Normalise all performances linearly to ``P`` frames (Eq. 7).
-    2. Learn the metric: which features, and which combinations of them, tell the moments of the
-       action in these performances, and which are noise or style (see ``metric``).
+    2. Learn the metric: weights of features, and of combinations of them, by how reliably they
+       identify a moment of the action in these performances (see ``metric``).
     3. Match ordered pairs: dynamic programming finds the offsets Delta(p) that
        minimise the synchronisation distance ``D_{n,m}`` (Eqs. 12-17)::
 
            sum_p |x_n(p) - x_m(p + Delta(p))|^2 + mu sum_p phi(rate)
 
        with both ends pinned and the local rate between 0 and ``max_rate``. By default
-       velocities and postures in the learnt metric stand in for the points x (see ``cost``).
+       the points x are velocities and postures in the learnt metric (see ``cost``).
     4. The pattern has the smallest global distance ``C_n = sum_m D_{n,m}`` (Eq. 19): it is the
        "median" performance, among more than 100 found by a part of all matches (see ``search``).
-    5. Consensus: the time of the pattern reaches a performance straight, or by way of
-       one of ``consensus`` exemplars, typical performances of the training set; the median
-       of these routes, weighted by how alike the performances along them are, outvotes a path
+    5. Consensus: the time of the pattern reaches a performance directly, or by way of
+       one of ``consensus`` exemplars, typical performances of the training set. The median
+       of these routes, weighted by the similarity of the performances along them, outvotes a path
        that took a wrong valley. It is then smoothed.
     6. Refinement: if it helps, as it does for repeated trials of a single source, whose postures
        agree but for noise and gain, Gauss-Newton steps place every moment to a fraction of a frame.
     7. ``transform`` samples performances at ``tau(p) = p + Delta(p)`` (Eq. 18).
 
-    Most data need nothing turned. Three parameters, among the first, are worth a thought:
-    ``n_frames``, the resolution of the clock; ``refine=True``, if all are trials of a single
-    source; ``max_offset``, how far apart they can be. ``pattern`` keeps a clock that is there
-    already. The seven from ``metric`` to ``subframes`` are there for the record: they were measured
-    and set, and make it the paper's exact method,
+    The defaults suit most data. Three parameters depend on them: ``n_frames``, the resolution of
+    the clock; ``refine=True``, for trials of a single source; ``max_offset``, the largest
+    difference in timing. ``pattern`` keeps an existing clock. The defaults of the seven from
+    ``metric`` to ``subframes`` were set by measurements; the paper's exact method is
     ``DenseSynchronizer(cost="posture", max_rate=2, subframes=1, consensus=0)``. The
-    last four are for many performances and long jobs.
+    last five are for many performances and long jobs.
 
     Parameters
     ----------
@@ -209,33 +98,33 @@ class DenseSynchronizer(DenseSteps):
     velocity_smoothing : "auto" or float, default="auto"
         Standard deviation of the Gaussian under which velocities are taken, as a share of the
         clip, so that it does not depend on the frame rate; beyond its ends a clip is
-        continued by its point reflection. ``"auto"``: 0.02 with a learnt metric, which knows what
-        is noise, and 0.03 without.
+        continued by its point reflection. ``"auto"``: 0.02 with a learnt metric, which weights
+        noise down, and 0.03 without.
     refine : "auto" or bool, default="auto"
-        Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and it
-        helps: on features of the training set that had no part in it (see ``refinement_``).
-        A single feature, or several that say the same, cannot tell.
+        Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and a test on
+        the training set shows that it helps, by features that had no part in it (see
+        ``refinement_``). A single feature, or correlated ones, cannot be tested.
     max_offset : "auto" or float, default="auto"
         Largest offset, as a share of ``n_frames``, in [0, 1]. ``"auto"``: 0.4 with a learnt
         metric, 0.25 without, where a wider band leads paths astray.
     metric : "learned" or None, default="learned"
-        What the velocity cost compares. ``"learned"``: velocities, compressed, and postures less
-        their own mean, weighted by how well they agree at the same moment; learnt in ``fit`` from
+        The metric of the velocity cost. ``"learned"``: of compressed velocities, and postures less
+        their own mean, weighted by their agreement at the same moment; learnt in ``fit`` from
         3 to 20 performances, and off without a vote (``consensus=0``). Distances are then pure
-        numbers. None: velocities, all directions alike. Other costs are compared as they are.
+        numbers. None: of velocities, with equal weights. Other costs have no metric.
     consensus : int, default=8
-        How many exemplars vote on a warp; 0 for the direct path only, as in the paper, which
+        Number of exemplars that vote on a warp; 0 for the direct path only, as in the paper, which
         is then neither smoothed nor, unless ``refine=True``, refined.
     warp_smoothing : float, default=0.02
         Standard deviation of the Gaussian under which the offsets are smoothed after the
-        vote, as a share of the clip. More makes smoother synchronised movements and hits
-        key moments less closely.
+        vote, as a share of the clip. A larger value gives smoother synchronised movements and
+        less accurate key moments.
     cost : {"velocity", "elastic", "posture"}, default="velocity"
-        What is compared. ``"velocity"``: how the point moves; at the local rate rho,
-        ``v_n`` with ``(0.8 + 0.2 rho) v_m``. ``"elastic"``: its velocity
-        divided by the square root of its speed, with weights that make the distance (of
-        Fisher and Rao) independent of how either sequence is timed. ``"posture"``: where the
-        point is, as in the paper.
+        The features that are compared. ``"velocity"``: the velocity of the point; at the local
+        rate rho, ``v_n`` with ``(0.8 + 0.2 rho) v_m``. ``"elastic"``: the velocity
+        divided by the square root of the speed, with weights that make the distance (of
+        Fisher and Rao) independent of the timing of either sequence. ``"posture"``: the
+        point, as in the paper.
     smoothness : float, default=0.003
         Weight of the changes of pace, a pure number: ``mu`` is ``smoothness`` times the
         mean squared norm of the compared features over the training set.
@@ -246,23 +135,23 @@ class DenseSynchronizer(DenseSteps):
         Positions a frame at which a path may stand. More than 1 serves direct paths
         (``consensus=0``); the vote, its smoothing and the refinement are finer anyway.
     search : {"auto", "exhaustive", "sampled"}, default="auto"
-        How the median is found: by all matches, or by those with random references, as few as it
-        takes to be sure (see ``search_``). ``"auto"``: by all up to 100 performances.
+        The search for the median: by all matches, or by a sequential test on matches with random
+        references (see ``search_``). ``"auto"``: by all matches of up to 100 performances.
     max_fit : int, default=None
-        Of how many performances, at least 2 and drawn at random, ``fit`` learns everything: clock,
-        metric, pattern, exemplars, whether to refine. The others are not looked at, nor read if
-        ``X`` gives performances by index: a fit takes the same time and memory however many there
-        are. A pattern that is told by its index is among them. None: of all. See
+        Size of a random sample, at least 2, from which ``fit`` learns everything: clock,
+        metric, pattern, exemplars, whether to refine. The others are not checked, nor read if
+        ``X`` gives performances by index: time and memory of a fit do not depend on their number.
+        A pattern given by its index is in the sample. None: all performances. See
         ``typical_share_``.
     random_state : int, RandomState instance or None, default=0
-        Draws the references of a sampled search, and who is learnt from. The default makes equal
-        input give equal results.
+        Draws the references of a sampled search, and the sample of ``max_fit``. With the default
+        equal input gives equal results.
     n_jobs : int, default=None
-        How many jobs share the matches, in ``fit``, ``transform`` and ``match``. None means 1
+        Number of parallel jobs in ``fit``, ``transform`` and ``match``. None means 1
         unless in a ``joblib.parallel_config`` context, -1 all cores. Results are the same to the
         last bit.
     verbose : int, default=0
-        Above 0, print how far a long job is, at most once a second.
+        Above 0, print the progress of a long job, at most once a second.
 
     Attributes
     ----------
@@ -273,58 +162,60 @@ class DenseSynchronizer(DenseSteps):
     n_frames_ : int
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
-        ``C_n`` of Eq. 19 of those who met all: of every performance after an exhaustive search, of
-        the best few after a sampled one; NaN for the others, and if nobody needed them. With a
-        learnt metric the search compares, where ``P`` is 1.5 times as many or more, at as many
-        frames as the smoothing of velocities leaves independent (51 by default; more for a
-        narrow band), in single precision if that tells the typical ones apart, or the data have
-        no other; sums are scaled to ``P``. Sums of the ``distances`` of `match`, at all frames, are
-        within 12 % of them on ten actions of people, and smallest for the same performance; the
-        precision makes 2e-7.
+        ``C_n`` of Eq. 19 by all matches: of every performance after an exhaustive search, of
+        the best few after a sampled one; else NaN. With a
+        learnt metric the search compares only as many frames as the smoothing of velocities leaves
+        independent (51 by default; more for a narrow band), if ``P`` is at least 1.5 times as many,
+        and in single precision, if that tells the most typical ones apart; sums are scaled to
+        ``P``. Sums of the ``distances`` of `match`, at all frames, are within 12 % of them on ten
+        actions of people, and smallest for the same performance; the precision makes 2e-7.
     certified_ : bool
-        Whether the pattern is the median of Eq. 19, as the search compares: known from all matches,
-        or because paired tests, which err with a probability of 1 % all together, rejected every
-        other performance. False if the pattern was given, or a search has spent its 150 matches a
-        performance. After a fit to a sample: whether nobody else of the sample may be more typical
-        of all.
+        Whether the pattern is the median of Eq. 19: by all matches, or because paired tests, with a
+        family-wise error rate of 1 %, rejected every other performance. False if the pattern was
+        given, or a search has spent its 150 matches a performance. After a fit to a sample: whether
+        no other performance of the sample may be more typical of all.
     n_matches_ : int
-        Matches by which the pattern and the exemplars were chosen.
+        Number of matches to choose the pattern and the exemplars.
     search_ : Bunch
-        ``n_matches``, ``certified``, as above; ``in_doubt``, how many others no test rejected;
-        ``excess``: with a probability of 99 % the pattern's ``C_n`` is at most ``1 + excess``
-        times the smallest. All are in doubt, the excess is NaN, if the pattern was given.
+        ``n_matches``, ``certified``, as above; ``in_doubt``, the number of others that no test
+        rejected; ``excess``: with a probability of 99 % the pattern's ``C_n`` is at most
+        ``1 + excess`` times the smallest. If the pattern was given, all are in doubt and the excess
+        is NaN.
     sample_ : ndarray of int
-        Indices of the performances that were learnt from: all, or ``max_fit`` of them.
-        ``global_distances_`` are those to these, NaN for all others; ``training_`` is of these.
+        Indices of the training performances: all, or ``max_fit`` of them. ``global_distances_`` are
+        sums over these, and NaN for all others; ``lengths_`` and ``examples_`` are theirs.
     typical_share_ : float
-        At most this share of all performances is more typical than the pattern: has a smaller
-        global distance. 0 if that is the certified median of all. After a fit to a sample it holds
-        with a probability of 95 % (beside the 1 % of the search), if the sample stands for all:
-        with 500 that leave no doubt it is 0.006. Distances are those of this fit, in the metric
-        of the sample. NaN if the pattern was given.
+        Upper bound of the share of all performances that are more typical than the pattern, with a
+        smaller global distance in the metric of this fit. 0 if that is the certified median of
+        all. After a fit to a random sample its confidence is 95 % (beside the 1 % of the
+        search); it is 0.006 for a sample of 500 with none in doubt. NaN if the pattern was given.
     metric_ : Bunch or None
-        What was learnt: ``share``, the part of every feature in what is compared, about 0 for
-        noise; ``energy``, its part in the plain velocities, which would be compared without a
-        metric, above 0.95 of one of several a warning; ``performances``, the indices of those it
-        was learnt from. It is learnt in single precision. None if none was learnt.
+        The learnt metric: ``share``, the share of every feature in what is compared, about 0 for
+        noise; ``energy``, its share in the velocities, which are compared without a
+        metric: above 0.95 of one of several there is a warning; ``performances``, the indices of
+        those it was learnt from. It is learnt in single precision. None without a metric.
     mu_ : float
-        The absolute weight of the changes of pace, by the frames that the search compares: within
-        1 % of that by all.
+        Absolute weight of the changes of pace, by the frames that the search compares: within
+        1 % of that by all frames.
     exemplars_ : ndarray of int
         Indices of the performances that vote.
     misfit_ : float
-        Median share of the pattern's variance that matched postures leave, smoothed so that
-        noise hardly counts; NaN unless ``refine="auto"`` finds that refining may help.
+        Median share of the variance of the pattern in the smoothed residuals of matched postures;
+        NaN unless ``refine="auto"`` finds that refining may help.
     refinement_ : Bunch
-        What was found out by ``refine="auto"``, on features that had no part in the warps:
+        The test of ``refine="auto"``, by features that had no part in the warps:
         ``ratio``, their misfit after refining by the other features to that after matching by the
-        others alone; ``p_value``, of a t test that refining does not help; both after a first
-        look if that leaves no hope; ``ratio_to_all``, to the misfit after matching by all features,
-        if that is still asked. NaN where nothing tells.
+        others alone; ``p_value``, of a t test that refining does not help; both after the first
+        pass of the test if that rejects refining; ``ratio_to_all``, to the misfit after matching by
+        all features. NaN where there is no test.
     refines_ : bool
         Whether warps are refined.
-    training_ : Bunch
-        What `find_performances` goes by, as of `Synchronizer`.
+    lengths_ : ndarray of int, shape (n_samples_fit,)
+        Numbers of frames of the training performances.
+    examples_ : ndarray, shape (min(n_samples_fit, 64), P, n_features)
+        Training performances linearly normalised: all, or 64 of them, evenly spaced.
+    features_ : callable
+        Turns postures on the clock into the features that are compared.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -334,8 +225,8 @@ class DenseSynchronizer(DenseSteps):
     --------
     LinearSynchronizer : The baseline without matching.
     KeyframeSynchronizer : Matching by key-frames.
-    ActionModel : What the synchronised performances have in common.
-    MetricDisplay : Draws what the metric listens to, and what it takes for noise.
+    ActionModel : Mean and variation of synchronised performances.
+    MetricDisplay : Draws the weights of the features in the metric.
 
     References
     ----------
@@ -344,7 +235,7 @@ class DenseSynchronizer(DenseSteps):
 
     Examples
     --------
-    A known warp is found again. The second performance is up to 8 frames ahead in its first
+    A known warp is recovered. The second performance is up to 8 frames ahead in its first
     half, and behind in its second.
 
     >>> import numpy as np
@@ -380,6 +271,8 @@ class DenseSynchronizer(DenseSteps):
         "n_jobs": [Integral, None],
         "verbose": ["verbose"],
     }
+
+    _SMALLER = "fewer frames, subframes or performances. Or learn from some: max_fit=1000"
 
     def __init__(
         self,
@@ -422,15 +315,35 @@ class DenseSynchronizer(DenseSteps):
 
     @snapshot
     def match(self, X):
+        """Match performances to the pattern: the warps of ``transform`` (Eqs. 12-17).
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+            Read in parts as by ``transform``.
+
+        Returns
+        -------
+        Match
+            ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
+            the pattern, after vote, smoothing and refinement; ``distances``, shape
+            (n_sequences,), of the direct paths: ``D_{n,m}`` of Eq. 12.
+        """
         return self._match_in_parts(X)
 
     def _match(self, performances):
-        warper = self._warper
-        self._check_unit(performances)
+        distances, times = self._distances_and_times(performances)
+        return Match(times, self._warper.matcher.features.back(distances))
+
+    def _warp_part(self, performances):
+        times = np.maximum.accumulate(self._distances_and_times(performances)[1], axis=1)
+        return sample(performances, times, self.n_frames_)
+
+    def _distances_and_times(self, performances):
         with self._progress(fits=False) as progress:
             portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "warping"}
-            distances, times = warp_in_portions(warper, performances, **portions)
-        return Match(times, warper.matcher.features.back(distances))
+            return warp_in_portions(self._warper, performances, **portions)
 
     @snapshot
     def disparity_space(self, X, performance=0):
@@ -439,15 +352,16 @@ class DenseSynchronizer(DenseSteps):
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
         performance : int, default=0
-            Which of them.
+            The index of one of them.
 
         Returns
         -------
         Bunch
             ``frames`` p and ``offsets`` d, all of them or, of long takes, evenly spaced ones;
-            ``costs`` E(p, d) of Eq. 12 at the pattern's rate, shape (n_frames, n_offsets), NaN
-            where no path that obeys Eqs. 9 and 13 can pass; ``path``, the offsets of the best
+            ``costs`` E(p, d) of Eq. 12 at rate 1, shape (n_frames, n_offsets), NaN
+            where no path passes by Eqs. 9 and 13; ``path``, the offsets of the best
             path, shape (P,), before vote, smoothing and refinement.
 
         Raises
@@ -468,180 +382,299 @@ class DenseSynchronizer(DenseSteps):
         costs = warper.matcher.features.back(costs)
         return Bunch(frames=frames, offsets=offsets, costs=costs, path=path)
 
+    # -- steps of a fit ---------------------------------------------------------------------
 
-# -- settings: what a matcher is made with, and the metric that is learnt before it ------
+    def _check_training_set(self, X):
+        some, sample, population = subsample(X, self.max_fit, self.pattern, self.random_state)
+        numbers = None if sample is None else sample.tolist()
+        performances = super()._check_training_set(some, numbers)
+        n = len(performances)
+        self.sample_ = np.arange(n) if sample is None else sample
+        self._population = n if sample is None else population
+        return performances
 
-# max_offset="auto". A wide band leads paths astray until a metric is learnt; after that gestures
-# need it: docs/method.md.
-_NARROW, _WIDE = 0.25, 0.4
-# The largest offset that a metric is learnt by, of what is certain: docs/method.md.
-_CERTAIN = 0.2
-# velocity_smoothing="auto": what is noise a metric knows; without one it is smoothed away.
-_SMOOTH, _SHARP = SMOOTHING, 0.02
-# Steps that a path may take at a frame, all offsets together.
-_MOST_WAYS = 1e9
-# Of how many performances a metric is learnt, at least and at most. Two have no route but the
-# direct one: what they disagree in cannot be told from a wrong path.
-_FEWEST, _MOST = 3, 20
+    def _number_as_given(self):
+        sample, distances = self.sample_, np.full(self._population, np.nan)
+        distances[sample] = self.global_distances_
+        self.global_distances_, self.exemplars_ = distances, sample[self.exemplars_]
+        if self.pattern_index_ is not None:
+            self.pattern_index_ = int(sample[self.pattern_index_])
+        if self.metric_ is not None:
+            self.metric_.performances = sample[self.metric_.performances]
 
+    def _learn(self, performances):
+        with self._progress(fits=True) as progress:
+            training = self._set_clock(performances, self.subframes)
+            positions = training.scaled
+            if self.subframes > 1:
+                positions = normalise(performances, self.n_frames_, self.subframes)
+                training.unit(positions, out=positions)
+            features = self._learn_metric(training.unit, positions)
+            settings = self._settings()
+            searched = features.for_search(self.n_frames_, settings["max_offset"])
+            store = FeatureStore(searched, positions)
+            _warn_of_one_feature(self, performances, store)
+            searcher, shared, median = self._search(searched, store, positions, progress)
+            matcher = searcher
+            if searched is not features:
+                reach = {name: settings[name] for name in ("max_offset", "max_rate")}
+                sizes = self.n_frames_, searcher.trellis.mu
+                trellis = Trellis.on_clock(self.cost, *sizes, subframes=self.subframes, **reach)
+                matcher = Matcher(features, trellis)
+            self.features_ = features
+            self.mu_ = float(features.back(matcher.trellis.mu))
+            source = self._set_pattern(training, median, features.degree)
+            # Sums over fewer frames, scaled to all.
+            self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
+            warper = self._choose_exemplars(training, matcher, source, median.estimates)
+            self._warper = self._decide_on_refinement(training, warper, source, progress, shared)
 
-@dataclass(frozen=True)
-class Settings:
-    """What `Matcher.learn` takes besides the performances."""
-
-    smoothness: float
-    max_offset: float
-    max_rate: float
-
-    @classmethod
-    def of(cls, synchronizer, learnt):
-        """Those of a synchronizer, with a metric or without."""
-        max_offset = synchronizer.max_offset
+    def _settings(self, learnt=None):
+        """The settings of `Matcher.learn`, for a learnt metric or none; by default as fitted."""
+        learnt = self.metric_ is not None if learnt is None else learnt
+        max_offset = self.max_offset
         if max_offset == "auto":
             max_offset = _WIDE if learnt else _NARROW
-        return cls(synchronizer.smoothness, max_offset, synchronizer.max_rate)
+        settings = {"smoothness": self.smoothness, "max_rate": self.max_rate}
+        return {**settings, "max_offset": max_offset}
 
-    def check(self, n_frames, subframes):
-        """Say what a trellis asks for before it takes for ever."""
+    def _learn_metric(self, unit, positions):
+        """The features with the learnt metric, from evenly spaced performances if there are many.
+
+        Sets ``metric_``.
+        """
+        learns = self.metric == "learned" and self.cost == "velocity" and self.consensus > 0
+        self._check_paths(self._settings(learns)["max_offset"])
+        smoothing, self.metric_ = self.velocity_smoothing, None
+        sharp, smooth = (_SHARP, _SMOOTH) if smoothing == "auto" else (smoothing, smoothing)
+        plain, n = Features(self.cost, self.subframes, smooth, unit), len(positions)
+        if not learns or n < _FEWEST:
+            return plain
+        some = np.unique(np.round(np.linspace(0, n - 1, min(n, _MOST))).astype(np.intp))
+        settings = self._settings(learnt=False)
+        settings["max_offset"] = min(settings["max_offset"], _LEARNING_OFFSET)
+        settings |= {"consensus": self.consensus, "warp_smoothing": self.warp_smoothing}
+        features = plain.replace(velocity_smoothing=sharp)
+        learnt = on_one_thread(partial(features.learn, **settings), positions[some])
+        if learnt is None:
+            return plain
+        features, share, energy = learnt
+        self.metric_ = Bunch(share=share, energy=energy, performances=some)
+        return features
+
+    def _check_paths(self, max_offset):
+        """Refuse a trellis that takes too long."""
+        subframes, n_frames = self.subframes, self.n_frames_
         steps = min(self.max_rate, n_frames - 1) * subframes + 1
-        ways = steps * (2 * self.max_offset * n_frames * subframes + 1)
-        if ways > _MOST_WAYS:
+        steps *= 2 * max_offset * n_frames * subframes + 1
+        if steps > _MOST_STEPS:
             raise ValueError(
                 f"subframes = {subframes}, max_rate = {self.max_rate} and max_offset = "
-                f"{self.max_offset} on {n_frames} frames ask for {ways:.0e} steps of a path "
-                f"at every frame of every pair; {_MOST_WAYS:.0e} is the limit. Use fewer "
+                f"{max_offset} on {n_frames} frames ask for {steps:.0e} steps of a path "
+                f"at every frame of every pair; {_MOST_STEPS:.0e} is the limit. Use fewer "
                 "subframes, a smaller rate or offset."
             )
 
+    def _search(self, features, store, positions, progress):
+        """The matcher that searches, the portions of the training set, and the median (Eq. 19)."""
+        energy = store.energy()
+        shape = len(positions), *store.template.shape[1:]
+        matcher = Matcher.of_energy(features, shape, energy, **self._settings())
+        portions = TrainingPortions(matcher, positions, store)
+        rounding = rounding_bound(store.template.dtype, energy)
+        compare = partial(portions.compare, n_jobs=self.n_jobs, progress=progress)
+        median = self._choose_median(compare, len(positions), rounding)
+        is_rounded = features.single and positions.dtype != store.template.dtype
+        if not is_rounded or not median.is_blurred(rounding):
+            return matcher, portions, median
+        # Nearly equal trials: single precision does not tell them apart.
+        features = features.replace(single=False)
+        return self._search(features, FeatureStore(features, positions), positions, progress)
 
-def features_of(synchronizer, unit, learnt):
-    """What a synchronizer compares, to be learnt with a metric or without one."""
-    smoothing = synchronizer.velocity_smoothing
-    if smoothing == "auto":
-        smoothing = _SHARP if learnt else _SMOOTH
-    return Features(synchronizer.cost, synchronizer.subframes, smoothing, unit)
+    def _choose_median(self, compare, n, rounding):
+        """The median (Eq. 19), by all matches or some; or only what chooses the exemplars."""
+        wanted, population = isinstance(self.pattern, str), self._population
+        if not wanted and (self.consensus == 0 or n <= self.consensus):
+            # None or all of the performances are exemplars.
+            median = Median.unknown(n)
+        elif self.search == "exhaustive" or (self.search == "auto" and n <= _EXHAUSTIVE):
+            median = exhaustive_median(compare, n, rounding, population)
+        elif wanted:
+            random_state = check_random_state(self.random_state)
+            median = sampled_median(compare, n, rounding, random_state, population)
+        else:
+            median = estimate_distances(compare, n, check_random_state(self.random_state))
+        known = median if wanted else Median.unknown(n, median.n_matches)
+        names = "n_matches", "certified", "in_doubt", "excess"
+        self.search_ = Bunch(**{name: getattr(known, name) for name in names})
+        self.n_matches_, self.certified_ = known.n_matches, known.certified
+        self.typical_share_ = typical_share(known.in_doubt, n, population) if wanted else np.nan
+        return median
+
+    def _choose_exemplars(self, training, matcher, source, estimates):
+        """Choose the exemplars; the warper to the pattern by way of them."""
+        self.exemplars_ = np.empty(0, dtype=np.intp)
+        if self.consensus > 0:
+            patterns = [self.pattern_index_]
+            self.exemplars_ = choose_exemplars(estimates, self.consensus, patterns)[:, 0]
+        arrays = list(training.performances)
+        chosen = [source, *(arrays[k] for k in self.exemplars_.tolist())]
+        # In double precision, as all performances that are warped.
+        chosen = [x.astype(np.float64, copy=False) for x in chosen]
+        positions = matcher.features.positions(chosen, self.n_frames_)
+        pattern, votes = positions[0, :: self.subframes], self.consensus > 0
+        settings = pattern, positions, votes, self.warp_smoothing
+        return on_one_thread(Warper.to_pattern, matcher, *settings)
+
+    def _decide_on_refinement(self, training, warper, source, progress, portions):
+        """Decide whether warps are refined by postures; the warper that does so or not."""
+        verdict = Verdict()
+        if self.refine == "auto" and self.consensus > 0:
+            others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
+            some = others[:: -(-len(others) // _TESTED) or 1]
+            verdict = self._test_refinement(
+                training.scaled, warper, source, some, progress, portions
+            )
+        names = "ratio", "p_value", "ratio_to_all"
+        self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
+        self.misfit_ = verdict.misfit
+        self.refines_ = bool(verdict.helps if self.refine == "auto" else self.refine)
+        if not self.refines_:
+            return warper
+        return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.scaled))
+
+    def _test_refinement(self, scaled, warper, source, some, progress, portions):
+        """The verdict on refining some performances, by their indices; without any figure if there
+        are no two folds of features.
+        """
+        folds = split_features(scaled[some]) if len(some) else []
+        if not folds:
+            return Verdict()
+        positions = portions.positions[some].astype(np.float64, copy=False)
+        every = 1 if len(some) < 2 * _SEVERAL else 2
+        width = choose_smoothing(scaled[some[::every]])
+        test = on_one_thread(
+            partial(RefinementTest.of, **self._settings(learnt=False)),
+            *(warper, warper.positions([source]), positions, folds, width),
+        )
+        energy = np.square(test.pattern - test.pattern.mean(axis=0)).sum() or 1.0
+        how = {"n_jobs": self.n_jobs, "progress": progress}
+
+        def misfits(method, name, every=1):
+            given = test, method, positions[::every], (portions, some[::every])
+            return np.concatenate(measure_in_portions(*given, name=name, **how), axis=1)
+
+        def verdict_of(by_fold, by_all=None):
+            by_all = np.full_like(by_fold[:1], np.nan) if by_all is None else by_all
+            return Verdict.of(np.concatenate([by_all, by_fold]), energy)
+
+        if len(some) >= _SEVERAL:
+            first = verdict_of(misfits("first_misfits", "first pass of the refinement test", every))
+            if first.is_hopeless:
+                return first
+        by_fold = misfits("misfits", "refinement test")
+        verdict = verdict_of(by_fold)
+        if not verdict.may_help:
+            return verdict
+        return verdict_of(by_fold, misfits("misfits_by_all", "refinement test, unrefined"))
 
 
-def learn_metric(synchronizer, plain, positions):
-    """What is compared, with the metric of a training set, learnt of evenly spaced ones of many.
+# -- a fit to a random sample of many performances ---------------------------------------------
+
+
+def subsample(X, size, pattern, random_state):
+    """A random sample of performances; the others are not read.
 
     Parameters
     ----------
-    synchronizer : DenseSynchronizer
-    plain : Features
-        What is compared without a metric.
-    positions : ndarray, shape (n_sequences, Q, n_features)
-        The performances at all positions, in the unit.
+    X : performances of any kind
+    size : int or None
+        Size of the sample; None for all.
+    pattern : as of a synchronizer
+        A pattern given by its index is always in the sample.
+    random_state : as of a synchronizer
 
     Returns
     -------
-    features : Features
-        Those without a metric if there is nothing to learn.
-    learnt : Bunch or None
-        ``metric_`` of the synchronizer.
+    some : performances of any kind
+    sample : ndarray of int or None
+        Their indices, which increase; None if they are all.
+    population : int or None
+        Size of the population.
     """
-    n = len(positions)
-    if n < _FEWEST:
-        return plain, None
-    some = np.unique(np.round(np.linspace(0, n - 1, min(n, _MOST))).astype(np.intp))
-    settings = vars(Settings.of(synchronizer, learnt=False))
-    settings = {**settings, "max_offset": min(settings["max_offset"], _CERTAIN)}
-    vote = {name: getattr(synchronizer, name) for name in ("consensus", "warp_smoothing")}
-    features = features_of(synchronizer, plain.unit, learnt=True)
-    (learnt,) = run(partial(features.learn, **vote, **settings), [(positions[some],)])
-    if learnt is None:
-        return plain, None
-    features, share, energy = learnt
-    return features, Bunch(share=share, energy=energy, performances=some)
+    if size is None:
+        return X, None, None
+    given = _indexable(as_pandas(X))
+    population = 0 if given is None else count_of(given)
+    is_index = isinstance(pattern, Integral) and not isinstance(pattern, bool)
+    if size >= population or (is_index and pattern >= population):
+        return X if given is None else given, None, None
+    # An independent stream: the search uses the same state.
+    seed = check_random_state(random_state).randint(np.iinfo(np.int32).max)
+    drawn = np.random.RandomState(seed).permutation(population)
+    if is_index:
+        drawn = np.concatenate([[pattern], drawn[drawn != pattern]])
+    sample = np.sort(drawn[:size])
+    return select(given, sample), sample, population
 
 
-# -- whether refining helps: tried on some of a training set, before a synchronizer does it
+def _indexable(X):
+    """Performances, or rows, by index; None for input that has to be refused."""
+    source = as_source(X)
+    if source is not None:
+        return source
+    if isinstance(X, pd.DataFrame):
+        return X if X.index.nlevels == 1 else as_collection(X)
+    known = isinstance(X, (list, tuple)) or (isinstance(X, np.ndarray) and X.ndim > 0)
+    return X if known or gives_rows(X) else None
 
-# Fewer performances do not tell after a few steps whether refining may help; of twice as many
-# every second one is looked at first.
-_SEVERAL = 3
 
+def typical_share(in_doubt, n, population):
+    """Upper 95 % confidence bound of the share of a population more typical than the pattern.
 
-def try_refinement(warper, source, scaled, shared, some, settings, **portions):
-    """The verdict on refining some performances of a training set.
+    At most ``in_doubt`` of a random sample of n are more typical than its pattern: it is one
+    of the ``in_doubt + 1`` most typical of the sample. The share of the population that is
+    more typical than the last of these follows a beta distribution if the sample is drawn with
+    replacement; it is smaller without.
 
     Parameters
     ----------
-    warper : Warper
-    source : ndarray, shape (n_frames, n_features)
-        The pattern at its own pace.
-    scaled : ndarray, shape (n_sequences, P, n_features)
-        The training set, in the unit.
-    shared : SharedArgument
-        The `shared_training_set`.
-    some : ndarray of int
-        Indices of those to try it on.
-    settings : dict
-        As `Matcher.learn` takes them.
-    **portions : dict
-        ``n_jobs`` and ``progress``.
-
-    Returns
-    -------
-    Verdict
-        Without any figure if nothing can be told.
+    in_doubt : int
+    n, population : int
+        If they are equal nothing is estimated.
     """
-    hands = deal_features(scaled[some]) if len(some) else []
-    if not hands:
-        return Verdict()
-    positions = shared.value.positions[some].astype(np.float64, copy=False)
-    every = 1 if len(some) < 2 * _SEVERAL else 2
-    source, width = warper.positions([source]), choose_smoothing(scaled[some[::every]])
-    portion = warper, source, positions, hands, width
-    (trial,) = run(partial(RefinementTrial.of, **settings), [portion])
-    energy = np.square(trial.pattern - trial.pattern.mean(axis=0)).sum() or 1.0
-
-    def misfits(method, name, every=1):
-        how = {"name": name, "found": (shared, some[::every]), **portions}
-        return np.concatenate(in_portions(trial, method, positions[::every], **how), axis=1)
-
-    def verdict_on(tried):
-        return Verdict.of(np.concatenate([np.full_like(tried[:1], np.nan), tried]), energy)
-
-    if len(some) >= _SEVERAL:
-        seen = verdict_on(misfits("glimpse", "trying a little to refine", every))
-        if seen.is_hopeless:
-            return seen
-    tried = misfits("misfits", "trying to refine")
-    verdict = verdict_on(tried)
-    if not verdict.may_help:
-        return verdict
-    by_all = misfits("misfits_by_all", "matching without refining")
-    return Verdict.of(np.concatenate([by_all, tried]), energy)
+    if n == population:
+        return in_doubt / n
+    return float(betaincinv(in_doubt + 1, n - in_doubt, _CONFIDENCE)) if in_doubt < n else 1.0
 
 
-# -- balance: whether one of several features drowns the others in what is compared ------
+# -- whether one of several features dominates the energy that is compared -----------------
 
 # Of 112 sets of features of people, one action each, the largest share of velocities is 0.93:
 # positions, direction cosines, and their first components, two or more (HDM05, UTKinect).
-_DROWNS = 0.95
-# A feature with less of the energy does not move, but for rounding.
-_STILL = 1e-24
-# Correlations of principal components are not larger by rounding.
+_DOMINANT = 0.95
+# A feature with a smaller share of the energy is constant but for rounding.
+_CONSTANT = 1e-24
+# Largest correlation of principal components due to rounding.
 _UNCORRELATED = 1e-5
-# Performances that are looked at together.
-AT_ONCE = 256
+# Performances processed at a time.
+BATCH = 256
 
 
-def warn_of_one_feature(synchronizer, performances, compared):
-    """Say if one of several features has nearly all of the energy, as other units have.
+def _warn_of_one_feature(synchronizer, performances, store):
+    """Warn if one of several features has nearly all of the energy, as with mixed units.
 
     Parameters
     ----------
     synchronizer : DenseSynchronizer
         Its metric is learnt.
     performances : sequence of ndarray (n_frames_i, n_features)
-    compared : Compared
-        What is compared of them without a metric; not looked at with one.
+    store : FeatureStore
+        Their features, used without a metric.
     """
     metric, names = synchronizer.metric_, names_of_input(synchronizer)
-    shares = metric.energy if metric else _shares(compared, synchronizer.cost)
-    if shares.max() <= _DROWNS or (shares > _STILL).sum() < 2:
+    shares = metric.energy if metric else _shares(store, synchronizer.cost)
+    if shares.max() <= _DOMINANT or (shares > _CONSTANT).sum() < 2:
         return
     if _are_principal_components(performances):
         return
@@ -657,21 +690,17 @@ def warn_of_one_feature(synchronizer, performances, compared):
     )
 
 
-def _shares(compared, cost):
-    """The share of every feature in what is compared without a metric."""
-    sums = [_sums(x) for x in compared.portions()]
+def _shares(store, cost):
+    """The share of every feature in the energy that is compared without a metric."""
+    total, energy, count = 0, 0, 0
+    for features in store.portions():
+        total += features.sum(axis=(0, 1), dtype=np.float64)
+        energy += np.einsum("npk,npk->k", features, features, dtype=np.float64)
+        count += features[:, :, 0].size
     if cost == "posture":
-        # Where all of them are makes no difference.
-        centre = sum(total for total, _, _ in sums) / sum(count for _, _, count in sums)
-        sums = [_sums(x - centre.astype(x.dtype)) for x in compared.portions()]
-    energy = sum(squares for _, squares, _ in sums)
+        # A common offset changes no distance.
+        energy = np.maximum(energy - total**2 / count, 0)
     return energy / (energy.sum() or 1.0)
-
-
-def _sums(features):
-    """Of every feature its sum and that of its squares, and how many frames there are."""
-    squares = np.einsum("npk,npk->k", features, features, dtype=np.float64)
-    return features.sum(axis=(0, 1), dtype=np.float64), squares, features[:, :, 0].size
 
 
 def _are_principal_components(performances):
@@ -679,13 +708,11 @@ def _are_principal_components(performances):
 
     They have one unit, and the first has most of the variance by construction.
     """
-    largest = max(float(np.abs(x).max()) for x in performances) or 1.0
-    # About a posture that is near, so that no digits are lost.
-    origin = performances[0].mean(axis=0, dtype=np.float64) / largest
-    total, products, count = 0, 0, 0
-    for rows in even_slices(len(performances), AT_ONCE):
-        frames = np.concatenate(list(performances[rows])).astype(np.float64) / largest
-        frames -= origin
+    # From a posture near the mean, so that no digits are lost.
+    origin = performances[0].mean(axis=0, dtype=np.float64)
+    arrays, total, products, count = list(performances), 0, 0, 0
+    for rows in even_slices(len(arrays), BATCH):
+        frames = np.concatenate(arrays[rows]).astype(np.float64) - origin
         total, products = total + frames.sum(axis=0), products + frames.T @ frames
         count += len(frames)
     covariance = products - np.outer(total, total) / count

@@ -9,7 +9,7 @@ from sklearn.utils._param_validation import Interval
 
 from ..inputs.numbers import as_numbers
 from ..matching.filters import SMOOTHING, smooth
-from ..matching.units import Unit, squared_distances
+from ..matching.units import Unit
 from ..matching.warps import even_slices, sample
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.pipelines import MissingMetadata
@@ -199,7 +199,8 @@ class KeyframeSynchronizer(Synchronizer):
                 own = knots[rows]
             times.append(self._interpolate(self.keyframes_, own))
             synchronised = sample(some, times[-1], self.n_frames_)
-            distances[rows] = squared_distances(synchronised, self.pattern_)
+            differences = np.square(synchronised - self.pattern_)
+            distances[rows] = differences.sum(axis=(1, 2), dtype=np.float64)
         return Match(np.concatenate(times), distances)
 
     def _learn(self, performances, keyframes):
@@ -208,8 +209,9 @@ class KeyframeSynchronizer(Synchronizer):
         comparable = training.scaled
         if self._given:
             knots = self._check_keyframes(performances, keyframes)
+            # On the mean key-frames all performances are comparable, as on one clock.
             times = self._interpolate(knots.mean(axis=0), knots)
-            comparable = training.unit.fill(sample(performances, times, self.n_frames_))
+            comparable = training.unit(sample(performances, times, self.n_frames_))
         self._set_pattern(training, self._plain_median(comparable))
         if self._given and self.pattern_index_ is not None:
             self.keyframes_ = knots[self.pattern_index_]

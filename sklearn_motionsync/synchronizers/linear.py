@@ -2,23 +2,22 @@
 
 import numpy as np
 
-from ..matching.units import squared_distances
-from ..matching.warps import even_slices
+from ..matching.warps import normalise
 from ..utils.atomic import snapshot
 from .base import Synchronizer
 from .match import Match
 
 __all__ = ["LinearSynchronizer"]
 
-# Performances that are handled together.
-_AT_ONCE = 256
+# Performances processed at a time: bounds the memory of intermediate arrays.
+_BATCH = 256
 
 
 class LinearSynchronizer(Synchronizer):
     """Linear normalisation (Eq. 7): the same number of frames, no matching.
 
-    The baseline that every other synchronizer is held against: each performance is
-    stretched evenly to ``n_frames``; the pattern only serves as reference.
+    The baseline of all other synchronizers: each performance is stretched evenly to
+    ``n_frames``; the pattern is only the reference of the distances.
 
     Parameters
     ----------
@@ -41,6 +40,12 @@ class LinearSynchronizer(Synchronizer):
         ``C_n`` of Eq. 19 for every performance; NaN if the pattern was given.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
+    lengths_ : ndarray of int, shape (n_sequences,)
+        Numbers of frames of the training performances.
+    examples_ : ndarray, shape (min(n_sequences, 64), P, n_features)
+        Training performances linearly normalised: all, or 64 of them, evenly spaced.
+    features_ : callable
+        Turns postures on the clock into the features that searches compare.
     feature_names_in_ : ndarray of str
         Names of the features; only if the input had names.
 
@@ -59,12 +64,25 @@ class LinearSynchronizer(Synchronizer):
 
     @snapshot
     def match(self, X):
+        """Match performances to the pattern without any warp.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+
+        Returns
+        -------
+        Match
+            Offsets of 0, and ``distances``, shape (n_sequences,): squared ones to the pattern.
+        """
         return self._match_in_parts(X)
 
     def _match(self, performances):
-        distances = np.empty(len(performances))
-        for rows in even_slices(len(performances), _AT_ONCE):
-            on_clock = self.normalize(performances.take(rows))
-            distances[rows] = squared_distances(on_clock, self.pattern_)
+        arrays, distances = list(performances), np.empty(len(performances))
+        for start in range(0, len(arrays), _BATCH):
+            rows = slice(start, start + _BATCH)
+            differences = normalise(arrays[rows], self.n_frames_) - self.pattern_
+            distances[rows] = np.square(differences).sum(axis=(1, 2), dtype=np.float64)
         clock = np.arange(self.n_frames_, dtype=np.float64)
-        return Match(np.tile(clock, (len(performances), 1)), distances)
+        return Match(np.tile(clock, (len(arrays), 1)), distances)

@@ -13,10 +13,9 @@ from sklearn.utils.validation import check_is_fitted
 from ..body.limbs import parts_of_names, parts_of_postures
 from ..inputs.features import choose_features
 from ..inputs.validation import names_of_input
-from ..matching.matcher import Matcher
-from ..matching.rows import Coupling
-from ..matching.warper import Warper
-from ..matching.warps import follow, normalise
+from ..matching.matcher import Matcher, Warper
+from ..matching.trellis import Coupling
+from ..matching.warps import evaluate_warps, normalise
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.groups import encode_groups
 from ..utils.parallel import Progress, run
@@ -36,12 +35,13 @@ _SHARED = (
     "pattern_index_",
     "n_frames_",
     "global_distances_",
-    "training_",
+    "lengths_",
+    "examples_",
+    "features_",
     "n_features_in_",
     "feature_names_in_",
     "_names_in",
     "_fitted_on_rows",
-    "_unit",
 )
 
 
@@ -94,8 +94,8 @@ class PartSynchronizer(Synchronizer):
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
         Global distances of the whole body, as of `DenseSynchronizer`.
-    training_ : Bunch
-        The part of the training set that `find_performances` needs, as of `Synchronizer`.
+    lengths_, examples_, features_
+        Those of ``synchronizer_``.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -396,7 +396,7 @@ _RIGID = 1e6
 
 def _warp_pattern_and_exemplars(warper, chosen):
     """The body's warps of the pattern and its exemplars; the pattern keeps its own pace."""
-    times = warper.warps(warper.matcher.features.unit(chosen), np.s_[:])[1]
+    times = warper.warps(warper.matcher.features.unit(chosen))[1]
     times[0] = np.arange(times.shape[1])
     return times
 
@@ -467,19 +467,18 @@ class PartWarper(Warper):
         arrays = [x.astype(np.float64, copy=False) for x in arrays]
         return normalise(arrays, len(self.pattern), self.matcher.features.subframes)
 
-    def warps(self, positions, rows, body):
+    def warps(self, positions, body):
         """Distances of the direct paths to the pattern, and times ``tau``, of some performances.
 
         Parameters
         ----------
         positions : ndarray, shape (n_sequences, Q, n_features)
             Whole performances at all positions, in double precision, not in the unit.
-        rows : slice
         body : ndarray, shape (n_sequences, P)
             The warps of the whole bodies.
         """
-        own = self.matcher.features.unit(positions[rows][:, :, self.columns])
-        return self.voted(own, self._coupling(body[rows]))
+        own = self.matcher.features.unit(positions[:, :, self.columns])
+        return super().warps(own, self._coupling(body))
 
     def _coupling(self, body):
         """The coupling of the paths from all bases.
@@ -490,5 +489,5 @@ class PartWarper(Warper):
         if not self.weight:
             return None
         at = np.broadcast_to(self.back[:, np.newaxis], (len(self.back), *body.shape))
-        from_bases = follow(np.broadcast_to(body, at.shape), at)
+        from_bases = evaluate_warps(np.broadcast_to(body, at.shape), at)
         return Coupling(self.weight, from_bases - np.arange(body.shape[1]))

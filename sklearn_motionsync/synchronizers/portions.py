@@ -1,4 +1,4 @@
-"""Portions: the matches of many performances, shared out among jobs, with progress."""
+"""Matches of many performances in portions, shared out among jobs, with progress."""
 
 import functools
 import threading
@@ -8,39 +8,41 @@ from joblib import effective_n_jobs
 
 from ..matching.warps import even_slices
 from ..utils.parallel import SharedArgument, on_cluster, run
+from ..utils.threads import on_one_thread
 
-__all__ = [
-    "Compared",
-    "compare_in_portions",
-    "in_portions",
-    "shared_training_set",
-    "warp_in_portions",
-]
+__all__ = ["FeatureStore", "TrainingPortions", "measure_in_portions", "warp_in_portions"]
 
-# Sizes of a portion of warping: worth sending away, and small enough to be shared out.
+# Sizes of a portion of warping: worth sending to another process, and small enough to share out.
 PORTION_CELLS = 50_000_000
 _PORTION_SEQUENCES = 256
-# So many times as long a portion may get for features that need not be made again.
+# How many times longer a portion may be that reuses features.
 _LONGEST = 4
 # Up to this share of a training set the pattern and the exemplars are worth sending after it.
 _LARGEST_SHARE = 0.4
+# Most bytes of features that are cached; beyond, computing them again takes a few per cent of the
+# time of comparing them, and caching them one more copy of all performances.
+CACHE_BYTES = 1 << 25
 
 
-class _TrainingSet:
-    """A training set as portions use it; sent away it holds one array, of which all else is made.
+# -- pairs of a training set ------------------------------------------------------------------
+
+
+class TrainingPortions:
+    """A training set whose pairs are compared in portions.
+
+    Other processes are sent the matcher and the positions once, and make the features.
 
     Parameters
     ----------
     matcher : Matcher
     positions : ndarray, shape (n_sequences, Q, n_features)
         The performances at all positions.
-    compared : Compared, default=None
-        What is compared of them.
+    store : FeatureStore, default=None
     """
 
-    def __init__(self, matcher, positions, compared=None):
+    def __init__(self, matcher, positions, store=None):
         self.matcher, self.positions = matcher, positions
-        self._compared = compared or Compared(matcher.features, positions)
+        self._store = store or FeatureStore(matcher.features, positions)
         self._held, self._lock = (b"", None), threading.Lock()
 
     def __getstate__(self):
@@ -49,80 +51,70 @@ class _TrainingSet:
     def __setstate__(self, state):
         self.__init__(*state)
 
-    def batches(self, bases, moving, size):
-        """Tiles of pairs, in batches of ``size(n_tiles)`` that need few features.
+    @functools.cached_property
+    def common(self):
+        """The training set as all portions share it."""
+        return SharedArgument(self)
 
-        If they are not kept, those of the fewer performances are held, and a batch has all tiles of
-        some of the others.
+    def compare(self, bases, moving, *, n_jobs, progress):
+        """Yield the synchronisation distances of all pairs of two index arrays, tile by tile.
+
+        Results do not depend on the portions: a few a worker.
         """
-        n_compared = self._compared.like.shape[2]
-        tiles = list(self.matcher.trellis.tiles(len(bases), len(moving), n_compared))
-        size = size(len(tiles))
-        if self._compared.is_kept:
-            return [tiles[batch] for batch in even_slices(len(tiles), size)]
-        along, batches, last = _along(bases, moving), [], None
-        for tile in sorted(tiles, key=lambda t: (t[along].start, t[1 - along].start)):
-            count, goes_on = len(batches[-1]) if batches else 0, tile[along].start == last
+        trellis, (n_bases, n_moving) = self.matcher.trellis, map(len, (bases, moving))
+        tiles = trellis.tiles(n_bases, n_moving, self._store.template.shape[2])
+        n_frames = self.positions.shape[1] // trellis.table.subframes
+        cells = max(1, n_bases * n_moving // max(1, len(tiles)))
+        cells *= n_frames * (2 * trellis.width + 1)
+        few = -(-len(tiles) // (4 * effective_n_jobs(n_jobs)))
+        size = max(1, min(few, PORTION_CELLS // cells))
+        portions = [(bases, moving, x) for x in self._batches(tiles, size, n_moving > n_bases)]
+        name = f"comparing {n_bases} with {n_moving} performances"
+        step = progress.stage(name, len(portions))
+        if len(portions) == 1:
+            yield from on_one_thread(self.distances, *portions[0])
+            step()
+            return
+        jobs = {"n_jobs": n_jobs, "prefer": "threads", "step": step}
+        for blocks in run(TrainingPortions.distances, portions, common=(self.common,), **jobs):
+            yield from blocks
+
+    def _batches(self, tiles, size, axis):
+        """Tiles in batches of ``size``.
+
+        If features are not cached, those of the fewer performances are held, and a batch has all
+        tiles of some of the others, along this axis.
+        """
+        if self._store.is_cached:
+            return [tiles[start : start + size] for start in range(0, len(tiles), size)]
+        batches, last = [], None
+        for tile in sorted(tiles, key=lambda t: (t[axis].start, t[1 - axis].start)):
+            count, goes_on = len(batches[-1]) if batches else 0, tile[axis].start == last
             if not batches or count >= (_LONGEST * size if goes_on else size):
                 batches.append([])
             batches[-1].append(tile)
-            last = tile[along].start
+            last = tile[axis].start
         return batches
 
     def distances(self, bases, moving, tiles):
-        """Of the tiles of one of the `batches` for the same arrays of indices."""
-        return self.matcher.distances(self._features(bases, moving, tiles), bases, moving, tiles)
-
-    def _features(self, bases, moving, tiles):
-        if self._compared.is_kept:
-            return self._compared.kept
-        along = _along(bases, moving)
-        fewer, more = (moving, bases) if along == 0 else (bases, moving)
-        some = [tile[along] for tile in tiles]
+        """Distances of the tiles of one portion."""
+        if self._store.is_cached:
+            return self.matcher.distances(self._store.cached, bases, moving, tiles)
+        axis = len(moving) > len(bases)
+        fewer, more = (bases, moving) if axis else (moving, bases)
+        some = [tile[axis] for tile in tiles]
         own = more[min(s.start for s in some) : max(s.stop for s in some)]
-        return Found((own, self._compared.of(own)), self._features_held(fewer))
-
-    def _features_held(self, indices):
-        """Those of many portions: made once in a process, whatever number of its threads ask."""
-        key = indices.tobytes()
+        # Those of many portions: made once in a process, by the first of its threads.
+        key = fewer.tobytes()
         with self._lock:
             if self._held[0] != key:
-                self._held = key, (indices, self._compared.of(indices))
-            return self._held[1]
+                self._held = key, (fewer, self._store.select(fewer))
+            held = self._held[1]
+        features = IndexedFeatures((own, self._store.select(own)), held)
+        return self.matcher.distances(features, bases, moving, tiles)
 
 
-def _along(bases, moving):
-    """Along which axis of the table of pairs the portions lie: that of more performances."""
-    return int(len(moving) > len(bases))
-
-
-def shared_training_set(matcher, positions, compared):
-    """A training set as the portions of a fit share it: others are sent its positions once."""
-    return SharedArgument(_TrainingSet(matcher, positions, compared))
-
-
-def compare_in_portions(training, bases, moving, *, n_jobs, progress):
-    """Yield the synchronisation distances of all pairs of two index arrays, tile by tile.
-
-    Which tiles go together makes no difference to the results: a few portions a worker.
-    """
-    here = training.value
-
-    def size(n_tiles):
-        cells = max(1, len(bases) * len(moving) // max(1, n_tiles))
-        cells *= here.matcher.trellis.cells(here.positions)
-        few = -(-n_tiles // (4 * effective_n_jobs(n_jobs)))
-        return max(1, min(few, PORTION_CELLS // cells))
-
-    portions = [(bases, moving, batch) for batch in here.batches(bases, moving, size)]
-    step = progress.stage(f"comparing {len(bases)} with {len(moving)} performances", len(portions))
-    jobs = {"n_jobs": n_jobs, "prefer": "threads", "step": step}
-    for blocks in run(_distances, portions, common=(training,), **jobs):
-        yield from blocks
-
-
-def _distances(training, bases, moving, tiles):
-    return training.distances(bases, moving, tiles)
+# -- performances one by one ------------------------------------------------------------------
 
 
 def warp_in_portions(warper, arrays, *along, n_jobs, progress, name):
@@ -132,9 +124,9 @@ def warp_in_portions(warper, arrays, *along, n_jobs, progress, name):
     ----------
     warper : Warper
     arrays : sequence of ndarray (n_frames_i, n_features)
-        As they are: nobody is sent more of them.
+        Workers are sent their own portions only.
     *along : ndarray, shape (n_sequences, ...)
-        What the warper takes besides.
+        Further arguments of the warper, by performance.
     n_jobs : int or None
     progress : Progress
     name : str
@@ -145,95 +137,90 @@ def warp_in_portions(warper, arrays, *along, n_jobs, progress, name):
     distances : ndarray, shape (n_sequences,)
     times : ndarray, shape (n_sequences, P)
     """
+    arrays = list(arrays)
     slices = _slices(warper, len(arrays))
-    portions = _Portions(slices, lambda rows: (_Arrays(arrays[rows]), *(x[rows] for x in along)))
+    step = progress.stage(name, len(slices))
+    if len(slices) == 1:
+        found = on_one_thread(warper.warps, warper.positions(arrays), *along)
+        step()
+        return found
+    portions = [(_Arrays(arrays[rows]), *(x[rows] for x in along)) for rows in slices]
     distances, times = np.empty(len(arrays)), np.empty((len(arrays), len(warper.pattern)))
-    jobs = {"n_jobs": n_jobs, "step": progress.stage(name, len(slices))}
-    results = run(_warps, portions, common=(SharedArgument(warper),), **jobs)
+    results = run(_warps, portions, common=(SharedArgument(warper),), n_jobs=n_jobs, step=step)
     for rows, (lengths, warps) in zip(slices, results, strict=True):
         distances[rows], times[rows] = lengths, warps
     return distances, times
 
 
-class _Portions:
-    """Portions that are made when it is their turn, so that not all of them are there at once."""
-
-    def __init__(self, slices, make):
-        self._slices, self._make = slices, make
-
-    def __len__(self):
-        return len(self._slices)
-
-    def __iter__(self):
-        return map(self._make, self._slices)
-
-
 class _Arrays(list):
-    """Arrays that are one where they are sent."""
+    """Arrays that are sent to another process as one, made when they are sent."""
 
     def __reduce__(self):
-        return _apart, (np.concatenate(self), [len(x) for x in self])
+        return _split, (np.concatenate(self), [len(x) for x in self])
 
 
-def _apart(frames, lengths):
+def _split(frames, lengths):
     ends = np.cumsum(lengths)
     return [frames[end - n : end] for end, n in zip(ends, lengths, strict=True)]
 
 
 def _warps(warper, arrays, *along):
-    return warper.warps(warper.positions(arrays), np.s_[:], *along)
+    return warper.warps(warper.positions(arrays), *along)
 
 
 def _slices(warper, n):
-    cells = len(warper.bases) * len(warper.pattern) * (2 * warper.matcher.trellis.width + 1)
-    return even_slices(n, min(max(1, PORTION_CELLS // cells), _PORTION_SEQUENCES))
+    cells = len(warper.bases.sequences) * len(warper.pattern)
+    cells *= 2 * warper.matcher.trellis.width + 1
+    size = min(max(1, PORTION_CELLS // cells), _PORTION_SEQUENCES)
+    return [slice(0, n)] if n <= size else even_slices(n, size)
 
 
-def in_portions(warper, method, positions, *, n_jobs, progress, name, found):
-    """Results of a method of a warper, for portions of some of a training set at all positions.
+def measure_in_portions(warper, method, positions, found, *, n_jobs, progress, name):
+    """Results of a method of a warper, for portions of some performances at all positions.
 
     Parameters
     ----------
     warper : Warper
     method : str
-        Of its methods one that takes positions and rows.
+        Of its methods one that takes positions.
     positions : ndarray, shape (n_sequences, Q, n_features)
+    found : tuple (training, rows)
+        Where the workers of a cluster find them: the `TrainingPortions`, and their indices in it.
     n_jobs : int or None
     progress : Progress
     name : str
         Of the stage.
-    found : tuple (training, rows)
-        Where a cluster finds them: the `shared_training_set`, and which of it they are.
     """
     slices = _slices(warper, len(positions))
     jobs = {"n_jobs": n_jobs, "step": progress.stage(name, len(slices))}
+    if len(slices) == 1:
+        found = on_one_thread(getattr(warper, method), positions)
+        jobs["step"]()
+        return [found]
     if on_cluster():
         training, rows = found
-        if _LARGEST_SHARE * len(training.value.positions) < len(warper.bases):
+        if _LARGEST_SHARE * len(training.positions) < len(warper.bases.sequences):
             jobs["n_jobs"] = 1
         portions = [(method, rows[some]) for some in slices]
-        return list(run(_of_training, portions, common=(SharedArgument(warper), training), **jobs))
+        common = SharedArgument(warper), training.common
+        return list(run(_measure_of_training, portions, common=common, **jobs))
     portions = [(method, positions[some]) for some in slices]
-    return list(run(_of_own, portions, common=(SharedArgument(warper),), **jobs))
+    return list(run(_measure, portions, common=(SharedArgument(warper),), **jobs))
 
 
-def _of_training(warper, training, method, rows):
-    return getattr(warper, method)(training.positions, rows)
+def _measure_of_training(warper, training, method, rows):
+    return getattr(warper, method)(training.positions[rows])
 
 
-def _of_own(warper, method, positions):
-    return getattr(warper, method)(positions, np.s_[:])
+def _measure(warper, method, positions):
+    return getattr(warper, method)(positions)
 
 
-# -- what is compared of a training set: kept of a small one, made in portions of a large one
-
-# Up to so many bytes features are kept; beyond, making them again takes a few per cent of what
-# comparing by them takes, and keeping them would be one copy more of all performances.
-KEPT_BYTES = 1 << 25
+# -- features of a training set: cached of a small one, made in portions of a large one ----------
 
 
-class Compared:
-    """What is compared of performances.
+class FeatureStore:
+    """Features of performances, made when they are needed.
 
     Parameters
     ----------
@@ -243,69 +230,61 @@ class Compared:
 
     Attributes
     ----------
-    is_kept : bool
-        Whether the features of all are.
+    is_cached : bool
+        Whether the features of all performances are cached.
     """
 
     def __init__(self, features, positions):
         self._features, self._positions = features, positions
-        self.is_kept = positions.nbytes <= KEPT_BYTES
-        self._kept, self._lock = None, threading.Lock()
-
-    def __len__(self):
-        return len(self._positions)
+        self.is_cached = positions.nbytes <= CACHE_BYTES
+        self._cached, self._lock = None, threading.Lock()
 
     @functools.cached_property
-    def like(self):
-        """An array of no performance that is of the kind of the features: (0, Q, n_compared)."""
-        return self.of(np.arange(1))[:0].copy()
+    def template(self):
+        """Features of no performance, with the right shape and dtype: (0, Q, n_compared)."""
+        some = self.cached if self.is_cached else self._features(self._positions[:1])
+        return some[:0].copy()
 
     @property
-    def kept(self):
-        """Of all, (n_sequences, Q, n_compared): made once, whatever number of threads ask."""
+    def cached(self):
+        """All features, (n_sequences, Q, n_compared): made once, by the first thread."""
         with self._lock:
-            if self._kept is None:
-                self._kept = self._features(self._positions)
-            return self._kept
+            if self._cached is None:
+                self._cached = self._features(self._positions)
+            return self._cached
 
-    def of(self, indices):
-        """Of some, (n_indices, Q, n_compared)."""
-        portions = [indices[rows] for rows in self._slices(len(indices))]
-        first = self._features(self._positions[portions[0]])
-        if len(portions) == 1:
-            return first
-        out, stop = np.empty((len(indices), *first.shape[1:]), first.dtype), len(first)
-        out[:stop] = first
-        for some in portions[1:]:
-            start, stop = stop, stop + len(some)
-            out[start:stop] = self._features(self._positions[some])
+    def select(self, indices):
+        """Features of some performances, (n_indices, Q, n_compared)."""
+        out = np.empty((len(indices), *self.template.shape[1:]), self.template.dtype)
+        for rows in self._slices(len(indices)):
+            out[rows] = self._features(self._positions[indices[rows]])
         return out
 
     def portions(self):
-        """Yield those of all, a portion at a time."""
-        if self.is_kept:
-            yield self.kept
+        """Yield the features of all performances, a portion at a time."""
+        if self.is_cached:
+            yield self.cached
             return
-        for rows in self._slices(len(self)):
+        for rows in self._slices(len(self._positions)):
             yield self._features(self._positions[rows])
 
     def _slices(self, n):
-        """Of so many performances, slices whose features take half a dozen copies in the making."""
-        return even_slices(n, max(1, KEPT_BYTES // (16 * self._positions[0].nbytes)))
+        """Slices of n performances whose features take half a dozen copies in the making."""
+        return even_slices(n, max(1, CACHE_BYTES // (16 * self._positions[0].nbytes)))
 
     def energy(self):
-        """The sum of the squares of all."""
+        """The sum of the squares of all features."""
         parts = [np.einsum("npk,npk->", x, x, dtype=np.float64) for x in self.portions()]
         return parts[0] if len(parts) == 1 else float(np.sum(parts))
 
 
-class Found:
-    """Features of some performances, found by the indices of these among all.
+class IndexedFeatures:
+    """Features of some performances, by their indices in the training set.
 
     Parameters
     ----------
     *parts : tuple (indices, features)
-        Those who are asked for together are in one of them.
+        An index array selects from one of them.
     """
 
     def __init__(self, *parts):

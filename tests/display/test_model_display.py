@@ -214,7 +214,7 @@ def test_legend_counts_departures_from_the_band_of_the_own_group(bunch, pipe):
         ({"unit": "ms"}, ValueError, "unit must be one of .*got 'ms'"),
         ({"unit": "seconds"}, ValueError, "needs frame_rate"),
         ({"unit": "seconds", "frame_rate": 0}, ValueError, "frame_rate must be one number above"),
-        ({"unit": "seconds", "frame_rate": [1, 2]}, ValueError, "each of the 9 .* got 2"),
+        ({"unit": "seconds", "frame_rate": [1, 2]}, ValueError, r"each of the 9 .* got \[1, 2\]"),
     ],
 )
 def test_action_model_display_refuses(bunch, pipe, arguments, error, message):

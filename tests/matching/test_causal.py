@@ -1,8 +1,119 @@
-"""Causal velocities: closed forms, no look-ahead, and gaps."""
+"""Running sequences: rows against all paths and the offline trellis; causal velocities."""
+
+import itertools
 
 import numpy as np
 import pytest
-from sklearn_motionsync.matching.causal import CausalDerivative, causal_velocity
+from sklearn_motionsync.matching.causal import CausalDerivative, CausalTrellis, causal_velocity
+from sklearn_motionsync.matching.costs import step_table
+from sklearn_motionsync.matching.trellis import Trellis
+
+from oracle import path_cost, step_costs
+
+SUBFRAMES, MU = 2, 0.4
+
+
+def best_to_every_end(base, moving, costs):
+    """Cheapest path to every position that the last sample may meet, of all there are."""
+    best = {}
+    for taken in itertools.product(sorted(costs), repeat=len(base) - 1):
+        path = np.concatenate([[0], np.cumsum(taken)]).astype(int)
+        if path[-1] < len(moving):
+            total = path_cost(base, moving, path, costs, MU, SUBFRAMES)
+            if total < best.get(path[-1], (np.inf,))[0]:
+                best[path[-1]] = total, path
+    return best
+
+
+@pytest.mark.parametrize("n_streams", [1, 3])
+def test_running_path_equals_all_paths(n_streams):
+    rng, costs = np.random.default_rng(0), step_costs("velocity", 2, SUBFRAMES)
+    bases, moving = rng.standard_normal((n_streams, 5, 2)), rng.standard_normal((9, 2))
+    trellis = Trellis(step_table("velocity", 2, SUBFRAMES), MU, 4, running=True)
+    live = CausalTrellis(trellis, moving, n_streams)
+    for p in range(5):
+        live.advance(bases[:, p])
+        paths = trellis.paths(bases[:, : p + 1], moving[np.newaxis])[:, 0]
+        for n in range(n_streams):
+            best = best_to_every_end(bases[n, : p + 1], moving, costs)
+            for q in range(9):
+                known = best.get(q, (np.inf, None))[0]
+                np.testing.assert_allclose(live.costs[n, q], known, atol=1e-12)
+            end = min(best, key=lambda q: best[q][0])
+            assert live.best()[0][n] == end
+            np.testing.assert_array_equal(paths[n], best[end][1])
+
+
+@pytest.mark.parametrize("n_streams", [1, 4])
+def test_running_trellis_equals_offline_trellis_bitwise(n_streams):
+    rng = np.random.default_rng(1)
+    bases, moving = rng.standard_normal((n_streams, 90, 7)), rng.standard_normal((201, 7))
+    trellis = Trellis(step_table("velocity", 3, 4), 0.7, 50, running=True)
+    live = CausalTrellis(trellis, moving, n_streams)
+    for p in range(90):
+        live.advance(bases[:, p])
+    assert live.n_samples == 90
+    np.testing.assert_array_equal(live.costs, trellis.ends(bases, moving[np.newaxis])[:, 0])
+    paths = trellis.paths(bases, moving[np.newaxis])[:, 0]
+    np.testing.assert_array_equal(live.best()[0], paths[:, -1])
+    again = trellis.paths(bases, moving[np.newaxis], max_bytes=0)[:, 0]
+    np.testing.assert_array_equal(again, paths)
+
+
+def test_missing_features_cost_nothing():
+    rng, costs = np.random.default_rng(2), step_costs("velocity", 1, SUBFRAMES)
+    base, moving = rng.standard_normal((5, 3)), rng.standard_normal((9, 3))
+    seen = [[0, 1, 2], [0, 2], [], [1], [0, 1, 2]]
+    trellis = Trellis(step_table("velocity", 1, SUBFRAMES), MU, 4, running=True)
+    live = CausalTrellis(trellis, moving, 2)
+    for x, columns in zip(base, seen, strict=True):
+        parts = (x[np.newaxis, columns], moving[:, columns]) if columns else None
+        # The second stream sees everything, and is not changed by the first.
+        live.advance(np.stack([x, x]), {(0,): parts} if len(columns) < 3 else None)
+    best = {}
+    for taken in itertools.product(sorted(costs), repeat=4):
+        path = np.concatenate([[0], np.cumsum(taken)]).astype(int)
+        total = 0.0
+        for p, columns in enumerate(seen):
+            b, g, phi = costs[SUBFRAMES if p == 0 else taken[p - 1]]
+            x, y = base[p, columns], moving[path[p], columns]
+            total += x @ x + b * (y @ y) - g * (x @ y) + (MU * phi if p else 0)
+        best[path[-1]] = min(total, best.get(path[-1], np.inf))
+    expected = [best.get(q, np.inf) for q in range(9)]
+    whole = best_to_every_end(base, moving, costs)
+    np.testing.assert_allclose(live.costs[1], [whole.get(q, (np.inf,))[0] for q in range(9)])
+    np.testing.assert_allclose(live.costs[0], expected, atol=1e-12)
+
+
+def test_restart_changes_one_stream_only():
+    rng = np.random.default_rng(3)
+    bases, moving = rng.standard_normal((2, 12, 4)), rng.standard_normal((17, 4))
+    trellis = Trellis(step_table("velocity", 2, 2), 0.5, 8, running=True)
+    both, alone, late = (CausalTrellis(trellis, moving, n) for n in (2, 1, 1))
+    for p in range(12):
+        if p == 5:
+            both.restart(1)
+        both.advance(bases[:, p])
+        alone.advance(bases[:1, p])
+        if p >= 5:
+            late.advance(bases[1:, p])
+    np.testing.assert_allclose(both.costs[0], alone.costs[0], atol=1e-12)
+    np.testing.assert_allclose(both.costs[1], late.costs[0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("sample", "place"), [(1.0, 1.0), (1.0, 0.0), (0.0, 1.0)])
+def test_best_end_is_the_earliest_of_equal_ones(sample, place):
+    live = CausalTrellis(
+        Trellis(step_table(max_rate=2), 0.0, 8, running=True), np.full((9, 3), place)
+    )
+    for p in range(4):
+        live.advance(np.full((1, 3), sample))
+        ends, costs = live.best()
+        assert ends == 0
+        assert costs == (p + 1) * 3 * (sample - place) ** 2
+
+
+# -- velocities -----------------------------------------------------------------------------
 
 
 def run(samples, width):
@@ -10,7 +121,7 @@ def run(samples, width):
     return np.array([derivative.step(x) for x in samples])
 
 
-def test_is_two_exponential_filters_of_differences():
+def test_step_equals_two_exponential_filters():
     rng = np.random.default_rng(0)
     x, width = rng.standard_normal(40), 3.0
     differences = np.diff(x, prepend=x[0])
@@ -21,7 +132,7 @@ def test_is_two_exponential_filters_of_differences():
 
 
 @pytest.mark.parametrize("subframes", [1, 3])
-def test_positions_of_a_sequence_are_filtered_as_its_frames_are(subframes):
+def test_positions_are_filtered_as_frames(subframes):
     rng = np.random.default_rng(1)
     x = rng.standard_normal((20 * subframes + 1, 2))
     found = causal_velocity(x, subframes, 2.0)
@@ -36,7 +147,7 @@ def test_positions_of_a_sequence_are_filtered_as_its_frames_are(subframes):
     )
 
 
-def test_an_even_movement_has_its_velocity_across_short_gaps_and_after_long_ones():
+def test_constant_velocity_survives_gaps():
     x = 0.5 * np.arange(100.0)[:, None, None] * np.ones((1, 1, 2))
     x[60:64, 0, 0] = np.nan  # short
     x[70:90, 0, 0] = np.nan  # long
@@ -49,13 +160,7 @@ def test_an_even_movement_has_its_velocity_across_short_gaps_and_after_long_ones
     np.testing.assert_allclose(found[91:, 0], 0.5, atol=1e-12)
 
 
-def test_what_was_lost_is_not_what_is_found_again():
-    x = np.concatenate([np.arange(30.0), np.full(30, np.nan), 100 - np.arange(30.0)])
-    found = run(x[:, None, None], 3.0).ravel()
-    np.testing.assert_allclose(found[61:], -1, atol=1e-12)
-
-
-def test_streams_begin_anew_alone():
+def test_restart_forgets_one_stream_only():
     x = np.random.default_rng(2).standard_normal((20, 2, 3))
     derivative = CausalDerivative(2.0, (2, 3))
     for sample in x[:10]:

@@ -1,56 +1,82 @@
-"""What a step costs, which steps there are, and the filters under which features are taken."""
+"""Every cost against its oracle: features, step weights; and the filters of its velocities."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 from sklearn import config_context
 from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.matching.costs import cost_features, step_table
+from sklearn_motionsync.matching.costs import COSTS, step_table
 from sklearn_motionsync.matching.filters import smooth
+from sklearn_motionsync.matching.matcher import cost_features
 
-from oracle import slow_filter
+from oracle import FEATURES, STEP_WEIGHTS, slow_filter
 
-PATHS = {"cost": "posture", "smoothness": 0, "consensus": 0, "max_offset": 1}
+METHOD = Path(__file__).parents[2] / "docs" / "method.md"
+DIRECT = {"cost": "posture", "smoothness": 0, "consensus": 0, "max_offset": 1}
+
+
+@pytest.mark.parametrize("cost", COSTS)
+def test_cost_has_oracles_and_documentation(cost):
+    """A new entry of COSTS fails here until all of these exist."""
+    new = f"COSTS[{cost!r}] has no"
+    assert cost in STEP_WEIGHTS, f"{new} oracle of its step table: add STEP_WEIGHTS[{cost!r}]"
+    assert cost in FEATURES, f"{new} oracle of its features: add FEATURES[{cost!r}]"
+    method = METHOD.read_text(encoding="utf-8")
+    assert f'| `"{cost}"`' in method, f"{new} row in the table of costs in docs/method.md"
+    assert f'cost="{cost}"' in method, f"{new} section in docs/method.md that names cost={cost!r}"
+    described = f'``"{cost}"``' in DenseSynchronizer.__doc__
+    assert described, f"{new} description in the parameter cost of DenseSynchronizer"
+
+
+@pytest.mark.parametrize("cost", COSTS)
+@pytest.mark.parametrize("subframes", [1, 3])
+def test_step_table_equals_oracle(cost, subframes):
+    steps, *found, sub = step_table(cost, max_rate=4, subframes=subframes)
+    assert sub == subframes
+    assert sorted(steps) == list(range(4 * subframes + 1))
+    # Those that change the pace least come first, the slower of two before the faster.
+    assert list(steps) == sorted(steps, key=lambda s: (abs(s - subframes), s))
+    expected = [STEP_WEIGHTS[cost](s / subframes) for s in steps]
+    np.testing.assert_allclose(np.transpose(found), expected)
+    # The local cost is a square.
+    np.testing.assert_allclose(found[1], 2 * np.sqrt(found[0]))
+
+
+@pytest.mark.parametrize("cost", COSTS)
+@pytest.mark.parametrize(("subframes", "smoothing"), [(1, 0.03), (3, 0.1)])
+def test_features_equal_oracle(cost, subframes, smoothing):
+    X = np.cumsum(np.random.default_rng(0).standard_normal((2, 61, 2)), axis=1)
+    expected = [FEATURES[cost](x, subframes, smoothing * 60) for x in X]
+    np.testing.assert_allclose(cost_features(X, cost, subframes, smoothing), expected, atol=1e-9)
+    velocity = subframes * smooth(X, smoothing * 60, 1)
+    found = cost_features(X, cost, velocity=velocity)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+def test_step_table_refuses_unknown_cost():
+    with pytest.raises(ValueError, match=r"cost='dtw' is unknown; use one of .*'posture'"):
+        step_table("dtw")
 
 
 @pytest.mark.parametrize(
     ("max_rate", "subframes", "fastest"),
     [(1, 1, 1), (1.9, 1, 1), (2, 1, 2), (1.4, 2, 1), (1.5, 2, 1.5), (2.9, 3, 8 / 3), (3.5, 4, 3.5)],
 )
-def test_no_step_is_faster_than_the_largest_rate(max_rate, subframes, fastest):
-    """A movement that is late runs as fast as it may, and no faster."""
+def test_late_movement_runs_at_the_largest_rate(max_rate, subframes, fastest):
     x = np.zeros((2, 41, 1))
     x[0, 8:], x[1, 28:] = 1, 1
     x[:, 33:] = np.arange(2, 10)[:, np.newaxis]
-    sync = DenseSynchronizer(pattern=0, max_rate=max_rate, subframes=subframes, **PATHS).fit(x)
+    sync = DenseSynchronizer(pattern=0, max_rate=max_rate, subframes=subframes, **DIRECT).fit(x)
     assert np.diff(sync.match(x[1:]).times).max() == pytest.approx(fastest)
     table = step_table(max_rate=max_rate, subframes=subframes)
     assert sorted(table.steps) == [s for s in range(99) if s <= max_rate * subframes]
 
 
-@pytest.mark.parametrize("subframes", [1, 3])
-def test_weights_of_steps(subframes):
-    """docs/method.md: b, g and phi at the rate rho."""
-    weights = {
-        "posture": lambda rho: (1, 2, abs(rho - 1)),
-        "velocity": lambda rho: ((0.8 + 0.2 * rho) ** 2, 1.6 + 0.4 * rho, (rho - 1) ** 2),
-        "elastic": lambda rho: (rho, 2 * rho**0.5, (rho - 1) ** 2),
-    }
-    for cost, expected in weights.items():
-        steps, *found, sub = step_table(cost, max_rate=4, subframes=subframes)
-        assert sub == subframes
-        assert sorted(steps) == list(range(4 * subframes + 1))
-        # Those that change the pace least come first, the slower of two before the faster.
-        assert list(steps) == sorted(steps, key=lambda s: (abs(s - subframes), s))
-        np.testing.assert_allclose(np.transpose(found), [expected(s / subframes) for s in steps])
-    assert list(step_table().steps) == [1, 0, 2]
-    with pytest.raises(ValueError, match=r"cost='dtw' is unknown; use one of .*'posture'"):
-        step_table("dtw")
-
-
 @pytest.mark.parametrize("order", [0, 1, 2])
 @pytest.mark.parametrize("sigma", [0, 0.3, 2.4, 9.9, 10.1, 14.5, 40])
 @pytest.mark.parametrize("n_frames", [2, 3, 25, 90])
-def test_filters_are_explicit_sums(n_frames, sigma, order):
+def test_filters_equal_explicit_sums(n_frames, sigma, order):
     """Narrow or wide, of sequences longer or shorter than the filter reaches."""
     x = 5 + np.random.default_rng(0).standard_normal((2, n_frames, 2))
     expected = [slow_filter(sequence, sigma, order) for sequence in x]
@@ -60,18 +86,13 @@ def test_filters_are_explicit_sums(n_frames, sigma, order):
         np.testing.assert_array_equal(smooth(x, sigma, order), found)
 
 
-@pytest.mark.parametrize("smoothing", [0.01, 0.1, 0.3, 0.9])
-def test_an_offset_of_a_performance_is_no_velocity(smoothing):
-    """Nor with filters wider than the clip."""
+@pytest.mark.parametrize("cost", ["velocity", "elastic"])
+def test_velocities_ignore_offsets_and_rest(cost):
+    """Also under filters wider than the clip; the direction of a rest must not become NaN."""
     x = np.cumsum(np.random.default_rng(0).standard_normal((1, 60, 2)), axis=1)
-    for cost in ("velocity", "elastic"):
+    for smoothing in (0.01, 0.1, 0.3, 0.9):
         lower, upper = (cost_features(z, cost, smoothing=smoothing) for z in (x, x + [30, -8]))
         np.testing.assert_allclose(upper, lower, atol=1e-10)
-
-
-@pytest.mark.parametrize("cost", ["velocity", "elastic"])
-def test_rest_is_no_movement(cost):
-    """Its direction is not known, and must not become NaN."""
     assert not cost_features(np.ones((2, 30, 3)), cost).any()
 
 
@@ -81,6 +102,6 @@ def test_velocities_are_by_the_frame(subframes):
     slope = np.array([3.0, -4.0])
     found = cost_features(p * slope, "velocity", subframes, smoothing=0.1)
     np.testing.assert_allclose(found[0], np.tile(slope, (p.size, 1)), rtol=1e-3)
-    # As long as the root of the speed, so that its squared length is the way.
+    # The length of the elastic feature is the root of the speed.
     found = cost_features(p * slope, "elastic", subframes, smoothing=0.1)
     np.testing.assert_allclose(found[0], np.tile(slope / 5**0.5, (p.size, 1)), rtol=1e-3)

@@ -1,4 +1,4 @@
-"""The learnt metric, against loops over pairs and frames, and what it must and must not learn."""
+"""The learnt metric against loops over pairs and frames; reliable and unreliable features."""
 
 from itertools import combinations
 
@@ -75,19 +75,19 @@ def some_times(n):
     return np.array([[(P - 1) * t ** rng.uniform(0.8, 1.25) for _ in range(n)] for _ in range(n)])
 
 
-def told(times):
-    """A match that finds these times, whatever it is given."""
+def fixed_match(times):
+    """A match with these times, whatever the features."""
     return lambda features, others: np.take_along_axis(times, others[:, :, np.newaxis], axis=1)
 
 
-def test_the_metric_equals_loops_over_pairs_and_frames(curves):
+def test_metric_equals_loops_over_pairs_and_frames(curves):
     positions, velocity = curves
     times, seen = some_times(len(positions)), []
 
     def match(features, others):
         seen.append(features)
         assert sorted(map(sorted, pairs_of(others))) == sorted(map(list, combinations(range(5), 2)))
-        return told(times)(features, others)
+        return fixed_match(times)(features, others)
 
     metric = learn_metric(match, positions, velocity)
     fast = slow_compressed(velocity)
@@ -124,7 +124,7 @@ def fast_inner(block, matrix):
     return frames @ matrix @ frames.T
 
 
-def test_differences_as_large_as_any_tell_nothing():
+def test_metric_matrix_of_unreliable_features_is_zero():
     rng = np.random.default_rng(0)
     block = rng.standard_normal((6, 50, 3))
     spread = np.einsum("npk,npl->kl", block, block) / 300
@@ -134,43 +134,26 @@ def test_differences_as_large_as_any_tell_nothing():
     np.testing.assert_array_equal(metric_matrix(0 * block, 0 * spread), 0)
 
 
-def test_what_does_not_move_teaches_nothing():
+def test_constant_performances_give_no_metric():
     still = np.ones((4, P, 2))
     assert learn_metric(None, still - 1, 0 * still) is None
     assert learn_metric(None, np.random.default_rng(0).normal(size=(1, P, 2)), still) is None
 
 
-def test_columns_of_nothing_change_nothing(curves):
-    positions, velocity = curves
-    times = some_times(len(positions))
-    alone = learn_metric(told(times), positions, velocity)
-
-    def padded(x):
-        return np.insert(x, [1, 3, 3], 0, axis=2)
-
-    padding = learn_metric(told(times), padded(positions), padded(velocity))
-    found = padding(padded(velocity), padded(positions))
-    np.testing.assert_allclose(inner(found), inner(alone(velocity, positions)), atol=1e-12)
-    np.testing.assert_array_equal(padding.features, [0, 2, 3])
-    shares = padding.shares(padded(velocity), padded(positions))
-    np.testing.assert_array_equal(shares[[1, 4, 5]], 0)
-
-
-def test_turned_features_are_compared_alike(curves):
-    """Only the space of the features counts, not its axes."""
+def test_metric_does_not_depend_on_the_axes(curves):
     positions, velocity = curves
     times = some_times(len(positions))
     turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
     one, other = (
-        learn_metric(told(times), positions @ a, velocity @ a)(velocity @ a, positions @ a)
+        learn_metric(fixed_match(times), positions @ a, velocity @ a)(velocity @ a, positions @ a)
         for a in (np.eye(3), turn)
     )
     np.testing.assert_allclose(inner(one), inner(other), atol=1e-9)
 
 
-def test_shares_add_up_and_follow_what_is_compared(curves):
+def test_shares_add_up_to_one(curves):
     positions, velocity = curves
-    metric = learn_metric(told(some_times(5)), positions, velocity)
+    metric = learn_metric(fixed_match(some_times(5)), positions, velocity)
     shares = metric.shares(velocity, positions)
     assert shares.sum() == pytest.approx(1)
     first = metric.velocity * [[1], [0], [0]], 0 * metric.posture
@@ -178,21 +161,20 @@ def test_shares_add_up_and_follow_what_is_compared(curves):
     np.testing.assert_allclose(only.shares(velocity, positions), [1, 0, 0], atol=1e-12)
 
 
-def test_noise_however_loud_is_left_out(curves):
-    """And then it makes no difference at all; a feature that agrees once matched comes back."""
+def test_loud_noise_is_left_out(curves):
     positions, velocity = curves
     rng, times = np.random.default_rng(0), some_times(5)
     noise = 100 * rng.standard_normal((2, 5, P, 4))
-    alone = learn_metric(told(times), positions, velocity)
+    alone = learn_metric(fixed_match(times), positions, velocity)
     loud, fast = (np.concatenate(x, axis=2) for x in zip(noise, (positions, velocity), strict=True))
-    found = learn_metric(told(times), loud, fast)
+    found = learn_metric(fixed_match(times), loud, fast)
     np.testing.assert_array_equal(found.features, alone.features + 4)
     np.testing.assert_allclose(found(fast, loud), alone(velocity, positions), atol=1e-9)
     np.testing.assert_array_equal(found.shares(fast, loud)[:4], 0)
 
 
-def test_a_feature_that_agrees_once_matched_comes_back():
-    """A ripple of which nothing is seen before matching."""
+def test_feature_that_agrees_once_matched_is_used():
+    """A ripple without any agreement before matching."""
     rng, t = np.random.default_rng(0), np.linspace(0, 1, 60)
     bends = rng.uniform(-0.12, 0.12, 10)
     phases = [t + b * np.sin(np.pi * t) for b in bends]
@@ -204,5 +186,5 @@ def test_a_feature_that_agrees_once_matched_comes_back():
     times = 59 * np.array([[np.interp(p, q, t) for q in phases] for p in phases])
     velocity = np.gradient(x, axis=1)
     even = np.broadcast_to(np.arange(60.0), times.shape)
-    assert learn_metric(told(even), x, velocity).features.tolist() == [0]
-    assert learn_metric(told(times), x, velocity).features.tolist() == [0, 1]
+    assert learn_metric(fixed_match(even), x, velocity).features.tolist() == [0]
+    assert learn_metric(fixed_match(times), x, velocity).features.tolist() == [0, 1]

@@ -1,16 +1,15 @@
-"""Whether refining helps: who judges, and what the verdict is."""
+"""Refinement and its test: folds of features, the verdict, and the Gauss-Newton steps."""
 
 import numpy as np
 import pytest
 from scipy.stats import ttest_1samp
 from sklearn_motionsync.matching.filters import smooth
 from sklearn_motionsync.matching.refinement import (
-    independent_frames,
     refine_warps,
     slow_energy,
     typical_energy,
 )
-from sklearn_motionsync.matching.refinement_test import Verdict, deal_features
+from sklearn_motionsync.matching.refinement_test import Verdict, split_features
 
 
 def features(*columns):
@@ -21,32 +20,32 @@ T = np.linspace(0, 1, 200)
 SINE, COSINE, RAMP = np.sin(9 * T), np.cos(9 * T), T - 0.5
 
 
-def test_features_that_say_the_same_stay_together():
+def test_correlated_features_are_in_one_fold():
     noise = np.random.default_rng(0).standard_normal((2, 200))
-    hands = deal_features(features(SINE, COSINE, SINE + 0.1 * noise[0], -3 * COSINE, 0 * T + 7))
-    assert sorted(hand.tolist() for hand in hands) == [[0, 2], [1, 3]]
+    folds = split_features(features(SINE, COSINE, SINE + 0.1 * noise[0], -3 * COSINE, 0 * T + 7))
+    assert sorted(fold.tolist() for fold in folds) == [[0, 2], [1, 3]]
 
 
 @pytest.mark.parametrize(
     "columns", [[SINE], [SINE, 0 * T], [SINE, -SINE], [0 * T, 0 * T], [SINE, SINE + 0.2 * COSINE]]
 )
-def test_one_voice_cannot_judge(columns):
-    assert deal_features(features(*columns)) == []
+def test_correlated_features_give_no_folds(columns):
+    assert split_features(features(*columns)) == []
 
 
-def test_hands_are_of_equal_weight():
-    hands = deal_features(features(3 * SINE, 2.9 * COSINE, np.sin(31 * T), np.sin(57 * T)))
-    assert sorted(hand.tolist() for hand in hands) == [[0, 3], [1, 2]]
+def test_folds_are_of_equal_energy():
+    folds = split_features(features(3 * SINE, 2.9 * COSINE, np.sin(31 * T), np.sin(57 * T)))
+    assert sorted(fold.tolist() for fold in folds) == [[0, 3], [1, 2]]
 
 
 def verdict(ratios, to_all=1.0):
-    """Of the ratios of misfits after refining to those before, of pairs of hands."""
+    """Of the ratios of misfits after refining to those before, of pairs of folds."""
     ratios = np.reshape(ratios, (-1, 2))
     return Verdict.of(np.stack([ratios / to_all, np.ones_like(ratios), ratios]), 10.0)
 
 
-def test_the_test_is_a_t_test_of_logarithms():
-    """With many values what is taken for granted hardly counts; with few it does."""
+def test_p_value_is_that_of_a_moderated_t_test():
+    """With many values the prior hardly counts; with few it does."""
     rng = np.random.default_rng(0)
     ratios = np.exp(-0.05 + 0.4 * rng.standard_normal(400))
     expected = ttest_1samp(np.log(ratios), 0, alternative="less").pvalue
@@ -70,30 +69,30 @@ def test_the_test_is_a_t_test_of_logarithms():
         ([0.01, 0.02], 0.5, True),
     ],
 )
-def test_it_helps_beyond_doubt_and_with_sight(ratios, to_all, helps):
+def test_verdict_needs_significance_and_a_ratio(ratios, to_all, helps):
     assert verdict(ratios, to_all).helps is helps
 
 
-def test_what_is_perfect_needs_no_help():
+def test_perfect_matches_have_no_p_value():
     for misfits in (np.zeros((3, 4, 2)), np.ones((3, 4, 2)) * [[[0]], [[1]], [[1]]]):
         found = Verdict.of(misfits, 1.0)
         assert np.isnan(found.p_value)
         assert not found.helps
 
 
-def test_the_misfit_is_the_median_share():
+def test_misfit_is_the_median_share():
     by_all = np.array([[1.0, 1.0], [2.0, 0.0], [5.0, 5.0]])
     assert Verdict.of(np.stack([by_all, by_all, by_all]), 4.0).misfit == 0.5
 
 
 @pytest.mark.parametrize("width", [0.0, 1.0, 2.0, 4.0])
-def test_the_energy_of_a_typical_feature(width):
-    """Of independent ones that of each, also if noise was smoothed and few frames are left."""
+def test_typical_energy_is_that_of_independent_features(width):
+    """Also if noise was smoothed, and of few frames."""
     rng = np.random.default_rng(0)
     noise = rng.standard_normal((100, 200, 8))
     # Away from the ends, where smoothing is another one.
     curves = (smooth(noise, width) if width else noise)[:, 40:160]
-    independent = independent_frames(120, width)
+    independent = 120 / max(1, np.sqrt(2 * np.pi) * width)
     each = np.square(curves).sum(axis=1).mean()
     typical = typical_energy(curves, independent)
     assert typical.mean() == pytest.approx(each, rel=0.07)
@@ -107,8 +106,7 @@ def test_the_energy_of_a_typical_feature(width):
 # -- the steps ------------------------------------------------------------------------------
 
 
-def test_a_step_balances_noise_and_change_of_pace():
-    """Noise leads astray, but not in proportion: the more of it, the stiffer the warp."""
+def test_more_noise_gives_stiffer_warps():
     P = 41
     frames = np.arange(P, dtype=float)
     base = np.column_stack([np.sin(frames / 6), np.cos(frames / 5)])
@@ -126,7 +124,7 @@ def test_a_step_balances_noise_and_change_of_pace():
     assert curved[1] < 4 * curved[0]
 
 
-def test_where_nothing_moves_warps_stay():
+def test_constant_postures_leave_warps_unchanged():
     start = np.linspace(0, 29, 30)[np.newaxis] ** 1.1
     start *= 29 / start.max()
     still, moving = np.zeros((30, 2)), np.ones((1, 30, 2))
@@ -135,12 +133,12 @@ def test_where_nothing_moves_warps_stay():
     np.testing.assert_array_equal(
         refine_warps(rng.standard_normal((30, 2)), moving, start, 29.0), start
     )
-    assert slow_energy(still, moving) == 0
+    assert slow_energy(still, moving, start) == 0
 
 
 @pytest.mark.parametrize("reach", [3.0, 39.0])
-def test_steps_stay_in_the_band_and_on_the_clock(reach):
-    """Also if nothing agrees: postures that have nothing to do with each other."""
+def test_refined_warps_stay_in_the_band(reach):
+    """Also for unrelated postures."""
     rng = np.random.default_rng(0)
     frames = np.arange(40)
     base = np.cumsum(rng.standard_normal((40, 2)), axis=0)

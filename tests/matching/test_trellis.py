@@ -4,32 +4,13 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from sklearn_motionsync.matching import rows
-from sklearn_motionsync.matching import trellis as narrow
-from sklearn_motionsync.matching import trellis as tiling
-from sklearn_motionsync.matching.costs import StepTable, step_table
-from sklearn_motionsync.matching.rows import Coupling
-from sklearn_motionsync.matching.trellis import Trellis
+from sklearn_motionsync.matching import trellis as module
+from sklearn_motionsync.matching.costs import COSTS, step_table
+from sklearn_motionsync.matching.trellis import Coupling, Trellis
 
-from oracle import all_free_paths, all_paths, brute_force, path_cost, plain_loops
+from oracle import all_free_paths, all_paths, brute_force, path_cost, plain_loops, step_costs
 
-
-def posture_costs(max_rate, subframes):
-    """(b, g, phi) of every step, from the text of Eq. 16."""
-    steps = range(int(max_rate * subframes) + 1)
-    return {s: (1.0, 2.0, abs(s / subframes - 1)) for s in steps}
-
-
-def rate_weighted_costs(max_rate, subframes):
-    """Weights that differ from step to step, as those of the Fisher-Rao distance do."""
-    steps = range(int(max_rate * subframes) + 1)
-    return {s: (s / subframes, 2 * np.sqrt(s / subframes), 0.1 * s) for s in steps}
-
-
-def table_of(costs, subframes):
-    steps = np.array(sorted(costs, key=lambda s: (abs(s - subframes), s)))
-    b, g, phi = np.array([costs[s] for s in steps]).T
-    return StepTable(steps, b, g, phi, subframes)
+ROOMS = pytest.mark.parametrize("small_bytes", [0, 10**6], ids=["by rows", "small"])
 
 
 def draw(rng, n, n_frames, subframes=1, n_features=2, whole=False):
@@ -54,18 +35,18 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize("make_costs", [posture_costs, rate_weighted_costs])
+@ROOMS
+@pytest.mark.parametrize("cost", COSTS)
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("whole", [False, True], ids=["reals", "ties"])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize("narrow_bytes", [0, 10**6], ids=["wide", "narrow"])
-def test_equals_every_admissible_path(case, make_costs, whole, dtype, narrow_bytes, monkeypatch):
-    monkeypatch.setattr(narrow, "NARROW_BYTES", [narrow_bytes] * 2)
+def test_best_path_equals_all_admissible_paths(case, cost, whole, dtype, small_bytes, monkeypatch):
+    monkeypatch.setattr(module, "SMALL_BYTES", [small_bytes] * 2)
     n_frames, max_rate, subframes, reach, mu = case
-    costs = make_costs(max_rate, subframes)
+    costs = step_costs(cost, max_rate, subframes)
     bases, moving = draw(np.random.default_rng(n_frames), 3, n_frames, subframes, whole=whole)
     bases, moving = bases.astype(dtype), moving.astype(dtype)
-    trellis = Trellis(table_of(costs, subframes), mu, reach)
+    trellis = Trellis(step_table(cost, max_rate, subframes), mu, reach)
     distances = trellis.distances(bases, moving)
     assert distances.dtype == dtype
     close = {"rtol": 1e-10, "atol": 1e-12} if dtype == np.float64 else {"rtol": 1e-4, "atol": 1e-4}
@@ -86,17 +67,16 @@ def test_equals_every_admissible_path(case, make_costs, whole, dtype, narrow_byt
                 np.testing.assert_allclose(cost, best, **close)
 
 
-@pytest.mark.parametrize("make_costs", [posture_costs, rate_weighted_costs])
+@pytest.mark.parametrize("cost", COSTS)
 @pytest.mark.parametrize("case", [(5, 2, 1, 2, 0.3), (4, 2, 2, 1, 0.4), (2, 3, 1, 4, 0.0)])
 @pytest.mark.parametrize("n_bases", [1, 2])
-def test_free_ends_equal_every_path(case, make_costs, n_bases):
+def test_free_ends_equal_all_paths(case, cost, n_bases):
     n_frames, max_rate, subframes, reach, mu = case
-    costs, rng = make_costs(max_rate, subframes), np.random.default_rng(0)
+    costs, rng = step_costs(cost, max_rate, subframes), np.random.default_rng(0)
     bases = rng.standard_normal((n_bases, n_frames, 2))
     moving = rng.standard_normal((3, (n_frames - 1) * subframes + 1 + 2 * reach * subframes, 2))
-    trellis = Trellis(table_of(costs, subframes), mu, reach, free=True)
+    trellis = Trellis(step_table(cost, max_rate, subframes), mu, reach, free=True)
     to_all = trellis.ends(bases, moving)
-    disparities = trellis.paths_to(trellis.ends_at, bases, moving)
     best = trellis.paths(bases, moving)
     again = trellis.paths(bases, moving, max_bytes=0)
     np.testing.assert_array_equal(again, best)
@@ -107,30 +87,29 @@ def test_free_ends_equal_every_path(case, make_costs, n_bases):
             totals = [path_cost(base, sequence, path, costs, mu, subframes) for path in paths]
             for i, end in enumerate(trellis.ends_at):
                 last = trellis.lead + (n_frames - 1) * subframes + end
-                known = {tuple(q): t for q, t in zip(paths, totals, strict=True) if q[-1] == last}
-                np.testing.assert_allclose(to_all[n, m, i], min(known.values()), atol=1e-12)
-                d = disparities[n, m, i]
-                path = tuple(trellis.lead + d + subframes * np.arange(n_frames))
-                np.testing.assert_allclose(known[path], min(known.values()), atol=1e-12)
-                added_up = trellis.costs(base, sequence[np.newaxis], d[np.newaxis])
-                np.testing.assert_allclose(added_up, known[path], atol=1e-12)
-            np.testing.assert_array_equal(best[n, m], disparities[n, m, to_all[n, m].argmin()])
+                known = [t for q, t in zip(paths, totals, strict=True) if q[-1] == last]
+                np.testing.assert_allclose(to_all[n, m, i], min(known), atol=1e-12)
+            known = {tuple(q): t for q, t in zip(paths, totals, strict=True)}
+            path = tuple(trellis.lead + best[n, m] + subframes * np.arange(n_frames))
+            np.testing.assert_allclose(known[path], min(totals), atol=1e-12)
+            added_up = trellis.costs(base, sequence[np.newaxis], best[n, m, np.newaxis])
+            np.testing.assert_allclose(added_up, known[path], atol=1e-12)
 
 
-def test_equal_free_ends_are_in_the_middle():
+def test_equal_free_ends_give_the_middle():
     trellis = Trellis(step_table(), 1.0, 4, free=True)
     assert not trellis.paths(np.zeros((1, 6, 2)), np.zeros((1, 14, 2))).any()
 
 
-@pytest.mark.parametrize("make_costs", [posture_costs, rate_weighted_costs])
+@pytest.mark.parametrize("cost", COSTS)
 @pytest.mark.parametrize("n_bases", [1, 2])
-@pytest.mark.parametrize("narrow_bytes", [0, 10**6], ids=["wide", "narrow"])
-def test_coupled_paths_equal_every_path(make_costs, n_bases, narrow_bytes, monkeypatch):
-    monkeypatch.setattr(narrow, "NARROW_BYTES", [narrow_bytes] * 2)
-    costs, rng = make_costs(2, 2), np.random.default_rng(0)
+@ROOMS
+def test_coupled_paths_equal_all_paths(cost, n_bases, small_bytes, monkeypatch):
+    monkeypatch.setattr(module, "SMALL_BYTES", [small_bytes] * 2)
+    costs, rng = step_costs(cost, 2, 2), np.random.default_rng(0)
     bases, moving = rng.standard_normal((n_bases, 5, 2)), rng.standard_normal((3, 9, 2))
     coupling = Coupling(0.7, rng.uniform(-1, 1, (n_bases, 3, 5)))
-    trellis = Trellis(table_of(costs, 2), 0.2, 2)
+    trellis = Trellis(step_table(cost, 2, 2), 0.2, 2)
     disparities = trellis.paths(bases, moving, coupling=coupling)
     np.testing.assert_array_equal(
         trellis.paths(bases, moving, max_bytes=0, coupling=coupling), disparities
@@ -146,24 +125,15 @@ def test_coupled_paths_equal_every_path(make_costs, n_bases, narrow_bytes, monke
             np.testing.assert_allclose(found, min(totals.values()), atol=1e-12)
 
 
-@pytest.mark.parametrize("make_costs", [posture_costs, rate_weighted_costs])
+@pytest.mark.parametrize("cost", COSTS)
 @pytest.mark.parametrize("case", [(40, 2, 1, 10, 0.5), (33, 3, 2, 6, 0.2), (25, 4, 4, 8, 1.0)])
-def test_equals_plain_loops(case, make_costs):
+def test_distances_equal_plain_loops(case, cost):
     n_frames, max_rate, subframes, reach, mu = case
-    costs = make_costs(max_rate, subframes)
+    costs = step_costs(cost, max_rate, subframes)
     bases, moving = draw(np.random.default_rng(1), 2, n_frames, subframes, n_features=5)
-    distances = Trellis(table_of(costs, subframes), mu, reach).distances(bases, moving)
+    distances = Trellis(step_table(cost, max_rate, subframes), mu, reach).distances(bases, moving)
     expected = [[plain_loops(x, y, costs, mu, subframes, reach) for y in moving] for x in bases]
     np.testing.assert_allclose(distances, expected, rtol=1e-10)
-
-
-def test_step_table_is_the_papers():
-    table = step_table("posture", max_rate=2, subframes=1)
-    costs = {
-        s: (b, g, phi)
-        for s, b, g, phi in zip(table.steps, table.moving, table.inner, table.penalty, strict=True)
-    }
-    assert costs == posture_costs(2, 1)
 
 
 def test_ties_keep_the_pace():
@@ -192,16 +162,16 @@ TABLES = [step_table(), step_table("velocity", max_rate=4, subframes=2)]
 
 @pytest.mark.parametrize("table", TABLES, ids=["one group", "several"])
 @pytest.mark.parametrize("n_bases", [1, 2, 5])
-def test_tiles_do_not_change_the_answer(n_bases, table, monkeypatch):
+def test_tile_sizes_change_no_result(n_bases, table, monkeypatch):
     bases, moving = draw(np.random.default_rng(3), n_bases, 30, table.subframes, n_features=4)
     trellis = Trellis(table, 0.5, 8)
     whole = trellis.distances(bases, moving)
     paths = trellis.paths(bases, moving)
-    monkeypatch.setattr(tiling, "TILE_PRODUCT", 1)
-    monkeypatch.setattr(tiling, "TILE_BASES", 2)
-    monkeypatch.setattr(tiling, "LONG_ROW", 1)
-    monkeypatch.setattr(rows, "PRODUCT_ROWS", 3)
-    monkeypatch.setattr(narrow, "NARROW_BYTES", [0, 0])
+    monkeypatch.setattr(module, "TILE_PRODUCT", 1)
+    monkeypatch.setattr(module, "TILE_BASES", 2)
+    monkeypatch.setattr(module, "LONG_ROW", 1)
+    monkeypatch.setattr(module, "PRODUCT_ROWS", 3)
+    monkeypatch.setattr(module, "SMALL_BYTES", [0, 0])
     np.testing.assert_allclose(trellis.distances(bases, moving), whole, rtol=1e-12)
     np.testing.assert_array_equal(trellis.paths(bases, moving), paths)
 
@@ -209,9 +179,9 @@ def test_tiles_do_not_change_the_answer(n_bases, table, monkeypatch):
 @pytest.mark.parametrize("table", TABLES, ids=["one group", "several"])
 @pytest.mark.parametrize("n_bases", [1, 3])
 @pytest.mark.parametrize("n_frames", [2, 16, 17, 150])
-def test_rows_that_are_not_kept_are_computed_again(n_frames, n_bases, table, monkeypatch):
+def test_little_memory_gives_the_same_bits(n_frames, n_bases, table, monkeypatch):
     """Little memory, the same bits."""
-    monkeypatch.setattr(narrow, "NARROW_BYTES", [0, 0])
+    monkeypatch.setattr(module, "SMALL_BYTES", [0, 0])
     bases, moving = draw(np.random.default_rng(3), n_bases, n_frames, table.subframes)
     trellis = Trellis(table, 0.5, min(40, n_frames - 1))
     paths = trellis.paths(bases, moving)
@@ -220,7 +190,7 @@ def test_rows_that_are_not_kept_are_computed_again(n_frames, n_bases, table, mon
 
 @pytest.mark.parametrize("sizes", [(1, 1), (3, 100), (50, 7), (97, 203)])
 @pytest.mark.parametrize("reach", [5, 25, 900])
-def test_tiles_cover_every_pair_once_and_are_tiles_themselves(sizes, reach):
+def test_tiles_cover_every_pair_once(sizes, reach):
     trellis = Trellis(step_table(), 0.5, reach)
     count = np.zeros(sizes, dtype=int)
     for some, columns in trellis.tiles(*sizes, n_features=16):
@@ -231,32 +201,7 @@ def test_tiles_cover_every_pair_once_and_are_tiles_themselves(sizes, reach):
     assert (count == 1).all()
 
 
-@pytest.mark.parametrize("sizes", [(60, 900), (400, 500), (1000, 40)])
-@pytest.mark.parametrize("reach", [5, 25, 400])
-def test_tiles_are_as_large_as_they_may_be(sizes, reach):
-    """The product of a row, a cell for every pair and offset, fills its room, and no more."""
-    trellis = Trellis(step_table(), 0.5, reach)
-    shapes = [
-        (some.stop - some.start, columns.stop - columns.start)
-        for some, columns in trellis.tiles(*sizes, n_features=16)
-    ]
-    products = [n * m * (2 * reach + 1) * (16 + 2) for n, m in shapes]
-    assert max(n for n, _ in shapes) <= tiling.TILE_BASES
-    assert max(products) <= tiling.TILE_PRODUCT
-    assert min(products) > tiling.TILE_PRODUCT / 3
-
-
-@pytest.mark.parametrize(
-    ("sizes", "reach", "n_bases"),
-    [((7, 1024), 0, 1), ((7, 1023), 0, 7), ((8, 3000), 0, 8), ((7, 20), 26, 1), ((7, 19), 26, 7)],
-)
-def test_few_bases_with_long_rows_are_taken_one_by_one(sizes, reach, n_bases):
-    """Less than 8 bases, 1024 cells and more."""
-    tiles = Trellis(step_table(), 0.5, reach).tiles(*sizes, n_features=3)
-    assert {some.stop - some.start for some, _ in tiles} == {n_bases}
-
-
-def test_memory_grows_with_the_band_not_with_the_square():
+def test_memory_grows_with_the_band():
     """4000 frames in a band of 81: a full matrix of float64 would take 128 MB."""
     bases, moving = draw(np.random.default_rng(5), 1, 4000, n_features=3)
     trellis = Trellis(step_table(), 0.5, 40)
@@ -271,7 +216,7 @@ def test_memory_grows_with_the_band_not_with_the_square():
     assert little < 1e6
 
 
-def test_inputs_may_be_read_only_and_are_not_written():
+def test_read_only_inputs_are_not_written():
     bases, moving = draw(np.random.default_rng(4), 2, 12)
     copies = bases.copy(), moving.copy()
     bases.flags.writeable = moving.flags.writeable = False

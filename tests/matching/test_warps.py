@@ -1,4 +1,4 @@
-"""Sequences sampled along warps, warps read between frames, and the routes that vote on them."""
+"""Sequences sampled along warps, warps between frames, and the vote of the routes."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def random_warps(rng, n, n_frames):
 
 
 @pytest.mark.parametrize("n_frames", [2, 3, 4, 30])
-def test_a_warp_is_a_straight_line_between_two_frames(n_frames):
+def test_warps_are_piecewise_linear(n_frames):
     """Between the first two and the last two as well."""
     rng = np.random.default_rng(n_frames)
     there, back = random_warps(rng, 5, n_frames), random_warps(rng, 5, n_frames)
@@ -31,7 +31,7 @@ def test_a_warp_is_a_straight_line_between_two_frames(n_frames):
 
 
 @pytest.mark.parametrize("n", [1, 3, 65, 150])
-def test_performances_of_any_number_and_length_are_sampled(n):
+def test_sampling_equals_linear_interpolation(n):
     """Along warps, and at even times of their course, each as if it were alone."""
     rng = np.random.default_rng(n)
     X = [rng.standard_normal((length, 2)) for length in rng.integers(2, 40, n)]
@@ -47,7 +47,7 @@ def test_performances_of_any_number_and_length_are_sampled(n):
             np.testing.assert_allclose(out, expected, atol=1e-12)
 
 
-def test_slices_are_few_and_even():
+def test_even_slices_are_few_and_even():
     for n in range(40):
         for size in (1, 2, 7, 64):
             slices = even_slices(n, size)
@@ -60,7 +60,7 @@ def test_slices_are_few_and_even():
 # -- the vote -------------------------------------------------------------------------------
 
 
-def test_the_vote_is_the_weighted_median_of_all_routes():
+def test_vote_equals_the_weighted_median_of_all_routes():
     rng, frames = np.random.default_rng(0), np.arange(15)
     direct, there = random_warps(rng, 4, 15), random_warps(rng, 6, 15)
     back = np.stack([random_warps(rng, 4, 15) for _ in range(6)])
@@ -69,21 +69,14 @@ def test_the_vote_is_the_weighted_median_of_all_routes():
         routes = there[:n_exemplars, np.newaxis], back[:n_exemplars]
         found = vote(direct, *routes, lengths)
         alike = vote(direct, *routes, np.ones_like(lengths))
+        # Without any distance all routes have the same weight.
+        np.testing.assert_array_equal(vote(direct, *routes, 0 * lengths), alike)
         for m in range(4):
             routes = [direct[m]]
             routes += [np.interp(there[k], frames, back[k, m]) for k in range(n_exemplars)]
-            says = np.exp(-1.5 * lengths[:, m] / np.median(lengths[:, m]))
-            np.testing.assert_allclose(found[m], slow_median(routes, says), atol=1e-12)
+            weights = np.exp(-1.5 * lengths[:, m] / np.median(lengths[:, m]))
+            np.testing.assert_allclose(found[m], slow_median(routes, weights), atol=1e-12)
             np.testing.assert_allclose(alike[m], np.median(routes, axis=0), atol=1e-12)
-
-
-def test_without_any_distance_all_routes_have_the_same_say():
-    rng = np.random.default_rng(0)
-    direct, there, back = random_warps(rng, 1, 9), random_warps(rng, 2, 9), random_warps(rng, 2, 9)
-    alike = (
-        vote(direct, there[:, np.newaxis], back[:, np.newaxis], x * np.ones((3, 1))) for x in (0, 1)
-    )
-    np.testing.assert_array_equal(*alike)
 
 
 def slow_median(values, weights):
@@ -101,7 +94,7 @@ def slow_median(values, weights):
 
 @pytest.fixture(scope="module")
 def people():
-    """Forty performances of one movement, each of a style and a pace of its own."""
+    """Forty performances of one movement, of different styles and paces."""
     rng, t = np.random.default_rng(0), np.linspace(0, 1, 30)
     X = []
     for _ in range(40):
@@ -112,7 +105,7 @@ def people():
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, 9, 10, 40])
-def test_the_pattern_is_no_exemplar(n, people):
+def test_pattern_is_no_exemplar(n, people):
     """It would vote for the direct path a second time."""
     for pattern in ("median", 0, n - 1):
         sync = DenseSynchronizer(pattern=pattern).fit(people[:n])

@@ -7,7 +7,7 @@ from joblib import parallel_config
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn_motionsync import DirectionCosines, synchronization_distances, to_frame
 from sklearn_motionsync.datasets import load_performances
-from sklearn_motionsync.matching.comparison import BLOCK
+from sklearn_motionsync.matching.pairwise import BLOCK
 
 import oracle
 

@@ -293,8 +293,8 @@ def test_chance_movements_have_mean_covariance_and_autocorrelation_of_the_postur
 def test_large_training_sets_are_subsampled():
     many = [movement(30 + i % 7, 0.9 + i / 500, 1 + i / 300) for i in range(70)]
     sync = LinearSynchronizer(30).fit(many)
-    assert len(sync.training_.kept) == 64
-    assert len(sync.training_.durations) == 70
+    assert len(sync.examples_) == 64
+    assert len(sync.lengths_) == 70
     groups = [f"subject {i // 8}" for i in range(70)]
     _, locations = find_performances(sync, TAKE[:130], groups=groups, durations=(50, 75))
     np.testing.assert_allclose(spans(locations), TRUE[:1], atol=8)

@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import load_performances
-from sklearn_motionsync.matching.costs import cost_features, step_table
-from sklearn_motionsync.matching.filters import smooth
-from sklearn_motionsync.matching.refinement import choose_smoothing, curvature
+from sklearn_motionsync.matching.costs import COSTS, step_table
+from sklearn_motionsync.matching.filters import choose_smoothing
+from sklearn_motionsync.matching.matcher import cost_features
+from sklearn_motionsync.matching.refinement import curvature
 from sklearn_motionsync.matching.trellis import Trellis
 
-from oracle import brute_force, plain_loops
+from oracle import FEATURES, brute_force, plain_loops, step_costs
 
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
 P = 100
@@ -19,12 +20,7 @@ P = 100
 # -- the costs against oracles of their own ---------------------------------------------
 
 
-def paper_oracle_costs():
-    return {s: (1.0, 2.0, abs(s - 1.0)) for s in (0, 1, 2)}
-
-
-def test_the_papers_settings_are_the_papers_equations():
-    """Through the public class: cost and path of every pair, against all admissible paths."""
+def test_paper_settings_equal_all_admissible_paths():
     rng = np.random.default_rng(0)
     X = rng.standard_normal((4, 7, 2))
     sync = DenseSynchronizer(pattern=1, smoothness=0.2, max_offset=0.5, **PAPER).fit(X)
@@ -32,62 +28,26 @@ def test_the_papers_settings_are_the_papers_equations():
     np.testing.assert_allclose(sync.mu_, mu)
     offsets, times, distances = sync.match(X)
     for m, x in enumerate(X):
-        best, paths = brute_force(X[1], x, paper_oracle_costs(), mu, 1, 3)
+        best, paths = brute_force(X[1], x, step_costs("posture", 2, 1), mu, 1, 3)
         np.testing.assert_allclose(distances[m], best, rtol=1e-10, atol=1e-12)
         assert tuple(times[m].astype(int)) in paths
         np.testing.assert_array_equal(offsets[m], times[m] - np.arange(7))
 
 
-def elastic_oracle_costs(max_rate, subframes):
-    """|q_n - sqrt(rho) q_m|^2 = |q_n|^2 + rho |q_m|^2 - 2 sqrt(rho) <q_n, q_m>."""
-    rates = {s: s / subframes for s in range(max_rate * subframes + 1)}
-    return {s: (rho, 2 * rho**0.5, (rho - 1) ** 2) for s, rho in rates.items()}
-
-
-def slow_elastic(x, subframes, sigma):
-    """q = v / sqrt(|v|), v the derivative under a Gaussian, by explicit sums."""
-    n = len(x)
-    reach = min(int(np.ceil(4 * sigma)) + 1, n - 1)
-
-    def at(i):
-        if i < 0:
-            return 2 * x[0] - x[-i]
-        return x[i] if i < n else 2 * x[-1] - x[2 * (n - 1) - i]
-
-    radius = int(4 * sigma + 0.5)
-    k = np.arange(-radius, radius + 1)
-    kernel = np.exp(-0.5 * (k / sigma) ** 2)
-    kernel /= kernel.sum()
-    q = np.empty_like(x)
-    for i in range(n):
-        terms = [
-            w * j / sigma**2 * at(min(max(i + j, -reach), n - 1 + reach))
-            for w, j in zip(kernel, k, strict=True)
-        ]
-        v = sum(terms) * subframes
-        q[i] = v / np.sqrt(np.linalg.norm(v))
-    return q
-
-
-def test_elastic_equals_an_oracle_of_its_own():
-    rng = np.random.default_rng(1)
-    X = np.cumsum(rng.standard_normal((3, 45, 2)), axis=1)
-    sub = 2
-    fine = np.stack([[np.interp(np.arange(89) / 2, np.arange(45), c) for c in x.T] for x in X])
-    q = np.stack([slow_elastic(x, sub, 0.03 * 88) for x in fine.transpose(0, 2, 1)])
-    settings = {
-        "max_rate": 3,
-        "subframes": sub,
-        "consensus": 0,
-        "velocity_smoothing": 0.03,
-    }
-    sync = DenseSynchronizer(
-        cost="elastic", pattern=0, smoothness=0.1, max_offset=0.2, **settings
-    ).fit(X)
-    mu = 0.1 * np.square(q).sum(axis=2).mean()
+@pytest.mark.parametrize("cost", COSTS)
+def test_distances_equal_oracle_of_the_cost(cost):
+    rng, P, sub = np.random.default_rng(1), 45, 2
+    X = np.cumsum(rng.standard_normal((3, P, 2)), axis=1)
+    half = np.arange(2 * P - 1) / 2
+    fine = [np.column_stack([np.interp(half, np.arange(P), c) for c in x.T]) for x in X]
+    features = np.stack([FEATURES[cost](x - X.mean(axis=(0, 1)), sub, 0.03 * 88) for x in fine])
+    settings = {"max_rate": 3, "subframes": sub, "consensus": 0, "velocity_smoothing": 0.03}
+    settings |= {"cost": cost, "pattern": 0, "smoothness": 0.1, "max_offset": 0.2}
+    sync = DenseSynchronizer(**settings).fit(X)
+    mu = 0.1 * np.square(features).sum(axis=2).mean()
     np.testing.assert_allclose(sync.mu_, mu)
-    costs = elastic_oracle_costs(3, sub)
-    expected = [plain_loops(q[0, ::sub], y, costs, mu, sub, 9) for y in q]
+    costs = step_costs(cost, 3, sub)
+    expected = [plain_loops(features[0, ::sub], y, costs, mu, sub, 9) for y in features]
     np.testing.assert_allclose(sync.match(X).distances, expected, rtol=1e-9, atol=1e-9)
 
 
@@ -121,7 +81,7 @@ def elastic_distance(x, y, subframes=8):
     return trellis.distances(q[:1, ::subframes], q[1:])[0, 0]
 
 
-def test_elastic_distance_of_a_warped_curve_is_nothing():
+def test_elastic_distance_of_a_warped_curve_is_near_zero():
     t = np.linspace(0, 1, 151)
     warped = t + 0.06 * np.sin(2 * np.pi * t)
     whole = elastic_distance(curve(t), other_curve(t))
@@ -136,7 +96,7 @@ def test_elastic_distance_does_not_depend_on_the_timing():
     np.testing.assert_allclose(elastic_distance(curve(t), other_curve(warped)), even, rtol=0.05)
 
 
-def test_elastic_distance_is_fdasrsfs():
+def test_elastic_distance_equals_fdasrsf():
     """fdasrsf 2.7.3 (curve_to_q without scaling, optimum_reparam_curve) gives 0.7281, 0.7175 and
     0.7169 on 151, 301 and 601 points; its slopes are a coarser set, so it stays above the minimum.
     """
@@ -145,22 +105,8 @@ def test_elastic_distance_is_fdasrsfs():
     assert 0.97 * 0.7169 < found < 0.7169
 
 
-def test_velocity_does_not_depend_on_the_frame_rate():
-    t = [np.linspace(0, 1, n) for n in (100, 400)]
-    slow, fast = (LinearSynchronizer(100).fit_transform([curve(s)])[0] for s in t)
-    a, b = (cost_features(x[np.newaxis], "velocity") for x in (slow, fast))
-    np.testing.assert_allclose(a, b, atol=0.01 * np.abs(b).max())
-
-
-def test_a_movement_cut_off_keeps_its_velocity():
-    """Beyond the ends a straight movement goes on straight."""
-    line = np.linspace(0, 50, 51)[np.newaxis, :, np.newaxis] * [1.0, -2.0]
-    np.testing.assert_allclose(cost_features(line, "velocity")[0], [[1, -2]] * 51, rtol=1e-3)
-    np.testing.assert_allclose(smooth(line, 2.0), line, atol=1e-10)
-
-
 @pytest.mark.parametrize("n_frames", [5, 6, 30])
-def test_curvature_is_the_sum_of_squared_second_differences(n_frames):
+def test_curvature_equals_the_sum_of_squared_second_differences(n_frames):
     """With pinned ends: tau' A tau + 2 b' tau + a constant, A as an upper band."""
     band, border = curvature(n_frames)
     inner = np.zeros((n_frames - 2, n_frames - 2))
@@ -217,7 +163,7 @@ def known_warps(seed, noise, n=8, n_features=16):
 
 @pytest.mark.parametrize(("noise", "error"), [(0.005, 0.03), (0.05, 0.12), (0.2, 0.35)])
 @pytest.mark.parametrize("refine", ["auto", True])
-def test_known_warps_of_a_single_source_are_found_to_a_fraction_of_a_frame(noise, error, refine):
+def test_refined_warps_of_a_single_source_have_small_errors(noise, error, refine):
     errors = []
     for seed in range(3):
         X, truth = known_warps(seed, noise)
@@ -227,25 +173,17 @@ def test_known_warps_of_a_single_source_are_found_to_a_fraction_of_a_frame(noise
     assert np.mean(errors) < error
 
 
-def test_smoothing_follows_the_noise():
+def test_smoothing_increases_with_the_noise():
     chosen = [choose_smoothing(np.stack(known_warps(0, noise)[0])) for noise in (0.005, 0.05, 0.2)]
     assert chosen[0] < chosen[1] < chosen[2]
 
 
-def test_synthetic_people_of_little_style_are_refined(bending_aspace):
+def test_people_of_little_style_are_refined(bending_aspace):
     assert DenseSynchronizer(P).fit(bending_aspace).refines_
 
 
-def test_two_trials_of_a_single_source_are_enough():
-    """One pair, no noise: the example of the docstring."""
-    t = np.linspace(0, 1, 101)
-    phase = t + 0.08 * np.sin(2 * np.pi * t)
-    X = [np.column_stack([np.cos(4 * s), np.sin(4 * s)]) for s in (t, phase)]
-    assert DenseSynchronizer(pattern=0).fit(X).refines_
-
-
-def test_what_says_the_same_cannot_judge():
-    """A single curve, also if it is there several times with some noise."""
+def test_correlated_features_are_not_refined():
+    """A single curve, or noisy copies of it."""
     X, _ = known_warps(0, 0.0, n_features=1)
     rng = np.random.default_rng(0)
     copies = [x * [1, -2, 0.5] + 0.01 * x.std() * rng.standard_normal((P, 3)) for x in X]
@@ -275,7 +213,7 @@ def test_people_are_not_refined(action, real_data):
 @pytest.mark.parametrize(
     ("archive", "action"), [("utkinect", "pull"), ("utkinect", "waveHands"), ("cmu07_walk", None)]
 )
-def test_people_that_nothing_was_chosen_on_are_not_refined(archive, action, real_data):
+def test_people_of_other_data_sets_are_not_refined(archive, action, real_data):
     """Pulls leave as little misfit as repeated trials do; one subject walks, each time anew."""
     bunch = load_performances(real_data / archive / f"{archive}_positions.npz")
     X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if action in (None, t)]
@@ -315,7 +253,7 @@ def times_of():
 
 
 @pytest.mark.parametrize("event", EVENTS, ids=lambda e: "-".join((*e[:2], *e[3:])))
-def test_key_moments_of_real_people(event, real_data, times_of):
+def test_key_moment_errors_of_real_people(event, real_data, times_of):
     action, joint, extreme = event[:3]
     (peer_mean, peer_median), (share, most), settings = EVENTS[event]
     bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
@@ -332,7 +270,7 @@ def test_key_moments_of_real_people(event, real_data, times_of):
     assert np.median(errors) <= most * peer_median
 
 
-def test_a_performance_is_matched_alike_in_and_out_of_the_training_set(bends):
+def test_warps_hardly_depend_on_being_in_the_training_set(bends):
     postures = DirectionCosines(bends.skeleton).fit_transform(bends.data)
     X = ASpace(12).fit_transform(postures)
     sync = DenseSynchronizer(P).fit(X)

@@ -1,25 +1,24 @@
-"""A warp depends on its performance and the fitted synchronizer, also where costs tie."""
+"""A warp depends on its performance and the fitted synchronizer only, also where costs tie."""
 
 import numpy as np
 import pytest
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
-from sklearn_motionsync.matching.costs import step_table
+from sklearn_motionsync.matching.costs import COSTS, step_table
 from sklearn_motionsync.matching.trellis import Trellis
 
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
 SETTINGS = {
-    "defaults": {},
+    "no metric": {"metric": None},
     "paper": PAPER,
     "paper, free changes of pace": {**PAPER, "smoothness": 0},
-    "elastic": {"cost": "elastic"},
-    "posture, voted on": {"cost": "posture"},
+    **{cost: {"cost": cost} for cost in COSTS},
     "half frames": {"subframes": 2, "max_rate": 3},
     "refined": {"refine": True},
 }
 
 
 def held(X):
-    """All of one length, the last frame held: every way to lose the time that is left ties."""
+    """All of one length, the last frame held: all ways to spend the remaining time tie."""
     n_frames = max(map(len, X)) + 20
     return [np.concatenate([x, np.repeat(x[-1:], n_frames - len(x), axis=0)]) for x in X]
 
@@ -52,8 +51,8 @@ def performances(request):
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize("settings", SETTINGS)
 @pytest.mark.parametrize("ties", TIES)
-def test_equal_bits_alone_and_in_groups(performances, ties, settings, dtype):
-    """Six by themselves, three, thirteen, and all: bundles of different shapes and layouts."""
+def test_match_has_equal_bits_alone_and_in_groups(performances, ties, settings, dtype):
+    """Six alone, three, thirteen, and all: tiles of different shapes."""
     X = [x.astype(dtype) for x in TIES[ties](performances)]
     n_frames = 40 if ties != "as they are" or settings == "half frames" else None
     sync = DenseSynchronizer(n_frames, **SETTINGS[settings]).fit(X)
@@ -66,7 +65,7 @@ def test_equal_bits_alone_and_in_groups(performances, ties, settings, dtype):
 
 
 @pytest.mark.parametrize("settings", SETTINGS)
-def test_single_precision_among_double(performances, settings):
+def test_single_precision_warps_are_equal_among_double(performances, settings):
     X = [x.astype(np.float32) for x in performances]
     sync = DenseSynchronizer(40, **SETTINGS[settings]).fit(X)
     alone = sync.match(X).times
@@ -74,12 +73,12 @@ def test_single_precision_among_double(performances, settings):
     np.testing.assert_array_equal(among, alone)
 
 
-@pytest.mark.parametrize("cost", ["posture", "velocity", "elastic"])
+@pytest.mark.parametrize("cost", COSTS)
 @pytest.mark.parametrize("n_others", [0, 3, 60])
 def test_ties_go_to_the_first_entry_of_the_step_table(cost, n_others):
-    """Stand still, move three frames late, stand still: where to lose the time is up to the rule.
+    """Rest, move three frames late, rest: many paths tie.
 
-    Walking backwards the path keeps its pace for as long as that costs nothing.
+    The back-tracking keeps the pace for as long as that costs nothing.
     """
     rng = np.random.default_rng(0)
     P, start, stop, late = 60, 12, 30, 3
@@ -96,8 +95,7 @@ def test_ties_go_to_the_first_entry_of_the_step_table(cost, n_others):
     np.testing.assert_array_equal(offsets, expected)
 
 
-def test_small_differences_are_no_ties():
-    """A ten-billionth of the energy decides."""
+def test_small_differences_decide():
     rng = np.random.default_rng(1)
     postures = rng.standard_normal((1, 25, 4)).repeat(2, axis=1)
     moving = postures.copy()

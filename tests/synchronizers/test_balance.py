@@ -61,8 +61,8 @@ def test_no_warning_for_balanced_or_single_features(params):
 
 @pytest.mark.parametrize("params", SETTINGS[1:])
 def test_warning_does_not_depend_on_portions(params, monkeypatch):
-    monkeypatch.setattr(compared, "KEPT_BYTES", 100)
-    monkeypatch.setattr(balance, "AT_ONCE", 2)
+    monkeypatch.setattr(compared, "CACHE_BYTES", 100)
+    monkeypatch.setattr(balance, "BATCH", 2)
     assert is_quiet(walks((1, 1)), **params)
     assert is_quiet(ASpace(2).fit_transform([x.to_numpy() for x in walks()]), **params)
     with pytest.warns(UserWarning, match=r"Feature 'force' holds 9\d.* % of the energy"):

@@ -1,4 +1,4 @@
-"""What a subclass of Synchronizer gets, if it only says how it matches."""
+"""Synchronizer: what a subclass inherits that only defines match."""
 
 import inspect
 import pickle
@@ -33,7 +33,7 @@ def shifted():
     return [np.exp(-(((t - c) / 0.1) ** 2)) * [1.0, -2.0, 0.5] for c in centres]
 
 
-def test_it_is_short_and_found_what_it_looks_for(shifted):
+def test_short_subclass_finds_shifts(shifted):
     assert len(inspect.getsource(ShiftSynchronizer).splitlines()) <= 15
     sync = ShiftSynchronizer(pattern=0).fit(shifted)
     offsets = sync.match(shifted).offsets[:, 40]
@@ -46,7 +46,7 @@ def test_check_estimator():
     check_estimator(ShiftSynchronizer())
 
 
-def test_scorers_and_searches(shifted):
+def test_subclass_works_with_scorers_and_searches(shifted):
     scores = cross_val_score(ShiftSynchronizer(60), shifted, cv=2, scoring=SpreadScorer())
     linear = cross_val_score(LinearSynchronizer(60), shifted, cv=2, scoring=SpreadScorer())
     assert (scores > linear).all()
@@ -56,7 +56,7 @@ def test_scorers_and_searches(shifted):
     assert np.isfinite(search.fit(shifted).best_score_)
 
 
-def test_pipeline_and_displays(bending):
+def test_subclass_works_in_pipelines_and_displays(bending):
     cosines = DirectionCosines(bending.skeleton)
     data = bending.data[:8]
     pipe = make_pipeline(cosines, ASpace(), ShiftSynchronizer(50), ActionModel()).fit(data)
@@ -78,7 +78,7 @@ def test_pipeline_and_displays(bending):
         (lambda X: Match(np.zeros((2, 30))), r"here \(5, 30\); got Match with \(2, 30\)"),
     ],
 )
-def test_what_a_subclass_may_not_answer(answer, message, shifted):
+def test_transform_refuses_wrong_answers_of_match(answer, message, shifted):
     class Wrong(Synchronizer):
         def match(self, X):
             return answer(X)
@@ -87,20 +87,20 @@ def test_what_a_subclass_may_not_answer(answer, message, shifted):
         Wrong(30).fit_transform(shifted)
 
 
-def test_pandas_output(shifted):
+def test_subclass_has_pandas_output(shifted):
     frames = [pd.DataFrame(x, columns=["a", "b", "c"]) for x in shifted]
     out = ShiftSynchronizer(30).set_output(transform="pandas").fit_transform(frames)
     assert out.shape == (150, 3)
     assert out.index.names == ["performance", "frame"]
 
 
-def test_a_subclass_must_say_how_it_matches(shifted):
+def test_match_must_be_defined(shifted):
     class Silent(Synchronizer):
         pass
 
     sync = Silent().fit(shifted)
     assert sync.n_frames_ == 81
-    with pytest.raises(NotImplementedError, match=r"Silent does not say .* match\(self, X\)"):
+    with pytest.raises(NotImplementedError, match=r"Silent does not define match\(self, X\)"):
         sync.transform(shifted)
 
 
@@ -127,14 +127,13 @@ def test_checked_performances_are_not_checked_again(shifted):
     some = univariate.match(univariate.check_performances(rows).take(slice(1, 3)))
     np.testing.assert_array_equal(some.times, univariate.match(rows[1:3]).times)
     np.testing.assert_array_equal(sync.match(checked).times, sync.match(shifted).times)
-    # Those of another estimator are.
+    # Those checked by another estimator are.
     narrow = LinearSynchronizer().fit([x[:, :2] for x in shifted])
     with pytest.raises(ValueError, match="Performance 0 has 3 features a frame"):
         narrow.transform(checked)
 
 
-def test_a_pattern_with_names_is_stored_without():
-    """Its names were checked by fit; not every format stores tables."""
+def test_pattern_is_pickled_without_names():
     X = [pd.DataFrame(np.eye(9)[:, :2] * k, columns=["hip", "knee"]) for k in (1, 2, 3)]
     sync = LinearSynchronizer(pattern=X[1]).fit(X)
     loaded = pickle.loads(pickle.dumps(sync))

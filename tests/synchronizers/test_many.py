@@ -18,8 +18,8 @@ from sklearn_motionsync import (
     to_frame,
 )
 from sklearn_motionsync.inputs import validation as reading
-from sklearn_motionsync.synchronizers import portions as compared
-from sklearn_motionsync.synchronizers.subsample import typical_share
+from sklearn_motionsync.synchronizers import portions
+from sklearn_motionsync.synchronizers.dense import typical_share
 
 from shift_synchronizer import ShiftSynchronizer
 
@@ -32,7 +32,7 @@ def walks(n, n_frames=30, n_features=3, dtype=np.float64):
 
 
 class Files:
-    """Gives performances by index, and remembers which."""
+    """Gives performances by index, and records the indices."""
 
     def __init__(self, performances):
         self.performances, self.read = performances, []
@@ -94,10 +94,10 @@ def peak_of(call):
 
 @pytest.mark.parametrize("settings", [{}, {"pattern": 3}, {"search": "exhaustive"}, PAPER])
 @pytest.mark.parametrize("n_jobs", [None, 2])
-def test_features_that_are_not_kept_change_nothing(monkeypatch, settings, n_jobs):
+def test_features_in_portions_change_nothing(monkeypatch, settings, n_jobs):
     X = walks(110, 20, dtype=np.float32)
     kept = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
-    monkeypatch.setattr(compared, "KEPT_BYTES", 1000)
+    monkeypatch.setattr(portions, "CACHE_BYTES", 1000)
     made = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
     assert made.pattern_index_ == kept.pattern_index_
     assert made.mu_ == pytest.approx(kept.mu_, rel=1e-12)
@@ -106,8 +106,8 @@ def test_features_that_are_not_kept_change_nothing(monkeypatch, settings, n_jobs
     np.testing.assert_array_equal(made.match(X[:9]).times, kept.match(X[:9]).times)
 
 
-def test_a_fit_holds_one_copy_and_a_transform_its_result(monkeypatch):
-    monkeypatch.setattr(compared, "KEPT_BYTES", 1 << 20)
+def test_memory_of_fit_and_transform_is_bounded(monkeypatch):
+    monkeypatch.setattr(portions, "CACHE_BYTES", 1 << 20)
     X = walks(4000, 20, 32, dtype=np.float32)
     sync = DenseSynchronizer(pattern=0, metric=None, refine=False, max_offset=0.05, consensus=1)
     assert peak_of(lambda: sync.fit(X)) < 2.6 * X.nbytes
@@ -122,7 +122,7 @@ def test_a_fit_holds_one_copy_and_a_transform_its_result(monkeypatch):
 @pytest.mark.usefixtures("small_parts")
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", SYNCHRONIZERS)
-def test_each_is_read_once(name, kind):
+def test_performances_are_read_once(name, kind):
     performances, files = KINDS[kind], Files(KINDS[kind])
     expected = clone(SYNCHRONIZERS[name]).fit(performances)
     sync = clone(SYNCHRONIZERS[name]).fit(files)
@@ -136,7 +136,7 @@ def test_each_is_read_once(name, kind):
 
 
 @pytest.mark.usefixtures("small_parts")
-def test_memory_maps(tmp_path):
+def test_memory_maps_equal_arrays(tmp_path):
     np.save(tmp_path / "all.npy", KINDS["single"])
     maps = np.load(tmp_path / "all.npy", mmap_mode="r")
     sync = DenseSynchronizer().fit(maps)
@@ -151,7 +151,7 @@ def test_memory_maps(tmp_path):
 
 
 @pytest.mark.usefixtures("small_parts")
-def test_tables_come_out_as_from_a_list():
+def test_tables_by_index_equal_a_list():
     sync = DenseSynchronizer().fit(KINDS["tables"]).set_output(transform="pandas")
     named = [x.copy() for x in KINDS["tables"]]
     for x, label in zip(named, "abcdefghijklmnop", strict=True):
@@ -172,7 +172,7 @@ BAD = {
 @pytest.mark.usefixtures("small_parts")
 @pytest.mark.parametrize("bad", BAD)
 @pytest.mark.parametrize("name", SYNCHRONIZERS)
-def test_what_is_wrong_is_named_by_its_index(name, bad):
+def test_transform_names_the_index_of_bad_performances(name, bad):
     sync = clone(SYNCHRONIZERS[name]).fit(X)
     spoilt = list(X)
     spoilt[11], message = BAD[bad]
@@ -180,7 +180,7 @@ def test_what_is_wrong_is_named_by_its_index(name, bad):
         sync.transform(Files(spoilt))
 
 
-def test_one_precision():
+def test_transform_refuses_mixed_precision():
     sync = LinearSynchronizer().fit(X)
     single = KINDS["single"]
     with pytest.raises(ValueError, match="Performance 9 is float64, and those before are float32"):
@@ -188,7 +188,7 @@ def test_one_precision():
     assert sync.transform(Files([*X[:9], *single[9:]])).dtype == np.float64
 
 
-def test_it_is_a_collection_for_everybody():
+def test_files_are_a_collection_for_all_estimators():
     files = Files(X)
     pipe = make_pipeline(ASpace(2), DenseSynchronizer(15, metric=None), ActionModel())
     expected = cross_val_score(pipe, list(X), cv=3)
@@ -198,7 +198,7 @@ def test_it_is_a_collection_for_everybody():
         DenseSynchronizer().fit(Files([]))
 
 
-def test_keyframes_come_for_all():
+def test_keyframes_are_given_for_all_files():
     knots = [[10.0, 12.0 + i % 5] for i in range(16)]
     sync = KeyframeSynchronizer().fit(Files(X), keyframes=knots)
     expected = sync.transform(X, keyframes=knots)
@@ -209,12 +209,12 @@ def test_keyframes_come_for_all():
 
 
 @pytest.mark.parametrize("settings", [{}, PAPER, {"pattern": X[3]}])
-def test_a_fit_to_a_sample_is_a_fit_to_these(settings):
+def test_fit_to_a_sample_equals_a_fit_to_these_performances(settings):
     files = Files(X)
     sync = DenseSynchronizer(max_fit=9, **settings).fit(files)
     sample = sync.sample_
     assert len(sample) == 9
-    # The first is looked at to tell what they are.
+    # The first is read for its kind.
     assert sorted({0, *files.read}) == sorted({0, *sample.tolist()})
     assert len(files.read) == len(set(files.read))
     expected = DenseSynchronizer(**settings).fit(X[sample])
@@ -233,7 +233,7 @@ def test_a_fit_to_a_sample_is_a_fit_to_these(settings):
         np.testing.assert_array_equal(sync.metric_.performances, learnt)
 
 
-def test_kinds_of_samples():
+def test_sample_does_not_depend_on_the_kind_of_input():
     expected = DenseSynchronizer(max_fit=9).fit(X)
     for given in (list(X), tuple(X), to_frame(X)):
         sync = DenseSynchronizer(max_fit=9).fit(given)
@@ -253,7 +253,7 @@ def test_kinds_of_samples():
 
 
 @pytest.mark.parametrize("pattern", [0, 7, 15])
-def test_a_pattern_that_is_given_is_in_the_sample(pattern):
+def test_given_pattern_is_in_the_sample(pattern):
     sync = DenseSynchronizer(max_fit=5, pattern=pattern).fit(X)
     assert (sync.pattern_index_, len(sync.sample_)) == (pattern, 5)
     assert sync.pattern_.tobytes() == X[pattern].tobytes()
@@ -268,7 +268,7 @@ def test_parts_are_learnt_from_the_sample():
     np.testing.assert_array_equal(sync.transform(X), expected.transform(X))
 
 
-def test_who_is_not_in_the_sample_is_not_checked_and_who_is_named_by_its_index():
+def test_only_the_sample_is_checked():
     sample = DenseSynchronizer(max_fit=9).fit(X).sample_
     spoilt = X.copy()
     spoilt[np.delete(np.arange(16), sample)] = np.nan
@@ -278,7 +278,7 @@ def test_who_is_not_in_the_sample_is_not_checked_and_who_is_named_by_its_index()
         DenseSynchronizer(max_fit=9).fit(spoilt)
 
 
-def test_the_limit_names_the_way_out(monkeypatch):
+def test_memory_limit_names_max_fit(monkeypatch):
     from sklearn_motionsync.synchronizers import base
 
     monkeypatch.setattr(base, "MOST_BYTES", 6 * X.size)
@@ -290,15 +290,14 @@ def test_the_limit_names_the_way_out(monkeypatch):
 
 
 @pytest.mark.parametrize(("n", "in_doubt"), [(20, 0), (20, 4), (200, 10), (5, 4)])
-def test_the_share_by_drawing(n, in_doubt):
-    """Typicality is uniform; the last that may be the pattern is the one after those in doubt."""
+def test_typical_share_equals_simulation(n, in_doubt):
     drawn = np.sort(np.random.default_rng(0).random((20_000, n)), axis=1)[:, in_doubt]
     share = typical_share(in_doubt, n, 10**9)
     assert (drawn <= share).mean() == pytest.approx(0.95, abs=0.006)
     assert typical_share(3, 12, 12) == 0.25
 
 
-def test_the_statement_holds():
+def test_typical_share_holds_for_samples():
     """Every performance is a number times one curve: the typical ones are next to the mean."""
     curve, held, shares = np.sin(np.linspace(0, 3, 5))[:, np.newaxis], [], []
     for seed in range(30):

@@ -1,7 +1,6 @@
 """Properties of all synchronizers, on performances that hypothesis draws.
 
-What a warp must not depend on, and by how much it does, in frames: the bounds are what rounding
-leaves, in double precision.
+Invariances of warps; bounds are in frames, for rounding in double precision.
 """
 
 import numpy as np
@@ -11,7 +10,7 @@ from hypothesis import strategies as st
 from sklearn.base import clone
 from sklearn_motionsync import DenseSynchronizer, KeyframeSynchronizer, LinearSynchronizer
 
-# Waves of random sizes: that one is much larger than all others happens, and is told.
+# Waves of random sizes: one may be much larger than all others, with a warning.
 pytestmark = pytest.mark.filterwarnings("ignore:Feature .* of the energy:UserWarning")
 
 PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0}
@@ -57,7 +56,7 @@ def assert_close(a, b, bound=ROUNDING):
 @every_synchronizer
 @few
 @given(performances(), st.floats(-1e3, 1e3))
-def test_where_the_origin_is(estimator, X, shift):
+def test_warps_do_not_depend_on_the_origin(estimator, X, shift):
     offset = shift * np.arange(1, 1 + X[0].shape[1])
     assert_close(
         times(estimator, [x + offset for x in X], pattern=0), times(estimator, X, pattern=0)
@@ -67,7 +66,7 @@ def test_where_the_origin_is(estimator, X, shift):
 @every_synchronizer
 @few
 @given(performances(), st.floats(-5, 5), st.integers(-16, 16))
-def test_the_unit(estimator, X, exponent, binary):
+def test_warps_do_not_depend_on_the_unit(estimator, X, exponent, binary):
     """To the last bit if the units differ by a power of two."""
     expected = times(estimator, X)
     assert_close(times(estimator, [np.ldexp(x, binary) for x in X]), expected, 0)
@@ -77,7 +76,7 @@ def test_the_unit(estimator, X, exponent, binary):
 @every_synchronizer
 @few
 @given(performances(), st.floats(-5, 5))
-def test_the_unit_of_single_precision(estimator, X, exponent):
+def test_warps_hardly_depend_on_the_unit_in_single_precision(estimator, X, exponent):
     X = [x.astype(np.float32) for x in X]
     factor = np.float32(10.0**exponent)
     scaled = [(x.astype(np.float64) * factor).astype(np.float32) for x in X]
@@ -89,7 +88,7 @@ def test_the_unit_of_single_precision(estimator, X, exponent):
 @every_synchronizer
 @few
 @given(performances(), st.randoms(use_true_random=False))
-def test_the_order_of_performances(estimator, X, random):
+def test_warps_do_not_depend_on_the_order_of_performances(estimator, X, random):
     order = random.sample(range(len(X)), len(X))
     expected = times(estimator, X)[order]
     assert_close(times(estimator, [X[i] for i in order]), expected)
@@ -98,7 +97,7 @@ def test_the_order_of_performances(estimator, X, random):
 @every_synchronizer
 @few
 @given(performances(), st.randoms(use_true_random=False))
-def test_the_order_of_features(estimator, X, random):
+def test_warps_do_not_depend_on_the_order_of_features(estimator, X, random):
     order = random.sample(range(X[0].shape[1]), X[0].shape[1])
     assert_close(times(estimator, [x[:, order] for x in X]), times(estimator, X))
 
@@ -106,7 +105,7 @@ def test_the_order_of_features(estimator, X, random):
 @every_synchronizer
 @few
 @given(performances(), st.floats(-1e6, 1e6), st.integers(1, 30))
-def test_features_that_do_not_move(estimator, X, value, count):
+def test_constant_features_change_no_warp(estimator, X, value, count):
     still = [np.hstack([x, np.full((len(x), count), value)]) for x in X]
     assert_close(times(estimator, still), times(estimator, X))
 
@@ -114,7 +113,7 @@ def test_features_that_do_not_move(estimator, X, value, count):
 @every_synchronizer
 @few
 @given(performances(), st.integers(0, 1), st.integers(1, 3))
-def test_features_that_are_there_twice(estimator, X, which, copies):
+def test_copies_of_features_change_no_warp(estimator, X, which, copies):
     if isinstance(estimator, KeyframeSynchronizer | LinearSynchronizer):
         copies, which = 1, slice(None)
     twice = [np.hstack([x, *[x[:, which].reshape(len(x), -1)] * copies]) for x in X]
@@ -124,7 +123,7 @@ def test_features_that_are_there_twice(estimator, X, which, copies):
 @every_synchronizer
 @few
 @given(performances(), st.integers(2, 4))
-def test_the_frame_rate(estimator, X, factor):
+def test_warps_do_not_depend_on_the_frame_rate(estimator, X, factor):
     def resampled(x):
         fine = np.linspace(0, len(x) - 1, factor * (len(x) - 1) + 1)
         return np.column_stack([np.interp(fine, np.arange(len(x)), column) for column in x.T])
@@ -135,7 +134,7 @@ def test_the_frame_rate(estimator, X, factor):
 @every_synchronizer
 @few
 @given(performances(), st.integers(0, 2))
-def test_the_pattern_is_itself(estimator, X, pattern):
+def test_pattern_is_matched_to_itself(estimator, X, pattern):
     frames = np.arange(30)
     assert_close(times(estimator, X, pattern=pattern)[pattern], frames, 0)
     given_as_array = clone(estimator).set_params(n_frames=30, pattern=X[pattern]).fit(X)
@@ -145,7 +144,7 @@ def test_the_pattern_is_itself(estimator, X, pattern):
 @every_synchronizer
 @few
 @given(performances())
-def test_alone_or_together(estimator, X):
+def test_warps_do_not_depend_on_the_other_performances(estimator, X):
     sync = clone(estimator).set_params(n_frames=30).fit(X)
     alone = np.concatenate([sync.match([x]).times for x in X])
     assert_close(sync.match(X).times, alone, 0)

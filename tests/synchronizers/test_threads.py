@@ -1,4 +1,4 @@
-"""One estimator in the hands of several threads."""
+"""One estimator used by several threads at once."""
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -57,7 +57,7 @@ def sets():
 
 
 def state(estimator):
-    """All that a fit learnt, and that a user can see."""
+    """The public fitted attributes."""
     names = [name for name in vars(estimator) if name.endswith("_")]
     return {name: as_bytes(getattr(estimator, name)) for name in sorted(names)}
 
@@ -65,13 +65,12 @@ def state(estimator):
 def as_bytes(value):
     if hasattr(value, "get_params"):
         return state(value)
-    return repr(value) if isinstance(value, dict) else np.asarray(value).tobytes()
+    return repr(value) if isinstance(value, (dict, tuple)) else np.asarray(value).tobytes()
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_fits_at_once(estimator, sets):
-    """No call fails, and in the end the estimator is that of one call, whole."""
-    # Names are learnt of frames only.
+def test_concurrent_fits_leave_the_state_of_one(estimator, sets):
+    # Only tables have names.
     sets = [*sets, [pd.DataFrame(x).add_prefix("f") for x in sets[0]]]
     expected = [state(clone(estimator).fit(X)) for X in sets]
     shared, start = clone(estimator), threading.Barrier(len(sets))
@@ -87,7 +86,7 @@ def test_fits_at_once(estimator, sets):
 
 
 @pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
-def test_each_fit_transform_is_right(estimator, sets):
+def test_concurrent_fit_transforms_are_right(estimator, sets):
     expected = [clone(estimator).fit_transform(X) for X in sets]
     shared, start = clone(estimator), threading.Barrier(len(sets))
 
@@ -104,7 +103,7 @@ def test_each_fit_transform_is_right(estimator, sets):
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_answers_while_it_is_fitted_again(estimator, sets):
+def test_answers_during_a_fit_are_those_of_one_fit(estimator, sets):
     """Each answer is that of the old state or of the new one."""
     ask = "transform" if hasattr(estimator, "transform") else "score_samples"
     first, second = sets[0], [x[:30] for x in sets[1]] if ask == "score_samples" else sets[1]
@@ -122,7 +121,7 @@ def test_answers_while_it_is_fitted_again(estimator, sets):
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-def test_a_fit_that_fails_leaves_nothing_fitted(estimator, sets):
+def test_failed_fit_leaves_nothing_fitted(estimator, sets):
     fitted = clone(estimator).fit(sets[0])
     parameters = fitted.get_params()
     with pytest.raises(ValueError, match="Performance 1"):
@@ -133,7 +132,7 @@ def test_a_fit_that_fails_leaves_nothing_fitted(estimator, sets):
     assert state(fitted.fit(sets[2])) == state(clone(estimator).fit(sets[2]))
 
 
-def test_a_fit_that_fails_does_not_undo_that_of_another_thread(sets):
+def test_failed_fit_keeps_the_fit_of_another_thread(sets):
     class Meeting(LinearSynchronizer):
         def _learn(self, performances):
             if len(performances) == len(sets[1]):
@@ -147,7 +146,7 @@ def test_a_fit_that_fails_does_not_undo_that_of_another_thread(sets):
     assert shared.n_frames_ == 30
 
 
-def test_what_a_fit_learns_may_have_any_name(sets):
+def test_learnt_attributes_may_have_any_name(sets):
     class Named(LinearSynchronizer):
         def __init__(self, n_frames=None, pattern="median", lambda_=1.0):
             super().__init__(n_frames, pattern)
@@ -166,8 +165,7 @@ def test_what_a_fit_learns_may_have_any_name(sets):
     assert vars(named) == {"n_frames": None, "pattern": "median", "lambda_": 2.0}
 
 
-def test_what_an_earlier_fit_alone_learnt_is_gone(sets):
-    """Names of features are learnt of frames only."""
+def test_second_fit_removes_attributes_of_the_first(sets):
     sync = LinearSynchronizer().fit([pd.DataFrame(x).add_prefix("f") for x in sets[0]])
     assert hasattr(sync, "feature_names_in_")
     assert not hasattr(sync.fit(sets[1]), "feature_names_in_")

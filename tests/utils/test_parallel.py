@@ -19,7 +19,7 @@ import threadpoolctl
 from sklearn.exceptions import NotFittedError
 from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.matching.refinement_test import RefinementTrial
+from sklearn_motionsync.matching.refinement_test import RefinementTest
 from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.utils.parallel import Progress, SharedArgument, run
 
@@ -141,7 +141,7 @@ def test_verbose_prints_the_progress_of_stages(walks, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert all(line.startswith("[DenseSynchronizer] ") for line in lines)
     assert "comparing 300 with 32 performances: 100 %" in lines[0]
-    assert "trying a little to refine: 100 %" in lines[-2]
+    assert "first pass of the refinement test: 100 %" in lines[-2]
     assert "warping: 100 %" in lines[-1]
 
 
@@ -197,7 +197,7 @@ def test_interrupted_fit_leaves_estimator_unfitted(walks, monkeypatch):
     def interrupted(self, *args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(RefinementTrial, "misfits", interrupted)
+    monkeypatch.setattr(RefinementTest, "misfits", interrupted)
     with pytest.raises(KeyboardInterrupt):
         sync.fit(walks)
     with pytest.raises(NotFittedError):
