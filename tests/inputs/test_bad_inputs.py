@@ -140,7 +140,6 @@ FITTED_ON = [
     (X, [x[:, :2] for x in X], ALL, ["2 features", "expecting 3"]),
     (X, one(masked), ALL, ["Performance 2", "masked"]),
     (X, one(lambda x: x + 0j), ALL, ["Performance 2", "complex"]),
-    (X, [1e35 * x for x in X], SYNCHRONIZERS, ["Performance 0", "1e+30 times", "same unit"]),
     (X, X[0], SEQUENCES, ["wrap one sequence as [X]"]),
     (np.stack(X)[:, :, 0], X, SEQUENCES, ["2-D"]),
 ]
@@ -169,7 +168,6 @@ PARAMETERS = [
     (SYNCHRONIZERS, {"pattern": X[0].astype("m8[s]")}, ["pattern", "durations"]),
     (SYNCHRONIZERS, {"pattern": [["a"] * 3] * 5}, ["pattern", "'a'"]),
     (SYNCHRONIZERS, {"pattern": True}, ["pattern", "index", "True"]),
-    (SYNCHRONIZERS, {"pattern": 1e40 * X[0]}, ["The pattern", "1e+30 times", "same unit"]),
     (SYNCHRONIZERS, {"pattern": 5}, ["pattern=5", "5 performances"]),
     (SYNCHRONIZERS, {"n_frames": 10**9}, ["n_frames = 1000000000", "GB"]),
     ([DenseSynchronizer()], {"subframes": 10**6}, ["subframes = 1000000", "steps", "fewer"]),
