@@ -308,7 +308,8 @@ def test_pattern_matches_itself_by_the_identity(estimator, pattern, performances
     # A cross-correlation finds no shift of what never moves.
     others = [] if isinstance(estimator, ShiftSynchronizer) else [still]
     for X in (performances, *([people] if people else []), *others):
-        sync = clone(estimator).set_params(pattern=pattern).fit(X)
+        name = "pattern" if "pattern" in estimator.get_params() else "synchronizer__pattern"
+        sync = clone(estimator).set_params(**{name: pattern}).fit(X)
         own = sync.match([X[sync.pattern_index_]]).times[0]
         np.testing.assert_array_equal(own, np.arange(sync.n_frames_))
 

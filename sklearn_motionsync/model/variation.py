@@ -101,8 +101,8 @@ def mean_band(performances, groups, coverage, random_state=None):
     groups with as many performances are drawn from the normal distribution with the covariance of
     the group means, and mean and variance are estimated from each draw.
 
-    In simulations with 4 to 20 people who come 1 to 5 times a band of nominal 95 % holds the mean
-    in 92 to 99 % of the cases; one of nominal 80 % in 67 to 78 %.
+    In simulations with 4 to 20 people of 1 to 5 performances each, a band of nominal 95 % holds the
+    mean in 92 to 99 % of the cases; one of nominal 80 % in 67 to 78 %.
 
     Parameters
     ----------

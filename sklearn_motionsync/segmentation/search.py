@@ -435,8 +435,8 @@ class Unlikeness:
         energy, self._floor = movement_energies(positions)
         if energy.max() <= self._floor:
             raise ValueError(
-                "Nobody moves in what is looked for: all times of a take where somebody stands "
-                "are alike. Give a pattern, or fit on performances, that move."
+                "The pattern does not move: it fits every moment of a take in which nothing moves. "
+                "Give a pattern that moves, or fit on performances that do."
             )
         self._energy = LogMoments.of(energy).standardize
         codes, _ = encode_groups(groups, count, at_least=min(count, 2))

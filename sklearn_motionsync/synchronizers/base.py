@@ -14,7 +14,7 @@ from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import Performances
-from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.numbers import as_numbers, check_finite, check_magnitude, check_names
 from ..inputs.validation import (
     SequenceLevelMixin,
     labels_of_parts,
@@ -319,13 +319,13 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         else:
             self.n_frames_ = int(np.median(self.lengths_)) if given is None else len(given)
         n, width = len(performances), performances[0].shape[1]
-        n_positions = (self.n_frames_ - 1) * subframes + 1
-        n_bytes = 8 * n * n_positions * width
+        n_bytes = 8 * n * ((self.n_frames_ - 1) * subframes + 1) * width
         if n_bytes > MOST_BYTES:
+            positions = f" and subframes = {subframes}" if subframes > 1 else ""
             raise ValueError(
-                f"{n} performances at {n_positions} positions of a clock of "
-                f"{self.n_frames_} frames take {n_bytes / 2**30:.0f} GB several times over; "
-                f"{MOST_BYTES / 2**30:.0f} GB is the limit. Use {self._SMALLER}."
+                f"{n} performances at n_frames = {self.n_frames_}{positions} take "
+                f"{n_bytes / 2**30:.0f} GB several times over; {MOST_BYTES / 2**30:.0f} GB is the "
+                f"limit. Use {self._SMALLER}."
             )
         on_clock = normalise(performances, self.n_frames_)
         unit = Unit.of(on_clock)
@@ -358,6 +358,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
                 f"frames, like the performances; got {pattern.shape}."
             )
         check_finite(pattern, "The pattern, frame", names_of_input(self))
+        check_magnitude(float(np.abs(pattern).max()), "The pattern", training=True)
         return pattern
 
     @property

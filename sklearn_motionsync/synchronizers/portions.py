@@ -53,8 +53,8 @@ class TrainingPortions:
 
     @functools.cached_property
     def common(self):
-        """The training set as all portions share it."""
-        return SharedArgument(self)
+        """The training set as all portions share it: a copy, so that there is no cycle."""
+        return SharedArgument(TrainingPortions(self.matcher, self.positions, self._store))
 
     def compare(self, bases, moving, *, n_jobs, progress):
         """Yield the synchronisation distances of all pairs of two index arrays, tile by tile.

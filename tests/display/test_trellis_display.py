@@ -78,7 +78,7 @@ def test_trellis_of_the_second_synchronizer(bunch):
 def test_disparity_space_of_long_takes_is_subsampled(bunch, pipe, monkeypatch):
     points = pipe[:2].transform(bunch.data)
     whole = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
-    monkeypatch.setattr("sklearn_motionsync.matching.warper.DRAWN_CELLS", whole.costs.size // 7)
+    monkeypatch.setattr("sklearn_motionsync.matching.matcher.DRAWN_CELLS", whole.costs.size // 7)
     thin = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
     np.testing.assert_array_equal(thin.frames, np.arange(0, 30, 3))
     np.testing.assert_array_equal(thin.offsets, np.arange(-12, 13, 3))

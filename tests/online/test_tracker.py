@@ -151,9 +151,6 @@ def test_groups_of_similar_performances_widen_deviations(tracker):
     alone = clone(tracker).fit(training)
     people = clone(tracker).fit(training, groups=["ann", "ann", "bob", "bob"])
     assert (np.diag(people.covariance_) > np.diag(alone.covariance_)).all()
-    # A single group is as none.
-    single = clone(tracker).fit(training, groups=[1] * 4)
-    np.testing.assert_array_equal(single.covariance_, alone.covariance_)
 
 
 # -- missing and improbable observations --------------------------------------------------

@@ -364,7 +364,7 @@ def test_refuses_invalid_takes_and_patterns(pipe):
     rows = DenseSynchronizer().fit(np.stack([TAKE[:60, 0], TAKE[60:120, 0]]))
     with pytest.raises(ValueError, match="rows of a 2-D array"):
         find_performances(rows, TAKE[:, 0])
-    with pytest.raises(ValueError, match="Nobody moves"):
+    with pytest.raises(ValueError, match="The pattern does not move"):
         find_performances(np.ones((30, 3)), np.ones((90, 3)))
     with pytest.raises(NotFittedError):
         find_performances(DenseSynchronizer(), TAKE)
