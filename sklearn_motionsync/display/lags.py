@@ -87,8 +87,14 @@ class LagDisplay:
             Fitted.
         X : performances
             As the estimator takes them.
-        groups, against, unit, frame_rate
-            As in ``PartSynchronizer.lags``.
+        groups : array-like, shape (n_sequences,), default=None
+            The subject of each performance.
+        against : str, default="rest"
+            The reference: ``"rest"``, ``"body"``, or the name of a part.
+        unit : {"frames", "percent", "seconds"}, default="percent"
+            Unit of the lags.
+        frame_rate : float or array-like (n_sequences,), default=None
+            Frames a second of the performances; ``unit="seconds"`` needs it.
         ax : Axes, or one for the map and one for each part, default=None
             A subplot to be divided, or one axes a panel. None makes a figure.
         colorbar : bool, default=True

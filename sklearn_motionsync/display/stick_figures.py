@@ -276,8 +276,10 @@ class SkeletonDisplay:
             others up to six in all.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        at, azimuth : float
-            See `plot`.
+        at : float in [0, 1], default=0.0
+            The moment that is drawn, as in `plot`.
+        azimuth : float, default=-60
+            The direction of view in degrees, as in `plot`.
         **params : dict
             Further arguments of the ``match`` of the synchronizer, such as ``keyframes``.
 
@@ -405,8 +407,10 @@ class SkeletonDisplay:
             rare (`ActionModel.simultaneous_factor`).
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        at, azimuth : float
-            See `plot`.
+        at : float in [0, 1], default=0.0
+            The moment that is drawn, as in `plot`.
+        azimuth : float, default=-60
+            The direction of view in degrees, as in `plot`.
         **params : dict
             Further arguments of the synchronizer, such as ``keyframes``.
 

@@ -19,7 +19,15 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
-from .numbers import FLOATS, LARGEST, as_numbers, check_finite, check_magnitude, column_names
+from .numbers import (
+    FLOATS,
+    LARGEST,
+    SMALLEST,
+    as_numbers,
+    check_finite,
+    check_magnitude,
+    column_names,
+)
 from .resampling import warn_of_uneven
 from .tables import INDEX_NAMES, as_pandas, labels_of, name_performance, split_table
 
@@ -156,7 +164,9 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
             peak = np.fmax.reduce(np.abs(array), axis=None, initial=0)
         if peak > largest:
             largest, holder = peak, i
-    check_magnitude(largest, name_performance(numbers[holder], labels[holder]), training=training)
+    if not SMALLEST <= largest <= LARGEST:
+        holder = name_performance(numbers[holder], labels[holder])
+        check_magnitude(largest, holder, training=training)
     if dtype is None:
         dtype = np.float32 if {a.dtype for a in arrays} == {np.dtype(np.float32)} else np.float64
     # Row by row in memory, so that no result depends on the layout of the input.

@@ -12,6 +12,7 @@ from scipy.sparse import issparse
 __all__ = [
     "FLOATS",
     "LARGEST",
+    "SMALLEST",
     "as_numbers",
     "check_finite",
     "check_magnitude",
@@ -25,7 +26,7 @@ __all__ = [
 FLOATS = np.dtype(np.float64), np.dtype(np.float32)
 # Limits of the largest magnitude of a set of performances. In any unit of motion capture data lie
 # far within; squares and fourth powers of such numbers neither overflow nor vanish.
-_SMALLEST, LARGEST = 1e-9, 1e9
+SMALLEST, LARGEST = 1e-9, 1e9
 
 _TIMES = (np.datetime64, np.timedelta64, datetime.date, datetime.time, datetime.timedelta)
 _SECONDS = "Give seconds as numbers, (t - t[0]) / np.timedelta64(1, 's')"
@@ -201,10 +202,10 @@ def check_magnitude(largest, what, *, training):
     training : bool
         Whether they are a whole training set: a smaller set may hold tiny values only.
     """
-    if largest > LARGEST or (training and 0 < largest < _SMALLEST):
+    if largest > LARGEST or (training and 0 < largest < SMALLEST):
         raise ValueError(
             f"{what} holds the largest magnitude of all, {largest:.3g}. It must be between "
-            f"{_SMALLEST:g} and {LARGEST:g} unless all values are 0: give the data in another unit."
+            f"{SMALLEST:g} and {LARGEST:g} unless all values are 0: give the data in another unit."
         )
 
 

@@ -28,8 +28,8 @@ __all__ = [
     "labels_of_input",
     "labels_of_parts",
     "names_of_input",
-    "parts_of_source",
     "read_collection",
+    "read_source",
     "restore",
 ]
 
@@ -128,7 +128,8 @@ def check_performances(
             f"Performance {out.numbers[0]} has {width} features a frame, but {name} is "
             f"expecting {estimator.n_features_in_} features as input."
         )
-    _check_names(estimator, sequences[0], reset)
+    if reset or out.frames:  # only tables have names
+        _check_names(estimator, sequences[0], reset)
     named = out.names is not None and any([isinstance(name, str) for name in out.names])
     # Arrays were checked above, all but those given after a fit on tables.
     if reset or named or hasattr(estimator, "feature_names_in_"):
@@ -306,23 +307,16 @@ _DOUBLE = 8
 _BYTES, MANY = 1 << 25, 4096
 
 
-def parts_of_source(estimator, X, on_rows):
-    """The number of performances, and an iterator over checked parts; None if all are in memory.
+def read_source(estimator, source, on_rows):
+    """Yield checked parts of a source, few enough performances at a time for the memory.
 
     Parameters
     ----------
     estimator : fitted estimator
-    X : performances of any kind
+    source : as `as_source` returns it
     on_rows : bool
         As for `check_performances`.
     """
-    source = as_source(X)
-    if source is None or len(source) == 0:
-        return None
-    return len(source), _read(estimator, source, on_rows)
-
-
-def _read(estimator, source, on_rows):
     dtype = _dtype_of_maps(source)
     start, part, size = 0, [], 0
     for i in range(len(source)):

@@ -57,7 +57,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     noise : float, default=0.05
         Standard deviation of observations, in the unit of the features; the default is one of
         direction cosines.
-    tempering : float, default=10
+    tempering : float, default=10.0
         Divides the log-likelihood of the velocities of every hundredth of the mean duration.
     frame_rate : float, default=None
         Frames a second of the training performances. Times are then in seconds; without it
@@ -256,8 +256,12 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
 
         Parameters
         ----------
-        X, times, projection :
-            As for ``track``.
+        X : array-like (n_frames, n_observed), DataFrame, or a list or 3-D array of takes
+            Observations, NaN where nothing is seen.
+        times : array-like, shape (n_frames,), or a list of them, default=None
+            Times of the frames, as for ``track``.
+        projection : array-like (n_observed, n_features) or (matrix, offset), default=None
+            The observation of a posture, as for ``track``.
 
         Returns
         -------

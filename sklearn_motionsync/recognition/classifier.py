@@ -59,8 +59,8 @@ class ActionClassifier(
 
     Parameters
     ----------
-    costs : {"velocity", "elastic", "posture"} or list of them, default=all three
-        The costs of the distances, each once. May be empty with ``summaries``: then nothing is
+    costs : str or list of str, default=("velocity", "elastic", "posture")
+        The costs of the distances, each once, out of these three. May be empty with ``summaries``: then nothing is
         warped.
     C : float, default=10
         Inverse strength of the penalty of the regression.

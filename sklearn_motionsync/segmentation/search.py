@@ -386,8 +386,8 @@ def scales(shortest, longest):
 _SAY_OF_MANNER = 0.05
 # They make nothing more unlike than e to this.
 _MOST = 3.0
-# Who stands still is as unlike as 1. What is not clearly more alike is not the action, however
-# unlike people are; and takes are noisier than clips, and windows begin at whole frames.
+# Standing still has the dissimilarity 1. The upper limit keeps the border below it, however much
+# people differ; the lower one allows for noise in takes and windows that begin at whole frames.
 _MOST_BORDER, _LEAST_BORDER = 0.7, 0.15
 # The border where a single performance tells nothing of how people differ.
 _BORDER_OF_ONE = 0.5

@@ -13,13 +13,13 @@ from sklearn.base import (
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.collections import Performances
+from ..inputs.collections import Performances, as_source
 from ..inputs.numbers import as_numbers, check_finite, check_magnitude, check_names
 from ..inputs.validation import (
     SequenceLevelMixin,
     labels_of_parts,
     names_of_input,
-    parts_of_source,
+    read_source,
     restore,
 )
 from ..matching.filters import SMOOTHING
@@ -289,9 +289,11 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         return labels_of_parts(labels, levels, part.names), out
 
     def _read_in_parts(self, X):
-        if isinstance(X, Performances):
+        """The number of performances, and checked parts of them; None if all are in memory."""
+        source = None if isinstance(X, Performances) else as_source(X)
+        if source is None or len(source) == 0:
             return None
-        return parts_of_source(self, X, self._read_rows_in_fit())
+        return len(source), read_source(self, source, self._read_rows_in_fit())
 
     def _match_in_parts(self, X):
         """The match of performances, which may be read in parts."""

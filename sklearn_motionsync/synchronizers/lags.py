@@ -30,11 +30,11 @@ class Lags(NamedTuple):
         The reference: ``"rest"``, ``"body"``, or the name of a part.
     unit : {"frames", "percent", "seconds"}
         Unit of the values.
-    groups : ndarray of int, shape (n_sequences,), or None
+    groups : ndarray of int, shape (n_sequences,), default=None
         The subject of every performance, counted from 0.
-    people : list or None
+    people : list, default=None
         Labels of the subjects.
-    labels : list or None
+    labels : list, default=None
         Labels of the performances.
 
     Examples
