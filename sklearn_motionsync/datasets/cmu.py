@@ -77,7 +77,7 @@ def fetch_cmu(
     -------
     Bunch
         data : list of DataFrame (n_frames_i, 3 * n_joints)
-            Joint positions in metres, as `read_motion` returns them.
+            Joint positions in metres, as ``read_motion`` returns them.
         subject : str
             Number of the subject, in two digits.
         take : ndarray of str (n_trials,)

@@ -144,7 +144,7 @@ def make_gait(
         cycle : ndarray of int (n_performances,)
             The number of the cycle of the person, from 1; not with takes.
         events : list of list of dict
-            With takes only: the events of each take by time, as of `read_motion`: ``label``
+            With takes only: the events of each take by time, as of ``read_motion``: ``label``
             ("Foot Strike" or "Foot Off"), ``context`` ("Right"), ``time`` in seconds and ``frame``,
             from 0 and with fractions.
         feature_names : list of str

@@ -427,7 +427,7 @@ class SkeletonDisplay:
 
         See Also
         --------
-        find_departures : The departures as a table.
+        sklearn_motionsync.find_departures : The departures as a table.
         ActionModelDisplay : The curves of the performance, and the band that they leave.
         """
         caller = f"{cls.__name__}.from_departures"

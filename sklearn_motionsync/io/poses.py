@@ -54,7 +54,7 @@ def from_poses(poses, *, min_confidence=None, frame_rate=None, max_gap=0, perfor
     Raises
     ------
     ValueError
-        If `poses` is not such a Dataset, or `min_confidence` is given and there is no confidence.
+        If ``poses`` is not such a Dataset, or ``min_confidence`` is given without a confidence.
 
     Warns
     -----

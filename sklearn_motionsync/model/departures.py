@@ -53,7 +53,7 @@ def find_departures(estimator, X, *, features=None, limit=None, **params):
 
     See Also
     --------
-    SkeletonDisplay.from_departures : Draws them as stick figures.
+    sklearn_motionsync.display.SkeletonDisplay.from_departures : Draws them as stick figures.
 
     Examples
     --------

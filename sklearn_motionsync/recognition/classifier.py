@@ -60,8 +60,8 @@ class ActionClassifier(
     Parameters
     ----------
     costs : str or list of str, default=("velocity", "elastic", "posture")
-        The costs of the distances, each once, out of these three. May be empty with ``summaries``: then nothing is
-        warped.
+        The costs of the distances, each once, out of these three. May be empty with
+        ``summaries``: then nothing is warped.
     C : float, default=10
         Inverse strength of the penalty of the regression.
     gamma : float, default=1

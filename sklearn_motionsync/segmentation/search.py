@@ -112,7 +112,7 @@ def find_performances(
     See Also
     --------
     ActionDetector : Whether a performance that is cut out already is the action.
-    SearchDisplay : Draws hits along the takes.
+    sklearn_motionsync.display.SearchDisplay : Draws hits along the takes.
 
     Notes
     -----

@@ -90,7 +90,7 @@ def blend_performances(
 
     See Also
     --------
-    SkeletonDisplay : Draws the blend, and lets it move.
+    sklearn_motionsync.display.SkeletonDisplay : Draws the blend, and lets it move.
     ActionModel.sample : Random mixtures of the training performances.
 
     Notes

@@ -226,7 +226,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     LinearSynchronizer : The baseline without matching.
     KeyframeSynchronizer : Matching by key-frames.
     ActionModel : Mean and variation of synchronised performances.
-    MetricDisplay : Draws the weights of the features in the metric.
+    sklearn_motionsync.display.MetricDisplay : Draws the weights of the features in the metric.
 
     References
     ----------

@@ -104,7 +104,7 @@ class PartSynchronizer(Synchronizer):
     See Also
     --------
     DenseSynchronizer : One warp for the whole body.
-    LagDisplay : Draws the lags.
+    sklearn_motionsync.display.LagDisplay : Draws the lags.
 
     Notes
     -----
