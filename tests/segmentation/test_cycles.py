@@ -153,7 +153,9 @@ def test_cycles_begin_with_the_foot_that_is_farther_ahead():
 
 def test_fit_refuses_takes_that_are_not_cyclic(gait):
     bunch = make_bending(2, random_state=0)
-    with pytest.raises(ValueError, match=r"Performance 0: not cyclic.* 0.00 at 0.00 cycles; thre"):
+    with pytest.raises(
+        ValueError, match=r"Performance 0: not cyclic.* 0.00 at 0.00 cycles; threshold"
+    ):
         CycleSegmenter(bunch.skeleton).fit(bunch.data)
     noise = np.random.default_rng(0).normal(size=(200, 4))
     with pytest.raises(ValueError, match=r"not cyclic. Its .* 0\.\d\d at .*; threshold=0.4"):
