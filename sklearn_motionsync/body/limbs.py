@@ -12,7 +12,6 @@ __all__ = [
     "LIMB_NAMES",
     "body_size",
     "complete_legs",
-    "exponent_of",
     "features_of_parts",
     "landmark_positions",
     "leg_length",
@@ -165,14 +164,6 @@ def body_size(lengths, limbs):
 def lowest_height(tracks):
     """The smallest second coordinate of (n_frames, n_dims) tracks; NaN if all are hidden."""
     return np.fmin.reduce([np.fmin.reduce(track[:, 1]) for track in tracks])
-
-
-def exponent_of(largest, dtype):
-    """The k of a unit ``2**k`` in which numbers up to the largest have squares; 0 if they have."""
-    info = np.finfo(dtype)
-    if largest == 0 or abs(k := int(np.frexp(largest)[1])) < info.maxexp // 8:
-        return 0
-    return k
 
 
 def unit_vectors(vectors):

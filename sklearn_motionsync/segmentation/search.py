@@ -39,7 +39,7 @@ _SHORTEST = 3
 # The first step by which ends of a hit are moved, as a share of its length; later steps are halved.
 _FIRST_MOVE = 1 / 8
 _MOVES = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
-# A window that is so many times as unlike as the threshold allows is not refined.
+# A window of more than so many times the dissimilarity of the threshold is not refined.
 _HOPELESS = 2
 
 
@@ -146,14 +146,14 @@ def find_performances(
             )
     shortest, longest = _check_durations(synchronizer, durations)
     propose = Proposer.of(synchronizer, shortest, longest)
-    unlikeness = Unlikeness(synchronizer, groups, length=durations is None)
+    dissimilarity = WindowDissimilarity(synchronizer, groups, length=durations is None)
     learns = threshold is None or threshold == "auto"
-    level = float(np.exp(-unlikeness.border(coverage)) if learns else threshold)
+    level = float(np.exp(-dissimilarity.threshold(coverage)) if learns else threshold)
     lowest = 0.0 if threshold is None else level
     rows = []
     for i, take in enumerate(takes):
         take = take.astype(np.float64, copy=False)
-        search = _Search(take, unlikeness, shortest, longest)
+        search = _Search(take, dissimilarity, shortest, longest)
         rows += [(i, *hit) for hit in search.hits(propose(take), lowest, max_hits)]
     rows = pd.DataFrame(rows, columns=["take", "start", "stop", "score"])
     rows = rows.astype({"take": int, "start": int, "stop": int, "score": float})
@@ -163,8 +163,8 @@ def find_performances(
 class _Search:
     """The best windows of a take that do not overlap."""
 
-    def __init__(self, take, unlikeness, shortest, longest):
-        self._take, self._unlikeness = take, unlikeness
+    def __init__(self, take, dissimilarity, shortest, longest):
+        self._take, self._dissimilarity = take, dissimilarity
         self._shortest, self._longest = shortest, longest
 
     def hits(self, windows, threshold, count):
@@ -173,7 +173,7 @@ class _Search:
         A window that is refined excludes those it overlaps even if it is rejected, so that the
         threshold selects among hits and changes none.
         """
-        scores = np.exp(-self._unlikeness(self._take, windows))
+        scores = np.exp(-self._dissimilarity(self._take, windows))
         refined = []
         for k in np.argsort(-scores, kind="stable"):
             if scores[k] < threshold**_HOPELESS:
@@ -199,7 +199,7 @@ class _Search:
             sizes = some[:, 1] - some[:, 0]
             inside = (some[:, 0] >= first) & (some[:, 1] <= last)
             some = some[inside & (sizes >= self._shortest) & (sizes <= self._longest)]
-            scores = np.exp(-self._unlikeness(self._take, some))
+            scores = np.exp(-self._dissimilarity(self._take, some))
             if scores.max(initial=0) > score:
                 window, score = some[scores.argmax()], scores.max()
             else:
@@ -380,47 +380,47 @@ def scales(shortest, longest):
     return np.unique(np.round(np.geomspace(shortest, longest, count)).astype(np.intp))
 
 
-# -- how unlike windows of a take are to performances that were learnt, and how unlike they may be
+# -- dissimilarity of windows of a take to training performances, and its threshold --------
 
-# Say of length and energy: of the sum of their squared standard deviations.
-_SAY_OF_MANNER = 0.05
-# They make nothing more unlike than e to this.
-_MOST = 3.0
-# Standing still has the dissimilarity 1. The upper limit keeps the border below it, however much
+# Weight of the squared standard scores of length and energy in the logarithm of the dissimilarity.
+_LENGTH_ENERGY_WEIGHT = 0.05
+# Largest logarithm of the factor by which they raise it.
+_MAX_LOG_FACTOR = 3.0
+# Standing still has the dissimilarity 1. The upper limit keeps the threshold below it, however much
 # people differ; the lower one allows for noise in takes and windows that begin at whole frames.
-_MOST_BORDER, _LEAST_BORDER = 0.7, 0.15
-# The border where a single performance tells nothing of how people differ.
-_BORDER_OF_ONE = 0.5
-# Of so many movements by chance, this share may be as alike as the border.
-_BY_CHANCE, _CHANCE_SHARE = 1000, 0.005
-# Windows that are compared at a time: bounds the memory, whatever the length of the take.
-_AT_ONCE = 256
-# They are compared at so many positions at most: their paths are not asked for.
-_MOST_POSITIONS = 100
+_MAX_THRESHOLD, _MIN_THRESHOLD = 0.7, 0.15
+# The threshold of a single performance, of which no variation can be learnt.
+_DEFAULT_THRESHOLD = 0.5
+# Random movements, and the share of them that may lie below the threshold.
+_N_RANDOM, _RANDOM_QUANTILE = 1000, 0.005
+# Windows that are compared at a time, which bounds the memory.
+_WINDOW_BATCH = 256
+# Largest number of positions of a window.
+_MAX_POSITIONS = 100
 
 
-class Unlikeness:
-    """How unlike windows are to training performances: 0 equal, 1 as unlike as standing still.
+class WindowDissimilarity:
+    """Dissimilarity of windows to training performances: 0 equal, 1 as that of standing still.
 
     The mean over the two most similar training performances of::
 
         r(y, y_i) = |y - y_i|^2 / (|y|^2 + |y_i|^2),
 
     half of postures less their own mean over time, to which a tenth of the squared distance of
-    these means is added, half of what the synchronizer compares; times e to a twentieth of the
-    squared standard deviations that length and energy are from what is usual.
+    these means is added, half of the features of the synchronizer; times e to a twentieth of the
+    squared standard scores of the logarithms of length and energy.
 
     Parameters
     ----------
     synchronizer : fitted Synchronizer
-    groups : array-like (n_kept,), default=None
+    groups : array-like (n_examples,), default=None
         Of the training performances that it keeps; by default each is its own.
     length : bool, default=True
         Whether the length counts.
 
     Attributes
     ----------
-    known : ndarray (n_kept,)
+    known : ndarray (n_examples,)
         That of the training performances, each compared with those of other groups.
     """
 
@@ -429,7 +429,7 @@ class Unlikeness:
         self._set_clock(synchronizer.features_, synchronizer.n_frames_)
         moments = LogMoments.of(lengths)
         self._length = moments.standardize if length else np.zeros_like
-        self._usual_length = np.exp(np.log(lengths).mean())
+        self._typical_length = np.exp(np.log(lengths).mean())
         count = len(examples)
         positions = self._positions(examples)
         energy, self._floor = movement_energies(positions)
@@ -443,56 +443,58 @@ class Unlikeness:
         self._neighbours = Neighbours(positions, codes, self._features, DIFFERENCES)
         self._training, self.known = positions, np.empty(0)
         if count > 1:
-            self.known = self._of(positions, lengths[_example_indices(synchronizer)], codes)
+            self.known = self._measure(positions, lengths[_example_indices(synchronizer)], codes)
 
-    def border(self, coverage):
-        """Up to how unlike a share of the performances of new people is expected to be.
+    def threshold(self, coverage):
+        """The dissimilarity below which a share of the performances of new people lies.
 
-        Movements by chance are more unlike, whatever that share.
+        It is at most that of random movements.
         """
         if not len(self.known):
-            return _BORDER_OF_ONE
-        learnt = min(log_moments(self.known).upper_limit(coverage), _MOST_BORDER)
-        return max(min(learnt, self._chance()), _LEAST_BORDER)
+            return _DEFAULT_THRESHOLD
+        learnt = min(log_moments(self.known).upper_limit(coverage), _MAX_THRESHOLD)
+        return max(min(learnt, self._random_limit()), _MIN_THRESHOLD)
 
     def __call__(self, take, windows):
-        """Of windows (n_windows, 2), start and stop, of a take (n_frames, n_features)."""
+        """The dissimilarity of windows (n_windows, 2), start and stop, of a take."""
         out = np.empty(len(windows))
-        for rows in even_slices(len(windows), _AT_ONCE):
+        for rows in even_slices(len(windows), _WINDOW_BATCH):
             positions = self._positions([take[start:stop] for start, stop in windows[rows]])
-            out[rows] = self._of(positions, windows[rows, 1] - windows[rows, 0])
+            out[rows] = self._measure(positions, windows[rows, 1] - windows[rows, 0])
         return out
 
     def _set_clock(self, features, n_frames):
-        """Positions of windows, and features of these that are as by the frame of the clock."""
-        self._n_positions = min((n_frames - 1) * features.subframes + 1, _MOST_POSITIONS)
+        """The number of positions of a window, and the features at this pace."""
+        self._n_positions = min((n_frames - 1) * features.subframes + 1, _MAX_POSITIONS)
         by_frame = (self._n_positions - 1) / (n_frames - 1)
         self._features = features.at_pace(by_frame)
 
-    def _chance(self):
-        """How unlike movements by chance are, all but the most alike."""
-        portions = even_slices(_BY_CHANCE, _AT_ONCE)
+    def _random_limit(self):
+        """A low quantile of the dissimilarity of random movements."""
+        portions = even_slices(_N_RANDOM, _WINDOW_BATCH)
         counts = [portion.stop - portion.start for portion in portions]
-        movements = chance_movements(self._training, counts)
-        found = [self._of(some, np.full(len(some), self._usual_length)) for some in movements]
-        return float(np.quantile(np.concatenate(found), _CHANCE_SHARE))
+        movements = random_movements(self._training, counts)
+        found = [
+            self._measure(some, np.full(len(some), self._typical_length)) for some in movements
+        ]
+        return float(np.quantile(np.concatenate(found), _RANDOM_QUANTILE))
 
     def _positions(self, performances):
-        """Performances at all positions, in the unit, in double precision."""
+        """Performances at all positions, in the unit of the features, in double precision."""
         arrays = [np.asarray(x, dtype=np.float64) for x in performances]
         return self._features.unit(normalise(arrays, self._n_positions))
 
-    def _of(self, positions, lengths, groups=None):
+    def _measure(self, positions, lengths, groups=None):
         shape = self._neighbours.dissimilarity(positions, groups)
         energy, _ = movement_energies(positions, self._floor)
-        manner = np.square(self._energy(energy)) + np.square(self._length(lengths))
-        return shape * np.exp(np.minimum(_SAY_OF_MANNER * manner, _MOST))
+        scores = np.square(self._energy(energy)) + np.square(self._length(lengths))
+        return shape * np.exp(np.minimum(_LENGTH_ENERGY_WEIGHT * scores, _MAX_LOG_FACTOR))
 
 
-# -- movements by chance: what a take may hold that is like an action without being it ---
+# -- random movements, which the threshold must reject -----------------------------------
 
 
-def chance_movements(positions, counts):
+def random_movements(positions, counts):
     """Movements with the mean and the covariance of postures, smooth as those of people.
 
     Parameters

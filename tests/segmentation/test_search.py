@@ -20,7 +20,7 @@ from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.model.similarity import log_moments
-from sklearn_motionsync.segmentation.search import Proposer, Unlikeness, chance_movements
+from sklearn_motionsync.segmentation.search import Proposer, WindowDissimilarity, random_movements
 
 import oracle
 
@@ -268,17 +268,17 @@ def test_auto_threshold_rejects_random_movements():
     rng = np.random.default_rng(0)
     bump = np.sin(np.linspace(0, np.pi, 20))[:, np.newaxis]
     training = [bump * [1, 0.5 * (-1) ** k] + 0.8 * wander(20, rng) for k in range(12)]
-    unlikeness = Unlikeness(DenseSynchronizer(20).fit(training))
+    dissimilarity = WindowDissimilarity(DenseSynchronizer(20).fit(training))
     frames, take = np.concatenate(training), wander(4000, rng)
     windows = np.arange(0, 3980, 20)[:, np.newaxis] + [0, 20]
-    chance = unlikeness(take * frames.std(axis=0) + frames.mean(axis=0), windows)
-    assert (chance < unlikeness.border(0.6)).mean() < 0.02
-    assert (chance < log_moments(unlikeness.known).upper_limit(0.6)).mean() > 0.1
+    chance = dissimilarity(take * frames.std(axis=0) + frames.mean(axis=0), windows)
+    assert (chance < dissimilarity.threshold(0.6)).mean() < 0.02
+    assert (chance < log_moments(dissimilarity.known).upper_limit(0.6)).mean() > 0.1
 
 
 def test_chance_movements_have_mean_covariance_and_autocorrelation_of_the_postures():
     positions = np.random.default_rng(0).standard_normal((30, 50, 3)) * [3, 1, 0] + [5, 0, 7]
-    (some,) = chance_movements(positions, [2000])
+    (some,) = random_movements(positions, [2000])
     frames = some.reshape(-1, 3)
     np.testing.assert_allclose(frames.mean(axis=0), positions.mean(axis=(0, 1)), atol=0.15)
     np.testing.assert_allclose(
@@ -287,7 +287,7 @@ def test_chance_movements_have_mean_covariance_and_autocorrelation_of_the_postur
     # Half a length later exp(-1/2) of it is left.
     left = [np.corrcoef(some[:, 10, k], some[:, 35, k])[0, 1] for k in (0, 1)]
     np.testing.assert_allclose(left, np.exp(-0.5), atol=0.08)
-    np.testing.assert_array_equal(some, next(chance_movements(positions, [2000])))
+    np.testing.assert_array_equal(some, next(random_movements(positions, [2000])))
 
 
 def test_large_training_sets_are_subsampled():
