@@ -111,9 +111,9 @@ def landmark_positions(positions, skeleton):
     A landmark that the skeleton lacks is 0; one with a joint that is NaN is NaN.
     """
     joints = positions.reshape(len(positions), -1, skeleton.n_dims)
-    points = np.zeros((len(joints), len(LANDMARKS), skeleton.n_dims), dtype=joints.dtype)
     indices = {LANDMARKS.index(name): skeleton.indices_of(name) for name in skeleton.landmarks}
-    points[:, list(indices)] = joints[:, [of_one[0] for of_one in indices.values()]]
+    points = joints[:, [indices.get(k, (0,))[0] for k in range(len(LANDMARKS))]]
+    points[:, [k for k in range(len(LANDMARKS)) if k not in indices]] = 0
     for k, of_one in indices.items():
         if len(of_one) > 1:
             points[:, k] = sum(joints[:, j] for j in of_one) / len(of_one)
@@ -169,7 +169,7 @@ def lowest_height(tracks):
 def unit_vectors(vectors):
     """Vectors (..., n_dims) divided by their length; 0 where that is 0, NaN where it is NaN."""
     norms = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, norms, out=np.zeros_like(vectors), where=norms != 0)
+    return vectors / np.where(norms == 0, 1, norms)
 
 
 # -- parts of the body --------------------------------------------------------------------
