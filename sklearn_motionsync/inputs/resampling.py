@@ -13,6 +13,8 @@ __all__ = [
     "even_grid",
     "find_time_gaps",
     "interpolate",
+    "is_even",
+    "rounded_rate",
     "times_as_numbers",
     "warn_of_uneven",
 ]
@@ -82,7 +84,7 @@ def even_grid(times, frame_rate, what):
     duration, n_steps = times[-1] - times[0], len(times) - 1
     slack = _slack(times)
     keeps_rate = frame_rate is None or abs(duration - n_steps / frame_rate) <= slack
-    if keeps_rate and _is_even(times, slack):
+    if keeps_rate and is_even(times):
         return None
     if frame_rate is None:
         n_steps = round(duration / float(np.median(np.diff(times))))
@@ -115,7 +117,7 @@ def warn_of_uneven(sequences):
             continue
         label, name = x.attrs["performance"], x.index.name
         times = times_as_numbers(x.index, f"The time of performance {label!r}")
-        if not np.isfinite(times).all() or _is_even(times, _slack(times)):
+        if not np.isfinite(times).all() or is_even(times):
             continue
         steps = np.diff(times)
         worst, what = steps.argmax(), "frame" if name is None else name
@@ -165,7 +167,7 @@ def attrs_of_rows(attrs, rows, n_rows, times=None, grid=None):
         seconds = np.asarray(seconds, dtype=np.float64)[rows]
         facts |= _clock_of(seconds if grid is None else np.interp(grid, times, seconds))
     elif rate and grid is not None:
-        facts["frame_rate"] = _rounded(rate * np.median(np.diff(times)) / (grid[1] - grid[0]))
+        facts["frame_rate"] = rounded_rate(rate * np.median(np.diff(times)) / (grid[1] - grid[0]))
     if isinstance(events, (list, tuple)) and (np.diff(rows) > 0).all():
         n_frames = len(rows if grid is None else grid)
         moved = [_move_event(event, rows, times, grid) for event in events]
@@ -181,13 +183,14 @@ def attrs_of_rows(attrs, rows, n_rows, times=None, grid=None):
 def _clock_of(seconds):
     """The frame rate of even times, or the times."""
     clock = {"first_time": float(seconds[0])}
-    if len(seconds) > 1 and _is_even(seconds, _slack(seconds)):
+    if len(seconds) > 1 and is_even(seconds):
         rate = (len(seconds) - 1) / (seconds[-1] - seconds[0])
-        return clock | {"frame_rate": _rounded(rate)}
+        return clock | {"frame_rate": rounded_rate(rate)}
     return clock | {"times": seconds.tolist()}
 
 
-def _rounded(rate):
+def rounded_rate(rate):
+    """A frame rate without the rounding of the times that it comes from."""
     return float(f"{rate:.9g}")
 
 
@@ -228,12 +231,12 @@ def _slack(times):
     return slack
 
 
-def _is_even(times, slack):
-    """Whether times are even but for rounding by ``slack``."""
+def is_even(times):
+    """Whether times are even but for rounding."""
     frames = np.arange(len(times)) - (len(times) - 1) / 2
     slope = frames @ times / max(frames @ frames, 1e-300)
     # Rounding moves a time by half a digit up or down.
-    return np.ptp(times - slope * frames) < 0.999 * slack
+    return np.ptp(times - slope * frames) < 0.999 * _slack(times)
 
 
 def as_frame_rates(frame_rate, n_sequences):
