@@ -115,4 +115,7 @@ def _rate_of_seconds(index):
     step = (seconds[-1] - seconds[0]) / (len(seconds) - 1)
     if not 0 < step < _LONGEST_STEP or not is_even(seconds):
         return None
+    if index.dtype.kind in "fiu" and (seconds[0], seconds[-1]) == (0, 1):
+        # Shares of a movement.
+        return None
     return rounded_rate(1 / step)

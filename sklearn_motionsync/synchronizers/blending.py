@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from numbers import Integral
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,7 @@ from ..body.direction_cosines import DirectionCosines
 from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
 from ..inputs.collections import NOT_ONE, as_collection, check_members
+from ..inputs.facts import check_facts, facts_in_fit
 from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.tables import FRAME, labels_of
 from ..utils.pipelines import flat_steps, route_to_synchronizer, union_transformers
@@ -29,8 +31,8 @@ _SLOWEST = 0.5
 _LONGEST = 100
 # Relative difference of time steps below which the frame rate is the same.
 _SAME_RATE = 0.01
-# Attributes of tables that hold the label of a performance.
-_LABELS = ("performance", "levels")
+# Attributes of tables that a blend has of its own or has not: the label, the clock, the events.
+_OWN = "performance", "levels", "frame_rate", "times", "first_time", "first_frame", "events", "rows"
 
 
 def blend_performances(
@@ -134,6 +136,8 @@ def blend_performances(
     may_be_rows = skeleton is None and not isinstance(estimator, Match)
     sequences, arrays, is_rows = _read(X, may_be_rows)
     labels, levels = labels_of(sequences)
+    known = SimpleNamespace()
+    check_facts(known, arrays.facts, arrays.called, reset=True)
     _check(sequences, arrays, skeleton)
     match = estimator
     if not isinstance(estimator, Match):
@@ -151,7 +155,8 @@ def blend_performances(
     frames, at = _blend_pace(warps, timing)
     weights = np.stack([np.interp(at, np.arange(n_frames), w) for w in weights.T])
     out = _blend(arrays, frames, weights, skeleton, owner).astype(arrays[0].dtype, copy=False)
-    return out[:, 0] if is_rows else _like(sequences, out, levels[-1])
+    rates = facts_in_fit(known).get("frame_rate", ())
+    return out[:, 0] if is_rows else _like(sequences, out, levels[-1], rates)
 
 
 def _read(X, may_be_rows):
@@ -292,13 +297,15 @@ def _blend(arrays, frames, weights, skeleton, owner):
     return blend_bodies(chosen, frames, weights, skeleton, owner)
 
 
-def _like(sequences, array, name):
-    """An array as a performance of the kind of others."""
+def _like(sequences, array, name, rates):
+    """An array as a performance of the kind of others, which have these frame rates."""
     x = sequences[0]
     if not isinstance(x, pd.DataFrame):
         return array
     df = pd.DataFrame(array, columns=x.columns, index=_clock(sequences, len(array), name))
-    df.attrs = {key: value for key, value in x.attrs.items() if key not in _LABELS}
+    df.attrs = {key: value for key, value in x.attrs.items() if key not in _OWN}
+    if len(rates) == 1:
+        df.attrs["frame_rate"] = rates[0]
     return df
 
 
