@@ -13,6 +13,7 @@ from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
 from ..inputs.collections import NOT_ONE, as_collection, check_members
 from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.recorded import timeless
 from ..inputs.tables import FRAME, labels_of
 from ..utils.pipelines import flat_steps, route_to_synchronizer, union_transformers
 from .match import Match
@@ -298,7 +299,7 @@ def _like(sequences, array, name):
     if not isinstance(x, pd.DataFrame):
         return array
     df = pd.DataFrame(array, columns=x.columns, index=_clock(sequences, len(array), name))
-    df.attrs = {key: value for key, value in x.attrs.items() if key not in _LABELS}
+    df.attrs = {key: value for key, value in timeless(x).items() if key not in _LABELS}
     return df
 
 
