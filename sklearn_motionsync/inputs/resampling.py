@@ -9,7 +9,6 @@ from .numbers import as_numbers
 
 __all__ = [
     "as_frame_rates",
-    "attrs_of_rows",
     "even_grid",
     "find_time_gaps",
     "interpolate",
@@ -138,79 +137,9 @@ def interpolate(column, times, grid):
     return np.interp(grid, times, column).astype(column.dtype, copy=False)
 
 
-def attrs_of_rows(attrs, rows, n_rows, times=None, grid=None):
-    """The ``attrs`` of a recording, its clock and events moved to the frames of a performance.
-
-    Parameters
-    ----------
-    attrs : dict
-        Of the table, as `io.read_motion` gives it.
-    rows : ndarray of int
-        Which of the ``n_rows`` of the table are in the performance, in its order.
-    times : ndarray, default=None
-        Of these rows, in any unit.
-    grid : ndarray, default=None
-        The even times that replace them.
-
-    Returns
-    -------
-    dict
-    """
-    facts = dict(attrs)
-    seconds, rate = facts.pop("times", None), facts.get("frame_rate")
-    events = facts.pop("events", None)
-    if rows[0]:
-        facts.pop("first_frame", None)
-        if rate and "first_time" in facts:
-            facts["first_time"] += rows[0] / rate
-    if seconds is not None and len(seconds) == n_rows:
-        seconds = np.asarray(seconds, dtype=np.float64)[rows]
-        facts |= _clock_of(seconds if grid is None else np.interp(grid, times, seconds))
-    elif rate and grid is not None:
-        facts["frame_rate"] = rounded_rate(rate * np.median(np.diff(times)) / (grid[1] - grid[0]))
-    if isinstance(events, (list, tuple)) and (np.diff(rows) > 0).all():
-        n_frames = len(rows if grid is None else grid)
-        moved = [_move_event(event, rows, times, grid) for event in events]
-        whole = len(rows) == n_rows
-        facts["events"] = [
-            event
-            for event in moved
-            if whole or event.get("frame") is None or 0 <= event["frame"] <= n_frames - 1
-        ]
-    return facts
-
-
-def _clock_of(seconds):
-    """The frame rate of even times, or the times."""
-    clock = {"first_time": float(seconds[0])}
-    if len(seconds) > 1 and is_even(seconds):
-        rate = (len(seconds) - 1) / (seconds[-1] - seconds[0])
-        return clock | {"frame_rate": rounded_rate(rate)}
-    return clock | {"times": seconds.tolist()}
-
-
 def rounded_rate(rate):
     """A frame rate without the rounding of the times that it comes from."""
     return float(f"{rate:.9g}")
-
-
-def _move_event(event, rows, times, grid):
-    """An event at its frame in the performance."""
-    if not isinstance(event, dict) or event.get("frame") is None:
-        return event
-    own = np.arange(len(rows))
-    place = _on_line(event["frame"], rows, own)
-    if grid is not None:
-        place = _on_line(_on_line(place, own, times), grid, np.arange(len(grid)))
-    return event | {"frame": round(float(place), 5)}
-
-
-def _on_line(x, xs, ys):
-    """Interpolate between points that increase, and extrapolate at their mean slope."""
-    if xs[0] <= x <= xs[-1]:
-        return np.interp(x, xs, ys)
-    end = 0 if x < xs[0] else -1
-    return ys[end] + (x - xs[end]) * (ys[-1] - ys[0]) / max(xs[-1] - xs[0], 1e-300)
 
 
 def _slack(times):

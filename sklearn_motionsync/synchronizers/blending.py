@@ -15,6 +15,7 @@ from ..body.skeleton import Skeleton
 from ..inputs.collections import NOT_ONE, as_collection, check_members
 from ..inputs.facts import check_facts, facts_in_fit
 from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.recorded import timeless
 from ..inputs.tables import FRAME, labels_of
 from ..utils.pipelines import flat_steps, route_to_synchronizer, union_transformers
 from .match import Match
@@ -31,8 +32,8 @@ _SLOWEST = 0.5
 _LONGEST = 100
 # Relative difference of time steps below which the frame rate is the same.
 _SAME_RATE = 0.01
-# Attributes of tables that a blend has of its own or has not: the label, the clock, the events.
-_OWN = "performance", "levels", "frame_rate", "times", "first_time", "first_frame", "events", "rows"
+# Attributes of tables that hold the label of a performance.
+_LABELS = ("performance", "levels")
 
 
 def blend_performances(
@@ -303,9 +304,9 @@ def _like(sequences, array, name, rates):
     if not isinstance(x, pd.DataFrame):
         return array
     df = pd.DataFrame(array, columns=x.columns, index=_clock(sequences, len(array), name))
-    df.attrs = {key: value for key, value in x.attrs.items() if key not in _OWN}
-    if len(rates) == 1:
-        df.attrs["frame_rate"] = rates[0]
+    df.attrs = {key: value for key, value in timeless(x).items() if key not in _LABELS}
+    if "frame_rate" in df.attrs or rates:
+        df.attrs["frame_rate"] = rates[0] if len(rates) == 1 else None
     return df
 
 

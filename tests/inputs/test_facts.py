@@ -169,7 +169,7 @@ def test_blends_have_the_facts_that_performances_share():
     X[1].attrs["frame_rate"] = 60
     with pytest.warns(UserWarning, match="Performance 1 has 60 frames a second"):
         mixed = blend_performances(fitted, X, {0: 0.5, 1: 0.5})
-    assert mixed.attrs == {"units": "mm"}
+    assert mixed.attrs == {"frame_rate": None, "units": "mm"}
     X[1].attrs = {"units": "m"}
     with pytest.raises(ValueError, match="Performance 1 has the unit 'm', and Performance 0"):
         blend_performances(fitted.match(X[:1] * 6), X, {0: 0.5, 1: 0.5})
