@@ -10,7 +10,7 @@ import pandas as pd
 
 from .recorded import frame_rate_of_rows
 
-__all__ = ["TIMELESS", "check_facts", "facts_in_fit", "facts_of"]
+__all__ = ["TIMELESS", "check_facts", "compare_facts", "facts_in_fit", "facts_of"]
 
 # Attribute of estimators: the different values of each fact in the training set.
 _FACTS = "_facts_in"
@@ -51,20 +51,53 @@ def facts_in_fit(estimator):
 
 
 def check_facts(estimator, facts, called, *, reset, which=None):
-    """Hold the facts of performances against each other, or against those of the training set.
+    """Hold the facts of performances against each other, and against those of the training set.
 
     Parameters
     ----------
-    estimator : object
+    estimator : estimator
         Gets the facts of its training set. A parameter ``frame_rate`` of it counts as known.
-    facts : list of dict
-        Of each performance, from `facts_of`.
-    called : callable
-        Gives the name of a performance by its index.
+    facts, called : as for `compare_facts`
     reset : bool
         True in ``fit``.
     which : sequence of str, default=None
         The facts that matter; by default ``_facts`` of the estimator, or all.
+
+    Raises
+    ------
+    ValueError
+        As from `compare_facts`.
+    """
+    which = getattr(estimator, "_facts", None) if which is None else which
+    known = {} if reset else facts_in_fit(estimator)
+    sources = dict.fromkeys(known, "the training set has")
+    if (rate := getattr(estimator, "frame_rate", None)) is not None:
+        known, sources = known | {"frame_rate": (rate,)}, sources | {"frame_rate": "frame_rate is"}
+    found = compare_facts(facts, called, which, known, sources)
+    if reset:
+        vars(estimator)[_FACTS] = found
+
+
+def compare_facts(facts, called, which=None, known=None, sources=None):
+    """The different values of the facts of performances, which must agree but for the frame rate.
+
+    Parameters
+    ----------
+    facts : list of dict
+        Of each performance, from `facts_of`.
+    called : callable
+        Gives the name of a performance by its index.
+    which : sequence of str, default=None
+        The facts to compare; by default all.
+    known : dict of str to tuple, default=None
+        Values known before; the first performance that says something is the reference of others.
+    sources : dict of str to str, default=None
+        Where these are from, for messages.
+
+    Returns
+    -------
+    dict of str to tuple
+        Only those that are known.
 
     Raises
     ------
@@ -76,16 +109,9 @@ def check_facts(estimator, facts, called, *, reset, which=None):
     UserWarning
         If frame rates differ by more than 1 %.
     """
-    known = {} if reset else facts_in_fit(estimator)
-    if reset:
-        vars(estimator)[_FACTS] = {}
-    if not any(facts):
-        return
-    for fact in getattr(estimator, "_facts", _WORDS) if which is None else which:
-        values = list(known.get(fact, ()))
-        source = "the training set has"
-        if fact == "frame_rate" and getattr(estimator, fact, None) is not None:
-            values, source = [getattr(estimator, fact)], "frame_rate says"
+    found = dict(known or {})
+    for fact in (_WORDS if which is None else which) if any(facts) else ():
+        values, source = list(found.get(fact, ())), (sources or {}).get(fact)
         different = {}
         for i, own in enumerate(facts):
             value = own.get(fact)
@@ -95,10 +121,11 @@ def check_facts(estimator, facts, called, *, reset, which=None):
                 different[i] = value
             else:
                 values, source = [value], f"{called(i)} has"
-        if reset and values:
-            facts_in_fit(estimator)[fact] = tuple(dict.fromkeys([values[0], *different.values()]))
+        if values:
+            found[fact] = tuple(dict.fromkeys([*values, *different.values()]))
         if different:
             _report(fact, different, called, source, values[0])
+    return found
 
 
 def _report(fact, different, called, source, reference):

@@ -6,8 +6,9 @@ import numpy as np
 import pandas as pd
 
 from .collections import NOT_ONE, as_collection, check_members
+from .facts import TIMELESS, compare_facts
 from .numbers import refuse_non_numeric
-from .recorded import CLOCK, Recorded
+from .recorded import CLOCK, Recorded, frame_rate_of_rows
 from .resampling import (
     even_grid,
     find_time_gaps,
@@ -55,6 +56,9 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
         order. By default rows are frames in the order they come in.
     frame_rate : float, default=None
         Frames in a unit of ``time`` that performances shall have. By default each keeps its own.
+        Without ``time`` they are frames a second, and each performance has a known frame rate: in
+        its ``attrs``, as from `io.read_motion`, or by an index in seconds. The index of the result
+        is then in seconds.
     max_gap_time : float, default=None
         Longest step of ``time``, in its unit, that is bridged by a straight line. By default
         steps above 1.9 times the median step are errors.
@@ -110,6 +114,14 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
                     0.125    5.5
                     0.250    8.0
     Name: knee, dtype: float64
+
+    A recording at another frame rate:
+
+    >>> x = pd.DataFrame({"knee": [0.0, 1, 2, 3, 4]})
+    >>> x.attrs["frame_rate"] = 100
+    >>> (slower,) = to_sequences(x, frame_rate=50)
+    >>> slower["knee"].tolist(), slower.attrs["frame_rate"]
+    ([0.0, 2.0, 4.0], 50.0)
     """
     df = as_pandas(df)
     if not isinstance(df, pd.DataFrame):
@@ -124,8 +136,11 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
         is_number = isinstance(value, Real) and not isinstance(value, bool)
         if not is_number or not 0 < value < np.inf:
             raise ValueError(f"{name} must be a number above 0, in units of time; got {value!r}.")
-        if time is None:
-            raise ValueError(f"{name}={value!r} needs time=, the column of the times.")
+    if time is None and max_gap_time is not None:
+        raise ValueError(f"max_gap_time={max_gap_time!r} needs time=, the column of the times.")
+    if time is None and frame_rate is not None:
+        sequences = [df] if by is None and df.index.nlevels < 2 else to_sequences(df, by)
+        return [_at_rate(x, frame_rate) for x in sequences]
     if by is None and time is None:
         sequences = split_table(df)
         warn_of_uneven(sequences)
@@ -197,13 +212,14 @@ def to_frame(sequences, *, performances=None, columns=None):
     -------
     DataFrame
         The concatenated performances. The index levels are ``performance`` and ``frame``, or what
-        they are called in the table that labels and frames come from.
+        they are called in the table that labels and frames come from. Its ``attrs`` have the frame
+        rate, unit and vertical axis that all performances share.
 
     Raises
     ------
     ValueError
-        If the performances do not agree in width or names, or a label is missing or
-        given twice.
+        If the performances do not agree in width, names, units or vertical axes, or a label is
+        missing or given twice.
 
     See Also
     --------
@@ -240,10 +256,33 @@ def to_frame(sequences, *, performances=None, columns=None):
         raise ValueError(
             f"columns must name the {arrays[0].shape[1]} features, one each; got {len(columns)}."
         )
-    return stack_frame(arrays, labels, arrays.frames, columns, levels)
+    table = stack_frame(arrays, labels, arrays.frames, columns, levels)
+    # An index of times keeps the rate of each.
+    timed = table.index.get_level_values(-1).dtype.kind in "fmM"
+    shared = compare_facts(arrays.facts, arrays.called, TIMELESS if timed else None)
+    table.attrs = {
+        fact: values[0]
+        for fact, values in shared.items()
+        if len(values) == 1 and all(fact in facts for facts in arrays.facts)
+    }
+    return table
 
 
 # -- steps of to_sequences ------------------------------------------------------------------
+
+
+def _at_rate(x, frame_rate):
+    """A performance of a known frame rate at another one."""
+    own = frame_rate_of_rows(x)
+    if own is None:
+        raise ValueError(
+            f"frame_rate={frame_rate!r} needs time=, the column of the times, or a table whose "
+            f"frame rate is known, by df.attrs['frame_rate'] or an index in seconds; {len(x)} rows "
+            f"with the index {x.index.name!r} have none."
+        )
+    time = next(name for name in ("time", "time_s", "seconds") if name not in x.columns)
+    timed = x.assign(**{time: np.arange(len(x)) / own})
+    return to_sequences(timed, time=time, frame_rate=frame_rate)[0]
 
 
 def _keys(df, by, time):

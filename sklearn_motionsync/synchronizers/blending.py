@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from numbers import Integral
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -13,7 +12,7 @@ from ..body.direction_cosines import DirectionCosines
 from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
 from ..inputs.collections import NOT_ONE, as_collection, check_members
-from ..inputs.facts import check_facts, facts_in_fit
+from ..inputs.facts import compare_facts
 from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.recorded import timeless
 from ..inputs.tables import FRAME, labels_of
@@ -137,8 +136,7 @@ def blend_performances(
     may_be_rows = skeleton is None and not isinstance(estimator, Match)
     sequences, arrays, is_rows = _read(X, may_be_rows)
     labels, levels = labels_of(sequences)
-    known = SimpleNamespace()
-    check_facts(known, arrays.facts, arrays.called, reset=True)
+    rates = compare_facts(arrays.facts, arrays.called).get("frame_rate", ())
     _check(sequences, arrays, skeleton)
     match = estimator
     if not isinstance(estimator, Match):
@@ -156,7 +154,6 @@ def blend_performances(
     frames, at = _blend_pace(warps, timing)
     weights = np.stack([np.interp(at, np.arange(n_frames), w) for w in weights.T])
     out = _blend(arrays, frames, weights, skeleton, owner).astype(arrays[0].dtype, copy=False)
-    rates = facts_in_fit(known).get("frame_rate", ())
     return out[:, 0] if is_rows else _like(sequences, out, levels[-1], rates)
 
 

@@ -18,6 +18,7 @@ from sklearn_motionsync import (
     Skeleton,
     blend_performances,
     to_frame,
+    to_sequences,
 )
 from sklearn_motionsync.datasets import make_bending
 
@@ -97,14 +98,49 @@ def test_the_index_tells_the_rate_of_the_rows():
     fitted = LinearSynchronizer().fit([*X[:3], *seconds[3:]])
     with pytest.warns(UserWarning, match=r"Performance 1 has 15 frames a second"):
         fitted.transform([X[0], X[1].iloc[::2]])
+    table = to_frame([seconds[0], seconds[1].iloc[::3]], performances=["a", "b"])
     with pytest.warns(UserWarning, match=r"Performance 1 \('b'\) has 10 frames a second"):
-        fitted.transform(to_frame([seconds[0], seconds[1].iloc[::3]], performances=["a", "b"]))
+        fitted.transform(table)
+
+
+def test_a_table_of_all_keeps_what_they_share():
+    X = tables(ASpace(), RATE | {"units": "mm", "up": "y"}, {"frame_rate": 30, "up": "y"})
+    assert to_frame(X).attrs == {"frame_rate": 30, "up": "y"}
+    with pytest.warns(UserWarning, match="Performance 5 has 60 frames a second"):
+        assert to_frame(tables(ASpace(), RATE, {"frame_rate": 60})).attrs == {}
+    with pytest.raises(ValueError, match="Performance 5 has the unit 'm'"):
+        to_frame(tables(ASpace(), {"units": "mm"}, {"units": "m"}))
+    again = to_sequences(to_frame(X), frame_rate=15)
+    assert [df.attrs["frame_rate"] for df in again] == [15] * 6
+
+
+def test_a_known_rate_is_changed_without_times():
+    x = pd.DataFrame({"a": np.arange(121) / 120}).set_axis(np.arange(121), axis=0)
+    x.attrs = {"frame_rate": 120, "events": [{"frame": 60.0}], "performance": "ann"}
+    for rows, n_frames, event in (
+        (slice(None), 31, 15),
+        (slice(None, None, 2), 31, 15),
+        (slice(12, None), 28, 12),
+    ):
+        (slow,) = to_sequences(x.iloc[rows], frame_rate=30)
+        np.testing.assert_allclose(slow["a"], x["a"].iloc[rows].iloc[0] + np.arange(n_frames) / 30)
+        assert slow.attrs["frame_rate"] == 30
+        assert slow.attrs["performance"] == "ann"
+        assert slow.attrs["events"] == [{"frame": event}]
+    (fast,) = to_sequences(slow, frame_rate=60)
+    assert len(fast) == 55
+    dates = x.set_axis(pd.date_range("2020", periods=121, freq="10ms"), axis=0)
+    dates.attrs = {}
+    assert len(to_sequences(dates, frame_rate=50)[0]) == 61
+    dates.index = range(121)
+    with pytest.raises(ValueError, match=r"frame_rate=50 needs time=, .* 121 rows"):
+        to_sequences(dates, frame_rate=50)
 
 
 def test_a_rate_that_a_parameter_says_counts():
     X = tables(ASpace(), RATE)
     for estimator in (OnlineSynchronizer(frame_rate=60), MotionTracker(frame_rate=60)):
-        with pytest.warns(UserWarning, match="30 frames a second, and frame_rate says 60"):
+        with pytest.warns(UserWarning, match="30 frames a second, and frame_rate is 60"):
             estimator.fit(X)
 
 
