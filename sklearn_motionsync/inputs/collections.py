@@ -14,6 +14,8 @@ precision is refused.
 """
 
 from collections.abc import Mapping
+from numbers import Number
+from os import PathLike
 
 import numpy as np
 import pandas as pd
@@ -242,6 +244,9 @@ def _members(X):
     if set(map(type, X)) == {np.ndarray} and max([x.ndim for x in X]) >= 2:
         return list(X)
     items = [as_pandas(x) for x in X]
+    for i, item in enumerate(items):
+        if not _depth(item) and not isinstance(item, (Number, str, bytes, PathLike, np.generic)):
+            raise ValueError(f"Performance {i} is of type {type(item).__name__}. {ACCEPTED}.")
     depths = [_depth(item) for item in items]
     if not items or max(depths) >= 2:
         return items

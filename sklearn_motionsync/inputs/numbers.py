@@ -135,11 +135,16 @@ def _refuse_column(column, what):
 
 
 def _refuse_items(values, what):
-    """Refuse text and dates in arrays, and in lists of lists."""
+    """Refuse text, dates and fields in arrays, and in lists of lists."""
     if isinstance(values, np.ndarray):
         kind = values.dtype.kind
         if kind in "Mm":
             raise ValueError(f"{what} holds dates or durations ({values.dtype}). {_SECONDS}.")
+        if kind == "V":
+            raise ValueError(
+                f"{what} is a structured array with {len(values.dtype.names or ())} fields: give "
+                "numpy.lib.recfunctions.structured_to_unstructured(x)."
+            )
         if kind not in "OSU":
             return
         values = values.ravel().tolist() if kind != "O" else values.flat
