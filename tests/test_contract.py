@@ -335,6 +335,19 @@ def test_pandas_output_of_collections(estimator, kind, how, performances, fit_on
         np.testing.assert_array_equal(frame, expected)
 
 
+@pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
+def test_names_of_input_features_are_one_each(estimator, performances, fit_once):
+    fitted, n = fit_once(estimator), performances[0].shape[1]
+    with pytest.raises(ValueError, match=f"must name every feature once, but 'zz' comes {n} times"):
+        fitted.get_feature_names_out(["zz"] * n)
+    with pytest.raises(ValueError, match="input_features should have length equal"):
+        fitted.get_feature_names_out(["zz"])
+    assert len(fitted.get_feature_names_out([f"c{k}" for k in range(n)]))
+    named = clone(estimator).fit([pd.DataFrame(x, columns=NAMES) for x in performances])
+    with pytest.raises(ValueError, match="input_features is not equal to feature_names_in_"):
+        named.get_feature_names_out([f"c{k}" for k in range(n)])
+
+
 def test_pandas_output_keeps_what_levels_are_called(performances):
     X = to_frame(performances, columns=NAMES).rename_axis(["trial", "sample"])
     frames = [df.rename_axis("sample") for df in to_sequences(X)]

@@ -6,6 +6,7 @@ from sklearn.base import _fit_context
 from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers
 from ..inputs.validation import check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
@@ -283,14 +284,15 @@ class DirectionCosines(PositionsTransformer):
 
         Parameters
         ----------
-        input_features : ignored
-            Present for API consistency.
+        input_features : array-like of str, default=None
+            Names of the columns before it, which are checked only.
 
         Returns
         -------
         ndarray of str
             One name a feature.
         """
+        check_input_features(self, input_features)
         axes = AXES[self.skeleton.n_dims]
         names = [f"{limb}_{axis}" for limb in self.skeleton.limbs for axis in axes]
         return np.asarray(["pelvis_height"] * self.skeleton.has_height + names, dtype=object)

@@ -4,6 +4,7 @@ import numpy as np
 from sklearn.base import _fit_context
 from sklearn.utils._param_validation import StrOptions
 
+from ..inputs.features import check_input_features
 from ..utils.atomic import atomic_fit
 from .axes import project_on_axes
 from .base import PositionsTransformer
@@ -122,14 +123,15 @@ class JointPositions(PositionsTransformer):
 
         Parameters
         ----------
-        input_features : ignored
-            Present for API consistency.
+        input_features : array-like of str, default=None
+            Names of the columns before it, which are checked only.
 
         Returns
         -------
         ndarray of str
             One name a feature.
         """
+        check_input_features(self, input_features)
         axes = AXES[self.skeleton.n_dims]
         names = [f"{landmark}_{axis}" for landmark in self._landmarks for axis in axes]
         return np.asarray(names, dtype=object)

@@ -12,6 +12,7 @@ from ..segmentation.cycles import (
     start_curves,
 )
 from ..segmentation.self_correlation import required_strength
+from ..synchronizers.match import rates_of
 from .arguments import as_index
 from .drawing import COLORS, panels
 from .time_axis import TimeAxis
@@ -98,7 +99,7 @@ class CycleDisplay:
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time; ``"percent"`` is of the take.
         frame_rate : float, default=None
-            Frames a second, for seconds.
+            Frames a second, for seconds; by default what tables tell, as in `Match.to_frame`.
         ax : Axes, or two of them, default=None
             A subplot to be divided, or one axes a panel. None makes a figure.
 
@@ -137,7 +138,7 @@ class CycleDisplay:
             name=name,
             reason=row["reason"],
         )
-        return display.plot(ax, unit=unit, frame_rate=frame_rate)
+        return display.plot(ax, unit=unit, frame_rate=rates_of([given[i]], frame_rate, unit))
 
     def plot(self, ax=None, *, unit="frames", frame_rate=None):
         """Draw.

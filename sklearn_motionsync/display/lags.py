@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..synchronizers.lags import Lags
+from ..synchronizers.match import rates_of
 from ..synchronizers.parts import PartSynchronizer
 from ..utils.pipelines import route_to_synchronizer
 from .drawing import COLORS, curves, front_line, legend_above, panels
@@ -94,7 +95,8 @@ class LagDisplay:
         unit : {"frames", "percent", "seconds"}, default="percent"
             Unit of the lags.
         frame_rate : float or array-like (n_sequences,), default=None
-            Frames a second of the performances; ``unit="seconds"`` needs it.
+            Frames a second of the performances, for seconds; by default what tables tell, as in
+            `Match.to_frame`.
         ax : Axes, or one for the map and one for each part, default=None
             A subplot to be divided, or one axes a panel. None makes a figure.
         colorbar : bool, default=True
@@ -109,7 +111,7 @@ class LagDisplay:
         """
         caller = f"{cls.__name__}.from_estimator"
         reached = route_to_synchronizer(estimator, X, params, caller, kind=PartSynchronizer)
-        how = {"against": against, "unit": unit, "frame_rate": frame_rate}
+        how = {"against": against, "unit": unit, "frame_rate": rates_of(X, frame_rate, unit)}
         lags = reached.synchronizer.lags(reached.performances, groups, **how)
         return cls(lags).plot(ax, colorbar=colorbar)
 

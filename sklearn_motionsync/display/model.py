@@ -8,6 +8,7 @@ from sklearn.base import clone
 from ..inputs.collections import as_collection
 from ..inputs.features import choose_features
 from ..model.views import view_of
+from ..synchronizers.match import rates_of
 from ..utils.groups import names_of_groups
 from .drawing import (
     COLORS,
@@ -186,7 +187,8 @@ class ActionModelDisplay:
             The unit of time: frames or per cent of the pattern, or seconds; the clock then lasts
             as long as the median performance of X.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames a second of X as recorded, for seconds; without X those of the clock.
+            Frames a second of X as recorded, for seconds, by default what tables tell, as in
+            `Match.to_frame`; without X those of the clock.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
@@ -233,7 +235,8 @@ class ActionModelDisplay:
             groups_of = SubjectGroups(groups, people, len(shown))
             mean, lower, upper = bands_of_groups(view.model, shown, groups_of, band)
         if unit == "seconds" and X is not None:
-            clock = TimeAxis(unit, mean.shape[-2], _lengths(X), frame_rate).clock
+            rates = rates_of(X, frame_rate)
+            clock = TimeAxis(unit, mean.shape[-2], _lengths(X), rates).clock
             frame_rate = (len(clock) - 1) / clock[-1]
         display = cls(
             mean[..., chosen],

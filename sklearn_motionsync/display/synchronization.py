@@ -5,7 +5,7 @@ import numpy as np
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.validation import read_collection
-from ..synchronizers.match import match_of_times
+from ..synchronizers.match import match_of_times, rates_of
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .arguments import as_names
@@ -142,7 +142,8 @@ class SynchronizationDisplay:
             The unit of time: frames; per cent of a performance, and of the pattern; or seconds of
             the performances as recorded, and of the median performance on the clock.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames a second of X, for seconds.
+            Frames a second of X, for seconds; by default what tables tell, as in
+            `Match.to_frame`.
         warps : bool, default=True
             Whether to draw tau(p) against the diagonal.
         ax : Axes or array-like of Axes, default=None
@@ -170,7 +171,7 @@ class SynchronizationDisplay:
             pattern_index=index_of_pattern(synchronizer, performances),
             groups=groups,
             unit=unit,
-            frame_rate=frame_rate,
+            frame_rate=rates_of(X, frame_rate, unit),
         )
         return display.plot(ax, warps=warps)
 
@@ -209,7 +210,8 @@ class SynchronizationDisplay:
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames a second of X, for seconds.
+            Frames a second of X, for seconds; by default what tables tell, as in
+            `Match.to_frame`.
         warps : bool, default=True
             Whether to draw tau(p) against the diagonal.
         ax : Axes or array-like of Axes, default=None
@@ -249,7 +251,7 @@ class SynchronizationDisplay:
             pattern=None if pattern is None else pattern[:, chosen],
             groups=groups,
             unit=unit,
-            frame_rate=frame_rate,
+            frame_rate=rates_of(X, frame_rate, unit),
         )
         return display.plot(ax, warps=warps)
 

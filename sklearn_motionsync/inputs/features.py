@@ -2,7 +2,10 @@
 
 from numbers import Integral
 
-__all__ = ["as_features", "choose_features", "names_of_features"]
+import pandas as pd
+from sklearn.base import OneToOneFeatureMixin
+
+__all__ = ["as_features", "check_input_features", "choose_features", "names_of_features"]
 
 # Features shown when none are named.
 _FEW = 4
@@ -38,6 +41,20 @@ def as_features(features):
         return []
     single = isinstance(features, str) or not hasattr(features, "__iter__")
     return [features] if single or getattr(features, "ndim", 1) == 0 else list(features)
+
+
+def check_input_features(estimator, input_features):
+    """Refuse ``input_features`` that are not one name each, or not those seen in fit."""
+    if input_features is None:
+        return
+    if hasattr(estimator, "n_features_in_"):
+        OneToOneFeatureMixin.get_feature_names_out(estimator, input_features)
+    counts = pd.Series(list(input_features), dtype=object).value_counts()
+    if (counts > 1).any():
+        raise ValueError(
+            f"input_features must name every feature once, but {counts.index[0]!r} comes "
+            f"{counts.iloc[0]} times."
+        )
 
 
 def names_of_features(before, step, width):

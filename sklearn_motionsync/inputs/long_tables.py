@@ -251,6 +251,9 @@ def to_frame(sequences, *, performances=None, columns=None):
             f"performances must be {len(arrays)} different labels, one a performance, "
             f"got {len(labels)} of which {len(set(labels))} differ."
         )
+    for i, label in enumerate(labels):
+        if any(pd.isna(part) is True for part in (label if isinstance(label, tuple) else [label])):
+            raise ValueError(f"Performance {i} has no label: performances[{i}] is {label!r}.")
     columns = names if columns is None else list(columns)
     if columns is not None and len(columns) != arrays[0].shape[1]:
         raise ValueError(

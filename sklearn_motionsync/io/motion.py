@@ -1,7 +1,6 @@
 """Files of motion capture: `read_motion`, and the registry of the readers of all formats."""
 
 import inspect
-import warnings
 from pathlib import Path
 
 import pandas as pd
@@ -12,7 +11,7 @@ from .bvh import read_bvh
 from .c3d import read_c3d
 from .gaps import check_max_gap, fill_gaps, warn_of_gaps, warn_of_missing
 from .storage import read_storage
-from .timestamps import check_frame_rate, describe_times
+from .timestamps import check_frame_rate, describe_times, warn_of_other_rate
 from .trc import read_trc
 
 # The readers, by the ending of the file's name in small letters. A format is one function and one
@@ -196,14 +195,8 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0, group=None):
         motion |= describe_times(
             path.name, times, stated=stated, decimals=decimals, frame_rate=frame_rate
         )
-        rate = motion["frame_rate"]
-        if frame_rate is None and stated and rate and rate != stated:
-            warnings.warn(
-                f"{path.name}: it says {stated:g} frames a second, but by its times there are "
-                f"{rate:g}, which is used. If the times are wrong, give frame_rate=.",
-                UserWarning,
-                stacklevel=2,
-            )
+        if frame_rate is None:
+            warn_of_other_rate(path.name, stated, motion["frame_rate"])
     elif frame_rate is not None:
         motion["frame_rate"] = float(frame_rate)
     df = _to_frame(motion, path)

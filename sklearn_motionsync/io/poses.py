@@ -9,7 +9,7 @@ import pandas as pd
 from ..inputs.tables import FRAME, label_of_part
 from .gaps import check_max_gap, fill_gaps
 from .text import make_unique
-from .timestamps import check_frame_rate, describe_times
+from .timestamps import SAME_RATE, check_frame_rate, describe_times, warn_of_other_rate
 
 _DIMENSIONS = ("time", "individual", "keypoint", "space")
 # Older names of some of them.
@@ -59,7 +59,8 @@ def from_poses(poses, *, min_confidence=None, frame_rate=None, max_gap=0, perfor
     Warns
     -----
     UserWarning
-        If times are uneven and no `frame_rate` is given.
+        If times are uneven, or contradict ``fps``, and no `frame_rate` is given. Every second or
+        k-th frame of ``fps`` is no contradiction.
 
     See Also
     --------
@@ -103,6 +104,8 @@ def from_poses(poses, *, min_confidence=None, frame_rate=None, max_gap=0, perfor
         facts["frame_rate"] = fps if frame_rate is None else float(frame_rate)
     else:
         facts |= describe_times("The poses", times, stated=fps, frame_rate=frame_rate, unit=unit)
+        if frame_rate is None and not _is_thinned(facts["frame_rate"], fps):
+            warn_of_other_rate("The poses", fps, facts["frame_rate"])
     joints = make_unique(_read_names(position, "keypoint"))
     facts |= {"kind": "keypoints", "joints": joints, "parents": [-1] * len(joints)}
     columns = [f"{joint}_{axis}" for joint in joints for axis in sorted(axes)]
@@ -173,6 +176,14 @@ def _read_axes(position):
             "other coordinates to these."
         )
     return axes
+
+
+def _is_thinned(rate, fps):
+    """Whether every k-th frame of ``fps`` makes this frame rate."""
+    if not rate or not fps:
+        return False
+    k = round(fps / rate)
+    return k >= 1 and abs(rate * k - fps) < SAME_RATE * fps
 
 
 def _read_times(position, attrs):

@@ -15,12 +15,23 @@ _GAP = 1.9
 # Seconds; no recording has shorter steps.
 _SHORTEST_STEP = 1e-9
 # Two frame rates that differ by a smaller share are the same.
-_SAME_RATE = 0.01
+SAME_RATE = 0.01
 
 
 def check_frame_rate(frame_rate):
     if frame_rate is not None and not (isinstance(frame_rate, Real) and 0 < frame_rate < math.inf):
         raise ValueError(f"frame_rate must be frames a second, above 0, got {frame_rate!r}.")
+
+
+def warn_of_other_rate(name, stated, rate):
+    """Warn if the times of a recording contradict the frame rate that it states."""
+    if stated and rate and rate != stated:
+        warnings.warn(
+            f"{name}: it says {stated:g} frames a second, but by its times there are {rate:g}, "
+            "which is used. If the times are wrong, give frame_rate=.",
+            UserWarning,
+            stacklevel=3,
+        )
 
 
 def describe_times(name, times, *, stated=None, decimals=17, frame_rate=None, unit="s"):
@@ -88,7 +99,7 @@ def _estimate_frame_rate(times, decimals, stated):
     # With few frames the digits leave the rate uncertain.
     blur = rounding / (len(times) - 1)
     agree = stated is not None and abs(step - 1 / stated) < max(
-        _SAME_RATE / stated, min(blur, step / 4)
+        SAME_RATE / stated, min(blur, step / 4)
     )
     off = times - step * np.arange(len(times))
     even = np.ptp(off) / 2 <= min(_JITTER * step + rounding / 2, _MAX_JITTER * step)

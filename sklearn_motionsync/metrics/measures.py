@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ..inputs.numbers import as_numbers
+from ..inputs.recorded import refuse_seconds
 from ..inputs.resampling import as_frame_rates
 from ..matching.warps import evaluate_warps
 
@@ -343,6 +344,8 @@ def _as_keyframes(keyframes, pattern_keyframes, lengths, n_frames):
             f"{len(lengths)} warps; got the shapes {[row.shape for row in rows]}."
         )
     pattern = _in_order(pattern, n_frames - 1, "The pattern", "frames of the clock")
+    for i, (row, length) in enumerate(zip(rows, lengths, strict=True)):
+        refuse_seconds(row, int(length), f"Performance {i}")
     frames = [
         _in_order(row, length - 1, f"Performance {i}", "its own frames")
         for i, (row, length) in enumerate(zip(rows, lengths, strict=True))

@@ -14,6 +14,7 @@ from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import Performances, as_source
+from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers, check_finite, check_magnitude, check_names
 from ..inputs.validation import (
     SequenceLevelMixin,
@@ -232,6 +233,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
             As many as the columns of the pandas output.
         """
         check_is_fitted(self)
+        check_input_features(self, input_features)
         names = OneToOneFeatureMixin.get_feature_names_out(self, input_features)
         if self._fitted_on_rows:
             names = [f"{type(self).__name__.lower()}{p}" for p in range(self.n_frames_)]

@@ -8,6 +8,7 @@ from sklearn.base import _fit_context
 from sklearn.utils._param_validation import Interval
 
 from ..inputs.numbers import as_numbers
+from ..inputs.recorded import refuse_moved_events, refuse_seconds
 from ..matching.filters import SMOOTHING, smooth
 from ..matching.units import Unit
 from ..matching.warps import even_slices, sample
@@ -110,8 +111,8 @@ class KeyframeSynchronizer(Synchronizer):
         y : ignored
             Present for API consistency.
         keyframes : list of arrays (n_keyframes,), default=None
-            Key-frames of each performance, in its own frames (fractions allowed), increasing;
-            found by curvature if None.
+            Key-frames of each performance, in its own frames, counted from its first row
+            (fractions allowed), increasing; found by curvature if None.
 
         Returns
         -------
@@ -122,8 +123,12 @@ class KeyframeSynchronizer(Synchronizer):
         ------
         ValueError
             If the input breaks the contract, the pattern does not exist or fit, or key-frames are
-            not increasing, inside their performance and equally many in all.
+            not increasing, inside their performance and equally many in all; if they look like
+            seconds, all below 1 or in the first fiftieth of a performance and not whole; or if
+            performances have events whose frames are not their rows.
         """
+        if keyframes is not None:
+            refuse_moved_events(X)
         self._learn(self._check_training_set(X), keyframes)
         return self
 
@@ -163,6 +168,8 @@ class KeyframeSynchronizer(Synchronizer):
             ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
             ``set_output(transform="pandas")``.
         """
+        if keyframes is not None:
+            refuse_moved_events(X)
         return self._warp(X, keyframes=keyframes)
 
     @snapshot
@@ -188,6 +195,7 @@ class KeyframeSynchronizer(Synchronizer):
                 "keyframes",
             )
         if keyframes is not None:
+            refuse_moved_events(X)
             knots = self._check_keyframes(performances, keyframes, len(self.keyframes_))
         distances, times = np.empty(len(performances)), []
         for rows in even_slices(len(performances), _BATCH):
@@ -238,6 +246,7 @@ class KeyframeSynchronizer(Synchronizer):
         for i, (given, x) in enumerate(zip(keyframes, arrays, strict=True)):
             frames = as_numbers(given, f"Performance {i}: keyframes", dtype=np.float64)
             count = frames.size if count is None else count
+            refuse_seconds(frames.ravel(), len(x), f"Performance {i}")
             path = np.concatenate([[0], frames.ravel(), [len(x) - 1]])
             if frames.shape != (count,) or count == 0 or not (np.diff(path) > 0).all():
                 raise ValueError(

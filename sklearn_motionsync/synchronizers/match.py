@@ -8,6 +8,7 @@ import pandas as pd
 from ..inputs.collections import as_collection
 from ..inputs.long_tables import to_frame
 from ..inputs.numbers import as_numbers
+from ..inputs.recorded import frame_rate_of_rows
 from ..inputs.resampling import as_frame_rates
 from ..inputs.validation import read_collection
 from ..matching.warps import sample
@@ -19,6 +20,7 @@ __all__ = [
     "check_match",
     "check_unit",
     "match_of_times",
+    "rates_of",
     "timing_table",
 ]
 
@@ -154,7 +156,8 @@ class Match:
         X : performances, or array-like of numbers, shape (n_sequences,), default=None
             For seconds: the performances, or how many frames each has.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
-            For seconds: frames per second of X.
+            For seconds: frames per second of X. By default what tables tell: an index in seconds,
+            or ``attrs["frame_rate"]`` of `io.read_motion`.
 
         Returns
         -------
@@ -179,7 +182,8 @@ class Match:
         X : performances, or array-like of numbers, shape (n_sequences,), default=None
             Needed for seconds. The labels of X are those of the table.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
-            For seconds: frames per second of X.
+            For seconds: frames per second of X. By default what tables tell: an index in seconds,
+            or ``attrs["frame_rate"]`` of `io.read_motion`.
         labels : sequence of length n_sequences, or Index, default=None
             Labels of the performances; by default those of X, or 0, 1, ... A MultiIndex makes
             several levels.
@@ -302,15 +306,16 @@ class Match:
         """
         return self._stretched(self.times, X)
 
-    def seconds(self, X, frame_rate):
+    def seconds(self, X, frame_rate=None):
         """The time in each performance that corresponds to each frame of the pattern.
 
         Parameters
         ----------
         X : performances, or array-like of numbers, shape (n_sequences,)
             The performances, or how many frames each has, as for ``frames``.
-        frame_rate : float, or array-like of shape (n_sequences,)
-            Frames per second of X; one for each performance if they differ.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            Frames per second of X; one for each performance if they differ. By default what tables
+            tell, as in ``to_frame``.
 
         Returns
         -------
@@ -320,14 +325,15 @@ class Match:
         Raises
         ------
         ValueError
-            As from ``frames``; or if a rate is not above 0, or there is not one a performance.
+            As from ``frames``; or if a rate is not above 0 or not known, or there is not one a
+            performance.
         """
         return self._in_seconds(self.times, X, frame_rate)
 
     def _in_unit(self, unit, X, frame_rate):
         """``times`` and ``offsets`` in a unit of time."""
         if check_unit(unit) == "seconds":
-            if X is None or frame_rate is None:
+            if X is None:
                 raise ValueError(
                     "unit='seconds' needs X, the performances or how many frames each has, and "
                     "frame_rate."
@@ -352,6 +358,12 @@ class Match:
         return times * (lengths[:, np.newaxis] - 1) / (self.times.shape[1] - 1)
 
     def _in_seconds(self, times, X, frame_rate):
+        frame_rate = rates_of(X, frame_rate)
+        if frame_rate is None:
+            raise ValueError(
+                "Time in seconds needs X and frame_rate, which X does not tell: give frames per "
+                "second, or tables with an index in seconds or attrs['frame_rate']."
+            )
         rates = as_frame_rates(frame_rate, len(self.times))
         return self._stretched(times, X) / rates
 
@@ -417,6 +429,19 @@ def timing_table(columns, X, labels):
         for of_one in zip(*columns.values(), strict=True)
     ]
     return to_frame(tables, performances=_labels_of(X) if labels is None else labels)
+
+
+def rates_of(X, frame_rate=None, unit="seconds"):
+    """The frame rates of performances: as given, or for seconds as tables tell them.
+
+    Returns
+    -------
+    float, array-like of shape (n_sequences,), or None if one is not known
+    """
+    if frame_rate is not None or unit != "seconds" or X is None or _are_lengths(X):
+        return frame_rate
+    rates = [frame_rate_of_rows(x) for x in as_collection(X) or [None]]
+    return None if None in rates else rates
 
 
 def _are_lengths(X):

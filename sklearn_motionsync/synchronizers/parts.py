@@ -22,7 +22,7 @@ from ..utils.parallel import Progress, run
 from .base import Synchronizer
 from .dense import DenseSynchronizer
 from .lags import Lags
-from .match import Match
+from .match import Match, rates_of
 from .portions import warp_in_portions
 
 __all__ = ["PartSynchronizer"]
@@ -237,7 +237,8 @@ class PartSynchronizer(Synchronizer):
         unit : {"frames", "percent", "seconds"}, default="frames"
             Unit of the lags, as in ``Match.offsets_in``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
-            Frames per second of X, for seconds.
+            Frames per second of X, for seconds; by default what tables tell, as in
+            `Match.to_frame`.
 
         Returns
         -------
@@ -259,7 +260,7 @@ class PartSynchronizer(Synchronizer):
         references = dict.fromkeys(parts, parts.get(against, body))
         if against == "rest":
             references = self._match_parts(performances, body, "rest")
-        clock = unit, [len(x) for x in performances], frame_rate
+        clock = unit, [len(x) for x in performances], rates_of(X, frame_rate, unit)
         names = [name for name in parts if name != against]
         values = [
             parts[name].offsets_in(*clock) - references[name].offsets_in(*clock) for name in names

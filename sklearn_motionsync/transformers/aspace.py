@@ -13,6 +13,7 @@ from sklearn.decomposition import PCA
 from sklearn.utils._param_validation import Interval, RealNotInt
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.features import check_input_features
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
@@ -173,6 +174,22 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         ]
         names = getattr(self, "feature_names_in_", range(self.n_features_in_))
         return restore(self, performances, arrays, columns=names)
+
+    def get_feature_names_out(self, input_features=None):
+        """Names of the coordinates: ``aspace0``, ``aspace1``, ...
+
+        Parameters
+        ----------
+        input_features : array-like of str, default=None
+            Names of the features before it, which are checked only.
+
+        Returns
+        -------
+        ndarray of str
+            One name a component.
+        """
+        check_input_features(self, input_features)
+        return super().get_feature_names_out(input_features)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()

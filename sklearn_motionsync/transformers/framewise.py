@@ -11,6 +11,7 @@ from sklearn.utils._param_validation import HasMethods
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers, column_names
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
@@ -180,6 +181,7 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
             there are none.
         """
         check_is_fitted(self)
+        check_input_features(self, input_features)
         if hasattr(self.transformer_, "get_feature_names_out"):
             if input_features is None:
                 input_features = getattr(self, "feature_names_in_", None)

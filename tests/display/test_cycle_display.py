@@ -2,6 +2,7 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import pytest
 from sklearn_motionsync import CycleSegmenter, self_correlation
 from sklearn_motionsync.datasets import make_bending, make_gait
@@ -67,3 +68,11 @@ def test_from_estimator_refuses(segmenter):
             CycleDisplay.from_estimator(segmenter, GAIT.data, **change)
     display = CycleDisplay([1, 0, 0.5, 0], [2], np.zeros(5), [0, 2], period=2.1).plot()
     assert repr(display).startswith("CycleDisplay(5 frames")
+
+
+def test_a_table_tells_its_frame_rate(segmenter):
+    x = make_gait(1, takes=True, random_state=0).data[0]
+    table = pd.DataFrame(x, index=pd.Index(np.arange(len(x)) / 100, name="time"))
+    told = CycleDisplay.from_estimator(CycleSegmenter(), [table], unit="seconds")
+    asked = CycleDisplay.from_estimator(CycleSegmenter(), [x], unit="seconds", frame_rate=100)
+    assert told.axes_[1].get_xlim() == pytest.approx(asked.axes_[1].get_xlim())

@@ -2,6 +2,7 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import pytest
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import DenseSynchronizer, DirectionCosines, Lags, PartSynchronizer
@@ -72,6 +73,13 @@ def test_from_estimator_of_a_pipeline_on_axes_of_the_user():
     np.testing.assert_array_equal(display.lags.values, sync.lags(X, against="trunk").values)
     assert display.figure_ is ax.figure
     assert [a.get_title() for a in display.axes_] == display.lags.parts
+    tables = [pd.DataFrame(x, columns=bunch.skeleton.column_names) for x in bunch.data]
+    for x in tables:
+        x.attrs["frame_rate"] = 50.0
+    told = LagDisplay.from_estimator(pipe.fit(tables), tables, unit="seconds")
+    asked = sync.lags(X, unit="seconds", frame_rate=50)
+    np.testing.assert_allclose(told.lags.values, asked.values)
+    assert np.abs(asked.values).max() > 0
 
 
 def test_from_predictions_refuses_other_classes(lags):

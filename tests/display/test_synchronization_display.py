@@ -167,3 +167,19 @@ def test_units_of_the_synchronization_display(bunch, pipe):
         assert {"frames": "frame of", "percent": "% of", "seconds": "(s)"}[unit] in labels
     with pytest.raises(ValueError, match="needs frame_rate"):
         SynchronizationDisplay.from_estimator(pipe, bunch.data, unit="seconds")
+
+
+def test_tables_tell_their_frame_rate(bunch, pipe):
+    tables = [pd.DataFrame(x) for x in bunch.data]
+    for k, x in enumerate(tables):
+        x.attrs["frame_rate"] = 25.0 + k
+    given = {"unit": "seconds", "features": [0]}
+    rates = [25.0 + k for k in range(len(tables))]
+    for display in (SynchronizationDisplay, ActionModelDisplay):
+        told = display.from_estimator(pipe, tables, **given)
+        asked = display.from_estimator(pipe, bunch.data, frame_rate=rates, **given)
+        for one, other in zip(np.ravel(told.axes_), np.ravel(asked.axes_), strict=True):
+            assert one.get_xlim() == other.get_xlim()
+        plt.close("all")
+        with pytest.raises(ValueError, match="needs frame_rate"):
+            display.from_estimator(pipe, [*tables[1:], bunch.data[0]], **given)

@@ -260,6 +260,8 @@ CALLS = [
     (lambda: KEYS.fit(X, keyframes=[[]] * 5), ["Performance 0", "some increasing"]),
     (lambda: KEYS.fit(X, keyframes=[DATES[:2]] * 5), ["Performance 0", "keyframes"]),
     (lambda: KEYS.fit(X, keyframes=[[5 + 0j, 9]] * 5), ["Performance 0", "complex"]),
+    (lambda: KEYS.fit(X, keyframes=[[0.31, 0.62]] * 5), ["Performance 0", "seconds * frame_rate"]),
+    (lambda: KEYED.transform(X[:1], keyframes=[[0.3, 0.6]]), ["Performance 0", "[0.3, 0.6]"]),
     (lambda: KEYED.transform(X), ["fitted with key-frames", "keyframes=[...]"]),
     (lambda: Match([[0, 3, 1, 3]]), ["Performance 0", "must not decrease", "1 at frame 2"]),
     (lambda: Match(np.ma.masked_equal([[0, 1, 2]], 1)), ["times", "masked"]),
@@ -273,6 +275,10 @@ CALLS = [
     (lambda: MATCH.frames(["a"] * 5), ["lengths", "'a'"]),
     (lambda: to_frame(X[0]), ["single 2-D input", "[X]"]),
     (lambda: to_frame(X, columns=["a"]), ["3 features", "got 1"]),
+    (lambda: to_frame(X[:2], performances=["a", None]), ["Performance 1", "no label", "None"]),
+    (lambda: to_frame(X[:2], performances=pd.Index([np.nan, 1])), ["Performance 0", "no label"]),
+    (lambda: to_frame(X[:2], performances=[("a", 1), ("a", pd.NA)]), ["Performance 1", "<NA>"]),
+    (lambda: MATCH.to_frame(labels=[*"abcd", pd.NaT]), ["Performance 4", "no label", "NaT"]),
     (lambda: DENSE.disparity_space(X, performance=True), ["performance=True", "0 to 4"]),
 ]
 

@@ -135,6 +135,15 @@ def test_frame_rate_follows_from_times_and_fps(ds, rate):
     assert from_poses(ds, frame_rate=12)[0].attrs["frame_rate"] == 12.0
 
 
+@pytest.mark.parametrize(("fps", "rate"), [(30, 60), (30, 50), (30, 20), (60, 25)])
+def test_times_that_contradict_fps_are_warned_of(fps, rate):
+    ds = poses(fps=fps, times=np.arange(40) / rate)
+    with pytest.warns(UserWarning, match=rf"The poses: it says {fps} frames .* are {rate}, which"):
+        (ann, _) = from_poses(ds)
+    assert ann.attrs["frame_rate"] == pytest.approx(rate)
+    assert from_poses(ds, frame_rate=fps)[0].attrs["frame_rate"] == fps
+
+
 @pytest.mark.parametrize(
     ("fps", "unit", "words"), [(50.0, "seconds", "s"), (None, "frames", "frames")]
 )

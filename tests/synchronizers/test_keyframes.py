@@ -1,6 +1,7 @@
 """KeyframeSynchronizer: given key-frames, found ones, and metadata routing."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from sklearn import config_context
 from sklearn.model_selection import cross_validate
@@ -213,3 +214,60 @@ def test_transform_needs_keyframes_after_a_fit_with_them(bending):
         sync.transform(bending.data)
     with pytest.raises(ValueError, match="must be 5 increasing"):
         sync.transform(bending.data, keyframes=bending.keyframes[:, :4])
+
+
+# -- what counts frames in another way ------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("n_frames", "frames", "is_refused"),
+    [
+        (100, [0.62], True),
+        (100, [0.31, 0.62], True),
+        (12, [0.25, 0.9], True),
+        (300, [0.62, 1.4, 2.5], True),
+        # Whole frames, few frames, and frames further back.
+        (300, [1, 4], False),
+        (3, [0.5], False),
+        (100, [0.5, 1.99], False),
+        (300, [2.5, 6.1], False),
+    ],
+)
+def test_keyframes_in_seconds_are_refused(n_frames, frames, is_refused):
+    X = [np.arange(50.0)[:, None] ** 2, np.arange(float(n_frames))[:, None]]
+    late = [20 + 5 * k for k in range(len(frames))]
+    sync = KeyframeSynchronizer().fit(X[:1] * 2, keyframes=[late, late])
+    calls = [
+        lambda: KeyframeSynchronizer().fit(X, keyframes=[late, frames]),
+        lambda: sync.match(X, keyframes=[late, frames]),
+        lambda: sync.transform(X, keyframes=[late, frames]),
+        lambda: keyframe_error([range(50)] * 2, [late, frames], late, [50, n_frames]),
+    ]
+    for call in calls:
+        if is_refused:
+            with pytest.raises(ValueError, match=r"Performance 1: .* look like seconds, .*_rate"):
+                call()
+        else:
+            call()
+
+
+def test_events_of_other_rows_are_no_keyframes():
+    rng = np.random.default_rng(0)
+    takes = [pd.DataFrame({"knee": rng.normal(size=60).cumsum()}) for _ in range(3)]
+    for x in takes:
+        x.attrs["events"] = [{"label": "off", "frame": 30.5}]
+    keyframes = [[x.attrs["events"][0]["frame"]] for x in takes]
+    sync = KeyframeSynchronizer().fit(takes, keyframes=keyframes)
+    for rows, words in (
+        (slice(10, None), "row 0 is frame 10"),
+        (slice(0, None, 2), "1 is frame 2"),
+    ):
+        X = [*takes[:2], takes[2].iloc[rows]]
+        for call in (KeyframeSynchronizer().fit, sync.match, sync.transform):
+            with pytest.raises(ValueError, match=f"Performance 2: .*{words} of the recording"):
+                call(X, keyframes=keyframes)
+            call([x.reset_index(drop=True) for x in X], keyframes=[[30.5], [30.5], [20.5]])
+        # Without key-frames, or events to take them from, rows count.
+        KeyframeSynchronizer().fit(X)
+        X[2].attrs = {}
+        sync.match(X, keyframes=[[30.5], [30.5], [20.5]])

@@ -1,6 +1,7 @@
 """Match: warps, frames and seconds, warping of other recordings, and timing."""
 
 import pickle
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
     DirectionCosines,
+    LinearSynchronizer,
     Match,
     to_frame,
 )
@@ -81,6 +83,31 @@ def test_frames_and_seconds(matched):
     np.testing.assert_array_equal(match.seconds(points, 120), frames / 120)
     rates = np.array([120, 120, 30, 60, 50, 100])
     np.testing.assert_array_equal(match.seconds(points, rates), frames / rates[:, np.newaxis])
+
+
+def test_tables_tell_their_frame_rate():
+    rng = np.random.default_rng(0)
+    seconds = [pd.Index(np.arange(n) / 50 + 3, name="time") for n in (30, 40, 50)]
+    tables = [pd.DataFrame({"knee": rng.normal(size=len(t)).cumsum()}, index=t) for t in seconds]
+    recorded = pd.DataFrame({"knee": rng.normal(size=90).cumsum()})
+    recorded.attrs["frame_rate"] = 120.0
+    X, rates = [*tables, recorded, recorded.iloc[::2]], [50, 50, 50, 120, 60]
+    match = LinearSynchronizer(20).fit(X).match(X)
+    lengths = list(map(len, X))
+    expected = match.to_frame("seconds", lengths, rates)
+    pd.testing.assert_frame_equal(match.to_frame("seconds", X), expected)
+    # One that is given counts.
+    given = match.to_frame("seconds", lengths, 10)
+    pd.testing.assert_frame_equal(match.to_frame("seconds", X, 10), given)
+    np.testing.assert_allclose(match.seconds(X)[:3, -1], [0.58, 0.78, 0.98])
+    offsets = match.offsets_in("seconds", lengths, rates)
+    np.testing.assert_array_equal(match.offsets_in("seconds", X), offsets)
+    long = to_frame(X[:3])
+    np.testing.assert_allclose(Match(match.times[:3]).seconds(long)[:, -1], [0.58, 0.78, 0.98])
+    for unknown in ([*X[:4], X[0].to_numpy()], [*X[:4], recorded.drop(index=5)], lengths):
+        for call in (match.seconds, partial(match.to_frame, "seconds")):
+            with pytest.raises(ValueError, match="needs X and frame_rate, which X does not tell"):
+                call(unknown)
 
 
 @pytest.mark.parametrize(
