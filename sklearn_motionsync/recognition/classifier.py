@@ -24,7 +24,7 @@ from ..model.action_model import ActionModel
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
-from ..utils.groups import encode_classes, encode_groups
+from ..utils.groups import add_unknown_label, encode_classes, encode_groups
 from ..utils.parallel import LongWorkMixin, run
 from .distances import SETTINGS, normalise_time, pairwise_distances
 
@@ -85,7 +85,8 @@ class ActionClassifier(
         nothing. ``"auto"`` is ``threshold_at(0.95)``. ``fit`` does not use it: it can be set
         afterwards.
     unknown_label : label, default=None
-        The label of rejected performances; by default "unknown" among text, -1 among numbers.
+        The label of rejected performances, which is none of the classes; by default "unknown" among
+        text, -1 among numbers, NaT among dates.
     n_jobs : int, default=None
         How many jobs share the comparisons, in ``fit`` and after it. None means 1 unless in a
         ``joblib.parallel_config`` context, -1 all cores. Results are the same to the last bit.
@@ -240,17 +241,18 @@ class ActionClassifier(
         Returns
         -------
         ndarray, shape (n_sequences,)
-            Classes, and ``unknown_label`` for those that ``reject_below`` rejects.
+            Classes, and ``unknown_label`` for those that ``reject_below`` rejects. If it is not
+            None, the dtype holds both: with classes of 8 bits without sign, and -1, it is int64.
         """
         decisions = self._decisions(X)
-        labels = self.classes_[decisions.argmax(axis=1)]
+        codes = decisions.argmax(axis=1)
         threshold = self.reject_below
         if threshold is None:
-            return labels
+            return self.classes_[codes]
         if isinstance(threshold, str):
             threshold = self.threshold_at(_COVERAGE)
-        unknown = check_unknown_label(self.unknown_label, self.classes_)
-        return np.where(decisions.max(axis=1) < threshold, unknown, labels)
+        codes[decisions.max(axis=1) < threshold] = len(self.classes_)
+        return add_unknown_label(self.classes_, self.unknown_label)[codes]
 
     @snapshot
     def predict_proba(self, X):
@@ -408,32 +410,6 @@ class ActionClassifier(
         with self._progress(fits=False) as progress:
             kernel = self._kernel(performances, n_jobs=self.n_jobs, progress=progress)
         return decision_values(kernel, *self._regression)
-
-
-def check_unknown_label(label, classes):
-    """The label of rejected performances, of the same type as the classes.
-
-    Parameters
-    ----------
-    label : str, number or None
-        None is "unknown", or -1 among numbers.
-    classes : ndarray, shape (n_classes,)
-    """
-    kind = classes.dtype.kind
-    is_text = kind in "US" or (kind == "O" and isinstance(classes[0], str))
-    if label is None:
-        label = "unknown" if is_text else -1
-    if label in classes.tolist():
-        raise ValueError(
-            f"unknown_label={label!r} is one of the classes: choose another label for rejected "
-            "performances."
-        )
-    if is_text != isinstance(label, str):
-        raise ValueError(
-            f"unknown_label={label!r} must be {'text' if is_text else 'a number'}, like the "
-            f"classes {classes.tolist()}."
-        )
-    return np.array(label, dtype=object) if kind == "O" else label
 
 
 class MotionKernel:

@@ -1,6 +1,7 @@
 """Groups and class labels of performances: the one place that checks and encodes them."""
 
 from collections.abc import Iterable, Mapping, Set, Sized
+from contextlib import suppress
 
 import numpy as np
 import pandas as pd
@@ -8,6 +9,7 @@ from sklearn.utils import assert_all_finite, check_consistent_length, column_or_
 from sklearn.utils.multiclass import check_classification_targets
 
 __all__ = [
+    "add_unknown_label",
     "encode_classes",
     "encode_groups",
     "mean_of_others",
@@ -18,6 +20,8 @@ __all__ = [
 # NumPy scalars that equal Python ones, as which they are kept.
 _SCALARS = np.str_, np.number, np.bool_
 _NOT_LISTS = str, bytes, Mapping, Set
+# Kinds of the dtypes of dates and durations.
+_DATES = "Mm"
 
 
 def encode_groups(groups, n_performances, *, name="groups", at_least=1, sort=False):
@@ -112,10 +116,15 @@ def encode_classes(y, performances, estimator_name):
     """
     if y is None:
         raise ValueError(f"{estimator_name} requires y to be passed, but the target y is None.")
+    if getattr(getattr(y, "dtype", None), "kind", None) == "T":
+        # NumPy's text of any length, which scikit-learn does not take.
+        y = y.astype(object)
     column = column_or_1d(y, warn=True)
     check_consistent_length(performances, column)
     # Of the input: an array of mixed types would be one of text.
-    _check_labels(np.asarray(y, dtype=object).ravel(), "y")
+    given = _check_labels(np.asarray(y, dtype=object).ravel(), "y")
+    if column.dtype.kind not in _DATES:
+        _check_held(column, given)
     assert_all_finite(column, input_name="y")
     check_classification_targets(column)
     classes, codes = np.unique(column, return_inverse=True)
@@ -125,6 +134,67 @@ def encode_classes(y, performances, estimator_name):
             f"{classes.tolist()[0]!r}. An ActionDetector learns a single action."
         )
     return classes, codes
+
+
+def add_unknown_label(classes, label=None):
+    """The classes and, behind them, the label of performances that belong to none of them.
+
+    Parameters
+    ----------
+    classes : ndarray, shape (n_classes,)
+        As `encode_classes` returns them.
+    label : str, number or None, default=None
+        None is "unknown" among text, -1 among numbers, NaT among dates and durations.
+
+    Returns
+    -------
+    ndarray, shape (n_classes + 1,)
+        In the dtype of the classes, or if that does not hold the label exactly, in one that holds
+        all: integers of 64 bits, floats of 64 bits, or objects.
+
+    Raises
+    ------
+    ValueError
+        If the label is one of the classes, or not of their type.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn_motionsync.utils.groups import add_unknown_label
+    >>> add_unknown_label(np.array([3, 255], dtype=np.uint8))
+    array([  3, 255,  -1])
+    """
+    if classes.dtype.kind in _DATES:
+        if label is not None:
+            raise ValueError(
+                f"unknown_label={label!r} must be None, as the classes are of dtype "
+                f"{classes.dtype}: rejected performances get NaT."
+            )
+        return np.append(classes, np.array("NaT", classes.dtype))
+    is_text = classes.dtype.kind in "UO"
+    if label is None:
+        label = "unknown" if is_text else -1
+    if isinstance(label, np.timedelta64) or is_text != isinstance(label, str):
+        raise ValueError(
+            f"unknown_label={label!r} must be {'text' if is_text else 'a number'}, like the "
+            f"classes {classes.tolist()}."
+        )
+    if isinstance(label, np.generic):
+        label = label.item()
+    labels = [*classes.tolist(), label]
+    if label in labels[:-1]:
+        raise ValueError(
+            f"unknown_label={label!r} is one of the classes: choose another label for rejected "
+            "performances."
+        )
+    larger = [None] if is_text else [np.int64, np.uint64, np.float64]
+    for dtype in [classes.dtype, *larger]:
+        # What is too large for a dtype, and NaN among integers, are errors.
+        with np.errstate(over="ignore"), suppress(OverflowError, ValueError):
+            held = np.array(labels, dtype)
+            if all(a == b or a != a != b for a, b in zip(held.tolist(), labels, strict=True)):
+                return held
+    return np.array(labels, dtype=object)
 
 
 def sums_of_groups(values, codes):
@@ -139,6 +209,16 @@ def mean_of_others(values, codes):
     """For each of the values (n, ...), the mean of those of all other groups."""
     sums, counts = sums_of_groups(values, codes)
     return ((sums.sum(axis=0) - sums) / (len(values) - counts))[codes]
+
+
+def _check_held(column, labels):
+    """Refuse labels that an array of all of them does not hold exactly."""
+    for i, (held, label) in enumerate(zip(column.tolist(), labels, strict=True)):
+        if held != label:
+            raise ValueError(
+                f"y[{i}] is {label!r}, which is {held!r} in an array of dtype {column.dtype}: give "
+                "labels of one type, such as text."
+            )
 
 
 def _check_labels(labels, name):

@@ -1,0 +1,120 @@
+"""Labels of classes and of rejected performances: of any type, none is ever taken for another."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn_motionsync import ActionClassifier
+
+# Two movements, five performances each.
+T = np.linspace(0, 1, 20)
+X = [np.column_stack([np.sin((3 + 3 * (i > 4)) * T), np.cos((4 + i / 9) * T)]) for i in range(10)]
+LIMITS = {name: np.iinfo(name) for name in ("int8", "uint8", "int16", "int64", "uint64")}
+# Pairs of classes as arrays or lists, and whether a class is text, a number or a date.
+PAIRS = {
+    **{name: (np.array([at.min, at.max], name), "number") for name, at in LIMITS.items()},
+    "small uint64": (np.array([3, 4], np.uint64), "number"),
+    "float16": (np.array([1, 2048], np.float16), "number"),
+    "float32": (np.array([1, 2**24], np.float32), "number"),
+    "float64": (np.array([-2.0, 2.0**53]), "number"),
+    "bool": (np.array([False, True]), "number"),
+    "list of integers": ([7, 200], "number"),
+    "pandas Int64": (pd.array([5, 300], dtype="Int64"), "number"),
+    "pandas categorical of integers": (pd.Categorical([1, 2]), "number"),
+    "fixed width": (np.array(["a", "unk"]), "text"),
+    "object": (np.array(["a", "longer"], dtype=object), "text"),
+    "any width": (np.array(["a", "b"], dtype=np.dtypes.StringDType()), "text"),
+    "list of text": (["3", "-1"], "text"),
+    "pandas categorical": (pd.Categorical(["a", "b"]), "text"),
+    "pandas string": (pd.array(["a", "b"], dtype="string"), "text"),
+    "datetime64[D]": (np.array(["2020-01-01", "9999-12-31"], "M8[D]"), "date"),
+    "datetime64[ns]": (np.array(["1969-12-31", "2020-01-01"], "M8[ns]"), "date"),
+    "timedelta64[h]": (np.array([-1, 5], "m8[h]"), "date"),
+}
+NUMBERS = [-1, 0, 0.5, 7.0, 255, 256, 1000, -129, 2**24 + 1, 2**53 + 1, 2**63, 2**64, 2**80, 1e300]
+NUMBERS += [True, np.nan, np.inf, np.uint8(9), np.float32(0.1), 0.1]
+TEXTS = ["unknown", "?", "unkn", "a\0", "", "-1", "nan", np.str_("b")]
+
+
+def fit(pair):
+    """A classifier of five performances a class, and its classes as they were given."""
+    given = list(pair)
+    if isinstance(pair, list):
+        y = [given[0]] * 5 + [given[1]] * 5
+    else:
+        y = pair.take(np.repeat([0, 1], 5))
+    return ActionClassifier([], n_frames=4).fit(X, y), given
+
+
+def equal(found, given):
+    """Whether two labels are the same: numbers as Python compares them, exactly."""
+    found, given = (
+        x.item() if isinstance(x, np.number | np.bool_) and not isinstance(x, np.timedelta64) else x
+        for x in (found, given)
+    )
+    if isinstance(found, str) != isinstance(given, str):
+        return False
+    return bool(found == given) or (found != found and given != given)
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_rejected_performances_never_have_a_class(name):
+    pair, kind = PAIRS[name]
+    classifier, given = fit(pair)
+    plain = classifier.predict(X)
+    assert all(equal(a, given[i // 5]) for i, a in enumerate(plain))
+    scores = classifier.score_samples(X)
+    border = float(np.median(scores))
+    labels = {"number": NUMBERS, "text": TEXTS, "date": []}[kind]
+    for label in (None, *labels):
+        default = {"number": -1, "text": "unknown", "date": np.datetime64("NaT")}[kind]
+        expected = default if label is None else label
+        dtypes = set()
+        for threshold in (border, 1e9):
+            classifier.set_params(reject_below=threshold, unknown_label=label)
+            if any(equal(expected, known) for known in given):
+                with pytest.raises(ValueError, match="is one of the classes"):
+                    classifier.predict(X)
+                continue
+            found = classifier.predict(X)
+            for i, (a, score) in enumerate(zip(found, scores, strict=True)):
+                if score < threshold:
+                    assert np.isnat(a) if kind == "date" else equal(a, expected)
+                    assert not any(equal(a, known) for known in given)
+                else:
+                    assert equal(a, given[i // 5])
+            dtypes.add(found.dtype)
+        # It does not depend on what is rejected.
+        assert len(dtypes) <= 1
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_unknown_label_of_another_kind_is_refused(name):
+    pair, kind = PAIRS[name]
+    classifier, _ = fit(pair)
+    others = {"number": "new", "text": 3, "date": -1}
+    for label in (others[kind], np.timedelta64(5, "D")):
+        classifier.set_params(reject_below=0, unknown_label=label)
+        with pytest.raises(ValueError, match=r"unknown_label=.* must be ") as error:
+            classifier.predict(X)
+        assert len(str(error.value)) < 600
+
+
+@pytest.mark.parametrize(
+    ("labels", "message"),
+    [
+        (["p"] * 5 + [3] * 5, r"y\[5\] is 3, y\[0\] is 'p': labels must be of one type"),
+        ([3] * 5 + ["p"] * 5, r"y\[5\] is 'p', y\[0\] is 3: labels must be of one type"),
+        (np.array(["p"] * 5 + [3] * 5, dtype=object), "labels must be of one type"),
+        ([2**63 + 1] * 5 + [-1] * 5, r"y\[0\] is 9223372036854775809, which is 9.22.*float64"),
+        ([2**53 + 1] * 5 + [2.0] * 5, r"y\[0\] is 9007199254740993, which is 9007199254740992.0"),
+        (
+            pd.array([2**53 + 1] * 5 + [2] * 5, dtype="Int64"),
+            r"y\[0\] is 9007199254740993, which is",
+        ),
+        (["a"] * 5 + ["a\0"] * 5, r"y\[5\] is 'a\\x00', which is 'a' in an array of dtype <U2"),
+        (np.array(["2020-01-01"] * 5 + ["NaT"] * 5, "M8[ns]"), r"y\[5\] is missing"),
+    ],
+)
+def test_labels_that_an_array_changes_are_refused(labels, message):
+    with pytest.raises(ValueError, match=message):
+        ActionClassifier([], n_frames=4).fit(X, labels)
