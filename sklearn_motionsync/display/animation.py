@@ -51,7 +51,7 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
     class NotebookAnimation(FuncAnimation):
         """An animation that computes the layout once and needs no network."""
 
-        def to_jshtml(self, *args, **kwargs):
+        def save(self, *args, **kwargs):
             # The layout takes longer than the drawing, and each picture would repeat it.
             layout = figure.get_layout_engine()
             figure.draw_without_rendering()
@@ -59,11 +59,14 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
             # Saving a picture draws it; drawing it on the canvas before would double the time.
             figure.canvas.draw_idle = _do_nothing
             try:
-                with pyplot().rc_context({"savefig.dpi": _DPI}):
-                    return embed_buttons(super().to_jshtml(*args, **kwargs))
+                super().save(*args, **kwargs)
             finally:
                 del figure.canvas.draw_idle, figure.get_layout_engine
                 figure.set_layout_engine(layout)
+
+        def to_jshtml(self, *args, **kwargs):
+            with pyplot().rc_context({"savefig.dpi": _DPI}):
+                return embed_buttons(super().to_jshtml(*args, **kwargs))
 
         def __del__(self):
             # Matplotlib warns of an animation that was not shown, unless its figure is closed.

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["COSTS", "RATE_WEIGHT", "Cost", "StepTable", "step_table"]
+__all__ = ["COSTS", "RATE_WEIGHT", "Cost", "StepGroup", "StepTable", "group_steps", "step_table"]
 
 # w of the velocity cost, from the measurement in docs/method.md.
 RATE_WEIGHT = 0.2
@@ -93,6 +93,33 @@ def step_table(cost="posture", max_rate=2, subframes=1):
     steps = np.arange(int(np.floor(max_rate * subframes)) + 1)
     steps = steps[np.argsort(np.abs(steps - subframes), kind="stable")]
     return StepTable(steps, *COSTS[cost].weights(steps / subframes), subframes)
+
+
+class StepGroup(NamedTuple):
+    """Steps of equal weights; their smallest penalty is taken out of the levels."""
+
+    moving: float
+    inner: float
+    penalty: float
+    levels: list
+
+
+def group_steps(table, mu, slopes):
+    """Groups of steps of equal weights, and the group of every step, given their slopes."""
+    weights = list(zip(table.moving.tolist(), table.inner.tolist(), strict=True))
+    unique = sorted(set(weights))
+    group_of_step = np.array([unique.index(pair) for pair in weights])
+    groups = []
+    for i, (moving, inner) in enumerate(unique):
+        members = group_of_step == i
+        penalties = mu * table.penalty[members]
+        least = penalties.min()
+        levels = [
+            (value - float(least), slopes[members][penalties == value].tolist())
+            for value in sorted(set(penalties.tolist()), reverse=True)
+        ]
+        groups.append(StepGroup(moving, inner, float(least), levels))
+    return groups, group_of_step
 
 
 # -- the costs ------------------------------------------------------------------------------

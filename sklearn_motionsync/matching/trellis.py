@@ -35,7 +35,7 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from sklearn import get_config
 
-from .costs import step_table
+from .costs import group_steps, step_table
 from .warps import even_slices
 
 __all__ = ["TIE", "Bases", "Coupling", "Tile", "Trellis", "right_factor"]
@@ -60,6 +60,9 @@ TIE = {np.dtype(np.float64): 2.0**-40, np.dtype(np.float32): 0.0}
 # three steps and five of one, on 68 and 100 frames: level at 1.2 MB for one base, 4 for several.
 SMALL_BYTES = 1_300_000, 3_000_000
 _MOST_BYTES = 15_000_000
+# Up to so many bytes the rows of a tile are kept for the back-tracking: malloc reuses such arrays.
+# Beyond, in double precision, so many bytes are, one a cell for the step that reached it.
+ROW_BYTES, CHOICE_BYTES = 32_000_000, 16_000_000
 # Up to so many pairs back-tracking in Python is faster than in NumPy.
 _FEW_PAIRS = 4
 
@@ -114,7 +117,7 @@ class Trellis:
         self.ends_at = np.arange(-self.lead, (self.width if running else self.lead) + 1)
         # The change of disparity of every step.
         self.slopes = table.steps - self.stride
-        self.groups, group_of_step = _group_steps(table, mu, self.slopes)
+        self.groups, self.group_of_step = group_steps(table, mu, self.slopes)
         # Of every step: its penalty, and the weights of |x_m|^2 and of the inner product.
         self.of_step = np.stack([mu * table.penalty, table.moving, table.inner])
         weights = [(group.moving, group.inner, group.penalty) for group in self.groups]
@@ -126,7 +129,7 @@ class Trellis:
         # Cells at both ends of a row that hold infinity.
         self.pad = int(np.abs(self.slopes).max())
         self.centre = self.width + self.pad
-        self.unit_group = group_of_step[table.steps == table.subframes][0]
+        self.unit_group = self.group_of_step[table.steps == table.subframes][0]
         self._windows = {}
 
     @classmethod
@@ -199,7 +202,8 @@ class Trellis:
         n_bases, n_frames, _ = bases.sequences.shape
         disparities = np.empty((n_bases, len(moving), n_frames), dtype=np.int32)
         costs = np.empty((n_bases, len(moving)), dtype=bases.sequences.dtype)
-        for rows, columns, tile in self.tiles_of(bases, moving, coupling):
+        n_kept = n_frames if TIE[costs.dtype] else 0
+        for rows, columns, tile in self.tiles_of(bases, moving, coupling, n_kept):
             found = tile.small_paths() if tile.is_small else tile.paths(max_bytes)
             disparities[rows, columns], costs[rows, columns] = found
         return disparities, costs
@@ -235,17 +239,19 @@ class Trellis:
             out[rows] = np.vecdot(differences, differences) + penalties.astype(out.dtype)
         return out
 
-    def tiles(self, n_bases, n_moving, n_features):
+    def tiles(self, n_bases, n_moving, n_features, n_kept=0):
         """Slices of bases and of moving sequences that cover all pairs.
 
-        The cost of a pair depends in its last bit on the tile it is computed in: jobs must share
-        whole tiles only.
+        ``n_kept`` is how many rows of choices are kept, if any are. The cost of a pair depends in
+        its last bit on the tile it is computed in: jobs must share whole tiles only.
         """
         band = 2 * self.width + 1
         cells = max(1, TILE_PRODUCT // (band * (n_features + 2)))
         n_rows = min(cells, TILE_BASES)
         if min(n_rows, n_bases) < _FEW_BASES and band * min(cells, n_moving) >= LONG_ROW:
             n_rows = 1
+        if n_kept:
+            cells = min(cells, max(1, CHOICE_BYTES // (band * n_kept)))
         if n_bases <= n_rows and 0 < n_bases * n_moving <= cells:
             return [(slice(0, n_bases), slice(0, n_moving))]
         return [
@@ -254,10 +260,10 @@ class Trellis:
             for columns in even_slices(n_moving, max(1, cells // (rows.stop - rows.start)))
         ]
 
-    def tiles_of(self, bases, moving, coupling=None):
+    def tiles_of(self, bases, moving, coupling=None, n_kept=0):
         """Yield the slices of every tile of pairs, and the tile."""
         n_bases, n_moving = len(bases.sequences), len(moving)
-        for rows, columns in self.tiles(n_bases, n_moving, moving.shape[2]):
+        for rows, columns in self.tiles(n_bases, n_moving, moving.shape[2], n_kept):
             part = bases
             if rows != slice(0, n_bases):
                 part = Bases(self, bases.sequences[rows])
@@ -280,33 +286,6 @@ class Trellis:
             high = np.minimum(self.width, np.minimum(up, down[::-1]))
             self._windows = {n_frames: (low.tolist(), high.tolist())}
         return self._windows[n_frames]
-
-
-class _Group(NamedTuple):
-    """Steps of equal weights; their smallest penalty is taken out of the levels."""
-
-    moving: float
-    inner: float
-    penalty: float
-    levels: list
-
-
-def _group_steps(table, mu, slopes):
-    """Groups of steps of equal weights, and the group of every step."""
-    weights = list(zip(table.moving.tolist(), table.inner.tolist(), strict=True))
-    unique = sorted(set(weights))
-    group_of_step = np.array([unique.index(pair) for pair in weights])
-    groups = []
-    for i, (moving, inner) in enumerate(unique):
-        members = group_of_step == i
-        penalties = mu * table.penalty[members]
-        least = penalties.min()
-        levels = [
-            (value - float(least), slopes[members][penalties == value].tolist())
-            for value in sorted(set(penalties.tolist()), reverse=True)
-        ]
-        groups.append(_Group(moving, inner, float(least), levels))
-    return groups, group_of_step
 
 
 # -- the two factors whose product is the local costs (Eq. 12), as rows of the trellis ---------
@@ -445,10 +424,12 @@ class Tile:
 
     # -- forward: the recurrence, Eq. 16 --------------------------------------
 
-    def advance(self, states, first=0, last=None):
+    def advance(self, states, first=0, last=None, choices=None):
         """Compute the rows ``S(p, .)`` from ``first`` on, before ``last``, in a ring of rows.
 
         Yields every p when its row is there. If ``first`` is not 0 its row must be there already.
+        A ring of rows ``choices`` gets the step by which each cell was reached, as its index in
+        the step table.
         """
         last = self.n_frames if last is None else last
         # Products of blocks are rounded differently: a running base must not use them.
@@ -457,10 +438,11 @@ class Tile:
         lows, highs = self.trellis.windows(self.n_frames)
         for p, local in costs(first, last, lows, highs):
             if p == 0 or p > first:
-                self.take_row(states, p, local, lows[p], highs[p])
+                chosen = None if choices is None else choices[p % len(choices)]
+                self.take_row(states, p, local, lows[p], highs[p], chosen)
             yield p
 
-    def take_row(self, states, p, local, low, high):
+    def take_row(self, states, p, local, low, high, chosen=None):
         """``S(p, .)`` of the row before it and the costs of its window, one flat array a group.
 
         Cells that no path reaches stay infinite: the windows first only grow, over
@@ -472,6 +454,8 @@ class Tile:
         if p == 0:
             unit = self.trellis.unit_group
             np.subtract(local[unit], self.trellis.groups[unit].penalty, out=new)
+        elif chosen is not None:
+            self._choose(old, start, stop, local, new, chosen[start:stop])
         else:
             first, *rest = self._levels
             total, level = self._buffers[:, : stop - start]
@@ -482,6 +466,43 @@ class Tile:
                 np.minimum(new, np.add(best, local[i], out=total), out=new)
         if self.coupling is not None:
             new += self._coupling_costs(p, low, high)
+
+    def _choose(self, old, start, stop, local, new, chosen):
+        """The same row step by step, and the step that the back-tracking would take."""
+        margin, better, index = (x[: stop - start] for x in self._choosing)
+        total, least = self._buffers[:, : stop - start]
+        chosen.fill(0)
+        for i, (shift, penalty, group) in enumerate(self._steps):
+            view = old[start - shift : stop - shift]
+            if penalty is not None:
+                view = np.add(view, penalty, out=total)
+            if i == 0:
+                np.add(view, local[group], out=new)
+                continue
+            np.add(view, local[group], out=total)
+            # The least so far, with the difference of the tie-breakers taken off.
+            so_far = new if i == 1 else np.minimum(least, new, out=least)
+            np.less(total, np.subtract(so_far, margin, out=least), out=better)
+            np.multiply(better.view(np.uint8), index.dtype.type(i), out=index)
+            np.maximum(chosen, index, out=chosen)
+            np.minimum(new, total, out=new)
+
+    @functools.cached_property
+    def _steps(self):
+        """Of every step: its shift in flat rows, its penalty beyond that of its group, if it has
+        one, and its group."""
+        trellis = self.trellis
+        beyond = trellis.of_step[0] - trellis.of_group[2, trellis.group_of_step]
+        penalties = [np.array(x, self.dtype) if x else None for x in beyond.tolist()]
+        return list(zip(trellis.slopes * self.pairs, penalties, trellis.group_of_step, strict=True))
+
+    @functools.cached_property
+    def _choosing(self):
+        """Rows: by how much a later step must be better, whether it is, and its index."""
+        n_cells = 2 * self.trellis.width + 1
+        margin = np.tile(self.tie_breakers[1], n_cells)
+        index = np.empty(margin.shape, np.min_scalar_type(len(self.trellis.slopes)))
+        return margin, np.empty(margin.shape, bool), index
 
     @functools.cached_property
     def _levels(self):
@@ -543,17 +564,20 @@ class Tile:
     def paths(self, max_bytes):
         """Disparities of the best paths, (n_bases, n_moving, P), and their costs.
 
-        If not all rows may be kept, every ``length``-th is, and the rows between two of them
-        are computed again, from the last to the first.
+        All rows are kept, or all choices. If not all of them may be, every ``length``-th row is,
+        and those between two of them are computed again, from the last to the first.
         """
         trellis, pairs = self.trellis, self.pairs
         n_frames, length = self.n_frames, self.n_frames
-        row_bytes = (2 * trellis.centre + 1) * pairs * self.dtype.itemsize
-        if row_bytes * n_frames > max_bytes:
+        n_cells, kept = (2 * trellis.centre + 1) * pairs, self.dtype
+        if n_cells * n_frames * kept.itemsize > ROW_BYTES and TIE[self.dtype]:
+            kept = self._choosing[2].dtype
+        if n_cells * n_frames * kept.itemsize > max_bytes:
             length = PRODUCT_ROWS * math.ceil(math.sqrt(n_frames) / PRODUCT_ROWS)
-        states = self.states(n_frames if length >= n_frames else 2)
+        choices = None if kept == self.dtype else np.empty((min(length, n_frames), n_cells), kept)
+        states = self.states(n_frames if length >= n_frames and choices is None else 2)
         checkpoints = {}
-        for p in self.advance(states):
+        for p in self.advance(states, choices=choices if length >= n_frames else None):
             if length < n_frames and p % length == 0:
                 checkpoints[p] = states[p % 2].copy()
         last_row = self._last_row(states)
@@ -570,11 +594,16 @@ class Tile:
         for first in range(0, n_frames, length)[::-1]:
             last = min(first + length, n_frames)
             if checkpoints:
-                states = self.states(length)
-                states[first % length] = checkpoints.pop(first)
-                for _ in self.advance(states, first, last):
+                states = self.states(length if choices is None else 2)
+                states[first % len(states)] = checkpoints.pop(first)
+                # A choice stands in the row that it leads to.
+                end = last if choices is None else min(last + 1, n_frames)
+                for _ in self.advance(states, first, end, choices):
                     pass
-            self._backtrack(states, at, first, last)
+            if choices is None:
+                self._backtrack(states, at, first, last)
+            else:
+                self._follow(choices, at, first, last)
         disparities = self._by_pair(at // pairs - trellis.centre)
         return disparities, np.maximum(costs, 0).reshape(-1, self.n_bases).T
 
@@ -601,6 +630,13 @@ class Tile:
                 value -= inner * products.ravel()
             here = here - shift.take(value.argmin(axis=0))
             at[p - 1] = here
+
+    def _follow(self, choices, at, first, last):
+        """The same by the choices."""
+        shift = self.trellis.slopes * self.pairs
+        for p in range(min(last, self.n_frames - 1), first, -1):
+            steps = choices[p % len(choices)].take(at[p])
+            np.subtract(at[p], shift.take(steps), out=at[p - 1])
 
     def _by_pair(self, at):
         """(n_bases, n_moving, P), from (P, pairs)."""

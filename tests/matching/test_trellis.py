@@ -10,7 +10,15 @@ from sklearn_motionsync.matching.trellis import Coupling, Trellis
 
 from oracle import all_free_paths, all_paths, brute_force, path_cost, plain_loops, step_costs
 
-ROOMS = pytest.mark.parametrize("small_bytes", [0, 10**6], ids=["by rows", "small"])
+KEPT = {"rows": (0, 10**9), "choices": (0, 0), "small": (10**6, 0)}
+
+
+@pytest.fixture(params=KEPT)
+def kept(request, monkeypatch):
+    """What is kept of a tile."""
+    small_bytes, row_bytes = KEPT[request.param]
+    monkeypatch.setattr(module, "SMALL_BYTES", [small_bytes] * 2)
+    monkeypatch.setattr(module, "ROW_BYTES", row_bytes)
 
 
 def draw(rng, n, n_frames, subframes=1, n_features=2, whole=False):
@@ -35,13 +43,11 @@ CASES = [
 ]
 
 
-@ROOMS
 @pytest.mark.parametrize("cost", COSTS)
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("whole", [False, True], ids=["reals", "ties"])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_best_path_equals_all_admissible_paths(case, cost, whole, dtype, small_bytes, monkeypatch):
-    monkeypatch.setattr(module, "SMALL_BYTES", [small_bytes] * 2)
+def test_best_path_equals_all_admissible_paths(case, cost, whole, dtype, kept):
     n_frames, max_rate, subframes, reach, mu = case
     costs = step_costs(cost, max_rate, subframes)
     bases, moving = draw(np.random.default_rng(n_frames), 3, n_frames, subframes, whole=whole)
@@ -103,9 +109,7 @@ def test_equal_free_ends_give_the_middle():
 
 @pytest.mark.parametrize("cost", COSTS)
 @pytest.mark.parametrize("n_bases", [1, 2])
-@ROOMS
-def test_coupled_paths_equal_all_paths(cost, n_bases, small_bytes, monkeypatch):
-    monkeypatch.setattr(module, "SMALL_BYTES", [small_bytes] * 2)
+def test_coupled_paths_equal_all_paths(cost, n_bases, kept):
     costs, rng = step_costs(cost, 2, 2), np.random.default_rng(0)
     bases, moving = rng.standard_normal((n_bases, 5, 2)), rng.standard_normal((3, 9, 2))
     coupling = Coupling(0.7, rng.uniform(-1, 1, (n_bases, 3, 5)))
@@ -171,6 +175,7 @@ def test_tile_sizes_change_no_result(n_bases, table, monkeypatch):
     monkeypatch.setattr(module, "TILE_BASES", 2)
     monkeypatch.setattr(module, "LONG_ROW", 1)
     monkeypatch.setattr(module, "PRODUCT_ROWS", 3)
+    monkeypatch.setattr(module, "CHOICE_BYTES", 1)
     monkeypatch.setattr(module, "SMALL_BYTES", [0, 0])
     np.testing.assert_allclose(trellis.distances(bases, moving), whole, rtol=1e-12)
     np.testing.assert_array_equal(trellis.paths(bases, moving), paths)
@@ -186,6 +191,27 @@ def test_little_memory_gives_the_same_bits(n_frames, n_bases, table, monkeypatch
     trellis = Trellis(table, 0.5, min(40, n_frames - 1))
     paths = trellis.paths(bases, moving)
     np.testing.assert_array_equal(trellis.paths(bases, moving, max_bytes=0), paths)
+
+
+@pytest.mark.parametrize("table", TABLES, ids=["one group", "several"])
+@pytest.mark.parametrize("whole", [False, True], ids=["reals", "ties"])
+@pytest.mark.parametrize("ends", [{}, {"free": True}], ids=["pinned", "free"])
+@pytest.mark.parametrize("max_bytes", [None, 0])
+def test_choices_give_the_paths_and_costs_of_rows(table, whole, ends, max_bytes, monkeypatch):
+    """Several sequences in a tile: to the last bit."""
+    monkeypatch.setattr(module, "SMALL_BYTES", [0, 0])
+    trellis = Trellis(table, 0.5, 12, **ends)
+    bases, moving = draw(np.random.default_rng(6), 3, 70, table.subframes, whole=whole)
+    if ends:
+        moving = np.pad(moving, ((0, 0), (trellis.width, trellis.width), (0, 0)))
+    coupling = Coupling(0.1, np.random.default_rng(7).uniform(-3, 3, (3, 4, 70)))
+    for drawn in (None, coupling):
+        kept = trellis.paths_and_costs(bases, moving, None, drawn)
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "ROW_BYTES", 0)
+            chosen = trellis.paths_and_costs(bases, moving, max_bytes, drawn)
+        for got, expected in zip(chosen, kept, strict=True):
+            np.testing.assert_array_equal(got, expected)
 
 
 @pytest.mark.parametrize("sizes", [(1, 1), (3, 100), (50, 7), (97, 203)])

@@ -92,6 +92,14 @@ def peak_of(call):
 # -- memory ---------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("cost", ["velocity", "posture"])
+def test_paths_of_long_performances_take_little_memory(cost):
+    """24 of 250 to 540 frames, 0.5 MB, whose rows of the trellis would take 180."""
+    X = [np.cumsum(walks(1, n)[0], axis=0) for n in np.linspace(250, 540, 24).astype(int)]
+    sync = DenseSynchronizer(cost=cost).fit(X)
+    assert peak_of(lambda: sync.transform(X)) < 30e6
+
+
 @pytest.mark.parametrize("settings", [{}, {"pattern": 3}, {"search": "exhaustive"}, PAPER])
 @pytest.mark.parametrize("n_jobs", [None, 2])
 def test_features_in_portions_change_nothing(monkeypatch, settings, n_jobs):
