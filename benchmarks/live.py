@@ -25,6 +25,7 @@ from events import EVENTS, P, read_actions
 from live_peers import PEERS, sampled
 from live_people import held_out
 from sklearn.metrics import roc_auc_score
+from sklearn_motionsync import DenseSynchronizer, OnlineSynchronizer
 
 ARCHIVES = {"hdm05": "HDM05", "utkinect": "UTKinect"}
 OURS = "OnlineSynchronizer"
@@ -130,7 +131,7 @@ def show_no_look_ahead(folds, cuts=8):
 
 
 def show_speed(name, fold):
-    """Frames a second of one processor, by ``step`` and by ``follow``."""
+    """Frames a second of one processor, by ``step`` and by ``follow``; what a fit adds."""
     online, clip = fold.online, fold.clips[0]
     cells = []
     for n_streams in (None, 10, 100):
@@ -149,6 +150,16 @@ def show_speed(name, fold):
     rate = sum(map(len, fold.clips)) / (time.process_time() - begin)
     cells.append(f"follow, clips: {len(fold.clips)}: {rate:,.0f}")
     print(f"   {name}, {clip.shape[1]} features: {'; '.join(cells)} frames a second", flush=True)
+    # As many clips as the calibration takes at most, and more.
+    training, took = (fold.training * 50)[:50], []
+    for _ in range(3):
+        begin = time.process_time()
+        sync = DenseSynchronizer(n_frames=P).fit(training)
+        sync.match(training)
+        between = time.process_time()
+        OnlineSynchronizer(DenseSynchronizer(n_frames=P)).fit(training)
+        took.append(time.process_time() - between - (between - begin))
+    print(f"   fit of 50 clips: {np.median(took):.2f} s beyond its synchronizer", flush=True)
 
 
 # -- what is seen otherwise -------------------------------------------------------------

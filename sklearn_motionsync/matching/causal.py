@@ -6,10 +6,11 @@ delay.
 """
 
 import numpy as np
+from scipy.signal import lfilter
 
 from .trellis import TIE, Bases, Tile, right_factor
 
-__all__ = ["CausalDerivative", "CausalTrellis", "causal_velocity"]
+__all__ = ["CausalDerivative", "CausalTrellis", "causal_costs", "causal_velocity"]
 
 # Gaps longer than this, in widths of the filter, are not bridged: the filter restarts.
 _BRIDGED = 3
@@ -26,7 +27,7 @@ class CausalDerivative:
     """
 
     def __init__(self, width, shape):
-        self._keep = float(np.exp(-1 / width)) if width > 0 else 0.0
+        self._keep = _kept_share(width)
         self._longest = max(1.0, _BRIDGED * width)
         self._last = np.full(shape, np.nan)
         # Samples since the last observation; states of both filters, and their observed weights.
@@ -89,7 +90,7 @@ def causal_velocity(positions, subframes, width):
     ----------
     positions : ndarray, shape (Q, n_features)
         ``subframes`` positions a frame. Every position is filtered with those whole frames before
-        it, as samples of a stream are.
+        it, as samples of a stream are. Without NaN.
     subframes : int
     width : float
         Time constant in frames.
@@ -98,16 +99,21 @@ def causal_velocity(positions, subframes, width):
     -------
     ndarray, shape (Q, n_features)
     """
-    n_frames = -(-(len(positions) - 1) // subframes)
-    behind = np.arange(n_frames + 1)[:, np.newaxis] * subframes - np.arange(subframes)
-    # Column k is k positions before whole frames; before the first position is rest.
-    lanes = positions[np.clip(behind, 0, len(positions) - 1)]
-    derivative = CausalDerivative(width, lanes.shape[1:])
-    found = np.stack([derivative.step(sample) for sample in lanes])
-    out = np.empty_like(positions)
-    inside = (behind >= 0) & (behind < len(positions))
-    out[behind[inside]] = found[inside]
-    return out
+    velocity = positions.copy()
+    # Before the first position is rest.
+    velocity[:subframes] -= positions[0]
+    velocity[subframes:] -= positions[:-subframes]
+    keep = _kept_share(width)
+    for lane in range(subframes):
+        for _ in range(2):
+            filtered = lfilter([1 - keep], [1, -keep], velocity[lane::subframes], axis=0)
+            velocity[lane::subframes] = filtered
+    return velocity
+
+
+def _kept_share(width):
+    """What a filter of this width keeps of its state from one sample to the next."""
+    return float(np.exp(-1 / width)) if width > 0 else 0.0
 
 
 # -- the rows of the trellis, sample by sample (Eqs. 16, 17) -----------------------------------
@@ -199,3 +205,20 @@ class CausalTrellis:
         samples, moving = parts
         right = right_factor(moving[np.newaxis])[: high + 1, 0]
         return right @ self._left(samples)
+
+
+def causal_costs(trellis, moving, base):
+    """Yield, of every sample of a whole base, the `CausalTrellis.costs` of one stream: (Q,).
+
+    Parameters
+    ----------
+    trellis : Trellis
+        With ``running=True``.
+    moving : ndarray, shape (Q, n_features)
+    base : ndarray, shape (n_samples, n_features)
+    """
+    tile = Tile(Bases(trellis, base[np.newaxis]), right_factor(moving[np.newaxis]))
+    states = tile.states(2)
+    for p in tile.advance(states):
+        row = states[p % 2, trellis.centre : trellis.centre + trellis.width + 1]
+        yield np.maximum(row, 0)

@@ -133,7 +133,7 @@ class Streams:
         self.trellis = CausalTrellis(reference.trellis, reference.moving, n_streams)
         self.mean_cost = np.zeros(n_streams)
         self._derivative = CausalDerivative(reference.width, (n_streams, n_features))
-        self._window = max(2, round(_WINDOW * reference.n_frames))
+        self._window = window_length(reference.n_frames)
         self._tolerance = max(1.0, _TOLERANCE * (reference.n_frames - 1))
         table = reference.trellis.table
         self._max_rate = table.steps.max() / table.subframes
@@ -276,6 +276,11 @@ class Resampler:
             return np.full_like(frame, np.nan)
         share = (at - self._time) / (time - self._time)
         return (1 - share) * self._frame + share * frame
+
+
+def window_length(n_frames):
+    """Samples of the window of rate and cost, of a clock of so many frames."""
+    return max(2, round(_WINDOW * n_frames))
 
 
 def stack_phases(phases):

@@ -10,7 +10,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.facts import TIMELESS
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
-from ..matching.causal import causal_velocity
+from ..matching.causal import causal_costs, causal_velocity
 from ..matching.costs import step_table
 from ..matching.filters import SMOOTHING
 from ..matching.matcher import cost_features
@@ -25,12 +25,12 @@ from ..utils.doc_links import DocumentedMixin
 from .stream import (
     LivePhase,
     Session,
-    Streams,
     check_observations,
     check_times,
     phase_probabilities,
     stack_phases,
     times_of_each,
+    window_length,
 )
 
 __all__ = ["OnlineSynchronizer", "Reference"]
@@ -486,7 +486,7 @@ def calibrate(reference_of, performances, warped, times):
         reference = reference_of((total - warped[i]) / (n - 1))
         costs, truth, largest_cost = _match_live(reference, performances[i], times[i])
         largest.append(largest_cost)
-        for k, temperature in enumerate(energy * _TEMPERATURES):
+        for k, temperature in enumerate((energy * _TEMPERATURES).tolist()):
             right = phase_probabilities(costs, temperature)[np.arange(len(costs)), truth]
             scores[k] += np.log(np.maximum(right, _MIN_PROBABILITY)).mean()
     # Copies of one performance have no costs but rounding.
@@ -495,17 +495,24 @@ def calibrate(reference_of, performances, warped, times):
 
 
 def _match_live(reference, performance, times):
-    """Path costs at even moments, the true positions there, and the largest mean cost."""
-    streams, duration = Streams(reference, 1, performance.shape[1]), len(performance) - 1
+    """Path costs at even moments, the true positions there, and the largest mean cost.
+
+    The costs are above the least of their moment, in single precision.
+    """
+    duration, last = len(performance) - 1, reference.n_frames - 1
     moments = np.arange(0, duration * (1 + 1e-9), reference.step) / duration
-    last = reference.n_frames - 1
-    costs, largest, every = [], 0.0, -(-len(moments) // _MAX_MOMENTS)
     samples = sample_at([performance], moments[np.newaxis] * last, last + 1)[0]
-    for k, sample in enumerate(samples):
-        streams.update(sample[np.newaxis])
-        largest = max(largest, streams.mean_cost[0])
+    postures = reference.unit(samples)
+    base = reference.features.compare(causal_velocity(postures, 1, reference.width), postures)
+    costs, every = [], -(-len(moments) // _MAX_MOMENTS)
+    before = mean_cost = largest = 0.0
+    window = window_length(reference.n_frames)
+    for k, row in enumerate(causal_costs(reference.trellis, reference.moving, base)):
+        least = float(row.min())
+        mean_cost += (least - before - mean_cost) / min(k + 1, window)
+        before, largest = least, max(largest, mean_cost)
         if k % every == 0:
-            costs.append(streams.trellis.costs[0])
+            costs.append((row - least).astype(np.float32))
     # Where tau is constant, any phase of that interval is right.
     rising = times + 1e-9 * np.arange(len(times))
     phases = np.interp(moments * last, rising, np.arange(len(times)))

@@ -4,7 +4,12 @@ import itertools
 
 import numpy as np
 import pytest
-from sklearn_motionsync.matching.causal import CausalDerivative, CausalTrellis, causal_velocity
+from sklearn_motionsync.matching.causal import (
+    CausalDerivative,
+    CausalTrellis,
+    causal_costs,
+    causal_velocity,
+)
 from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.trellis import Trellis
 
@@ -50,9 +55,12 @@ def test_running_trellis_equals_offline_trellis_bitwise(n_streams):
     bases, moving = rng.standard_normal((n_streams, 90, 7)), rng.standard_normal((201, 7))
     trellis = Trellis(step_table("velocity", 3, 4), 0.7, 50, running=True)
     live = CausalTrellis(trellis, moving, n_streams)
+    rows = causal_costs(trellis, moving, bases[0])
     for p in range(90):
         live.advance(bases[:, p])
+        np.testing.assert_allclose(next(rows), live.costs[0], atol=1e-9)
     assert live.n_samples == 90
+    assert list(rows) == []
     np.testing.assert_array_equal(live.costs, trellis.ends(bases, moving[np.newaxis])[:, 0])
     paths = trellis.paths(bases, moving[np.newaxis])[:, 0]
     np.testing.assert_array_equal(live.best()[0], paths[:, -1])

@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.special import log_softmax
 from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
@@ -20,7 +21,7 @@ from sklearn_motionsync.matching.causal import CausalDerivative
 from sklearn_motionsync.matching.matcher import Features
 from sklearn_motionsync.matching.units import Unit
 from sklearn_motionsync.online.stream import Streams, check_times
-from sklearn_motionsync.online.synchronizer import Reference
+from sklearn_motionsync.online.synchronizer import Reference, calibrate
 
 P = 60
 
@@ -311,6 +312,45 @@ def test_max_rate_is_bounded_by_the_pattern():
     X = [performance(20, bend)[0] for bend in (0.0, 0.3)]
     a, b = (OnlineSynchronizer(DenseSynchronizer(20), max_rate=r).fit(X) for r in (19, 1e9))
     np.testing.assert_array_equal(a.track(X), b.track(X))
+
+
+def test_calibration_equals_streams_matched_to_the_mean_of_the_others():
+    """By frames of streams: the likeliest temperature, and the median of the largest mean costs.
+
+    Of 30 performances 24 are matched; of a long one every second moment counts.
+    """
+    X = [performance(45 + i % 7, 0.03 * (i % 9 - 4), 0.02, i)[0] for i in range(30)]
+    X[0] = performance(160, -0.2, 0.02)[0]
+    live = OnlineSynchronizer(DenseSynchronizer(P, metric=None, refine=False)).fit(X)
+    match = live.synchronizer_.match(X)
+    warped, last = match.warp(X), P - 1
+
+    def reference_of(mean):
+        return Reference(live.synchronizer_.features_, mean, live.duration_, 0.1, 0.03, 3)
+
+    energy = np.square(reference_of(live.mean_).moving).sum(axis=1).mean()
+    temperatures = energy * np.geomspace(0.01, 1e3, 41)
+    scores, largest = np.zeros(41), []
+    for i in sorted({round(k * 29 / 23) for k in range(24)}):
+        others, x = np.delete(warped, i, axis=0).mean(axis=0), X[i]
+        streams, rows, mean_costs = Streams(reference_of(others), 1, 3), [], []
+        times = np.arange(0, len(x) - 1 + 1e-6, live.duration_ / last)
+        for t in times:
+            sample = [np.interp(t, np.arange(len(x)), column) for column in x.T]
+            streams.update(np.array([sample]))
+            rows.append(streams.trellis.costs[0])
+            mean_costs.append(streams.mean_cost[0])
+        largest.append(max(mean_costs))
+        clock = times / (len(x) - 1) * last
+        phases = np.interp(clock, match.times[i] + 1e-9 * np.arange(P), np.arange(P))
+        right = np.round(2 * phases).astype(int)
+        every = 2 if i == 0 else 1
+        for k, temperature in enumerate(temperatures):
+            found = log_softmax(-np.array(rows) / temperature, axis=1)[np.arange(len(rows)), right]
+            scores[k] += np.maximum(found[::every], np.log(1e-12)).mean()
+    temperature, typical_cost = calibrate(reference_of, X, warped, match.times)
+    assert temperature == pytest.approx(temperatures[scores.argmax()])
+    assert typical_cost == pytest.approx(np.median(largest), rel=1e-6)
 
 
 # -- refusals -----------------------------------------------------------------------------
