@@ -98,6 +98,7 @@ def test_skeleton_is_found_by_its_name(tmp_path):
         ("length 4", "", "line 24: bone 'thigh' needs a name of its own, a direction and a length"),
         ("    dof rx", "begin", "expected end, got 'begin rz'"),
         ("root thigh\n", "root leg\n", ":hierarchy names 'leg', which is not in :bonedata"),
+        ("thigh shin\n", "thigh shin\nleg\n", ":hierarchy names 'leg', which is not in :bonedata"),
         ("thigh shin\n", "shin thigh\n", ":hierarchy gives 'thigh' two parents"),
         ("thigh shin\n", "\n", "does not connect 1 bones to the root, 'shin' is one"),
         ("root thigh\n", "\n", "does not connect 2 bones to the root, 'shin' is one"),

@@ -173,6 +173,14 @@ def test_dissimilarity_does_not_depend_on_other_performances(n_features):
     np.testing.assert_array_equal(model.dissimilarity(new[order]), together[order])
 
 
+def test_single_precision_is_compared_in_double():
+    """Performances of float32 and the same numbers as float64 have equal dissimilarities."""
+    X, new = (curves(n, seed=n).astype("f4") for n in (9, 70))
+    model, double = ActionModel().fit(X), ActionModel().fit(X.astype("f8"))
+    np.testing.assert_array_equal(model.dissimilarity(new), double.dissimilarity(new.astype("f8")))
+    assert model.threshold_ == double.threshold_
+
+
 # -- limits -----------------------------------------------------------------------------
 
 
