@@ -70,6 +70,14 @@ def test_dissimilarity_and_threshold_equal_slow_loops(grouped, coverage):
     np.testing.assert_array_equal(model.predict(new), np.where(inside, 1, -1))
 
 
+def test_a_single_neighbour_of_another_group_decides_alone():
+    X = curves(3)
+    model = ActionModel().fit(X, groups=["a", "b", "b"])
+    others = [slow_ratio(X[0], x) for x in X[1:]]
+    expected = [np.mean(others), *others]
+    np.testing.assert_allclose(model.dissimilarities_, expected, rtol=1e-9)
+
+
 def test_dissimilarity_of_equal_still_opposite_and_distant_performances():
     X = curves(10)
     X -= X.mean(axis=1, keepdims=True)
