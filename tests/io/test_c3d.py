@@ -354,10 +354,15 @@ def test_events_of_the_header_count_from_the_first_frame(tmp_path):
         ]
 
 
-def test_first_frame_may_take_two_words_or_be_0(tmp_path):
+def test_first_frame_may_take_one_word_or_two_or_be_0(tmp_path):
     trial = {"ACTUAL_START_FIELD": words(10, 2), "ACTUAL_END_FIELD": words(49, 2)}
     events = {"EVENT": event_parameters()}
-    for first, others, expected in ((65535, {"TRIAL": trial}, 2 * 65536 + 10), (0, {}, 0)):
+    one_word = {"ACTUAL_START_FIELD": words(7)}
+    for first, others, expected in (
+        (65535, {"TRIAL": trial}, 2 * 65536 + 10),
+        (1, {"TRIAL": one_word}, 7),
+        (0, {}, 0),
+    ):
         header = {"first": first, "last": min(first + 39, 65535)}
         content = c3d(tracks(), header=header, others=others | events)
         df = read_motion(put(tmp_path, content, "a.c3d"))
