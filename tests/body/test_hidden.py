@@ -153,6 +153,13 @@ def test_last_heading_stays_where_hips_and_shoulders_are_hidden(fitted):
     np.testing.assert_allclose(faces, [0, 0, 30, 0], atol=1e-9)
 
 
+@pytest.mark.parametrize("size", [0, 1e-9, 1e-12])
+def test_vertical_hips_show_no_heading(size):
+    """What is left of them across is rounding: the heading before them stays, not that."""
+    hips = np.array([[0.6, 0, 0.8], [-size, 1, size], [np.nan] * 3])
+    np.testing.assert_allclose(heading_axes_with_gaps(hips)[2, 0], hips[0])
+
+
 def test_limbs_before_the_first_heading_are_nan(fitted):
     x = turning([20, 20, 20, 20], [15, 15, 15, 15])
     x = hide(hide(x, [0, 1], "left_hip"), [0], "left_shoulder")

@@ -51,6 +51,16 @@ def test_root_starts_at_its_position_and_orientation(tmp_path):
     np.testing.assert_allclose(joint(df, "thigh")[0] / INCH, [6, 3, 4])
 
 
+def test_lines_that_are_left_out_have_defaults(tmp_path):
+    """A place, an orientation and axes of 0, in the order XYZ, in units of 1."""
+    asf = ASF.replace("length 0.5", "length 1").replace("0 0 90 XYZ", "0 0 0 XYZ")
+    expected = acclaim(tmp_path, asf)
+    for line in ("  length 1", "  angle deg", "  axis XYZ", "  position 0 0 0",
+                 "  orientation 0 0 0", "    axis 0 0 0 XYZ"):  # fmt: skip
+        assert f"{line}\n" in asf
+        pd.testing.assert_frame_equal(acclaim(tmp_path, asf.replace(f"{line}\n", "")), expected)
+
+
 def test_hierarchy_may_have_any_order(tmp_path):
     expected = acclaim(tmp_path)
     asf = ASF.replace("root thigh\n    thigh shin", "thigh shin\n    root thigh")
@@ -62,10 +72,12 @@ def test_hierarchy_may_have_any_order(tmp_path):
 
 def test_angles_may_be_radians(tmp_path):
     expected = acclaim(tmp_path)
-    asf = ASF.replace("angle deg", "angle rad").replace("0 0 90", f"0 0 {np.pi / 2}")
+    asf = ASF.replace("angle deg", "angle Radians").replace("0 0 90", f"0 0 {np.pi / 2}")
     amc = AMC.replace("90", f"{np.pi / 2}").replace(":DEGREES\n", "")
     pd.testing.assert_frame_equal(acclaim(tmp_path, asf, amc), expected)
     pd.testing.assert_frame_equal(acclaim(tmp_path, asf, AMC), expected)
+    asf = ASF.replace("angle deg", "angle degrees")
+    pd.testing.assert_frame_equal(acclaim(tmp_path, asf), expected)
 
 
 def test_frame_rate_is_the_stated_one(tmp_path):
@@ -98,6 +110,7 @@ def test_skeleton_is_found_by_its_name(tmp_path):
         ("length 4", "", "line 24: bone 'thigh' needs a name of its own, a direction and a length"),
         ("    dof rx", "begin", "expected end, got 'begin rz'"),
         ("root thigh\n", "root leg\n", ":hierarchy names 'leg', which is not in :bonedata"),
+        ("thigh shin\n", "thigh shin\nleg\n", ":hierarchy names 'leg', which is not in :bonedata"),
         ("thigh shin\n", "shin thigh\n", ":hierarchy gives 'thigh' two parents"),
         ("thigh shin\n", "\n", "does not connect 1 bones to the root, 'shin' is one"),
         ("root thigh\n", "\n", "does not connect 2 bones to the root, 'shin' is one"),

@@ -145,6 +145,7 @@ def test_words_that_are_not_numbers_are_refused(tmp_path, word):
     ("row", "message"),
     [
         ("1 1e12 3", "needs finite numbers .*got '1e12'"),
+        ("1 2 -1e12", "needs finite numbers .*got '-1e12'"),
         ("1 2", "needs 3 numbers, got 2 \\('1 2'\\)"),
         ("1 2 3 4 5 6", "needs 3 numbers, got 6"),
     ],
@@ -184,6 +185,7 @@ def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame T
         (small(motion="Frames: 1\nFrame Time: 0\n1 2 3"), "Frame Time: must be above 0"),
         (small(motion="Frames: 1\nFrame Time: inf\n1 2 3"), "Frame Time: needs finite numbers"),
         (small(motion="Frames: 9999999999\nFrame Time: 1\n1 2 3\n"), "but only 6 bytes follow"),
+        (small(motion="Frames: 1\nFrame Time: 1\n1 2\n"), "but only 4 bytes follow"),
         (small(motion="Frames: 2\nFrame Time: 1\n1.00 2.00 3.00\n"), "2, but 1 frames follow"),
         (small(motion="Frames: 1\nFrame Time: 1\n1 2 3\n4 5 6\n"), "1, but 2 frames follow"),
         (small(motion="Frames: 1\nFrame Time: 1\n1 2 \n"), r"line 10: a frame .* needs 3 numbers"),

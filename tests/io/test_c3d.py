@@ -59,6 +59,17 @@ def test_number_of_frames_is_the_one_that_fits_the_size(tmp_path):
     assert len(read_motion(path)) == n
 
 
+@pytest.mark.parametrize("first", [1, 65530])
+def test_number_of_frames_may_be_that_of_the_limits_of_the_trial(tmp_path, first):
+    """Of two words each, the lower first; the header is wrong."""
+    trial = {
+        f"ACTUAL_{end}_FIELD": words(frame, frame >> 16)
+        for end, frame in (("START", first), ("END", first + 39))
+    }
+    content = c3d(tracks(), header={"last": 4}, changes={"FRAMES": None}, others={"TRIAL": trial})
+    assert len(read_motion(put(tmp_path, content, "a.c3d"))) == 40
+
+
 def test_floats_are_not_scaled(tmp_path):
     positions = tracks()
     other = {"SCALE": (4, [], struct.pack("<f", -0.1))}
@@ -80,6 +91,22 @@ def test_parameters_end_at_the_data_whatever_their_stated_length(tmp_path):
     end = content.index(b"N4") - 2
     junk = content[:end] + b"\0\0" + b"\xff" * 100 + content[end + 102 :]
     assert len(read_motion(put(tmp_path, junk, "a.c3d"))) == 40
+
+
+def test_bytes_too_few_for_a_parameter_are_none(tmp_path):
+    """Four of any value, between the last parameter and the data, which begin a block."""
+
+    def made(n):
+        notes = {f"N{i}": texts("x" * 200) for i in range(3)} | {"LAST": texts("x" * n)}
+        content = c3d(tracks(), others={"NOTES": notes})
+        data = 512 * (content[16] - 1)
+        return content, data, content.rindex(b"x", 0, data) + 2
+
+    _, data, end = made(1)
+    content, data, end = made(1 + data - end - 4)
+    assert data - end == 4
+    content = content[:end] + b"\1\1\1\1" + content[data:]
+    assert len(read_motion(put(tmp_path, content, "a.c3d"))) == 40
 
 
 @pytest.mark.parametrize(("machine", "order"), [(86, "<"), (84, ">")])
@@ -327,10 +354,15 @@ def test_events_of_the_header_count_from_the_first_frame(tmp_path):
         ]
 
 
-def test_first_frame_may_take_two_words_or_be_0(tmp_path):
+def test_first_frame_may_take_one_word_or_two_or_be_0(tmp_path):
     trial = {"ACTUAL_START_FIELD": words(10, 2), "ACTUAL_END_FIELD": words(49, 2)}
     events = {"EVENT": event_parameters()}
-    for first, others, expected in ((65535, {"TRIAL": trial}, 2 * 65536 + 10), (0, {}, 0)):
+    one_word = {"ACTUAL_START_FIELD": words(7)}
+    for first, others, expected in (
+        (65535, {"TRIAL": trial}, 2 * 65536 + 10),
+        (1, {"TRIAL": one_word}, 7),
+        (0, {}, 0),
+    ):
         header = {"first": first, "last": min(first + 39, 65535)}
         content = c3d(tracks(), header=header, others=others | events)
         df = read_motion(put(tmp_path, content, "a.c3d"))

@@ -78,6 +78,8 @@ def test_missing_values_of_other_dtypes_are_gaps():
     for other in (df.convert_dtypes(), df.astype(object).where(df.notna(), None)):
         pd.testing.assert_frame_equal(find_gaps(other), find_gaps(df))
         pd.testing.assert_frame_equal(fill_gaps(other, 9), fill_gaps(df, 9))
+    single = df.astype("f4")
+    pd.testing.assert_frame_equal(fill_gaps(single, 9), fill_gaps(single.astype("f8"), 9))
 
 
 def one_changed(value):

@@ -170,6 +170,7 @@ def test_single_frame_has_the_stated_rate(tmp_path):
         (("\n9\t0.160\t", "\n9\t0.160\t7\t"), "line 15: .* 11 in all, got 12"),
         (("\n9\t0.160\t", "\n9\t0.160\tx"), "line 15: a frame needs numbers, or nothing .* got 'x"),
         (("\n9\t0.160\t", "\n9\t0.160\t1_"), "got '1_"),
+        (("\n9\t0.160\t", "\n9\t0.1_60\t"), "line 15: a frame needs numbers, .* got '0.1_60'"),
         ((BODY, ""), "line 5: the file ends where frames should follow; it is not complete"),
         ((TEXT, ""), "line 0: expected 'PathFileType'"),
     ],

@@ -42,6 +42,14 @@ def test_accepts_postures_inside_in_every_feature(model):
     assert model.accepts(np.array(postures), np.int64(4)).dtype == bool
 
 
+def test_postures_are_compared_in_the_precision_of_the_model(performances):
+    """One at the bound is accepted, however many digits it is given with."""
+    model = ActionModel().fit(performances.astype("f4"))
+    lower, upper = (bound[4].astype("f8") for bound in model.envelope())
+    assert model.accepts([lower - 1e-12, upper + 1e-12], 4).all()
+    assert not model.accepts([lower - 1e-3, upper + 1e-3], 4).any()
+
+
 # -- scores and samples ------------------------------------------------------------------
 
 

@@ -101,6 +101,17 @@ def test_every_posture_is_inside(n_std, dtype):
         assert inside(drawn, X, n_std)
 
 
+def test_samples_near_an_outlier_are_as_far_away_as_it_is():
+    """10 deviations; the envelope of 50 does not change them."""
+    X = np.eye(100)[:, :1]
+    near = [x for x in postures_of(X, 5000, n_std=50)[:, 0] if x > 0.5]
+    assert 20 < len(near) < 100
+    # The share of one training posture in the variance, 0.84, and of a mixture and noise, 0.16.
+    expected = X.mean() + np.sqrt(0.84) * (1 - X.mean())
+    np.testing.assert_allclose(np.mean(near), expected, atol=0.02)
+    np.testing.assert_allclose(np.std(near), np.sqrt(0.16) * X.std(), rtol=0.3)
+
+
 def test_constant_features_stay_constant():
     X = np.column_stack([np.full(8, 2.5), np.arange(8.0)])
     drawn = postures_of(X, 100)

@@ -70,6 +70,14 @@ def test_dissimilarity_and_threshold_equal_slow_loops(grouped, coverage):
     np.testing.assert_array_equal(model.predict(new), np.where(inside, 1, -1))
 
 
+def test_a_single_neighbour_of_another_group_decides_alone():
+    X = curves(3)
+    model = ActionModel().fit(X, groups=["a", "b", "b"])
+    others = [slow_ratio(X[0], x) for x in X[1:]]
+    expected = [np.mean(others), *others]
+    np.testing.assert_allclose(model.dissimilarities_, expected, rtol=1e-9)
+
+
 def test_dissimilarity_of_equal_still_opposite_and_distant_performances():
     X = curves(10)
     X -= X.mean(axis=1, keepdims=True)
@@ -173,6 +181,14 @@ def test_dissimilarity_does_not_depend_on_other_performances(n_features):
     np.testing.assert_array_equal(model.dissimilarity(new[order]), together[order])
 
 
+def test_single_precision_is_compared_in_double():
+    """Performances of float32 and the same numbers as float64 have equal dissimilarities."""
+    X, new = (curves(n, seed=n).astype("f4") for n in (9, 70))
+    model, double = ActionModel().fit(X), ActionModel().fit(X.astype("f8"))
+    np.testing.assert_array_equal(model.dissimilarity(new), double.dissimilarity(new.astype("f8")))
+    assert model.threshold_ == double.threshold_
+
+
 # -- limits -----------------------------------------------------------------------------
 
 
@@ -183,6 +199,16 @@ def test_static_performances_are_compared_by_postures():
     near = 1.1 + np.linspace(0, 0.05, 5)[:, np.newaxis] * [1, 1]
     new = [np.full((5, 2), 1.15), near, np.full((5, 2), 5.0), moving]
     assert model.predict(new).tolist() == [1, 1, -1, -1]
+
+
+def test_dissimilarity_of_static_performances_is_that_of_their_postures():
+    """A tenth of the squared distance, as a share of the variance of all postures."""
+    held = np.array([0.9, 1.0, 1.1, 1.2, 1.3])
+    model = ActionModel().fit([np.full((7, 2), v) for v in held])
+    found = model.dissimilarity([np.full((7, 2), v) for v in (1.15, 1.3, 5.0)])
+    nearest = np.array([[0.05, 0.05], [0, 0.1], [3.7, 3.8]])
+    expected = 0.1 * np.square(nearest).mean(axis=1) / held.var()
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_standing_still_is_rejected_however_people_differ():
