@@ -1,5 +1,6 @@
 """The base of the transformers of joint positions: what they accept, and the body they see."""
 
+import warnings
 from typing import NamedTuple
 
 import numpy as np
@@ -96,6 +97,8 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
 
     # How `check_performances` treats NaN; "allow-nan" admits hidden joints.
     _finite = True
+    # Lengths count in those of the body, so units do not matter.
+    _facts = "frame_rate", "up"
 
     fit_transform = atomic_fit(TransformerMixin.fit_transform)
 
@@ -147,6 +150,16 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
         # All tables of a list have the column names of the first.
         first = X[0] if isinstance(X, (list, tuple, np.ndarray)) else X
         check_columns(first, skeleton, "Performance 0")
+        for i, facts in enumerate(performances.facts):
+            up = facts.get("up", skeleton.up)
+            if up != skeleton.up:
+                warnings.warn(
+                    f"{performances.called(i)} has the vertical axis {up!r} in its attrs, and the "
+                    f"skeleton {skeleton.up!r}. Use Skeleton.from_frame(x), or set x.attrs['up'].",
+                    UserWarning,
+                    stacklevel=2,
+                )
+                break
         return performances
 
     def _body(self, performances, i):

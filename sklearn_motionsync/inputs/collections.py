@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
+from .facts import facts_of
 from .numbers import (
     FLOATS,
     LARGEST,
@@ -69,7 +70,11 @@ class Performances(tuple):
         Names of the levels of an index; the last is that of the frames.
     numbers : sequence of int
         The index of each in all that was given.
+    facts : list of dict
+        What the tables say of each, from `facts_of`; empty without tables.
     """
+
+    facts = ()
 
     def __new__(cls, arrays, kind, labels, frames=(), names=None, levels=INDEX_NAMES, numbers=None):
         self = super().__new__(cls, arrays)
@@ -140,9 +145,11 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
             )
         arrays.append(array)
         if array.shape[1] != arrays[0].shape[1]:
+            turned = all(len(other) == len(arrays[0]) < min(other.shape[1:]) for other in arrays)
             raise ValueError(
                 f"{what()} has {array.shape[1]} features a frame, performance {numbers[0]} has "
                 f"{arrays[0].shape[1]}. All performances need the same features in the same order."
+                + (" If they are (n_features, n_frames), give [x.T for x in X]." if turned else "")
             )
         if tables and column_names(x) != names:
             raise ValueError(
@@ -171,7 +178,10 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
         dtype = np.float32 if {a.dtype for a in arrays} == {np.dtype(np.float32)} else np.float64
     # Row by row in memory, so that no result depends on the layout of the input.
     arrays = [np.ascontiguousarray(a, dtype=dtype) for a in arrays]
-    return Performances(arrays, "list", labels, frames, names, levels, numbers)
+    performances = Performances(arrays, "list", labels, frames, names, levels, numbers)
+    if tables:
+        performances.facts = [facts_of(x) for x in sequences]
+    return performances
 
 
 # -- kinds of collections -----------------------------------------------------------
@@ -179,6 +189,7 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
 
 def as_collection(X):
     """The performances of a collection as a list; None for what scikit-learn calls 2-D."""
+    _refuse_containers(X)
     X = as_pandas(X)
     if isinstance(X, pd.DataFrame):
         if X.index.nlevels < 2:
@@ -203,6 +214,27 @@ def as_collection(X):
         )
     source = as_source(X)
     return None if source is None else [source[i] for i in range(len(source))]
+
+
+# Containers of other packages, by package and class, and the way from them to a list.
+_CONTAINERS = {
+    ("xarray", "Dataset"): "sklearn_motionsync.io.from_poses(X) gives the performances of one; of "
+    "several, [x for poses in X for x in from_poses(poses)].",
+    ("skfda", "FDataGrid"): "Give list(X.data_matrix).",
+}
+_NESTED = "A cell of the table holds a series. Give [np.column_stack(row) for row in X.to_numpy()]."
+
+
+def _refuse_containers(X):
+    """Refuse what other packages keep performances in, alone or in a list."""
+    items = X if isinstance(X, (list, tuple)) else [X]
+    for kind in set(map(type, items)):
+        way = _CONTAINERS.get((kind.__module__.partition(".")[0], kind.__name__))
+        if way:
+            raise ValueError(f"{ACCEPTED}, got {kind.__name__}. {way}")
+    table = isinstance(X, pd.DataFrame) and X.shape[1] > 0
+    if table and X.dtypes.iloc[0].kind == "O" and any(map(_depth, X.iloc[:1, 0])):
+        raise ValueError(f"{ACCEPTED}. {_NESTED}")
 
 
 def _members(X):

@@ -7,8 +7,8 @@ import pandas as pd
 
 from .collections import NOT_ONE, as_collection, check_members
 from .numbers import refuse_non_numeric
+from .recorded import CLOCK, Recorded
 from .resampling import (
-    attrs_of_rows,
     even_grid,
     find_time_gaps,
     interpolate,
@@ -65,10 +65,12 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
         One ``(n_frames_i, n_features)`` frame a performance, in order of first appearance, indexed
         by the frame level, the time, or 0, 1, ... What ``by`` and ``time`` name are no features.
         ``attrs["performance"]`` is the label, a tuple if several levels name the performance,
-        ``attrs["levels"]`` the names of the levels, and ``attrs["resampled"]``, with a ``time``,
-        whether frames were interpolated. A table without ``by`` keeps the label that it has. Other
-        ``attrs`` stay; what `io.read_motion` puts there of times, frame rate and events is
-        that of the frames returned.
+        ``attrs["levels"]`` the names of the levels. With a ``time``, ``attrs["resampled"]`` is
+        whether frames were interpolated, and ``attrs["clock"]`` the time of the first frame and the
+        step to the next. A table without ``by`` keeps the label that it has. Other ``attrs`` stay;
+        what `io.read_motion` puts there of times, frame rate and events is that of the frames
+        returned. The index of the table tells which frames of the recording its rows are, as after
+        ``df.iloc[10:]``; where it does not, as it holds text, events and frame rate are left out.
 
     Raises
     ------
@@ -149,12 +151,13 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
     if not keys and own_label(df)[0] is not None:
         label, names = own_label(df)
         labels = [label]
+    recording = Recorded(df)
     if time is None:
         level = ROW if FRAME in names else None
         sequences = []
         for rows, label in zip(parts, labels, strict=True):
             x = _rows(features, rows, pd.RangeIndex(len(rows), name=level))
-            attrs = attrs_of_rows(df.attrs, rows, len(df))
+            attrs = recording.attrs_of(rows)
             sequences.append(labelled(x, label, (*names, level or FRAME), attrs))
         return sequences
     clock = flat[time]
@@ -170,8 +173,9 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
             columns = {k: interpolate(x.iloc[:, k], times, grid) for k in range(x.shape[1])}
             index = pd.Index(grid, name=time)
             x = pd.DataFrame(columns, index=index).set_axis(x.columns, axis=1)
-        attrs = attrs_of_rows(df.attrs, rows, len(df), times, grid)
-        sequences.append(labelled(x, label, (*names, time), attrs, resampled=grid is not None))
+        attrs = recording.attrs_of(rows, times, grid) | {"resampled": grid is not None}
+        attrs[CLOCK] = _clock(times if grid is None else grid)
+        sequences.append(labelled(x, label, (*names, time), attrs))
     return sequences
 
 
@@ -320,6 +324,12 @@ def _check_gaps(timed, labels, max_gap_time):
             "evenly spaced: bridge gaps by straight lines with max_gap_time="
             f"{end - start:.7g}, or leave such performances out."
         )
+
+
+def _clock(times):
+    """The first of even times, and their step."""
+    step = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1
+    return float(times[0]), float(step)
 
 
 def _rows(features, rows, index):

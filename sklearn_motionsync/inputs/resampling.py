@@ -9,10 +9,11 @@ from .numbers import as_numbers
 
 __all__ = [
     "as_frame_rates",
-    "attrs_of_rows",
     "even_grid",
     "find_time_gaps",
     "interpolate",
+    "is_even",
+    "rounded_rate",
     "times_as_numbers",
     "warn_of_uneven",
 ]
@@ -82,7 +83,7 @@ def even_grid(times, frame_rate, what):
     duration, n_steps = times[-1] - times[0], len(times) - 1
     slack = _slack(times)
     keeps_rate = frame_rate is None or abs(duration - n_steps / frame_rate) <= slack
-    if keeps_rate and _is_even(times, slack):
+    if keeps_rate and is_even(times):
         return None
     if frame_rate is None:
         n_steps = round(duration / float(np.median(np.diff(times))))
@@ -115,7 +116,7 @@ def warn_of_uneven(sequences):
             continue
         label, name = x.attrs["performance"], x.index.name
         times = times_as_numbers(x.index, f"The time of performance {label!r}")
-        if not np.isfinite(times).all() or _is_even(times, _slack(times)):
+        if not np.isfinite(times).all() or is_even(times):
             continue
         steps = np.diff(times)
         worst, what = steps.argmax(), "frame" if name is None else name
@@ -136,78 +137,9 @@ def interpolate(column, times, grid):
     return np.interp(grid, times, column).astype(column.dtype, copy=False)
 
 
-def attrs_of_rows(attrs, rows, n_rows, times=None, grid=None):
-    """The ``attrs`` of a recording, its clock and events moved to the frames of a performance.
-
-    Parameters
-    ----------
-    attrs : dict
-        Of the table, as `io.read_motion` gives it.
-    rows : ndarray of int
-        Which of the ``n_rows`` of the table are in the performance, in its order.
-    times : ndarray, default=None
-        Of these rows, in any unit.
-    grid : ndarray, default=None
-        The even times that replace them.
-
-    Returns
-    -------
-    dict
-    """
-    facts = dict(attrs)
-    seconds, rate = facts.pop("times", None), facts.get("frame_rate")
-    events = facts.pop("events", None)
-    if rows[0]:
-        facts.pop("first_frame", None)
-        if rate and "first_time" in facts:
-            facts["first_time"] += rows[0] / rate
-    if seconds is not None and len(seconds) == n_rows:
-        seconds = np.asarray(seconds, dtype=np.float64)[rows]
-        facts |= _clock_of(seconds if grid is None else np.interp(grid, times, seconds))
-    elif rate and grid is not None:
-        facts["frame_rate"] = _rounded(rate * np.median(np.diff(times)) / (grid[1] - grid[0]))
-    if isinstance(events, (list, tuple)) and (np.diff(rows) > 0).all():
-        n_frames = len(rows if grid is None else grid)
-        moved = [_move_event(event, rows, times, grid) for event in events]
-        whole = len(rows) == n_rows
-        facts["events"] = [
-            event
-            for event in moved
-            if whole or event.get("frame") is None or 0 <= event["frame"] <= n_frames - 1
-        ]
-    return facts
-
-
-def _clock_of(seconds):
-    """The frame rate of even times, or the times."""
-    clock = {"first_time": float(seconds[0])}
-    if len(seconds) > 1 and _is_even(seconds, _slack(seconds)):
-        rate = (len(seconds) - 1) / (seconds[-1] - seconds[0])
-        return clock | {"frame_rate": _rounded(rate)}
-    return clock | {"times": seconds.tolist()}
-
-
-def _rounded(rate):
+def rounded_rate(rate):
+    """A frame rate without the rounding of the times that it comes from."""
     return float(f"{rate:.9g}")
-
-
-def _move_event(event, rows, times, grid):
-    """An event at its frame in the performance."""
-    if not isinstance(event, dict) or event.get("frame") is None:
-        return event
-    own = np.arange(len(rows))
-    place = _on_line(event["frame"], rows, own)
-    if grid is not None:
-        place = _on_line(_on_line(place, own, times), grid, np.arange(len(grid)))
-    return event | {"frame": round(float(place), 5)}
-
-
-def _on_line(x, xs, ys):
-    """Interpolate between points that increase, and extrapolate at their mean slope."""
-    if xs[0] <= x <= xs[-1]:
-        return np.interp(x, xs, ys)
-    end = 0 if x < xs[0] else -1
-    return ys[end] + (x - xs[end]) * (ys[-1] - ys[0]) / max(xs[-1] - xs[0], 1e-300)
 
 
 def _slack(times):
@@ -228,12 +160,12 @@ def _slack(times):
     return slack
 
 
-def _is_even(times, slack):
-    """Whether times are even but for rounding by ``slack``."""
+def is_even(times):
+    """Whether times are even but for rounding."""
     frames = np.arange(len(times)) - (len(times) - 1) / 2
     slope = frames @ times / max(frames @ frames, 1e-300)
     # Rounding moves a time by half a digit up or down.
-    return np.ptp(times - slope * frames) < 0.999 * slack
+    return np.ptp(times - slope * frames) < 0.999 * _slack(times)
 
 
 def as_frame_rates(frame_rate, n_sequences):

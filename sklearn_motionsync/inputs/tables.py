@@ -210,9 +210,9 @@ def stack_frame(arrays, labels, frames, columns, levels=INDEX_NAMES):
     return pd.DataFrame(np.concatenate(list(arrays)), index=index, columns=columns)
 
 
-def labelled(x, label, levels, attrs, **more):
+def labelled(x, label, levels, attrs):
     """A performance with its label and the names of its levels in ``attrs``, beside other facts."""
-    x.attrs = {**attrs, _LABEL: label, _LEVELS: tuple(levels), **more}
+    x.attrs = {**attrs, _LABEL: label, _LEVELS: tuple(levels)}
     return x
 
 

@@ -4,8 +4,10 @@ import math
 from collections import Counter
 from numbers import Real
 
+import numpy as np
 import pandas as pd
 
+from ..inputs.recorded import Recorded
 from ..inputs.tables import FRAME, label_of_part
 
 _HELP = (
@@ -21,8 +23,10 @@ def cut_at_events(df, start, stop=None, *, performance=None):
     ----------
     df : DataFrame (n_frames, n_features)
         A recording whose ``attrs["events"]`` are as `read_motion` returns them: a list of dicts
-        with ``label``, ``context`` and ``frame``, the position in the rows, from 0, with
-        fractions. Every group of a C3D file has them at its own frame rate.
+        with ``label``, ``context`` and ``frame``, from 0, with fractions. Every group of a C3D file
+        has them at its own frame rate. Frames are looked up in the index, so that rows may have
+        been selected before: ``df.iloc[10:]`` begins with frame 10, and ``df.iloc[::2]`` has every
+        second frame.
     start : str or (str, str)
         Label of the events at which a performance begins, or label and context: ``"Foot Strike"``,
         ``("Foot Strike", "Left")``. Case is ignored.
@@ -36,17 +40,19 @@ def cut_at_events(df, start, stop=None, *, performance=None):
     -------
     list of DataFrame (n_frames_i, n_features)
         The performances by time, one for each `start` that is followed by a `stop`. Both are
-        included, rounded to whole frames, and frames are indexed from 0. A performance is left
-        out if another `start` comes before its `stop`, or if one of them lies outside of the
-        recording. The list is empty if none is complete. The ``attrs`` of a performance are those
-        of the recording, with these changed or added:
+        included, rounded to the frames that the recording has, and frames are indexed from 0. A
+        performance is left out if another `start` comes before its `stop`, or if one of them lies
+        outside of the recording. The list is empty if none is complete. The ``attrs`` of a
+        performance are those of the recording, with these changed or added:
 
         events : list of dict
             The events within the performance, with ``frame`` counted from its first frame. The
             events at its two ends are left out, so that the others are key-frames for
             `KeyframeSynchronizer`.
         rows : list of int
-            Its first and last row in the recording.
+            Its first and last frame, as events count them in the recording.
+        frame_rate : float
+            That of its rows, half of the recording's in ``df.iloc[::2]``.
         first_frame : int
             The number of its first frame in the trial, if the recording has ``first_frame``.
         first_time, times : float, list of float
@@ -59,7 +65,8 @@ def cut_at_events(df, start, stop=None, *, performance=None):
     ------
     ValueError
         If the recording has no events, or none of `start` or `stop`; the message lists those that
-        it has.
+        it has. If the index does not tell which frames the rows are, or not in order, or frames of
+        a performance are missing.
 
     See Also
     --------
@@ -89,12 +96,13 @@ def cut_at_events(df, start, stop=None, *, performance=None):
     events = _read_events(df)
     starts = _select(events, start, "start")
     stops = starts if stop is None else _select(events, stop, "stop")
+    recording = _Frames(df)
     parts = []
-    for begin, end in _pair(starts, stops):
-        first, last = _row(begin), _row(end)
-        if first >= 0 and last < len(df):
-            others = [event for event in events if event is not begin and event is not end]
-            parts.append(_cut(df, first, last, others))
+    for begin, end in _pair(starts, stops, recording.place):
+        others = [event for event in events if event is not begin and event is not end]
+        rows = recording.rows_between(begin, end)
+        if rows is not None:
+            parts.append(_cut(df, recording, rows, others))
     whole = df.attrs.get("performance") if performance is None else performance
     for i, part in enumerate(parts):
         part.attrs |= {"performance": i, "levels": ("performance", FRAME)}
@@ -144,37 +152,75 @@ def _words(event):
     return [str(event.get(key) or "").strip().casefold() for key in ("label", "context")]
 
 
-def _row(event):
-    return math.floor(event["frame"] + 0.5)
+class _Frames(Recorded):
+    """Where events lie among the frames of a recording, of which rows may have been taken out."""
+
+    def __init__(self, df):
+        super().__init__(df)
+        if self.frames is None:
+            raise ValueError(
+                f"The index of this recording, {df.index[:3].tolist()!r:.100} ..., does not tell "
+                "which frames its rows are, so that its events are not found. Cut before the index "
+                "is changed; if no row was taken out, df.reset_index(drop=True) numbers them."
+            )
+        back = np.flatnonzero(np.diff(self.frames) <= 0)
+        if len(back):
+            row = int(back[0])
+            raise ValueError(
+                f"The rows of this recording are not in order of time: frame "
+                f"{self.frames[row + 1]} follows frame {self.frames[row]}. Cut it before rows are "
+                "rearranged, or sort it by df.sort_index()."
+            )
+
+    def place(self, event):
+        """The frame next to an event: steps from the first row, where no row is missing."""
+        start = self.frames[0] if len(self.frames) else 0
+        return math.floor((event["frame"] - start) / self.step + 0.5)
+
+    def rows_between(self, begin, end):
+        """The rows from one event to another; None if one of them is outside of the recording."""
+        if not len(self.frames):
+            return None
+        places = np.arange(self.place(begin), self.place(end) + 1)
+        frames = self.frames[0] + places * self.step
+        if frames[0] < self.frames[0] or frames[-1] > self.frames[-1]:
+            return None
+        rows = np.minimum(np.searchsorted(self.frames, frames), len(self.frames) - 1)
+        missing = frames[self.frames[rows] != frames]
+        if len(missing):
+            raise ValueError(
+                f"Between {begin['label']!r} at frame {begin['frame']:g} and {end['label']!r} at "
+                f"frame {end['frame']:g} the recording has no row of frame {missing[0]}, one of "
+                f"{len(missing)} that are missing there, and frames count as evenly spaced. Cut "
+                "the recording before rows are dropped, as by dropna, or fill its gaps."
+            )
+        return rows
 
 
-def _pair(starts, stops):
+def _pair(starts, stops, place):
     """Every start with the next stop, if no other start lies between them."""
     for i, start in enumerate(starts):
-        stop = next((event for event in stops if _row(event) > _row(start)), None)
+        stop = next((event for event in stops if place(event) > place(start)), None)
         if stop is None:
             continue
         others = (event for event in starts[i + 1 :] if event is not stop)
         # Two starts in the same row are one: the last of them counts.
-        if not any(_row(start) <= _row(other) < _row(stop) for other in others):
+        if not any(place(start) <= place(other) < place(stop) for other in others):
             yield start, stop
 
 
-def _cut(df, first, last, events):
-    """The rows first to last, with the ``attrs`` that belong to them."""
-    part = df.iloc[first : last + 1].set_axis(pd.RangeIndex(last - first + 1, name="frame"))
-    attrs = df.attrs | {"rows": [first, last]}
+def _cut(df, recording, rows, events):
+    """Some rows, with the ``attrs`` that belong to them."""
+    part = df.iloc[rows].set_axis(pd.RangeIndex(len(rows), name=FRAME))
+    first, last = recording.frames[rows[[0, -1]]].tolist()
+    attrs = recording.attrs_of(rows) | {"rows": [first, last]}
     attrs["events"] = [
-        event | {"frame": round(event["frame"] - first, 5)}
+        event | {"frame": round((event["frame"] - first) / recording.step, 5)}
         for event in events
         if first < event["frame"] < last
     ]
-    if isinstance(number := attrs.get("first_frame"), int):
+    if isinstance(number := df.attrs.get("first_frame"), int):
         attrs["first_frame"] = number + math.floor(first / _rows_per_frame(attrs))
-    if (times := attrs.get("times")) is not None:
-        attrs |= {"times": times[first : last + 1], "first_time": times[first]}
-    elif attrs.get("frame_rate") and "first_time" in attrs:
-        attrs["first_time"] += first / attrs["frame_rate"]
     part.attrs = attrs
     return part
 

@@ -8,6 +8,7 @@ import pandas as pd
 
 from ..body.skeleton import parse_joint_columns
 from ..inputs.numbers import as_numbers, check_finite
+from ..inputs.recorded import Recorded
 
 
 def find_gaps(df):
@@ -76,8 +77,8 @@ def fill_gaps(df, max_gap):
     df : DataFrame (n_frames, 3 * n_joints) or (n_frames, 2 * n_joints)
         Joint positions, as for `find_gaps`. It is not changed.
     max_gap : int
-        The longest gap to fill, in frames. Longer gaps stay NaN, as do those that touch an end
-        of the recording: nothing is extrapolated.
+        The longest gap to fill, in frames, with those of rows that were dropped. Longer gaps stay
+        NaN, as do those that touch an end of the recording: nothing is extrapolated.
 
     Returns
     -------
@@ -89,7 +90,7 @@ def fill_gaps(df, max_gap):
     ------
     ValueError
         If `max_gap` is not a whole number of frames, 0 or more. If `df` is not as `find_gaps`
-        needs it.
+        needs it, or its index says that rows are not in order of time.
 
     See Also
     --------
@@ -131,13 +132,16 @@ def fill_gaps(df, max_gap):
     _, n_dims, values = _read(df)
     missing = _missing(values, n_dims)
     joint, first, last = _find(missing)
-    short = (first > 0) & (last < len(df) - 1) & (last - first < max_gap)
+    places = _places(df)
+    before, after = places.take(first - 1, mode="clip"), places.take(last + 1, mode="clip")
+    short = (first > 0) & (last < len(df) - 1) & (after - before <= max_gap + 1)
     # By the joint's index: names may be repeated.
     for j in np.unique(joint[short]):
         gaps = short & (joint == j)
         frames = np.concatenate(list(map(np.arange, first[gaps], last[gaps] + 1)))
         part = values[:, n_dims * j : n_dims * (j + 1)]
-        filled = _interpolate(np.flatnonzero(~missing[:, j]), part, frames)
+        known = np.flatnonzero(~missing[:, j])
+        filled = _interpolate(places[known], part[known], places[frames])
         part[frames] = np.where(np.isnan(part[frames]), filled, part[frames])
     result = pd.DataFrame(values, index=df.index, columns=df.columns)
     result.attrs = dict(df.attrs)
@@ -227,11 +231,25 @@ def _find(missing):
     return joint, first, np.nonzero(change == -1)[1] - 1
 
 
-def _interpolate(known, part, frames):
+def _places(df):
+    """Where rows lie in time, in frames: further apart where rows between them were dropped."""
+    recording = Recorded(df)
+    if recording.frames is None:
+        return np.arange(len(df))
+    steps = np.diff(recording.frames)
+    if not ((steps > 0).all() or (steps < 0).all()):
+        raise ValueError(
+            "The rows of this recording are not in order of time, by its index; sort it by "
+            "df.sort_index() before its gaps are filled."
+        )
+    return np.abs(recording.frames - recording.frames[:1]) / recording.step
+
+
+def _interpolate(known, values, at):
     from scipy.interpolate import Akima1DInterpolator
 
     if len(known) == 2:
         # With two points SciPy 1.13 reads uninitialised memory.
-        share = ((frames - known[0]) / (known[1] - known[0]))[:, None]
-        return (1 - share) * part[known[0]] + share * part[known[1]]
-    return Akima1DInterpolator(known, part[known])(frames)
+        share = ((at - known[0]) / (known[1] - known[0]))[:, None]
+        return (1 - share) * values[0] + share * values[1]
+    return Akima1DInterpolator(known, values)(at)

@@ -8,6 +8,7 @@ from sklearn.base import BaseEstimator, MetaEstimatorMixin, _fit_context, clone
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.facts import TIMELESS
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
 from ..matching.causal import causal_velocity
 from ..matching.costs import step_table
@@ -301,7 +302,13 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         """
         check_is_fitted(self)
         performances = check_performances(
-            self, X, reset=False, level="sequence", on_rows=self._fitted_on_rows, finite="allow-nan"
+            self,
+            X,
+            reset=False,
+            level="sequence",
+            on_rows=self._fitted_on_rows,
+            finite="allow-nan",
+            facts=None if times is None else TIMELESS,
         )
         tracks, times = [], times_of_each(times, len(performances))
         for i, (x, t) in enumerate(zip(performances, times, strict=True)):

@@ -9,6 +9,7 @@ from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
+from ..inputs.facts import TIMELESS, check_facts, facts_of
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.tables import as_pandas, labels_of, name_performance
 from ..inputs.validation import SequenceLevelMixin, names_of_input
@@ -334,6 +335,13 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         labels = ["The take"]
         if not single:
             labels = [name_performance(*pair) for pair in enumerate(labels_of(sequences)[0])]
+        # What a projection shows has units and axes of its own.
+        which = [
+            *(TIMELESS if projection is None else ()),
+            *(["frame_rate"] if times is None else ()),
+        ]
+        facts = [facts_of(x) for x in sequences]
+        check_facts(self, facts, labels.__getitem__, reset=False, which=which)
         times = [times] if single else times_of_each(times, len(sequences))
         tracks = []
         for what, x, t in zip(labels, sequences, times, strict=True):

@@ -5,6 +5,7 @@ import pandas as pd
 
 from ..inputs.collections import as_collection
 from ..inputs.numbers import as_numbers
+from ..inputs.recorded import Recorded
 from ..inputs.tables import FRAME, as_pandas, label_of_part, own_label
 
 __all__ = ["as_takes", "cut_takes"]
@@ -37,7 +38,8 @@ def cut_takes(X, performances, rows):
     Parameters
     ----------
     X : list of arrays (n_frames_i, n_features), or any collection
-        The takes as they were given: DataFrames keep columns and ``attrs``.
+        The takes as they were given: DataFrames keep columns and ``attrs``, which are
+        moved to the frames of the performance.
     performances : Performances
         The same, checked.
     rows : DataFrame
@@ -55,18 +57,20 @@ def cut_takes(X, performances, rows):
     given = as_collection(X)
     takes = list(performances if given is None else given)
     numbers = rows.groupby("take")["start"].rank(method="first").astype(int).to_numpy() - 1
+    tables = {i: takes[i] for i in set(rows["take"]) if isinstance(takes[i], pd.DataFrame)}
+    recorded = {i: Recorded(table) for i, table in tables.items()}
     parts = []
     for take, start, stop, number in zip(
         rows["take"], rows["start"], rows["stop"], numbers, strict=True
     ):
-        source = takes[take]
-        if isinstance(source, pd.DataFrame):
+        if take in tables:
+            source = tables[take]
             part = source.iloc[start:stop]
             part = part.set_axis(pd.RangeIndex(len(part), name=FRAME))
             label, levels = own_label(source)
             levels = ("take",) if label is None else levels
             name = label_of_part(performances.labels[take], int(number), "part", (*levels, FRAME))
-            part.attrs = source.attrs | name
+            part.attrs = recorded[take].attrs_of(np.arange(start, stop)) | name
             parts.append(part)
         else:
             parts.append(performances[take][start:stop].copy())

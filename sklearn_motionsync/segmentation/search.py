@@ -136,7 +136,7 @@ def find_performances(
     """
     X = as_takes(X, univariate=True)
     checker = type("find_performances", (SequenceLevelMixin, BaseEstimator), {})()
-    given = check_performances(checker, X, reset=True, level="sequence")
+    given = check_performances(checker, X, reset=True, level="sequence", facts=())
     synchronizer, takes, groups = _reach(pattern, X, groups)
     for i, (before, after) in enumerate(zip(given, takes, strict=True)):
         if len(before) != len(after):

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from numbers import Integral
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,9 @@ from ..body.direction_cosines import DirectionCosines
 from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
 from ..inputs.collections import NOT_ONE, as_collection, check_members
+from ..inputs.facts import check_facts, facts_in_fit
 from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.recorded import timeless
 from ..inputs.tables import FRAME, labels_of
 from ..utils.pipelines import flat_steps, route_to_synchronizer, union_transformers
 from .match import Match
@@ -134,6 +137,8 @@ def blend_performances(
     may_be_rows = skeleton is None and not isinstance(estimator, Match)
     sequences, arrays, is_rows = _read(X, may_be_rows)
     labels, levels = labels_of(sequences)
+    known = SimpleNamespace()
+    check_facts(known, arrays.facts, arrays.called, reset=True)
     _check(sequences, arrays, skeleton)
     match = estimator
     if not isinstance(estimator, Match):
@@ -151,7 +156,8 @@ def blend_performances(
     frames, at = _blend_pace(warps, timing)
     weights = np.stack([np.interp(at, np.arange(n_frames), w) for w in weights.T])
     out = _blend(arrays, frames, weights, skeleton, owner).astype(arrays[0].dtype, copy=False)
-    return out[:, 0] if is_rows else _like(sequences, out, levels[-1])
+    rates = facts_in_fit(known).get("frame_rate", ())
+    return out[:, 0] if is_rows else _like(sequences, out, levels[-1], rates)
 
 
 def _read(X, may_be_rows):
@@ -292,13 +298,15 @@ def _blend(arrays, frames, weights, skeleton, owner):
     return blend_bodies(chosen, frames, weights, skeleton, owner)
 
 
-def _like(sequences, array, name):
-    """An array as a performance of the kind of others."""
+def _like(sequences, array, name, rates):
+    """An array as a performance of the kind of others, which have these frame rates."""
     x = sequences[0]
     if not isinstance(x, pd.DataFrame):
         return array
     df = pd.DataFrame(array, columns=x.columns, index=_clock(sequences, len(array), name))
-    df.attrs = {key: value for key, value in x.attrs.items() if key not in _LABELS}
+    df.attrs = {key: value for key, value in timeless(x).items() if key not in _LABELS}
+    if "frame_rate" in df.attrs or rates:
+        df.attrs["frame_rate"] = rates[0] if len(rates) == 1 else None
     return df
 
 

@@ -41,6 +41,7 @@ _SHARED = (
     "n_features_in_",
     "feature_names_in_",
     "_names_in",
+    "_facts_in",
     "_fitted_on_rows",
 )
 

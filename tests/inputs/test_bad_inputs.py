@@ -54,6 +54,27 @@ def put(value, x=None):
     return change if x is None else change(x)
 
 
+class FDataGrid:
+    """Samples, each of its own kind, as those of scikit-fda."""
+
+    __module__ = "skfda.representation.grid"
+
+    def __len__(self):
+        return 5
+
+    def __getitem__(self, i):
+        return self
+
+
+class Dataset:
+    """A mapping of arrays, as that of xarray."""
+
+    __module__ = "xarray.core.dataset"
+
+
+NESTED = pd.DataFrame({name: [df[name] for df in FRAMES] for name in NAMES})
+
+
 def masked(x):
     return np.ma.masked_where(np.arange(x.size).reshape(x.shape) == 7, x)
 
@@ -119,6 +140,15 @@ PERFORMANCES = [
     (pd.Series({"a": X[0]}), ALL, ["got Series", "list"]),
     (map(np.array, X), ALL, ["got map", "list"]),
     ([x for _, x in LONG.groupby("trial")], ALL, ["'ann'", "'trial'", CALL]),
+    (
+        [x.T[:, : 15 + i] for i, x in enumerate(X)],
+        ALL,
+        ["Performance 1 has 16", "[x.T for x in X]"],
+    ),
+    (FDataGrid(), ALL, ["got FDataGrid", "list(X.data_matrix)"]),
+    ([Dataset(), Dataset()], ALL, ["got Dataset", "from_poses(poses)]"]),
+    (Dataset(), ALL, ["got Dataset", "from_poses(X)"]),
+    (NESTED, ALL, ["[np.column_stack(row) for row in X.to_numpy()]"]),
 ]
 
 
@@ -254,6 +284,44 @@ def test_fit_warns_of_a_clock_among_the_features():
     named = [pd.DataFrame(x, columns=["time", *NAMES]).round(3) for x in clocks]
     with pytest.warns(UserWarning, match="Feature 'time' .* clock"):
         LinearSynchronizer().fit(named)
+
+
+@pytest.mark.parametrize("estimator", ALL, ids=by_name)
+@pytest.mark.parametrize("kind", [np.stack, list, lambda X: [pd.DataFrame(x) for x in X]])
+def test_fit_warns_of_exchanged_axes(estimator, kind):
+    exchanged = kind([x.T for x in X])
+    with pytest.warns(UserWarning, match=r"3 frames of 20 features.* \[x\.T for x in X\]"):
+        clone(estimator).fit(exchanged)
+    noise = kind(list(RNG.standard_normal((5, 4, 50))))
+    with pytest.warns(UserWarning, match="4 frames of 50 features"):
+        clone(estimator).fit(noise)
+
+
+@pytest.mark.parametrize("estimator", ALL, ids=by_name)
+def test_fit_takes_fewer_frames_than_features_in_the_right_order(estimator):
+    many = np.cumsum(RNG.standard_normal((5, 12, 40)), axis=1)
+    for given in (many, [*many], [x[: 9 + i] for i, x in enumerate(many)] + [many[0]]):
+        if len(given) == 5 or not isinstance(estimator, ActionModel):
+            clone(estimator).fit(given)
+    # Named columns are features.
+    named = [pd.DataFrame(x.T, columns=[f"c{i}" for i in range(20)]) for x in X]
+    clone(estimator).fit(named)
+
+
+@pytest.mark.parametrize("estimator", SEQUENCES, ids=by_name)
+def test_fit_warns_of_one_trial_that_is_taken_as_many(estimator):
+    trial = np.cumsum(RNG.standard_normal((100, 6)), axis=0)
+    with pytest.warns(UserWarning, match=r"100 univariate performances of 6 frames.* as \[X\]"):
+        clone(estimator).fit(trial)
+    bend = np.sin(np.linspace(0, 3, 30)) * RNG.uniform(0.9, 1.1, (60, 1))
+    clone(estimator).fit(bend + 0.01 * RNG.standard_normal(bend.shape))
+
+
+@pytest.mark.parametrize("estimator", ALL, ids=by_name)
+def test_polars_output_of_a_collection_is_refused(estimator):
+    if hasattr(estimator, "transform"):
+        polars = clone(estimator).set_output(transform="polars")
+        refuses(lambda: polars.fit_transform(X), ["'polars'", "pl.from_pandas(", "'pandas'"])
 
 
 @pytest.mark.parametrize("estimator", ALL, ids=by_name)

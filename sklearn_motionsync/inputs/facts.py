@@ -1,0 +1,127 @@
+"""What is known of performances beside their numbers: frame rate, unit and vertical axis.
+
+Tables say so: their ``attrs``, as `io.read_motion` fills them, and an index in seconds. Arrays say
+nothing, and are taken as they are.
+"""
+
+import warnings
+
+import pandas as pd
+
+from .recorded import frame_rate_of_rows
+
+__all__ = ["TIMELESS", "check_facts", "facts_in_fit", "facts_of"]
+
+# Attribute of estimators: the different values of each fact in the training set.
+_FACTS = "_facts_in"
+# Rates that differ by less are one: 29.97 and 30, 59.94 and 60 frames a second.
+_SAME_RATE = 0.01
+# The facts that matter where the times of frames are given.
+TIMELESS = "units", "up"
+# Units that are spelled in several ways, without a plural's s.
+_UNITS = {"millimeter": "mm", "millimetre": "mm", "centimeter": "cm", "centimetre": "cm"}
+_UNITS |= {"meter": "m", "metre": "m", "degree": "deg", "°": "deg", "radian": "rad"}
+# Of each fact: how a value reads, and what to do where values differ.
+_WORDS = {
+    "frame_rate": (
+        "{:g} frames a second",
+        "Durations and speeds are compared in frames. Resample: to_sequences(x, frame_rate={:g}).",
+    ),
+    "units": ("the unit {!r}", "Convert the numbers, and set x.attrs['units'] = {!r}."),
+    "up": ("the vertical axis {!r}", "Turn the positions, and set x.attrs['up'] = {!r}."),
+}
+
+
+def facts_of(x):
+    """The known facts of a performance: a dict, which is empty for an array."""
+    if not isinstance(x, pd.DataFrame):
+        return {}
+    up = x.attrs.get("up")
+    facts = {
+        "frame_rate": frame_rate_of_rows(x),
+        "units": _unit(x.attrs.get("units")),
+        "up": up if isinstance(up, str) else None,
+    }
+    return {fact: value for fact, value in facts.items() if value is not None}
+
+
+def facts_in_fit(estimator):
+    """The facts of the training set of an estimator: a dict of tuples of different values."""
+    return vars(estimator).get(_FACTS, {})
+
+
+def check_facts(estimator, facts, called, *, reset, which=None):
+    """Hold the facts of performances against each other, or against those of the training set.
+
+    Parameters
+    ----------
+    estimator : object
+        Gets the facts of its training set. A parameter ``frame_rate`` of it counts as known.
+    facts : list of dict
+        Of each performance, from `facts_of`.
+    called : callable
+        Gives the name of a performance by its index.
+    reset : bool
+        True in ``fit``.
+    which : sequence of str, default=None
+        The facts that matter; by default ``_facts`` of the estimator, or all.
+
+    Raises
+    ------
+    ValueError
+        If units or vertical axes differ.
+
+    Warns
+    -----
+    UserWarning
+        If frame rates differ by more than 1 %.
+    """
+    known = {} if reset else facts_in_fit(estimator)
+    if reset:
+        vars(estimator)[_FACTS] = {}
+    if not any(facts):
+        return
+    for fact in getattr(estimator, "_facts", _WORDS) if which is None else which:
+        values = list(known.get(fact, ()))
+        source = "the training set has"
+        if fact == "frame_rate" and getattr(estimator, fact, None) is not None:
+            values, source = [getattr(estimator, fact)], "frame_rate says"
+        different = {}
+        for i, own in enumerate(facts):
+            value = own.get(fact)
+            if value is None or any(_equal(value, other) for other in values):
+                continue
+            if values:
+                different[i] = value
+            else:
+                values, source = [value], f"{called(i)} has"
+        if reset and values:
+            facts_in_fit(estimator)[fact] = tuple(dict.fromkeys([values[0], *different.values()]))
+        if different:
+            _report(fact, different, called, source, values[0])
+
+
+def _report(fact, different, called, source, reference):
+    """Say that performances differ: a warning of rates, an error of all else."""
+    words, remedy = _WORDS[fact]
+    first, *others = different
+    more = f" {len(others)} more differ." if others else ""
+    message = (
+        f"{called(first)} has {words.format(different[first])}, and {source} "
+        f"{words.format(reference)}.{more} {remedy.format(reference)}"
+    )
+    if fact != "frame_rate":
+        raise ValueError(message)
+    warnings.warn(message, UserWarning, stacklevel=2)
+
+
+def _equal(a, b):
+    return a == b if isinstance(a, str) or isinstance(b, str) else abs(a - b) <= _SAME_RATE * b
+
+
+def _unit(units):
+    """The unit, or the different units of channels, as one text; None if there is none."""
+    given = units if isinstance(units, (list, tuple)) else [units]
+    names = [unit.strip() for unit in given if isinstance(unit, str)]
+    names = [_UNITS.get(name.lower().removesuffix("s"), name) for name in names]
+    return " ".join(dict.fromkeys(names)) or None

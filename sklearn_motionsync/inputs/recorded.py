@@ -1,0 +1,235 @@
+"""Which frames of a recording the rows of a table are, and the frame rate that these rows have.
+
+The ``attrs`` of a recording (``frame_rate``, ``times``, ``events``, ...) stay as they are when
+pandas drops, thins out or reorders rows. The index goes with the rows: it tells which frames they
+are.
+"""
+
+import math
+import re
+from numbers import Real
+
+import numpy as np
+import pandas as pd
+
+from .resampling import is_even, rounded_rate, times_as_numbers
+
+__all__ = ["CLOCK", "Recorded", "frame_rate_of_rows", "recorded_frames", "timeless"]
+
+# Key of ``attrs``: the time of frame 0 and the step to the next, where the index is a time.
+CLOCK = "clock"
+# Keys of ``attrs`` that are true of the rows of one table only.
+_OF_ROWS = ("events", "times", "first_frame", "first_time", "rows", CLOCK)
+# Names of an index in seconds: "time", "t", "time_s", "time (s)", "seconds", ...
+_SECONDS = re.compile(r"(time|t)?[\s_]*[(\[]?(s|secs?|seconds?)?[)\]]?", re.IGNORECASE)
+# Seconds; longer steps of a time are of another unit.
+_LONGEST_STEP = 1
+# A share of a step by which rounding may move a time.
+_ROUNDING = 0.4
+
+
+def recorded_frames(df):
+    """The frames of the recording that the rows of a table are.
+
+    Parameters
+    ----------
+    df : DataFrame
+        One performance. Frames are counted as in its ``attrs["events"]``: from 0, the first row
+        of the table that ``attrs`` describe.
+
+    Returns
+    -------
+    ndarray of int, shape (n_rows,), or None
+        In the order of the rows. None if the index does not tell.
+    """
+    index, clock = _frame_level(df), df.attrs.get(CLOCK)
+    if isinstance(index, pd.RangeIndex) and not _may_be_seconds(index):
+        return index.to_numpy() if index.min() >= 0 or not len(index) else None
+    if index.dtype.kind not in "iuf":
+        return None
+    values, slack = index.to_numpy(dtype=np.float64, na_value=np.nan), 0
+    if not np.isfinite(values).all():
+        return None
+    if index.dtype.kind == "f" and isinstance(clock, (tuple, list)):
+        values, slack = (values - clock[0]) / clock[1], _ROUNDING
+    elif _may_be_seconds(index) and (index.dtype.kind == "f" or _smallest_step(values) > 1):
+        # Whole seconds, or every tenth frame, or milliseconds.
+        return None
+    frames = np.round(values)
+    if (np.abs(values - frames) > slack).any() or frames.min(initial=0) < 0:
+        return None
+    return frames.astype(np.int64)
+
+
+def frame_rate_of_rows(x):
+    """The frame rate that the rows of a table have now: 60 of every second one of 120.
+
+    Parameters
+    ----------
+    x : DataFrame, or anything
+        One performance.
+
+    Returns
+    -------
+    float or None
+        Frames a second, by ``attrs["frame_rate"]`` and which frames the rows are, or by an index
+        in seconds: dates, durations, or numbers under such a name. None if it is not known or rows
+        are not evenly spaced, and for all that is no DataFrame.
+    """
+    if not isinstance(x, pd.DataFrame):
+        return None
+    rate, frames = x.attrs.get("frame_rate"), recorded_frames(x)
+    if frames is None or not _is_rate(rate):
+        return _rate_of_seconds(_frame_level(x))
+    steps = np.abs(np.diff(frames))
+    if len(steps) and (steps[0] == 0 or (steps != steps[0]).any()):
+        return None
+    return float(rate / steps[0]) if len(steps) else float(rate)
+
+
+def timeless(x):
+    """The ``attrs`` of a table without those of its rows; ``frame_rate`` is that of the rows."""
+    facts = {key: value for key, value in x.attrs.items() if key not in _OF_ROWS}
+    return facts | ({"frame_rate": frame_rate_of_rows(x)} if "frame_rate" in facts else {})
+
+
+class Recorded:
+    """A table of a recording: which frames its rows are, and what ``attrs`` parts of it have.
+
+    Parameters
+    ----------
+    df : DataFrame
+        One recording, or a long table of several whose ``attrs`` are true of all.
+
+    Attributes
+    ----------
+    frames : ndarray of int, shape (n_rows,), or None
+        As from `recorded_frames`.
+    step : int
+        The smallest step between frames: 2 where every second row was taken.
+    """
+
+    def __init__(self, df):
+        self._attrs, self._n_rows, self.frames = df.attrs, len(df), recorded_frames(df)
+        steps = np.diff(np.unique([] if self.frames is None else self.frames))
+        self.step = int(steps.min()) if len(steps) else 1
+        self._is_whole = (steps == self.step).all()
+
+    def attrs_of(self, rows, times=None, grid=None):
+        """The ``attrs`` of some rows, clock and events moved to the frames of a performance.
+
+        Parameters
+        ----------
+        rows : ndarray of int
+            Which rows of the table are in the performance, in its order.
+        times : ndarray, default=None
+            Of these rows, in any unit.
+        grid : ndarray, default=None
+            The even times that replace them.
+
+        Returns
+        -------
+        dict
+            Without those that are not known, as the index does not tell which frames rows are.
+        """
+        facts = {key: value for key, value in self._attrs.items() if key not in _OF_ROWS}
+        rate = facts.get("frame_rate")
+        if self.frames is None:
+            return facts | ({} if rate is None else {"frame_rate": None})
+        frames = self.frames[rows]
+        first, all_rows = int(frames[0]), len(rows) == self._n_rows
+        start, seconds, events = map(self._attrs.get, ("first_time", "times", "events"))
+        for key, still in (("first_frame", first == 0), ("rows", first == 0 and all_rows)):
+            if still and key in self._attrs:
+                facts[key] = self._attrs[key]
+        if start is not None and (rate or first == 0):
+            facts["first_time"] = start + (first / rate if first else 0)
+        if seconds is not None and frames.max() < len(seconds):
+            seconds = np.asarray(seconds, dtype=np.float64)[frames]
+            facts |= _clock_of(seconds if grid is None else np.interp(grid, times, seconds))
+        elif _is_rate(rate):
+            facts["frame_rate"] = self._rate_of(rate, frames, times, grid)
+        if isinstance(events, (list, tuple)) and (np.diff(frames) > 0).all():
+            last = len(frames if grid is None else grid) - 1
+            moved = [_move_event(event, frames, times, grid) for event in events]
+            facts["events"] = [
+                event for event in moved if all_rows or 0 <= (_frame_of(event) or 0) <= last
+            ]
+        return facts
+
+    def _rate_of(self, rate, frames, times, grid):
+        """The frame rate of a performance, from that of the recording."""
+        if grid is not None:
+            pace = np.median(np.diff(times)) / (grid[1] - grid[0])
+            return rounded_rate(rate / self.step * pace)
+        if times is None and not self._is_whole and (np.diff(frames) != self.step).any():
+            return None
+        return rate / self.step
+
+
+def _clock_of(seconds):
+    """The frame rate of even times, or the times."""
+    clock = {"first_time": float(seconds[0])}
+    if len(seconds) > 1 and is_even(seconds):
+        rate = (len(seconds) - 1) / (seconds[-1] - seconds[0])
+        return clock | {"frame_rate": rounded_rate(rate)}
+    return clock | {"times": seconds.tolist()}
+
+
+def _frame_of(event):
+    return event.get("frame") if isinstance(event, dict) else None
+
+
+def _move_event(event, frames, times, grid):
+    """An event at its frame in the performance."""
+    frame, own = _frame_of(event), np.arange(len(frames))
+    if frame is None:
+        return event
+    place = _on_line(frame, frames, own)
+    if grid is not None:
+        place = _on_line(_on_line(place, own, times), grid, np.arange(len(grid)))
+    return event | {"frame": round(float(place), 5)}
+
+
+def _on_line(x, xs, ys):
+    """Interpolate between points that increase, and extrapolate at their mean slope."""
+    if xs[0] <= x <= xs[-1]:
+        return np.interp(x, xs, ys)
+    end = 0 if x < xs[0] else -1
+    return ys[end] + (x - xs[end]) * (ys[-1] - ys[0]) / max(xs[-1] - xs[0], 1e-300)
+
+
+def _frame_level(df):
+    return df.index.get_level_values(-1)
+
+
+def _is_rate(rate):
+    return isinstance(rate, Real) and not isinstance(rate, bool) and 0 < rate < math.inf
+
+
+def _may_be_seconds(index):
+    return bool(index.name) and bool(_SECONDS.fullmatch(str(index.name).strip()))
+
+
+def _smallest_step(values):
+    return np.abs(np.diff(values)).min(initial=np.inf)
+
+
+def _rate_of_seconds(index):
+    """The frame rate of even times in seconds; None of all else."""
+    if len(index) < 2 or not (index.dtype.kind in "mM" or _may_be_seconds(index)):
+        return None
+    if index.dtype.kind not in "mMfiu":
+        return None
+    seconds = times_as_numbers(index, "The index")
+    if not np.isfinite(seconds).all():
+        return None
+    if seconds[-1] < seconds[0]:
+        seconds = seconds[::-1]
+    step = (seconds[-1] - seconds[0]) / (len(seconds) - 1)
+    if not 0 < step < _LONGEST_STEP or not is_even(seconds):
+        return None
+    if index.dtype.kind in "fiu" and (seconds[0], seconds[-1]) == (0, 1):
+        # Shares of a movement.
+        return None
+    return rounded_rate(1 / step)

@@ -1,0 +1,175 @@
+"""What tables say of their performances, frame rate, unit and vertical axis, is held together."""
+
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    MotionTracker,
+    OnlineSynchronizer,
+    Skeleton,
+    blend_performances,
+    to_frame,
+)
+from sklearn_motionsync.datasets import make_bending
+
+from estimators import BODY, EVERY, NAMES, by_name, data_for, outputs
+
+RATE = {"frame_rate": 30}
+# Of two performances: what their tables say, and words of the warning or the error.
+RATES = [
+    ({"frame_rate": 120}, r"has 120 frames a second, and .* 30 frames a second.*frame_rate=30"),
+    ({"frame_rate": 31}, "has 31 frames a second"),
+]
+DIFFERENT = [
+    ({"units": "mm"}, {"units": "m"}, r"has the unit 'm', and .* the unit 'mm'.*'units'\] = 'mm'"),
+    ({"units": "degrees"}, {"units": "rad"}, "the unit 'rad', and .* the unit 'deg'"),
+    ({"units": ["N", "Nm"]}, {"units": ["N", "Nmm"]}, "'N Nmm'"),
+    ({"up": "y"}, {"up": "z"}, r"the vertical axis 'z', and .* the vertical axis 'y'"),
+]
+ALIKE = [
+    ({}, {"frame_rate": 120, "units": "mm", "up": "z"}),
+    ({"frame_rate": 30}, {"frame_rate": 29.97}),
+    ({"units": "mm"}, {"units": "Millimetres "}),
+    ({"units": ["N", "N"]}, {"units": "N"}),
+    ({"units": None, "up": None, "frame_rate": None}, {"units": "mm", "up": "y"}),
+    ({"units": 3, "up": 1, "frame_rate": "fast"}, {"units": "m", "up": "y", "frame_rate": 3}),
+]
+
+
+def tables(estimator, *facts):
+    """What an estimator is fitted on as tables; the last ones say what is given, one each."""
+    data = data_for(estimator)
+    frames = [pd.DataFrame(x, columns=NAMES if x.shape[1] == len(NAMES) else None) for x in data]
+    given = [facts[0]] * (len(frames) - len(facts)) + list(facts)
+    for df, attrs in zip(frames, given, strict=True):
+        df.attrs = dict(attrs)
+    return frames
+
+
+@pytest.mark.parametrize(("other", "message"), RATES)
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_rates_that_differ_are_warned_of(estimator, other, message):
+    last = len(data_for(estimator)) - 1
+    with pytest.warns(UserWarning, match=f"Performance {last} {message}"):
+        clone(estimator).fit(tables(estimator, RATE, other))
+    fitted = clone(estimator).fit(tables(estimator, RATE))
+    with pytest.warns(UserWarning, match=f"Performance {last} has .*and the training set has 30"):
+        outputs(fitted, tables(estimator, RATE, other))
+
+
+@pytest.mark.parametrize(("one", "other", "message"), DIFFERENT)
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_units_and_axes_that_differ_are_refused(estimator, one, other, message):
+    if estimator in BODY and "units" in one:
+        # Directions, and positions in units of the body.
+        clone(estimator).fit(tables(estimator, one, other))
+        return
+    with pytest.raises(ValueError, match=message):
+        clone(estimator).fit(tables(estimator, one, other))
+    fitted = clone(estimator).fit(tables(estimator, one))
+    with pytest.raises(ValueError, match="the training set has"):
+        outputs(fitted, tables(estimator, one, other))
+
+
+@pytest.mark.parametrize(("one", "other"), ALIKE)
+@pytest.mark.parametrize("estimator", [LinearSynchronizer(), ASpace(2)], ids=by_name)
+def test_what_is_alike_or_not_known_passes(estimator, one, other):
+    fitted = clone(estimator).fit(tables(estimator, one, other))
+    outputs(fitted, tables(estimator, other, one))
+    clone(estimator).fit([x.to_numpy() for x in tables(estimator, one)])
+    outputs(fitted, tables(estimator, one))
+
+
+def test_the_index_tells_the_rate_of_the_rows():
+    X = tables(ASpace(), RATE)
+    seconds = [df.set_axis(pd.Index(np.arange(len(df)) / 30, name="time")) for df in X]
+    for df in seconds:
+        df.attrs = {}
+    fitted = LinearSynchronizer().fit([*X[:3], *seconds[3:]])
+    with pytest.warns(UserWarning, match=r"Performance 1 has 15 frames a second"):
+        fitted.transform([X[0], X[1].iloc[::2]])
+    with pytest.warns(UserWarning, match=r"Performance 1 \('b'\) has 10 frames a second"):
+        fitted.transform(to_frame([seconds[0], seconds[1].iloc[::3]], performances=["a", "b"]))
+
+
+def test_a_rate_that_a_parameter_says_counts():
+    X = tables(ASpace(), RATE)
+    for estimator in (OnlineSynchronizer(frame_rate=60), MotionTracker(frame_rate=60)):
+        with pytest.warns(UserWarning, match="30 frames a second, and frame_rate says 60"):
+            estimator.fit(X)
+
+
+def test_times_replace_the_rate():
+    X = tables(ASpace(), RATE)
+    fast = [df.iloc[::2] for df in X[:2]]
+    online = OnlineSynchronizer(LinearSynchronizer()).fit(X)
+    tracker = MotionTracker(LinearSynchronizer(), n_particles=10).fit(X)
+    for track in (online.track, tracker.track, tracker.smooth):
+        track(fast, times=[np.arange(0, 30, 2.0)] * 2)
+        with pytest.warns(UserWarning, match="Performance 0 has 15 frames a second"):
+            track(fast)
+    fast[1].attrs = {"units": "mm"}
+    X[0].attrs["units"] = "m"
+    tracker.fit(X)
+    # What a projection shows has a unit of its own.
+    seen = [x.iloc[:, :2] for x in fast]
+    tracker.track(seen, times=[np.arange(0, 30, 2.0)] * 2, projection=np.eye(45)[:2])
+    with pytest.raises(ValueError, match="Performance 1 has the unit 'mm'"):
+        tracker.track(fast, times=[np.arange(0, 30, 2.0)] * 2)
+
+
+def test_a_refit_forgets_what_was_known():
+    X = tables(ASpace(), RATE)
+    fitted = LinearSynchronizer().fit(X).fit([x.to_numpy() for x in X])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # names without names
+        fitted.transform([x.set_axis(x.columns, axis=1) for x in tables(ASpace(), RATES[0][0])])
+
+
+def test_more_than_one_difference_is_counted():
+    with pytest.warns(UserWarning, match=r"Performance 4 has 60 .* 30 frames a second\. 1 more"):
+        LinearSynchronizer().fit(tables(ASpace(), RATE, {"frame_rate": 60}, {"frame_rate": 60}))
+
+
+def test_bodies_hold_the_axis_of_their_skeleton_against_that_of_tables():
+    (x,) = make_bending(1, random_state=0).data
+    df = pd.DataFrame(x, columns=Skeleton.paper().column_names)
+    df.attrs["up"] = "z"
+    with pytest.warns(UserWarning, match="Performance 0 has the vertical axis 'z' in its attrs"):
+        DirectionCosines(Skeleton.paper()).fit([df])
+    df.attrs["up"] = "y"
+    DirectionCosines(Skeleton.paper()).fit([df])
+
+
+def test_pipelines_see_rates_at_their_first_step():
+    bunch = make_bending(4, n_frames=40, random_state=0)
+    X = [pd.DataFrame(x, columns=bunch.skeleton.column_names) for x in bunch.data]
+    for df in X:
+        df.attrs["frame_rate"] = 50
+    steps = DirectionCosines(bunch.skeleton), ASpace(2), DenseSynchronizer(20), ActionModel()
+    pipe = make_pipeline(*steps).fit(X)
+    X[3].attrs["frame_rate"] = 200
+    with pytest.warns(UserWarning, match="Performance 3 has 200 frames a second"):
+        pipe.predict(X)
+
+
+def test_blends_have_the_facts_that_performances_share():
+    X = tables(ASpace(), RATE | {"units": "mm", "events": [{"frame": 3}], "performance": "a"})
+    fitted = LinearSynchronizer().fit(X)
+    assert blend_performances(fitted, X, {0: 0.5, 1: 0.5}).attrs == {**RATE, "units": "mm"}
+    X[1].attrs["frame_rate"] = 60
+    with pytest.warns(UserWarning, match="Performance 1 has 60 frames a second"):
+        mixed = blend_performances(fitted, X, {0: 0.5, 1: 0.5})
+    assert mixed.attrs == {"frame_rate": None, "units": "mm"}
+    X[1].attrs = {"units": "m"}
+    with pytest.raises(ValueError, match="Performance 1 has the unit 'm', and Performance 0"):
+        blend_performances(fitted.match(X[:1] * 6), X, {0: 0.5, 1: 0.5})

@@ -1,0 +1,225 @@
+"""Recordings of which rows were taken out: the same frames are cut, or they are refused."""
+
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn_motionsync import to_sequences
+from sklearn_motionsync.io import cut_at_events, fill_gaps, read_motion
+
+from motion_files import c3d, everything, put, texts
+
+RATE = 120.0
+SEEDS = range(100)
+
+
+def recording(rng):
+    """The column "number" holds the frame, "number" of an event its true one."""
+    n_frames = int(rng.integers(40, 300))
+    df = pd.DataFrame({"number": np.arange(float(n_frames)), "knee": rng.normal(size=n_frames)})
+    df.index = pd.RangeIndex(n_frames, name=rng.choice(["frame", None]))
+    at = np.sort(rng.uniform(-20, n_frames + 20, int(rng.integers(3, 12)))).round(2)
+    df.attrs = {
+        "events": [
+            {"label": label, "context": None, "frame": float(x), "number": float(x)}
+            for x, label in zip(at, rng.choice(["Strike", "Strike", "Off"], len(at)), strict=True)
+        ],
+        "frame_rate": RATE,
+        "first_time": 2.0,
+        "first_frame": 101,
+    }
+    df.attrs["events"][0]["label"] = "Strike"
+    if rng.random() < 0.3:
+        seconds = 2 + np.cumsum(rng.uniform(0.005, 0.01, n_frames))
+        df.attrs |= {"times": seconds.tolist(), "frame_rate": None}
+    return df
+
+
+def check_attrs(part, whole, step=1, known=None):
+    """Events, times and frame rate of a performance are those of its rows."""
+    numbers = part["number"].to_numpy()
+    for event in part.attrs["events"]:
+        assert np.interp(event["frame"], np.arange(len(part)), numbers) == pytest.approx(
+            event["number"], abs=1e-4
+        )
+    if "times" in whole.attrs:
+        # Straight lines bridge frames that were dropped before.
+        known = numbers if known is None else np.sort(known)
+        seconds = np.interp(numbers, known, np.array(whole.attrs["times"])[known.astype(int)])
+        assert part.attrs.get("times", seconds) == pytest.approx(seconds, abs=1e-9)
+        assert part.attrs["first_time"] == pytest.approx(seconds[0], abs=1e-9)
+    else:
+        assert part.attrs["frame_rate"] == RATE / step
+        assert part.attrs["first_time"] == pytest.approx(2 + numbers[0] / RATE)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_recording_without_its_beginning_or_end_is_cut_at_the_same_frames(seed):
+    rng = np.random.default_rng(seed)
+    df = recording(rng)
+    k = int(rng.integers(0, len(df) // 2))
+    for rows in (slice(k, None), slice(None, len(df) - k)):
+        some = df.iloc[rows]
+        inside = [
+            part
+            for part in cut_at_events(df, "Strike")
+            if part["number"].isin(some["number"]).all()
+        ]
+        found = cut_at_events(some, "Strike")
+        for x, y in zip(found, inside, strict=True):
+            pd.testing.assert_frame_equal(x, y)
+            drop = "performance"
+            assert {**x.attrs, drop: 0} == {**y.attrs, drop: 0}
+            check_attrs(x, df)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_every_kth_frame_is_cut_next_to_the_events(seed):
+    rng = np.random.default_rng(seed)
+    df = recording(rng)
+    k, start = int(rng.integers(2, 11)), int(rng.integers(0, 9))
+    some = df.iloc[start::k]
+    places = [e["number"] for e in df.attrs["events"] if e["label"] == "Strike"]
+    rows = [int(np.floor((x - start) / k + 0.5)) for x in places]
+    # The last of several strikes next to one row, and the next strike.
+    pairs = [(a, b) for a, b in pairwise(rows) if a < b]
+    expected = [some["number"].iloc[a : b + 1] for a, b in pairs if a >= 0 and b < len(some)]
+    found = cut_at_events(some, "Strike")
+    for part, numbers in zip(found, expected, strict=True):
+        assert part["number"].tolist() == numbers.tolist()
+        assert part.attrs["rows"] == numbers.iloc[[0, -1]].tolist()
+        assert min(abs(numbers.iloc[0] - x) for x in places) <= k / 2
+        check_attrs(part, df, k)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_rows_that_were_dropped_are_not_bridged(seed):
+    rng = np.random.default_rng(seed)
+    df = recording(rng)
+    lost = rng.choice(len(df), int(rng.integers(1, 4)), replace=False)
+    ends = np.r_[: int(rng.integers(0, 9)), len(df) - int(rng.integers(0, 9)) : len(df)]
+    df.loc[np.r_[lost, ends], "knee"] = np.nan
+    some = df.dropna()
+    last = some["number"].max()
+    whole = [
+        part
+        for part in cut_at_events(df, "Strike")
+        if some["number"].min() <= part["number"].min() and part["number"].max() <= last
+    ]
+    if any(part["knee"].isna().any() for part in whole):
+        with pytest.raises(
+            ValueError, match=r"has no row of frame .*Cut the recording before rows"
+        ):
+            cut_at_events(some, "Strike")
+        return
+    found = cut_at_events(some, "Strike")
+    assert [part["number"].tolist() for part in found] == [p["number"].tolist() for p in whole]
+    for part in found:
+        check_attrs(part, df)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("kind", ["reversed", "shuffled"])
+def test_rows_in_another_order_are_refused(kind, seed):
+    rng = np.random.default_rng(seed)
+    df = recording(rng)
+    other = df.iloc[::-1] if kind == "reversed" else df.iloc[rng.permutation(len(df))]
+    with pytest.raises(ValueError, match=r"not in order of time: frame .*sort_index"):
+        cut_at_events(other, "Strike")
+    for x, y in zip(
+        cut_at_events(other.sort_index(), "Strike"), cut_at_events(df, "Strike"), strict=True
+    ):
+        pd.testing.assert_frame_equal(x, y)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_events_stay_at_their_frames_in_tables_of_several_parts(seed):
+    rng = np.random.default_rng(seed)
+    df = recording(rng)
+    k = int(rng.integers(1, 5))
+    rows = {
+        "behind": df.iloc[k * 5 :],
+        "thinned out": df.iloc[::k],
+        "shuffled": df.iloc[rng.permutation(len(df))],
+        "dropped": df.drop(index=rng.choice(len(df), 5, replace=False)),
+    }
+    for name, some in rows.items():
+        trial = np.minimum(some["number"] // (len(df) // 2), 1).astype(int)
+        timed = some.assign(trial=trial, ms=some["number"] * 1000 / RATE)
+        for x in to_sequences(timed, by="trial", time="ms", max_gap_time=1e3):
+            assert "first_frame" not in x.attrs or x["number"].iloc[0] == 0
+            given = k if name == "thinned out" else 1, some["number"].to_numpy()
+            check_attrs(x, df, *given)
+            # Cut again, under an index of times.
+            for y in cut_at_events(x.iloc[1:], "Strike") if has(x, "Strike") else []:
+                numbers = y["number"].to_numpy()
+                places = [e["number"] for e in df.attrs["events"] if e["label"] == "Strike"]
+                for end in numbers[[0, -1]]:
+                    assert min(abs(end - place) for place in places) <= k / 2 + 1e-6
+                check_attrs(y, df, *given)
+
+
+def has(df, label):
+    return any(event["label"] == label for event in df.attrs["events"])
+
+
+@pytest.mark.parametrize(
+    "index",
+    [
+        pd.Index(np.arange(60) / RATE, name="time"),
+        pd.Index([f"r{i}" for i in range(60)]),
+        pd.RangeIndex(-10, 50),
+        pd.Index([0.0, np.nan, *range(58)]),
+        pd.date_range("2020", periods=60),
+    ],
+    ids=lambda index: str(index.dtype),
+)
+def test_an_index_that_does_not_tell_frames_is_refused(index):
+    df = pd.DataFrame({"number": np.arange(60.0)}, index=index)
+    df.attrs["events"] = [{"label": "Strike", "frame": x} for x in (9, 30)]
+    with pytest.raises(ValueError, match=r"does not tell which frames .* df.reset_index"):
+        cut_at_events(df, "Strike")
+    (part,) = cut_at_events(df.reset_index(drop=True), "Strike")
+    assert part.attrs["rows"] == [9, 30]
+    (x,) = to_sequences(df.assign(trial=0), by="trial")
+    assert "events" not in x.attrs
+
+
+def test_an_empty_recording_has_no_performances():
+    df = recording(np.random.default_rng(0))
+    assert cut_at_events(df.iloc[:0], "Strike") == []
+
+
+@pytest.mark.parametrize("group", ["markers", "analog"])
+def test_numbers_of_frames_in_the_trial_stay(tmp_path, group):
+    content = everything()
+    content["others"]["EVENT"] |= {
+        "LABELS": texts("Strike", "Off", "Strike"),
+        "CONTEXTS": texts("Left", "Left", "Left"),
+        "TIMES": (4, [2, 3], np.array([0, 2.108, 0, 2.3, 0, 2.512], "<f4").tobytes()),
+    }
+    path = put(tmp_path, c3d(**content), "a.c3d")
+    df = read_motion(path, group=group, max_gap=9 if group == "markers" else 0)
+    (part,), (same,) = cut_at_events(df, "Strike"), cut_at_events(df.iloc[3:], "Strike")
+    pd.testing.assert_frame_equal(part, same)
+    assert part.attrs == same.attrs
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_gaps_are_filled_where_frames_are_in_time(seed):
+    rng = np.random.default_rng(seed)
+    t = np.arange(200.0)
+    whole = pd.DataFrame({f"knee_{axis}": np.sin(t / 20 + i) for i, axis in enumerate("xyz")})
+    gap = int(rng.integers(30, 150))
+    df = whole.copy()
+    df.iloc[gap : gap + 6] = np.nan
+    lost = np.r_[gap - 4 : gap - 1, gap + 2 : gap + 4]
+    error = (fill_gaps(df.drop(index=lost), 6) - whole.drop(index=lost)).abs().max(axis=None)
+    assert error < 2e-3
+    pd.testing.assert_frame_equal(fill_gaps(df.iloc[::-1], 6).iloc[::-1], fill_gaps(df, 6))
+    pd.testing.assert_frame_equal(fill_gaps(df.iloc[7:], 6), fill_gaps(df, 6).iloc[7:])
+    # Six frames are missing, of which two have no row.
+    assert fill_gaps(df.drop(index=lost), 5).isna().any(axis=None)
+    with pytest.raises(ValueError, match="not in order of time"):
+        fill_gaps(df.iloc[rng.permutation(200)], 6)
