@@ -9,6 +9,11 @@ the jogs begin from standing, and their first stride is longer. The mean stride 
 Deviations of foot strikes are those of their phases from the mean phase of the foot, in hundredths
 of a cycle, within takes and within all takes of an action. Takes are cut by what was learnt from
 other actors or, where there is one actor, from the other takes.
+
+Several cycles fit where every second or fourth repetition differs: exercises of UI-PRMD, chained
+from repetitions of one person, some of them done wrong. A period is right within 10 % of the mean
+repetition. Right periods that are warned of are false alarms; so are those of walks and jogs,
+whole, and of their single limbs, whose period is that of the whole body.
 """
 
 import argparse
@@ -20,7 +25,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 from sklearn.model_selection import LeaveOneGroupOut
-from sklearn_motionsync import CycleSegmenter
+from sklearn_motionsync import CycleSegmenter, DirectionCosines
 from sklearn_motionsync.datasets import load_performances
 
 CYCLIC = {"cmu07_walk": "walk", "hdm05": "jogLeftCircle4StepsRstart"}
@@ -37,6 +42,8 @@ SINGLE = {
 }
 # Standard deviation, in seconds, of the filter before maxima are looked for; least time between.
 SMOOTHING, APART = 0.02, 0.3
+# Of so many repetitions in a chain every so many is one done wrong; 0 is none.
+CHAIN, EVERY, DRAWS = 12, (0, 2, 4), 3
 
 
 def read(folder, archive, label):
@@ -118,6 +125,56 @@ def phases_of_others(bunch, **params):
     return out
 
 
+def limbs(bunch):
+    """Single limbs of takes, in directions, and the periods of the whole bodies."""
+    periods = CycleSegmenter(bunch.skeleton).report(bunch.data)["period"]
+    cosines = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+    for x, period in zip(cosines, periods, strict=True):
+        for k in range(0, x.shape[1] - 2, 3):
+            yield x[:, k : k + 3], period
+
+
+def chains(folder, every):
+    """Repetitions of a person and an exercise, one after the other, and their mean length."""
+    file = np.load(Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz")
+    positions = file["positions"] - file["positions"].mean(axis=1, keepdims=True)
+    parts = np.split(positions.reshape(len(positions), -1), file["offsets"][1:-1])
+    rng = np.random.default_rng(0)
+    for label in np.unique(file["label"]):
+        for actor in np.unique(file["actor"]):
+            own = (file["label"] == label) & (file["actor"] == actor)
+            right, wrong = (np.flatnonzero(own & (file["correct"] == k)) for k in (True, False))
+            if len(right) < 8 or len(wrong) < 5:
+                continue
+            for _ in range(DRAWS):
+                good, bad = (np.resize(rng.permutation(k), CHAIN) for k in (right, wrong))
+                chosen = [bad[k] if every and k % every == 0 else good[k] for k in range(CHAIN)]
+                chain = [parts[k] for k in chosen]
+                yield np.concatenate(chain), np.mean([len(x) for x in chain])
+
+
+def several_fit(pairs, segmenter=None):
+    """Of cyclic takes: how many periods are right, warned of; not right, and warned of."""
+    takes, expected = zip(*pairs, strict=True)
+    report = (segmenter or CycleSegmenter()).report(list(takes))
+    right = np.abs(report["period"] / np.array(expected) - 1) < 0.1
+    warned, cyclic = report["periods"].map(len) > 1, report["cyclic"]
+    return [int((cyclic & k & w).sum()) for k in (right, ~right) for w in (True, warned)]
+
+
+def warnings_of(folder):
+    """Names of sets of takes, and what `several_fit` counts."""
+    for names in CYCLIC.items():
+        bunch = read(folder, *names)
+        segmenter = CycleSegmenter(bunch.skeleton)
+        periods = segmenter.report(bunch.data)["period"]
+        yield names[1], several_fit(zip(bunch.data, periods, strict=True), segmenter)
+        yield "  single limbs", several_fit(limbs(bunch))
+    for every in EVERY:
+        name = f"exercises, 1 of {every} wrong" if every else "exercises, none wrong"
+        yield name, several_fit(chains(folder, every))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("data", help="folder of hdm05, cmu07_walk and utkinect")
@@ -156,6 +213,9 @@ def main():
             report = CycleSegmenter(bunch.skeleton).report(bunch.data)
             called, strongest = report["cyclic"].sum(), report["strength"].max()
             print(f"  {label:30} {len(report):4d} {called:14d} {strongest:17.2f}")
+    print("\nseveral cycles fit         period right, warned of; not right, warned of")
+    for name, counts in warnings_of(folder):
+        print(f"  {name:28}" + "".join(f"{count:8d}" for count in counts))
 
 
 if __name__ == "__main__":

@@ -3,16 +3,19 @@
 UTKinect's 20 recordings hold ten actions each, once, labelled by hand. All but two actors at a time
 teach an action by their clips, and the recordings of these two are searched. A hit is right if it
 overlaps a labelled part that no better hit has, by half of what both cover together. All clips of
-an actor of HDM05, joined in any order, are such a recording, too. Takes ten minutes.
+an actor of HDM05, joined in any order, are such a recording, too; they are searched at other frame
+rates than that of the clips. Takes a quarter of an hour.
 
     python benchmarks/search.py ../shared/data [coverage=0.6 ...]
 """
 
 import sys
+import warnings
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy.spatial.distance import cdist
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
@@ -203,6 +206,44 @@ def table(recordings, folds, methods):
     print(f"| mean | {cells} | {np.mean(false[:: len(methods)]):.1f} |", flush=True)
 
 
+def search_rates(path, taught=4, searched=(1, 2, 4, 8, 16), full=120):
+    """HDM05's joined takes at several frame rates: hits, right and all, with known rates or not."""
+    found = {(every, known): [0, 0] for every in searched for known in (True, False)}
+    teaching, takes = Recordings.joined(path, taught), {}
+    for every in searched:
+        takes[every] = Recordings.joined(path, every)
+    for action in dict.fromkeys(label for *_, label in teaching.parts):
+        for take, actor in enumerate(teaching.actors_of_takes):
+            clips, actors = teaching.teachers(action, [actor])
+            pipe = make_pipeline(ASpace(), DenseSynchronizer(P), ActionModel())
+            pipe.fit([at_rate(x, full / taught) for x in clips], actionmodel__groups=actors)
+            for every, known in found:
+                some = takes[every]
+                given = at_rate(some.takes[take], full / every if known else None)
+                with warnings.catch_warnings():
+                    warnings.filterwarnings("ignore", "Performance 0 has no known frame rate")
+                    _, locations = find_performances(pipe, given)
+                rows = locations[["start", "stop", "score"]].to_numpy()
+                parts = [part for part in some.parts if (part[0], part[3]) == (take, action)]
+                right = judge([(take, *row) for row in rows], parts)
+                found[every, known] += np.array([right.sum(), len(right)])
+    total = len(teaching.parts)
+    print(
+        f"\nHDM05, joined, taught at {full / taught:g} Hz: right of all hits, {total} to be found"
+    )
+    for every in searched:
+        cells = " | ".join("{} of {}".format(*found[every, known]) for known in (True, False))
+        print(f"| {full / every:g} | {cells} |", flush=True)
+
+
+def at_rate(x, rate):
+    """A table that tells its frame rate, if it has one."""
+    df = pd.DataFrame(x)
+    if rate is not None:
+        df.attrs["frame_rate"] = rate
+    return df
+
+
 def main():
     folder = Path(sys.argv[1])
     recordings = Recordings.read(folder / "utkinect")
@@ -226,6 +267,7 @@ def main():
     for name, some, folds in runs:
         print(f"\n| {name} | {head} |\n|---|---|---|---|---|---|")
         table(some, folds, methods)
+    search_rates(folder / "hdm05" / "hdm05_positions.npz")
 
 
 if __name__ == "__main__":

@@ -119,7 +119,7 @@ class CycleDisplay:
         segmenter = CycleSegmenter(**estimator.get_params()).set_params(not_cyclic="skip")
         given, takes = check_takes(segmenter, X, reset=True)
         i = as_index(take, len(takes), "take")
-        (x,), (found,) = correlate_takes(given[i : i + 1], takes[i : i + 1], segmenter.skeleton)
+        (x,), (found,) = correlate_takes(segmenter, given[i : i + 1], takes[i : i + 1])
         row = segmenter.report(given[i : i + 1]).iloc[0]
         name, curve = _curve_of(segmenter, estimator if fitted else None, given[i], x, feature)
         cuts = np.array([], dtype=int)

@@ -1,5 +1,6 @@
 """CycleSegmenter: long takes of a movement that repeats, cut into its cycles."""
 
+import warnings
 from itertools import pairwise
 from numbers import Integral, Real
 
@@ -78,6 +79,10 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         Whether to return what precedes the first and follows the last whole cycle, too.
     not_cyclic : {"raise", "skip"}, default="raise"
         What to do with a take that is not cyclic, or has fewer than 1.6 cycles.
+    period : (float, float), default=None
+        Least and largest number of frames of a cycle, for takes in which several cycles fit: a step
+        and two, where every second one is stronger. None takes the shortest of those that repeat
+        best, and warns of the others.
 
     Attributes
     ----------
@@ -126,6 +131,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         "refine": ["boolean"],
         "incomplete": ["boolean"],
         "not_cyclic": [StrOptions({"raise", "skip"})],
+        "period": [tuple, list, np.ndarray, None],
     }
 
     def __init__(
@@ -136,6 +142,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         refine=True,
         incomplete=False,
         not_cyclic="raise",
+        period=None,
     ):
         self.skeleton = skeleton
         self.start = start
@@ -143,6 +150,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         self.refine = refine
         self.incomplete = incomplete
         self.not_cyclic = not_cyclic
+        self.period = period
 
     @atomic_fit
     @_fit_context(prefer_skip_nested_validation=True)
@@ -168,7 +176,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
             ``not_cyclic="raise"``; no take is left; or there is no such `start`.
         """
         given, takes = check_takes(self, X, reset=True)
-        features, found = correlate_takes(given, takes, self.skeleton)
+        features, found = correlate_takes(self, given, takes)
         kept = self._select_cyclic(takes, found)
         if not kept:
             raise ValueError(
@@ -254,37 +262,51 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         DataFrame
             One row a take, indexed by its label: ``n_frames``; ``period``, frames of a cycle, NaN
             without any; ``n_cycles``; ``strength``, the self-correlation at the period; ``cyclic``,
-            whether it can be segmented; and the ``reason`` why not.
+            whether it can be segmented; the ``reason`` why not; and ``periods``, of all cycles that
+            fit.
         """
         self._validate_params()
         given, takes = check_takes(clone(self), X, reset=True)
-        _, found = correlate_takes(given, takes, self.skeleton)
+        _, found = correlate_takes(self, given, takes)
         reasons = [rejection_reason(f, self.threshold) for f in found]
         rows = [
-            (len(x), f.period, f.n_cycles, f.strength, not reason, reason)
+            (len(x), f.period, f.n_cycles, f.strength, not reason, reason, f.periods.tolist())
             for x, f, reason in zip(takes, found, reasons, strict=True)
         ]
-        columns = ["n_frames", "period", "n_cycles", "strength", "cyclic", "reason"]
+        columns = ["n_frames", "period", "n_cycles", "strength", "cyclic", "reason", "periods"]
         index = pd.Index(takes.labels, tupleize_cols=False, name="take")
         return pd.DataFrame(rows, columns=columns, index=index)
 
     def _select_cyclic(self, takes, found):
         """Indices of the takes that are cyclic; an error if others are not to be skipped."""
         reasons = [rejection_reason(f, self.threshold) for f in found]
-        rejected = [i for i, reason in enumerate(reasons) if reason]
-        if rejected and self.not_cyclic == "raise":
-            i = rejected[0]
+        kept = [i for i, reason in enumerate(reasons) if not reason]
+        if len(kept) < len(takes) and self.not_cyclic == "raise":
+            i = next(i for i, reason in enumerate(reasons) if reason)
+            within = "" if self.period is None else f" within period={self.period}"
             raise ValueError(
-                f"{takes.called(i)}: {reasons[i]}. Its self-correlation is {found[i].strength:.2f} "
-                f"at {found[i].n_cycles:.2f} cycles; threshold={self.threshold:g} and at least "
-                f"{LEAST_CYCLES} cycles are required. Leave it out, give a longer take, or set "
-                'not_cyclic="skip"; see report(X).'
+                f"{takes.called(i)}: {reasons[i]}{within}. Its self-correlation is "
+                f"{found[i].strength:.2f} at {found[i].n_cycles:.2f} cycles; "
+                f"threshold={self.threshold:g} and at least {LEAST_CYCLES} cycles are required. "
+                'Leave it out, give a longer take, or set not_cyclic="skip"; see report(X).'
             )
-        return [i for i, reason in enumerate(reasons) if not reason]
+        several = [i for i in kept if len(found[i].periods) > 1]
+        if several:
+            i = several[0]
+            periods = ", ".join(f"{period:.1f}" for period in found[i].periods)
+            warnings.warn(
+                f"{takes.called(i)}: several cycles fit, of {periods} frames; "
+                f"{found[i].period:.1f} is taken. This holds for {len(several)} of {len(takes)} "
+                "takes. Give period=(least, largest), in frames, to choose; report(X)['periods'] "
+                "lists what fits.",
+                UserWarning,
+                stacklevel=5,
+            )
+        return kept
 
     def _phases(self, given, takes):
         """Yield the index, the samples, and their phases, of every take that is cyclic."""
-        features, found = correlate_takes(given, takes, self.skeleton)
+        features, found = correlate_takes(self, given, takes)
         align = match_phases if self.refine else constant_phases
         for i in self._select_cyclic(takes, found):
             take = SampledTake(features[i], found[i].period)
@@ -334,16 +356,31 @@ def check_takes(segmenter, X, *, reset):
     return as_collection(X), takes
 
 
-def correlate_takes(given, takes, skeleton):
+def correlate_takes(segmenter, given, takes):
     """The compared features of takes, in float64, and their self-correlations.
 
     The features are the directions of limbs if there is a skeleton, else those of the takes.
     """
-    if skeleton is not None:
-        cosines = DirectionCosines(skeleton).set_output(transform="default")
+    limits = _check_period(segmenter.period)
+    if segmenter.skeleton is not None:
+        cosines = DirectionCosines(segmenter.skeleton).set_output(transform="default")
         takes = cosines.fit_transform(given)
     features = [np.asarray(x, dtype=np.float64) for x in takes]
-    return features, [correlate(x) for x in features]
+    return features, [correlate(x, limits) for x in features]
+
+
+def _check_period(period):
+    """The least and the largest number of frames of a cycle, or None."""
+    if period is None:
+        return None
+    pair = tuple(period)
+    good = len(pair) == 2 and all(isinstance(n, Real) for n in pair)
+    if not (good and 2 <= pair[0] <= pair[1]):
+        raise ValueError(
+            "period must be two numbers of frames, the least, at least 2, and the largest, of a "
+            f"cycle; got {period!r}."
+        )
+    return pair
 
 
 def compared_names(segmenter):

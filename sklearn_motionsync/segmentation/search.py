@@ -13,8 +13,10 @@ from sklearn.utils._param_validation import Interval, StrOptions, validate_param
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
+from ..inputs.facts import facts_in_fit, facts_of
 from ..inputs.numbers import as_numbers, check_finite
-from ..inputs.tables import as_pandas
+from ..inputs.recorded import timeless
+from ..inputs.tables import FRAME, as_pandas
 from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..matching.filters import SMOOTHING, smooth
 from ..matching.matcher import Features
@@ -24,7 +26,12 @@ from ..model.action_model import ActionModel
 from ..model.similarity import DIFFERENCES, LogMoments, Neighbours, log_moments, movement_energies
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.groups import encode_groups
-from ..utils.pipelines import find_synchronizer, flat_steps, route_to_synchronizer
+from ..utils.pipelines import (
+    find_synchronizer,
+    flat_steps,
+    route_to_synchronizer,
+    union_transformers,
+)
 from .cutting import as_takes, cut_takes
 
 __all__ = ["find_performances"]
@@ -34,6 +41,10 @@ _CLOCK = 100
 # Hits may be shorter and longer than the training performances by this ratio; the larger one is for
 # a single pattern.
 _MARGIN, _MARGIN_OF_ONE = 1.1, 1.5
+# Frame rates that differ by a smaller share are one.
+_SAME_RATE = 0.01
+# A take is resampled to at most so many times its frames.
+_MOST = 100
 # The shortest window, in frames.
 _SHORTEST = 3
 # The first step by which ends of a hit are moved, as a share of its length; later steps are halved.
@@ -74,8 +85,9 @@ def find_performances(
         takes the takes. An array is a single performance, which carries no information about the
         differences between performances.
     X : array (n_frames, n_features), list of such arrays, or other collection
-        One take, or several, at the frame rate of the training performances. A take of a single
-        feature may be one-dimensional.
+        One take, or several. A take of a single feature may be one-dimensional. Tables that know
+        their frame rate, by ``attrs["frame_rate"]`` or an index in seconds, are resampled to that
+        of the training performances; what has no known rate is taken to have the same.
     threshold : "auto", float or None, default="auto"
         The lowest score of a hit. ``"auto"``: learnt from the training performances, each compared
         with those of other groups, but not below what random movements among their postures rarely
@@ -87,9 +99,9 @@ def find_performances(
     max_hits : int, default=None
         How many hits are kept of each take, the best ones; by default all.
     durations : (int, int), default=None
-        Smallest and largest number of frames of a hit. By default 10 % beyond the training
-        performances, and an unusual length lowers the score; for an array from 2/3 to 3/2 of its
-        length.
+        Smallest and largest number of frames of a hit in its take. By default 10 % beyond the
+        training performances, and an unusual length lowers the score; for an array from 2/3 to 3/2
+        of its length.
     groups : array-like, default=None
         Group of each training performance, such as its subject. By default the groups that an
         `ActionModel` in the pipeline was fitted with; it keeps those of at most 64 performances.
@@ -101,7 +113,7 @@ def find_performances(
         labelled by the label of their take and their number in it.
     locations : DataFrame
         One row a performance: ``take``, its index or label; ``start`` and ``stop``, frames of the
-        take, ``stop`` excluded; ``score``; ``threshold``, the given or learnt one.
+        take as it was given, ``stop`` excluded; ``score``; ``threshold``, the given or learnt one.
 
     Raises
     ------
@@ -137,27 +149,107 @@ def find_performances(
     X = as_takes(X, univariate=True)
     checker = type("find_performances", (SequenceLevelMixin, BaseEstimator), {})()
     given = check_performances(checker, X, reset=True, level="sequence", facts=())
-    synchronizer, takes, groups = _reach(pattern, X, groups)
-    for i, (before, after) in enumerate(zip(given, takes, strict=True)):
+    searched, paces = _at_rate_of(pattern, X, given)
+    synchronizer, takes, groups = _reach(pattern, searched, groups)
+    sources = given if searched is X else searched
+    for i, (before, after) in enumerate(zip(sources, takes, strict=True)):
         if len(before) != len(after):
             raise ValueError(
                 f"{given.called(i)} has {len(before)} frames, and {len(after)} after the steps "
                 "before the synchronizer, so frames of hits are unknown. Resample the takes first."
             )
-    shortest, longest = _check_durations(synchronizer, durations)
-    propose = Proposer.of(synchronizer, shortest, longest)
     dissimilarity = WindowDissimilarity(synchronizer, groups, length=durations is None)
     learns = threshold is None or threshold == "auto"
     level = float(np.exp(-dissimilarity.threshold(coverage)) if learns else threshold)
     lowest = 0.0 if threshold is None else level
     rows = []
-    for i, take in enumerate(takes):
-        take = take.astype(np.float64, copy=False)
-        search = _Search(take, dissimilarity, shortest, longest)
-        rows += [(i, *hit) for hit in search.hits(propose(take), lowest, max_hits)]
+    proposers = {
+        pace: Proposer.of(synchronizer, *_check_durations(synchronizer, durations, pace))
+        for pace in set(paces)
+    }
+    for i, (take, pace) in enumerate(zip(takes, paces, strict=True)):
+        take, propose = take.astype(np.float64, copy=False), proposers[pace]
+        search = _Search(take, dissimilarity, propose.shortest, propose.longest)
+        hits = search.hits(propose(take), lowest, max_hits)
+        rows += [(i, *hit) for hit in _in_frames_given(hits, pace, len(given[i]))]
     rows = pd.DataFrame(rows, columns=["take", "start", "stop", "score"])
     rows = rows.astype({"take": int, "start": int, "stop": int, "score": float})
     return cut_takes(X, given, rows.assign(threshold=level))
+
+
+def _at_rate_of(pattern, X, given):
+    """Takes at the frame rate of the training set.
+
+    Returns
+    -------
+    takes : collection
+        ``X``, if none is resampled.
+    paces : list of float
+        For each, the frames that were given in a frame that is searched.
+    """
+    rates = [facts.get("frame_rate") for facts in given.facts] or [None] * len(given)
+    known = _frame_rate_of(pattern)
+    unsure = [i for i, rate in enumerate(rates) if (rate is None) != (known is None)]
+    if unsure:
+        rate = rates[unsure[0]]
+        first, second = ("The pattern", given.called(unsure[0]))[:: 1 if known is None else -1]
+        warnings.warn(
+            f"{first} has no known frame rate, {second[0].lower() + second[1:]} has "
+            f"{known or rate:g} frames a second: both are taken to have the same. Resample if they "
+            "differ, or set x.attrs['frame_rate'] of tables, of performances before the fit.",
+            UserWarning,
+            stacklevel=4,
+        )
+    paces = [1.0 if known is None or rate is None else rate / known for rate in rates]
+    paces = [1.0 if abs(pace - 1) <= _SAME_RATE else pace for pace in paces]
+    if set(paces) == {1.0}:
+        return X, paces
+    searched = list(as_collection(X))
+    for i, pace in enumerate(paces):
+        if pace * _MOST < 1:
+            raise ValueError(
+                f"{given.called(i)} has {rates[i]:g} frames a second, the pattern {known:g}, more "
+                f"than {_MOST} times as many. Correct the wrong one: attrs['frame_rate'], or an "
+                "index in seconds."
+            )
+        if pace != 1:
+            searched[i] = _resample(searched[i], given[i], pace, known)
+    return searched, paces
+
+
+def _frame_rate_of(pattern):
+    """The frame rate of the training set; None if it is unknown, or if there are several."""
+    if not hasattr(pattern, "fit"):
+        return facts_of(as_pandas(pattern)).get("frame_rate")
+    steps = [each for step in flat_steps(pattern) for each in union_transformers(step)]
+    steps.append(find_synchronizer(pattern)[1])
+    found = (facts_in_fit(step).get("frame_rate", ()) for step in steps)
+    rates = next(filter(None, found), ())
+    return rates[0] if len(rates) == 1 else None
+
+
+def _resample(x, array, pace, rate):
+    """A table at another frame rate."""
+    n_steps = max(int((len(array) - 1) / pace + 1e-6), 1)
+    times = np.arange(n_steps + 1) * pace
+    values = at_times(array, times).astype(array.dtype, copy=False)
+    out = pd.DataFrame(values, columns=x.columns).rename_axis(index=FRAME)
+    out.attrs = timeless(x) | {"frame_rate": rate}
+    return out
+
+
+def _in_frames_given(hits, pace, n_frames):
+    """Hits of a resampled take, in the frames of the take as it was given."""
+    if pace == 1 or not hits:
+        return hits
+    starts = [round(start * pace) for start, _, _ in hits]
+    # Hits that touch may share a frame of a take of a lower rate.
+    return [
+        (first, min(first + round((stop - 1 - start) * pace) + 1, limit), score)
+        for (start, stop, score), first, limit in zip(
+            hits, starts, [*starts[1:], n_frames], strict=True
+        )
+    ]
 
 
 class _Search:
@@ -279,8 +371,8 @@ def _training_groups(pattern, reached, groups):
     return None
 
 
-def _check_durations(synchronizer, durations):
-    """The smallest and the largest number of frames of a window."""
+def _check_durations(synchronizer, durations, pace):
+    """The smallest and the largest number of frames of a window of takes at a pace."""
     if durations is None:
         known = synchronizer.lengths_
         margin = _MARGIN if len(known) > 1 else _MARGIN_OF_ONE
@@ -292,7 +384,10 @@ def _check_durations(synchronizer, durations):
             "durations must be two whole numbers of frames, the smallest, at least 2, and the "
             f"largest; got {durations!r}."
         )
-    return int(pair[0]), int(pair[1])
+    # Both ends are frames of the window.
+    shortest, longest = ((n - 1) / pace + 1 for n in pair)
+    shortest = max(2, int(np.ceil(shortest)))
+    return shortest, max(shortest, int(longest))
 
 
 # -- proposals: windows of a take that may hold the action, by matching with free ends ------

@@ -27,6 +27,10 @@ _OVERLAP = 0.3
 # Multiples of a period have peaks, too: the period is at the first peak of this share of the
 # highest.
 _NEAR = 0.9
+# Other cycles fit where the strength is this share of the one that the default threshold requires.
+_FITS, _THRESHOLD = 0.6, 0.4
+# A lag this near to a multiple of a period is that multiple; lags of a lower ratio are one.
+_MULTIPLE, _DISTINCT = 0.1, 1.25
 # Before a peak the correlation falls below this share of the peak, or the peak is a noise ripple.
 _FALL = 0.5
 # Width of the smoothing, as a share of the time scale of the movement.
@@ -60,6 +64,10 @@ class SelfCorrelation(NamedTuple):
         Participation ratio of the variances along the principal components, the effective number of
         dimensions: the squared sum of the variances by the sum of their squares, 1 for a single
         feature. The smaller it is, the larger are chance correlations of noise.
+    periods : ndarray of float
+        Frames of all cycles that fit, in increasing order, ``period`` among them: where every
+        second or fourth step is stronger, those of a step, of two, and of four. Peaks that reach 60
+        % of the strength of a cyclic take, without the multiples of a period that is as strong.
     """
 
     correlation: np.ndarray
@@ -70,6 +78,7 @@ class SelfCorrelation(NamedTuple):
     strength: float
     n_cycles: float
     breadth: float
+    periods: np.ndarray
 
 
 def self_correlation(take, skeleton=None):
@@ -143,8 +152,11 @@ def self_correlation(take, skeleton=None):
     return correlate(np.asarray(array))
 
 
-def correlate(x):
-    """`self_correlation` of features (n_frames, n_features) that were checked."""
+def correlate(x, limits=None):
+    """`self_correlation` of features (n_frames, n_features) that were checked.
+
+    ``limits`` are the least and the largest number of frames of a period.
+    """
     n_frames = len(x)
     x = x.astype(np.float64) - x[0]
     x -= x.mean(axis=0)
@@ -156,15 +168,38 @@ def correlate(x):
     )
     breadth, correlation = _breadth(smoothed[0]), (posture + velocity) / 2
     peaks = _find_peaks(correlation, posture)
-    period, strength, n_cycles = np.nan, 0.0, 0.0
-    if len(peaks):
-        lags, values = _vertices(correlation, peaks)
+    lags, values = _vertices(correlation, peaks)
+    if limits is not None:
+        inside = (limits[0] <= lags) & (lags <= limits[1])
+        lags, values = lags[inside], values[inside]
+    period, periods, strength, n_cycles = np.nan, np.empty(0), 0.0, 0.0
+    if len(lags):
         first = int(np.argmax(values >= _NEAR * values.max()))
         period, strength = float(lags[first]), float(values[first])
         n_cycles = n_frames / period
+        fits = values >= _FITS * required_strength(n_frames / lags, breadth, _THRESHOLD)
+        fits &= np.maximum(lags / period, period / lags) >= _DISTINCT
+        fits[first] = True
+        periods = _distinct_periods(lags[fits], values[fits], period)
     return SelfCorrelation(
-        correlation, posture, velocity, peaks, period, strength, n_cycles, breadth
+        correlation, posture, velocity, peaks, period, strength, n_cycles, breadth, periods
     )
+
+
+def _distinct_periods(lags, values, period):
+    """Lags without those that a shorter one explains: near it, or multiples that hardly exceed it.
+
+    The ``period`` is kept.
+    """
+    kept = []
+    for lag, value in zip(lags, values, strict=True):
+        ratios, others = lag / np.array([k for k, _ in kept]), np.array([v for _, v in kept])
+        multiples = np.round(ratios)
+        repeats = (multiples > 1) & (np.abs(ratios - multiples) <= _MULTIPLE * multiples)
+        explained = (ratios < _DISTINCT) | (repeats & (others >= _NEAR * value))
+        if lag == period or not explained.any():
+            kept.append((lag, value))
+    return np.array([lag for lag, _ in kept])
 
 
 def required_strength(n_cycles, breadth, threshold):

@@ -148,6 +148,27 @@ def test_cycles_begin_with_the_foot_that_is_farther_ahead():
         np.testing.assert_allclose(locations["start"], true[: len(locations)], atol=3)
 
 
+def test_warns_where_several_cycles_fit_and_period_selects_one():
+    """Every second step is stronger: a cycle may be a step, or two."""
+    angle = 2 * np.pi * np.arange(640)[:, np.newaxis] / 40
+    steady = np.sin(angle + np.arange(3)) + 0.5 * np.cos(2 * angle)
+    beat = steady * np.repeat(np.tile([1, 0.4], 8), 40)[:, np.newaxis]
+    segmenter = CycleSegmenter()
+    message = r"Performance 1: several cycles fit, of 38\.\d, 80\.0 frames; 80\.0 is taken"
+    X = [steady, beat]
+    report = segmenter.report(X)
+    assert [len(periods) for periods in report["periods"]] == [1, 2]
+    assert report["period"][1] == report["periods"][1][1]
+    for method in (segmenter.fit, segmenter.segment, segmenter.phases):
+        with pytest.warns(UserWarning, match=message + r".* for 1 of 2 takes\. Give period="):
+            method(X)
+    chosen = CycleSegmenter(period=(20, 60)).fit(X)
+    np.testing.assert_allclose(chosen.periods_, report["periods"][1][0], rtol=0.1)
+    assert len(chosen.segment([beat])[0]) >= 14
+    with pytest.raises(ValueError, match=r"not cyclic within period=\(8, 12\)"):
+        CycleSegmenter(period=(8, 12)).fit(X)
+
+
 # -- errors ---------------------------------------------------------------------------------
 
 
@@ -224,6 +245,9 @@ def test_refuses_wrong_input_and_parameters(gait, fitted):
     for params in ({"threshold": 2}, {"not_cyclic": "drop"}, {"skeleton": "paper"}, {"start": 1.5}):
         with pytest.raises(ValueError, match=f"The '{next(iter(params))}' parameter"):
             CycleSegmenter(**params).report(gait.data)
+    for period in ((40,), (60, 40), (0.5, 1.5), (2, np.nan), ("20", "60")):
+        with pytest.raises(ValueError, match="period must be two numbers of frames, the least"):
+            CycleSegmenter(period=period).report(gait.data)
 
 
 # -- the contract -----------------------------------------------------------------------------

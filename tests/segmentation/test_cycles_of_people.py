@@ -67,3 +67,14 @@ def test_matched_phases_of_foot_strikes_vary_less_than_at_constant_periods(cycle
     within = [cycles.deviations(phases, strikes)[0] for phases in (followed, constant)]
     assert within[0] < 2
     assert within[0] < 0.6 * within[1]
+
+
+def test_warnings_of_several_cycles_are_right(cycles, real_data):
+    """Chains in which every second or fourth repetition is done wrong."""
+    found = list(cycles.warnings_of(real_data))
+    n_right, n_false, n_wrong, n_warned = np.transpose([counts for _, counts in found])
+    for (name, _), count in zip(found, n_false, strict=True):
+        assert count == 0 or "limbs" in name
+    assert n_false.sum() <= 0.02 * n_right.sum()
+    assert n_wrong.sum() > 100
+    assert n_warned.sum() > 0.9 * n_wrong.sum()

@@ -230,6 +230,71 @@ def test_takes_without_the_action_give_no_hits(pipe, take):
         assert locations[["start", "stop"]].dtypes.tolist() == [np.dtype(int)] * 2
 
 
+# -- frame rates ----------------------------------------------------------------------------------
+
+
+def table(x, rate=None):
+    """A table at so many frames a second, of frames recorded at 30."""
+    at = np.arange(0, len(x) - 1 + 1e-9, 30 / (rate or 30))
+    columns = [np.interp(at, np.arange(len(x)), column) for column in np.transpose(x)]
+    df = pd.DataFrame(np.transpose(columns), columns=["hip", "knee", "ankle"])
+    return df if rate is None else attributed(df, frame_rate=rate)
+
+
+def attributed(df, **attrs):
+    df.attrs |= attrs
+    return df
+
+
+@pytest.fixture(scope="module")
+def at_30():
+    steps = DenseSynchronizer(40), ActionModel()
+    X = [table(x, 30) for x in TRAINING]
+    return make_pipeline(*steps).fit(X, actionmodel__groups=SUBJECTS)
+
+
+@pytest.mark.parametrize("rate", [7.5, 15, 29.97, 50, 60, 120])
+def test_takes_of_another_frame_rate_are_resampled(at_30, rate):
+    take = table(TAKE, rate)
+    performances, locations = find_performances(at_30, take)
+    np.testing.assert_allclose(np.array(spans(locations)) * 30 / rate, TRUE, atol=6)
+    assert (locations["stop"].to_numpy()[:-1] <= locations["start"].to_numpy()[1:]).all()
+    for part, (start, stop) in zip(performances, spans(locations), strict=True):
+        np.testing.assert_array_equal(part, take.iloc[start:stop])
+        assert part.attrs["frame_rate"] == rate
+    by_index = table(TAKE, rate).set_axis(pd.Index(np.arange(len(take)) / rate, name="time"))
+    by_index.attrs.clear()
+    pd.testing.assert_frame_equal(find_performances(at_30, by_index)[1], locations)
+    together = find_performances(at_30, [table(TAKE, 30), take])[1]
+    own = together[together["take"] == 1].assign(take=0).reset_index(drop=True)
+    pd.testing.assert_frame_equal(own, locations)
+
+
+def test_durations_and_patterns_have_frame_rates(at_30):
+    take, detector = table(TAKE, 120), ActionDetector(at_30).fit([table(x, 30) for x in TRAINING])
+    _, locations = find_performances(detector, take, durations=(80, 228), threshold=None)
+    assert (locations["stop"] - locations["start"]).between(80, 228).all()
+    pattern = table(movement(60), 30)
+    found = np.array(spans(find_performances(pattern, take)[1]))
+    np.testing.assert_allclose(found / 4, TRUE, atol=6)
+    assert spans(find_performances(at_30, table(TAKE[:3], 120))[1]) == []
+    assert spans(find_performances(at_30, table(other(300), 7.5))[1]) == []
+
+
+def test_warns_if_one_frame_rate_only_is_known(pipe, at_30):
+    with pytest.warns(
+        UserWarning, match=r"Performance 1 has no known .* the pattern has 30 frames"
+    ):
+        assert len(find_performances(at_30, [table(TAKE, 30), table(TAKE)])[1]) == 6
+    sync = DenseSynchronizer(40).fit([table(x) for x in TRAINING])
+    with pytest.warns(
+        UserWarning, match=r"The pattern has no known .* performance 0 has 60 frames"
+    ):
+        find_performances(sync, table(TAKE, 60))
+    with pytest.raises(ValueError, match=r"Performance 0 has 0\.2 frames a second, the pattern 30"):
+        find_performances(at_30, attributed(table(TAKE), frame_rate=0.2))
+
+
 # -- threshold and number of hits ------------------------------------------------------------------
 
 

@@ -8,6 +8,8 @@ from sklearn_motionsync import Skeleton, self_correlation, to_frame
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.segmentation.self_correlation import correlate, rejection_reason
 
+import oracle
+
 
 def waves(n_frames, period, n_features=4, seed=0):
     rng = np.random.default_rng(seed)
@@ -35,6 +37,20 @@ def test_correlation_is_that_of_the_formula():
         assert found.posture[lag] == pytest.approx(by_the_formula(x, lag), abs=0.01)
         assert found.velocity[lag] == pytest.approx(by_the_formula(velocity, lag), abs=0.04)
     np.testing.assert_array_equal(found.correlation, (found.posture + found.velocity) / 2)
+
+
+@pytest.mark.parametrize("drift", [0.0, 3.0, 40.0])
+def test_correlation_of_a_drifting_curve_is_pearsons_at_every_lag(drift):
+    """Of the curve smoothed as docs/method.md says, and of its derivative."""
+    t = np.arange(400) / 400
+    x = np.sin(14 * np.pi * t) + 0.5 * np.cos(28 * np.pi * t**1.1) + drift * (t - t**2 / 3)
+    found = self_correlation(x[:, np.newaxis])
+    change, bend = (np.square(np.diff(x, k)).mean() for k in (1, 2))
+    width = np.sqrt(x.var() / (change - bend / 3)) / 4
+    for order, correlation in enumerate((found.posture, found.velocity)):
+        y = oracle.slow_filter(x[:, np.newaxis], width, order)[:, 0]
+        expected = [np.corrcoef(y[: 400 - lag], y[lag:])[0, 1] for lag in range(len(correlation))]
+        np.testing.assert_allclose(correlation, expected, atol=1e-5)
 
 
 @pytest.mark.parametrize("period", [9.6, 37.3, 250.0])
@@ -132,3 +148,47 @@ def test_breadth_is_the_effective_number_of_dimensions():
     found = correlate(np.eye(8)[np.arange(160) // 5 % 8])
     assert 5 < found.breadth <= 7
     assert correlate(np.sin(np.arange(100.0))[:, np.newaxis]).breadth == pytest.approx(1)
+
+
+# -- several cycles fit -------------------------------------------------------------------------
+
+
+def beats(strengths, period=40, n_steps=16, seed=0):
+    """Steps of one shape, whose strengths repeat."""
+    step = waves(period, period, seed=seed)
+    return np.concatenate([strengths[k % len(strengths)] * step for k in range(n_steps)])
+
+
+@pytest.mark.parametrize(
+    ("strengths", "expected"),
+    [
+        ((1,), [40]),
+        ((1, 0.3), [40, 80]),
+        ((1, 0.25, 0.45, 0.25), [40, 80, 160]),
+        # The strength of two steps is within a tenth of that of three, of which it is no multiple.
+        ((1, 1, 0.2), [40, 120]),
+    ],
+)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_periods_are_those_of_all_cycles_that_fit(strengths, expected, seed):
+    found = self_correlation(beats(strengths, seed=seed))
+    np.testing.assert_allclose(found.periods, expected, rtol=0.03)
+    assert found.period in found.periods
+
+
+def test_ripples_and_multiples_are_no_other_cycles():
+    noise = np.random.default_rng(0).normal(size=(600, 4))
+    for size in (0.1, 0.5):
+        found = self_correlation(waves(600, 60) + size * noise)
+        assert found.periods.tolist() == [found.period]
+    assert self_correlation(np.zeros((30, 2))).periods.tolist() == []
+
+
+@pytest.mark.parametrize(
+    ("limits", "expected"), [((20, 60), 40), ((60, 100), 80), ((140, 180), 160)]
+)
+def test_limits_select_the_period(limits, expected):
+    found = correlate(beats((1, 0.25, 0.45, 0.25)), limits)
+    assert found.period == pytest.approx(expected, rel=0.02)
+    assert found.periods.tolist() == [found.period]
+    assert np.isnan(correlate(beats((1,)), (3, 9)).period)
