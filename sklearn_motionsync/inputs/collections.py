@@ -30,6 +30,7 @@ from .numbers import (
 )
 from .resampling import warn_of_uneven
 from .tables import INDEX_NAMES, as_pandas, labels_of, name_performance, split_table
+from .wording import counted
 
 __all__ = [
     "ACCEPTED",
@@ -141,8 +142,9 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
         arrays.append(array)
         if array.shape[1] != arrays[0].shape[1]:
             raise ValueError(
-                f"{what()} has {array.shape[1]} features a frame, performance {numbers[0]} has "
-                f"{arrays[0].shape[1]}. All performances need the same features in the same order."
+                f"{what()} has {counted(array.shape[1], 'feature')} a frame, performance "
+                f"{numbers[0]} has {arrays[0].shape[1]}. All performances need the same features "
+                "in the same order."
             )
         if tables and column_names(x) != names:
             raise ValueError(
@@ -215,8 +217,8 @@ def _members(X):
         return items
     if len({len(item) for item, depth in zip(items, depths, strict=True) if depth == 1}) > 1:
         raise ValueError(
-            f"{ACCEPTED}. Performance 0 has {len(items[0])} values in one dimension and others "
-            "have other lengths: give univariate performances as columns, x[:, np.newaxis]."
+            f"{ACCEPTED}. Performance 0 has {counted(len(items[0]), 'value')} in one dimension and "
+            "others have other lengths: give univariate performances as columns, x[:, np.newaxis]."
         )
     return None
 

@@ -16,6 +16,7 @@ from ..inputs.collections import as_collection
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.tables import as_pandas
 from ..inputs.validation import SequenceLevelMixin, check_performances
+from ..inputs.wording import counted
 from ..matching.filters import SMOOTHING, smooth
 from ..matching.matcher import Features
 from ..matching.trellis import Trellis
@@ -270,7 +271,7 @@ def _training_groups(pattern, reached, groups):
         return known
     if len(np.unique(known)) < len(known):
         warnings.warn(
-            f"The model keeps the groups of {len(known)} of {n_seen} performances, the "
+            f"The model keeps the groups of {len(known)} of {counted(n_seen, 'performance')}, the "
             f"synchronizer was fitted on {count}: their groups are unknown, each counts as its "
             "own, and the threshold will be too high. Give groups, one for each performance.",
             UserWarning,
