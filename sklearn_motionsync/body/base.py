@@ -8,6 +8,7 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.validation import check_performances, restore
+from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from .axes import heading_axes, heading_axes_with_gaps, to_y_up
@@ -143,7 +144,7 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
         width, expected = performances[0].shape[1], skeleton.n_dims * len(skeleton.joints)
         if width != expected:
             raise ValueError(
-                f"Performance 0 has {width} features a frame, but the skeleton's "
+                f"Performance 0 has {counted(width, 'feature')} a frame, but the skeleton's "
                 f"{len(skeleton.joints)} joints need {expected}: "
                 f"{', '.join(AXES[skeleton.n_dims])} of each."
             )

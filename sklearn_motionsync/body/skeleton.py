@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..inputs.numbers import as_numbers, column_names, is_integer
+from ..inputs.wording import counted
 from .axes import UP_AXES
 from .formats import AXES, FORMATS, LANDMARKS
 from .landmarks import add_midpoints, as_tuple, guess_landmarks, missing_counterparts
@@ -517,7 +518,7 @@ def _nearest_parents(joints, names, parents):
     if len(names) != len(parents) or any(not -1 <= p < len(names) for p in parents):
         raise ValueError(
             "df.attrs must have one parent, an index or -1, for each of its joints; got "
-            f"{len(names)} joints and the parents {parents}."
+            f"{counted(len(names), 'joint')} and the parents {parents}."
         )
     above = {name: names[p] for name, p in zip(names, parents, strict=True) if p >= 0}
     index = {joint: j for j, joint in enumerate(joints)}

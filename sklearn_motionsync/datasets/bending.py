@@ -8,6 +8,7 @@ from sklearn.utils import Bunch, check_random_state
 from sklearn.utils._param_validation import Interval, validate_params
 
 from ..body.skeleton import Skeleton
+from ..inputs.wording import counted
 from .limits import LIMITS, check_size
 
 # The five moments, as shares of the action.
@@ -130,7 +131,7 @@ def make_bending(
     >>> [x.shape[1] for x in bunch.data], bunch.keyframes.shape
     ([45, 45, 45], (3, 5))
     """
-    what = f"{n_performances} performances of about {n_frames} frames"
+    what = f"{counted(n_performances, 'performance')} of about {n_frames} frames"
     n_numbers = n_performances * n_frames * 45
     check_size("make_bending", what, n_numbers, "n_performances or n_frames")
     random_state = check_random_state(random_state)

@@ -8,6 +8,7 @@ from scipy.interpolate import PchipInterpolator
 from sklearn.utils import Bunch, check_random_state
 from sklearn.utils._param_validation import Interval, validate_params
 
+from ..inputs.wording import counted
 from .limits import LIMITS, check_size
 
 _GROUPS = ("A", "B")
@@ -183,7 +184,7 @@ def make_gait(
     >>> later[[0, 30, 62, 100]].round(1).tolist()  # in per cent of the cycle
     [0.0, 0.8, 3.0, 0.0]
     """
-    what = f"{n_people} people with {n_cycles} cycles of about {n_frames} frames"
+    what = f"{n_people} people with {counted(n_cycles, 'cycle')} of about {n_frames} frames"
     n_numbers = n_people * n_cycles * n_frames * len(_CURVES)
     check_size("make_gait", what, n_numbers, "n_people, n_cycles or n_frames")
     # The same people walk, in cycles and in takes.

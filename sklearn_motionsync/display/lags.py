@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..inputs.wording import counted
 from ..synchronizers.lags import Lags
 from ..synchronizers.match import rates_of
 from ..synchronizers.parts import PartSynchronizer
@@ -255,6 +256,7 @@ class LagDisplay:
         parts = f"{n_parts} parts" if n_parts > 1 else self.lags.parts[0]
         people = ""
         if self.lags.groups is not None:
-            people = f" of {len(np.unique(self.lags.groups))} people"
-        count = f"{n_sequences} performance{'s' * (n_sequences != 1)}"
+            n_people = len(np.unique(self.lags.groups))
+            people = " of 1 person" if n_people == 1 else f" of {n_people} people"
+        count = counted(n_sequences, "performance")
         return f"{parts} behind {behind}, {count}{people}"

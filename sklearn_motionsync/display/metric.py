@@ -4,6 +4,7 @@ import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.wording import counted
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import find_step
 from .drawing import COLORS, panels
@@ -62,7 +63,7 @@ class MetricDisplay:
         self.feature_names, self.n_performances = feature_names, n_performances
 
     def __repr__(self):
-        return f"MetricDisplay({len(self.feature_names)} rows, {self._describe()})"
+        return f"MetricDisplay({counted(len(self.feature_names), 'row')}, {self._describe()})"
 
     @classmethod
     def from_estimator(cls, estimator, *, features=None, ax=None):
@@ -148,7 +149,7 @@ class MetricDisplay:
     def _describe(self):
         if self.n_performances is None:
             return "learnt metric"
-        return f"metric learnt from {self.n_performances} performances"
+        return f"metric learnt from {counted(self.n_performances, 'performance')}"
 
 
 def _sort_and_sum(names, shares):
@@ -170,6 +171,6 @@ def _explain_missing(synchronizer):
         "There is no metric to draw, metric_ is None: DenseSynchronizer learns one with "
         "metric='learned', cost='velocity' and consensus above 0, from at least 3 performances "
         f"in which something moves. It has {', '.join(f'{k}={v!r}' for k, v in values.items())} "
-        f"and was fitted to {n} performance{'s' * (n != 1)}; change what is missing and fit it "
+        f"and was fitted to {counted(n, 'performance')}; change what is missing and fit it "
         "again."
     )

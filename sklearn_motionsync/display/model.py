@@ -7,6 +7,7 @@ from sklearn.base import clone
 
 from ..inputs.collections import as_collection
 from ..inputs.features import choose_features
+from ..inputs.wording import counted
 from ..model.views import view_of
 from ..synchronizers.match import rates_of
 from ..utils.groups import names_of_groups
@@ -318,7 +319,7 @@ class ActionModelDisplay:
             handles, labels = [self.envelope_[0]], [label]
             if self.performances is not None:
                 handles.append(self.performances_[0])
-                labels.append(f"{len(self.performances)} performances")
+                labels.append(counted(len(self.performances), "performance"))
         else:
             handles, labels = [], []
             bands = iter(self.envelope_)

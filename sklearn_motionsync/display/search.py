@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from ..inputs.tables import labels_of
+from ..inputs.wording import counted
 from ..segmentation.search import find_performances
 from .arguments import as_performances
 from .drawing import COLORS, panels
@@ -58,7 +59,7 @@ class SearchDisplay:
 
     def __repr__(self):
         count, takes = int(self._accepted().sum()), len(self.lengths)
-        return f"SearchDisplay({count} hit{'s' * (count != 1)} in {takes} take{'s' * (takes != 1)})"
+        return f"SearchDisplay({counted(count, 'hit')} in {counted(takes, 'take')})"
 
     @classmethod
     def from_estimator(cls, pattern, X, *, segments=None, ax=None, **params):

@@ -9,6 +9,7 @@ from sklearn.utils.validation import check_is_fitted
 from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
 from ..inputs.tables import name_performance
+from ..inputs.wording import counted
 from ..model.action_model import ActionModel
 from ..model.views import models_of_classes
 from ..synchronizers.match import match_of_times
@@ -360,7 +361,10 @@ class SkeletonDisplay:
             accepted = model.accepts(samples, frame)
             for points in (mean[[frame]], samples[accepted, :width]):
                 scenes.append([x[np.newaxis] - floor for x in bodies_of(points)])
-            titles += [f"frame {frame}\nmean posture", f"frame {frame}\n{sum(accepted)} samples"]
+            titles += [
+                f"frame {frame}\nmean posture",
+                f"frame {frame}\n{counted(sum(accepted), 'sample')}",
+            ]
         return cls(scenes, skeleton, titles).plot(ax, **view)
 
     @classmethod

@@ -5,6 +5,7 @@ import numpy as np
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.validation import read_collection
+from ..inputs.wording import counted
 from ..synchronizers.match import match_of_times, rates_of
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
@@ -108,7 +109,8 @@ class SynchronizationDisplay:
         self._axis = TimeAxis(unit, self.times.shape[1], lengths, frame_rate)
 
     def __repr__(self):
-        return f"SynchronizationDisplay({len(self.before)} performances, {self.feature_names})"
+        count = counted(len(self.before), "performance")
+        return f"SynchronizationDisplay({count}, {self.feature_names})"
 
     @classmethod
     def from_estimator(
@@ -293,7 +295,7 @@ class SynchronizationDisplay:
             right.sharey(left)
             right.autoscale_view()
             if row == 0:
-                left.set_title(f"as recorded\n{len(self.before)} performances")
+                left.set_title(f"as recorded\n{counted(len(self.before), 'performance')}")
                 means = ", thick: means of groups" if styles else ""
                 right.set_title(f"synchronised{means}\n{self._describe_pattern()}")
         left.set_xlabel(self._axis.performance_label)

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..body.direction_cosines import DirectionCosines
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.wording import counted
 from ..online.particle_filter import Track
 from ..online.tracker import MotionTracker
 from .arguments import TIME_LABELS, Takes, as_frames, as_index, as_names, one_each, times_from_zero
@@ -105,8 +106,8 @@ class TrackingDisplay:
         n_frames, n_features = self.hidden.shape
         count = int(self.hidden.any(axis=0).sum())
         return (
-            f"TrackingDisplay({n_frames} frames of {n_features} features, {count} of them hidden "
-            "at times)"
+            f"TrackingDisplay({n_frames} frames of {counted(n_features, 'feature')}, {count} of "
+            "them hidden at times)"
         )
 
     @classmethod

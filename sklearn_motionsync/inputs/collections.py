@@ -33,6 +33,7 @@ from .numbers import (
 )
 from .resampling import warn_of_uneven
 from .tables import INDEX_NAMES, as_pandas, labels_of, name_performance, split_table
+from .wording import counted
 
 __all__ = [
     "ACCEPTED",
@@ -149,8 +150,9 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
         if array.shape[1] != arrays[0].shape[1]:
             turned = all(len(other) == len(arrays[0]) < min(other.shape[1:]) for other in arrays)
             raise ValueError(
-                f"{what()} has {array.shape[1]} features a frame, performance {numbers[0]} has "
-                f"{arrays[0].shape[1]}. All performances need the same features in the same order."
+                f"{what()} has {counted(array.shape[1], 'feature')} a frame, performance "
+                f"{numbers[0]} has {arrays[0].shape[1]}. All performances need the same features "
+                "in the same order."
                 + (" If they are (n_features, n_frames), give [x.T for x in X]." if turned else "")
             )
         if tables and column_names(x) != names:
@@ -252,8 +254,8 @@ def _members(X):
         return items
     if len({len(item) for item, depth in zip(items, depths, strict=True) if depth == 1}) > 1:
         raise ValueError(
-            f"{ACCEPTED}. Performance 0 has {len(items[0])} values in one dimension and others "
-            "have other lengths: give univariate performances as columns, x[:, np.newaxis]."
+            f"{ACCEPTED}. Performance 0 has {counted(len(items[0]), 'value')} in one dimension and "
+            "others have other lengths: give univariate performances as columns, x[:, np.newaxis]."
         )
     return None
 

@@ -31,6 +31,7 @@ from .tables import (
     split_table,
     stack_frame,
 )
+from .wording import counted
 
 __all__ = ["to_frame", "to_sequences"]
 
@@ -159,9 +160,9 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
     labels, parts = rows_of_labels(index, names)
     if keys and len(flat) == len(labels):
         raise ValueError(
-            f"{keys} give {len(flat)} performances of one row each, and a performance has 2 frames "
-            "or more, one below the other. Name in by= the columns of the performance only, and "
-            "the time in time=: to_sequences(df, by=..., time=...)."
+            f"{keys} give {counted(len(flat), 'performance')} of one row each, and a performance "
+            "has 2 frames or more, one below the other. Name in by= the columns of the "
+            "performance only, and the time in time=: to_sequences(df, by=..., time=...)."
         )
     if not keys and own_label(df)[0] is not None:
         label, names = own_label(df)
@@ -248,7 +249,7 @@ def to_frame(sequences, *, performances=None, columns=None):
         levels = (*outer, levels[-1])
     if len(labels) != len(arrays) or len(set(labels)) != len(labels):
         raise ValueError(
-            f"performances must be {len(arrays)} different labels, one a performance, "
+            f"performances must be {counted(len(arrays), 'different label')}, one a performance, "
             f"got {len(labels)} of which {len(set(labels))} differ."
         )
     for i, label in enumerate(labels):
@@ -257,7 +258,8 @@ def to_frame(sequences, *, performances=None, columns=None):
     columns = names if columns is None else list(columns)
     if columns is not None and len(columns) != arrays[0].shape[1]:
         raise ValueError(
-            f"columns must name the {arrays[0].shape[1]} features, one each; got {len(columns)}."
+            f"columns must name the {counted(arrays[0].shape[1], 'feature')}, one each; got "
+            f"{len(columns)}."
         )
     table = stack_frame(arrays, labels, arrays.frames, columns, levels)
     # An index of times keeps the rate of each.

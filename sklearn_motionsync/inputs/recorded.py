@@ -104,7 +104,7 @@ def refuse_seconds(frames, n_frames, name):
     """Refuse key-frames of a performance, fractions among them, that can only be seconds."""
     last = max(frames, default=0)
     is_early = n_frames >= _FEW_FRAMES and last < max(1, _IN_SECONDS * (n_frames - 1))
-    if is_early and (frames % 1 != 0).any():
+    if is_early and (frames != np.round(frames)).any():
         raise ValueError(
             f"{name}: its key-frames {frames[:5].tolist()} look like seconds, as it has {n_frames} "
             "frames: give seconds * frame_rate. If they are frames, round them."
@@ -157,6 +157,7 @@ class Recorded:
         steps = np.diff(np.unique([] if self.frames is None else self.frames))
         self.step = int(steps.min()) if len(steps) else 1
         self._is_whole = (steps == self.step).all()
+        self._rate = frame_rate_of_rows(df)
 
     def attrs_of(self, rows, times=None, grid=None):
         """The ``attrs`` of some rows, clock and events moved to the frames of a performance.
@@ -178,14 +179,15 @@ class Recorded:
         facts = {key: value for key, value in self._attrs.items() if key not in _OF_ROWS}
         rate = facts.get("frame_rate")
         if self.frames is None:
-            return facts | ({} if rate is None else {"frame_rate": None})
+            own = self._rate if grid is None and (np.diff(rows) == 1).all() else None
+            return facts if rate is None and own is None else facts | {"frame_rate": own}
         frames = self.frames[rows]
         first, all_rows = int(frames[0]), len(rows) == self._n_rows
         start, seconds, events = map(self._attrs.get, ("first_time", "times", "events"))
         for key, still in (("first_frame", first == 0), ("rows", first == 0 and all_rows)):
             if still and key in self._attrs:
                 facts[key] = self._attrs[key]
-        if start is not None and (rate or first == 0):
+        if start is not None and (_is_rate(rate) or first == 0):
             facts["first_time"] = start + (first / rate if first else 0)
         if seconds is not None and frames.max() < len(seconds):
             seconds = np.asarray(seconds, dtype=np.float64)[frames]

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from .numbers import as_numbers
+from .wording import counted
 
 __all__ = [
     "as_frame_rates",
@@ -176,6 +177,6 @@ def as_frame_rates(frame_rate, n_sequences):
         which = f": performance {int(np.argmin(valid))}" if rate.ndim and not valid.all() else ""
         raise ValueError(
             "frame_rate must be one number above 0, in frames a second, or one for each of the "
-            f"{n_sequences} performances, got {frame_rate!r}{which}."
+            f"{counted(n_sequences, 'performance')}, got {frame_rate!r}{which}."
         )
     return rate[..., np.newaxis]

@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_hashable
 
+from .wording import counted
+
 __all__ = [
     "FRAME",
     "INDEX_NAMES",
@@ -73,9 +75,9 @@ def rows_of_labels(keys, names):
         missing = np.flatnonzero(pd.isna(keys.get_level_values(k)))
         if len(missing):
             raise ValueError(
-                f"{name!r} is missing (NaN) in {len(missing)} of {len(keys)} rows, the first is "
-                f"row {missing[0]}. Drop these rows or fill them in: every row needs the name of "
-                "its performance."
+                f"{name!r} is missing (NaN) in {len(missing)} of {counted(len(keys), 'row')}, the "
+                f"first is row {missing[0]}. Drop these rows or fill them in: every row needs the "
+                "name of its performance."
             )
     codes, labels = pd.factorize(keys)
     order = np.argsort(codes, kind="stable")

@@ -21,6 +21,7 @@ from .numbers import (
     refuse_non_numeric,
 )
 from .tables import FRAME, INDEX_NAMES, PERFORMANCE, SPLIT, as_pandas, labels_of, stack_frame
+from .wording import counted
 
 __all__ = [
     "SequenceLevelMixin",
@@ -140,7 +141,7 @@ def check_performances(
     width = out[0].shape[1]
     if not reset and width != estimator.n_features_in_:
         raise ValueError(
-            f"Performance {out.numbers[0]} has {width} features a frame, but {name} is "
+            f"Performance {out.numbers[0]} has {counted(width, 'feature')} a frame, but {name} is "
             f"expecting {estimator.n_features_in_} features as input."
         )
     if reset or out.frames:  # only tables have names
@@ -293,9 +294,10 @@ def _refuse_long_table(name, df):
     timed = (dates or fractions) and index.is_monotonic_increasing and index.is_unique
     if not numbered or timed:
         raise ValueError(
-            f"{name} got a table of {len(df)} rows with the columns {list(df.columns[:4])}, whose "
-            f"index does not tell performances apart. {SPLIT} If every row is one univariate "
-            "performance, give df.to_numpy(); if every column is one, df.T.to_numpy()."
+            f"{name} got a table of {counted(len(df), 'row')} with the columns "
+            f"{list(df.columns[:4])}, whose index does not tell performances apart. {SPLIT} If "
+            "every row is one univariate performance, give df.to_numpy(); if every column is one, "
+            "df.T.to_numpy()."
         )
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..inputs.wording import counted
 from .kinematics import place_joints, rotate, split_channels, turn
 from .text import MotionText, decode, quote
 
@@ -184,7 +185,8 @@ def _connect(text, bones, parents):
     if len(reached) < len(bones):
         lost = sorted(set(bones) - set(reached))
         raise text.error(
-            f":hierarchy does not connect {len(lost)} bones to the root, {lost[0][:60]!r} is one."
+            f":hierarchy does not connect {counted(len(lost), 'bone')} to the root, "
+            f"{lost[0][:60]!r} is one."
         )
 
 

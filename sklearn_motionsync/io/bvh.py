@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..inputs.wording import counted
 from .kinematics import place_joints, split_channels
 from .text import MotionText, decode, make_unique, quote
 
@@ -80,8 +81,8 @@ def _read_hierarchy(text):
             raise text.error(f"expected {expected}, got {quote([word])}.")
     if stack or not joints:
         raise text.error(
-            f"MOTION begins, but {len(stack)} joints are open and {len(joints)} are complete or "
-            "open; every { needs a }, and at least one ROOT must be there."
+            f"MOTION begins with {counted(len(stack), 'open joint')} of {len(joints)}; every "
+            "{ needs a }, and at least one ROOT must be there."
         )
     return joints
 
@@ -130,8 +131,8 @@ def _read_motion(text, n_channels):
     # A number takes two bytes at least, with the blank behind it.
     if 2 * n_frames * n_channels - 1 > text.n_left:
         raise text.error(
-            f"Frames: says {n_frames}, each of {n_channels} channels, but only {text.n_left} bytes "
-            "follow; the file is not complete, or that line is wrong."
+            f"Frames: says {n_frames}, each of {counted(n_channels, 'channel')}, but only "
+            f"{text.n_left} bytes follow; the file is not complete, or that line is wrong."
         )
     values = text.table(n_channels, "a frame (one number a channel)")
     text.check_n_frames(len(values), n_frames, "Frames:")

@@ -9,6 +9,10 @@ import pandas as pd
 from ..body.skeleton import parse_joint_columns
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import Recorded
+from ..inputs.wording import counted
+
+# Kinds of what joints are the names of; angles and forces have no positions.
+_POSITIONS = ("joints", "markers", "keypoints")
 
 
 def find_gaps(df):
@@ -29,7 +33,7 @@ def find_gaps(df):
         joint : str
             Name of the joint.
         first, last : int
-            First and last missing frame, counted from 0.
+            First and last missing frame: rows of `df`, counted from 0.
         n_frames : int
             Length of the gap, in frames.
         inside : bool
@@ -162,10 +166,12 @@ def warn_of_gaps(df, name):
     n_missing = gaps.groupby("joint")["n_frames"].sum()
     n_outside = int((~gaps["inside"]).sum())
     ends = f"; {n_outside} touch an end and cannot be interpolated" if n_outside else ""
+    what = "positions" if df.attrs.get("kind", "joints") in _POSITIONS else "values"
     warnings.warn(
-        _describe_missing(name, "positions", n_missing, df, len(joints), "joints")
-        + f": {len(gaps)} gaps, the longest of {gaps['n_frames'].max()} frames{ends}. Interpolate "
-        "short gaps with read_motion(..., max_gap=<frames>), list them with find_gaps(df), or drop "
+        _describe_missing(name, what, n_missing, df, len(joints), "joints")
+        + f": {counted(len(gaps), 'gap')}, the longest of "
+        f"{counted(gaps['n_frames'].max(), 'frame')}{ends}. Interpolate short gaps with "
+        "read_motion(..., max_gap=<frames>), list them with find_gaps(df), or drop "
         "those columns.",
         UserWarning,
         stacklevel=3,
@@ -193,9 +199,10 @@ def _describe_missing(name, what, n_missing, df, n_columns, kind):
     names = ", ".join(str(column)[:40] for column in worst.index[:4])
     names += ", ..." if len(worst) > 4 else ""
     share = 100 * worst.sum() / (len(df) * n_columns)
+    digits = 2 if share < 99 else 3
     return (
-        f"{name}: {share:.2g} % of the {what} are missing (NaN), of {len(worst)} of {n_columns} "
-        f"{df.attrs.get('kind', kind)} ({names})"
+        f"{name}: {share:.{digits}g} % of the {what} are missing (NaN), of {len(worst)} of "
+        f"{n_columns} {df.attrs.get('kind', kind)} ({names})"
     )
 
 

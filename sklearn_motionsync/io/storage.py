@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..inputs.wording import counted
 from .text import (
     MotionText,
     decode,
@@ -90,6 +91,7 @@ def _split_rows(text, n_labels, n_components):
         if len(fields) != n or len(parts) != 1 + n_labels * max(n_components, 1):
             commas = f" of {n_components} numbers, with commas between them" * bool(n_components)
             raise text.error(
-                f"a row needs its time and {n_labels} columns{commas}, got {quote([row])}."
+                f"a row needs its time and {counted(n_labels, 'column')}{commas}, got "
+                f"{quote([row])}."
             )
         yield parts

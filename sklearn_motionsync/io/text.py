@@ -8,6 +8,8 @@ from collections import Counter
 import numpy as np
 import pandas as pd
 
+from ..inputs.wording import counted
+
 # No number of a recording is larger, in any unit.
 _LARGEST = 1e12
 # Bytes of a table that are parsed at once: memory beside the file and its numbers stays constant.
@@ -81,7 +83,9 @@ class MotionText:
     def numbers(self, words, n, what):
         """`n` finite numbers."""
         if len(words) != n:
-            raise self.error(f"{what} needs {n} numbers, got {len(words)} ({quote(words)}).")
+            raise self.error(
+                f"{what} needs {counted(n, 'number')}, got {len(words)} ({quote(words)})."
+            )
         try:
             numbers = array.array("d", map(float, words))
         except ValueError:
@@ -130,14 +134,15 @@ class MotionText:
         """Refuse a file that states another number of frames than it has."""
         if n_stated not in (None, n_frames):
             raise self.error(
-                f"{name} says {n_stated}, but {n_frames} frames follow; the file is not complete, "
-                "or that line is wrong: then correct it."
+                f"{name} says {n_stated}, but {counted(n_frames, 'frame')} "
+                f"follow{'s' * (n_frames == 1)}; the file is not complete, or that line is wrong: "
+                "then correct it."
             )
 
     def check_size(self, n_frames, n_joints):
         """Refuse positions out of all proportion to the file, before they are made."""
         n_bytes = 24 * n_frames * n_joints
-        what = f"{n_frames} frames of {n_joints} joints"
+        what = f"{counted(n_frames, 'frame')} of {counted(n_joints, 'joint')}"
         check_result_size(self.path, self.size, n_bytes, what)
 
     def error(self, message):

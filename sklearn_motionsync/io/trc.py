@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 
+from ..inputs.wording import counted
 from .text import (
     MotionText,
     decode,
@@ -97,8 +98,9 @@ def _read_names(text, header):
         places = labels[: 3 * n : 3]
         if not n or len(places) != n or sum(map(bool, places)) != len(names):
             raise text.error(
-                f"line {line_number} names {len(names)} markers, but there are columns for {n}; "
-                "each has its name in the first of its three columns, with tabs between them."
+                f"line {line_number} names {counted(len(names), 'marker')}, but there are columns "
+                f"for {n}; each has its name in the first of its three columns, with tabs between "
+                "them."
             )
         names = [name or b"marker_%d" % (j + 1) for j, name in enumerate(places)]
     return [decode(name) for name in names], row

@@ -10,6 +10,7 @@ import pandas as pd
 from ..inputs.numbers import as_numbers
 from ..inputs.recorded import refuse_seconds
 from ..inputs.resampling import as_frame_rates
+from ..inputs.wording import counted
 from ..matching.warps import evaluate_warps
 
 __all__ = [
@@ -288,7 +289,9 @@ def _as_moments(moments, n_sequences):
     """Shares of the action, one array (n_frames_i >= 2,) a warp, from 0 to 1, not decreasing."""
     rows = _as_rows(moments, "moments")
     if len(rows) != n_sequences:
-        raise ValueError(f"There are {n_sequences} warps and {len(rows)} sets of moments.")
+        raise ValueError(
+            f"Got {counted(n_sequences, 'warp')} and {counted(len(rows), 'set')} of moments."
+        )
     for i, phi in enumerate(rows):
         if phi.ndim != 1 or len(phi) < 2:
             raise ValueError(
@@ -316,7 +319,7 @@ def _as_lengths(n_frames, n_sequences):
     lengths = as_numbers(n_frames, "n_frames", dtype=np.float64)
     if lengths.shape != (n_sequences,):
         raise ValueError(
-            f"n_frames must be the lengths of the {n_sequences} performances, such as "
+            f"n_frames must be the lengths of the {counted(n_sequences, 'performance')}, such as "
             f"[len(x) for x in X], got shape {lengths.shape}."
         )
     valid = (lengths >= 2) & (lengths == np.floor(lengths)) & np.isfinite(lengths)
@@ -340,8 +343,9 @@ def _as_keyframes(keyframes, pattern_keyframes, lengths, n_frames):
     rows = _as_rows(keyframes, "keyframes")
     if [row.shape for row in rows] != [pattern.shape] * len(lengths):
         raise ValueError(
-            f"keyframes must have {len(pattern)} numbers, as pattern_keyframes, for each of the "
-            f"{len(lengths)} warps; got the shapes {[row.shape for row in rows]}."
+            f"keyframes must have {counted(len(pattern), 'number')}, as pattern_keyframes, for "
+            f"each of the {counted(len(lengths), 'warp')}; got the shapes "
+            f"{[row.shape for row in rows]}."
         )
     pattern = _in_order(pattern, n_frames - 1, "The pattern", "frames of the clock")
     for i, (row, length) in enumerate(zip(rows, lengths, strict=True)):

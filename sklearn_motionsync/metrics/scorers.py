@@ -9,6 +9,7 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
 from sklearn.utils.metadata_routing import MetadataRequest
 
+from ..inputs.wording import counted
 from ..matching.warps import normalise
 from ..utils.pipelines import accepted_params, route_to_synchronizer
 from .spread import least_squares, pairwise_correlation, sobolev_least_squares
@@ -259,8 +260,8 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
             )
         if not isinstance(self.n_folds, Integral) or not 2 <= self.n_folds <= n_features:
             raise ValueError(
-                f"n_folds={self.n_folds!r} must be between 2 and the {n_features} features there "
-                "are, a whole number."
+                f"n_folds={self.n_folds!r} must be between 2 and the "
+                f"{counted(n_features, 'feature')} there are, a whole number."
             )
         if reached.takes_params:
             # Metadata that the estimator needs are missing for its clones, too.

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..inputs.wording import counted
 from ..matching.warps import at_times
 from .state_space import CausalSlopes, exponential_average, kalman_update, squared_norms, whitening
 
@@ -48,7 +49,7 @@ class Track(NamedTuple):
     >>> X = [size * np.sin(np.linspace(0, 3, 40))[:, np.newaxis] for size in (0.9, 1.0, 1.1)]
     >>> track = MotionTracker(LinearSynchronizer()).fit(X).track(X[0])
     >>> track
-    Track(40 frames of 1 features, 0 of them lost)
+    Track(40 frames of 1 feature, 0 of them lost)
     >>> track.covariances.shape
     (40, 1, 1)
     """
@@ -63,7 +64,9 @@ class Track(NamedTuple):
     def __repr__(self):
         n_frames, n_features = np.size(self.lost), self.postures.shape[-1]
         n_lost = np.count_nonzero(self.lost)
-        return f"Track({n_frames} frames of {n_features} features, {n_lost} of them lost)"
+        return (
+            f"Track({n_frames} frames of {counted(n_features, 'feature')}, {n_lost} of them lost)"
+        )
 
 
 def stack_frames(frames, dtype):

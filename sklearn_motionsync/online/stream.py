@@ -406,9 +406,9 @@ def times_of_each(times, n):
     """A list with the times of each of n performances, or None for each without times."""
     if times is None:
         return [None] * n
-    given = len(times) if np.iterable(times) else "no"
+    given = len(times) if np.iterable(times) else "none"
     if given != n:
         raise ValueError(
-            f"There are {n} performances, but {given} sequences of times: give one for each."
+            f"There must be one sequence of times for each performance, got {given} for {n}."
         )
     return list(times)

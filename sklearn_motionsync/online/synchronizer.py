@@ -10,6 +10,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.facts import TIMELESS
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
+from ..inputs.wording import counted
 from ..matching.causal import causal_costs, causal_velocity
 from ..matching.costs import step_table
 from ..matching.filters import SMOOTHING
@@ -246,8 +247,8 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         known = streams.dtype.kind in "iu" and np.isin(streams, np.arange(-n_streams, n_streams))
         if len(streams) and not np.all(known):
             raise ValueError(
-                f"stream={stream!r}, but {n_streams} performances run: give an index of these or "
-                "several, or None for all."
+                f"stream={stream!r} is not among {counted(n_streams, 'running performance')}: give "
+                "an index of these or several, or None for all."
             )
         for n in streams:
             self._session.restart(int(n))

@@ -8,6 +8,7 @@ from sklearn.base import BaseEstimator
 from sklearn.utils._param_validation import Interval, StrOptions, validate_params
 
 from ..inputs.validation import SequenceLevelMixin, check_performances
+from ..inputs.wording import counted
 from ..matching.costs import COSTS
 from ..matching.pairwise import BLOCK, PairwiseDistance
 from ..matching.warps import normalise
@@ -190,7 +191,7 @@ def _directed(comparison, bases, moving, *, n_jobs, progress, name):
     )
     blocks = list(itertools.product(rows, columns))
     portions = [(blocks[i : i + _PORTION_BLOCKS],) for i in range(0, len(blocks), _PORTION_BLOCKS)]
-    stage = f"comparing {len(bases)} with {len(moving)} performances{name}"
+    stage = f"comparing {len(bases)} with {counted(len(moving), 'performance')}{name}"
     jobs = {"n_jobs": n_jobs, "step": progress.stage(stage, len(portions))}
     out = np.empty((len(bases), len(moving)))
     common = (SharedArgument((comparison, bases, moving)),)

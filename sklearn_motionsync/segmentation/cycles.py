@@ -179,9 +179,9 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         features, found = correlate_takes(self, given, takes)
         kept = self._select_cyclic(takes, found)
         if not kept:
+            none = "The take is not" if len(takes) == 1 else f"None of the {len(takes)} takes is"
             raise ValueError(
-                f"None of the {len(takes)} takes is cyclic. See report(X); give takes that repeat, "
-                "or another threshold."
+                f"{none} cyclic. See report(X); give takes that repeat, or another threshold."
             )
         curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
         sampled = [SampledTake(features[i], found[i].period) for i in kept]

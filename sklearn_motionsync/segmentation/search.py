@@ -18,6 +18,7 @@ from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import timeless
 from ..inputs.tables import FRAME, as_pandas
 from ..inputs.validation import SequenceLevelMixin, check_performances
+from ..inputs.wording import counted
 from ..matching.filters import SMOOTHING, smooth
 from ..matching.matcher import Features
 from ..matching.trellis import Trellis
@@ -362,7 +363,7 @@ def _training_groups(pattern, reached, groups):
         return known
     if len(np.unique(known)) < len(known):
         warnings.warn(
-            f"The model keeps the groups of {len(known)} of {n_seen} performances, the "
+            f"The model keeps the groups of {len(known)} of {counted(n_seen, 'performance')}, the "
             f"synchronizer was fitted on {count}: their groups are unknown, each counts as its "
             "own, and the threshold will be too high. Give groups, one for each performance.",
             UserWarning,

@@ -9,6 +9,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from ..body.direction_cosines import DirectionCosines
 from ..inputs.collections import as_collection, check_members
 from ..inputs.tables import as_pandas
+from ..inputs.wording import counted
 from ..matching.filters import smooth
 
 __all__ = [
@@ -143,8 +144,8 @@ def self_correlation(take, skeleton=None):
     several = as_collection(take)
     if several is not None and not (isinstance(take, pd.DataFrame) and len(several) == 1):
         raise ValueError(
-            f"Give one take, (n_frames, n_features), got {len(several)} performances; for several "
-            "use CycleSegmenter().report(X)."
+            f"Give one take, (n_frames, n_features), got {counted(len(several), 'performance')}; "
+            "for several use CycleSegmenter().report(X)."
         )
     (array,) = check_members([take])
     if skeleton is not None:

@@ -23,6 +23,7 @@ from ..inputs.validation import (
     read_source,
     restore,
 )
+from ..inputs.wording import counted
 from ..matching.filters import SMOOTHING
 from ..matching.matcher import Features
 from ..matching.median import Median, linear_median
@@ -327,7 +328,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         if n_bytes > MOST_BYTES:
             positions = f" and subframes = {subframes}" if subframes > 1 else ""
             raise ValueError(
-                f"{n} performances at n_frames = {self.n_frames_}{positions} take "
+                f"{counted(n, 'performance')} at n_frames = {self.n_frames_}{positions} take "
                 f"{n_bytes / 2**30:.0f} GB several times over; {MOST_BYTES / 2**30:.0f} GB is the "
                 f"limit. Use {self._SMALLER}."
             )

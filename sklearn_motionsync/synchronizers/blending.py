@@ -16,6 +16,7 @@ from ..inputs.facts import compare_facts
 from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.recorded import timeless
 from ..inputs.tables import FRAME, labels_of
+from ..inputs.wording import counted
 from ..utils.pipelines import flat_steps, route_to_synchronizer, union_transformers
 from .match import Match
 
@@ -193,8 +194,9 @@ def _check(sequences, arrays, skeleton):
         names = skeleton.get_feature_names_out()
         if arrays[0].shape[1] != len(names):
             raise ValueError(
-                f"Performance 0 has {arrays[0].shape[1]} features a frame, but postures of these "
-                f"DirectionCosines have {len(names)}. For joint positions give the Skeleton."
+                f"Performance 0 has {counted(arrays[0].shape[1], 'feature')} a frame, but postures "
+                f"of these DirectionCosines have {len(names)}. For joint positions give the "
+                "Skeleton."
             )
         for i, x in enumerate(sequences):
             check_names(x, names, f"Performance {i}")
@@ -216,8 +218,8 @@ def _weights(given, labels, n_frames, what):
     rows = np.atleast_2d(as_numbers(given, what, dtype=np.float64))
     if rows.ndim != 2 or rows.shape[1] != len(labels):
         raise ValueError(
-            f"{what} must be one for each of the {len(labels)} performances, or rows of them; got "
-            f"shape {np.shape(given)}. For some, give a dict: {{0: 0.5, 1: 0.5}}."
+            f"{what} must be one for each of the {counted(len(labels), 'performance')}, or rows of "
+            f"them; got shape {np.shape(given)}. For some, give a dict: {{0: 0.5, 1: 0.5}}."
         )
     check_finite(rows, f"{what}, row")
     total = rows.sum(axis=1)

@@ -9,6 +9,7 @@ from sklearn.utils._param_validation import Interval
 
 from ..inputs.numbers import as_numbers
 from ..inputs.recorded import refuse_moved_events, refuse_seconds
+from ..inputs.wording import counted
 from ..matching.filters import SMOOTHING, smooth
 from ..matching.units import Unit
 from ..matching.warps import even_slices, sample
@@ -250,7 +251,8 @@ class KeyframeSynchronizer(Synchronizer):
             path = np.concatenate([[0], frames.ravel(), [len(x) - 1]])
             if frames.shape != (count,) or count == 0 or not (np.diff(path) > 0).all():
                 raise ValueError(
-                    f"Performance {i}: key-frames must be {count or 'some'} increasing frames "
+                    f"Performance {i}: key-frames must be "
+                    f"{counted(count, 'increasing frame') if count else 'some increasing frames'} "
                     f"between 0 and {len(x) - 1}, both excluded, got {given}."
                 )
             checked.append(frames * (self.n_frames_ - 1) / (len(x) - 1))

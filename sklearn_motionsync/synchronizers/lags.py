@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
+from ..inputs.wording import counted
 from .match import timing_table
 
 __all__ = ["Lags"]
@@ -109,8 +110,8 @@ class Lags(NamedTuple):
     def __repr__(self):
         n_sequences, n_parts, n_frames = self.values.shape
         return (
-            f"Lags({n_parts} parts of {n_sequences} performances on {n_frames} frames, behind "
-            f"{self.against!r}, in {self.unit})"
+            f"Lags({counted(n_parts, 'part')} of {counted(n_sequences, 'performance')} on "
+            f"{n_frames} frames, behind {self.against!r}, in {self.unit})"
         )
 
     def _spread(self, values):

@@ -11,6 +11,7 @@ from ..inputs.numbers import as_numbers
 from ..inputs.recorded import frame_rate_of_rows
 from ..inputs.resampling import as_frame_rates
 from ..inputs.validation import read_collection
+from ..inputs.wording import counted
 from ..matching.warps import sample
 from ..utils.pipelines import route_to_synchronizer
 
@@ -119,8 +120,8 @@ class Match:
         distances = np.array(as_numbers(distances, "distances"))
         if distances.shape != (n_sequences,):
             raise ValueError(
-                f"distances must be one for each of the {n_sequences} performances, got shape "
-                f"{distances.shape}."
+                f"distances must be one for each of the {counted(n_sequences, 'performance')}, got "
+                f"shape {distances.shape}."
             )
         self.times, self.distances = times, distances
 
@@ -216,7 +217,7 @@ class Match:
         """
         times, offsets = self._in_unit(unit, X, frame_rate)
         if labels is not None:
-            self._check_count(labels, "labels")
+            self._check_count(labels, "label")
         columns = {"time": times, "offset": offsets, "rate": self.rates}
         return timing_table(columns, X, labels)
 
@@ -282,7 +283,7 @@ class Match:
             performances.
         """
         arrays, _ = read_collection(X)
-        self._check_count(arrays, "sequences to warp")
+        self._check_count(arrays, "sequence")
         return sample(arrays, self.times, self.times.shape[1])
 
     def frames(self, X):
@@ -340,20 +341,20 @@ class Match:
                 )
             return tuple(self._in_seconds(t, X, frame_rate) for t in (self.times, self.offsets))
         if X is not None:
-            self._check_count(_lengths(X), "lengths")
+            self._check_count(_lengths(X), "length")
         scale = 100 / (self.times.shape[1] - 1) if unit == "percent" else 1
         return self.times * scale, self.offsets * scale
 
     def _stretched(self, times, X):
         """Frames of the pattern in frames of each performance."""
         lengths = _lengths(X)
-        self._check_count(lengths, "lengths")
+        self._check_count(lengths, "length")
         sound = (lengths >= 2) & (lengths == np.floor(lengths))
         if not sound.all():
             i = int(np.argmin(sound))
             raise ValueError(
-                f"Performance {i} has {lengths[i]:g} frames; give the performances, or how many "
-                "frames each has, whole numbers of at least 2."
+                f"Performance {i} has {counted(lengths[i], 'frame')}; give the performances, or "
+                "how many frames each has, whole numbers of at least 2."
             )
         return times * (lengths[:, np.newaxis] - 1) / (self.times.shape[1] - 1)
 
@@ -372,13 +373,13 @@ class Match:
 
     def __repr__(self):
         n_sequences, n_frames = self.times.shape
-        return f"Match({n_sequences} performances on {n_frames} frames)"
+        return f"Match({counted(n_sequences, 'performance')} on {n_frames} frames)"
 
-    def _check_count(self, given, what):
+    def _check_count(self, given, noun):
         if len(given) != len(self.times):
             raise ValueError(
-                f"There are {len(self.times)} matched performances, but {len(given)} {what}: give "
-                "one for each, in the same order."
+                f"{counted(len(self.times), 'matched performance')}, but "
+                f"{counted(len(given), noun)}: give one for each, in the same order."
             )
 
 

@@ -6,6 +6,7 @@ import threading
 import numpy as np
 from joblib import effective_n_jobs
 
+from ..inputs.wording import counted
 from ..matching.warps import even_slices
 from ..utils.parallel import SharedArgument, on_cluster, run
 from ..utils.threads import on_one_thread
@@ -69,7 +70,7 @@ class TrainingPortions:
         few = -(-len(tiles) // (4 * effective_n_jobs(n_jobs)))
         size = max(1, min(few, PORTION_CELLS // cells))
         portions = [(bases, moving, x) for x in self._batches(tiles, size, n_moving > n_bases)]
-        name = f"comparing {n_bases} with {n_moving} performances"
+        name = f"comparing {n_bases} with {counted(n_moving, 'performance')}"
         step = progress.stage(name, len(portions))
         if len(portions) == 1:
             yield from on_one_thread(self.distances, *portions[0])

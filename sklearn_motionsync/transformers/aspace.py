@@ -15,6 +15,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
 from ..inputs.validation import check_performances, check_transformed, restore
+from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 
@@ -113,9 +114,9 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         most = min(postures.shape)
         if isinstance(self.n_components, Integral) and self.n_components > most:
             raise ValueError(
-                f"n_components={self.n_components} is more than the {len(postures)} postures of "
-                f"{postures.shape[1]} features can span; use at most {most}, or a share of the "
-                "variance such as 0.95."
+                f"n_components={self.n_components} is more than the "
+                f"{counted(len(postures), 'posture')} of {counted(postures.shape[1], 'feature')} "
+                f"can span; use at most {most}, or a share of the variance such as 0.95."
             )
         with np.errstate(invalid="ignore"):  # of postures all equal: PCA divides 0 by 0
             pca = PCA().set_output(transform="default").fit(postures)

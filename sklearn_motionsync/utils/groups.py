@@ -71,8 +71,8 @@ def encode_groups(groups, n_performances, *, name="groups", at_least=1, sort=Fal
         )
     if len(groups) != n_performances:
         raise ValueError(
-            f"{name} has {len(groups)} labels, and there are {n_performances} performances: give "
-            "one label for each."
+            f"{name} must have one label for each performance, got {len(groups)} for "
+            f"{n_performances}."
         )
     given = _check_labels(groups, name)
     labels = list(dict.fromkeys(given))

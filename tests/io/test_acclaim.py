@@ -112,7 +112,7 @@ def test_skeleton_is_found_by_its_name(tmp_path):
         ("root thigh\n", "root leg\n", ":hierarchy names 'leg', which is not in :bonedata"),
         ("thigh shin\n", "thigh shin\nleg\n", ":hierarchy names 'leg', which is not in :bonedata"),
         ("thigh shin\n", "shin thigh\n", ":hierarchy gives 'thigh' two parents"),
-        ("thigh shin\n", "\n", "does not connect 1 bones to the root, 'shin' is one"),
+        ("thigh shin\n", "\n", "does not connect 1 bone to the root, 'shin' is one"),
         ("root thigh\n", "\n", "does not connect 2 bones to the root, 'shin' is one"),
         (":bonedata", ":bones", ":hierarchy names 'thigh', which is not in :bonedata"),
         (ASF[ASF.index(":bonedata") :], "", "ends without a complete :root, :bonedata"),

@@ -26,7 +26,7 @@ def test_files_of_every_processor_are_the_same(tmp_path, machine, real):
 def test_gaps_are_nan_with_a_warning_or_filled(tmp_path):
     path = put(tmp_path, c3d(tracks(gap=(10, 14))), "a.c3d")
     message = (
-        r"^a\.c3d: 3\.3 % of the positions are missing \(NaN\), of 1 of 3 markers \(M1\): 1 gaps, "
+        r"^a\.c3d: 3\.3 % of the positions are missing \(NaN\), of 1 of 3 markers \(M1\): 1 gap, "
         r"the longest of 4 frames\. Interpolate short gaps with read_motion\(\.\.\., max_gap="
     )
     with pytest.warns(UserWarning, match=message) as caught:
@@ -115,7 +115,7 @@ def test_integers_may_have_another_byte_order_than_floats(tmp_path, machine, ord
     analog = np.random.default_rng(0).integers(-300, 300, (40, 2, 2))
     content = c3d(tracks(gap=(3, 5)), machine, real, analog=analog, order=order)
     path = put(tmp_path, content, "a.c3d")
-    with pytest.warns(UserWarning, match="1 gaps"):
+    with pytest.warns(UserWarning, match="1 gap, "):
         df = read_motion(path)
     np.testing.assert_array_equal(df.to_numpy().reshape(40, 3, 3), tracks(gap=(3, 5)))
     np.testing.assert_array_equal(read_motion(path, group="analog"), analog.reshape(80, 2))

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync.io import fill_gaps, find_gaps
+from sklearn_motionsync.io.gaps import warn_of_gaps
 
 
 def with_gaps():
@@ -114,3 +115,25 @@ def test_tables_are_filled_performance_by_performance():
     filled = table.groupby(level=0, group_keys=False).apply(fill_gaps, max_gap=9)
     np.testing.assert_array_equal(filled.loc["q"], fill_gaps(with_gaps() * 2, 9))
     pd.testing.assert_frame_equal(fill_gaps(table.loc[["p"]], 9), filled.loc[["p"]])
+
+
+@pytest.mark.parametrize(
+    ("kind", "share", "words"),
+    [
+        ("markers", 0.5, "50 % of the positions are missing"),
+        ("markers", 0.996, r"99\.6 % of the positions"),
+        ("joints", 1.0, "100 % of the positions"),
+        (
+            "angles",
+            0.25,
+            r"25 % of the values are .*, of 1 of 1 angles \(a\): 1 gap, the",
+        ),
+        ("moments", 0.001, r"0\.1 % of the values .*: 1 gap, the longest of 1 frame; 1 touch"),
+    ],
+)
+def test_the_warning_says_how_much_is_missing_of_what(kind, share, words):
+    df = pd.DataFrame({f"a_{axis}": np.zeros(1000) for axis in "xyz"})
+    df.iloc[: int(1000 * share)] = np.nan
+    df.attrs["kind"] = kind
+    with pytest.warns(UserWarning, match=words):
+        warn_of_gaps(df, "a.c3d")

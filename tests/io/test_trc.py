@@ -72,7 +72,7 @@ def test_names_are_unique_and_complete(tmp_path):
 def test_unseen_markers_are_nan_with_a_warning(tmp_path, blank, end):
     text = trc(tracks(gap=(3, 9)), NAMES, blank=blank).replace("\n", end + "\n")
     path = put(tmp_path, text, "a.trc")
-    with pytest.warns(UserWarning, match=r"a\.trc: 5 % .* 1 of 3 markers \(R\.Knee Lat\): 1 gaps"):
+    with pytest.warns(UserWarning, match=r"a\.trc: 5 % .* 1 of 3 markers \(R\.Knee Lat\): 1 gap, "):
         df = read_motion(path)
     np.testing.assert_array_equal(df, tracks(gap=(3, 9)).reshape(40, 9))
     assert not read_motion(path, max_gap=6).isna().any(axis=None)

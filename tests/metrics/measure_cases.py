@@ -158,8 +158,8 @@ WRONG_MOMENTS = [
     ([[0, 0.5, 0.4, 1]], "must not decrease.*after frame 1"),
     ([[0]], r"at least 2, got \(1,\)"),
     ([[[0, 1]]], r"got \(1, 2\)"),
-    ([0, 1], "1 warps and 2 sets"),
-    ([], "1 warps and 0 sets"),
+    ([0, 1], "1 warp and 2 sets"),
+    ([], "1 warp and 0 sets"),
     ([["0", "1"]], "Performance 0: moments is not a numeric"),
     ({"a": [0, 1]}, "got dict"),
     (None, "got NoneType"),
@@ -174,7 +174,7 @@ WRONG_KEYFRAMES = [
     (([[5]], [NAN], [9]), "The pattern"),
     (([[5]], 2, [9]), r"pattern_keyframes must have shape \(n_keyframes,\)"),
     (([[]], [], [9]), "at least one"),
-    (([[5], [5]], [2], [9]), r"each of the 1 warps; got the shapes \[\(1,\), \(1,\)\]"),
+    (([[5], [5]], [2], [9]), r"each of the 1 warp; got the shapes \[\(1,\), \(1,\)\]"),
     (([5], [2], [9]), r"got the shapes \[\(\)\]"),
     (([[5, 6]], [2], [9]), r"got the shapes \[\(2,\)\]"),
     ((5, [2], [9]), "list of arrays, one a performance, got int"),
@@ -183,7 +183,7 @@ WRONG_KEYFRAMES = [
     (([np.ma.masked_equal([5], 5)], [2], [9]), "masked"),
     (([[5]], [2], [1]), "Performance 0: n_frames must be a whole number of at least 2, got 1"),
     *((([[5]], [2], [wrong]), f"got {wrong}") for wrong in (9.5, NAN, INF)),
-    (([[5]], [2], [9, 9]), "n_frames must be the lengths of the 1 performances"),
+    (([[5]], [2], [9, 9]), "n_frames must be the lengths of the 1 performance"),
     (([[5]], [2], 9), "n_frames must be the lengths"),
 ]
 

@@ -209,7 +209,11 @@ def test_many_of_one_group_before_another():
         (np.full((3, 10, 2), np.nan), None, "Performance 0, frame 0, feature 0 is NaN"),
         (np.zeros((3, 10, 3)), None, "3 features a frame, but ActionModel is expecting 2"),
         (curves(3, n_frames=10), ["a", None, "b"], r"groups\[1\] is missing, None"),
-        (curves(3, n_frames=10), ["a"], "groups has 1 labels, and there are 3"),
+        (
+            curves(3, n_frames=10),
+            ["a"],
+            "one label for each performance, got 1 for 3",
+        ),
         (np.zeros((3, 10)), None, "wrap one sequence as"),
         ([], None, "Found 0 performances"),
     ],

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import pytest
 from sklearn_motionsync import LinearSynchronizer, to_frame, to_sequences
 from sklearn_motionsync.inputs.validation import check_performances
 from sklearn_motionsync.segmentation.cutting import cut_takes
@@ -37,6 +38,26 @@ def test_tables_keep_columns_and_attrs():
     assert df.index.names == ["take", "part", "frame"]
     assert list(df.columns) == ["hip", "knee"]
     assert df.sort_index().loc[(1, 1)]["hip"].tolist() == [8, 10, 12, 14, 16]
+
+
+@pytest.mark.parametrize("step", [1, 2])
+def test_events_and_times_are_those_of_the_performance(step):
+    number = np.arange(20.0 * step)
+    table = pd.DataFrame({"number": number, "knee": number**2})
+    table.attrs = {"frame_rate": 120.0, "first_time": 2.0, "first_frame": 7, "rows": [0, 9]}
+    table.attrs["events"] = [{"label": "off", "frame": x} for x in (1.0, 5.5 * step, 30.0 * step)]
+    timed = table.set_index(pd.Index(number / 50, name="time"))
+    later, first, _ = cut([table.iloc[::step], table.iloc[::step]])[0]
+    assert later["number"].tolist() == [step * k for k in range(4, 9)]
+    assert later.attrs["events"] == [{"label": "off", "frame": 1.5}]
+    assert later.attrs["frame_rate"] == 120 / step
+    assert later.attrs["first_time"] == 2 + 4 * step / 120
+    assert "first_frame" not in later.attrs
+    assert (first.attrs["first_frame"], first.attrs["first_time"]) == (7, 2.0)
+    # An index in seconds tells a frame rate, but not where the events are.
+    part = cut([timed.iloc[::step]] * 2)[0][0]
+    assert part.attrs["frame_rate"] == pytest.approx(50 / step)
+    assert "events" not in part.attrs
 
 
 def test_performances_are_labelled_by_their_take():

@@ -399,7 +399,7 @@ def test_memory_does_not_grow_with_the_take(pipe):
         ({"max_hits": 0}, "The 'max_hits' parameter"),
         ({"durations": (9, 4)}, "durations must be two whole numbers"),
         ({"durations": 30}, "durations must be two whole numbers"),
-        ({"groups": [0, 1]}, "groups has 2 labels, .* 12 performances"),
+        ({"groups": [0, 1]}, "groups must have one label for each .*, got 2 for 12"),
         ({"groups": "abcdefghijkl"}, "groups must be a list"),
         ({"groups": 3}, "groups must be a list"),
     ],

@@ -354,6 +354,15 @@ def test_tables_keep_labels_and_names(bending):
     np.testing.assert_array_equal(by_number, found)
 
 
+def test_a_blend_has_no_events_of_one_performance():
+    takes = [pd.DataFrame({"knee": np.sin(np.arange(n) / 9)}) for n in (40, 50, 60)]
+    for x in takes:
+        x.attrs = {"frame_rate": 120.0, "units": "deg", "first_frame": 3, "events": [{"frame": 9}]}
+    X = [x.iloc[::2] for x in takes]
+    found = blend_performances(LinearSynchronizer().fit(X), X, [0.5, 0.5, 0])
+    assert found.attrs == {"frame_rate": 60.0, "units": "deg"}
+
+
 @pytest.mark.parametrize(
     ("times", "expected"),
     [

@@ -114,7 +114,7 @@ def test_tables_tell_their_frame_rate():
     ("lengths", "rate", "message"),
     [
         ([40] * 5, 1, "6 matched performances, but 5 lengths"),
-        ([40, 40, 1, 40, 40, 40], 1, "Performance 2 has 1 frames; give the performances"),
+        ([40, 40, 1, 40, 40, 40], 1, "Performance 2 has 1 frame; give the performances"),
         ([40, 40, 40, 40, 40.5, 40], 1, "Performance 4 has 40.5 frames"),
         (np.zeros((6, 9)), 1, r"Wrap one performance .* \[X.shape\[1\]\] \* len\(X\)"),
         ({"a": np.zeros((6, 9))}, 1, "got dict"),
@@ -139,7 +139,7 @@ def test_seconds_refuses_invalid_lengths_and_rates(matched, lengths, rate, messa
         ([[0.0, 1.0], [0.0, 1.5]], None, "Performance 1: .* 0 to P - 1 = 1, .* got 0 to 1.5"),
         ([[0.0, 1.0]], ["near"], "distances is not a numeric array: got str, 'near'"),
         ([[0.0, np.nan]], None, "from 0 to P - 1"),
-        ([[0.0, 1.0]], [1.0, 2.0], r"each of the 1 performances, got shape \(2,\)"),
+        ([[0.0, 1.0]], [1.0, 2.0], r"each of the 1 performance, got shape \(2,\)"),
     ],
 )
 def test_match_refuses_invalid_times_and_distances(times, distances, message):
@@ -248,9 +248,9 @@ def test_offsets_in_units(late):
         (lambda m: m.offsets_in("ms"), r"unit must be one of \['frames', .*got 'ms'"),
         (lambda m: m.offsets_in("seconds"), "needs X, .* and frame_rate"),
         (lambda m: m.offsets_in("seconds", frame_rate=5), "needs X, .* and frame_rate"),
-        (lambda m: m.offsets_in("seconds", [5], 5), "2 matched performances, but 1 lengths"),
-        (lambda m: m.offsets_in("percent", [5]), "2 matched performances, but 1 lengths"),
-        (lambda m: m.to_frame(labels=["a"]), "2 matched performances, but 1 labels"),
+        (lambda m: m.offsets_in("seconds", [5], 5), "2 matched performances, but 1 length:"),
+        (lambda m: m.offsets_in("percent", [5]), "2 matched performances, but 1 length:"),
+        (lambda m: m.to_frame(labels=["a"]), "2 matched performances, but 1 label:"),
         (lambda m: m.to_frame(labels=["a", "a"]), "2 different labels"),
         (lambda m: m.to_frame("hours"), "unit must be one of"),
     ],

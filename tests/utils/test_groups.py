@@ -71,7 +71,7 @@ REFUSED = [
     (pd.to_datetime(["2020-01-01"] * 4 + [None] * 2), r"\[4\] is missing, NaT"),
     (pd.Series([1, 2, None] * 2, dtype="Int64"), r"\[2\] is missing, <NA>"),
     ([1, 2, 3, "b", 5, 6], r"\[3\] is 'b', {0}\[0\] is 1: labels must be of one type"),
-    (list("abcde"), "{0} has 5 labels, and there are 6 performances"),
+    (list("abcde"), "{0} must have one label for each performance, got 5 for 6"),
     ("abcdef", "{0} must be a list or 1-D array .* got 'abcdef'"),
     (dict.fromkeys(range(6)), "{0} must be a list or 1-D array .* got {{"),
     (set(range(6)), "{0} must be a list or 1-D array .* got {{"),

@@ -1,0 +1,9 @@
+"""Words of messages and reprs."""
+
+__all__ = ["counted"]
+
+
+def counted(n, noun):
+    """A number and its noun: "1 frame", "2 frames"."""
+    number = f"{n:g}" if isinstance(n, float) else n
+    return f"{number} {noun}" if n == 1 else f"{number} {noun}s"
