@@ -7,9 +7,9 @@ from .limbs import LIMBS, nearest_ancestor, unit_vectors
 __all__ = [
     "UP_AXES",
     "convert_to_parent_axes",
+    "fill_heading",
     "from_y_up",
     "heading_axes",
-    "heading_axes_with_gaps",
     "project_on_axes",
     "to_y_up",
 ]
@@ -76,8 +76,8 @@ def heading_axes(left):
     return np.stack([x, y, np.cross(x, y)], axis=1).astype(left.dtype)
 
 
-def heading_axes_with_gaps(hips, shoulders=None):
-    """Axes of bodies as of `heading_axes`, of directions that are NaN in some frames.
+def fill_heading(hips, shoulders=None):
+    """Directions to the left for `heading_axes`, where those of the hips are NaN in some frames.
 
     No frame uses a later one. Where the hips are hidden, the shoulders give the heading, corrected
     by the angle between both when they were last seen together; before that, by none. Where both
@@ -91,7 +91,7 @@ def heading_axes_with_gaps(hips, shoulders=None):
 
     Returns
     -------
-    ndarray, shape (n_frames, 3, 3)
+    ndarray, shape (n_frames, 3)
         NaN before the first frame that shows a heading.
     """
     angles = _horizontal(hips)
@@ -103,9 +103,7 @@ def heading_axes_with_gaps(hips, shoulders=None):
     hidden, left = np.isnan(hips[:, 0]), hips.copy()
     known = _last_known(angles)[hidden]
     left[hidden] = np.column_stack([known.real, np.zeros_like(known.real), known.imag])
-    axes = heading_axes(left)
-    axes[np.isnan(left[:, 0])] = np.nan
-    return axes
+    return left
 
 
 def _horizontal(directions):

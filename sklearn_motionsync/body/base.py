@@ -1,5 +1,6 @@
 """The base of the transformers of joint positions: what they accept, and the body they see."""
 
+import functools
 import warnings
 from typing import NamedTuple
 
@@ -11,8 +12,8 @@ from ..inputs.validation import check_performances, restore
 from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
-from .axes import heading_axes, heading_axes_with_gaps, to_y_up
-from .formats import AXES, LANDMARKS
+from .axes import fill_heading, heading_axes, to_y_up
+from .formats import AXES, LANDMARKS, SIDES
 from .limbs import (
     LATERAL_LIMBS,
     LIMB_NAMES,
@@ -20,12 +21,16 @@ from .limbs import (
     body_size,
     landmark_positions,
     limb_vectors,
+    lowest_height,
     median_lengths,
 )
-from .skeleton import Skeleton, check_columns
+from .skeleton import check_columns
 from .upright import check_upright
 
 __all__ = ["Body", "PositionsTransformer", "mask_hidden"]
+
+# Frames whose points are computed at a time: they stay in the cache.
+PORTION = 4096
 
 
 def mask_hidden(points):
@@ -33,8 +38,8 @@ def mask_hidden(points):
     points[np.isnan(points).any(axis=2)] = np.nan
 
 
-class Body(NamedTuple):
-    """The body of a performance, y up.
+class Portion(NamedTuple):
+    """Some frames of a body, y up.
 
     Attributes
     ----------
@@ -45,22 +50,19 @@ class Body(NamedTuple):
     lengths : ndarray, shape (n_frames, 12)
         Lengths of the limbs; 0 if the skeleton lacks them, and for hips and shoulders that a
         picture shows end-on; NaN where they are hidden.
-    skeleton : Skeleton
+    left : ndarray, shape (n_frames, 3), or None
+        Directions to the left that give the heading; NaN before the first. None in the plane, and
+        without hips and shoulders.
     """
 
     points: np.ndarray
     limbs: np.ndarray
     lengths: np.ndarray
-    skeleton: Skeleton
+    left: np.ndarray | None
 
     def position_of(self, landmark):
         """Positions (n_frames, n_dims) of a landmark."""
         return self.points[:, LANDMARKS.index(landmark)]
-
-    @property
-    def size(self):
-        """The unit of length: the stretched leg, or without one the sum of all limbs."""
-        return body_size(median_lengths(self.lengths), self.skeleton.limbs)
 
     @property
     def directions(self):
@@ -72,28 +74,145 @@ class Body(NamedTuple):
 
     @property
     def axes(self):
-        """Axes (n_frames, 3, 3) that turn with the body: rows x to the left, y up, z forward.
-
-        None in the plane, and without hips and shoulders.
-        """
-        lateral = [name for name in LATERAL_LIMBS if name in self.skeleton.limbs]
-        if not lateral or self.skeleton.n_dims == 2:
+        """Axes (n_frames, 3, 3) that turn with the body: rows x to the left, y up, z forward."""
+        if self.left is None:
             return None
-        first, *others = map(self._direction, lateral)
-        if not np.isnan(first[:, 0]).any():
-            return heading_axes(first)
-        return heading_axes_with_gaps(first, *others)
+        axes = heading_axes(self.left)
+        axes[np.isnan(self.left[:, 0])] = np.nan
+        return axes
 
-    def _direction(self, limb):
-        i = LIMB_NAMES.index(limb)
-        return self.limbs[:, i] / self.lengths[:, i, np.newaxis]
+
+class Body:
+    """The body of a performance, checked, of which few frames are computed at a time.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (n_frames, n_dims * n_joints)
+    skeleton : Skeleton
+    hides : bool
+        Whether NaN are hidden joints.
+    called : str
+        The name of the performance, with a capital letter.
+
+    Attributes
+    ----------
+    lengths : ndarray, shape (n_frames, 12)
+        As of `Portion`.
+    floor : float
+        The smallest height of an ankle; NaN if all are hidden.
+    """
+
+    def __init__(self, positions, skeleton, hides, called):
+        self._positions, self._skeleton, self._hides = positions, skeleton, hides
+        n_frames = len(positions)
+        self._slices = [slice(k, k + PORTION) for k in range(0, n_frames, PORTION)]
+        self._held = None
+        self.lengths = np.empty((n_frames, len(LIMB_NAMES)), positions.dtype)
+        heights = np.empty((n_frames, len(LANDMARKS)), positions.dtype)
+        largest = 0
+        for rows in self._slices:
+            points, limbs = self._held = self._points_and_limbs(rows)
+            self.lengths[rows] = np.linalg.norm(limbs, axis=2)
+            heights[rows] = points[:, :, 1]
+            largest = np.fmax.reduce(np.abs(points), axis=None, initial=largest)
+        self._check_lengths(largest, called)
+        check_upright(heights, self._all_points, self.lengths, skeleton, called)
+        ankles = [f"{side}_ankle" for side in SIDES if f"{side}_ankle" in skeleton.landmarks]
+        self.floor = lowest_height([heights[:, LANDMARKS.index(name)] for name in ankles])
+        self._lateral = [
+            LIMB_NAMES.index(name)
+            for name in LATERAL_LIMBS
+            if name in skeleton.limbs and skeleton.n_dims == 3
+        ]
+        self._left = self._left_in_gaps()
+
+    @functools.cached_property
+    def median_lengths(self):
+        """Medians (12,) of the lengths over the frames that show a limb; NaN without any."""
+        return median_lengths(self.lengths)
+
+    @property
+    def size(self):
+        """The unit of length: the stretched leg, or without one the sum of all limbs."""
+        return body_size(self.median_lengths, self._skeleton.limbs)
+
+    def features(self, function):
+        """Features (n_frames, n_features) that a function gives for every portion."""
+        out = None
+        for rows in self._slices:
+            found = function(self._portion(rows), self)
+            if len(self._slices) == 1:
+                return found
+            if out is None:
+                out = np.empty((len(self.lengths), found.shape[1]), found.dtype)
+            out[rows] = found
+        return out
+
+    def _points_and_limbs(self, rows):
+        points = landmark_positions(self._positions[rows], self._skeleton)
+        points = to_y_up(points, self._skeleton)
+        if self._hides:
+            mask_hidden(points)
+        return points, limb_vectors(points)
+
+    def _all_points(self):
+        return np.concatenate([self._points_and_limbs(rows)[0] for rows in self._slices])
+
+    def _portion(self, rows):
+        held = self._held if len(self._slices) == 1 else self._points_and_limbs(rows)
+        (points, limbs), lengths = held, self.lengths[rows]
+        if not lengths.all():
+            limbs[lengths == 0] = 0
+        left = None
+        if self._left is not None:
+            left = self._left[rows]
+        elif self._lateral:
+            left = self._directions(self._lateral[0], limbs, rows)
+        return Portion(points, limbs, lengths, left)
+
+    def _directions(self, limb, limbs, rows):
+        return limbs[:, limb] / self.lengths[rows, limb, np.newaxis]
+
+    def _left_in_gaps(self):
+        """Directions (n_frames, 3) to the left, if the first limb that gives them is hidden."""
+        if not self._lateral or not np.isnan(self.lengths[:, self._lateral[0]]).any():
+            return None
+        found = [[] for _ in self._lateral]
+        for rows in self._slices:
+            limbs = self._points_and_limbs(rows)[1]
+            for of_limb, k in zip(found, self._lateral, strict=True):
+                of_limb.append(self._directions(k, limbs, rows))
+        return fill_heading(*map(np.concatenate, found))
+
+    def _check_lengths(self, largest, called):
+        """Refuse limbs without length; those that are not there have length 0."""
+        lengths, skeleton = self.lengths, self._skeleton
+        # A shorter limb is rounding of the largest coordinate.
+        zero = lengths <= np.finfo(lengths.dtype).eps * largest
+        there = skeleton.limbs
+        for k, name in enumerate(LIMB_NAMES):
+            if name not in there:
+                lengths[:, k], zero[:, k] = 0, False
+            elif skeleton.n_dims == 2 and name in LATERAL_LIMBS:
+                end_on = zero[:, k].copy()
+                if (end_on | np.isnan(lengths[:, k])).all():
+                    lengths[end_on, k], zero[end_on, k] = 0, False
+        if zero.any():
+            frame, limb = np.argwhere(zero)[0]
+            name = LIMB_NAMES[limb]
+            raise ValueError(
+                f"{called}, frame {frame}: the limb {name!r} has no length, its "
+                f"joints {[skeleton.landmarks[j] for j in LIMBS[name][:2]]} coincide. Repair "
+                "the frame, or choose other landmarks."
+            )
 
 
 class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
     """Base of the transformers that compute features of joint positions, body by body.
 
     A subclass has a ``skeleton``, a ``fit`` that calls ``_check(X, reset=True)``, a
-    ``get_feature_names_out``, and a ``_features(body)`` that returns the features of a `Body`.
+    ``get_feature_names_out``, and a ``_features(portion, body)`` that returns the features of a
+    `Portion` of a `Body`.
     """
 
     # How `check_performances` treats NaN; "allow-nan" admits hidden joints.
@@ -127,7 +246,8 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
         """
         check_is_fitted(self)
         performances = self._check(X, reset=False)
-        features = [self._features(self._body(performances, i)) for i in range(len(performances))]
+        bodies = (self._body(performances, i) for i in range(len(performances)))
+        features = [body.features(self._features) for body in bodies]
         return restore(self, performances, features)
 
     def __sklearn_tags__(self):
@@ -165,30 +285,5 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
 
     def _body(self, performances, i):
         """The body of a performance, checked."""
-        skeleton = self.skeleton
-        points = to_y_up(landmark_positions(performances[i], skeleton), skeleton)
-        if self._finite is not True:
-            mask_hidden(points)
-        limbs = limb_vectors(points)
-        lengths = np.linalg.norm(limbs, axis=2)
-        # A shorter limb is rounding of the largest coordinate.
-        largest = np.fmax.reduce(np.abs(points), axis=None, initial=0)
-        zero = lengths <= np.finfo(lengths.dtype).eps * largest
-        there = skeleton.limbs
-        for k, name in enumerate(LIMB_NAMES):
-            if name not in there:
-                limbs[:, k], lengths[:, k], zero[:, k] = 0, 0, False
-            elif skeleton.n_dims == 2 and name in LATERAL_LIMBS:
-                end_on = zero[:, k].copy()
-                if (end_on | np.isnan(lengths[:, k])).all():
-                    limbs[end_on, k], lengths[end_on, k], zero[end_on, k] = 0, 0, False
-        if zero.any():
-            frame, limb = np.argwhere(zero)[0]
-            name = LIMB_NAMES[limb]
-            raise ValueError(
-                f"{performances.called(i)}, frame {frame}: the limb {name!r} has no length, its "
-                f"joints {[skeleton.landmarks[j] for j in LIMBS[name][:2]]} coincide. Repair "
-                "the frame, or choose other landmarks."
-            )
-        check_upright(points, lengths, skeleton, performances.called(i))
-        return Body(points, limbs, lengths, skeleton)
+        hides = self._finite is not True
+        return Body(performances[i], self.skeleton, hides, performances.called(i))

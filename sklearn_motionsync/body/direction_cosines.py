@@ -161,7 +161,8 @@ class DirectionCosines(PositionsTransformer):
         performances = self._check(X, reset=True)
         limbs = self.skeleton.limbs
         lengths = [self._body(performances, i).lengths for i in range(len(performances))]
-        found = median_lengths(np.concatenate(lengths))[limb_indices(limbs)]
+        lengths = np.concatenate(lengths) if len(lengths) > 1 else lengths[0]
+        found = median_lengths(lengths)[limb_indices(limbs)]
         if np.isnan(found).any():
             never = [name for name, length in zip(limbs, found, strict=True) if np.isnan(length)]
             raise ValueError(
@@ -297,9 +298,9 @@ class DirectionCosines(PositionsTransformer):
         names = [f"{limb}_{axis}" for limb in self.skeleton.limbs for axis in axes]
         return np.asarray(["pelvis_height"] * self.skeleton.has_height + names, dtype=object)
 
-    def _features(self, body):
-        limbs, cosines = self.skeleton.limbs, body.directions
-        axes = body.axes if self.reference != "world" else None
+    def _features(self, portion, body):
+        limbs, cosines = self.skeleton.limbs, portion.directions
+        axes = portion.axes if self.reference != "world" else None
         if axes is not None:
             cosines = project_on_axes(cosines, axes)
         if self.reference == "parent":
@@ -307,14 +308,13 @@ class DirectionCosines(PositionsTransformer):
         cosines = cosines[:, limb_indices(limbs)].reshape(len(cosines), -1)
         if not self.skeleton.has_height:
             return cosines
-        ankles = [f"{side}_ankle" for side in SIDES if f"{side}_ankle" in self.skeleton.landmarks]
-        floor = lowest_height([body.position_of(ankle) for ankle in ankles])
-        lengths = median_lengths(body.lengths)
+        lengths = body.median_lengths
         leg = leg_length(lengths, limbs)
         if np.isnan(leg):
             lengths = scale_missing_lengths(lengths, self._all_lengths(self.limb_lengths_))
             leg = leg_length(lengths, limbs)
-        return np.column_stack([(body.position_of("pelvis")[:, 1] - floor) / leg, cosines])
+        heights = (portion.position_of("pelvis")[:, 1] - body.floor) / leg
+        return np.column_stack([heights, cosines])
 
     def _as_lengths(self, limb_lengths):
         """One length above 0 for each limb; by default those of ``fit``."""
@@ -399,7 +399,7 @@ def _forward_kinematics(heights, cosines, lengths, skeleton):
     if heights is not None:
         limit = _LARGEST_SHIFT * leg_length(lengths, skeleton.limbs)
         ankles = [f"{side}_ankle" for side in SIDES if f"{side}_leg" in skeleton.limbs]
-        above = lowest_height([at[ankle] for ankle in ankles])
+        above = lowest_height([at[ankle][:, 1] for ankle in ankles])
         # The floor is unknown if every ankle is hidden.
         shift = 0 if np.isnan(above) else np.clip(above, -limit, limit)
         for side in SIDES:

@@ -142,11 +142,11 @@ class JointPositions(PositionsTransformer):
         origin = _origin_of(self.skeleton)
         return [name for name in self.skeleton.landmarks if [name] != origin]
 
-    def _features(self, body):
-        origin = [body.position_of(name) for name in _origin_of(self.skeleton)]
+    def _features(self, portion, body):
+        origin = [portion.position_of(name) for name in _origin_of(self.skeleton)]
         # The pelvis is the first landmark, and the origin if it is there.
-        places = (body.points[:, 1:] - (sum(origin) / len(origin))[:, np.newaxis]) / body.size
-        axes = body.axes if self.reference == "heading" else None
+        places = (portion.points[:, 1:] - (sum(origin) / len(origin))[:, np.newaxis]) / body.size
+        axes = portion.axes if self.reference == "heading" else None
         if axes is not None:
             places = project_on_axes(places, axes)
         if len(self._landmarks) < places.shape[1]:

@@ -161,9 +161,9 @@ def body_size(lengths, limbs):
     return sum(lengths[LIMB_NAMES.index(name)] for name in limbs)
 
 
-def lowest_height(tracks):
-    """The smallest second coordinate of (n_frames, n_dims) tracks; NaN if all are hidden."""
-    return np.fmin.reduce([np.fmin.reduce(track[:, 1]) for track in tracks])
+def lowest_height(heights):
+    """The smallest of all heights (n_frames,) of some joints; NaN if all are hidden."""
+    return np.fmin.reduce([np.fmin.reduce(of_joint) for of_joint in heights], initial=np.nan)
 
 
 def unit_vectors(vectors):

@@ -62,27 +62,29 @@ def estimate_up(positions, skeleton):
     return _nearest_axis(rise)
 
 
-def check_upright(points, lengths, skeleton, what):
+def check_upright(heights, points, lengths, skeleton, what):
     """Refuse a body that is upside down from the first to the last frame.
 
     Parameters
     ----------
-    points : ndarray, shape (n_frames, 15, n_dims)
-        Landmarks, the second axis vertical; NaN where they are hidden.
+    heights : ndarray, shape (n_frames, 15)
+        Of the landmarks; NaN where they are hidden.
+    points : callable
+        Gives the landmarks, (n_frames, 15, n_dims), the second axis vertical. Few bodies need them.
     lengths : ndarray, shape (n_frames, 12)
         Of the limbs.
     skeleton : Skeleton
     what : str
         The subject of the message, with a capital letter.
     """
-    never_seen = np.isnan(points[:, :, 0]).all(axis=0)
+    never_seen = np.isnan(heights).all(axis=0)
     seen = [name for name in skeleton.landmarks if not never_seen[LANDMARKS.index(name)]]
-    lower, middle, upper = _levels(points, seen)
+    lower, middle, upper = _levels(heights, seen)
     if middle is None or (lower is None and upper is None):
         return
     # Without legs the trunk decides.
     bottom, top = (middle, upper) if lower is None else (lower, middle)
-    rises = top[:, 1] - bottom[:, 1]
+    rises = top - bottom
     below = np.count_nonzero(rises < 0)
     if not below or below < _MOST_FRAMES * (np.count_nonzero(np.isfinite(rises)) - 1):
         return
@@ -92,6 +94,8 @@ def check_upright(points, lengths, skeleton, what):
     margin = _MARGIN * body_size(medians, limbs)
     if np.quantile(rises, _MOST_FRAMES) >= -margin or not _is_symmetric(medians, limbs):
         return
+    lower, middle, upper = _levels(points(), seen)
+    bottom, top = (middle, upper) if lower is None else (lower, middle)
     trunk = [] if upper is None else _seen_rises(middle, upper)
     if len(trunk) and trunk[:, 1].mean() > -margin:
         return
@@ -107,7 +111,7 @@ def check_upright(points, lengths, skeleton, what):
 
 
 def _levels(points, landmarks):
-    """Tracks (n_frames, n_dims) of the feet, the pelvis and the head; None where they are absent.
+    """Tracks (n_frames, ...) of the feet, the pelvis and the head; None where they are absent.
 
     The hips replace the pelvis, and the neck or the shoulders the head.
     """

@@ -265,7 +265,8 @@ def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
     names = getattr(estimator, "feature_names_in_", None)
     labels = index if index is not None else numbers
     check_finite(out, "Row", names, labels, allow_nan=finite == "allow-nan")
-    size = np.fmax.reduce(np.abs(out), axis=1, initial=0)
+    ends = (np.fmax.reduce(out, axis=1, initial=0), -np.fmin.reduce(out, axis=1, initial=0))
+    size = np.maximum(*ends)
     row = int(size.argmax())
     row_name = f"Row {row if numbers is None else numbers[row]}"
     check_magnitude(size[row], row_name, training=reset)

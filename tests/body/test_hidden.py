@@ -5,7 +5,7 @@ import pytest
 from made_bodies import columns_of, standing, turned, turned_over
 from sklearn.utils import get_tags
 from sklearn_motionsync import ASpace, DirectionCosines, Skeleton, to_frame
-from sklearn_motionsync.body.axes import heading_axes_with_gaps
+from sklearn_motionsync.body.axes import fill_heading, heading_axes
 from sklearn_motionsync.datasets import load_performances, make_bending
 
 PAPER = Skeleton.paper()
@@ -393,14 +393,14 @@ def test_shoulders_halve_the_error_of_the_heading_of_turning_people(real_data):
     for i in np.flatnonzero(bunch.target == "jogLeftCircle4StepsRstart"):
         x = bunch.data[i].astype(float).reshape(len(bunch.data[i]), -1, 3)
         hips, shoulders = (across(x, bunch.skeleton, part) for part in ("hip", "shoulder"))
-        true = heading_axes_with_gaps(hips)[:, 0]
+        true = heading_axes(fill_heading(hips))[:, 0]
         for start in range(1, len(x) - 120, 60):
             gap = slice(start, start + 120)
             lost = hips.copy()
             lost[gap] = np.nan
             for name, found in (
-                ("shoulders", heading_axes_with_gaps(lost, shoulders)),
-                ("held", heading_axes_with_gaps(lost)),
+                ("shoulders", heading_axes(fill_heading(lost, shoulders))),
+                ("held", heading_axes(fill_heading(lost))),
             ):
                 cosines = np.clip((true * found[:, 0]).sum(axis=1), -1, 1)
                 errors[name].append(np.rad2deg(np.arccos(cosines))[gap])
