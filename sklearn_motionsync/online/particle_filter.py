@@ -206,8 +206,11 @@ class ParticleFilter:
         model, rows = self.model, matrix[seen]
         residuals = values[seen] - expected @ rows.T
         innovations = residuals - self.means[0] @ rows.T
-        covariance, update = kalman_update(self.covariance, rows, innovations, model.noise)
-        if not (update.nis <= model.gate).any():
+        # What overflows is outside the gate.
+        with np.errstate(over="ignore", invalid="ignore"):
+            covariance, update = kalman_update(self.covariance, rows, innovations, model.noise)
+            in_gate = (update.nis <= model.gate).any()
+        if not in_gate:
             self._update_nis(2 * model.nis_limits, dt)
             return
         self.accepted = seen

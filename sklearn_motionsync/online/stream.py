@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.numbers import LARGEST, SMALLEST, as_numbers, check_finite, check_names
 from ..matching.causal import CausalDerivative, CausalTrellis
 
 __all__ = ["LivePhase", "Session", "Streams", "check_observations", "check_times", "time_left"]
@@ -175,7 +175,9 @@ class Streams:
                 by_columns.setdefault(columns, []).append(int(n))
             for columns, rows in by_columns.items():
                 part = reference.subset(columns)
-                if part is not None:
+                if part is None:
+                    observed[rows] = 0
+                else:
                     part = part.compare(velocity[rows], postures[rows]), part.moving
                 parts[tuple(rows)] = part
         self.trellis.advance(compared, parts)
@@ -240,7 +242,8 @@ class Resampler:
 
     def __init__(self, step, n_frames, frame, time):
         self._step, self._n_frames = step, n_frames
-        self._next, self._time, self._frame = time, time, frame.copy()
+        # Since the origin, so that times of any magnitude are told apart.
+        self._origin, self._next, self._time, self._frame = time, 0.0, 0.0, frame.copy()
         self._restarted = []
         self.elapsed = 0.0
 
@@ -252,11 +255,12 @@ class Resampler:
         """Yield the samples (n_streams, n_features) up to a new frame of that shape."""
         self._frame[self._restarted] = frame[self._restarted]
         self._restarted = []
+        time -= self._origin
         gap = (time - self._time) / self._step
         if gap > _FORGETTING * self._n_frames:
             # The samples go on at this frame.
             yield from [np.full_like(frame, np.nan)] * (_FORGETTING * self._n_frames)
-            self._next = time
+            self._origin, self._next, time = self._origin + time, 0.0, 0.0
         bridged = gap <= max(1, _LONGEST_GAP * self._n_frames)
         # Rounding of the times loses no sample.
         while self._next <= time + 1e-9 * self._step:
@@ -377,7 +381,8 @@ def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
     Raises
     ------
     ValueError
-        If there is not one time a frame, or times are not finite, or do not increase.
+        If there is not one time a frame, or times are not finite, or do not increase, by 1e-9 to
+        1e9 frames.
     """
     if times is None:
         return np.arange(n_frames) + (0.0 if after is None else after + 1)
@@ -386,20 +391,25 @@ def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
         raise ValueError(
             f"{what}: times must be one a frame, shape ({n_frames},), got {stamps.shape}."
         )
-    finite = np.isfinite(stamps)
+    scale = 1.0 if frame_rate is None else frame_rate
+    with np.errstate(over="ignore"):
+        frames = stamps * scale
+        given = frames if after is None else np.concatenate([[after], frames])
+        steps = np.diff(given)
+    finite = np.isfinite(frames)
     if not finite.all():
         i = int(finite.argmin())
         raise ValueError(f"{what}: the time of frame {i} is {stamps[i]}; times must be finite.")
-    scale = 1.0 if frame_rate is None else frame_rate
-    given = stamps if after is None else np.concatenate([[after / scale], stamps])
-    falls = np.diff(given) <= 0
-    if falls.any():
-        i = int(falls.argmax())
+    wrong = (steps < SMALLEST) | (steps > LARGEST)
+    if wrong.any():
+        i = int(wrong.argmax())
+        before, now = given[i : i + 2] / scale
         raise ValueError(
-            f"{what}: time stamps must increase, but {given[i + 1]:.10g} follows {given[i]:.10g}. "
-            "Leave out a frame that comes twice or late; begin another performance with reset()."
+            f"{what}: time stamps must increase, but {now:.10g} follows {before:.10g}; from one "
+            f"to the next by {SMALLEST:g} to {LARGEST:g} frames. Leave out a frame that comes "
+            "twice or late; begin another performance with reset()."
         )
-    return stamps * scale
+    return frames
 
 
 def times_of_each(times, n):

@@ -9,6 +9,7 @@ from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.facts import TIMELESS
+from ..inputs.numbers import check_magnitude
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
 from ..inputs.wording import counted
 from ..matching.causal import causal_costs, causal_velocity
@@ -214,14 +215,16 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         Raises
         ------
         ValueError
-            If the frame is infinite, has another width or other names, there are not as many
-            streams as in the frames before, or time does not increase. The performance
-            then goes on as if the frame had not been given.
+            If the frame is infinite or above 1e9, has another width or other names, there are not
+            as many streams as in the frames before, or time does not increase, by 1e-9 to 1e9
+            frames. The performance then goes on as if the frame had not been given.
         """
         if "_session" not in vars(self):
             check_is_fitted(self)
         width = self.mean_.shape[1]
         frame = check_observations(frame, "The frame", names_of_input(self), width, (1, 2))
+        largest = np.abs(frame).max(initial=0.0, where=~np.isnan(frame))
+        check_magnitude(float(largest), "The frame", training=False)
         session = self._session
         last = None if session is None else session.time
         time = float(check_times(time, 1, self.frame_rate, "The frame", last)[0])
@@ -245,7 +248,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         n_streams = 0 if self._session is None else self._session.n_streams
         streams = np.atleast_1d(stream)
         known = streams.dtype.kind in "iu" and np.isin(streams, np.arange(-n_streams, n_streams))
-        if len(streams) and not np.all(known):
+        if streams.ndim > 1 or (len(streams) and not np.all(known)):
             raise ValueError(
                 f"stream={stream!r} is not among {counted(n_streams, 'running performance')}: give "
                 "an index of these or several, or None for all."
@@ -398,12 +401,15 @@ class Reference:
         self.trellis = Trellis(table, mu, last + rest, running=True)
 
     def subset(self, columns):
-        """The `FeatureSubset` of some columns, a tuple; None if the metric has none of these."""
+        """The `FeatureSubset` of some columns, a tuple; None if none of them is compared."""
         cached = self._cached
         if columns not in cached:
             # A hidden feature stays hidden for a while, and two subsets serve one that flickers.
             # Threads share the cache, so it is replaced, never changed.
             subset = self._subset(np.array(columns, dtype=np.intp))
+            # Features that are constant in the mean say nothing of the phase.
+            if subset is not None and not subset.moving.any():
+                subset = None
             cached = self._cached = {**dict(list(cached.items())[-1:]), columns: subset}
         return cached[columns]
 
@@ -513,9 +519,11 @@ def _match_live(reference, performance, times):
         mean_cost += (least - before - mean_cost) / min(k + 1, window)
         before, largest = least, max(largest, mean_cost)
         if k % every == 0:
-            costs.append((row - least).astype(np.float32))
+            costs.append(row - least)
     # Where tau is constant, any phase of that interval is right.
     rising = times + 1e-9 * np.arange(len(times))
     phases = np.interp(moments * last, rising, np.arange(len(times)))
     truth = np.round(phases * reference.trellis.table.subframes).astype(np.intp)
-    return np.array(costs), truth[::every], largest
+    # What overflows has no probability.
+    with np.errstate(over="ignore"):
+        return np.array(costs, dtype=np.float32), truth[::every], largest

@@ -10,7 +10,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS, check_facts, facts_of
-from ..inputs.numbers import as_numbers, check_finite
+from ..inputs.numbers import LARGEST, as_numbers, check_finite, check_magnitude
 from ..inputs.tables import as_pandas, labels_of, name_performance
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
@@ -56,8 +56,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     n_particles : int, default=500
         Particles of phase and rate.
     noise : float, default=0.05
-        Standard deviation of observations, in the unit of the features; the default is one of
-        direction cosines.
+        Standard deviation of observations, in the unit of the features, up to 1e9; the default is
+        one of direction cosines.
     tempering : float, default=10.0
         Divides the log-likelihood of the velocities of every hundredth of the mean duration.
     frame_rate : float, default=None
@@ -143,7 +143,7 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     _parameter_constraints: dict = {
         "synchronizer": [HasMethods(["fit", "match"]), None],
         "n_particles": [Interval(Integral, 1, None, closed="left")],
-        "noise": [Interval(Real, 0, None, closed="neither")],
+        "noise": [Interval(Real, 0, LARGEST, closed="right")],
         "tempering": [Interval(Real, 0, None, closed="neither")],
         "frame_rate": [Interval(Real, 0, None, closed="neither"), None],
         "random_state": ["random_state"],
@@ -370,8 +370,8 @@ def check_projection(projection, n_features):
     Raises
     ------
     ValueError
-        If the matrix is not of this width, or anything is not finite, or there is not one offset
-        for each of its rows.
+        If the matrix is not of this width, or anything is not finite or above 1e9, or there is not
+        one offset for each of its rows.
     """
     if projection is None:
         return np.eye(n_features), np.zeros(n_features)
@@ -384,5 +384,7 @@ def check_projection(projection, n_features):
             f"with an offset (n_observed,); got the shapes {shapes}."
         )
     matrix, offset = pair if len(pair) == 2 else (pair[0], np.zeros(n))
-    check_finite(np.column_stack([matrix, offset]), "The projection, row")
+    both = np.column_stack([matrix, offset])
+    check_finite(both, "The projection, row")
+    check_magnitude(float(np.abs(both).max()), "The projection", training=False)
     return matrix, offset

@@ -236,6 +236,21 @@ def test_parameters_out_of_range_are_refused(params):
         make_gait(**params)
 
 
+def test_people_are_as_many_as_given():
+    """Ten by default, of two groups in turn; up to a million."""
+    ten = make_gait(random_state=0)
+    assert len(set(ten.person)) == 10
+    assert ten.person.tolist() == [f"person{i}" for i in range(10) for _ in range(3)]
+    for n in (1, 2, 5):
+        gait = make_gait(n, 2, random_state=0)
+        assert len(gait.data) == 2 * n
+        assert "".join(gait.group[::2]) == "ABABA"[:n]
+    with pytest.raises(ValueError, match="1000000 people with 10000 cycles"):
+        make_gait(10**6, 10**4)
+    with pytest.raises(ValueError, match=r"'n_people' parameter .* \[1, 1000000\]"):
+        make_gait(10**6 + 1)
+
+
 def test_too_large_results_are_refused_with_their_size():
     said = r"1000 people with 10000 cycles of about 100 frames would take 32 GB.*n_people, n_cycles"
     with pytest.raises(ValueError, match=said):

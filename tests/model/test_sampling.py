@@ -11,7 +11,12 @@ from sklearn_motionsync import (
     DirectionCosines,
     Skeleton,
 )
-from sklearn_motionsync.model.sampling import directions_in, sample_performances, sample_postures
+from sklearn_motionsync.model.sampling import (
+    TangentSpace,
+    directions_in,
+    sample_performances,
+    sample_postures,
+)
 
 
 def moments(X):
@@ -247,6 +252,18 @@ def test_directions_keep_their_length_and_vary_as_those_of_people():
     np.testing.assert_allclose(*(a.std(axis=0) for a in angles), rtol=0.15)
     # As numbers they would shrink.
     assert norms(X.mean(axis=0)).min() < 0.95
+
+
+def test_tangent_space_inverts_itself_and_leaves_out_what_is_no_tangent():
+    """Coordinates along a direction change nothing; what they are about is the mean direction."""
+    X = turning(12).astype(np.float64)
+    mean = X.mean(axis=0)
+    space = TangentSpace(mean, X - mean)
+    back = space.performances(space.coordinates)
+    np.testing.assert_allclose(back, X, atol=1e-12)
+    about, along = space.performances(np.zeros_like(X)), space.coordinates.copy()
+    along[..., 1:7] += 0.7 * about[..., 1:7]
+    np.testing.assert_allclose(space.performances(along), back, atol=1e-12)
 
 
 def test_directions_moved_inside_keep_their_length():

@@ -213,6 +213,65 @@ def test_time_left_is_weighted_mean_of_duration_and_phase(live):
         assert live.time_left() == pytest.approx(expected)
 
 
+@pytest.mark.parametrize("sync", [LinearSynchronizer(), DenseSynchronizer(P, metric=None)])
+def test_constant_features_say_nothing_of_the_phase(sync):
+    """Seen alone they are as nothing seen; beside others they change nothing."""
+
+    def beside(x, value):
+        return np.column_stack([x, np.full(len(x), value)])
+
+    X = [beside(performance(50 + i, 0.1 * (i - 3), 0.02, i)[0], 5.0) for i in range(7)]
+    live = OnlineSynchronizer(sync).fit(X)
+    x, nothing = performance(60, 0.2, 0.02, 9)[0], np.full((60, 3), np.nan)
+    seen, hidden, alone, blind = live.track(
+        [beside(x, 5.0), beside(x, np.nan), beside(nothing, 5.0), beside(nothing, np.nan)]
+    )
+    np.testing.assert_allclose(hidden.phase, seen.phase, atol=1e-9)
+    np.testing.assert_array_equal(alone, blind)
+    assert alone.confidence[20:].max() < 0.1
+
+
+def test_estimates_of_streams_equal_their_definitions():
+    """Rate, confidence and mean cost of two streams, one of which is hidden at times."""
+    X = [performance(50 + i, 0.1 * (i - 3), 0.02, i)[0] for i in range(7)]
+    live = OnlineSynchronizer(DenseSynchronizer(P, metric=None, refine=False)).fit(X)
+    settings = live.duration_, 0.1, 0.03, 3
+    reference = Reference(live.synchronizer_.features_, live.mean_, *settings, 8.0, 1.5)
+    # The last posture is held until the filters, 1.77 frames wide, have forgotten the movement.
+    assert len(reference.moving) == 2 * (P - 1) + 1 + 2 * 11
+    streams = Streams(reference, 2, 3)
+    x, y = performance(75, 0.3, 0.1, 8)[0], performance(75, 0.0, 0.02, 9)[0]
+    y[20:23] = y[40, :2] = np.nan
+    phases, costs, shares = [], [], []
+    for sample in np.stack([x, y], axis=1):
+        known = streams.trellis.best()[1] if phases else np.zeros(2)
+        streams.update(sample)
+        ends, now = streams.trellis.best()
+        phases.append(np.minimum(ends / 2, P - 1))
+        costs.append(now - known)
+        # A velocity is unknown in a gap, and at the first sample after a long one.
+        shares.append((~np.isnan(sample)).mean(axis=1))
+        found, n = streams.estimate(0.0), len(phases)
+        window = min(n - 1, 6)
+        moved = phases[-1] - phases[-1 - window] + 6 - window
+        np.testing.assert_allclose(found.rate, np.clip(moved / 6, 0, 3), atol=1e-12)
+        for i in range(2):
+            mean_cost, share = 0.0, 1.0
+            for k, (cost, seen) in enumerate(zip(costs, shares, strict=True)):
+                weight = 1 / min(k + 1, 6)
+                share += weight * ((seen[i] > 0) - share)
+                if seen[i]:
+                    mean_cost += weight * (cost[i] / seen[i] - mean_cost)
+            assert streams.mean_cost[i] == pytest.approx(mean_cost)
+            mass = np.exp(log_softmax(-streams.trellis.costs[i] / 8))
+            positions = np.minimum(np.arange(len(mass)) / 2, P - 1)
+            mass = mass[np.abs(positions - phases[-1][i]) <= 0.05 * (P - 1)].sum()
+            expected = share * mass / max(mean_cost / 1.5, 1) ** 2
+            assert found.confidence[i] == pytest.approx(expected)
+    later = streams.estimate(0.5)
+    np.testing.assert_allclose(later.phase, np.minimum(found.phase + found.rate / 2, P - 1))
+
+
 # -- streams and sessions -----------------------------------------------------------------
 
 
@@ -247,6 +306,11 @@ def test_time_left_begins_again_for_a_reset_stream(live):
     live.reset(0)
     assert live.time_left()[0] == pytest.approx(live.duration_)
     live.step(x[[0, 10]], 10)
+    # Before its first sample it is at the beginning, and goes on at the mean pace.
+    live.reset(0)
+    ahead = live.step(x[[0, 10]], 10.1)
+    assert 0 <= ahead.phase[0] < 1
+    assert (ahead.rate[0], ahead.confidence[0]) == (1, 1)
     first, second = live.time_left()
     assert first == pytest.approx(live.duration_, abs=2)
     assert second < first - 5
@@ -366,7 +430,10 @@ def test_refused_frame_changes_nothing(fitted, live):
             (np.append(frame[:2], np.inf), None, "The frame, frame 0, feature 2 is infinity"),
             (["a", "b", "c"], None, "The frame"),
             (np.stack([frame, frame]), None, r"had the shape \(3,\), this one has \(2, 3\)"),
+            (np.append(frame[:2], 1e10), None, r"largest magnitude of all, 1e\+10"),
             (frame, k - 1.0, "time stamps must increase"),
+            (frame, k - 1 + 1e-12, "by 1e-09 to 1e\\+09 frames"),
+            (frame, 1e10, r"but 1e\+10 follows"),
             (frame, np.nan, "must be finite"),
         ]:
             with pytest.raises(ValueError, match=message):
@@ -379,13 +446,39 @@ def test_unknown_streams_and_wrong_times_are_refused(fitted, live):
         live.reset(0)
     live.step(np.zeros((2, 3)))
     live.reset([])
-    for stream in (2, -3, "a", 0.5):
+    for stream in (2, -3, "a", 0.5, [[0, 1]]):
         with pytest.raises(ValueError, match="not among 2 running performances"):
             live.reset(stream)
     with pytest.raises(ValueError, match=r"one sequence of times .*, got 2 for 1"):
         fitted.track([performance(9)[0]], [None, None])
     with pytest.raises(ValueError, match="Performance 1: times must be one a frame"):
         fitted.track([performance(9)[0]] * 2, [range(9), range(8)])
+
+
+def test_time_stamps_that_come_twice_are_refused():
+    """At any frame rate: seconds that are rounded are compared as frames."""
+    for seconds in np.random.default_rng(0).uniform(0, 100, 300):
+        (frames,) = check_times(seconds, 1, 29.97)
+        with pytest.raises(ValueError, match="must increase"):
+            check_times(seconds, 1, 29.97, after=frames)
+        assert check_times(seconds + 1e-3, 1, 29.97, after=frames) > frames
+    for times in ([0, 1e300], [-1.7e308, 1.7e308]):
+        with pytest.raises(ValueError, match="must increase, but"):
+            check_times(times, 2)
+    with pytest.raises(ValueError, match="must be finite"):
+        check_times([0, 1e300], 2, 1e10)
+
+
+@pytest.mark.parametrize("origin", [-1e6, 1e9, 1e17])
+def test_phases_do_not_depend_on_the_origin_of_time(fitted, origin):
+    """1e17 is a time in nanoseconds, where the next number is 16 later."""
+    x, _ = performance(60, 0.3, 0.02, 4)
+    times = np.arange(0, 960, 16.0)
+    slow = OnlineSynchronizer(LinearSynchronizer()).fit(
+        [np.repeat(performance(50, b, 0.02, i)[0], 16, axis=0) for i, b in enumerate((-0.2, 0.2))]
+    )
+    (expected,), (found,) = slow.track([x], [times]), slow.track([x], [times + origin])
+    np.testing.assert_array_equal(found.phase, expected.phase)
 
 
 def test_feature_names_of_frames_are_checked():

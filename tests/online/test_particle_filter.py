@@ -2,23 +2,34 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 from sklearn_motionsync import LinearSynchronizer, MotionTracker
 from sklearn_motionsync.online.particle_filter import (
+    ParticleFilter,
     Particles,
     systematic_resampling,
     weighted_median,
 )
-from sklearn_motionsync.online.state_space import CausalSlopes, Clock, MaternProcess, RateProcess
+from sklearn_motionsync.online.state_space import (
+    CausalSlopes,
+    Clock,
+    MaternProcess,
+    RateProcess,
+    TrackerModel,
+)
+
+
+def make_training(n, seed=0):
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 1, 25)[:, np.newaxis]
+    return [np.sin(4 * t + rng.uniform(0, 1, 3)) * rng.uniform(0.7, 1.3, 3) for _ in range(n)]
 
 
 @pytest.fixture(scope="module")
 def fitted():
     """With one particle, whose phases are those of the track."""
-    rng = np.random.default_rng(0)
-    t = np.linspace(0, 1, 25)[:, np.newaxis]
-    training = [np.sin(4 * t + rng.uniform(0, 1, 3)) * rng.uniform(0.7, 1.3, 3) for _ in range(6)]
-    return MotionTracker(LinearSynchronizer(), 1, noise=0.1, random_state=1).fit(training)
+    return MotionTracker(LinearSynchronizer(), 1, noise=0.1, random_state=1).fit(make_training(6))
 
 
 def sample_body(tracker, times, rng):
@@ -86,6 +97,50 @@ def test_postures_equal_gaussian_process_posterior(fitted, seen, method, project
         np.testing.assert_allclose(track.covariances[i], covariance, rtol=0, atol=1e-9)
 
 
+def kalman_filter_and_rts(tracker, mean, values, times):
+    """A textbook Kalman filter and Rauch-Tung-Striebel smoother of values and derivatives."""
+    C, n, rate = tracker.covariance_, values.shape[1], np.sqrt(3) / tracker.length_scale_
+    prior, filtered, ahead = np.kron(np.diag([1, rate**2]), C), [], []
+    state, P, eye = np.zeros(2 * n), prior, np.eye(n)
+    for k, y in enumerate(values):
+        dt = times[k] - times[k - 1] if k else 0.0
+        A = np.kron(expm(np.array([[0, 1], [-(rate**2), -2 * rate]]) * dt), eye)
+        state, P = A @ state, A @ (P - prior) @ A.T + prior
+        ahead.append((A, state, P))
+        H = np.hstack([eye, 0 * eye])[~np.isnan(y)]
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + tracker.noise**2 * np.eye(len(H)))
+        state, P = state + K @ ((y - mean[k])[~np.isnan(y)] - H @ state), P - K @ H @ P
+        filtered.append((state, P))
+    smoothed = [filtered[-1]]
+    for (state, P), (A, predicted, Q) in zip(filtered[-2::-1], ahead[:0:-1], strict=True):
+        G, (later, R) = P @ A.T @ np.linalg.inv(Q), smoothed[-1]
+        smoothed.append((state + G @ (later - predicted), P + G @ (R - Q) @ G.T))
+    for found in (filtered, smoothed[::-1]):
+        states, covariances = map(np.array, zip(*found, strict=True))
+        yield mean + states[:, :n], covariances[:, :n, :n]
+
+
+def test_track_and_smooth_equal_kalman_filter_and_rts_at_known_phase(fitted, seen):
+    """The phase is that of the one particle; or the mean is constant, so that no phase matters."""
+    rng = np.random.default_rng(8)
+    t = np.linspace(0, 1, 25)[:, np.newaxis]
+    waves = [np.sin(5 * t + rng.uniform(0, 6, 3)) for _ in range(4)]
+    even = [5 + sign * wave for wave in waves for sign in (1, -1)]
+    level = MotionTracker(LinearSynchronizer(), 30, noise=0.1).fit(even)
+    np.testing.assert_allclose(level.mean_, 5, atol=1e-12)
+    values, times = with_gaps(seen[0]), seen[1]
+    for tracker, given in ((fitted, values), (level, values + 5 - np.nanmean(values))):
+        phases = tracker.track(given, times=times).phases
+        clock = np.arange(tracker.n_frames_)
+        mean = np.column_stack([np.interp(phases, clock, m) for m in tracker.mean_.T])
+        known = kalman_filter_and_rts(tracker, mean, given, times)
+        for method, (postures, covariances) in zip(("track", "smooth"), known, strict=True):
+            track = getattr(tracker, method)(given, times=times)
+            assert not track.lost.any()
+            np.testing.assert_allclose(track.postures, postures, rtol=0, atol=1e-9)
+            np.testing.assert_allclose(track.covariances, covariances, rtol=0, atol=1e-9)
+
+
 def test_smooth_of_several_blocks_equals_posterior(fitted):
     rng = np.random.default_rng(5)
     times = np.cumsum(rng.uniform(0.03, 0.07, 230))
@@ -113,6 +168,101 @@ def test_squared_distances_in_covariances_are_chi_square(fitted):
                 distances.append(off @ np.linalg.solve(track.covariances[6], off))
     assert len(distances) > 30
     assert 2.4 < np.mean(distances) < 3.6
+
+
+# -- mixtures of particles, and limits -----------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["track", "smooth"])
+def test_first_frame_unseen_is_the_mixture_of_first_phases(method):
+    """Of 20 particles two begin elsewhere, evenly spread; each is on a path of the smoother."""
+    tracker = MotionTracker(LinearSynchronizer(), 20, noise=0.1).fit(make_training(6))
+    last, mean = tracker.n_frames_ - 1, tracker.mean_
+    track = getattr(tracker, method)(np.full((1, 3), np.nan))
+    phases = np.append(np.zeros(18), [9 / 19 * last, last])
+    postures = np.column_stack([np.interp(phases, np.arange(last + 1), m) for m in mean.T])
+    np.testing.assert_allclose(track.postures[0], postures.mean(axis=0), atol=1e-12)
+    between = np.cov(postures.T, bias=True)
+    np.testing.assert_allclose(track.covariances[0], tracker.covariance_ + between, atol=1e-12)
+    assert (track.phases[0], track.effective_sizes[0]) == (0, pytest.approx(20))
+
+
+@pytest.mark.parametrize("outlier", [False, True])
+@pytest.mark.parametrize("duration", [24.0, 100.0])
+def test_limits_of_the_nis_equal_their_definition(outlier, duration):
+    """By regression lines and a Kalman filter, take by take."""
+    warped, noise, width = np.stack(make_training(6)), 0.05, 3
+    if outlier:
+        warped[2, 10:16] += [5, 0, -5]
+    clock, step = Clock(24.0, duration), duration / 24
+    model = TrackerModel.learn(warped, np.ones((6, 25)), np.arange(6), clock, noise, 10.0, 50)
+    deviations = (warped - warped.mean(axis=0)) * 6 / 5
+    window, times = max(0.03 * duration, 1.0), step * np.arange(25)
+    slopes, noises = np.empty((6, 24, width)), []
+    for p in range(1, 25):
+        weights, design = np.exp((times[: p + 1] - times[p]) / window), np.vander(times[: p + 1], 2)
+        line = np.linalg.solve(design.T * weights @ design, design.T * weights)[0]
+        slopes[:, p - 1] = np.einsum("t,ntk->nk", line, deviations[:, : p + 1])
+        noises.append(np.square(line).sum() * noise**2)
+
+    def shrunk(values):
+        moments = np.einsum("npi,npj->ij", values, values) / values[..., 0].size
+        return (moments + np.diag(np.diag(moments))) / 2
+
+    def largest(values, variances):
+        nis, most, left = np.ones(6), 1.0, np.exp(-step / (3 * window))
+        for p, variance in enumerate(variances):
+            inverse = np.linalg.inv(shrunk(values) + variance * np.eye(width))
+            squares = np.einsum("ni,ij,nj->n", values[:, p], inverse, values[:, p])
+            nis = left * nis + (1 - left) * (squares + variance * np.trace(inverse)) / width
+            most = max(most, nis.max())
+        return most
+
+    velocity = max(2 * (largest(slopes, noises) - 1), 4 * np.sqrt(2 / (3 * width)))
+    posture = max(2 * (largest(deviations, [noise**2] * 25) - 1), 8.0)
+    np.testing.assert_allclose(model.nis_limits, [1 + velocity, 1 + posture], rtol=1e-9)
+    np.testing.assert_allclose(model.velocities, shrunk(slopes), rtol=1e-9)
+    innovations, process = [], model.process
+    for x in deviations:
+        means, covariance = np.zeros((2, 1, width)), process.stationary
+        for p in range(25):
+            if p:
+                means, covariance = process.predict(means, covariance, step)
+            S = covariance[:width, :width] + noise**2 * np.eye(width)
+            off = x[p] - means[0, 0]
+            innovations.append(off @ np.linalg.solve(S, off) / width)
+            gain = covariance[:, :width] @ np.linalg.inv(S)
+            means = means + (gain @ off).reshape(2, 1, width)
+            covariance = covariance - gain @ S @ gain.T
+    assert model.gate == pytest.approx(max(100, 10 * max(innovations)), rel=1e-6)
+    assert (model.gate > 100) == (posture > 8) == outlier
+
+
+def test_estimates_are_those_of_the_weighted_particles():
+    """Law of total variance, weighted medians, effective size; and of rates at the end, 0."""
+    clock, rates = (
+        Clock(24.0, 24.0),
+        np.exp(0.2 * np.random.default_rng(1).standard_normal((6, 25))),
+    )
+    given = np.stack(make_training(6)), rates, np.arange(6), clock
+    model = TrackerModel.learn(*given, 0.1, 1.0, 60)
+    running, mean = ParticleFilter(model, 3, 0.0, 3), given[0].mean(axis=0)
+    for p in range(25):
+        track = running.step(given[0][2, p], float(p), np.eye(3))
+        particles = running.particles
+        weights = np.exp(particles.log_weights)
+        assert weights.sum() == pytest.approx(1)
+        postures = np.column_stack([np.interp(particles.phases, np.arange(25), m) for m in mean.T])
+        postures += running.means[0]
+        np.testing.assert_allclose(track.postures, weights @ postures)
+        between = np.cov(postures.T, aweights=weights, ddof=0)
+        np.testing.assert_allclose(track.covariances, running.covariance[:3, :3] + between)
+        assert track.effective_sizes == pytest.approx(1 / np.square(weights).sum())
+        paces = np.where(particles.phases < 24, np.exp(particles.log_rates), 0)
+        for found, values in ((track.phases, particles.phases), (track.rates, paces)):
+            assert weights[values < found].sum() <= 0.5 + 1e-9
+            assert weights[values > found].sum() <= 0.5 + 1e-9
+    assert np.ptp(weights) > 1e-4
 
 
 # -- parts ---------------------------------------------------------------------------------

@@ -129,7 +129,8 @@ def test_projection_of_postures(tracker, running):
         track = method(image, projection=(matrix, offset))
         assert np.abs(track.phases - np.arange(60))[5:].max() < 5
         assert np.abs(track.postures - clean)[5:].mean() < 0.1
-    assert_same(tracker.track(clean, projection=np.eye(3)), tracker.track(clean))
+    for identity in (np.eye(3), (np.eye(3),), (np.eye(3), np.zeros(3))):
+        assert_same(tracker.track(clean, projection=identity), tracker.track(clean))
     for frame in image[:5]:
         running.step(frame, projection=(matrix, offset))
     # The projection may change from step to step.
@@ -144,6 +145,58 @@ def test_rate_follows_a_faster_movement(tracker):
     track = clone(tracker).fit(training).track(movement(1.05, 30))
     assert 1.4 < np.median(track.rates[10:25]) < 2.4
     assert np.abs(track.phases - np.linspace(0, 59, 30))[5:].max() < 6
+
+
+def test_learnt_times_do_not_depend_on_the_frames_of_the_clock():
+    """In frames of the training performances, whatever P is."""
+    rng, t = np.random.default_rng(0), np.linspace(0, 1, 60)
+    X = [
+        movement(1, 60)
+        + 0.2 * np.column_stack([np.sin(f * t + a) for f, a in rng.uniform(4, 8, (3, 2))])
+        for _ in range(8)
+    ]
+    few, many = (MotionTracker(LinearSynchronizer(n), 20).fit(X) for n in (40, 120))
+    assert few.length_scale_ == pytest.approx(many.length_scale_, rel=0.05)
+    assert few.duration_ == many.duration_ == 59
+
+
+def test_rate_spread_is_that_of_paces():
+    """A pace is the mean time of a frame of the clock over the own one, by the synchronizer."""
+    t = np.linspace(0, 1, 240)
+    X = [
+        movement(1, 240)[np.round(239 * np.interp(np.linspace(0, 1, n), t, t**bend)).astype(int)]
+        for n, bend in ((50, 0.7), (60, 1.0), (70, 1.2), (90, 1.4))
+    ]
+    tracker = MotionTracker(DenseSynchronizer(60, metric=None, refine=False), 20).fit(X)
+    times = tracker.synchronizer_.match(X).times
+    own = np.gradient(times, axis=1) * np.array([[49], [59], [69], [89]]) / 59
+    paces = np.clip(tracker.duration_ / 59 / np.maximum(own, 1e-6), 0.25, 4)
+    assert tracker.rate_spread_ == pytest.approx(np.sqrt(np.mean(np.log(paces) ** 2)), rel=1e-6)
+
+
+def test_constant_features_have_the_least_variance():
+    """A billionth of the largest; the others are tracked as without them."""
+    X = [np.column_stack([x, np.full(len(x), 5.0)]) for x in TRAINING]
+    fitted = MotionTracker(LinearSynchronizer(), 100, noise=0.02).fit(X)
+    variances = np.diag(fitted.covariance_)
+    assert variances[3] == pytest.approx(1e-9 * variances.max(), rel=1e-12)
+    assert fitted.covariance_[3, :3].tolist() == [0, 0, 0]
+    take, without = movement(1.05), MotionTracker(LinearSynchronizer(), 100, noise=0.02)
+    expected = without.fit(TRAINING).track(take)
+    for value in (5.0, np.nan):
+        track = fitted.track(np.column_stack([take, np.full(60, value)]))
+        np.testing.assert_allclose(track.postures[:, 3], 5, atol=1e-3)
+        assert np.abs(track.phases - expected.phases)[5:].max() < 3
+        assert not track.lost.any()
+
+
+def test_two_performances_are_enough():
+    """Of two the deviations are their differences."""
+    X = [movement(1.0), movement(1.2)]
+    fitted = MotionTracker(LinearSynchronizer(), 50).fit(X)
+    squares = np.square(X[1] - X[0]).mean(axis=0)
+    np.testing.assert_allclose(np.diag(fitted.covariance_), squares)
+    assert np.isfinite(fitted.track(movement(1.05)).postures).all()
 
 
 def test_groups_of_similar_performances_widen_deviations(tracker):
@@ -166,7 +219,37 @@ def test_without_observations_the_movement_goes_on(tracker):
     assert np.isfinite(tracker.smooth(np.full((9, 3), np.nan)).covariances).all()
 
 
-@pytest.mark.parametrize("size", [50.0, 1e30])
+def paced(paces):
+    """A movement that goes on by these shares of the mean pace, frame by frame, and its phases."""
+    phases = np.minimum(np.cumsum(paces), 59.0)
+    return np.column_stack([np.interp(phases, np.arange(60), m) for m in movement(1.05).T]), phases
+
+
+@pytest.fixture(scope="module")
+def of_any_pace():
+    sizes, frames = (0.9, 1.0, 1.1, 1.2), (40, 52, 65, 83)
+    X = [movement(size, n) for size, n in zip(sizes, frames, strict=True)]
+    return MotionTracker(LinearSynchronizer(60), 400, noise=0.02).fit(X)
+
+
+def test_phase_follows_another_pace_with_a_feature_never_seen(of_any_pace):
+    take, phases = paced(np.full(38, 59 / 37))
+    take[:, 1] = np.nan
+    for track in (of_any_pace.track(take), of_any_pace.smooth(take)):
+        assert np.abs(track.phases - phases)[8:].mean() < 4
+
+
+def test_smoothed_phases_of_hidden_frames_are_those_that_lead_to_the_later_ones(of_any_pace):
+    """Nothing is seen in the beginning of a fast take: the filter is late, the smoother is not."""
+    take, phases = paced(np.full(40, 59 / 39))
+    take[1:15] = np.nan
+    track, smooth = of_any_pace.track(take), of_any_pace.smooth(take)
+    assert (phases - track.phases)[14] > 5
+    assert np.abs(smooth.phases - phases)[:30].max() < 3
+    assert (np.diff(smooth.phases)[:30] > 0).all()
+
+
+@pytest.mark.parametrize("size", [50.0, 1e30, 1.7e308])
 def test_observations_outside_the_gate_are_ignored_then_lost(tracker, size):
     clean = movement(1.05)
     odd, without = clean.copy(), clean.copy()
@@ -245,6 +328,10 @@ INFINITE = np.where(np.arange(180).reshape(60, 3) == 11, np.inf, movement(1))
         (movement(1), {"projection": np.eye(2)}, r"matrix \(n_observed, 3\)"),
         (movement(1), {"projection": (np.eye(3), [1.0])}, r"an offset \(n_observed,\)"),
         (movement(1), {"projection": np.full((1, 3), np.nan)}, "is NaN"),
+        (movement(1), {"projection": [np.eye(3), np.zeros(3)]}, "The projection is not a numeric"),
+        (movement(1), {"projection": 1e12 * np.eye(3)}, r"The projection holds .* 1e\+12"),
+        (movement(1), {"times": 1e-12 * np.arange(60)}, r"by 1e-09 to 1e\+09 frames"),
+        (movement(1)[:2], {"times": [0, 1e200]}, r"but 1e\+200 follows 0"),
     ],
 )
 def test_track_refuses(tracker, X, more, message):
@@ -278,6 +365,11 @@ def test_feature_names_are_checked():
         named.track(frames[0][list("zyx")])
     with pytest.raises(ValueError, match="should match"):
         named.step(frames[0][list("zyx")].iloc[0])
+
+
+def test_fit_refuses_noise_beyond_all_data(tracker):
+    with pytest.raises(ValueError, match=r"'noise' parameter .* \(0.0, 1000000000.0\]"):
+        clone(tracker).set_params(noise=1e200).fit(TRAINING)
 
 
 def test_fit_refuses_a_single_performance(tracker):
