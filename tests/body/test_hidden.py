@@ -153,6 +153,17 @@ def test_last_heading_stays_where_hips_and_shoulders_are_hidden(fitted):
     np.testing.assert_allclose(faces, [0, 0, 30, 0], atol=1e-9)
 
 
+def test_hips_stay_at_the_pelvis_where_no_ankle_is_seen(recordings, fitted):
+    cosines = fitted()
+    postures = cosines.transform(recordings[0])
+    for side in ("left", "right"):
+        limb(cosines, postures, f"{side}_leg")[:] = np.nan
+    body = cosines.inverse_transform(postures).reshape(len(postures), 15, 3)
+    pelvis, left, right = (body[:, JOINTS.index(j)] for j in ("pelvis", "left_hip", "right_hip"))
+    assert np.isfinite(pelvis).all()
+    np.testing.assert_allclose((left + right) / 2, pelvis, atol=1e-12)
+
+
 @pytest.mark.parametrize("size", [0, 1e-9, 1e-12])
 def test_vertical_hips_show_no_heading(size):
     """What is left of them across is rounding: the heading before them stays, not that."""

@@ -185,6 +185,33 @@ def test_joints_of_means_are_paired_in_their_order():
     np.testing.assert_array_equal(found["m2_y"], df["m4_y"])
 
 
+def test_landmarks_go_before_names():
+    names = ["L_a", "R_a", "L_b", "R_b"]
+    df = with_markers(names)
+    for i, name in enumerate(names):
+        df[f"{name}_y"] += i
+    given = {"left_knee": "L_a", "right_knee": "R_b", "left_ankle": "L_b", "right_ankle": "R_a"}
+    found = mirror(df, Skeleton.from_frame(df, landmarks=given))
+    for left, right in (("L_a", "R_b"), ("L_b", "R_a")):
+        np.testing.assert_array_equal(found[f"{left}_y"], df[f"{right}_y"])
+        np.testing.assert_array_equal(found[f"{right}_y"], df[f"{left}_y"])
+
+
+def test_shoulders_show_the_middle_of_a_body_without_hips():
+    for joint in ("C7", "left_wrist"):
+        df = with_markers(["marker"])
+        at = "neck" if joint == "C7" else joint
+        df[[f"marker_{a}" for a in "xyz"]] = df[[f"{at}_{a}" for a in "xyz"]]
+        df = df.drop(columns=[c for c in df if c.split("_")[1] in ("hip", "knee", "ankle")])
+        skeleton = Skeleton.from_frame(df)
+        assert "hip" not in skeleton.limbs
+        if joint == "C7":
+            np.testing.assert_array_equal(mirror(df, skeleton)["marker_x"], -df["marker_x"])
+        else:
+            with pytest.raises(ValueError, match="'marker' is on one side in every frame"):
+                mirror(df, skeleton)
+
+
 def test_joint_without_counterpart_is_in_the_middle_or_refused():
     df = with_markers(["RBAK", "C7"], middle=["C7"])
     message = "'RBAK' is on one side in every frame, and has no counterpart"

@@ -176,6 +176,7 @@ def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame T
         (small().replace("}\n", ""), "MOTION begins with 1 open joint of"),
         ("MOTION\n", "at least one ROOT"),
         (small("7 Xrotation"), "CHANNELS needs a number from 0 to 6, got '7'"),
+        (small("9" * 5000), "CHANNELS needs a number from 0 to 6, got '999"),
         (small("2 Xrotation Xrotation"), "as many different names"),
         (small("1 Wrotation"), "got 'WROTATION'"),
         (small("0"), "no joint has CHANNELS"),

@@ -94,7 +94,10 @@ def test_parameters_end_at_the_data_whatever_their_stated_length(tmp_path):
 
 
 def test_bytes_too_few_for_a_parameter_are_none(tmp_path):
-    """Four of any value, between the last parameter and the data, which begin a block."""
+    """Four of any value, between the last parameter and the data, which begin a block.
+
+    Five may be one, with a name of one letter; its end lies in the data.
+    """
 
     def made(n):
         notes = {f"N{i}": texts("x" * 200) for i in range(3)} | {"LAST": texts("x" * n)}
@@ -102,11 +105,15 @@ def test_bytes_too_few_for_a_parameter_are_none(tmp_path):
         data = 512 * (content[16] - 1)
         return content, data, content.rindex(b"x", 0, data) + 2
 
-    _, data, end = made(1)
-    content, data, end = made(1 + data - end - 4)
-    assert data - end == 4
-    content = content[:end] + b"\1\1\1\1" + content[data:]
-    assert len(read_motion(put(tmp_path, content, "a.c3d"))) == 40
+    def filled(last):
+        _, data, end = made(1)
+        content, data, end = made(1 + data - end - len(last))
+        assert data - end == len(last)
+        return put(tmp_path, content[:end] + last + content[data:], "a.c3d")
+
+    assert len(read_motion(filled(b"\1\1\1\1"))) == 40
+    with pytest.raises(ValueError, match="leads out of the parameters"):
+        read_motion(filled(b"\1\xfeA\xff\1"))
 
 
 @pytest.mark.parametrize(("machine", "order"), [(86, "<"), (84, ">")])
@@ -361,6 +368,7 @@ def test_first_frame_may_take_one_word_or_two_or_be_0(tmp_path):
     for first, others, expected in (
         (65535, {"TRIAL": trial}, 2 * 65536 + 10),
         (1, {"TRIAL": one_word}, 7),
+        (101, {"TRIAL": {"ACTUAL_START_FIELD": floats(-5)}}, 101),
         (0, {}, 0),
     ):
         header = {"first": first, "last": min(first + 39, 65535)}

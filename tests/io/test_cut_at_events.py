@@ -61,6 +61,11 @@ def test_performances_last_from_start_to_stop(start, stop, expected):
     assert rows(cut_at_events(recording(*WALK[::-1]), start, stop)) == expected
 
 
+def test_first_and_last_frames_of_a_recording_may_be_events():
+    ends = (STRIKE, "Left", 0.0), (STRIKE, "Left", 199.0)
+    assert rows(cut_at_events(recording(*ends), STRIKE)) == [[0, 199]]
+
+
 def test_attrs_belong_to_the_performance():
     df = recording(*WALK, frame_rate=50.0, kind="markers", first_frame=101)
     before = df.copy()

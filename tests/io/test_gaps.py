@@ -44,11 +44,11 @@ def test_fill_gaps_fills_inner_gaps_up_to_max_gap():
 
 
 def test_two_known_frames_are_joined_by_a_line_and_none_stay_missing():
-    df = pd.DataFrame({f"a_{axis}": [0.0, np.nan, np.nan, 3.0] for axis in "xyz"})
-    np.testing.assert_allclose(fill_gaps(df, 2)["a_z"], [0, 1, 2, 3])
+    df = pd.DataFrame({f"a_{axis}": [np.nan, 4.0, np.nan, np.nan, 7.0] for axis in "xyz"})
+    np.testing.assert_allclose(fill_gaps(df, 2)["a_z"], [np.nan, 4, 5, 6, 7])
     df[:] = np.nan
     assert fill_gaps(df, 9).isna().all(axis=None)
-    assert find_gaps(df).to_numpy().tolist() == [["a", 0, 3, 4, False]]
+    assert find_gaps(df).to_numpy().tolist() == [["a", 0, 4, 5, False]]
 
 
 def test_other_columns_are_refused():

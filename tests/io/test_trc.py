@@ -119,6 +119,28 @@ def test_times_with_few_digits_give_the_frame_rate(tmp_path, rate, digits):
     assert read(tmp_path, unsaid).attrs["frame_rate"] == pytest.approx(rate, rel=0.002)
 
 
+@pytest.mark.parametrize(("off", "even"), [(0.002, True), (0.003, False)])
+def test_even_times_miss_their_places_by_a_tenth_of_a_step_and_half_a_digit(tmp_path, off, even):
+    """0.0025 s in steps of 0.02 s with three digits, where no rate is stated."""
+    times = 1 + np.arange(41) / 50 + off * (-1.0) ** np.arange(41)
+    text = trc(tracks(41), NAMES, times=times).replace("DataRate\tC", "Rate\tC")
+    if even:
+        assert read(tmp_path, text).attrs["frame_rate"] == 50
+    else:
+        with pytest.warns(UserWarning, match="its times are uneven"):
+            assert read(tmp_path, text).attrs["frame_rate"] is None
+
+
+def test_equal_times_have_the_stated_rate_or_none(tmp_path):
+    text = trc(tracks(), NAMES, times=np.zeros(40))
+    facts = read(tmp_path, text).attrs
+    assert facts["frame_rate"] == 50
+    assert "times" not in facts
+    with pytest.warns(UserWarning, match="in steps of 0 to 0 s"):
+        facts = read(tmp_path, text.replace("DataRate\tC", "Rate\tC")).attrs
+    assert facts["frame_rate"] is None
+
+
 @pytest.mark.parametrize("n_frames", [3, 5, 12])
 def test_stated_rate_is_used_where_digits_are_few(tmp_path, n_frames):
     df = read(tmp_path, trc(tracks()[:n_frames], NAMES, 30, digits=2))
@@ -145,8 +167,8 @@ def test_lost_frames_are_uneven_times(tmp_path):
         df = read(tmp_path, text)
     assert df.attrs["frame_rate"] is None
     np.testing.assert_allclose(df.attrs["times"], times)
-    df = read(tmp_path, text, frame_rate=50)
-    assert df.attrs["frame_rate"] == 50
+    for rate in (50, 0.5):
+        assert read(tmp_path, text, frame_rate=rate).attrs["frame_rate"] == rate
 
 
 def test_single_frame_has_the_stated_rate(tmp_path):

@@ -204,8 +204,11 @@ def test_static_performances_are_compared_by_postures():
 def test_dissimilarity_of_static_performances_is_that_of_their_postures():
     """A tenth of the squared distance, as a share of the variance of all postures."""
     held = np.array([0.9, 1.0, 1.1, 1.2, 1.3])
-    model = ActionModel().fit([np.full((7, 2), v) for v in held])
-    found = model.dissimilarity([np.full((7, 2), v) for v in (1.15, 1.3, 5.0)])
+
+    def still(values):
+        return [np.full((7, 2), v) + [0, 10] for v in values]
+
+    found = ActionModel().fit(still(held)).dissimilarity(still([1.15, 1.3, 5.0]))
     nearest = np.array([[0.05, 0.05], [0, 0.1], [3.7, 3.8]])
     expected = 0.1 * np.square(nearest).mean(axis=1) / held.var()
     np.testing.assert_allclose(found, expected, rtol=1e-9)

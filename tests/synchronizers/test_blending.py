@@ -167,6 +167,27 @@ def test_lengths_of_limbs_are_weighted_means(weights):
     np.testing.assert_allclose(lengths_of(found, PAPER), weights @ own, atol=1e-9)
 
 
+@pytest.mark.parametrize("parents", [PAPER.parents, [-1] * 15])
+def test_tilted_hips_and_shoulders_keep_their_width(parents):
+    """Means of their places would be 0.87 as far apart."""
+    skeleton = Skeleton(PAPER.joints, parents)
+    X = []
+    for degrees in (30, -30):
+        turn = Rotation.from_euler("z", degrees, degrees=True).as_matrix()
+        body = standing(9).reshape(9, -1, 3)
+        for middle, parts in (("pelvis", ("hip", "knee", "ankle")),
+                              ("neck", ("shoulder", "elbow", "wrist"))):  # fmt: skip
+            at = [PAPER.index_of(f"{s}_{part}") for s in ("left", "right") for part in parts]
+            place = body[:, [PAPER.index_of(middle)]]
+            body[:, at] = (body[:, at] - place) @ turn.T + place
+        X.append(body.reshape(9, -1))
+    found = blend_performances(even(*X), X, [0.5, 0.5], skeleton=skeleton).reshape(9, -1, 3)
+    for part, middle, width in (("hip", "pelvis", 0.2), ("shoulder", "neck", 0.4)):
+        left, right = (found[:, PAPER.index_of(f"{s}_{part}")] for s in ("left", "right"))
+        np.testing.assert_allclose(np.linalg.norm(left - right, axis=1), width)
+        np.testing.assert_allclose((left + right) / 2, found[:, PAPER.index_of(middle)])
+
+
 def test_lengths_of_chooses_the_limbs_of_one_performance():
     X = [walker(60), walker(80, size=1.3, seed=1)]
     found = blend_performances(even(*X), X, [1, 0], skeleton=PAPER, lengths_of=1)
@@ -251,7 +272,8 @@ def test_noise_does_not_rotate_a_lying_body():
 
 def test_transition_between_walks_is_continuous():
     X = [walker(60), turned(walker(60, seed=1), 90)]
-    X[1][:, ::3] += 20  # far away
+    X[1][:, ::3] += 20  # far away, on another floor
+    X[1][:, 1::3] += 20
     found = blend_performances(even(*X), X, [[1, 0], [0, 1]], skeleton=PAPER)
     pelvis = found[:, [0, 2]]
     assert np.linalg.norm(np.diff(pelvis, axis=0), axis=1).max() < 0.1
