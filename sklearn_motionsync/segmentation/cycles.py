@@ -550,10 +550,7 @@ def locate_cycles(take, phases, template, incomplete):
     frames = np.round(np.interp(whole, rising, take.times)).astype(int)
     ends = list(zip(whole, frames.tolist(), strict=True))
     if incomplete:
-        if not ends or ends[0][1] > 0:
-            ends = [(phases[0], 0), *ends]
-        if ends[-1][1] < last:
-            ends = [*ends, (phases[-1], last)]
+        ends = [(phases[0], 0), *ends, (phases[-1], last)]
     for (first, start), (following, stop) in pairwise(ends):
         if stop > start:
             score = _similarity(template, take, phases, first, following)

@@ -196,7 +196,7 @@ def _distinct_periods(lags, values, period):
     for lag, value in zip(lags, values, strict=True):
         ratios, others = lag / np.array([k for k, _ in kept]), np.array([v for _, v in kept])
         multiples = np.round(ratios)
-        repeats = (multiples > 1) & (np.abs(ratios - multiples) <= _MULTIPLE * multiples)
+        repeats = np.abs(ratios - multiples) <= _MULTIPLE * multiples
         explained = (ratios < _DISTINCT) | (repeats & (others >= _NEAR * value))
         if lag == period or not explained.any():
             kept.append((lag, value))

@@ -110,6 +110,23 @@ def test_cycles_begin_at_the_maximum_of_the_start_feature(gait):
         CycleSegmenter(start="ahead").fit(gait.data)
 
 
+def test_cycles_begin_by_default_with_the_feature_that_repeats_best():
+    """Not with the largest, which drift."""
+    t = 2 * np.pi * np.arange(500) / 50
+    drift = np.sin(t / 7.3)
+    take = np.column_stack([3 * np.sin(t) + drift, 2 * np.cos(t), 4 * np.sin(t) - 2 * drift])
+    assert CycleSegmenter().fit(take).start_ == "x1"
+
+
+def test_a_template_of_constant_periods_is_blurred():
+    take, _ = slowing_take()
+    sizes = [
+        np.square(CycleSegmenter(start=0, refine=refine).fit(take).template_).mean()
+        for refine in (False, True)
+    ]
+    assert sizes[0] < 0.9 * sizes[1]
+
+
 def test_incomplete_adds_the_first_and_last_part_cycle():
     take, _ = slowing_take()
     segmenter = CycleSegmenter(start=0).fit(take)
@@ -242,6 +259,10 @@ def test_refuses_wrong_input_and_parameters(gait, fitted):
         fitted.segment([x[:, :3] for x in gait.data])
     with pytest.raises(NotFittedError):
         CycleSegmenter().segment(gait.data)
+    joints = ["pelvis", "neck", "left_knee", "left_ankle", "right_knee", "right_ankle"]
+    legs, take = Skeleton(joints, [-1, 0, 0, 2, 0, 4]), np.tile(gait.data[0], 5)[:, :18]
+    with pytest.raises(ValueError, match=r"start='ahead' needs a skeleton .* hips or shoulders"):
+        CycleSegmenter(legs, start="ahead").fit(take + np.arange(18))
     for params in ({"threshold": 2}, {"not_cyclic": "drop"}, {"skeleton": "paper"}, {"start": 1.5}):
         with pytest.raises(ValueError, match=f"The '{next(iter(params))}' parameter"):
             CycleSegmenter(**params).report(gait.data)

@@ -94,6 +94,52 @@ def test_strength_is_robust_to_white_noise(size, lost):
     assert found.period == pytest.approx(expected.period, rel=0.02)
 
 
+def test_peaks_are_positive_maxima_after_a_fall():
+    """Below half their height, of the postures; ripples on the way down are none."""
+    noise = np.random.default_rng(3).normal(size=(300, 2))
+    ripple = np.sin(np.arange(300)[:, np.newaxis] / 1.7 + np.arange(2))
+    left_out = 0
+    for x in (waves(300, 110, 2) + 0.4 * ripple, waves(300, 60, 2) + 0.8 * noise, noise):
+        found = self_correlation(x)
+        r, expected = found.correlation, []
+        for lag in range(1, len(r) - 1):
+            if r[lag - 1] < r[lag] >= r[lag + 1]:
+                fallen = min(found.posture[: lag + 1]) < 0.5 * r[lag]
+                expected += [lag] if r[lag] > 0 and fallen else []
+                left_out += not (r[lag] > 0 and fallen)
+        assert found.peaks.tolist() == expected
+    assert left_out > 3
+
+
+def test_period_and_strength_are_those_of_the_parabola_through_a_peak():
+    found = self_correlation(waves(200, 11.4))
+    at = found.peaks[np.abs(found.peaks - found.period).argmin()]
+    a, b, c = np.polyfit([-1, 0, 1], found.correlation[at - 1 : at + 2], 2)
+    assert found.period == pytest.approx(at - b / (2 * a))
+    assert found.strength == pytest.approx(c - b * b / (4 * a))
+    assert found.strength > found.correlation[at] + 1e-3
+
+
+def test_at_most_half_of_a_sum_is_noise():
+    """Of a slow wave under noise, whose velocities are mostly noise."""
+    x = waves(1800, 900, 3) + 0.3 * np.random.default_rng(0).normal(size=(1800, 3))
+    found = self_correlation(x)
+    change, bend = (np.square(np.diff(x, k, axis=0)).sum() / (1800 - k) for k in (1, 2))
+    width = np.sqrt(x.var(axis=0).sum() / max(change - bend / 3, change / 100)) / 4
+    velocity = oracle.slow_filter(x, width, 1)
+    for lag in (300, 450, 600):
+        assert found.velocity[lag] == pytest.approx(2 * by_the_formula(velocity, lag), rel=1e-6)
+
+
+def test_standing_still_correlates_with_nothing():
+    """Rounding errors of what stands do not count."""
+    moving = waves(200, 40)
+    x = np.concatenate([np.repeat(moving[:1], 200, axis=0), moving]) + 1e6 / 3
+    found = self_correlation(x)
+    # Beyond, the earlier frames of an overlap stand still, but for the reach of the filter.
+    assert (found.correlation[240:] == 0).all()
+
+
 @pytest.mark.parametrize("n_frames", [2, 3, 4, 7])
 def test_still_or_very_short_takes_have_no_period(n_frames):
     for x in (np.zeros((n_frames, 2)), np.full((n_frames, 1), 1e9), waves(n_frames, 50)):

@@ -1,0 +1,91 @@
+"""Phases of takes along a template, and the cycles between them: each step by itself."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from sklearn_motionsync import CycleSegmenter
+from sklearn_motionsync.segmentation.cycles import (
+    PHASES,
+    average_cycle,
+    circular_peak,
+    locate_cycles,
+    match_phases,
+)
+
+ANGLES = 2 * np.pi * np.arange(PHASES) / PHASES
+TEMPLATE = np.column_stack([np.sin(ANGLES), np.cos(ANGLES), np.sin(2 * ANGLES)])
+
+
+def test_mean_cycle_is_that_of_every_sample_at_its_phase():
+    """Samples half-way between those of the cycle are on straight lines."""
+    rng = np.random.default_rng(0)
+    first, second = rng.normal(size=(70, 2)), rng.normal(size=(41, 2))
+    places = [np.arange(70) + 5, np.arange(41) + 7.5]
+    found = average_cycle([first, second], [place / PHASES for place in places])
+    for k in range(PHASES):
+        values = [first[i] for i in range(70) if (i + 5) % PHASES == k]
+        values += [(second[i] + second[i + 1]) / 2 for i in range(40) if (i + 8) % PHASES == k]
+        np.testing.assert_allclose(found[k], np.mean(values, axis=0), atol=1e-12)
+
+
+@pytest.mark.parametrize("place", [0.2, 5.0, 13.37, 31.6])
+def test_maximum_of_a_closed_curve_lies_between_samples(place):
+    found = circular_peak(np.cos(ANGLES - 2 * np.pi * place / PHASES))
+    assert (found - place + 5) % PHASES - 5 == pytest.approx(0, abs=0.01)
+    assert circular_peak(np.zeros(PHASES)) == 0
+
+
+def test_portions_of_a_long_take_are_joined_in_the_middle_of_their_overlap():
+    """Beyond it the phases are those of the later portion alone, but for whole cycles."""
+    rng = np.random.default_rng(1)
+    values = np.tile(TEMPLATE, (30, 1)) + 1.2 * rng.normal(size=(30 * PHASES, 3))
+    whole, overlap = 16 * PHASES, 2 * PHASES
+    joined = match_phases(TEMPLATE, SimpleNamespace(values=values))
+    early = match_phases(TEMPLATE, SimpleNamespace(values=values[: whole + overlap]))
+    late = match_phases(TEMPLATE, SimpleNamespace(values=values[whole:]))
+    middle = whole + overlap // 2
+    np.testing.assert_allclose(joined[:middle], early[:middle])
+    shift = joined[middle + 1 :] - late[overlap // 2 + 1 :]
+    assert np.ptp(shift) < 1e-9
+    assert shift[0] == pytest.approx(np.round(shift[0]), abs=1e-9)
+    # The portions differ where they meet, so that it matters where they do.
+    apart = early[whole:] - late[:overlap] - shift[0]
+    assert np.abs(apart).max() > 1e-3
+    assert (np.diff(joined) >= 0).all()
+
+
+def test_cycles_end_where_their_phase_is_reached_and_are_scored_by_themselves():
+    times, phases = np.arange(0, 320, 2.0), np.linspace(0.25, 5.25, 160)
+    # It stands at phase 2.
+    phases[np.abs(phases - 2) < 0.2] = 2
+    values = TEMPLATE[np.round(phases * PHASES).astype(int) % PHASES]
+    values[phases >= 4] = np.random.default_rng(0).normal(size=((phases >= 4).sum(), 3))
+    take = SimpleNamespace(times=times, values=values)
+    rows = list(locate_cycles(take, phases, TEMPLATE, incomplete=True))
+    stands = int(times[phases == 2][0])
+    starts = [0, round(np.interp(1, phases, times)), stands]
+    starts += [round(np.interp(k, phases, times)) for k in (3, 4, 5)]
+    assert [row[0] for row in rows] == starts
+    assert [row[1] for row in rows] == [start + 1 for start in [*starts[1:], 318]]
+    assert [row[2] for row in rows] == [False, True, True, True, True, False]
+    assert all(row[3] > 0.99 for row in rows[:4])
+    assert max(row[3] for row in rows[4:]) < 0.7
+    whole = list(locate_cycles(take, phases, TEMPLATE, incomplete=False))
+    assert whole == rows[1:-1]
+
+
+def test_no_part_is_empty_where_a_take_begins_and_ends_with_a_whole_phase():
+    phases = np.linspace(1, 3, 65)
+    take = SimpleNamespace(times=np.arange(65.0), values=np.tile(TEMPLATE, (3, 1))[:65])
+    rows = list(locate_cycles(take, phases, TEMPLATE, incomplete=True))
+    assert [row[:3] for row in rows] == [(0, 33, True), (32, 65, True)]
+
+
+def test_phases_begin_within_the_first_cycle():
+    angles = 2 * np.pi * np.arange(400)[:, np.newaxis] / 80
+    take = np.sin(angles + np.arange(3)) + 0.5 * np.cos(2 * angles)
+    segmenter = CycleSegmenter(start=0).fit(take)
+    first = [segmenter.phases(take[k:])[0][0] for k in range(0, 80, 16)]
+    assert all(0 <= phase < 1 for phase in first)
+    assert np.ptp(first) > 0.5
