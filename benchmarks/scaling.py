@@ -4,19 +4,20 @@ Random bends of 100 frames as points of their aSpace, 16 features, single precis
 once, in five minutes. Every line is of a process of its own. Memory is its peak above what it had
 when it began, data in memory included; pages of a memory map that were looked at count, though the
 system can take them back. Processor time of one thread. ``memory`` takes ten minutes, ``sample``
-one, ``many`` ten.
+one, ``many`` ten. ``classes`` takes three, of a process: `ActionClassifier` of four actions.
 
-    OMP_NUM_THREADS=1 python benchmarks/scaling.py [memory] [sample] [many]
+    OMP_NUM_THREADS=1 python benchmarks/scaling.py [memory] [sample] [many] [classes]
 """
 
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import numpy as np
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ASpace, DirectionCosines, LinearSynchronizer
+from sklearn_motionsync import ActionClassifier, ASpace, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import make_bending
 
 FOLDER = Path(tempfile.gettempdir())
@@ -131,7 +132,41 @@ def many():
         print(f"| 200,000 | {mode} | {got}", flush=True)
 
 
-SECTIONS = {"memory": memory, "sample": sample, "many": many}
+def actions(n, seed):
+    """Bends, halves of them and their reverse, as cosines of limbs: data, actions, people."""
+    bunch = make_bending(n, n_actors=20, random_state=seed)
+    X = list(DirectionCosines(bunch.skeleton).fit_transform(bunch.data))
+    parts = [lambda x: x, lambda x: x[: len(x) // 2], lambda x: x[len(x) // 2 :], lambda x: x[::-1]]
+    return [parts[i % 4](x) for i, x in enumerate(X)], np.arange(n) % 4, bunch.actor
+
+
+def seconds_of(function):
+    """Processor time."""
+    start = time.process_time()
+    function()
+    return time.process_time() - start
+
+
+def classes():
+    """Fit and predictions of the classifier, compared with all performances and with landmarks."""
+    print("| N | compared with | fit | one | a hundred, each | equal answers |")
+    print("|---|---|---|---|---|---|")
+    X, y, people = actions(1000, 0)
+    new = actions(100, 1)[0]
+    for n in (250, 500, 1000):
+        found = []
+        for n_landmarks in (None, ActionClassifier().n_landmarks):
+            model = ActionClassifier(n_landmarks=n_landmarks)
+            fit = seconds_of(lambda model=model, n=n: model.fit(X[:n], y[:n], groups=people[:n]))
+            found.append(model.predict(new))
+            one = np.median([seconds_of(lambda m=model, x=x: m.predict([x])) for x in new[:20]])
+            hundred = seconds_of(lambda model=model: model.predict(new)) / 100
+            same = np.mean(found[0] == found[-1])
+            row = f"{fit:.1f} s | {1e3 * one:.0f} ms | {1e3 * hundred:.0f} ms | {100 * same:.0f} %"
+            print(f"| {n} | {len(model.landmarks_)} | {row} |", flush=True)
+
+
+SECTIONS = {"memory": memory, "sample": sample, "many": many, "classes": classes}
 
 
 def main():

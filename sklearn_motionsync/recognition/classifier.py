@@ -6,13 +6,9 @@ from numbers import Integral, Real
 
 import numpy as np
 import pandas as pd
-from scipy.linalg import eigh
-from scipy.optimize import minimize_scalar
 from scipy.spatial.distance import cdist
-from scipy.special import log_softmax, softmax
+from scipy.special import softmax
 from sklearn.base import BaseEstimator, ClassifierMixin, _fit_context
-from sklearn.linear_model import LogisticRegression
-from sklearn.model_selection import GroupKFold
 from sklearn.pipeline import Pipeline
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
@@ -27,23 +23,18 @@ from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import add_unknown_label, encode_classes, encode_groups
 from ..utils.parallel import LongWorkMixin, run
 from .distances import SETTINGS, normalise_time, pairwise_distances
+from .regression import assign_folds, decision_values, fit_regression
 
 __all__ = ["ActionClassifier"]
 
-# Folds of the cross-validation in a fit.
-_N_FOLDS = 5
 # The coverage of reject_below="auto".
 _COVERAGE = 0.95
 # Standard deviations below this share of the size of the data are rounding.
 _ROUNDING = 2.0**-44
 # Frames that are averaged for the start and the end of a performance.
 _N_END_FRAMES = 3
-# Eigenvalues below this share of the largest are rounding.
-_EIGENVALUE_ROUNDING = 1e-10
-_MOST_ITERATIONS, _TOLERANCE = 10_000, 1e-6
-# Prior temperature, and the standard deviation of its logarithm, which counts as one performance:
-# on UTKinect it is 3.3 to 4.4.
-_PRIOR_TEMPERATURE, _PRIOR_STD = 4.0, 1.0
+# The golden ratio less 1.
+_GOLDEN = (5**0.5 - 1) / 2
 
 
 class ActionClassifier(
@@ -69,6 +60,9 @@ class ActionClassifier(
     summaries : bool, default=True
         Whether mean, standard deviation, minimum, maximum, start and end of every feature make a
         kernel, too.
+    n_landmarks : int or None, default=250
+        If there are more than twice as many performances, they are compared with so many of them
+        only, chosen evenly from all classes and groups (Nyström's method). None compares all.
     n_frames : int, default=50
         ``P``, frames of the common clock. Time grows with its square.
     velocity_smoothing : float, default=0.06
@@ -97,6 +91,8 @@ class ActionClassifier(
     ----------
     classes_ : ndarray, shape (n_classes,)
         The classes, sorted.
+    landmarks_ : ndarray of int, shape (n_landmarks,)
+        The training performances that others are compared with: their indices, rising.
     temperature_ : float
         The factor of decision values in probabilities, estimated from held-out performances.
     held_out_ : ndarray, shape (n_sequences,)
@@ -119,7 +115,8 @@ class ActionClassifier(
     and thresholds are then those of new people. Under metadata routing
     ``set_fit_request(groups=True)``; otherwise a pipeline takes ``actionclassifier__groups``.
 
-    Time and memory of a fit grow with the square of the number of performances.
+    Time and memory of a fit grow with the square of the number of performances where all are
+    compared, and with their number where landmarks are; those of a prediction with ``landmarks_``.
 
     Examples
     --------
@@ -152,6 +149,7 @@ class ActionClassifier(
         "C": [Interval(Real, 0, None, closed="neither")],
         "gamma": [Interval(Real, 0, None, closed="neither")],
         "summaries": ["boolean"],
+        "n_landmarks": [Interval(Integral, 2, None, closed="left"), None],
         **SETTINGS,
         "reject_below": [Interval(Real, None, None, closed="neither"), StrOptions({"auto"}), None],
         "unknown_label": [str, Integral, Real, None],
@@ -164,6 +162,7 @@ class ActionClassifier(
         C=10,
         gamma=1,
         summaries=True,
+        n_landmarks=250,
         n_frames=50,
         velocity_smoothing=0.06,
         max_offset=0.4,
@@ -178,6 +177,7 @@ class ActionClassifier(
         self.C = C
         self.gamma = gamma
         self.summaries = summaries
+        self.n_landmarks = n_landmarks
         self.n_frames = n_frames
         self.velocity_smoothing = velocity_smoothing
         self.max_offset = max_offset
@@ -218,9 +218,12 @@ class ActionClassifier(
         self.classes_, codes = encode_classes(y, performances, type(self).__name__)
         if groups is not None:
             groups, _ = encode_groups(groups, len(performances), at_least=2)
+        self.landmarks_ = choose_landmarks(codes, groups, self.n_landmarks)
         with self._progress(fits=True) as progress:
-            matrix = kernel.fit(performances, n_jobs=self.n_jobs, progress=progress)
-        fit_in_portion = partial(fit_regression, self.C, assign_folds(codes, groups))
+            jobs = {"n_jobs": self.n_jobs, "progress": progress}
+            matrix = kernel.fit(performances, self.landmarks_, **jobs)
+        folds = assign_folds(codes, groups)
+        fit_in_portion = partial(fit_regression, self.C, folds, self.landmarks_)
         ((self._regression, self.temperature_, self.held_out_),) = run(
             fit_in_portion, [(matrix, codes)]
         )
@@ -401,6 +404,8 @@ class ActionClassifier(
         names = "velocity_smoothing", "max_offset", "smoothness", "max_rate"
         settings = {name: getattr(self, name) for name in names}
         settings["n_frames"] = int(self.n_frames)
+        # A kernel needs no more than single precision: six digits of a distance.
+        settings["dtype"] = np.float32
         # Postures keep the unit of the training set.
         return [PairwiseDistance(c, normalize=c != "posture", **settings) for c in costs]
 
@@ -412,11 +417,50 @@ class ActionClassifier(
         return decision_values(kernel, *self._regression)
 
 
+def choose_landmarks(codes, groups, n_landmarks):
+    """Performances of all classes, and of all groups of each, in numbers as even as possible.
+
+    Parameters
+    ----------
+    codes : ndarray of int, shape (n,)
+        Classes.
+    groups : ndarray of int, shape (n,), or None
+    n_landmarks : int or None
+
+    Returns
+    -------
+    ndarray of int
+        Indices, rising; all, if there are at most twice as many.
+    """
+    n = len(codes)
+    if n_landmarks is None or n <= 2 * n_landmarks:
+        return np.arange(n)
+    groups = np.zeros(n, dtype=np.intp) if groups is None else groups
+    # Multiples of the golden ratio, modulo 1, are evenly spread over the performances of a group,
+    # and over the groups of a class.
+    spread = (np.arange(n) * _GOLDEN) % 1
+    in_group = _ranks(codes * (groups.max() + 1) + groups, spread)
+    in_class = _ranks(codes, in_group + (groups + codes) * _GOLDEN % 1)
+    return np.sort(np.lexsort((codes, in_class))[:n_landmarks])
+
+
+def _ranks(cells, keys):
+    """The rank of each key (n,) among those of its cell, from 0."""
+    order = np.lexsort((keys, cells))
+    ranks = np.empty(len(cells), dtype=np.intp)
+    ranks[order] = np.arange(len(cells)) - np.searchsorted(cells[order], cells[order])
+    return ranks
+
+
 class MotionKernel:
     """The mean of kernels ``exp(-gamma D / median(D))``, medians over the training pairs.
 
     One ``D`` a comparison is that of its synchronisation distances. The last is the squared
     Euclidean distance of the `summary_statistics`, in standard deviations of the training set.
+
+    Performances are compared with landmarks of the training set. If these are not all of it, the
+    kernels are not added up, but stand side by side: each then has a regression of its own, which
+    comes nearer to that of all pairs.
 
     Parameters
     ----------
@@ -429,39 +473,53 @@ class MotionKernel:
     def __init__(self, comparisons, gamma, summaries):
         self.comparisons, self.gamma, self.summaries = comparisons, gamma, summaries
 
-    def fit(self, performances, **jobs):
-        """Estimate units and medians from the training set, and return its kernel: (n, n).
+    def fit(self, performances, landmarks, **jobs):
+        """Estimate units and medians from the training set, and return its kernel.
 
         Parameters
         ----------
         performances : sequence of ndarray (n_frames_i, n_features)
+        landmarks : ndarray of int, shape (n_landmarks,)
         **jobs : dict
             ``n_jobs`` and ``progress``.
+
+        Returns
+        -------
+        ndarray, shape (n, n), or (n, n_kernels * n_landmarks)
         """
         frames = [x.astype(np.float64, copy=False) for x in performances]
         self._center = np.concatenate(frames).mean(axis=0)
         variances = [np.square(x - self._center).sum(axis=1).mean() for x in frames]
         self._unit = np.sqrt(np.mean(variances)) or 1.0
         scaled = self._scale(performances)
-        self._features = self._compared(scaled)
-        distances = [
-            pairwise_distances(c, features, name=f" by {c.cost}", **jobs)
-            for c, features in zip(self.comparisons, self._features, strict=True)
-        ]
+        features = self._compared(scaled)
+        self._features = [f[landmarks] for f in features]
+        # Landmarks among themselves, so that no pair is compared twice, and the others with them.
+        is_other = np.ones(len(scaled), dtype=bool)
+        is_other[landmarks] = False
+        distances = np.empty((len(self.comparisons) + self.summaries, len(scaled), len(landmarks)))
+        for i, (c, f) in enumerate(zip(self.comparisons, features, strict=True)):
+            d, known, name = distances[i], self._features[i], f" by {c.cost}"
+            d[landmarks] = pairwise_distances(c, known, name=name, **jobs)
+            if is_other.any():
+                d[is_other] = pairwise_distances(c, f[is_other], known, name=name, **jobs)
         if self.summaries:
             statistics = np.array([summary_statistics(x) for x in scaled])
             self._mean, std = statistics.mean(axis=0), statistics.std(axis=0)
             # Statistics that are constant in the training set have no weight.
             rounding = _ROUNDING * max(1.0, np.abs(self._center).max() / self._unit)
             self._std = np.where(std > rounding, std, np.inf)
-            self._statistics = (statistics - self._mean) / self._std
-            distances.append(cdist(self._statistics, self._statistics, "sqeuclidean"))
-        pairs = np.triu_indices(len(scaled), 1)
-        self._medians = [_positive_median(d[pairs]) for d in distances]
-        return self._mean_kernel(distances)
+            statistics = (statistics - self._mean) / self._std
+            self._statistics = statistics[landmarks]
+            distances[-1] = cdist(statistics, self._statistics, "sqeuclidean")
+        is_pair = np.ones(distances[0].shape, dtype=bool)
+        is_pair[landmarks, np.arange(len(landmarks))] = False
+        self._medians = [_positive_median(d[is_pair]) for d in distances]
+        self._side_by_side = bool(is_other.any())
+        return self._combined(distances)
 
     def __call__(self, performances, **jobs):
-        """The kernel of other performances and the training set: (n_other, n)."""
+        """The kernel of other performances and the landmarks."""
         scaled = self._scale(performances)
         distances = [
             pairwise_distances(c, new, known, name=f" by {c.cost}", **jobs)
@@ -473,7 +531,7 @@ class MotionKernel:
             statistics = np.array([summary_statistics(x) for x in scaled])
             statistics = (statistics - self._mean) / self._std
             distances.append(cdist(statistics, self._statistics, "sqeuclidean"))
-        return self._mean_kernel(distances)
+        return self._combined(distances)
 
     def _scale(self, performances):
         """Performances about the mean posture, in the unit of the training set."""
@@ -486,12 +544,12 @@ class MotionKernel:
         on_clock = normalise_time(scaled, self.comparisons[0].n_frames)
         return [c.features(on_clock) for c in self.comparisons]
 
-    def _mean_kernel(self, distances):
-        kernels = (
+    def _combined(self, distances):
+        kernels = [
             np.exp(-self.gamma * d / median)
             for d, median in zip(distances, self._medians, strict=True)
-        )
-        return sum(kernels) / len(distances)
+        ]
+        return (np.hstack(kernels) if self._side_by_side else sum(kernels)) / len(distances)
 
 
 def summary_statistics(x):
@@ -506,116 +564,3 @@ def _positive_median(distances):
     if not distances.size:
         return 1.0
     return float(np.median(distances)) or float(distances.mean()) or 1.0
-
-
-class KernelRegression:
-    """Multinomial logistic regression, ``f = K A + b``, with one column a class that sum to 0.
-
-    Parameters
-    ----------
-    kernel : ndarray, shape (n, n)
-        Of the training set, positive semidefinite but for rounding.
-    C : float
-        Inverse strength of the penalty ``|f|^2 / 2``, for all of them.
-    """
-
-    def __init__(self, kernel, C):
-        self.C = C
-        values, vectors = eigh(kernel)
-        kept = values > _EIGENVALUE_ROUNDING * max(values[-1], 0)
-        roots = np.sqrt(values[kept])
-        # K = Z Z', and f = Z w.
-        self._z, self._back = vectors[:, kept] * roots, vectors[:, kept] / roots
-
-    def fit(self, codes, rows=slice(None)):
-        """Fit to the classes (n,), integers from 0, of some performances.
-
-        Returns
-        -------
-        A : ndarray, shape (n, n_classes)
-        b : ndarray, shape (n_classes,)
-            Minus infinity for classes that none of them has.
-        """
-        n_classes = codes.max() + 1
-        # The same penalty, relative to the mean loss, as for all.
-        C = self.C * len(codes) / len(codes[rows])
-        model = LogisticRegression(C=C, max_iter=_MOST_ITERATIONS, tol=_TOLERANCE)
-        model.fit(self._z[rows], codes[rows])
-        weights, intercepts = model.coef_, model.intercept_
-        if len(weights) == 1:
-            # Of two classes scikit-learn fits the difference.
-            weights = np.concatenate([-weights, weights]) / 2
-            intercepts = np.concatenate([-intercepts, intercepts]) / 2
-        A, b = np.zeros((len(codes), n_classes)), np.full(n_classes, -np.inf)
-        A[:, model.classes_] = self._back @ weights.T
-        b[model.classes_] = intercepts
-        return A, b
-
-
-def decision_values(kernel, A, b):
-    """Decision values (m, n_classes) of a kernel (m, n), each row by itself."""
-    return np.vecdot(kernel[:, np.newaxis], A.T) + b
-
-
-def assign_folds(codes, groups, n_folds=_N_FOLDS):
-    """The fold of each performance, with no group in two folds.
-
-    Without groups the performances of each class are divided evenly, in order.
-    """
-    folds = np.empty(len(codes), dtype=np.intp)
-    if groups is None:
-        order = np.argsort(codes, kind="stable")
-        starts = np.searchsorted(codes[order], codes[order])
-        folds[order] = (np.arange(len(codes)) - starts) % n_folds
-        return folds
-    splits = GroupKFold(min(n_folds, groups.max() + 1)).split(codes, groups=groups)
-    for fold, (_, out) in enumerate(splits):
-        folds[out] = fold
-    return folds
-
-
-def held_out_decisions(regression, kernel, codes, folds):
-    """Decision values (n, n_classes) of each performance, fitted on the other folds.
-
-    NaN where these have fewer than two classes, and minus infinity for classes they do not have.
-    """
-    found = np.full((len(codes), codes.max() + 1), np.nan)
-    for fold in np.unique(folds):
-        out = folds == fold
-        if len(np.unique(codes[~out])) > 1:
-            found[out] = decision_values(kernel[out], *regression.fit(codes, ~out))
-    return found
-
-
-def fit_temperature(decisions, codes):
-    """The factor of decision values with the largest posterior density (temperature scaling).
-
-    Parameters
-    ----------
-    decisions : ndarray, shape (n, n_classes)
-        Of held-out performances, as `held_out_decisions` returns them.
-    codes : ndarray of int, shape (n,)
-
-    Returns
-    -------
-    float
-    """
-    known = np.isfinite(decisions[np.arange(len(codes)), codes])
-    decisions, codes = decisions[known], codes[known]
-
-    def loss(log_ratio):
-        logs = log_softmax(_PRIOR_TEMPERATURE * np.exp(log_ratio) * decisions, axis=1)
-        own = logs[np.arange(len(codes)), codes]
-        return (log_ratio / _PRIOR_STD) ** 2 / 2 - own.sum()
-
-    found = minimize_scalar(loss, bounds=(-5, 5), method="bounded", options={"xatol": 1e-6})
-    return float(_PRIOR_TEMPERATURE * np.exp(found.x))
-
-
-def fit_regression(C, folds, kernel, codes):
-    """The regression (A, b), its temperature, and the largest held-out decision values (n,)."""
-    regression = KernelRegression(kernel, C)
-    decisions = held_out_decisions(regression, kernel, codes, folds)
-    A, b = regression.fit(codes)
-    temperature = fit_temperature(decisions, codes)
-    return (np.ascontiguousarray(A.T).T, b), temperature, decisions.max(axis=1)

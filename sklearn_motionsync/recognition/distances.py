@@ -1,6 +1,5 @@
 """synchronization_distances: the matrix of Eq. 12 between performances."""
 
-import itertools
 from numbers import Integral, Real
 
 import numpy as np
@@ -10,7 +9,7 @@ from sklearn.utils._param_validation import Interval, StrOptions, validate_param
 from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..inputs.wording import counted
 from ..matching.costs import COSTS
-from ..matching.pairwise import BLOCK, PairwiseDistance
+from ..matching.pairwise import PairwiseDistance, blocks_of_pairs
 from ..matching.warps import normalise
 from ..utils.parallel import Progress, SharedArgument, run
 
@@ -186,10 +185,7 @@ def pairwise_distances(comparison, X, Y=None, *, symmetric=True, n_jobs=None, pr
 
 
 def _directed(comparison, bases, moving, *, n_jobs, progress, name):
-    rows, columns = (
-        [slice(i, i + BLOCK) for i in range(0, len(some), BLOCK)] for some in (bases, moving)
-    )
-    blocks = list(itertools.product(rows, columns))
+    blocks = blocks_of_pairs(len(bases), len(moving))
     portions = [(blocks[i : i + _PORTION_BLOCKS],) for i in range(0, len(blocks), _PORTION_BLOCKS)]
     stage = f"comparing {len(bases)} with {counted(len(moving), 'performance')}{name}"
     jobs = {"n_jobs": n_jobs, "step": progress.stage(stage, len(portions))}

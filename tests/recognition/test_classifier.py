@@ -31,7 +31,9 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import load_performances, make_bending
 from sklearn_motionsync.display import SkeletonDisplay
-from sklearn_motionsync.recognition.classifier import (
+from sklearn_motionsync.matching.pairwise import PairwiseDistance
+from sklearn_motionsync.recognition.classifier import choose_landmarks
+from sklearn_motionsync.recognition.regression import (
     KernelRegression,
     assign_folds,
     decision_values,
@@ -268,6 +270,115 @@ def test_unknown_label_is_checked(known, labels, unknown, message):
     classifier = ActionClassifier(n_frames=8, reject_below="auto", unknown_label=unknown)
     with pytest.raises(ValueError, match=message):
         classifier.fit(X, np.repeat(labels, 10)).predict(X)
+
+
+# -- large training sets ----------------------------------------------------------------
+
+
+def test_landmarks_are_chosen_evenly_from_classes_and_groups():
+    rng = np.random.default_rng(0)
+    codes, groups = rng.choice(4, 900, p=[0.6, 0.3, 0.09, 0.01]), rng.integers(0, 7, 900)
+    chosen = choose_landmarks(codes, groups, 100)
+    assert (np.diff(chosen) > 0).all()
+    np.testing.assert_array_equal(chosen, choose_landmarks(codes, groups, 100))
+    assert len(chosen) == 100
+    rare = (codes == 3).sum()
+    assert rare < 25
+    # A class that has fewer than its share is chosen whole, the others have as many.
+    share = (100 - rare) / 3
+    counts = np.bincount(codes[chosen])
+    assert counts[3] == rare
+    assert np.abs(counts[:3] - share).max() < 1
+    for code in range(2):
+        of_groups = np.bincount(groups[chosen[codes[chosen] == code]], minlength=7)
+        assert np.ptp(of_groups) <= 1
+    without = choose_landmarks(codes, None, 100)
+    assert (np.bincount(codes[without]) == counts).all()
+    # Spread over a class, as performances of one person come one after the other.
+    many = np.flatnonzero(codes == 0)
+    at = np.searchsorted(many, without[codes[without] == 0])
+    assert np.diff(at, prepend=0, append=len(many)).max() < 3 * len(many) / len(at)
+    # Groups that a class has not enough landmarks for are not those of the other classes.
+    codes, groups = np.repeat([0, 1], 300), np.tile(np.arange(100), 6)
+    halves = choose_landmarks(codes, groups, 100)
+    assert len(set(groups[halves])) > 60
+    for n_landmarks, n in ((None, 600), (300, 600), (299, 299)):
+        assert len(choose_landmarks(codes, groups, n_landmarks)) == n
+
+
+def test_few_landmarks_tell_the_classes_and_know_their_temperature():
+    X, y, people = movements(30, noise=0.3)
+    new = movements(20, seed=1, noise=0.3)
+    every = ActionClassifier(n_frames=20).fit(X, y, groups=people)
+    some = ActionClassifier(n_frames=20, n_landmarks=24).fit(X, y, groups=people)
+    np.testing.assert_array_equal(every.landmarks_, np.arange(90))
+    assert len(some.landmarks_) == 24
+    assert set(zip(y[some.landmarks_], people[some.landmarks_], strict=True)) == set(
+        zip(y, people, strict=True)
+    )
+    assert np.mean(some.predict(new[0]) == every.predict(new[0])) > 0.95
+    assert some.score(new[0], new[1]) > 0.95
+    assert 0.5 < some.temperature_ / every.temperature_ < 2
+    assert np.corrcoef(some.held_out_, every.held_out_)[0, 1] > 0.8
+    np.testing.assert_allclose(some.decision_function(new[0]).sum(axis=1), 0, atol=1e-4)
+
+
+def test_decisions_by_landmarks_depend_on_neither_jobs_nor_other_performances():
+    X, y, people = movements(20)
+    new = movements(3, seed=1)[0]
+    one, two = (
+        ActionClassifier(n_frames=20, n_landmarks=15, n_jobs=n).fit(X, y, groups=people)
+        for n in (1, 2)
+    )
+    decisions = one.decision_function(new)
+    np.testing.assert_array_equal(two.decision_function(new), decisions)
+    np.testing.assert_array_equal(one.held_out_, two.held_out_)
+    for i in (0, 8):
+        np.testing.assert_array_equal(one.decision_function([new[i]])[0], decisions[i])
+
+
+def compared_pairs(monkeypatch, work):
+    """How many pairs are compared, of both directions and all costs."""
+    counts, block = [], PairwiseDistance.block
+
+    def counted(self, bases, moving):
+        counts.append(len(bases) * len(moving))
+        return block(self, bases, moving)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(PairwiseDistance, "block", counted)
+        work()
+    return sum(counts)
+
+
+def test_fit_and_predict_compare_with_landmarks_only(monkeypatch):
+    X, y, people = movements(20)
+    classifier = ActionClassifier(n_frames=8, n_landmarks=10)
+    fitted = compared_pairs(monkeypatch, lambda: classifier.fit(X, y, groups=people))
+    assert fitted == 3 * (10 * 10 + 2 * 10 * 50)
+    for n in (1, 7):
+        asked = compared_pairs(monkeypatch, lambda n=n: classifier.predict(X[:n]))
+        assert asked == 3 * 2 * 10 * n
+    everything = ActionClassifier(n_frames=8, n_landmarks=None)
+    assert compared_pairs(monkeypatch, lambda: everything.fit(X, y)) == 3 * 60 * 60
+
+
+def test_landmarks_tell_the_actions_of_new_people_as_all_pairs_do(real_data):
+    """Of half of the people, with 45 of their 100 clips as landmarks."""
+    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
+    X = list(DirectionCosines(bunch.skeleton).fit_transform(bunch.data))
+    people = np.unique(bunch.actor)
+    right = []
+    for half in (people[::2], people[1::2]):
+        known = np.flatnonzero(np.isin(bunch.actor, half))
+        new = np.setdiff1d(np.arange(len(X)), known)
+        for n_landmarks in (None, 45):
+            classifier = ActionClassifier(n_frames=30, n_landmarks=n_landmarks)
+            classifier.fit([X[i] for i in known], bunch.target[known], bunch.actor[known])
+            right.append(classifier.predict([X[i] for i in new]) == bunch.target[new])
+    of_all, of_landmarks = np.concatenate(right[::2]), np.concatenate(right[1::2])
+    assert abs(of_all.mean() - of_landmarks.mean()) <= 0.011
+    assert np.mean(of_all == of_landmarks) > 0.97
 
 
 # -- small training sets ---------------------------------------------------------------

@@ -1,5 +1,7 @@
 """Distances between performances: against plain loops, closed forms and people."""
 
+import itertools
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,7 +9,8 @@ from joblib import parallel_config
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn_motionsync import DirectionCosines, synchronization_distances, to_frame
 from sklearn_motionsync.datasets import load_performances
-from sklearn_motionsync.matching.pairwise import BLOCK
+from sklearn_motionsync.matching.pairwise import BLOCK, PairwiseDistance, blocks_of_pairs
+from sklearn_motionsync.recognition.distances import normalise_time
 
 import oracle
 
@@ -93,6 +96,57 @@ def test_distance_depends_on_the_pair_alone(cost, normalize):
     part = synchronization_distances(X[3:20], X[30:], **settings)
     np.testing.assert_array_equal(part, D[3:20, 30:])
     assert synchronization_distances([X[5]], [X[33]], **settings) == D[5, 33]
+
+
+# Of 13 bases, and of 8 moving sequences.
+PARTS = slice(0, 5), slice(5, 13)
+
+
+@pytest.mark.parametrize("cost", COSTS)
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("n_features", [1, 3, 41])
+@pytest.mark.parametrize("n_frames", [2, 17, 33])
+def test_blocks_of_any_shape_have_the_same_bits(cost, dtype, n_features, n_frames):
+    settings = {"velocity_smoothing": 0.06, "max_offset": 0.4, "smoothness": 0.003, "max_rate": 4}
+    comparison = PairwiseDistance(cost, normalize=True, n_frames=n_frames, dtype=dtype, **settings)
+    X = comparison.features(normalise_time(walks(21, n_features), n_frames))
+    bases, moving = X[:13], X[13:]
+    D = comparison.block(bases, moving)
+    assert X.dtype == D.dtype == dtype
+    rows = np.concatenate([comparison.block(bases[i : i + 1], moving) for i in range(13)])
+    columns = np.hstack([comparison.block(bases, moving[i : i + 1]) for i in range(8)])
+    parts = np.block([[comparison.block(bases[a], moving[b]) for b in PARTS] for a in PARTS])
+    for found in (rows, columns, parts):
+        np.testing.assert_array_equal(found, D)
+
+
+@pytest.mark.parametrize("n_bases", [1, 2, 15, 16, 17, 100, 1000])
+@pytest.mark.parametrize("n_moving", [1, 3, 16, 300])
+def test_blocks_hold_every_pair_once_and_nothing_else(n_bases, n_moving):
+    counts = np.zeros((n_bases, n_moving), dtype=int)
+    blocks = blocks_of_pairs(n_bases, n_moving)
+    for rows, columns in blocks:
+        counts[rows, columns] += 1
+    assert (counts == 1).all()
+    sizes = [len(range(*r.indices(n_bases))) * len(range(*c.indices(n_moving))) for r, c in blocks]
+    assert max(sizes) <= BLOCK**2
+    # A single performance does not take more blocks than its share of many.
+    if n_bases == 1:
+        assert len(blocks) == -(-n_moving // BLOCK**2)
+
+
+def test_single_precision_is_right_to_six_digits():
+    settings = {"velocity_smoothing": 0.06, "max_offset": 0.4, "smoothness": 0.003, "max_rate": 4}
+    on_clock = normalise_time(walks(20, 5), 50)
+    for cost, normalize in itertools.product(COSTS, (True, False)):
+        both = []
+        for dtype in (np.float64, np.float32):
+            shared = {"normalize": normalize, "n_frames": 50, "dtype": dtype, **settings}
+            comparison = PairwiseDistance(cost, **shared)
+            features = comparison.features(on_clock)
+            both.append(comparison.block(features, features))
+        assert (np.diag(both[1]) == 0).all()
+        np.testing.assert_allclose(both[1], both[0], rtol=1e-5, atol=1e-6 * both[0].max())
 
 
 @pytest.mark.parametrize("backend", ["threading", "loky"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from scipy.special import logsumexp, softmax
-from sklearn_motionsync.recognition.classifier import (
+from sklearn_motionsync.recognition.regression import (
     KernelRegression,
     assign_folds,
     decision_values,
@@ -54,6 +54,53 @@ def test_fit_of_some_rows_equals_a_fit_without_the_others():
     alone = KernelRegression(K[np.ix_(some, some)], 5 * 24 / 18).fit(codes[some])
     expected = decision_values(K[:, some], *alone)
     np.testing.assert_allclose(decision_values(K, A, b), expected, atol=2e-3)
+
+
+def low_rank(n, n_kernels, rank=4, seed=3):
+    """Kernels of few features each, side by side, and classes that they tell."""
+    rng = np.random.default_rng(seed)
+    Z = rng.standard_normal((n_kernels, n, rank))
+    codes = (Z[0, :, 0] + Z[-1, :, 1] + 0.5 * rng.standard_normal(n) > 0).astype(int)
+    return Z @ Z.swapaxes(1, 2), codes + (Z[0, :, 2] > 1)
+
+
+@pytest.mark.parametrize("n_kernels", [1, 3])
+def test_landmarks_that_span_the_kernels_lose_nothing(n_kernels):
+    """Nyström's approximation is exact where the rank is not above the number of landmarks."""
+    kernels, codes = low_rank(60, n_kernels)
+    landmarks = np.arange(0, 60, 5)
+    exact = KernelRegression(kernels.sum(axis=0), 2).fit(codes)
+    expected = decision_values(kernels.sum(axis=0), *exact)
+    wide = np.hstack(kernels[:, :, landmarks])
+    found = KernelRegression(wide, 2, landmarks).fit(codes)
+    np.testing.assert_allclose(decision_values(wide, *found), expected, atol=2e-3)
+    # Of all as landmarks, in any order.
+    order = np.random.default_rng(0).permutation(60)
+    wide = np.hstack(kernels[:, :, order])
+    found = KernelRegression(wide, 2, order).fit(codes)
+    np.testing.assert_allclose(decision_values(wide, *found), expected, atol=2e-3)
+
+
+def test_landmarks_that_are_held_out_are_not_compared_with():
+    kernels, codes = low_rank(60, 2)
+    landmarks = np.arange(0, 60, 3)
+    wide = np.hstack(kernels[:, :, landmarks])
+    regression = KernelRegression(wide, 2, landmarks)
+    out = np.arange(60) % 4 == 0
+    A, _ = regression.fit(codes, ~out)
+    is_out = np.tile(out[landmarks], 2)
+    assert (A[is_out] == 0).all()
+    assert (A[~is_out] != 0).any(axis=1).all()
+    folds = out.astype(int)
+    np.testing.assert_array_equal(
+        held_out_decisions(regression, wide, codes, folds)[out],
+        decision_values(wide[out], *regression.fit(codes, ~out)),
+    )
+    # Without a landmark there is no decision.
+    all_in_one = np.isin(np.arange(60), landmarks).astype(int)
+    found = held_out_decisions(regression, wide, codes, all_in_one)
+    assert np.isnan(found[landmarks]).all()
+    assert np.isfinite(found[all_in_one == 0]).all()
 
 
 def test_held_out_decisions_are_those_of_the_other_folds():
