@@ -9,7 +9,6 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
 from sklearn.utils.metadata_routing import MetadataRequest
 
-from ..inputs.wording import counted
 from ..matching.warps import normalise
 from ..utils.pipelines import accepted_params, route_to_synchronizer
 from .spread import least_squares, pairwise_correlation, sobolev_least_squares
@@ -256,12 +255,12 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
             raise ValueError(
                 "FeatureHoldoutScorer holds features out, and these performances have only one, as "
                 "have all rows of a 2-D array: use SpreadScorer. "
-                f"(n_folds={self.n_folds!r} must be between 2 and the 1 features there are.)"
+                f"(n_folds={self.n_folds!r} must be from 2 to the number of features.)"
             )
         if not isinstance(self.n_folds, Integral) or not 2 <= self.n_folds <= n_features:
             raise ValueError(
-                f"n_folds={self.n_folds!r} must be between 2 and the "
-                f"{counted(n_features, 'feature')} there are, a whole number."
+                f"n_folds={self.n_folds!r} must be between 2 and the {n_features} features there "
+                "are, a whole number."
             )
         if reached.takes_params:
             # Metadata that the estimator needs are missing for its clones, too.

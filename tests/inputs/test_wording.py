@@ -19,6 +19,7 @@ KEPT = [
     'f"None of the {len(takes)} takes is"',
     'f"{n_parts} parts" if n_parts > 1',
     'f"{len(shares)} features the others',
+    "must be between 2 and the {n_features} features",
 ]
 
 
