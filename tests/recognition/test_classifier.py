@@ -363,6 +363,24 @@ def test_fit_and_predict_compare_with_landmarks_only(monkeypatch):
     assert compared_pairs(monkeypatch, lambda: everything.fit(X, y)) == 3 * 60 * 60
 
 
+def test_landmarks_tell_the_actions_of_new_people_as_all_pairs_do(real_data):
+    """Of half of the people, with 49 of their 100 clips as landmarks."""
+    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
+    X = list(DirectionCosines(bunch.skeleton).fit_transform(bunch.data))
+    people = np.unique(bunch.actor)
+    right = []
+    for half in (people[::2], people[1::2]):
+        known = np.flatnonzero(np.isin(bunch.actor, half))
+        new = np.setdiff1d(np.arange(len(X)), known)
+        for n_landmarks in (None, 49):
+            classifier = ActionClassifier(n_landmarks=n_landmarks)
+            classifier.fit([X[i] for i in known], bunch.target[known], bunch.actor[known])
+            right.append(classifier.predict([X[i] for i in new]) == bunch.target[new])
+    of_all, of_landmarks = np.concatenate(right[::2]), np.concatenate(right[1::2])
+    assert abs(of_all.mean() - of_landmarks.mean()) <= 0.011
+    assert np.mean(of_all == of_landmarks) > 0.97
+
+
 # -- small training sets ---------------------------------------------------------------
 
 
