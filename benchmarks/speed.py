@@ -1,10 +1,11 @@
 """Time and memory, side by side with peers, as Markdown tables (docs/speed.md).
 
 Ours and the peers run in alternation, one thread each, the peers in an environment of their own;
-each figure is a median, each ratio a median of ratios within a round, with its quartiles.
+times are of the processor but for cold starts, workers and the tables of memory. Each figure is a
+median, each ratio a median of ratios within a round, with its quartiles.
 
     python -m venv peers && peers/bin/pip install dtaidistance aeon tslearn gdtw fdasrsf affinewarp
-    python benchmarks/speed.py --peers peers/bin/python
+    python benchmarks/speed.py --peers peers/bin/python --data ../shared/data
 
 The C recurrence needs a C compiler named cc. ``--only pair,pairs`` runs some of the sections.
 """
@@ -29,12 +30,18 @@ import numpy as np
 import sklearn_motionsync
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
-from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.datasets import load_performances, make_bending
 from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.trellis import Bases, Trellis
 
 HERE = Path(__file__).resolve().parent
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
+ARCHIVES = {
+    "hdm05": "hdm05",
+    "utkinect": "utkinect",
+    "cmu07_walk": "cmu07_walk",
+    "uiprmd": "uiprmd_odd",
+}
 FOLDER = Path(tempfile.mkdtemp(prefix="motionsync-speed-"))
 
 
@@ -51,11 +58,11 @@ def walks(n=40, n_frames=100, n_features=16, seed=0):
     return np.load(path), path
 
 
-def timed(function):
-    """Seconds of one run."""
-    start = time.perf_counter()
+def timed(function, clock=time.process_time):
+    """Seconds of one run: of the processor, which other work on the machine moves less."""
+    start = clock()
     function()
-    return time.perf_counter() - start
+    return clock() - start
 
 
 class Peers:
@@ -154,9 +161,9 @@ def compare(title, jobs, rounds, against=None, note=""):
     return {name: float(np.median(values)) for name, values in seconds.items()}
 
 
-def fit(X, **settings):
+def fit(X, clock=time.process_time, **settings):
     """A job: fit."""
-    return lambda: timed(lambda: DenseSynchronizer(**settings).fit(X))
+    return lambda: timed(lambda: DenseSynchronizer(**settings).fit(X), clock)
 
 
 def pair(peers):
@@ -245,6 +252,82 @@ def pairs(peers, title, rounds=15, **size):
     compare(title, jobs, rounds)
 
 
+def one_source(n=40, n_frames=100, n_features=16, noise=0.05):
+    """Trials of a single source: one movement, each with timing and noise of its own."""
+    rng, t = np.random.default_rng(0), np.linspace(0, 1, n_frames)
+    knots = np.linspace(0, 1, 12)
+    curves = [np.interp(t, knots, x) for x in rng.standard_normal((n_features, len(knots)))]
+    warps = t + 0.05 * np.sin(np.pi * t) * rng.standard_normal((n, 1))
+    X = np.array([[np.interp(warp, t, x) for x in curves] for warp in warps]).swapaxes(1, 2)
+    return X + noise * X.std() * rng.standard_normal(X.shape)
+
+
+def real_sets(data):
+    """Real performances as points of their aSpace, by archive, action, and the people in the set.
+
+    The sets of an action are all people together, and each person with three or more.
+    """
+    for archive, name in ARCHIVES.items():
+        bunch = load_performances(Path(data) / archive / f"{name}_positions.npz")
+        if archive == "uiprmd":  # markers: about their mean
+            shaped = [x.reshape(len(x), -1, 3) for x in bunch.data]
+            postures = [(x - x.mean(axis=1, keepdims=True)).reshape(len(x), -1) for x in shaped]
+        else:
+            postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+        labels, actors = np.asarray(bunch.target), np.asarray(bunch.actor)
+        for label in np.unique(labels):
+            own = np.flatnonzero(labels == label)
+            for actor in [None, *np.unique(actors[own])]:
+                some = own if actor is None else own[actors[own] == actor]
+                alone = len(np.unique(actors[own])) == 1
+                if len(some) >= 3 and not (alone and actor is None):
+                    X = ASpace(16).fit_transform([postures[i] for i in some])
+                    yield archive, label, actor, X
+
+
+def sources(peers, data):
+    """Where refining is on, and where it is not."""
+    sets, counts = {"one source, 40": one_source()}, {}
+    sets["simulated bends, 40"] = np.load(bends(40)).astype(float)
+    sets["random walks, 40"] = walks()[0]
+    for archive, label, actor, X in real_sets(data):
+        key = archive, "all people" if actor is None else "each person"
+        refines = DenseSynchronizer(100).fit(X).refines_
+        counts[key] = np.add(counts.get(key, 0), (refines, 1))
+        if actor is None and len(X) > 23:
+            X = LinearSynchronizer(100).fit_transform(X[:: max(1, len(X) // 40)])[:40]
+            sets[f"{archive}, {label}, {len(X)}"] = X.astype(float)
+    print("\n## Trials of one source, where refining is on, beside people\n")
+    print(
+        "| performances of 100 x 16 | refined | dtaidistance, pairs, ms | `fit`, ms | ratio ",
+        end="",
+    )
+    print(
+        "| dtaidistance, path, ms | `transform` of one, ms | of all, each, ms |\n"
+        + 8 * "|---"
+        + "|"
+    )
+    for k, (name, X) in enumerate(sets.items()):
+        np.save(path := FOLDER / f"set-{k}.npy", X)
+        sync = DenseSynchronizer().fit(X)
+        jobs = (
+            partial(peers, "dtaidistance pairs", path),
+            fit(X),
+            partial(peers, "dtaidistance path", path),
+            lambda s=sync, x=X[1:2]: timed(lambda: s.transform(x)),
+            lambda s=sync, x=X: timed(lambda: s.transform(x)) / len(x),
+        )
+        seconds = np.array([[job() for job in jobs] for _ in range(16)])[1:]
+        pairs_, fits, *others = (f"{1e3 * x:.3g}" for x in np.median(seconds, axis=0))
+        low, ratio, high = np.percentile(seconds[:, 1] / seconds[:, 0], [25, 50, 75])
+        cells = [name, "yes" if sync.refines_ else "no", pairs_, fits]
+        cells += [f"{ratio:.2f} ({low:.2f} to {high:.2f})", *others]
+        print(f"| {' | '.join(cells)} |", flush=True)
+    print("\n| real sets | | refined | of |\n|---|---|---|---|")
+    for (archive, kind), (refined, of) in counts.items():
+        print(f"| {archive} | {kind} | {refined} | {of} |")
+
+
 def whole(peers):
     """Pattern and all warps of a set."""
     X, path = walks()
@@ -297,7 +380,8 @@ def cold(peers):
         names = ("dtaidistance DBA", "tslearn path", "tslearn DBA", "aeon path", "aeon DBA")
         names += ("gdtw path", "fdasrsf path", "affinewarp fit")
         jobs |= {name: [*server, name, str(path)] for name in names}
-    table = {name: partial(timed, partial(run, *command)) for name, command in jobs.items()}
+    clock = time.perf_counter
+    table = {name: partial(timed, partial(run, *job), clock) for name, job in jobs.items()}
     compare("Cold start: a new process to its first result", table, rounds=3)
 
 
@@ -412,7 +496,7 @@ def workers(peers):
     """One and two workers, the same job."""
     for name, settings, n in (("defaults", {}, 600), ("the paper's settings", PAPER, 1200)):
         X, _ = walks(n=n)
-        settings = {**settings, "search": "exhaustive"}
+        settings = {**settings, "search": "exhaustive", "clock": time.perf_counter}
         shared = fit(X, n_jobs=2, **settings)
 
         def in_processes(shared=shared):
@@ -435,6 +519,7 @@ SECTIONS = {
     "n200": partial(pairs, title="All pairs of 200 performances (`fit` samples)", n=200, rounds=3),
     "frames": partial(pairs, title="All pairs of 40 performances of 200 x 16", n_frames=200),
     "features": partial(pairs, title="All pairs of 40 performances of 100 x 60", n_features=60),
+    "sources": sources,
     "whole": whole,
     "cold": cold,
     "long": long,
@@ -448,6 +533,7 @@ def main():
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--peers", help="the Python of the peers' environment")
+    parser.add_argument("--data", help="the folder of the real recordings")
     parser.add_argument("--only", help="sections, separated by commas", default=",".join(SECTIONS))
     options = parser.parse_args()
     peers = Peers(options.peers)
@@ -457,7 +543,7 @@ def main():
         f"{peers.versions()}."
     )
     for name in options.only.split(","):
-        SECTIONS[name](peers)
+        SECTIONS[name](*[peers, options.data][: 1 + (name == "sources")])
 
 
 if __name__ == "__main__":
