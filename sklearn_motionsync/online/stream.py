@@ -243,7 +243,9 @@ class Resampler:
     def __init__(self, step, n_frames, frame, time):
         self._step, self._n_frames = step, n_frames
         # Since the origin, so that times of any magnitude are told apart.
-        self._origin, self._next, self._time, self._frame = time, 0.0, 0.0, frame.copy()
+        self._origin, self._next, self._time = time, 0.0, 0.0
+        # The last values that were seen, and their times.
+        self._seen, self._seen_at = np.full(frame.shape, np.nan), np.zeros(frame.shape)
         self._restarted = []
         self.elapsed = 0.0
 
@@ -253,33 +255,36 @@ class Resampler:
 
     def add(self, frame, time):
         """Yield the samples (n_streams, n_features) up to a new frame of that shape."""
-        self._frame[self._restarted] = frame[self._restarted]
+        self._seen[self._restarted] = frame[self._restarted]
+        self._seen_at[self._restarted] = self._time
         self._restarted = []
         time -= self._origin
         gap = (time - self._time) / self._step
         if gap > _FORGETTING * self._n_frames:
             # The samples go on at this frame.
             yield from [np.full_like(frame, np.nan)] * (_FORGETTING * self._n_frames)
+            self._seen_at -= time
             self._origin, self._next, time = self._origin + time, 0.0, 0.0
-        bridged = gap <= max(1, _LONGEST_GAP * self._n_frames)
         # Rounding of the times loses no sample.
         while self._next <= time + 1e-9 * self._step:
-            yield self._interpolate(self._next, frame, time, bridged)
+            yield self._interpolate(self._next, frame, time)
             self._next += self._step
-        # The caller may write all frames to the same array.
-        self._time, self._frame = time, frame.copy()
+        seen = ~np.isnan(frame)
+        self._seen, self._seen_at = (
+            np.where(seen, frame, self._seen),
+            np.where(seen, time, self._seen_at),
+        )
+        self._time = time
         self.elapsed = max(0.0, 1 - (self._next - time) / self._step)
 
-    def _interpolate(self, at, frame, time, bridged):
-        """Linear interpolation; NaN where either frame is, and in gaps that are not bridged."""
+    def _interpolate(self, at, frame, time):
+        """Linear interpolation from the last seen values to a frame; NaN where it or a gap is."""
         if at >= time - 1e-9 * self._step:
             return frame
-        if at <= self._time + 1e-9 * self._step:
-            return self._frame
-        if not bridged:
-            return np.full_like(frame, np.nan)
-        share = (at - self._time) / (time - self._time)
-        return (1 - share) * self._frame + share * frame
+        gap = time - self._seen_at
+        share = (at - self._seen_at) / gap
+        bridged = gap <= max(1, _LONGEST_GAP * self._n_frames) * self._step
+        return np.where(bridged, (1 - share) * self._seen + share * frame, np.nan)
 
 
 def window_length(n_frames):

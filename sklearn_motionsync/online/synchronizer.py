@@ -102,8 +102,8 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
     mean stands still.
 
     Features that are NaN are not compared. During frames of NaN, or time without frames,
-    the phase moves on at the mean pace. Between frames movements are interpolated linearly,
-    across gaps of a quarter of the clock at most.
+    the phase moves on at the mean pace. Between the frames that show it a feature is interpolated
+    linearly, across gaps of a quarter of the clock at most.
 
     Examples
     --------

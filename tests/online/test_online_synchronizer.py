@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from scipy.special import log_softmax
 from sklearn.base import clone
+from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ASpace,
@@ -20,7 +21,7 @@ from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.causal import CausalDerivative
 from sklearn_motionsync.matching.matcher import Features
 from sklearn_motionsync.matching.units import Unit
-from sklearn_motionsync.online.stream import Streams, check_times
+from sklearn_motionsync.online.stream import Resampler, Streams, check_times
 from sklearn_motionsync.online.synchronizer import Reference, calibrate
 
 P = 60
@@ -114,6 +115,7 @@ def test_phase_of_new_person_is_near_offline_path(real_data, action):
 
 def test_track_equals_step_and_does_not_look_ahead(fitted, live):
     x, _ = performance(70, 0.4, 0.05, 5)
+    x[0, 1] = x[7:9, 2] = np.nan
     whole, part = fitted.track([x, x[:40]])
     steps = step_all(live, x)
     for values, name in zip(whole, ("phase", "rate", "confidence"), strict=True):
@@ -162,6 +164,51 @@ def test_hidden_features_are_not_compared(fitted):
     (found,) = fitted.track([hidden])
     assert np.median(error(found, phase)) < 2
     assert (error(found, phase) < 8).all()
+
+
+@pytest.mark.parametrize("hidden", [0.0, 0.4])
+def test_samples_lie_between_the_frames_that_show_a_feature(hidden):
+    """Of each feature, from the last frame that showed it, in gaps of a quarter of the clock."""
+    rng = np.random.default_rng(3)
+    times = 50 + np.cumsum(rng.choice([0.3, 0.9, 1.7, 2.6, 9.0], 80))
+    times[40:] += 2 * 3 * 60  # longer than three clocks: samples go on at that frame
+    frames = rng.standard_normal((80, 2, 3))
+    frames[rng.random(frames.shape) < hidden] = np.nan
+    resampler, step, quarter = Resampler(1.25, 60, frames[0], times[0]), 1.25, 15 * 1.25
+    restarts, begun, at = {20: 0, 60: 1}, [0, 0], times[0]
+    for k, (frame, time) in enumerate(zip(frames, times, strict=True)):
+        if k in restarts:
+            resampler.restart(restarts[k])
+            begun[restarts[k]] = k
+        found = list(resampler.add(frame, time))
+        if k == 40:
+            assert len(found) == 3 * 60 + 1
+            assert np.isnan(found[:-1]).all()
+            np.testing.assert_array_equal(found[-1], frame)
+            at = time + step
+            continue
+        for sample in found:
+            assert times[k - 1] < at <= time + 1e-9 or k == 0
+            for stream, feature in np.ndindex(2, 3):
+                i, values = k - 1, frames[:, stream, feature]
+                while i > begun[stream] and np.isnan(values[i]):
+                    i -= 1
+                expected = values[k]
+                if k > begun[stream]:
+                    line = values[i] + (at - times[i]) / (time - times[i]) * (values[k] - values[i])
+                    expected = line if time - times[i] <= quarter else np.nan
+                np.testing.assert_allclose(sample[stream, feature], expected, atol=1e-9)
+            at += step
+        assert resampler.elapsed == pytest.approx((time - at) / step + 1, abs=1e-6)
+
+
+@pytest.mark.parametrize("every", ["frame", "feature"])
+def test_what_is_seen_in_every_second_frame_is_compared(fitted, every):
+    x, phase = performance(60, 0.3, 0.02, 9)
+    odd = np.arange(60)[:, np.newaxis] + (np.arange(3) if every == "feature" else 0)
+    (found,) = fitted.track([np.where(odd % 2, np.nan, x)])
+    assert np.median(error(found, phase)) < 1
+    assert found.confidence[30:].mean() > 0.2
 
 
 def test_phase_goes_on_at_mean_pace_without_observations(fitted):
@@ -439,6 +486,18 @@ def test_refused_frame_changes_nothing(fitted, live):
             with pytest.raises(ValueError, match=message):
                 live.step(bad, time)
         assert live.step(frame) == expected[k]
+
+
+def test_parameters_of_the_synchronizer_are_checked():
+    with pytest.raises(ValueError, match="'max_rate' parameter of DenseSynchronizer"):
+        OnlineSynchronizer(DenseSynchronizer(max_rate="3")).fit([performance(20)[0]] * 2)
+
+
+def test_methods_before_fit_are_refused():
+    live = OnlineSynchronizer()
+    for call in (live.reset, live.time_left, lambda: live.history, lambda: live.step([0.0])):
+        with pytest.raises(NotFittedError):
+            call()
 
 
 def test_unknown_streams_and_wrong_times_are_refused(fitted, live):

@@ -141,6 +141,30 @@ def test_track_and_smooth_equal_kalman_filter_and_rts_at_known_phase(fitted, see
             np.testing.assert_allclose(track.covariances, covariances, rtol=0, atol=1e-9)
 
 
+def test_restarts_leave_the_body_where_it_is():
+    """As a mean whose jump, from the last frame to the first, fades as deviations do."""
+    times, rng, t = np.arange(130.0), np.random.default_rng(4), np.linspace(0, 6.1, 25)
+    cycles = [a * np.sin(t[:, np.newaxis] + [0, 1, 2]) for a in (0.8, 0.9, 1.1, 1.2)]
+    fitted = MotionTracker(LinearSynchronizer(), 1, noise=0.1, random_state=1).fit(cycles)
+    phases = fitted.track(np.full((130, 3), np.nan), times=times).phases
+    clock = np.arange(fitted.n_frames_)
+    mean = np.column_stack([np.interp(phases, clock, m) for m in fitted.mean_.T])
+    restarts = np.flatnonzero(np.diff(phases) < 0) + 1
+    assert len(restarts) > 0
+    for k in restarts:
+        faded = np.sqrt(3) * (times[k:] - times[k]) / fitted.length_scale_
+        jump = fitted.mean_[-1] - fitted.mean_[0]
+        mean[k:] += ((1 + faded) * np.exp(-faded))[:, np.newaxis] * jump
+    values = mean + 0.1 * rng.standard_normal(mean.shape)
+    values[rng.random(mean.shape) < 0.3] = np.nan
+    known = kalman_filter_and_rts(fitted, mean, values, times)
+    for method, (postures, covariances) in zip(("track", "smooth"), known, strict=True):
+        track = getattr(fitted, method)(values, times=times)
+        np.testing.assert_array_equal(track.phases, phases)
+        np.testing.assert_allclose(track.postures, postures, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(track.covariances, covariances, rtol=0, atol=1e-9)
+
+
 def test_smooth_of_several_blocks_equals_posterior(fitted):
     rng = np.random.default_rng(5)
     times = np.cumsum(rng.uniform(0.03, 0.07, 230))
@@ -263,6 +287,41 @@ def test_estimates_are_those_of_the_weighted_particles():
             assert weights[values < found].sum() <= 0.5 + 1e-9
             assert weights[values > found].sum() <= 0.5 + 1e-9
     assert np.ptp(weights) > 1e-4
+
+
+@pytest.mark.parametrize("rows", [[0, 2], [0, 1, 2], [0, 1, 2, 0, 1]])
+def test_weights_and_nis_equal_their_definitions(rows):
+    """By the slopes of the particles; a NIS of few numbers varies as that of all features."""
+    clock, rates = (
+        Clock(24.0, 48.0),
+        np.exp(0.2 * np.random.default_rng(1).standard_normal((6, 25))),
+    )
+    given = np.stack(make_training(6)), rates, np.arange(6), clock
+    model, matrix = TrackerModel.learn(*given, 0.1, 2.0, 60), np.eye(3)[rows]
+    running, all_seen = ParticleFilter(model, 3, 0.0, len(rows)), np.ones(len(rows), dtype=bool)
+    nis, n, share = np.ones(2), len(rows), min(np.sqrt(len(rows) / 3), 1)
+    noise, frames = 0.01 * np.eye(n), np.arange(25)
+    for p in range(25):
+        before, dt = running.particles, 2.0 if p else 0.0
+        y = matrix @ given[0][2, p] + 0.02 * np.cos(np.arange(n) + p)
+        running.update(y, 2.0 * p, matrix)
+        now = running.particles
+        if p:
+            slopes, variances = running.slopes.fit(all_seen)
+            known = matrix @ model.velocities @ matrix.T + 0.01 * np.diag(variances)
+            distances = np.einsum("ni,ij,nj->n", slopes, np.linalg.inv(known), slopes)
+            old = before.weights if before.effective_size >= 30 else np.full(60, 1 / 60)
+            weights = old * np.exp(-0.5 * 100 * min(dt, 1.44) / 48 / 2 * distances)
+            np.testing.assert_allclose(now.weights, weights / weights.sum(), rtol=1e-6)
+        expected = np.column_stack([np.interp(now.phases, frames, m) for m in model.mean.T])
+        # Postures are judged before the weights change.
+        off = y - matrix @ (old @ expected if p else expected.mean(axis=0))
+        spread = matrix @ model.process.covariance @ matrix.T + noise
+        new = np.array([now.weights @ distances if p else n, off @ np.linalg.solve(spread, off)])
+        left = np.exp(-dt / (3 * 1.44))
+        nis = left * nis + (1 - left) * (1 + (new / n - 1) * share)
+        np.testing.assert_allclose(running.nis, nis, rtol=1e-6)
+        assert not running.lost
 
 
 # -- parts ---------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn import clone
+from sklearn.exceptions import NotFittedError
 from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
@@ -365,6 +366,13 @@ def test_feature_names_are_checked():
         named.track(frames[0][list("zyx")])
     with pytest.raises(ValueError, match="should match"):
         named.step(frames[0][list("zyx")].iloc[0])
+
+
+def test_methods_before_fit_are_refused():
+    unfitted = MotionTracker()
+    for call in (unfitted.reset, lambda: unfitted.step([0.0]), lambda: unfitted.track([[0.0]])):
+        with pytest.raises(NotFittedError):
+            call()
 
 
 def test_fit_refuses_noise_beyond_all_data(tracker):
