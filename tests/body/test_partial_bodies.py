@@ -271,3 +271,11 @@ def test_landmarks_of_marker_clusters_in_a_file(real_data):
     # Up is z, and the cosine with it is the same whichever way the person faces.
     expected = shin[:, 2] / np.linalg.norm(shin, axis=1)
     np.testing.assert_allclose(table["left_leg_y"], expected, atol=1e-12)
+
+
+def test_body_has_the_landmarks_that_limbs_join():
+    """No head without a neck, and no pelvis that is not given."""
+    legs = [f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee", "ankle")]
+    given = Skeleton([*legs, "head"], [-1] * 7, {name: name for name in [*legs, "head"]})
+    assert given.body().joints == tuple(legs)
+    assert Skeleton(legs, [-1] * 6).body().joints == ("pelvis", *legs)

@@ -77,6 +77,12 @@ def test_floats_are_not_scaled(tmp_path):
     np.testing.assert_allclose(df, positions.reshape(len(df), -1), rtol=1e-6)
 
 
+def test_scales_of_header_and_parameters_may_differ_by_rounding(tmp_path):
+    other = {"SCALE": (4, [], struct.pack("<f", 0.50004))}
+    df = read_motion(put(tmp_path, c3d(tracks(), real=False, changes=other), "a.c3d"))
+    np.testing.assert_allclose(df, tracks().reshape(40, 9), rtol=1e-4)
+
+
 def many_texts(n):
     return {"NOTES": {f"N{i}": texts("x" * 255, "y" * 255) for i in range(n)}}
 
