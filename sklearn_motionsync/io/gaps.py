@@ -151,9 +151,9 @@ def check_max_gap(max_gap):
 
 def warn_of_gaps(df, name):
     """Warn of missing positions in a recording that a file was read into, if there are any."""
-    gaps = find_gaps(df)
-    if gaps.empty:
+    if not np.isnan(df.to_numpy()).any():
         return
+    gaps = find_gaps(df)
     joints, _ = parse_joint_columns(df)
     n_missing = gaps.groupby("joint")["n_frames"].sum()
     n_outside = int((~gaps["inside"]).sum())

@@ -233,7 +233,8 @@ def _to_frame(motion, path):
         columns = [f"{joint}_{axis}" for joint in motion["joints"] for axis in "xyz"]
     else:
         values, columns = motion.pop("values"), motion["channels"]
-    df = pd.DataFrame(values, columns=columns, index=pd.RangeIndex(len(values), name="frame"))
+    index = pd.RangeIndex(len(values), name="frame")
+    df = pd.DataFrame(values, columns=columns, index=index, copy=False)
     df.attrs = {"format": path.suffix.lower().removeprefix(".")} | motion
     df.attrs |= {"performance": path.stem, "levels": ["recording", FRAME]}
     return df
