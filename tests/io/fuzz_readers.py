@@ -193,7 +193,12 @@ def run_case(files, folder):
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            for message in ("(positions|values) are missing", "times are uneven", "by its times"):
+            for message in (
+                "(positions|values) are missing",
+                "times are uneven",
+                "by its times",
+                "scale",
+            ):
                 warnings.filterwarnings("ignore", message=rf"a\.\w+: .*{message}")
             results = read_all(path, folder)
     except ValueError as error:
