@@ -6,7 +6,8 @@ import numpy as np
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.validation import check_performances, restore
+from ..inputs.numbers import column_names
+from ..inputs.validation import check_performances, names_of_input, restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from .axes import heading_axes, heading_axes_with_gaps, to_y_up
@@ -144,9 +145,10 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
                 f"{len(skeleton.joints)} joints need {expected}: "
                 f"{', '.join(AXES[skeleton.n_dims])} of each."
             )
-        # All tables of a list have the column names of the first.
+        # Tables have their columns in the order of fit; if it had none, in that of the first.
         first = X[0] if isinstance(X, (list, tuple, np.ndarray)) else X
-        check_columns(first, skeleton, "Performance 0")
+        names = names_of_input(self) or column_names(first)
+        check_columns(names or (), skeleton, "Performance 0")
         return performances
 
     def _body(self, performances, i):
