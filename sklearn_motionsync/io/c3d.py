@@ -19,6 +19,10 @@ _MAX_HEADER_EVENTS = 18
 _LONG_LABELS = 12345
 
 
+class MissingGroup(ValueError):
+    """A file has no such group."""
+
+
 def read_c3d(path, *, group="markers"):
     """A C3D file as a reader of `motion.READERS` returns it; invalid points are NaN.
 
@@ -495,9 +499,9 @@ def _check_group(file, groups, group):
     if group in groups and groups[group]["n"]:
         return
     there = [f"{name!r} ({facts['n']})" for name, facts in groups.items() if facts["n"]]
-    raise ValueError(
-        f"{file.path}: there are no {group} in this file; read_motion(..., group=...) reads "
-        f"{', '.join(there)}."
+    raise MissingGroup(
+        f"{file.path}: there are no {group[:40]} in this file; read_motion(..., group=...) reads "
+        f"{', '.join(there)[:300]}."
     )
 
 

@@ -1,6 +1,7 @@
 """Cut recordings into performances, from one event to another."""
 
 import math
+import warnings
 from collections import Counter
 from numbers import Real
 
@@ -38,7 +39,8 @@ def cut_at_events(df, start, stop=None, *, performance=None):
         The performances by time, one for each `start` that is followed by a `stop`. Both are
         included, rounded to whole frames, and frames are indexed from 0. A performance is left
         out if another `start` comes before its `stop`, or if one of them lies outside of the
-        recording. The list is empty if none is complete. The ``attrs`` of a performance are those
+        recording. The list is empty if none is complete, or if ``attrs["events"]`` is, as of a
+        static trial. The ``attrs`` of a performance are those
         of the recording, with these changed or added:
 
         events : list of dict
@@ -58,8 +60,13 @@ def cut_at_events(df, start, stop=None, *, performance=None):
     Raises
     ------
     ValueError
-        If the recording has no events, or none of `start` or `stop`; the message lists those that
-        it has.
+        If the recording has no ``attrs["events"]``, or none of `start` or `stop`; the message lists
+        those that it has.
+
+    Warns
+    -----
+    UserWarning
+        If ``attrs["events"]`` is empty; the message names the recording.
 
     See Also
     --------
@@ -86,15 +93,25 @@ def cut_at_events(df, start, stop=None, *, performance=None):
         raise ValueError(
             f"A recording must be a DataFrame, as read_motion returns it, got {type(df).__name__}."
         )
-    events = _read_events(df)
-    starts = _select(events, start, "start")
-    stops = starts if stop is None else _select(events, stop, "stop")
+    name = name_recording(df)
+    if isinstance(known := df.attrs.get("events"), (list, tuple)) and not known:
+        warnings.warn(
+            f"{name} has no events, so no performance is cut out of it.", UserWarning, stacklevel=2
+        )
+        return []
+    events = _read_events(df, name)
+    starts = _select(events, start, "start", name)
+    stops = starts if stop is None else _select(events, stop, "stop", name)
     parts = []
     for begin, end in _pair(starts, stops):
         first, last = _row(begin), _row(end)
         if first >= 0 and last < len(df):
-            others = [event for event in events if event is not begin and event is not end]
-            parts.append(_cut(df, first, last, others))
+            others = [
+                event
+                for event in events
+                if first < event["frame"] < last and event is not begin and event is not end
+            ]
+            parts.append(cut_rows(df, first, last, others))
     whole = df.attrs.get("performance") if performance is None else performance
     for i, part in enumerate(parts):
         part.attrs |= {"performance": i, "levels": ("performance", FRAME)}
@@ -103,25 +120,31 @@ def cut_at_events(df, start, stop=None, *, performance=None):
     return parts
 
 
-def _read_events(df):
+def name_recording(df):
+    """The name of a recording in messages."""
+    label = df.attrs.get("performance")
+    return "The recording" if label is None else f"The recording {str(label)[:60]!r}"
+
+
+def _read_events(df, name):
     """The events that have a frame, by time."""
     events = df.attrs.get("events")
-    if not isinstance(events, (list, tuple)) or not events:
-        raise ValueError(f"This recording has no events; {_HELP}.")
+    if not isinstance(events, (list, tuple)):
+        raise ValueError(f"{name} has no events; {_HELP}.")
     for event in events:
         known = isinstance(event, dict) and isinstance(event.get("label"), str)
         if not known or not isinstance(event.get("frame"), Real | None):
-            raise ValueError(f"{_HELP}, got {event!r} among them.")
+            raise ValueError(f"{name}: {_HELP}, got {repr(event)[:100]} among them.")
     placed = [e for e in events if e.get("frame") is not None and math.isfinite(e["frame"])]
     if not placed:
         raise ValueError(
-            "The events of this recording have no frames, as its file has no frame rate. Set them: "
+            f"{name}: its events have no frames, as its file has no frame rate. Set them: "
             "event['frame'] = event['time'] * rate, for each of df.attrs['events']."
         )
     return sorted(placed, key=lambda event: event["frame"])
 
 
-def _select(events, what, name):
+def _select(events, what, name, recording):
     """Events of a label, or of a label and a context."""
     wanted = (what,) if isinstance(what, str) else what
     good = isinstance(wanted, (tuple, list)) and len(wanted) in (1, 2)
@@ -136,7 +159,8 @@ def _select(events, what, name):
         listed = ", ".join(
             f"{(kind[0] if kind[1] is None else kind)!r} ({n})" for kind, n in kinds.items()
         )
-        raise ValueError(f"There is no event {what!r} for {name}; there are {listed}.")
+        listed = listed if len(listed) <= 300 else f"{listed[:300]} ..."
+        raise ValueError(f"{recording} has no event {what!r} for {name}; there are {listed}.")
     return found
 
 
@@ -160,15 +184,11 @@ def _pair(starts, stops):
             yield start, stop
 
 
-def _cut(df, first, last, events):
-    """The rows first to last, with the ``attrs`` that belong to them."""
+def cut_rows(df, first, last, events):
+    """The rows first to last, with the ``attrs`` that belong to them and some events."""
     part = df.iloc[first : last + 1].set_axis(pd.RangeIndex(last - first + 1, name="frame"))
     attrs = df.attrs | {"rows": [first, last]}
-    attrs["events"] = [
-        event | {"frame": round(event["frame"] - first, 5)}
-        for event in events
-        if first < event["frame"] < last
-    ]
+    attrs["events"] = [event | {"frame": round(event["frame"] - first, 5)} for event in events]
     if isinstance(number := attrs.get("first_frame"), int):
         attrs["first_frame"] = number + math.floor(first / _rows_per_frame(attrs))
     if (times := attrs.get("times")) is not None:
