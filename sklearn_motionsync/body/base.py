@@ -8,7 +8,8 @@ import numpy as np
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
-from ..inputs.validation import check_performances, restore
+from ..inputs.numbers import column_names
+from ..inputs.validation import check_performances, names_of_input, restore
 from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
@@ -268,9 +269,10 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
                 f"{len(skeleton.joints)} joints need {expected}: "
                 f"{', '.join(AXES[skeleton.n_dims])} of each."
             )
-        # All tables of a list have the column names of the first.
+        # Tables have their columns in the order of fit; if it had none, in that of the first.
         first = X[0] if isinstance(X, (list, tuple, np.ndarray)) else X
-        check_columns(first, skeleton, "Performance 0")
+        names = names_of_input(self) or column_names(first)
+        check_columns(names or (), skeleton, "Performance 0")
         for i, facts in enumerate(performances.facts):
             up = facts.get("up", skeleton.up)
             if up != skeleton.up:

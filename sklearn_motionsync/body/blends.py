@@ -15,6 +15,7 @@ from .limbs import (
     limb_vectors,
     unit_vectors,
 )
+from .skeleton import loose_joints
 from .sphere import mean_direction, mean_length, mean_vector
 
 __all__ = ["at_frames", "blend_bodies", "blend_numbers", "blend_postures"]
@@ -95,7 +96,14 @@ def blend_bodies(arrays, frames, weights, skeleton, owner=None):
     angle, place = _blend_path(figures, frames, weights, size)
     place[:, 1] = _blend_heights([x.place[:, 1] for x in figures], figures, frames, weights, size)
     foot = _blend_heights([x.foot for x in figures], figures, frames, weights, size)
-    return structure.compose(links, place, angle, foot)
+    blend = structure.compose(links, place, angle, foot)
+    for j in loose_joints(skeleton):
+        columns = slice(skeleton.n_dims * j, skeleton.n_dims * (j + 1))
+        own = [x[:, columns] for x in arrays]
+        # What stands in the room does not turn with the body.
+        if not any(np.ptp(x, axis=0).any() for x in own):
+            blend[:, columns] = blend_numbers(own, frames, weights)
+    return blend
 
 
 def at_frames(x, frames):

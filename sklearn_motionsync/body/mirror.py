@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from ..inputs.collections import as_collection
-from ..inputs.numbers import as_numbers
+from ..inputs.numbers import as_numbers, column_names
 from ..inputs.tables import as_pandas
 from .axes import UP_AXES, heading_axes, to_y_up
 from .formats import LANDMARKS
@@ -89,7 +89,7 @@ def _as_positions(x, skeleton, i):
     """Positions (..., n_joints, n_dims) of one performance, or of several in one array."""
     what = f"Performance {i}"
     x = as_pandas(x)
-    check_columns(x, skeleton, what)
+    check_columns(column_names(x) or (), skeleton, what)
     array = as_numbers(x, what)
     width = skeleton.n_dims * len(skeleton.joints)
     if array.ndim < 2 or array.shape[-1] != width:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inputs.numbers import as_numbers, column_names, is_integer
+from ..inputs.numbers import as_numbers, is_integer
 from ..inputs.wording import counted
 from .axes import UP_AXES
 from .formats import AXES, FORMATS, LANDMARKS
@@ -13,7 +13,11 @@ from .landmarks import add_midpoints, as_tuple, guess_landmarks, missing_counter
 from .limbs import LIMBS, complete_legs, features_of_parts, limbs_between
 from .upright import estimate_up
 
-__all__ = ["Skeleton", "check_columns", "find_cycle", "parse_joint_columns"]
+__all__ = ["Skeleton", "check_columns", "find_cycle", "loose_joints", "parse_joint_columns"]
+
+# A root that moves less than this share of the largest coordinate stands still, and the length of a
+# bone that changes less does not.
+_STILL = 1e-4
 
 
 class _ReadOnly(dict):
@@ -160,7 +164,8 @@ class Skeleton:
             Columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint by joint, or ``<joint>_x``,
             ``<joint>_y`` of key-points in a picture. If ``df.attrs`` has ``joints`` and
             ``parents``, the parent of a joint is its nearest ancestor that has columns; otherwise
-            every joint is a root.
+            every joint is a root. So is a joint whose parent is no landmark and stands still while
+            the joint moves away from it, as the roots of some retargeted takes do.
         landmarks : mapping of str to str or tuple of str, default=None
             The joints of some or all landmarks, several for their mean; the others are guessed from
             the names. None as a joint leaves a landmark out.
@@ -206,6 +211,8 @@ class Skeleton:
         guess = guess_landmarks(joints, names if set(joints) <= set(names) else ())
         landmarks = _check_landmarks(add_midpoints(guess | given), given, joints)
         parents = _nearest_parents(joints, names, _as_parents(attrs.get("parents", ())))
+        held = {joint for at in landmarks.values() for joint in as_tuple(at)}
+        parents = _without_still_roots(df, joints, parents, held)
         up = attrs.get("up") if up is None else up
         skeleton = cls(joints, parents, landmarks, "y" if up is None else up, n_dims)
         estimate = _estimate_up(df, skeleton) if up is None else None
@@ -386,21 +393,21 @@ def parse_joint_columns(df):
     )
 
 
-def check_columns(x, skeleton, what):
-    """Refuse a table in which a column of the skeleton has the place of another one.
+def check_columns(names, skeleton, what):
+    """Refuse columns of which one of the skeleton has the place of another one.
 
     Columns with other names are accepted.
 
     Parameters
     ----------
-    x : table, or anything without names
+    names : sequence of str
     skeleton : Skeleton
     what : str
         The subject of the message, with a capital letter.
     """
     expected = skeleton.column_names
     place_of = {name: place for place, name in enumerate(expected)}
-    for place, name in enumerate(column_names(x) or ()):
+    for place, name in enumerate(names):
         if place_of.get(name, place) != place:
             raise ValueError(
                 f"{what}: column {place} is {name!r}, where the skeleton has "
@@ -409,13 +416,44 @@ def check_columns(x, skeleton, what):
             )
 
 
-def _estimate_up(df, skeleton):
-    """The vertical axis estimated from a table of positions, or None."""
+def loose_joints(skeleton):
+    """Indices of the joints that are no landmarks and in no bone, while others are in bones."""
+    held = {joint for name in skeleton.landmarks for joint in skeleton.indices_of(name)}
+    held |= {joint for bone in skeleton.bones for joint in bone}
+    return [j for j in range(len(skeleton.joints)) if j not in held] if skeleton.bones else []
+
+
+def _positions_of(df):
+    """The positions of a table; None if they are no numbers."""
     try:
-        positions = as_numbers(df, "df", dtype=np.float64)
+        return as_numbers(df, "df", dtype=np.float64)
     except (TypeError, ValueError):
         return None
-    return estimate_up(positions, skeleton)
+
+
+def _estimate_up(df, skeleton):
+    """The vertical axis estimated from a table of positions, or None."""
+    positions = _positions_of(df)
+    return None if positions is None else estimate_up(positions, skeleton)
+
+
+def _without_still_roots(df, joints, parents, held):
+    """Parents, -1 for the joints that move away from a root that stands still and is not held."""
+    roots = {p for p in parents if p >= 0 and parents[p] < 0 and joints[p] not in held}
+    positions = _positions_of(df) if roots else None
+    if positions is None or not len(positions):
+        return parents
+    x = positions.reshape(len(positions), len(joints), -1)
+    largest = np.fmax.reduce(np.abs(x), axis=None, initial=0)
+
+    def changes(values):
+        return (np.fmax.reduce(values) - np.fmin.reduce(values) > _STILL * largest).any()
+
+    still = {root for root in roots if not changes(x[:, root])}
+    return [
+        -1 if p in still and changes(np.linalg.norm(x[:, j] - x[:, p], axis=1)) else p
+        for j, p in enumerate(parents)
+    ]
 
 
 # -- checks of names, parents and landmarks -----------------------------------------------

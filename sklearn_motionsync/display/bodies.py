@@ -7,7 +7,7 @@ import numpy as np
 from ..body.axes import heading_axes, to_y_up
 from ..body.direction_cosines import DirectionCosines
 from ..body.limbs import unit_vectors
-from ..body.skeleton import Skeleton, check_columns
+from ..body.skeleton import Skeleton, check_columns, loose_joints
 from ..inputs.numbers import as_numbers, check_finite, column_names
 from .drawing import nanmean
 
@@ -33,7 +33,7 @@ def read_positions(x, skeleton, i):
     Parameters
     ----------
     x : array-like, shape (n_frames, n_dims * n_joints)
-        NaN where a joint was not seen.
+        NaN where a joint was not seen. Joints that nothing is joined to become NaN.
     skeleton : Skeleton or None
         Without a skeleton the second axis is vertical. There are three axes, or two if the names of
         the columns or their number imply it.
@@ -47,7 +47,10 @@ def read_positions(x, skeleton, i):
         )
     what = f"Performance {i}"
     if skeleton is not None:
-        check_columns(x, skeleton, what)
+        wanted = skeleton.column_names
+        if set(column_names(x) or ()) == set(wanted) and len(x.columns) == len(wanted):
+            x = x[wanted]
+        check_columns(column_names(x) or (), skeleton, what)
         n_dims, n_joints = skeleton.n_dims, len(skeleton.joints)
         expected = f"the skeleton's {n_joints} joints are (n_frames, {n_dims * n_joints})"
     names = column_names(x) or ()
@@ -62,7 +65,13 @@ def read_positions(x, skeleton, i):
         raise ValueError(f"{what} has shape {x.shape}, but the positions of {expected}.")
     check_finite(x, f"{what}, frame", allow_nan=True)
     points = x.reshape(len(x), -1, n_dims)
-    return points if skeleton is None else to_y_up(points, skeleton)
+    if skeleton is None:
+        return points
+    points, loose = to_y_up(points, skeleton), loose_joints(skeleton)
+    if loose:
+        points = points.copy()
+        points[:, loose] = np.nan
+    return points
 
 
 def place_on_floor(x, skeleton, *, follow=False):

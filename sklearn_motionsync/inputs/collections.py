@@ -29,7 +29,9 @@ from .numbers import (
     as_numbers,
     check_finite,
     check_magnitude,
+    check_names,
     column_names,
+    listed,
 )
 from .resampling import warn_of_uneven
 from .tables import INDEX_NAMES, as_pandas, labels_of, name_performance, split_table
@@ -102,7 +104,7 @@ class Performances(tuple):
         return Performances(arrays, kind, labels, frames, self.names, self.levels, numbers)
 
 
-def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=None):
+def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=None, names=None):
     """Check the performances of a collection in one pass.
 
     Parameters
@@ -116,6 +118,9 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
         The index of each in all that was given; by default 0, 1, ...
     dtype : dtype, default=None
         Of those before: by default single precision if all of these are.
+    names : list, default=None
+        The columns of tables, in the order that is wanted; by default those of the first. A table
+        that has them in another order is brought into this one.
 
     Returns
     -------
@@ -125,24 +130,28 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
     if len(sequences) == 0:
         raise ValueError(f"Found 0 performances (n_samples=0), at least 1 is needed. {ACCEPTED}.")
     numbers = range(len(sequences)) if numbers is None else numbers
-    labels, levels, frames, names = list(numbers), INDEX_NAMES, [], None
+    labels, levels, frames, fitted = list(numbers), INDEX_NAMES, [], names
     tables = any([issubclass(kind, pd.DataFrame) for kind in set(map(type, sequences))])
     if tables:
         labels, levels = labels_of(sequences, numbers)
-        names = column_names(sequences[0])
+        first = column_names(sequences[0])
+        names = first if fitted is None or first is None else fitted
         frames = [x.index if isinstance(x, pd.DataFrame) else range(len(x)) for x in sequences]
+    names = names if tables else None
     arrays, largest, holder = [], 0.0, 0
 
-    def what():
+    def what(i):
         return name_performance(numbers[i], labels[i])
 
     for i, x in enumerate(sequences):
+        if tables and column_names(x) != names:
+            x = _in_order(x, names, what(i), None if names is fitted else what(0))
         # For a plain array nothing but NumPy itself is called.
         plain = type(x) is np.ndarray and x.dtype in FLOATS
-        array = x if plain else as_numbers(x, what())
+        array = x if plain else as_numbers(x, what(i))
         if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] < 1:
             raise ValueError(
-                f"{what()} has shape {array.shape}, expected (n_frames, n_features) with at least "
+                f"{what(i)} has shape {array.shape}, expected (n_frames, n_features) with at least "
                 "2 frames and 1 feature. Give a univariate performance as a column, "
                 "x[:, np.newaxis]."
             )
@@ -150,19 +159,14 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
         if array.shape[1] != arrays[0].shape[1]:
             turned = all(len(other) == len(arrays[0]) < min(other.shape[1:]) for other in arrays)
             raise ValueError(
-                f"{what()} has {counted(array.shape[1], 'feature')} a frame, performance "
+                f"{what(i)} has {counted(array.shape[1], 'feature')} a frame, performance "
                 f"{numbers[0]} has {arrays[0].shape[1]}. All performances need the same features "
                 "in the same order."
                 + (" If they are (n_features, n_frames), give [x.T for x in X]." if turned else "")
             )
-        if tables and column_names(x) != names:
-            raise ValueError(
-                f"{what()} has the columns {column_names(x)}, performance {numbers[0]} has "
-                f"{names}. All performances need the same columns in the same order."
-            )
         if dtype == np.float32 and array.dtype != dtype:
             raise ValueError(
-                f"{what()} is {array.dtype}, and those before are float32: what is read in parts "
+                f"{what(i)} is {array.dtype}, and those before are float32: what is read in parts "
                 "has the precision of the first. Give all as x.astype(np.float32)."
             )
         if not finite:
@@ -171,12 +175,12 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
         peak = high if high > low else low
         if not peak <= LARGEST:
             own = frames[i] if tables else None
-            check_finite(array, f"{what()}, frame", names, own, allow_nan=finite == "allow-nan")
+            check_finite(array, f"{what(i)}, frame", names, own, allow_nan=finite == "allow-nan")
             peak = np.fmax.reduce(np.abs(array), axis=None, initial=0)
         if peak > largest:
             largest, holder = peak, i
     if not SMALLEST <= largest <= LARGEST:
-        holder = name_performance(numbers[holder], labels[holder])
+        holder = what(holder)
         check_magnitude(largest, holder, training=training)
     if dtype is None:
         dtype = np.float32 if {a.dtype for a in arrays} == {np.dtype(np.float32)} else np.float64
@@ -186,6 +190,25 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
     if tables:
         performances.facts = [facts_of(x) for x in sequences]
     return performances
+
+
+def _in_order(x, names, what, first):
+    """A performance with its columns in the order of these names, those of fit or of the first."""
+    own = column_names(x)
+    if own and names and len(own) == len(names) == len(set(own)) and set(own) == set(names):
+        return x[names]
+    if first is None:
+        check_names(x, names, what)
+        return x
+    lacking, besides = (
+        f"; it {word} {listed([name for name in some or () if name not in (others or ())])}"
+        for word, some, others in (("lacks", names, own), ("has besides", own, names))
+    )
+    raise ValueError(
+        f"{what} has the columns {listed(own)}, {first} has {listed(names)}{lacking}{besides}. All "
+        "need the same columns: select them by x[names]; of files, read_motion(paths, "
+        "columns='common') leaves out those that some lack."
+    )
 
 
 # -- kinds of collections -----------------------------------------------------------

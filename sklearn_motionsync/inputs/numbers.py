@@ -19,6 +19,7 @@ __all__ = [
     "check_names",
     "column_names",
     "is_integer",
+    "listed",
     "refuse_non_numeric",
 ]
 
@@ -237,10 +238,22 @@ def check_names(x, expected, what):
     if names is None or expected is None or names == list(expected):
         return
     raise ValueError(
-        f"{what} has the columns {names[:8]}, expected are {list(expected)[:8]}. The feature names "
-        "should match those that were passed during fit, in the same order: select them by "
+        f"{what} has the columns {listed(names)}, expected are {listed(expected)}. The feature "
+        "names should match those that were passed during fit, in the same order: select them by "
         "df[names]."
     )
+
+
+def listed(names):
+    """Names as a message lists them: a few of many, and of long ones their beginning."""
+    if names is None:
+        return "without names"
+    shown, left = [], 60
+    for name in map(repr, names):
+        if len(name) > left:
+            return f"[{', '.join([*shown, name[: max(left, 4)]])} ... {len(names)} in all]"
+        shown, left = [*shown, name], left - len(name) - 2
+    return f"[{', '.join(shown)}]"
 
 
 def is_integer(value):

@@ -137,14 +137,16 @@ def check_performances(
             f"{estimator.n_features_in_}) and got a collection of performances. Give it 2-D "
             "input, or fit it on a collection."
         )
-    out = check_members(sequences, finite=finite, training=reset, numbers=numbers, dtype=dtype)
+    how = {"numbers": numbers, "dtype": dtype}
+    how |= {} if reset else {"names": names_of_input(estimator)}
+    out = check_members(sequences, finite=finite, training=reset, **how)
     width = out[0].shape[1]
     if not reset and width != estimator.n_features_in_:
         raise ValueError(
             f"Performance {out.numbers[0]} has {counted(width, 'feature')} a frame, but {name} is "
             f"expecting {estimator.n_features_in_} features as input."
         )
-    if reset or out.frames:  # only tables have names
+    if reset:
         _check_names(estimator, sequences[0], reset)
     named = out.names is not None and any([isinstance(name, str) for name in out.names])
     # Arrays were checked above, all but those given after a fit on tables.

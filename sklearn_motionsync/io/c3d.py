@@ -1,6 +1,7 @@
 """C3D: markers, quantities computed from them, and analog channels of optical motion capture."""
 
 import math
+import warnings
 
 import numpy as np
 
@@ -18,6 +19,10 @@ _MAX_HEADER_EVENTS = 18
 _LONG_LABELS = 12345
 
 
+class MissingGroup(ValueError):
+    """A file has no such group."""
+
+
 def read_c3d(path, *, group="markers"):
     """A C3D file as a reader of `motion.READERS` returns it; invalid points are NaN.
 
@@ -25,8 +30,8 @@ def read_c3d(path, *, group="markers"):
     """
     file = _File(path)
     parameters = _Parameters(file)
-    n_points, n_analog, per_frame = _read_counts(file, parameters)
-    frames = _Frames(file, parameters, n_points, n_analog)
+    n_points, n_stated, per_frame = _read_counts(file, parameters)
+    frames = _Frames(file, parameters, n_points, n_stated, per_frame)
     rate = parameters.number("POINT", "RATE", file.float(20))
     rate = float(rate) if math.isfinite(rate) and rate > 0 else None
     labels = _read_labels(parameters, "POINT", n_points, "marker")
@@ -35,8 +40,8 @@ def read_c3d(path, *, group="markers"):
         name: {"n": len(points), "units": units, "frame_rate": rate}
         for name, (points, units) in members.items()
     }
-    if n_analog:
-        n_channels = n_analog // per_frame
+    if frames.n_analog:
+        n_channels = frames.n_analog // per_frame
         units = (parameters.texts("ANALOG", "UNITS") + [""] * n_channels)[:n_channels]
         groups["analog"] = {
             "n": n_channels,
@@ -149,6 +154,9 @@ class _Parameters:
             n_chars, group = np.frombuffer(data, "i1", 2, at).tolist()
             link = at + 2 + abs(n_chars)
             step = file.integer(link) if link + 2 <= end else 0
+            if link + step > end:
+                # Some programs write what they change in the order of their own processor.
+                step = step >> 8 | (step & 0xFF) << 8
             content = data[link + 2 : min(end, link + step) if step else end]
             if link + 2 > end or link + step > end or step == 1:
                 if at >= counted:
@@ -227,7 +235,9 @@ class _Parameters:
 
 
 def _read_counts(file, parameters):
-    """Numbers of points and of analog values in a frame, and of values of a channel."""
+    """Numbers of points in a frame, of analog values as header and section state it, and of values
+    of a channel.
+    """
     n_points, n_analog, per_frame = (file.integer(at) for at in (2, 4, 18))
     used = parameters.number("POINT", "USED", n_points)
     if used != n_points or not (n_points or n_analog):
@@ -235,31 +245,21 @@ def _read_counts(file, parameters):
             f"the header says {n_points} markers, POINT:USED says {used:g}; both must be the same "
             "and above 0"
         )
-    channels = parameters.number("ANALOG", "USED")
-    if channels is not None and channels * per_frame != n_analog:
-        raise file.error(
-            f"the header says {n_analog} analog values a frame, but ANALOG:USED says {channels:g} "
-            f"channels, {per_frame} values each"
-        )
-    if n_analog % max(per_frame, 1):
-        raise file.error(
-            f"the header says {n_analog} analog values a frame, {per_frame} of each channel, which "
-            "is no whole number of channels"
-        )
-    return n_points, n_analog, max(per_frame, 1)
+    per_frame = max(per_frame, 1)
+    channels = parameters.number("ANALOG", "USED", n_analog / per_frame)
+    return n_points, (n_analog, channels * per_frame), per_frame
 
 
 class _Frames:
     """The numbers of all frames, and how they are written."""
 
-    def __init__(self, file, parameters, n_points, n_analog):
+    def __init__(self, file, parameters, n_points, n_stated, per_frame):
         self.file = file
-        self.n_points, self.n_analog = n_points, n_analog
+        self.n_points = n_points
         scale = _read_scale(file, parameters)
         self.real = scale < 0
         self.scale = 1.0 if self.real else scale
         self.word = 4 if self.real else 2
-        frame_bytes = self.word * (4 * n_points + n_analog)
         start = file.data_start
         stated = (parameters.number("POINT", "DATA_START", 0) or start // _BLOCK + 1) - 1
         if not file.first_parameter < start < len(file.data) or start != stated * _BLOCK:
@@ -268,9 +268,26 @@ class _Frames:
                 f"{stated * _BLOCK:g}; both must be the same, behind the parameters at byte "
                 f"{file.first_parameter} and before the end at byte {len(file.data)}"
             )
-        self.n_frames = _count_frames(file, parameters, frame_bytes, len(file.data) - start)
+        stated, n_bytes = _stated_frames(file, parameters), len(file.data) - start
+        fitting = {n for n in n_stated if n >= 0 and n % per_frame == 0}
+        if len(set(n_stated)) > 1:
+            # The size decides. Data are padded to whole blocks.
+            left = {n: [n_bytes - k * self.frame_bytes(n) for k in stated] for n in fitting}
+            fitting = {n for n in fitting if any(0 <= rest < _BLOCK for rest in left[n])}
+        if len(fitting) != 1:
+            raise file.error(
+                f"the header says {n_stated[0]} analog values a frame, {per_frame} of each "
+                f"channel, but ANALOG:USED says {n_stated[1] / per_frame:g} channels; they must be "
+                "the same whole number, or one of them fit the size of the file"
+            )
+        self.n_analog = int(fitting.pop())
+        frame_bytes = self.frame_bytes(self.n_analog)
+        self.n_frames = _count_frames(file, stated, frame_bytes, n_bytes)
         raw = np.frombuffer(file.data, np.uint8, self.n_frames * frame_bytes, start)
         self._raw = raw.reshape(self.n_frames, frame_bytes)
+
+    def frame_bytes(self, n_analog):
+        return self.word * (4 * self.n_points + n_analog)
 
     def numbers(self, first, stop, kind="i"):
         """The numbers first to stop of every frame, integers of kind "i" or "u"."""
@@ -287,16 +304,25 @@ def _read_scale(file, parameters):
     if scale < 0 and header < 0:
         # Floats are not scaled, and some writers put any negative number here.
         return scale
-    if not math.isfinite(scale) or not scale or not math.isclose(scale, header, rel_tol=1e-3):
+    if not math.isfinite(header + scale) or min(header, scale) <= 0:
         raise file.error(
-            f"the header says scale {header:g}, POINT:SCALE says {scale:g}; both must be the same "
-            "and not 0"
+            f"the header says scale {header:g}, POINT:SCALE says {scale:g}; both must be below 0, "
+            "or both above"
         )
-    return scale
+    if math.isclose(scale, header, rel_tol=1e-3):
+        return scale
+    warnings.warn(
+        f"{file.path.name}: the header says scale {header:g}, which is used, POINT:SCALE says "
+        f"{scale:g}. If positions are too large or too small, multiply them by "
+        f"{scale / header:.6g}.",
+        UserWarning,
+        stacklevel=5,
+    )
+    return header
 
 
-def _count_frames(file, parameters, frame_bytes, n_bytes):
-    """The number of frames. Where the file states several, its size decides.
+def _stated_frames(file, parameters):
+    """The numbers of frames that the file states, that of the header first.
 
     Long recordings do not fit the 16 bits of the header, and writers worked around that
     in different ways.
@@ -308,16 +334,23 @@ def _count_frames(file, parameters, frame_bytes, n_bytes):
     if all(len(limit) == 2 for limit in limits):
         low, high = (limit[0] + 65536 * limit[1] for limit in limits)
         stated.add(high - low + 1)
-    stated = sorted(int(n) for n in stated if math.isfinite(n) and n > 0 and n == int(n))
+    return sorted(
+        (int(n) for n in stated if math.isfinite(n) and n > 0 and n == int(n)),
+        key=lambda n: (n != header, -n),
+    )
+
+
+def _count_frames(file, stated, frame_bytes, n_bytes):
+    """The number of frames. Where the file states several, its size decides."""
     possible = [n for n in stated if n * frame_bytes <= n_bytes]
-    # Data are padded to whole blocks.
     exact = [n for n in possible if n_bytes - n * frame_bytes < _BLOCK]
     if exact:
-        return header if header in exact else exact[-1]
+        return exact[0]
     if len(stated) == 1 and possible:
         return stated[0]
+    numbers = " or ".join(map(str, sorted(stated))) or "no"
     raise file.error(
-        f"it says {' or '.join(map(str, stated)) or 'no'} frames of {frame_bytes} bytes, but holds "
+        f"it says {numbers} frames of {frame_bytes} bytes, but holds "
         f"{n_bytes / frame_bytes:.1f} frames; it is not complete, or its header is wrong"
     )
 
@@ -466,9 +499,9 @@ def _check_group(file, groups, group):
     if group in groups and groups[group]["n"]:
         return
     there = [f"{name!r} ({facts['n']})" for name, facts in groups.items() if facts["n"]]
-    raise ValueError(
-        f"{file.path}: there are no {group} in this file; read_motion(..., group=...) reads "
-        f"{', '.join(there)}."
+    raise MissingGroup(
+        f"{file.path}: there are no {group[:40]} in this file; read_motion(..., group=...) reads "
+        f"{', '.join(there)[:300]}."
     )
 
 

@@ -1,6 +1,7 @@
 """Cut recordings into performances, from one event to another."""
 
 import math
+import warnings
 from collections import Counter
 from numbers import Real
 
@@ -42,8 +43,9 @@ def cut_at_events(df, start, stop=None, *, performance=None):
         The performances by time, one for each `start` that is followed by a `stop`. Both are
         included, rounded to the frames that the recording has, and frames are indexed from 0. A
         performance is left out if another `start` comes before its `stop`, or if one of them lies
-        outside of the recording. The list is empty if none is complete. The ``attrs`` of a
-        performance are those of the recording, with these changed or added:
+        outside of the recording. The list is empty if none is complete, or if
+        ``attrs["events"]`` is, as of a static trial. The ``attrs`` of a performance are those of
+        the recording, with these changed or added:
 
         events : list of dict
             The events within the performance, with ``frame`` counted from its first frame. The
@@ -64,9 +66,14 @@ def cut_at_events(df, start, stop=None, *, performance=None):
     Raises
     ------
     ValueError
-        If the recording has no events, or none of `start` or `stop`; the message lists those that
-        it has. If the index does not tell which frames the rows are, or not in order, or frames of
-        a performance are missing.
+        If the recording has no ``attrs["events"]``, or none of `start` or `stop`; the message lists
+        those that it has. If the index does not tell which frames the rows are, or not in order, or
+        frames of a performance are missing.
+
+    Warns
+    -----
+    UserWarning
+        If ``attrs["events"]`` is empty; the message names the recording.
 
     See Also
     --------
@@ -93,10 +100,16 @@ def cut_at_events(df, start, stop=None, *, performance=None):
         raise ValueError(
             f"A recording must be a DataFrame, as read_motion returns it, got {type(df).__name__}."
         )
-    events = _read_events(df)
-    starts = _select(events, start, "start")
-    stops = starts if stop is None else _select(events, stop, "stop")
-    recording = _Frames(df)
+    name = name_recording(df)
+    if isinstance(known := df.attrs.get("events"), (list, tuple)) and not known:
+        warnings.warn(
+            f"{name} has no events, so no performance is cut out of it.", UserWarning, stacklevel=2
+        )
+        return []
+    events = _read_events(df, name)
+    starts = _select(events, start, "start", name)
+    stops = starts if stop is None else _select(events, stop, "stop", name)
+    recording = _Frames(df, name)
     parts = []
     for begin, end in _pair(starts, stops, recording.place):
         others = [event for event in events if event is not begin and event is not end]
@@ -111,25 +124,31 @@ def cut_at_events(df, start, stop=None, *, performance=None):
     return parts
 
 
-def _read_events(df):
+def name_recording(df):
+    """The name of a recording in messages."""
+    label = df.attrs.get("performance")
+    return "The recording" if label is None else f"The recording {str(label)[:60]!r}"
+
+
+def _read_events(df, name):
     """The events that have a frame, by time."""
     events = df.attrs.get("events")
-    if not isinstance(events, (list, tuple)) or not events:
-        raise ValueError(f"This recording has no events; {_HELP}.")
+    if not isinstance(events, (list, tuple)):
+        raise ValueError(f"{name} has no events; {_HELP}.")
     for event in events:
         known = isinstance(event, dict) and isinstance(event.get("label"), str)
         if not known or not isinstance(event.get("frame"), Real | None):
-            raise ValueError(f"{_HELP}, got {event!r} among them.")
+            raise ValueError(f"{name}: {_HELP}, got {repr(event)[:100]} among them.")
     placed = [e for e in events if e.get("frame") is not None and math.isfinite(e["frame"])]
     if not placed:
         raise ValueError(
-            "The events of this recording have no frames, as its file has no frame rate. Set them: "
+            f"{name}: its events have no frames, as its file has no frame rate. Set them: "
             "event['frame'] = event['time'] * rate, for each of df.attrs['events']."
         )
     return sorted(placed, key=lambda event: event["frame"])
 
 
-def _select(events, what, name):
+def _select(events, what, name, recording):
     """Events of a label, or of a label and a context."""
     wanted = (what,) if isinstance(what, str) else what
     good = isinstance(wanted, (tuple, list)) and len(wanted) in (1, 2)
@@ -144,7 +163,8 @@ def _select(events, what, name):
         listed = ", ".join(
             f"{(kind[0] if kind[1] is None else kind)!r} ({n})" for kind, n in kinds.items()
         )
-        raise ValueError(f"There is no event {what!r} for {name}; there are {listed}.")
+        listed = listed if len(listed) <= 300 else f"{listed[:300]} ..."
+        raise ValueError(f"{recording} has no event {what!r} for {name}; there are {listed}.")
     return found
 
 
@@ -155,11 +175,12 @@ def _words(event):
 class _Frames(Recorded):
     """Where events lie among the frames of a recording, of which rows may have been taken out."""
 
-    def __init__(self, df):
+    def __init__(self, df, name):
         super().__init__(df)
+        self._name = name
         if self.frames is None:
             raise ValueError(
-                f"The index of this recording, {df.index[:3].tolist()!r:.100} ..., does not tell "
+                f"{name}: its index, {df.index[:3].tolist()!r:.100} ..., does not tell "
                 "which frames its rows are, so that its events are not found. Cut before the index "
                 "is changed; if no row was taken out, df.reset_index(drop=True) numbers them."
             )
@@ -167,7 +188,7 @@ class _Frames(Recorded):
         if len(back):
             row = int(back[0])
             raise ValueError(
-                f"The rows of this recording are not in order of time: frame "
+                f"{name}: its rows are not in order of time: frame "
                 f"{self.frames[row + 1]} follows frame {self.frames[row]}. Cut it before rows are "
                 "rearranged, or sort it by df.sort_index()."
             )
@@ -189,9 +210,9 @@ class _Frames(Recorded):
         missing = frames[self.frames[rows] != frames]
         if len(missing):
             raise ValueError(
-                f"Between {begin['label']!r} at frame {begin['frame']:g} and {end['label']!r} at "
-                f"frame {end['frame']:g} the recording has no row of frame {missing[0]}, one of "
-                f"{len(missing)} that are missing there, and frames count as evenly spaced. Cut "
+                f"{self._name}: between {begin['label']!r} at frame {begin['frame']:g} and "
+                f"{end['label']!r} at frame {end['frame']:g} there is no row of frame "
+                f"{missing[0]}, one of {len(missing)}, and frames count as evenly spaced. Cut "
                 "the recording before rows are dropped, as by dropna, or fill its gaps."
             )
         return rows

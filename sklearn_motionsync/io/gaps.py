@@ -10,6 +10,7 @@ from ..body.skeleton import parse_joint_columns
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import Recorded
 from ..inputs.wording import counted
+from .events import name_recording
 
 # Kinds of what joints are the names of; angles and forces have no positions.
 _POSITIONS = ("joints", "markers", "keypoints")
@@ -73,8 +74,8 @@ def find_gaps(df):
     )
 
 
-def fill_gaps(df, max_gap):
-    """Interpolate short gaps of a recording.
+def fill_gaps(df, max_gap, *, ends="keep"):
+    """Interpolate short gaps of a recording, and trim it to what was seen.
 
     Parameters
     ----------
@@ -83,18 +84,24 @@ def fill_gaps(df, max_gap):
     max_gap : int
         The longest gap to fill, in frames, with those of rows that were dropped. Longer gaps stay
         NaN, as do those that touch an end of the recording: nothing is extrapolated.
+    ends : {"keep", "trim"}, default="keep"
+        "trim" leaves out the frames before the first and after the last one in which all joints
+        are seen, after short gaps are filled. Joints that are never seen do not count.
 
     Returns
     -------
     DataFrame
         The positions with gaps filled, in the unit of `df`, with the same columns, index and
-        ``attrs``.
+        ``attrs``. If it was trimmed, ``attrs["rows"]`` are its first and last row in `df`; events
+        and times in ``attrs`` are those of the frames that are left, and frames that were numbered
+        from 0 still are.
 
     Raises
     ------
     ValueError
-        If `max_gap` is not a whole number of frames, 0 or more. If `df` is not as `find_gaps`
-        needs it, or its index says that rows are not in order of time.
+        If `max_gap` is not a whole number of frames, 0 or more, or there is no such `ends`. If `df`
+        is not as `find_gaps` needs it, or its index says that rows are not in order of time. If no
+        two frames show all joints and it is to be trimmed.
 
     See Also
     --------
@@ -131,8 +138,15 @@ def fill_gaps(df, max_gap):
     [0.0, 1.0, 2.0, 3.0, 4.0]
     >>> fill_gaps(df, 1)["knee_y"].isna().sum()
     np.int64(2)
+
+    A marker that was seen late:
+
+    >>> late = pd.DataFrame({f"knee_{axis}": [np.nan, 1.0, 2.0, 3.0] for axis in "xyz"})
+    >>> fill_gaps(late, 2, ends="trim")["knee_y"].tolist()
+    [1.0, 2.0, 3.0]
     """
     check_max_gap(max_gap)
+    check_ends(ends)
     _, n_dims, values = _read(df)
     missing = _missing(values, n_dims)
     joint, first, last = _find(missing)
@@ -149,7 +163,35 @@ def fill_gaps(df, max_gap):
         part[frames] = np.where(np.isnan(part[frames]), filled, part[frames])
     result = pd.DataFrame(values, index=df.index, columns=df.columns)
     result.attrs = dict(df.attrs)
-    return result
+    return _trim(result, _missing(values, n_dims)) if ends == "trim" else result
+
+
+def _trim(df, missing):
+    """A recording from the first to the last frame in which all joints are seen."""
+    never = missing.all(axis=0)
+    seen = np.flatnonzero(~missing[:, ~never].any(axis=1))
+    if len(seen) < 2 or never.all():
+        raise ValueError(
+            f"{name_recording(df)} cannot be trimmed: {0 if never.all() else len(seen)} of "
+            f"{len(df)} frames show all joints. find_gaps(df) lists the gaps; give a larger "
+            "max_gap, leave out joints, or leave out the recording."
+        )
+    first, last = int(seen[0]), int(seen[-1])
+    rows, recording = np.arange(first, last + 1), Recorded(df)
+    part = df.iloc[rows]
+    if len(part) == len(df) or not df.index.equals(pd.RangeIndex(len(df))):
+        # The index tells which frames of the recording the rows are.
+        return part
+    part = part.set_axis(pd.RangeIndex(len(rows), name=df.index.name))
+    part.attrs = recording.attrs_of(rows) | {"rows": [first, last]}
+    if isinstance(number := df.attrs.get("first_frame"), int):
+        part.attrs["first_frame"] = number + first
+    return part
+
+
+def check_ends(ends):
+    if ends not in ("keep", "trim"):
+        raise ValueError(f"ends must be 'keep' or 'trim', got {ends!r}.")
 
 
 def check_max_gap(max_gap):
@@ -159,13 +201,13 @@ def check_max_gap(max_gap):
 
 def warn_of_gaps(df, name):
     """Warn of missing positions in a recording that a file was read into, if there are any."""
-    gaps = find_gaps(df)
-    if gaps.empty:
+    if not np.isnan(df.to_numpy()).any():
         return
+    gaps = find_gaps(df)
     joints, _ = parse_joint_columns(df)
     n_missing = gaps.groupby("joint")["n_frames"].sum()
     n_outside = int((~gaps["inside"]).sum())
-    ends = f"; {n_outside} touch an end and cannot be interpolated" if n_outside else ""
+    ends = f"; {n_outside} touch an end, where ends='trim' leaves frames out" if n_outside else ""
     what = "positions" if df.attrs.get("kind", "joints") in _POSITIONS else "values"
     warnings.warn(
         _describe_missing(name, what, n_missing, df, len(joints), "joints")
@@ -222,8 +264,8 @@ def _read(df):
         )
     values = df.to_numpy(copy=True)
     if values.dtype != np.float64:
-        values = np.array(as_numbers(df, "The recording", dtype=np.float64))
-    check_finite(values, "The recording, frame", list(df.columns), allow_nan=True)
+        values = np.array(as_numbers(df, name_recording(df), dtype=np.float64))
+    check_finite(values, f"{name_recording(df)}, frame", list(df.columns), allow_nan=True)
     return joints, n_dims, values
 
 

@@ -7,7 +7,7 @@ import numpy as np
 # Joints times frames of a level that are placed at once, in the mean: enough for the overhead of
 # NumPy's calls not to count, and few enough for the processor's cache. And those of all levels,
 # which bounds the memory.
-_LEVEL = 2**12
+_LEVEL = 2**14
 _BLOCK = 2**20
 # The two axes that turn about a third, the first to where the second was.
 _OTHERS = {"X": (1, 2), "Y": (2, 0), "Z": (0, 1)}
@@ -133,7 +133,10 @@ def _find_levels(parents, turning, leaves_turn):
 
 def rotate(axes, vectors):
     """Vectors (3, ...) given along axes (3, 3, ...), in the coordinates of the axes."""
-    return axes[:, 0] * vectors[0] + axes[:, 1] * vectors[1] + axes[:, 2] * vectors[2]
+    result = axes[:, 0] * vectors[0]
+    result += axes[:, 1] * vectors[1]
+    result += axes[:, 2] * vectors[2]
+    return result
 
 
 def turn(axes, names, angles):
@@ -141,4 +144,8 @@ def turn(axes, names, angles):
     for name, c, s in zip(names, np.cos(angles), np.sin(angles), strict=True):
         i, j = _OTHERS[name]
         first, second = axes[:, i], axes[:, j]
-        axes[:, i], axes[:, j] = c * first + s * second, c * second - s * first
+        across = s * first
+        first *= c
+        first += s * second
+        second *= c
+        second -= across

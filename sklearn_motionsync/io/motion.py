@@ -1,15 +1,18 @@
 """Files of motion capture: `read_motion`, and the registry of the readers of all formats."""
 
 import inspect
+import os
+import warnings
 from pathlib import Path
 
 import pandas as pd
 
+from ..inputs.numbers import listed
 from ..inputs.tables import FRAME
 from .acclaim import read_acclaim
 from .bvh import read_bvh
-from .c3d import read_c3d
-from .gaps import check_max_gap, fill_gaps, warn_of_gaps, warn_of_missing
+from .c3d import MissingGroup, read_c3d
+from .gaps import check_ends, check_max_gap, fill_gaps, warn_of_gaps, warn_of_missing
 from .storage import read_storage
 from .timestamps import check_frame_rate, describe_times, warn_of_other_rate
 from .trc import read_trc
@@ -41,14 +44,16 @@ READERS = {
 }
 
 
-def read_motion(path, *, asf=None, frame_rate=None, max_gap=0, group=None):
-    """Read a recording from a file of motion capture (BVH, AMC, C3D, TRC, MOT or STO).
+def read_motion(
+    path, *, asf=None, frame_rate=None, max_gap=0, ends="keep", group=None, columns=None
+):
+    """Read recordings from files of motion capture (BVH, AMC, C3D, TRC, MOT or STO).
 
     Parameters
     ----------
-    path : str or path-like
+    path : str, path-like, or iterable of them
         A file whose name ends with ``.bvh``, ``.amc``, ``.c3d``, ``.trc``, ``.mot`` or ``.sto``, in
-        any case.
+        any case; or several, such as ``sorted(folder.glob("*.c3d"))``.
     asf : str or path-like, default=None
         The skeleton of an AMC file. By default the ``.asf`` file in the same folder with the
         longest name that the AMC file's begins with (``02.asf`` for ``02_01.amc``), or the only
@@ -58,23 +63,30 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0, group=None):
     max_gap : int, default=0
         The longest gap to interpolate, in frames, for joints and markers; see `fill_gaps`. By
         default none is.
+    ends : {"keep", "trim"}, default="keep"
+        "trim" leaves out the frames before the first and after the last one in which all joints or
+        markers are seen; see `fill_gaps`. Other groups of the file are longer then.
     group : str, default=None
         The group of a C3D file to read: by default its "markers"; "angles", "forces", "moments",
         "powers", "scalars" or "reactions", if the file says that some of its points are these;
         "analog" for the analog channels recorded at the same time. ``attrs["groups"]`` lists
-        the groups of a file.
+        the groups of a file. Of several files those that have no such group are left out.
+    columns : {None, "common"}, default=None
+        Of several files: "common" leaves out the columns that some of them lack, such as other
+        markers, and brings the others into the order of the first. By default all stay. The joints
+        and parents in ``attrs`` are those of the file in any case.
 
     Returns
     -------
-    DataFrame (n_frames, 3 * n_joints)
-        Float64 columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint by joint, and an index
-        named "frame", from 0. Repeated names end with ``_2``, ``_3`` and so on. A joint
-        of a BVH file is the centre of its rotation, and ``<parent>_end`` an End Site; a joint
-        of an AMC file is the far end of the bone of that name. A marker that was not seen is NaN:
-        in a C3D file it is marked so, or at exactly (0, 0, 0) and without a camera; in a TRC file
-        it is blank, no number, or 0. The group "analog" has a column for each channel, in
-        its unit, and a row for each sample; a MOT or STO file a column for each of its own but
-        the time (vectors ``_x``, ``_y``, ``_z``, quaternions ``_w``, ``_x``, ``_y``, ``_z``).
+    DataFrame (n_frames, 3 * n_joints), or list of DataFrame
+        Of several files a list. Float64 columns ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, joint
+        by joint, and an index named "frame", from 0. Repeated names end with ``_2``, ``_3`` and so
+        on. A joint of a BVH file is the centre of its rotation, and ``<parent>_end`` an End Site; a
+        joint of an AMC file is the far end of the bone of that name. A marker that was not seen is
+        NaN: in a C3D file it is marked so, or at exactly (0, 0, 0) and without a camera; in a TRC
+        file it is blank, no number, or 0. The group "analog" has a column for each channel, in its
+        unit, and a row for each sample; a MOT or STO file a column for each of its own but the time
+        (vectors ``_x``, ``_y``, ``_z``, quaternions ``_w``, ``_x``, ``_y``, ``_z``).
         Its ``attrs`` hold
 
         format : {"bvh", "amc", "c3d", "trc", "mot", "sto"}
@@ -138,7 +150,8 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0, group=None):
     UserWarning
         If positions or values are missing; the message says how many, and of which markers or
         columns. If times are uneven, or contradict the frame rate that the file states, unless
-        `frame_rate` is given.
+        `frame_rate` is given. Of several files, if one is left out for it lacks the group, and
+        if columns are left out. If a C3D file states two scales.
 
     See Also
     --------
@@ -170,7 +183,18 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0, group=None):
     (100.0, ['arm', 'arm_end'], [-1, 0])
     """
     check_max_gap(max_gap)
+    check_ends(ends)
     check_frame_rate(frame_rate)
+    several = not isinstance(path, (str, os.PathLike))
+    if columns not in (None, "common") or (columns and not several):
+        raise ValueError(
+            "columns must be None, or 'common' with a list of several files, got "
+            f"columns={columns!r} for {path!r}."
+        )
+    if several:
+        options = {"asf": asf, "frame_rate": frame_rate, "max_gap": max_gap, "ends": ends}
+        recordings = _read_several(path, options | {"group": group})
+        return _keep_common(recordings) if columns else recordings
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"There is no motion file at {path}.")
@@ -201,17 +225,65 @@ def read_motion(path, *, asf=None, frame_rate=None, max_gap=0, group=None):
         motion["frame_rate"] = float(frame_rate)
     df = _to_frame(motion, path)
     if "joints" not in df.attrs:
-        if max_gap:
+        if max_gap or ends != "keep":
             raise ValueError(
-                f"max_gap goes with positions, got max_gap={max_gap} frames for the "
-                f"{df.attrs['kind']} of {path}."
+                f"max_gap and ends go with positions, got max_gap={max_gap} frames for the "
+                f"{df.attrs['kind']} of {path}, and ends={ends!r}."
             )
         warn_of_missing(df, path.name)
         return df
-    if max_gap:
-        df = fill_gaps(df, max_gap)
+    if max_gap or ends != "keep":
+        df = fill_gaps(df, max_gap, ends=ends)
     warn_of_gaps(df, path.name)
     return df
+
+
+def _read_several(paths, options):
+    """The recordings of those files that have the group."""
+    recordings, refused = [], []
+    for path in paths:
+        try:
+            recordings.append(read_motion(path, **options))
+        except MissingGroup as error:
+            refused.append(error)
+    if not recordings:
+        raise refused[0] if refused else ValueError("There are no files to read, got none.")
+    for error in refused:
+        warnings.warn(f"{error} The file is left out.", UserWarning, stacklevel=3)
+    return recordings
+
+
+def _keep_common(recordings):
+    """Recordings with the columns that all of them have, in the order of the first."""
+    shared = set.intersection(*(set(x.columns) for x in recordings))
+    kept = [name for name in recordings[0].columns if name in shared]
+    others = []
+    for x in recordings:
+        lost = [name for name in x.columns if name not in shared]
+        if lost:
+            label = x.attrs["performance"][:40]
+            others.append(f"{len(lost)} of {label!r} {listed(lost)}")
+    what = "; ".join(others[:3]) + f"; and some of {len(others) - 3} more" * (len(others) > 3)
+    if not kept:
+        raise ValueError(
+            f"No column is common to the {len(recordings)} files, there are {what}. Read those "
+            "together that have the same joints, markers or channels."
+        )
+    if others:
+        warnings.warn(
+            f"{len(kept)} columns are common to {len(recordings)} files. Left out are {what}.",
+            UserWarning,
+            stacklevel=3,
+        )
+    result = []
+    for x in recordings:
+        places = x.columns.get_indexer(kept)
+        part = x[kept]
+        for key in ("channels", "units"):
+            if isinstance(values := x.attrs.get(key), list):
+                part.attrs[key] = [values[k] for k in places]
+        result.append(part)
+    return result
 
 
 def _join(endings):
@@ -226,7 +298,8 @@ def _to_frame(motion, path):
         columns = [f"{joint}_{axis}" for joint in motion["joints"] for axis in "xyz"]
     else:
         values, columns = motion.pop("values"), motion["channels"]
-    df = pd.DataFrame(values, columns=columns, index=pd.RangeIndex(len(values), name="frame"))
+    index = pd.RangeIndex(len(values), name="frame")
+    df = pd.DataFrame(values, columns=columns, index=index, copy=False)
     df.attrs = {"format": path.suffix.lower().removeprefix(".")} | motion
     df.attrs |= {"performance": path.stem, "levels": ["recording", FRAME]}
     return df

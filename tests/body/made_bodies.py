@@ -44,3 +44,14 @@ def turned_over(positions, axes=(1, -1, -1)):
 def columns_of(x, skeleton=None):
     """A table of positions."""
     return pd.DataFrame(x, columns=(skeleton or Skeleton.paper()).column_names)
+
+
+def with_still_root(x, skeleton, place=(0.0, 0.0, 0.0)):
+    """A table of positions as retargeted takes have them: the body's root hangs on another joint,
+    which stays at its place.
+    """
+    root = pd.DataFrame([place] * len(x), columns=["World_x", "World_y", "World_z"])
+    df = pd.concat([root, columns_of(x, skeleton)], axis=1)
+    df.attrs = {"joints": ["World", *skeleton.joints], "up": skeleton.up}
+    df.attrs["parents"] = [-1, *(p + 1 for p in skeleton.parents)]
+    return df

@@ -7,8 +7,10 @@ import joblib
 import numpy as np
 import pandas as pd
 import pytest
+from made_bodies import with_still_root
 from sklearn.base import clone
 from sklearn_motionsync import DirectionCosines, Skeleton
+from sklearn_motionsync.datasets import make_bending
 
 
 def positions_of(skeleton, **attrs):
@@ -209,3 +211,26 @@ def test_landmarks_cannot_be_changed():
     assert landmarks == PAPER.landmarks
     assert landmarks | {"head": "x"} == {**PAPER.landmarks, "head": "x"}
     assert pickle.loads(pickle.dumps(landmarks)) == copy.deepcopy(landmarks) == landmarks
+
+
+def test_a_root_that_stands_still_is_joined_to_nothing_that_moves():
+    bunch = make_bending(2, n_frames=30, random_state=0)
+    walk = bunch.data[0].reshape(30, -1, 3) + np.arange(30)[:, np.newaxis, np.newaxis] / 50
+    walk = walk.reshape(30, -1)
+    paper = bunch.skeleton
+    bones = [(a + 1, b + 1) for a, b in paper.bones]
+    for place in ((0, 0, 0), (5, -3, 200)):
+        assert Skeleton.from_frame(with_still_root(walk, paper, place)).bones == bones
+    df = with_still_root(walk, paper)
+    # One that moves along with the body, one that is a landmark, one at a fixed distance: joined.
+    along = df.copy()
+    along[["World_x", "World_z"]] = walk[:, [0, 2]]
+    hips = with_still_root(walk, paper).rename(columns=lambda name: name.replace("World", "Hips"))
+    hips.attrs = df.attrs | {"joints": ["Hips", *paper.joints]}
+    still = with_still_root(walk - np.tile(walk[:, :3], 15) + 1, paper)
+    landmarks = {"pelvis": "Hips"}
+    for x, given in ((along, None), (hips, landmarks), (still, None)):
+        assert Skeleton.from_frame(x, landmarks=given).parents == (
+            -1,
+            *(p + 1 for p in paper.parents),
+        )

@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 from artists import bones_drawn
 from IPython.core.formatters import HTMLFormatter
+from made_bodies import with_still_root
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
@@ -327,3 +328,21 @@ def test_performances_have_the_labels_of_a_table(bunch, keys):
     labels = SkeletonDisplay.from_performances(pd.concat(tables, keys=keys), bunch.skeleton).labels
     assert labels == [key if isinstance(key, str) else f"{key[0]}, {key[1]}" for key in keys]
     assert SkeletonDisplay.from_performances(tables, bunch.skeleton).labels == ["0", "1"]
+
+
+def test_a_root_that_stands_still_is_not_drawn():
+    """The same picture as without it, though it is far away."""
+    bunch = make_bending(2, n_frames=30, random_state=0)
+    x = bunch.data[0] + np.tile(np.arange(30)[:, np.newaxis] / 50 * [1, 0, 0], (1, 15))
+    df = with_still_root(x, bunch.skeleton, (90, -80, 70))
+    before = df.copy()
+    displays = [
+        SkeletonDisplay.from_positions(y, skeleton, frames=[0, 29])
+        for y, skeleton in ((df, Skeleton.from_frame(df)), (x, bunch.skeleton))
+    ]
+    pd.testing.assert_frame_equal(df, before)
+    for a, b in zip(displays[0].bones_, displays[1].bones_, strict=True):
+        for side in b:
+            np.testing.assert_array_equal(a[side].get_segments(), b[side].get_segments())
+    for a, b in zip(displays[0].axes_, displays[1].axes_, strict=True):
+        assert (a.get_xlim(), a.get_ylim()) == (b.get_xlim(), b.get_ylim())

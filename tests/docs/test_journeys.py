@@ -1,6 +1,8 @@
 """The journeys of docs/howto/journeys.md: from files to what is saved, in ten lines at most."""
 
+import contextlib
 import re
+import warnings
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -10,6 +12,7 @@ import pytest
 import xarray as xr
 from sklearn_motionsync import Match
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.io import read_motion
 
 from motion_files import c3d, texts, trc
 
@@ -284,7 +287,7 @@ def test_real_markers(real_data, tmp_path, monkeypatch):
     for old, new in (
         ("walks[0])", f"walks[0], landmarks={landmarks})"),
         ('Path("walks")', repr(real_data / "original_files" / "c3d").replace("PosixPath", "Path")),
-        ("max_gap=10) for", "max_gap=20).dropna() for"),
+        ("max_gap=10", "max_gap=20"),
     ):
         assert code.count(old) == 1
         code = code.replace(old, new)
@@ -299,9 +302,8 @@ def test_real_markers(real_data, tmp_path, monkeypatch):
     check_picture("walks.png")
 
 
-def test_angles_and_events(curves, tmp_path, monkeypatch):
+def write_strides(curves, folder):
     """Two strides a file, one behind the other, from heel strike to heel strike."""
-    folder = tmp_path / "gait"
     folder.mkdir()
     strides = {}
     for number, (a, b) in enumerate([TRIALS[:2], TRIALS[2:4]]):
@@ -329,11 +331,100 @@ def test_angles_and_events(curves, tmp_path, monkeypatch):
         }
         made = c3d(points, changes=changes, others={"EVENT": events})
         (folder / f"walk{number}.c3d").write_bytes(made)
+    return strides
+
+
+def test_angles_and_events(curves, tmp_path, monkeypatch):
+    strides = write_strides(curves, tmp_path / "gait")
     left = go("Angles and events of C3D files", tmp_path, monkeypatch)
     saved = pd.read_csv("strides.csv", index_col=["recording", "part", "frame"])
     check_saved(saved, strides, left["synchronizer"].match(left["strides"]))
     check_picture("strides.png")
     assert [len(lines.get_segments()) for lines in left["display"].after_] == [4] * 4
+
+
+# -- a folder whose files differ ----------------------------------------------------------------
+
+
+def as_written_elsewhere(path, keep=slice(None), order=None, more=(), events=True):
+    """A file again, as another laboratory writes it.
+
+    `keep` are the frames in which the first and the last point are seen, `order` that of the
+    points, `more` the names of further points.
+    """
+    groups = {}
+    for group in ("markers", "angles"):
+        with contextlib.suppress(ValueError):
+            groups[group] = read_motion(path, group=group)
+    points = np.concatenate([x.to_numpy().reshape(len(x), -1, 3) for x in groups.values()], axis=1)
+    names = [name for x in groups.values() for name in x.attrs["joints"]]
+    hidden = np.ones(len(points), dtype=bool)
+    hidden[keep] = False
+    points[hidden, 0] = points[hidden, -1] = np.nan
+    further = np.repeat(1 + points[:, -1:], len(more), axis=1)
+    points, names = np.concatenate([points, further], axis=1), [*names, *more]
+    order = list(range(len(names))) if order is None else order
+    changes = {"LABELS": texts(*(names[k] for k in order))}
+    if "angles" in groups:
+        angles = [name for name in names if name.endswith("Angles")]
+        changes |= {"ANGLES": texts(*angles), "ANGLE_UNITS": texts("deg")}
+    marked = next(iter(groups.values())).attrs["events"] if events else []
+    others = {}
+    if marked:
+        times = np.column_stack([np.zeros(len(marked)), [event["time"] for event in marked]])
+        others["EVENT"] = {
+            "USED": (2, [], np.array([len(marked)], "<u2").tobytes()),
+            "LABELS": texts(*(event["label"] for event in marked)),
+            "CONTEXTS": texts(*(event["context"] for event in marked)),
+            "TIMES": (4, [2, len(marked)], times.astype("<f4").tobytes()),
+        }
+    path.write_bytes(c3d(points[:, order], changes=changes, others=others))
+
+
+def test_markers_of_several_laboratories(bodies, tmp_path, monkeypatch):
+    """Columns in another order, further markers, gaps at both ends, a static trial."""
+    folder = tmp_path / "walks"
+    write_takes(folder, "c3d", bodies)
+    as_written_elsewhere(folder / "take1.c3d", order=[3, 1, 2, 0, 4, 7, 6, 5])
+    as_written_elsewhere(folder / "take2.c3d", keep=slice(3, 55), more=["T10", "CLAV"])
+    positions, joints, _ = bodies
+    still = np.repeat(positions[0][:1], 60, axis=0)
+    (folder / "static.c3d").write_bytes(markers(still, joints))
+    message = r"^24 columns are common to 5 files\. Left out are 6 of 'take2' \['T10_x', "
+    with pytest.warns(UserWarning, match=message) as caught:
+        left = go("Markers of C3D files", tmp_path, monkeypatch)
+    assert len(caught) == 1
+    assert [x.attrs["performance"] for x in left["walks"]] == ["static", *shins(bodies)]
+    assert left["walks"][3].attrs["rows"] == [3, 54]
+    saved = pd.read_csv("walks.csv", index_col=["recording", "frame"])
+    cut = [still, *positions[:2], positions[2][3:55], positions[3]]
+    originals = dict(zip(["static", *shins(bodies)], cut, strict=True))
+    originals = {k: pd.DataFrame({"left_leg_y": shin_up(x, joints)}) for k, x in originals.items()}
+    check_saved(saved, originals, Match.from_estimator(left["pipe"], left["walks"]))
+    check_picture("walks.png")
+
+
+def test_angles_of_several_laboratories(curves, tmp_path, monkeypatch):
+    """The same for angles and events; another file has no angles at all."""
+    folder = tmp_path / "gait"
+    strides = write_strides(curves, folder)
+    as_written_elsewhere(folder / "walk1.c3d", order=[2, 0, 1, 3], more=["LAnkleAngles"])
+    (folder / "static.c3d").write_bytes((folder / "walk0.c3d").read_bytes())
+    as_written_elsewhere(folder / "static.c3d", events=False)
+    (folder / "hall.c3d").write_bytes(c3d(np.ones((9, 2, 3))))
+    # An angle is not known before the first strike and after the last.
+    as_written_elsewhere(folder / "walk0.c3d", keep=slice(9, -7))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        left = go("Angles and events of C3D files", tmp_path, monkeypatch)
+    said = "\n".join(str(warning.message) for warning in caught)
+    assert "The recording 'static' has no events" in said
+    assert "hall.c3d: there are no angles in this file" in said
+    assert "Left out are 3 of 'walk1' ['LAnkleAngles_x'" in said
+    assert len(caught) == 3
+    saved = pd.read_csv("strides.csv", index_col=["recording", "part", "frame"])
+    check_saved(saved, strides, left["synchronizer"].match(left["strides"]))
+    check_picture("strides.png")
 
 
 # -- key-points -----------------------------------------------------------------------------------

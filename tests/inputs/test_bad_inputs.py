@@ -32,6 +32,8 @@ RNG = np.random.default_rng(0)
 X = [np.cumsum(RNG.standard_normal((20, 3)), axis=0) for _ in range(5)]
 FRAMES = [pd.DataFrame(x, columns=NAMES) for x in X]
 TURNED = [df[NAMES[::-1]] for df in FRAMES]
+MORE = [df.assign(toe=df["hip"]) for df in FRAMES]
+TWICE = FRAMES[2].set_axis(["hip", "knee", "hip"], axis=1)
 NUMBERED = [pd.DataFrame(x, columns=[10, 20, 30]) for x in X]
 MIXED = [pd.DataFrame(x, columns=["hip", 1, 2]) for x in X]
 LABELLED = to_frame(FRAMES, performances=["ann", "bob", "cem", "dov", "eva"])
@@ -121,8 +123,11 @@ PERFORMANCES = [
     (one(lambda x: x[:, :0]), ALL, ["Performance 2", "(20, 0)", "1 feature"]),
     (one(lambda x: [[1, 2, 3], [4, 5]]), ALL, ["Performance 2", "not a numeric array"]),
     (LABELLED.mask(LABELLED["knee"] == X[1][4, 1]), ALL, ["'bob'", "frame 4", "'hip'", "NaN"]),
-    ([*FRAMES[:2], TURNED[2]], ALL, ["Performance 2", "columns", "same order"]),
-    ([*NUMBERED[:2], NUMBERED[2][[20, 10, 30]]], ALL, ["Performance 2", "[20, 10, 30]"]),
+    ([*FRAMES[:2], FRAMES[2][NAMES[:2]]], ALL, ["Performance 2", "it lacks ['ankle']", "common"]),
+    ([*FRAMES[:2], MORE[2]], ALL, ["Performance 2", "has besides ['toe']", "columns='common'"]),
+    ([*FRAMES[:2], X[2]], ALL, ["Performance 2 has the columns without names", "['hip',"]),
+    ([*FRAMES[:2], TWICE], ALL, ["Performance 2", "['hip', 'knee', 'hip']", "lacks ['ankle']"]),
+    ([*NUMBERED[:2], NUMBERED[2].add_prefix("n")], ALL, ["Performance 2", "'n10'", "[10, 20, 30]"]),
     (MIXED, ALL, ["['int', 'str']", "astype(str)"]),
     (["a.csv", "b.csv"], ALL, ["'a.csv'", "reads files"]),
     ("a.csv", ALL, ["got str"]),
@@ -172,8 +177,8 @@ def test_fit_refuses(given, estimator, words):
 
 FITTED_ON = [
     # fitted on, input, estimators, words
-    (FRAMES, TURNED, ALL, ["feature names should match"]),
-    (NUMBERED, [df[[30, 20, 10]] for df in NUMBERED], ALL, ["[30, 20, 10]", "same order"]),
+    (FRAMES, MORE, ALL, ["Performance 0", "'toe'", "feature names should match"]),
+    (FRAMES, [FRAMES[0], MORE[1]], ALL, ["Performance 1", "'toe'", "feature names should match"]),
     (NUMBERED, FRAMES, ALL, ["'hip'", "[10, 20, 30]"]),
     (X, [x[:, :2] for x in X], ALL, ["2 features", "expecting 3"]),
     (X, one(masked), ALL, ["Performance 2", "masked"]),
@@ -193,6 +198,35 @@ def test_fitted_estimator_refuses(training, given, estimator, words):
     fitted = clone(estimator).fit(training)
     ask = fitted.transform if hasattr(fitted, "transform") else fitted.predict
     refuses(lambda: ask(given), words)
+
+
+@pytest.mark.parametrize("estimator", ALL, ids=by_name)
+@pytest.mark.parametrize("tables", [FRAMES, NUMBERED], ids=["text", "numbers"])
+def test_columns_are_aligned_by_name(estimator, tables):
+    """To those of the first in fit, and to those of fit later: alone or together the same bits."""
+    names, rng = list(tables[0]), np.random.default_rng(3)
+    given = [tables[0], *(x[[names[k] for k in rng.permutation(3)]] for x in tables[1:])]
+    assert any(list(x) != names for x in given)
+    fitted, expected = clone(estimator).fit(given), clone(estimator).fit(tables)
+    method = "transform" if hasattr(fitted, "transform") else "score_samples"
+    ask, right = getattr(fitted, method), getattr(expected, method)(tables)
+    for answers in (ask(given), ask(given[::-1])[::-1], [ask([x])[0] for x in given]):
+        for answer, one in zip(answers, right, strict=True):
+            np.testing.assert_array_equal(answer, one)
+
+
+def test_messages_about_columns_are_short():
+    """Two hundred columns of long names, as C3D files have them."""
+    names = [
+        f"{'a very long name of a marker ' * 3}{k}_{axis}" for k in range(70) for axis in "xyz"
+    ]
+    tables = [pd.DataFrame(np.ones((3, 210)), columns=names) for _ in range(2)]
+    tables[1] = tables[1].add_prefix("x")
+    fitted = ASpace().fit(tables[:1] * 2)
+    for ask in (ASpace().fit, fitted.transform):
+        with pytest.raises(ValueError, match="Performance 1") as caught:
+            ask(tables)
+        assert len(str(caught.value)) < 600
 
 
 # -- parameters -----------------------------------------------------------------------------

@@ -70,6 +70,29 @@ def test_number_of_frames_may_be_that_of_the_limits_of_the_trial(tmp_path, first
     assert len(read_motion(put(tmp_path, content, "a.c3d"))) == 40
 
 
+@pytest.mark.parametrize("machine", [84, 85, 86])
+def test_a_parameter_may_have_its_length_in_the_other_byte_order(tmp_path, machine):
+    content = c3d(tracks(), machine)
+    for name in (b"LABELS", b"UNITS"):
+        at = content.index(name) + len(name)
+        content = content[:at] + content[at : at + 2][::-1] + content[at + 2 :]
+    df = read_motion(put(tmp_path, content, "a.c3d"))
+    pd.testing.assert_frame_equal(df, read_motion(put(tmp_path, c3d(tracks(), machine), "a.c3d")))
+    assert (df.attrs["joints"], df.attrs["units"]) == (["M0", "M1", "M2"], "mm")
+
+
+def test_of_two_scales_that_of_the_header_is_used_with_a_warning(tmp_path):
+    other = {"SCALE": floats(0.25)}
+    path = put(tmp_path, c3d(tracks(), real=False, changes=other), "a.c3d")
+    message = (
+        r"^a\.c3d: the header says scale 0\.5, .*SCALE says 0\.25\. .* multiply them by 0\.5\.$"
+    )
+    with pytest.warns(UserWarning, match=message) as caught:
+        df = read_motion(path)
+    assert caught[0].filename == __file__
+    np.testing.assert_array_equal(df.to_numpy().reshape(40, 3, 3), tracks())
+
+
 def test_floats_are_not_scaled(tmp_path):
     positions = tracks()
     other = {"SCALE": (4, [], struct.pack("<f", -0.1))}
@@ -312,6 +335,29 @@ def test_files_may_have_analog_channels_only(tmp_path):
     assert df.attrs["channels"] == ["channel_1", "channel_2"]
     with pytest.raises(ValueError, match=r"no markers in this file; .* 'analog' \(2\)\."):
         read_motion(path)
+
+
+@pytest.mark.parametrize("real", [True, False])
+@pytest.mark.parametrize(("header", "used"), [(3, 3), (9, 3), (12, 9), (12, 2.5), (12, -3)])
+def test_of_two_numbers_of_analog_values_the_size_tells_the_right_one(tmp_path, real, header, used):
+    raw = np.random.default_rng(0).integers(-2000, 2000, (40, 4, 3))
+    others = analog_parameters(USED=floats(used) if used % 1 or used < 0 else words(used))
+    content = c3d(tracks(), real=real, analog=raw, others=others, header={"analog": header})
+    path = put(tmp_path, content, "a.c3d")
+    right = put(tmp_path, c3d(tracks(), real=real, analog=raw, others=analog_parameters()), "b.c3d")
+    for group in ("analog", "markers"):
+        np.testing.assert_array_equal(
+            read_motion(path, group=group), read_motion(right, group=group)
+        )
+
+
+@pytest.mark.parametrize(("header", "used"), [(9, 7), (24, 4)])
+def test_two_numbers_of_analog_values_that_do_not_fit_are_refused(tmp_path, header, used):
+    raw = np.ones((40, 4, 3))
+    content = c3d(tracks(), analog=raw, others=analog_parameters(used), header={"analog": header})
+    message = rf"a\.c3d: the header says {header} analog values .* ANALOG:USED says {used} channels"
+    with pytest.raises(ValueError, match=message):
+        read_motion(put(tmp_path, content, "a.c3d"))
 
 
 @pytest.mark.parametrize(

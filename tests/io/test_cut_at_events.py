@@ -128,7 +128,13 @@ def test_events_within_performances_are_keyframes():
 @pytest.mark.parametrize(
     ("df", "start", "stop", "message"),
     [
-        (recording(), "a", None, r"has no events; attrs\['events'\] must be a list of dicts"),
+        (
+            recording(*WALK, events=None),
+            "a",
+            None,
+            r"recording has no events; attrs\['events'\] mu",
+        ),
+        (recording(*WALK, performance="w"), "a", None, r"^The recording 'w' has no event 'a' for"),
         (recording(*WALK), "Heel", None, r"no event 'Heel' for start; there are \('Foot Str"),
         (recording(*WALK), LEFT, (OFF, "Both"), r"no event \('Foot Off', 'Both'\) for stop; .*'G"),
         (recording(*WALK), LEFT, OFF[:4], r"\('Foot Strike', 'Left'\) \(4\), .*'General' \(1\)"),
@@ -162,3 +168,18 @@ def test_groups_of_a_file_are_cut_at_the_same_times(tmp_path, group):
     assert part.attrs["first_frame"] == 101 + bounds[0] // k
     assert [e["frame"] for e in part.attrs["events"]] == [15 * k - bounds[0]]
     np.testing.assert_array_equal(part, df.iloc[int(bounds[0]) : int(bounds[1]) + 1])
+
+
+def test_a_static_trial_without_events_gives_none_and_is_named():
+    message = r"^The recording 'standing' has no events, so no performance is cut out of it\.$"
+    with pytest.warns(UserWarning, match=message) as caught:
+        assert cut_at_events(recording(performance="standing"), LEFT) == []
+    assert caught[0].filename == __file__
+
+
+def test_messages_are_short_whatever_is_marked():
+    many = [("a long label of an event " * 9 + str(k), "General", 3.0) for k in range(200)]
+    for df in (recording(*many, performance="p" * 300), recording(("a", None, "x" * 9999))):
+        with pytest.raises(ValueError, match="The recording") as caught:
+            cut_at_events(df, LEFT)
+        assert len(str(caught.value)) < 600

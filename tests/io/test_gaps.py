@@ -137,3 +137,56 @@ def test_the_warning_says_how_much_is_missing_of_what(kind, share, words):
     df.attrs["kind"] = kind
     with pytest.warns(UserWarning, match=words):
         warn_of_gaps(df, "a.c3d")
+
+
+# -- ends -----------------------------------------------------------------------------------
+
+
+def test_a_recording_is_trimmed_to_the_frames_that_show_all_joints():
+    df, before = with_gaps(), with_gaps()
+    trimmed = fill_gaps(df, 4, ends="trim")
+    pd.testing.assert_frame_equal(df, before)
+    pd.testing.assert_frame_equal(trimmed, fill_gaps(df, 4).iloc[4:50], check_flags=False)
+    # The index tells which frames they are.
+    assert trimmed.attrs == {"kind": "markers"}
+    assert find_gaps(fill_gaps(df, 5, ends="trim")).empty
+    whole = df.dropna()
+    pd.testing.assert_frame_equal(fill_gaps(whole, 0, ends="trim"), whole)
+    # A gap that is not filled and reaches into what is left out: the end is behind it.
+    df.iloc[2:9, 0] = np.nan
+    assert fill_gaps(df, 4, ends="trim").index.tolist() == list(range(109, 150))
+    df["d_x"] = df["d_y"] = df["d_z"] = np.nan  # never seen
+    assert fill_gaps(df, 4, ends="trim").index.tolist() == list(range(109, 150))
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_events_and_clock_of_a_trimmed_recording(even):
+    """Each frame that is left has the events and times that it had."""
+    df = with_gaps().reset_index(drop=True)
+    times = np.arange(60) / 50 + (0 if even else 0.003 * np.sin(np.arange(60)))
+    frames = [-2.0, 0.0, 3.0, 4.0, 20.5, 49.0, 55.0]
+    df.attrs["events"] = [{"label": str(f), "context": None, "frame": f} for f in frames]
+    df.attrs |= {"first_frame": 11, "frame_rate": 50.0 if even else None}
+    df.attrs |= {"first_time": 2.0} if even else {"times": times.tolist()}
+    trimmed = fill_gaps(df, 5, ends="trim")
+    assert trimmed.index.equals(pd.RangeIndex(46))
+    assert [event["frame"] + 4 for event in trimmed.attrs["events"]] == frames[3:6]
+    assert trimmed.attrs["rows"] == [4, 49]
+    assert trimmed.attrs["first_frame"] == 15
+    assert trimmed.attrs["first_time"] == pytest.approx(2.08 if even else times[4])
+    assert even or trimmed.attrs["times"] == times[4:50].tolist()
+    assert df.attrs["events"][0]["frame"] == -2
+
+
+def test_what_cannot_be_trimmed_is_refused_by_name():
+    df = with_gaps()
+    df.attrs["performance"] = "walk7"
+    with pytest.raises(ValueError, match="ends must be 'keep' or 'trim', got 'cut'"):
+        fill_gaps(df, 3, ends="cut")
+    df[["b_x"]] = np.where(np.arange(60) == 20, 0, np.nan)[:, None]
+    message = r"^The recording 'walk7' cannot be trimmed: 1 of 60 frames show all joints\."
+    with pytest.raises(ValueError, match=message):
+        fill_gaps(df, 9, ends="trim")
+    df[:] = np.nan
+    with pytest.raises(ValueError, match="cannot be trimmed: 0 of 60"):
+        fill_gaps(df, 9, ends="trim")

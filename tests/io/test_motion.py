@@ -12,7 +12,7 @@ from sklearn_motionsync.io.motion import READERS
 
 import fuzz_readers
 from fuzz_readers import DAMAGES
-from motion_files import AMC, EXAMPLES, body, put
+from motion_files import AMC, EXAMPLES, body, c3d, put, texts
 
 ROOT = Path(__file__).resolve().parents[2]
 MANUAL = (ROOT / "docs" / "howto" / "own_data.md").read_text(encoding="utf-8")
@@ -168,3 +168,72 @@ def test_real_files_agree_with_plain_parsers(real_data, benchmark, name):
     scale = 1e-12 * np.abs(expected).max()
     df = read_motion(path)
     np.testing.assert_allclose(df.to_numpy().reshape(expected.shape), expected, atol=scale, rtol=0)
+
+
+# -- several files ------------------------------------------------------------------------
+
+
+def folder_of(tmp_path):
+    """Three recordings: of three markers, of two in another order, and of another two."""
+    names = (["LKNE", "RKNE", "SACR"], ["SACR", "LKNE"], ["LKNE", "SACR", "T10"])
+    paths = []
+    for i, labels in enumerate(names):
+        x = np.random.default_rng(i).integers(-900, 900, (40 + i, len(labels), 3)) / 2
+        content = c3d(x, changes={"LABELS": texts(*labels)}, analog=np.ones((40 + i, 2, 1)))
+        paths.append(put(tmp_path, content, f"walk{i}.c3d"))
+    return paths
+
+
+def test_several_files_are_read_as_a_list(tmp_path):
+    paths = folder_of(tmp_path)
+    for given in (paths, map(str, paths)):
+        for x, path in zip(read_motion(given), paths, strict=True):
+            pd.testing.assert_frame_equal(x, read_motion(path))
+            assert x.attrs == read_motion(path).attrs
+    with pytest.raises(ValueError, match="There are no files to read"):
+        read_motion([])
+    with pytest.raises(ValueError, match=r"walk0\.c3d: there are no angles"):
+        read_motion(paths, group="angles")
+    for given, columns in ((paths, "all"), (paths[0], "common")):
+        with pytest.raises(ValueError, match="columns must be None, or 'common' with a list"):
+            read_motion(given, columns=columns)
+
+
+def test_common_columns_of_several_files(tmp_path):
+    paths = folder_of(tmp_path)
+    message = (
+        r"^6 columns are common to 3 files\. Left out are 3 of 'walk0' \['RKNE_x', 'RKNE_y', "
+        r"'RKNE_z'\]; 3 of 'walk2' \['T10_x', .*\.$"
+    )
+    with pytest.warns(UserWarning, match=message) as caught:
+        common = read_motion(paths, columns="common")
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+    names = [f"{joint}_{axis}" for joint in ("LKNE", "SACR") for axis in "xyz"]
+    for x, path in zip(common, paths, strict=True):
+        pd.testing.assert_frame_equal(x, read_motion(path)[names])
+        assert x.attrs == read_motion(path).attrs
+    (one, two) = read_motion([paths[1], paths[1]], columns="common")
+    pd.testing.assert_frame_equal(one, two)
+    for i, order in enumerate(("abc", "cab")):
+        k = ["abc".index(name) for name in order]
+        units = {
+            name: texts(*np.array(words)[k])
+            for name, words in {"UNITS": ["N", "V", "m"], "LABELS": ["a", "b", "c"]}.items()
+        }
+        content = c3d(np.ones((9, 1, 3)), analog=np.ones((9, 2, 3)), others={"ANALOG": units})
+        put(tmp_path, content, f"force{i}.c3d")
+    for x in read_motion(sorted(tmp_path.glob("force*")), group="analog", columns="common"):
+        assert list(x) == x.attrs["channels"] == ["a", "b", "c"]
+        assert x.attrs["units"] == ["N", "V", "m"]
+
+
+def test_messages_about_several_files_are_short(tmp_path):
+    paths = []
+    for i in range(12):
+        labels = [f"{chr(97 + i)} marker of a long name, as some have them, {k}" for k in range(99)]
+        content = c3d(np.ones((2, 99, 3)), changes={"LABELS": texts(*labels)})
+        paths.append(put(tmp_path, content, f"{i}_{'long' * 40}.c3d"))
+    with pytest.raises(ValueError, match="No column is common to the 12 files") as caught:
+        read_motion(paths, columns="common")
+    assert len(str(caught.value)) < 600

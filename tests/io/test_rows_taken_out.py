@@ -109,7 +109,7 @@ def test_rows_that_were_dropped_are_not_bridged(seed):
     ]
     if any(part["knee"].isna().any() for part in whole):
         with pytest.raises(
-            ValueError, match=r"has no row of frame .*Cut the recording before rows"
+            ValueError, match=r"there is no row of frame .*Cut the recording before rows"
         ):
             cut_at_events(some, "Strike")
         return

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from made_bodies import with_still_root
 from scipy.spatial.transform import Rotation
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
@@ -461,3 +462,16 @@ def test_keyframes_are_passed_to_the_match(bending):
     np.testing.assert_allclose(found, X[1], atol=1e-12)
     with pytest.raises(ValueError, match=r"blend_performances\(estimator, X, keyframes="):
         blend_performances(pipe, X, [0, 1, 0, 0])
+
+
+@pytest.mark.parametrize("heading", [0, 90])
+def test_a_root_that_stands_still_is_no_limb(heading):
+    """The others are blended as without it, and it stays between where it stood."""
+    walks = [walker(50), turned(walker(50, 1.3, seed=1), heading)]
+    tables = [with_still_root(x, PAPER, (k, 0.5, 2)) for k, x in enumerate(walks)]
+    skeleton = Skeleton.from_frame(tables[0])
+    blend = blend_performances(even(50, 50), tables, [0.25, 0.75], skeleton=skeleton)
+    expected = blend_performances(even(50, 50), walks, [0.25, 0.75], skeleton=PAPER)
+    np.testing.assert_allclose(blend[PAPER.column_names], expected, atol=1e-12)
+    root = blend[["World_x", "World_y", "World_z"]]
+    np.testing.assert_allclose(root, np.tile([0.75, 0.5, 2], (50, 1)), atol=1e-12)
