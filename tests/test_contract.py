@@ -484,7 +484,7 @@ def test_other_feature_names_are_refused(estimator, performances):
     frames = KINDS["frames"](performances)
     fitted = clone(estimator).fit(frames)
     with pytest.raises(ValueError, match="feature names should match"):
-        outputs(fitted, [x[NAMES[::-1]] for x in frames])
+        outputs(fitted, [x.add_prefix("other ") for x in frames])
 
 
 @pytest.mark.parametrize("estimator", EVERY, ids=by_name)

@@ -145,7 +145,8 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
 
     for i, x in enumerate(sequences):
         if tables and column_names(x) != names:
-            x = _in_order(x, names, what(i), None if names is fitted else what(0))
+            of_fit = fitted is not None and names is fitted
+            x = _in_order(x, names, what(i), None if of_fit else what(0).replace("P", "p", 1))
         # For a plain array nothing but NumPy itself is called.
         plain = type(x) is np.ndarray and x.dtype in FLOATS
         array = x if plain else as_numbers(x, what(i))

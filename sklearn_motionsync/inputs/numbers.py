@@ -247,8 +247,8 @@ def check_names(x, expected, what):
 def listed(names):
     """Names as a message lists them: a few of many, and of long ones their beginning."""
     if names is None:
-        return "without names"
-    shown, left = [], 60
+        return "None"
+    shown, left = [], 36
     for name in map(repr, names):
         if len(name) > left:
             return f"[{', '.join([*shown, name[: max(left, 4)]])} ... {len(names)} in all]"

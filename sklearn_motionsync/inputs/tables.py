@@ -115,9 +115,9 @@ def as_pandas(table):
 
 def name_performance(i, label):
     """The name of a performance in messages and figures."""
-    if isinstance(label, tuple):
-        return f"Performance {i} {label!r}"
-    return f"Performance {i}" if label == i else f"Performance {i} ({label!r})"
+    name = repr(label) if isinstance(label, tuple) else "" if label == i else f"({label!r})"
+    name = name if len(name) <= 60 else f"{name[:56]} ..."
+    return f"Performance {i} {name}".rstrip()
 
 
 def labels_of(sequences, numbers=None):

@@ -125,7 +125,7 @@ PERFORMANCES = [
     (LABELLED.mask(LABELLED["knee"] == X[1][4, 1]), ALL, ["'bob'", "frame 4", "'hip'", "NaN"]),
     ([*FRAMES[:2], FRAMES[2][NAMES[:2]]], ALL, ["Performance 2", "it lacks ['ankle']", "common"]),
     ([*FRAMES[:2], MORE[2]], ALL, ["Performance 2", "has besides ['toe']", "columns='common'"]),
-    ([*FRAMES[:2], X[2]], ALL, ["Performance 2 has the columns without names", "['hip',"]),
+    ([*FRAMES[:2], X[2]], ALL, ["Performance 2 has the columns None", "['hip',"]),
     ([*FRAMES[:2], TWICE], ALL, ["Performance 2", "['hip', 'knee', 'hip']", "lacks ['ankle']"]),
     ([*NUMBERED[:2], NUMBERED[2].add_prefix("n")], ALL, ["Performance 2", "'n10'", "[10, 20, 30]"]),
     (MIXED, ALL, ["['int', 'str']", "astype(str)"]),
@@ -222,7 +222,9 @@ def test_messages_about_columns_are_short():
     ]
     tables = [pd.DataFrame(np.ones((3, 210)), columns=names) for _ in range(2)]
     tables[1] = tables[1].add_prefix("x")
-    fitted = ASpace().fit(tables[:1] * 2)
+    for k, x in enumerate(tables):
+        x.attrs["performance"] = "a recording of a long name" * 9 + str(k)
+    fitted = ASpace().fit(tables[:1])
     for ask in (ASpace().fit, fitted.transform):
         with pytest.raises(ValueError, match="Performance 1") as caught:
             ask(tables)
