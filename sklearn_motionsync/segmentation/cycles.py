@@ -16,6 +16,7 @@ from ..body.formats import SIDES
 from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
 from ..inputs.collections import as_collection
+from ..inputs.facts import TIMELESS
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.validation import check_performances
 from ..matching.costs import StepTable, step_table
@@ -352,7 +353,9 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
 def check_takes(segmenter, X, *, reset):
     """Takes as they were given, a single one as a list, and checked."""
     X = as_takes(X)
-    takes = check_performances(segmenter, X, reset=reset, level="sequence")
+    # A period is that of its take, at any frame rate.
+    facts = TIMELESS if segmenter.period is None else None
+    takes = check_performances(segmenter, X, reset=reset, level="sequence", facts=facts)
     return as_collection(X), takes
 
 

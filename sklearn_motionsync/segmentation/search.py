@@ -44,7 +44,7 @@ _CLOCK = 100
 _MARGIN, _MARGIN_OF_ONE = 1.1, 1.5
 # Frame rates that differ by a smaller share are one.
 _SAME_RATE = 0.01
-# A take is resampled to at most so many times its frames.
+# Rates that differ by a larger ratio are mistakes.
 _MOST = 100
 # The shortest window, in frames.
 _SHORTEST = 3
@@ -172,7 +172,7 @@ def find_performances(
         take, propose = take.astype(np.float64, copy=False), proposers[pace]
         search = _Search(take, dissimilarity, propose.shortest, propose.longest)
         hits = search.hits(propose(take), lowest, max_hits)
-        rows += [(i, *hit) for hit in _in_frames_given(hits, pace, len(given[i]))]
+        rows += [(i, *hit) for hit in in_frames_given(hits, pace, len(given[i]), durations)]
     rows = pd.DataFrame(rows, columns=["take", "start", "stop", "score"])
     rows = rows.astype({"take": int, "start": int, "stop": int, "score": float})
     return cut_takes(X, given, rows.assign(threshold=level))
@@ -207,11 +207,11 @@ def _at_rate_of(pattern, X, given):
         return X, paces
     searched = list(as_collection(X))
     for i, pace in enumerate(paces):
-        if pace * _MOST < 1:
+        if not 1 / _MOST <= pace <= _MOST:
             raise ValueError(
-                f"{given.called(i)} has {rates[i]:g} frames a second, the pattern {known:g}, more "
-                f"than {_MOST} times as many. Correct the wrong one: attrs['frame_rate'], or an "
-                "index in seconds."
+                f"{given.called(i)} has {rates[i]:g} frames a second, the pattern {known:g}: one "
+                f"is more than {_MOST} times the other. Correct the wrong one, "
+                "attrs['frame_rate'] or an index in seconds."
             )
         if pace != 1:
             searched[i] = _resample(searched[i], given[i], pace, known)
@@ -239,16 +239,30 @@ def _resample(x, array, pace, rate):
     return out
 
 
-def _in_frames_given(hits, pace, n_frames):
-    """Hits of a resampled take, in the frames of the take as it was given."""
+def in_frames_given(hits, pace, n_frames, durations=None):
+    """Hits in a resampled take, in order of time, in the frames of the take as it was given.
+
+    Parameters
+    ----------
+    hits : list of (int, int, float)
+        Start, stop and score.
+    pace : float
+        The frames that were given in a frame that was searched.
+    n_frames : int
+        Of the take that was given.
+    durations : (int, int), default=None
+        Limits of the numbers of frames.
+    """
     if pace == 1 or not hits:
         return hits
+    shortest, longest = durations or (1, n_frames)
     starts = [round(start * pace) for start, _, _ in hits]
+    sizes = [round((stop - 1 - start) * pace) + 1 for start, stop, _ in hits]
     # Hits that touch may share a frame of a take of a lower rate.
     return [
-        (first, min(first + round((stop - 1 - start) * pace) + 1, limit), score)
-        for (start, stop, score), first, limit in zip(
-            hits, starts, [*starts[1:], n_frames], strict=True
+        (start, min(start + min(max(size, shortest), longest), limit), score)
+        for start, size, limit, (_, _, score) in zip(
+            starts, sizes, [*starts[1:], n_frames], hits, strict=True
         )
     ]
 

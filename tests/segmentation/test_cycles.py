@@ -118,6 +118,21 @@ def test_cycles_begin_by_default_with_the_feature_that_repeats_best():
     assert CycleSegmenter().fit(take).start_ == "x1"
 
 
+def test_takes_of_other_frame_rates_are_cut_at_the_same_phase(gait, fitted):
+    tables = [
+        pd.DataFrame(x).iloc[::step] for x, step in zip(gait.data[3:], (1, 2, 3), strict=True)
+    ]
+    for table in tables:
+        table.attrs["frame_rate"] = 100
+    _, locations = fitted.segment(tables)
+    _, expected = fitted.segment(gait.data[3:])
+    assert locations["take"].tolist() == expected["take"].tolist()
+    starts = locations["start"] * (locations["take"] + 1)
+    assert (starts - expected["start"]).abs().max() <= 4
+    with pytest.warns(UserWarning, match="50 frames a second"):
+        CycleSegmenter(start=HIP, period=(20, 200)).fit(tables)
+
+
 def test_a_template_of_constant_periods_is_blurred():
     take, _ = slowing_take()
     sizes = [

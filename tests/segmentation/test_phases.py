@@ -38,21 +38,19 @@ def test_maximum_of_a_closed_curve_lies_between_samples(place):
 
 def test_portions_of_a_long_take_are_joined_in_the_middle_of_their_overlap():
     """Beyond it the phases are those of the later portion alone, but for whole cycles."""
-    rng = np.random.default_rng(1)
-    values = np.tile(TEMPLATE, (30, 1)) + 1.2 * rng.normal(size=(30 * PHASES, 3))
+    values = np.random.default_rng(7).normal(size=(19 * PHASES, 3))
     whole, overlap = 16 * PHASES, 2 * PHASES
     joined = match_phases(TEMPLATE, SimpleNamespace(values=values))
     early = match_phases(TEMPLATE, SimpleNamespace(values=values[: whole + overlap]))
     late = match_phases(TEMPLATE, SimpleNamespace(values=values[whole:]))
     middle = whole + overlap // 2
-    np.testing.assert_allclose(joined[:middle], early[:middle])
-    shift = joined[middle + 1 :] - late[overlap // 2 + 1 :]
-    assert np.ptp(shift) < 1e-9
-    assert shift[0] == pytest.approx(np.round(shift[0]), abs=1e-9)
-    # The portions differ where they meet, so that it matters where they do.
-    apart = early[whole:] - late[:overlap] - shift[0]
-    assert np.abs(apart).max() > 1e-3
-    assert (np.diff(joined) >= 0).all()
+    np.testing.assert_array_equal(joined[:middle], early[:middle])
+    # Noise fits anywhere: the portions meet at different phases, the later one behind.
+    apart = late[overlap // 2] - early[middle]
+    assert abs(apart - np.round(apart)) > 0.05
+    expected = late[overlap // 2 :] - np.round(apart)
+    assert expected[0] < early[middle - 1]
+    np.testing.assert_array_equal(joined[middle:], np.maximum(expected, early[middle - 1]))
 
 
 def test_cycles_end_where_their_phase_is_reached_and_are_scored_by_themselves():

@@ -1,6 +1,7 @@
 """find_performances: planted movements, recordings, parameters and errors."""
 
 import tracemalloc
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,12 @@ from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.model.similarity import log_moments
-from sklearn_motionsync.segmentation.search import Proposer, WindowDissimilarity, random_movements
+from sklearn_motionsync.segmentation.search import (
+    Proposer,
+    WindowDissimilarity,
+    in_frames_given,
+    random_movements,
+)
 
 import oracle
 
@@ -277,7 +283,7 @@ def test_durations_and_patterns_have_frame_rates(at_30):
     pattern = table(movement(60), 30)
     found = np.array(spans(find_performances(pattern, take)[1]))
     np.testing.assert_allclose(found / 4, TRUE, atol=6)
-    assert spans(find_performances(at_30, table(TAKE[:3], 120))[1]) == []
+    assert spans(find_performances(at_30, table(TAKE[:2], 120).iloc[:3])[1]) == []
     assert spans(find_performances(at_30, table(other(300), 7.5))[1]) == []
 
 
@@ -291,8 +297,38 @@ def test_warns_if_one_frame_rate_only_is_known(pipe, at_30):
         UserWarning, match=r"The pattern has no known .* performance 0 has 60 frames"
     ):
         find_performances(sync, table(TAKE, 60))
-    with pytest.raises(ValueError, match=r"Performance 0 has 0\.2 frames a second, the pattern 30"):
-        find_performances(at_30, attributed(table(TAKE), frame_rate=0.2))
+    for rate in (0.2, 4000):
+        with pytest.raises(ValueError, match=rf"Performance 0 has {rate} frames .* the pattern 30"):
+            find_performances(at_30, attributed(table(TAKE), frame_rate=rate))
+    with pytest.warns(UserWarning, match="Performance 1 has 60 frames"):
+        sync = DenseSynchronizer(40).fit([table(TRAINING[0], 30), table(TRAINING[1], 60)])
+    with pytest.warns(UserWarning, match="The pattern has no known"):
+        find_performances(sync, table(TAKE, 60))
+
+
+def test_rates_within_a_hundredth_are_one(at_30):
+    take = table(TAKE, 30)
+    expected = find_performances(at_30, take)[1]
+    found = find_performances(at_30, attributed(take.copy(), frame_rate=29.97))[1]
+    pd.testing.assert_frame_equal(found, expected)
+
+
+def test_hits_in_frames_given_keep_order_durations_and_limits():
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        pace, n_given = rng.uniform(0.2, 6), int(rng.integers(900, 2000))
+        last = int((n_given - 1) / pace)
+        edges = np.sort(rng.choice(np.arange(0, last + 2, 12), 7, replace=False)).tolist()
+        hits = [(a, b - (k % 2), 0.5) for k, (a, b) in enumerate(pairwise(edges))]
+        found = in_frames_given(hits, pace, n_given)
+        for (start, stop, _), (a, b, _) in zip(found, hits, strict=True):
+            assert abs(start - a * pace) <= 0.5
+            assert abs(stop - 1 - (b - 1) * pace) <= 1.5
+            assert 0 <= start < stop <= n_given
+        assert all(a[1] <= b[0] for a, b in pairwise(found))
+    (hit,) = in_frames_given([(0, 2, 0.5)], 4.0, 90, (2, 3))
+    assert hit == (0, 3, 0.5)
+    assert in_frames_given([(3, 12, 0.5)], 4.0, 90) == [(12, 45, 0.5)]
 
 
 # -- threshold and number of hits ------------------------------------------------------------------
@@ -301,6 +337,9 @@ def test_warns_if_one_frame_rate_only_is_known(pipe, at_30):
 def test_threshold_max_hits_and_durations_select_hits(pipe):
     locations = find_performances(pipe, TAKE, threshold=None)[1]
     assert len(locations) > 3
+    lengths = [len(x) for x in TRAINING]
+    sizes = locations["stop"] - locations["start"]
+    assert sizes.between(min(lengths) / 1.1 - 1, np.ceil(max(lengths) * 1.1)).all()
     assert (locations["stop"].to_numpy()[:-1] <= locations["start"].to_numpy()[1:]).all()
     best = find_performances(pipe, TAKE, threshold=None, max_hits=2)[1]
     assert sorted(best["score"]) == sorted(locations["score"])[-2:]
