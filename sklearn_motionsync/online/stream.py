@@ -409,10 +409,10 @@ def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
     if wrong.any():
         i = int(wrong.argmax())
         before, now = given[i : i + 2] / scale
+        by = f", by {SMALLEST:g} to {LARGEST:g} frames" if steps[i] > 0 else ""
         raise ValueError(
-            f"{what}: time stamps must increase, but {now:.10g} follows {before:.10g}; from one "
-            f"to the next by {SMALLEST:g} to {LARGEST:g} frames. Leave out a frame that comes "
-            "twice or late; begin another performance with reset()."
+            f"{what}: time stamps must increase{by}, but {now:.10g} follows {before:.10g}. Leave "
+            "out a frame that comes twice or late; begin another performance with reset()."
         )
     return frames
 
