@@ -60,6 +60,12 @@ def test_variants_of_programs_are_the_same(tmp_path, text):
     assert df.attrs["units"] == "mm"
 
 
+def test_without_a_row_of_axes_the_header_says_how_many_markers_there_are(tmp_path):
+    bare = TEXT.replace(AXES + "\n", "").replace("\t3\tmm", "\t41\tmm")
+    with pytest.raises(ValueError, match="line 4 names 3 markers, but there are columns for 41"):
+        read(tmp_path, bare)
+
+
 def test_names_are_unique_and_complete(tmp_path):
     df = read(tmp_path, trc(tracks(), ["Anna:KNEE", "Anna:KNEE", "*12"]))
     assert df.attrs["joints"] == ["Anna:KNEE", "Anna:KNEE_2", "*12"]

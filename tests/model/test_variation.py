@@ -176,8 +176,10 @@ def test_variance_of_identical_performances_is_the_floor():
     assert (predictive_variance(np.zeros((3, 4, 1)), np.arange(3)) == 1e-9).all()
 
 
-def test_a_constant_feature_does_not_change_the_others():
+@pytest.mark.parametrize("unit", [1, 1e-3])
+def test_a_constant_feature_does_not_change_the_others(unit):
     X, groups = people([2] * 4)
+    X *= unit
     Y = np.concatenate([X, np.full((8, 15, 1), 0.1)], axis=2)
     v = predictive_variance(Y, groups)
     np.testing.assert_allclose(v[:, :2], predictive_variance(X, groups))
