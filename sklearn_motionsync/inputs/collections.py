@@ -13,6 +13,7 @@ performance that is read in parts sets the precision of all: after single precis
 precision is refused.
 """
 
+from collections import Counter
 from collections.abc import Mapping
 from numbers import Number
 from os import PathLike
@@ -135,6 +136,12 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
     if tables:
         labels, levels = labels_of(sequences, numbers)
         first = column_names(sequences[0])
+        if first is not None and len(set(first)) < len(first):
+            name, count = Counter(first).most_common(1)[0]
+            raise ValueError(
+                f"{name_performance(numbers[0], labels[0])} has {count} columns of the name "
+                f"{name!r}: rename them, as in x.set_axis(names, axis=1)."
+            )
         names = first if fitted is None or first is None else fitted
         frames = [x.index if isinstance(x, pd.DataFrame) else range(len(x)) for x in sequences]
     names = names if tables else None
@@ -144,9 +151,9 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
         return name_performance(numbers[i], labels[i])
 
     for i, x in enumerate(sequences):
-        if tables and column_names(x) != names:
-            of_fit = fitted is not None and names is fitted
-            x = _in_order(x, names, what(i), None if of_fit else what(0).replace("P", "p", 1))
+        own = column_names(x) if tables else None
+        if own != names and _are_same(own, names):
+            x, own = x[names], names
         # For a plain array nothing but NumPy itself is called.
         plain = type(x) is np.ndarray and x.dtype in FLOATS
         array = x if plain else as_numbers(x, what(i))
@@ -156,6 +163,10 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
                 "2 frames and 1 feature. Give a univariate performance as a column, "
                 "x[:, np.newaxis]."
             )
+        if own != names and fitted is not None and names is fitted:
+            check_names(x, names, what(i))
+        elif own != names:
+            _refuse_columns(own, names, what(i), what(0).replace("P", "p", 1))
         arrays.append(array)
         if array.shape[1] != arrays[0].shape[1]:
             turned = all(len(other) == len(arrays[0]) < min(other.shape[1:]) for other in arrays)
@@ -193,21 +204,24 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
     return performances
 
 
-def _in_order(x, names, what, first):
-    """A performance with its columns in the order of these names, those of fit or of the first."""
-    own = column_names(x)
-    if own and names and len(own) == len(names) == len(set(own)) and set(own) == set(names):
-        return x[names]
-    if first is None:
-        check_names(x, names, what)
-        return x
-    lacking, besides = (
-        f"; it {word} {listed([name for name in some or () if name not in (others or ())])}"
-        for word, some, others in (("lacks", names, own), ("has besides", own, names))
+def _are_same(own, names):
+    """Whether names of columns are the same in another order, each of them once."""
+    if not own or not names or len(own) != len(names):
+        return False
+    return len(set(own)) == len(own) and set(own) == set(names)
+
+
+def _refuse_columns(own, names, what, first):
+    """Say which columns a performance lacks, and which it has besides, by the first one."""
+    own_names, known = own or [], names or []
+    lacks = [name for name in known if name not in own_names]
+    besides = [name for name in own_names if name not in known]
+    differ = (f"; it lacks {listed(lacks)}" if lacks else "") + (
+        f"; it has besides {listed(besides)}" if besides else ""
     )
     raise ValueError(
-        f"{what} has the columns {listed(own)}, {first} has {listed(names)}{lacking}{besides}. All "
-        "need the same columns: select them by x[names]; of files, read_motion(paths, "
+        f"{what} has the columns {listed(own)}, and {first} has {listed(names)}{differ}. All need "
+        "the same columns: select them by x[names]; of files, read_motion(paths, "
         "columns='common') leaves out those that some lack."
     )
 
@@ -316,11 +330,11 @@ def gives_rows(X):
 
 
 def _has_no_order(X):
-    """Whether an object has items, but gives neither their number nor an item by its number."""
+    """Whether an object gives neither the number of its items nor an item by its number."""
     if isinstance(X, pd.Series):
         return X.dtype == object and any(_depth(x) >= 2 for x in X)
-    has = [hasattr(X, name) for name in ("__iter__", "__len__", "__getitem__")]
-    return not hasattr(X, "__array__") and any(has) and not all(has[1:])
+    has = [hasattr(X, name) for name in ("__len__", "__getitem__")]
+    return not hasattr(X, "__array__") and not all(has)
 
 
 def _has_items(X):

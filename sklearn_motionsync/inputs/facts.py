@@ -10,12 +10,12 @@ import pandas as pd
 
 from .recorded import frame_rate_of_rows
 
-__all__ = ["TIMELESS", "check_facts", "compare_facts", "facts_in_fit", "facts_of"]
+__all__ = ["SAME_RATE", "TIMELESS", "check_facts", "compare_facts", "facts_in_fit", "facts_of"]
 
 # Attribute of estimators: the different values of each fact in the training set.
 _FACTS = "_facts_in"
 # Rates that differ by less are one: 29.97 and 30, 59.94 and 60 frames a second.
-_SAME_RATE = 0.01
+SAME_RATE = 0.01
 # The facts that matter where the times of frames are given.
 TIMELESS = "units", "up"
 # Units that are spelled in several ways, without a plural's s.
@@ -120,7 +120,7 @@ def compare_facts(facts, called, which=None, known=None, sources=None):
             if values:
                 different[i] = value
             else:
-                values, source = [value], f"{called(i)} has"
+                values, source = [value], f"{called(i)} has".replace("P", "p", 1)
         if values:
             found[fact] = tuple(dict.fromkeys([*values, *different.values()]))
         if different:
@@ -143,7 +143,7 @@ def _report(fact, different, called, source, reference):
 
 
 def _equal(a, b):
-    return a == b if isinstance(a, str) or isinstance(b, str) else abs(a - b) <= _SAME_RATE * b
+    return a == b if isinstance(a, str) or isinstance(b, str) else abs(a - b) <= SAME_RATE * b
 
 
 def _unit(units):

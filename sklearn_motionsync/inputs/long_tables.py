@@ -1,5 +1,6 @@
 """Tables of frames to performances, in order of an even time, and back."""
 
+import reprlib
 from numbers import Real
 
 import numpy as np
@@ -136,7 +137,9 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
             continue
         is_number = isinstance(value, Real) and not isinstance(value, bool)
         if not is_number or not 0 < value < np.inf:
-            raise ValueError(f"{name} must be a number above 0, in units of time; got {value!r}.")
+            raise ValueError(
+                f"{name} must be a number above 0, in units of time; got {reprlib.repr(value)}."
+            )
     if time is None and max_gap_time is not None:
         raise ValueError(f"max_gap_time={max_gap_time!r} needs time=, the column of the times.")
     if time is None and frame_rate is not None:
@@ -282,8 +285,8 @@ def _at_rate(x, frame_rate):
     if own is None:
         raise ValueError(
             f"frame_rate={frame_rate!r} needs time=, the column of the times, or a table whose "
-            f"frame rate is known, by df.attrs['frame_rate'] or an index in seconds; {len(x)} rows "
-            f"with the index {x.index.name!r} have none."
+            f"frame rate is known, by df.attrs['frame_rate'] or an index in seconds; "
+            f"{counted(len(x), 'row')} with the index {x.index.name!r} have none."
         )
     time = next(name for name in ("time", "time_s", "seconds") if name not in x.columns)
     timed = x.assign(**{time: np.arange(len(x)) / own})

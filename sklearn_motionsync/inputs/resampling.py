@@ -1,5 +1,6 @@
 """The times of frames: as numbers, in order, without gaps, and evenly spaced or made so."""
 
+import reprlib
 import warnings
 
 import numpy as np
@@ -177,6 +178,6 @@ def as_frame_rates(frame_rate, n_sequences):
         which = f": performance {int(np.argmin(valid))}" if rate.ndim and not valid.all() else ""
         raise ValueError(
             "frame_rate must be one number above 0, in frames a second, or one for each of the "
-            f"{counted(n_sequences, 'performance')}, got {frame_rate!r}{which}."
+            f"{counted(n_sequences, 'performance')}, got {reprlib.repr(frame_rate)}{which}."
         )
     return rate[..., np.newaxis]

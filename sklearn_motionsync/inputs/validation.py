@@ -327,9 +327,9 @@ def _warn_of_one_trial(rows):
         return
     if _smoothness(rows[np.newaxis]) < _TIME:
         warnings.warn(
-            f"A 2-D input is taken as {n_rows} univariate performances of {n_columns} frames, and "
-            "its rows change smoothly from one to the next. If it is one performance of "
-            f"{n_rows} frames and {n_columns} features, wrap it as [X].",
+            f"A 2-D input is taken as {counted(n_rows, 'univariate performance')} of "
+            f"{n_columns} frames, and its rows change smoothly from one to the next. If it is one "
+            f"performance of {n_rows} frames and {counted(n_columns, 'feature')}, wrap it as [X].",
             UserWarning,
             stacklevel=2,
         )
@@ -338,13 +338,13 @@ def _warn_of_one_trial(rows):
 def _smoothness(arrays):
     """The mean squared step along the rows of arrays (n, a, b), over that along the columns.
 
-    Steps are in units of the variance along the same axis.
+    Steps are in units of the variance along the same axis. NaN of what is constant along one.
     """
     steps = []
     for axis in (1, 2):
         spread = np.square(arrays - arrays.mean(axis=axis, keepdims=True)).sum()
         steps.append(np.square(np.diff(arrays, axis=axis)).sum() / spread if spread > 0 else 0)
-    return steps[0] / steps[1] if steps[1] > 0 else 1
+    return steps[0] / steps[1] if min(steps) > 0 else np.nan
 
 
 def _warn_of_clocks(performances, names):

@@ -9,6 +9,7 @@ import pandas as pd
 
 from ..inputs.numbers import listed
 from ..inputs.tables import FRAME
+from ..inputs.wording import counted
 from .acclaim import read_acclaim
 from .bvh import read_bvh
 from .c3d import MissingGroup, read_c3d
@@ -271,7 +272,8 @@ def _keep_common(recordings):
         )
     if others:
         warnings.warn(
-            f"{len(kept)} columns are common to {len(recordings)} files. Left out are {what}.",
+            f"{len(recordings)} files have {counted(len(kept), 'column')} in common. Left out are "
+            f"{what}.",
             UserWarning,
             stacklevel=3,
         )

@@ -6,10 +6,11 @@ from numbers import Real
 import numpy as np
 import pandas as pd
 
+from ..inputs.facts import SAME_RATE
 from ..inputs.tables import FRAME, label_of_part
 from .gaps import check_max_gap, fill_gaps
 from .text import make_unique
-from .timestamps import SAME_RATE, check_frame_rate, describe_times, warn_of_other_rate
+from .timestamps import check_frame_rate, describe_times, warn_of_other_rate
 
 _DIMENSIONS = ("time", "individual", "keypoint", "space")
 # Older names of some of them.

@@ -6,6 +6,8 @@ from numbers import Real
 
 import numpy as np
 
+from ..inputs.facts import SAME_RATE
+
 # A share of a step by which even times may miss their places, beside rounding.
 _JITTER = 0.1
 # A larger share is never explained by rounding: half a step is what one lost frame leaves.
@@ -14,8 +16,6 @@ _MAX_JITTER = 0.45
 _GAP = 1.9
 # Seconds; no recording has shorter steps.
 _SHORTEST_STEP = 1e-9
-# Two frame rates that differ by a smaller share are the same.
-SAME_RATE = 0.01
 
 
 def check_frame_rate(frame_rate):

@@ -1,5 +1,6 @@
 """find_performances: where in long takes an action happens."""
 
+import reprlib
 import warnings
 from bisect import bisect, insort
 from numbers import Integral, Real
@@ -13,7 +14,7 @@ from sklearn.utils._param_validation import Interval, StrOptions, validate_param
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
-from ..inputs.facts import facts_in_fit, facts_of
+from ..inputs.facts import SAME_RATE, facts_in_fit, facts_of
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import timeless
 from ..inputs.tables import FRAME, as_pandas
@@ -42,8 +43,6 @@ _CLOCK = 100
 # Hits may be shorter and longer than the training performances by this ratio; the larger one is for
 # a single pattern.
 _MARGIN, _MARGIN_OF_ONE = 1.1, 1.5
-# Frame rates that differ by a smaller share are one.
-_SAME_RATE = 0.01
 # Rates that differ by a larger ratio are mistakes.
 _MOST = 100
 # The shortest window, in frames.
@@ -202,7 +201,7 @@ def _at_rate_of(pattern, X, given):
             stacklevel=4,
         )
     paces = [1.0 if known is None or rate is None else rate / known for rate in rates]
-    paces = [1.0 if abs(pace - 1) <= _SAME_RATE else pace for pace in paces]
+    paces = [1.0 if abs(pace - 1) <= SAME_RATE else pace for pace in paces]
     if set(paces) == {1.0}:
         return X, paces
     searched = list(as_collection(X))
@@ -397,7 +396,7 @@ def _check_durations(synchronizer, durations, pace):
     if not (whole and 2 <= pair[0] <= pair[1]):
         raise ValueError(
             "durations must be two whole numbers of frames, the smallest, at least 2, and the "
-            f"largest; got {durations!r}."
+            f"largest; got {reprlib.repr(durations)}."
         )
     # Both ends are frames of the window.
     shortest, longest = ((n - 1) / pace + 1 for n in pair)

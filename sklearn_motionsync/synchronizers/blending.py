@@ -12,7 +12,7 @@ from ..body.direction_cosines import DirectionCosines
 from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
 from ..inputs.collections import NOT_ONE, as_collection, check_members
-from ..inputs.facts import compare_facts
+from ..inputs.facts import SAME_RATE, compare_facts
 from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.recorded import timeless
 from ..inputs.tables import FRAME, labels_of
@@ -30,8 +30,6 @@ _WHOLE = 1e-11
 _SLOWEST = 0.5
 # Largest number of frames of a blend, by that of the longest performance.
 _LONGEST = 100
-# Relative difference of time steps below which the frame rate is the same.
-_SAME_RATE = 0.01
 # Attributes of tables that hold the label of a performance.
 _LABELS = ("performance", "levels")
 
@@ -315,6 +313,6 @@ def _clock(sequences, n_frames, name):
     if not all(index.dtype.kind in "fmM" for index in indices):
         return pd.RangeIndex(n_frames, name=name)
     steps = [(index[-1] - index[0]) / (len(index) - 1) for index in indices]
-    if max(steps) - min(steps) > _SAME_RATE * min(steps):
+    if max(steps) - min(steps) > SAME_RATE * min(steps):
         return pd.RangeIndex(n_frames, name=FRAME)
     return pd.Index(np.arange(n_frames) * steps[0], name=name)

@@ -1,5 +1,6 @@
 """Match: warps of performances to the pattern, the result of every synchronizer."""
 
+import reprlib
 from collections.abc import Mapping
 
 import numpy as np
@@ -406,7 +407,7 @@ def check_match(match, n_sequences, n_frames, name):
 def check_unit(unit):
     """Refuse what is no unit of time."""
     if not (isinstance(unit, str) and unit in UNITS):
-        raise ValueError(f"unit must be one of {list(UNITS)}, got {unit!r}.")
+        raise ValueError(f"unit must be one of {list(UNITS)}, got {reprlib.repr(unit)}.")
     return unit
 
 

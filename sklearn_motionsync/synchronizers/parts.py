@@ -1,6 +1,7 @@
 """PartSynchronizer: a warp for each part of the body, coupled to the warp of the whole body."""
 
 import math
+import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Real
@@ -301,7 +302,7 @@ class PartSynchronizer(Synchronizer):
             )
         known = [*_REFERENCES, *self.parts_]
         if not (isinstance(against, str) and against in known):
-            raise ValueError(f"against must be one of {known}, got {against!r}.")
+            raise ValueError(f"against must be one of {known}, got {reprlib.repr(against)}.")
         if [against] == [*self.parts_]:
             raise ValueError(f"{against!r} is the only part: use against='rest' or 'body'.")
 

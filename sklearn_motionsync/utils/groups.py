@@ -1,5 +1,6 @@
 """Groups and class labels of performances: the one place that checks and encodes them."""
 
+import reprlib
 from collections.abc import Iterable, Mapping, Set, Sized
 from contextlib import suppress
 
@@ -64,7 +65,7 @@ def encode_groups(groups, n_performances, *, name="groups", at_least=1, sort=Fal
         or isinstance(groups, _NOT_LISTS)
         or getattr(groups, "ndim", 1) != 1
     ):
-        got = f"shape {groups.shape}" if hasattr(groups, "shape") else repr(groups)
+        got = f"shape {groups.shape}" if hasattr(groups, "shape") else reprlib.repr(groups)
         raise ValueError(
             f"{name} must be a list or 1-D array with one label for each performance, such as its "
             f"subject; got {got}."
@@ -226,7 +227,9 @@ def _check_labels(labels, name):
     labels = [label.item() if isinstance(label, _SCALARS) else label for label in labels]
     for i, label in enumerate(labels):
         if np.ndim(label):
-            raise ValueError(f"{name}[{i}] is {label!r}: a label is one text, number or date.")
+            raise ValueError(
+                f"{name}[{i}] is {reprlib.repr(label)}: a label is one text, number or date."
+            )
         if pd.isna(label):
             raise ValueError(
                 f"{name}[{i}] is missing, {label!r}: give performance {i} a label, or leave the "

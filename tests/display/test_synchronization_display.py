@@ -176,10 +176,12 @@ def test_tables_tell_their_frame_rate(bunch, pipe):
     given = {"unit": "seconds", "features": [0]}
     rates = [25.0 + k for k in range(len(tables))]
     for display in (SynchronizationDisplay, ActionModelDisplay):
-        told = display.from_estimator(pipe, tables, **given)
+        with pytest.warns(UserWarning, match="Performance 1 has 26 frames a second"):
+            told = display.from_estimator(pipe, tables, **given)
         asked = display.from_estimator(pipe, bunch.data, frame_rate=rates, **given)
         for one, other in zip(np.ravel(told.axes_), np.ravel(asked.axes_), strict=True):
             assert one.get_xlim() == other.get_xlim()
         plt.close("all")
-        with pytest.raises(ValueError, match="needs frame_rate"):
+        pytest_warns = pytest.warns(UserWarning, match="Performance 1 has 27 frames a second")
+        with pytest_warns, pytest.raises(ValueError, match="needs frame_rate"):
             display.from_estimator(pipe, [*tables[1:], bunch.data[0]], **given)

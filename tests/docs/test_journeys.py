@@ -390,7 +390,7 @@ def test_markers_of_several_laboratories(bodies, tmp_path, monkeypatch):
     positions, joints, _ = bodies
     still = np.repeat(positions[0][:1], 60, axis=0)
     (folder / "static.c3d").write_bytes(markers(still, joints))
-    message = r"^24 columns are common to 5 files\. Left out are 6 of 'take2' \['T10_x', "
+    message = r"^5 files have 24 columns in common\. Left out are 6 of 'take2' \['T10_x', "
     with pytest.warns(UserWarning, match=message) as caught:
         left = go("Markers of C3D files", tmp_path, monkeypatch)
     assert len(caught) == 1

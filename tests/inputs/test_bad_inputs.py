@@ -155,6 +155,7 @@ PERFORMANCES = [
     (one(lambda x: dict(enumerate(x))), ALL, ["Performance 2 is of type dict"]),
     (one(lambda x: iter(x)), ALL, ["Performance 2 is of type"]),
     (one(lambda x: None), ALL, ["Performance 2 is of type NoneType"]),
+    ([df.set_axis([*"aab"], axis=1) for df in FRAMES], ALL, ["Performance 0", "2 columns", "'a'"]),
     (FDataGrid(), ALL, ["got FDataGrid", "list(X.data_matrix)"]),
     ([Dataset(), Dataset()], ALL, ["got Dataset", "from_poses(poses)]"]),
     (Dataset(), ALL, ["got Dataset", "from_poses(X)"]),

@@ -202,7 +202,7 @@ def test_several_files_are_read_as_a_list(tmp_path):
 def test_common_columns_of_several_files(tmp_path):
     paths = folder_of(tmp_path)
     message = (
-        r"^6 columns are common to 3 files\. Left out are 3 of 'walk0' \['RKNE_x', 'RKNE_y', "
+        r"^3 files have 6 columns in common\. Left out are 3 of 'walk0' \['RKNE_x', 'RKNE_y', "
         r"'RKNE_z'\]; 3 of 'walk2' \['T10_x', .*\.$"
     )
     with pytest.warns(UserWarning, match=message) as caught:

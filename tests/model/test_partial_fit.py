@@ -257,7 +257,11 @@ def test_partial_fit_takes_all_kinds_of_collections():
     assert_same_state(model, ActionModel().fit(X))
     assert model.feature_names_in_.tolist() == ["x", "y"]
     with pytest.raises(ValueError, match="feature names should match"):
-        model.partial_fit([x[["y", "x"]] for x in named[1]])
+        model.partial_fit([x.rename(columns={"x": "z"}) for x in named[1]])
+    assert_same_state(
+        model.partial_fit([x[["y", "x"]] for x in named[1][:3]]),
+        ActionModel().partial_fit(X).partial_fit(X[:3]),
+    )
     rows = ActionModel().partial_fit(X[:1, :, 0]).partial_fit(X[1:, :, 0])
     assert_same_state(rows, ActionModel().fit(X[:, :, 0]))
     assert rows.sample(2, random_state=0).shape == (2, 10)

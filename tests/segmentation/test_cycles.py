@@ -267,9 +267,10 @@ def test_errors_name_the_bad_take(change, message, gait, fitted):
 def test_refuses_wrong_input_and_parameters(gait, fitted):
     with pytest.raises(ValueError, match="0 performances"):
         CycleSegmenter().fit([])
-    for X in (gait.data[0][:, 0], 3.0):
-        with pytest.raises(ValueError, match=r"one take \(n_frames, n_features\), or a list"):
-            fitted.segment(X)
+    with pytest.raises(ValueError, match=r"one take \(n_frames, n_features\), or a list"):
+        fitted.segment(gait.data[0][:, 0])
+    with pytest.raises(ValueError, match=r"A set of performances is .*got float"):
+        fitted.segment(3.0)
     with pytest.raises(ValueError, match="3 features a frame, but CycleSegmenter is expecting 4"):
         fitted.segment([x[:, :3] for x in gait.data])
     with pytest.raises(NotFittedError):

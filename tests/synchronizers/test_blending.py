@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_bodies import with_still_root
 from scipy.spatial.transform import Rotation
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
@@ -17,6 +16,8 @@ from sklearn_motionsync import (
     blend_performances,
     to_sequences,
 )
+
+from made_bodies import with_still_root
 
 PAPER = Skeleton.paper()
 FORMATS = ("paper", "acclaim", "kinect", "kinect_v2", "mediapipe", "plug_in_gait", "unreal")
