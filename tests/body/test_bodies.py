@@ -3,10 +3,11 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_bodies import moved, standing, turned, turned_over
 from sklearn import clone
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton, to_frame
 from sklearn_motionsync.datasets import make_bending
+
+from made_bodies import moved, standing, turned, turned_over
 
 PAPER = Skeleton.paper()
 NAMES = PAPER.column_names

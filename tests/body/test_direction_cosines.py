@@ -3,9 +3,10 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_bodies import standing
 from sklearn_motionsync import ASpace, DirectionCosines, Skeleton, to_frame
 from sklearn_motionsync.datasets import make_bending
+
+from made_bodies import standing
 
 REFERENCES = ["heading", "parent", "world"]
 

@@ -3,10 +3,11 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_bodies import columns_of
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
 from sklearn_motionsync.body.formats import FORMATS
 from sklearn_motionsync.datasets import load_performances, make_bending
+
+from made_bodies import columns_of
 
 PAPER = Skeleton.paper()
 # Number of joints, some joints by their index, the vertical axis in space, and some landmarks.

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from made_bodies import columns_of, standing, turned, turned_over
 from sklearn.utils import get_tags
 from sklearn_motionsync import ASpace, DirectionCosines, Skeleton, to_frame
 from sklearn_motionsync.body.axes import fill_heading, heading_axes
 from sklearn_motionsync.datasets import load_performances, make_bending
+
+from made_bodies import columns_of, standing, turned, turned_over
 
 PAPER = Skeleton.paper()
 JOINTS = list(PAPER.joints)

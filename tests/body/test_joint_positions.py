@@ -6,7 +6,6 @@ from statistics import median
 import numpy as np
 import pandas as pd
 import pytest
-from made_bodies import moved, standing, turned
 from sklearn import clone, config_context
 from sklearn.pipeline import make_union
 from sklearn_motionsync import (
@@ -17,6 +16,8 @@ from sklearn_motionsync import (
     to_sequences,
 )
 from sklearn_motionsync.datasets import load_performances, make_bending
+
+from made_bodies import moved, standing, turned
 
 PAPER = Skeleton.paper()
 LANDMARKS = list(PAPER.joints)[1:]

@@ -6,10 +6,11 @@ import numpy as np
 import pandas as pd
 import polars as pl
 import pytest
-from made_bodies import columns_of
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton, mirror, to_frame
 from sklearn_motionsync.body.formats import FORMATS
 from sklearn_motionsync.datasets import load_performances, make_bending
+
+from made_bodies import columns_of
 
 PAPER = Skeleton.paper()
 BUNCH = make_bending(3, random_state=1)

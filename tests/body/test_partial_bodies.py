@@ -3,10 +3,11 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_bodies import columns_of, standing, turned
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
 from sklearn_motionsync.datasets import load_performances, make_bending
 from sklearn_motionsync.io import read_motion
+
+from made_bodies import columns_of, standing, turned
 
 PAPER = Skeleton.paper()
 LEGS = ["pelvis", *(f"{s}_{j}" for s in ("left", "right") for j in ("hip", "knee", "ankle"))]

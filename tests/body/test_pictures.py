@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_bodies import columns_of, standing, turned
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
@@ -14,6 +13,8 @@ from sklearn_motionsync import (
     Skeleton,
 )
 from sklearn_motionsync.datasets import make_bending
+
+from made_bodies import columns_of, standing, turned
 
 PAPER = Skeleton.paper()
 PLANE = Skeleton.paper(n_dims=2)

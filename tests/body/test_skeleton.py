@@ -7,10 +7,11 @@ import joblib
 import numpy as np
 import pandas as pd
 import pytest
-from made_bodies import with_still_root
 from sklearn.base import clone
 from sklearn_motionsync import DirectionCosines, Skeleton
 from sklearn_motionsync.datasets import make_bending
+
+from made_bodies import with_still_root
 
 
 def positions_of(skeleton, **attrs):

@@ -3,9 +3,10 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_bodies import columns_of, standing, turned_over
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton
 from sklearn_motionsync.datasets import load_performances, make_bending
+
+from made_bodies import columns_of, standing, turned_over
 
 PAPER = Skeleton.paper()
 UPS = ["x", "y", "z", "-x", "-y", "-z"]

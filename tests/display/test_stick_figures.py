@@ -6,7 +6,6 @@ import pandas as pd
 import pytest
 from artists import bones_drawn
 from IPython.core.formatters import HTMLFormatter
-from made_bodies import with_still_root
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
@@ -18,6 +17,8 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SkeletonDisplay, stick_figures
 from sklearn_motionsync.display.animation import animate
+
+from made_bodies import with_still_root
 
 
 @pytest.fixture(scope="module")
