@@ -120,24 +120,43 @@ class PairTile(Tile):
 
     def costs_of_samples(self, first, last, lows, highs):
         """Yield ``p`` and the costs of its window, one flat array a group, less ``|x_n(p)|^2``."""
-        bases, n_groups = self.bases.sequences, len(self.trellis.groups)
+        bases, moving, n_groups = self.bases.sequences, self.moving, len(self.trellis.groups)
         of_group = self.trellis.of_group.astype(self.dtype)
         weights, inner, penalty = of_group[:, :, np.newaxis, np.newaxis]
-        energies = np.vecdot(self.moving, self.moving).T
-        fixed = np.repeat(weights * energies + penalty, len(bases), axis=2)
+        if n_groups == 1:
+            # All but a constant is in the product.
+            energies = np.vecdot(moving, moving)[:, :, np.newaxis]
+            moving = np.concatenate([moving, weights * energies + penalty], axis=2)
+            bases = np.concatenate([-inner * bases, np.ones_like(bases[:, :, :1])], axis=2)
+        else:
+            energies = np.vecdot(moving, moving).T
+            fixed = np.repeat(weights * energies + penalty, len(bases), axis=2)
         for start in range(first, last, PRODUCT_ROWS):
             stop = min(start + PRODUCT_ROWS, last)
             lowest, highest = start + lows[start], stop + highs[stop - 1]
-            columns = self.moving[:, np.newaxis, lowest:highest].swapaxes(2, 3)
-            products = np.matmul(bases[:, start:stop], columns)
+            columns = moving[:, np.newaxis, lowest:highest].swapaxes(2, 3)
+            products = self._products(stop - start, highest - lowest)
+            np.matmul(bases[:, start:stop], columns, out=products)
             products = products.reshape(self.pairs, stop - start, -1).transpose(1, 2, 0)
             for p, row in enumerate(np.ascontiguousarray(products), start):
                 window = slice(p + lows[p], p + highs[p] + 1)
                 row = row[window.start - lowest : window.stop - lowest]
+                if n_groups == 1:
+                    yield p, row.reshape(1, -1)
+                    continue
                 costs = self._cost_buffer[: n_groups * row.size].reshape(n_groups, *row.shape)
                 np.multiply(row, -inner, out=costs)
                 costs += fixed[:, window]
                 yield p, costs.reshape(n_groups, -1)
+
+    def _products(self, n_rows, n_columns):
+        """An array (n_moving, n_bases, n_rows, n_columns) whose pairs are read side by side."""
+        # An odd number of cache lines from pair to pair: other distances share few of its sets.
+        line = 64 // self.dtype.itemsize
+        size = n_rows * n_columns
+        pitch = (-(-size // line) | 1) * line
+        products = np.empty((self.pairs, pitch), self.dtype)[:, :size]
+        return products.reshape(len(self.moving), -1, n_rows, n_columns)
 
     # Of a single base, too.
     _costs_of_blocks = costs_of_samples
