@@ -34,7 +34,7 @@ from .numbers import (
     column_names,
     listed,
 )
-from .resampling import warn_of_uneven
+from .recorded import warn_of_rows
 from .tables import INDEX_NAMES, as_pandas, labels_of, name_performance, split_table
 from .wording import counted
 
@@ -201,6 +201,7 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
     performances = Performances(arrays, "list", labels, frames, names, levels, numbers)
     if tables:
         performances.facts = [facts_of(x) for x in sequences]
+        warn_of_rows(sequences, what)
     return performances
 
 
@@ -236,9 +237,7 @@ def as_collection(X):
     if isinstance(X, pd.DataFrame):
         if X.index.nlevels < 2:
             return None
-        sequences = split_table(X)
-        warn_of_uneven(sequences)
-        return sequences
+        return split_table(X)
     if isinstance(X, np.ndarray):
         if X.ndim == 3:
             return list(X)

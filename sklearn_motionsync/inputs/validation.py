@@ -91,8 +91,6 @@ class SequenceLevelMixin:
         """Check the input of ``fit``: all performances, or some with their numbers."""
         performances = check_performances(self, X, reset=True, level="sequence", numbers=numbers)
         self._fitted_on_rows = performances.kind == "rows"
-        if not self._fitted_on_rows:
-            _warn_of_clocks(performances, names_of_input(self))
         return performances
 
 
@@ -162,6 +160,8 @@ def check_performances(
     free = reset and not named and getattr(estimator, "skeleton", None) is None
     if free and all(len(x) < width for x in out):
         _warn_of_exchanged_axes(out)
+    if reset and level == "sequence":
+        _warn_of_clocks(out, names_of_input(estimator))
     check_facts(estimator, out.facts, out.called, reset=reset, which=facts)
     return out
 
