@@ -105,7 +105,16 @@ class Performances(tuple):
         return Performances(arrays, kind, labels, frames, self.names, self.levels, numbers)
 
 
-def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=None, names=None):
+def check_members(
+    sequences,
+    *,
+    finite=True,
+    training=True,
+    numbers=None,
+    dtype=None,
+    names=None,
+    timed=False,
+):
     """Check the performances of a collection in one pass.
 
     Parameters
@@ -122,6 +131,8 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
     names : list, default=None
         The columns of tables, in the order that is wanted; by default those of the first. A table
         that has them in another order is brought into this one.
+    timed : bool, default=False
+        Whether the times of frames are given, so that the index need not tell them.
 
     Returns
     -------
@@ -201,7 +212,8 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
     performances = Performances(arrays, "list", labels, frames, names, levels, numbers)
     if tables:
         performances.facts = [facts_of(x) for x in sequences]
-        warn_of_rows(sequences, what)
+        if not timed:
+            warn_of_rows(sequences, what)
     return performances
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from .resampling import is_even, rounded_rate, times_as_numbers
-from .tables import FRAME
+from .tables import FRAME, split_table
 
 __all__ = [
     "CLOCK",
@@ -119,10 +119,12 @@ def refuse_seconds(frames, n_frames, name):
 
 
 def refuse_moved_events(X):
-    """Refuse tables of a list whose rows are not the frames that their events count.
+    """Refuse tables, in a list or in one, whose rows are not the frames that their events count.
 
     Key-frames count the rows of a performance; those of its events would be of other rows.
     """
+    if isinstance(X, pd.DataFrame) and X.index.nlevels > 1:
+        X = split_table(X)
     for i, x in enumerate(X if isinstance(X, (list, tuple)) else ()):
         if not isinstance(x, pd.DataFrame) or not x.attrs.get("events"):
             continue

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.base import clone
-from sklearn_motionsync import find_performances, to_frame
+from sklearn_motionsync import MotionTracker, OnlineSynchronizer, find_performances, to_frame
 from sklearn_motionsync.inputs.recorded import frame_rate_of_rows, recorded_frames
 
 from estimators import EVERY, by_name, data_for, outputs
@@ -166,6 +166,23 @@ def test_a_take_backwards_is_warned_of_where_it_is_searched():
     take = pd.DataFrame({"knee": np.sin(t), "hip": np.cos(1.7 * t)})
     with pytest.warns(UserWarning, match="Performance 0: its rows are not in order of time"):
         find_performances(take.iloc[50:90], take.iloc[::-1])
+
+
+def test_rows_of_tracks_are_even_steps_unless_their_times_are_given():
+    t = np.arange(60) / 30
+    X = [pd.DataFrame({"knee": np.sin(t + k), "hip": np.cos(2 * t + k)}) for k in (0, 0.1, 0.2)]
+    for df in X:
+        df.index, df.attrs = pd.Index(t, name="time"), {"frame_rate": 30}
+    some = [df.drop(df.index[20:25]) for df in X]
+    for live in (OnlineSynchronizer(frame_rate=30), MotionTracker(frame_rate=30, n_particles=10)):
+        tracks = [live.fit(X).track]
+        tracks += [live.smooth] if hasattr(live, "smooth") else []
+        for track in tracks:
+            track(some, times=[df.index for df in some])
+            with pytest.warns(UserWarning, match="Performance 0: .* not even"):
+                track(some)
+            with pytest.warns(UserWarning, match="Performance 0: .* order of time"):
+                track([df.iloc[::-1] for df in X])
 
 
 def test_the_order_of_rows_may_be_meant():
