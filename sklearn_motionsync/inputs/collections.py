@@ -34,7 +34,7 @@ from .numbers import (
     column_names,
     listed,
 )
-from .resampling import warn_of_uneven
+from .recorded import warn_of_rows
 from .tables import INDEX_NAMES, as_pandas, labels_of, name_performance, split_table
 from .wording import counted
 
@@ -105,7 +105,16 @@ class Performances(tuple):
         return Performances(arrays, kind, labels, frames, self.names, self.levels, numbers)
 
 
-def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=None, names=None):
+def check_members(
+    sequences,
+    *,
+    finite=True,
+    training=True,
+    numbers=None,
+    dtype=None,
+    names=None,
+    timed=False,
+):
     """Check the performances of a collection in one pass.
 
     Parameters
@@ -122,6 +131,8 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
     names : list, default=None
         The columns of tables, in the order that is wanted; by default those of the first. A table
         that has them in another order is brought into this one.
+    timed : bool, default=False
+        Whether the times of frames are given, so that the index need not tell them.
 
     Returns
     -------
@@ -201,6 +212,8 @@ def check_members(sequences, *, finite=True, training=True, numbers=None, dtype=
     performances = Performances(arrays, "list", labels, frames, names, levels, numbers)
     if tables:
         performances.facts = [facts_of(x) for x in sequences]
+        if not timed:
+            warn_of_rows(sequences, what)
     return performances
 
 
@@ -236,9 +249,7 @@ def as_collection(X):
     if isinstance(X, pd.DataFrame):
         if X.index.nlevels < 2:
             return None
-        sequences = split_table(X)
-        warn_of_uneven(sequences)
-        return sequences
+        return split_table(X)
     if isinstance(X, np.ndarray):
         if X.ndim == 3:
             return list(X)

@@ -8,14 +8,12 @@ import warnings
 
 import pandas as pd
 
-from .recorded import frame_rate_of_rows
+from .recorded import SAME_RATE, frame_rate_of_rows
 
-__all__ = ["SAME_RATE", "TIMELESS", "check_facts", "compare_facts", "facts_in_fit", "facts_of"]
+__all__ = ["TIMELESS", "check_facts", "compare_facts", "facts_in_fit", "facts_of"]
 
 # Attribute of estimators: the different values of each fact in the training set.
 _FACTS = "_facts_in"
-# Rates that differ by less are one: 29.97 and 30, 59.94 and 60 frames a second.
-SAME_RATE = 0.01
 # The facts that matter where the times of frames are given.
 TIMELESS = "units", "up"
 # Units that are spelled in several ways, without a plural's s.
@@ -27,7 +25,7 @@ _WORDS = {
         "{:g} frames a second",
         "Durations and speeds are compared in frames. Resample: to_sequences(x, frame_rate={:g}).",
     ),
-    "units": ("the unit {!r}", "Convert the numbers, and set x.attrs['units'] = {!r}."),
+    "units": ("the unit {!r:.60}", "Convert the numbers, and set x.attrs['units'] = {!r:.60}."),
     "up": ("the vertical axis {!r}", "Turn the positions, and set x.attrs['up'] = {!r}."),
 }
 
@@ -39,7 +37,7 @@ def facts_of(x):
     up = x.attrs.get("up")
     facts = {
         "frame_rate": frame_rate_of_rows(x),
-        "units": _unit(x.attrs.get("units")),
+        "units": _unit(x),
         "up": up if isinstance(up, str) else None,
     }
     return {fact: value for fact, value in facts.items() if value is not None}
@@ -146,9 +144,17 @@ def _equal(a, b):
     return a == b if isinstance(a, str) or isinstance(b, str) else abs(a - b) <= SAME_RATE * b
 
 
-def _unit(units):
-    """The unit, or the different units of channels, as one text; None if there is none."""
-    given = units if isinstance(units, (list, tuple)) else [units]
-    names = [unit.strip() for unit in given if isinstance(unit, str)]
-    names = [_UNITS.get(name.lower().removesuffix("s"), name) for name in names]
-    return " ".join(dict.fromkeys(names)) or None
+def _unit(x):
+    """The unit of a table as one text, or those of its columns by their names; None without any."""
+    given, names = x.attrs.get("units"), x.attrs.get("channels")
+    given = given if isinstance(given, (list, tuple)) else [given]
+    units = [unit.strip() if isinstance(unit, str) else "" for unit in given]
+    units = [_UNITS.get(unit.lower().removesuffix("s"), unit) for unit in units]
+    if len(set(units)) < 2:
+        return units[0] or None if units else None
+    # pandas leaves attrs as they are where columns are selected or rearranged.
+    names = names if isinstance(names, (list, tuple)) and len(names) == len(units) else x.columns
+    if len(names) == len(units):
+        known = dict(zip(names, units, strict=True))
+        units = [known.get(name, "") for name in sorted(x.columns, key=str)]
+    return " ".join(units[:1] if len(set(units)) == 1 else units)

@@ -9,13 +9,12 @@ import pandas as pd
 from .collections import NOT_ONE, as_collection, check_members
 from .facts import TIMELESS, compare_facts
 from .numbers import refuse_non_numeric
-from .recorded import CLOCK, Recorded, frame_rate_of_rows
+from .recorded import CLOCK, Recorded, frame_rate_of_rows, warn_of_rows
 from .resampling import (
     even_grid,
     find_time_gaps,
     interpolate,
     times_as_numbers,
-    warn_of_uneven,
 )
 from .tables import (
     FRAME,
@@ -147,7 +146,7 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
         return [_at_rate(x, frame_rate) for x in sequences]
     if by is None and time is None:
         sequences = split_table(df)
-        warn_of_uneven(sequences)
+        warn_of_rows(sequences, lambda i: f"Performance {sequences[i].attrs['performance']!r}")
         return sequences
     if df.index.nlevels > 1:
         df = df.rename_axis(index=full_names(df.index.names))

@@ -7,21 +7,26 @@ are.
 
 import math
 import re
+import warnings
 from numbers import Real
 
 import numpy as np
 import pandas as pd
 
 from .resampling import is_even, rounded_rate, times_as_numbers
+from .tables import FRAME, split_table
 
 __all__ = [
     "CLOCK",
+    "SAME_RATE",
     "Recorded",
     "frame_rate_of_rows",
+    "is_thinned",
     "recorded_frames",
     "refuse_moved_events",
     "refuse_seconds",
     "timeless",
+    "warn_of_rows",
 ]
 
 # Key of ``attrs``: the time of frame 0 and the step to the next, where the index is a time.
@@ -32,6 +37,8 @@ _OF_ROWS = ("events", "times", "first_frame", "first_time", "rows", CLOCK)
 _SECONDS = re.compile(r"(time|t)?[\s_]*[(\[]?(s|secs?|seconds?)?[)\]]?", re.IGNORECASE)
 # Seconds; longer steps of a time are of another unit.
 _LONGEST_STEP = 1
+# Rates that differ by less are one: 29.97 and 30, 59.94 and 60 frames a second.
+SAME_RATE = 0.01
 # A share of a step by which rounding may move a time.
 _ROUNDING = 0.4
 # Key-frames are seconds if all of a performance are below 1, or in this share of it. Of 585 moments
@@ -112,10 +119,12 @@ def refuse_seconds(frames, n_frames, name):
 
 
 def refuse_moved_events(X):
-    """Refuse tables of a list whose rows are not the frames that their events count.
+    """Refuse tables, in a list or in one, whose rows are not the frames that their events count.
 
     Key-frames count the rows of a performance; those of its events would be of other rows.
     """
+    if isinstance(X, pd.DataFrame) and X.index.nlevels > 1:
+        X = split_table(X)
     for i, x in enumerate(X if isinstance(X, (list, tuple)) else ()):
         if not isinstance(x, pd.DataFrame) or not x.attrs.get("events"):
             continue
@@ -128,6 +137,71 @@ def refuse_moved_events(X):
                 "Cut performances by cut_at_events, which moves events; if the key-frames count "
                 "rows, give df.reset_index(drop=True)."
             )
+
+
+def warn_of_rows(sequences, called):
+    """Warn of the first table whose index says that its rows are not even steps of time.
+
+    Or that they have a frame rate of which the one in ``attrs`` is no multiple: rows may have been
+    left out since.
+
+    Parameters
+    ----------
+    sequences : list of DataFrame and of others, which pass
+    called : callable
+        Gives the name of a performance by its index.
+    """
+    for i, x in enumerate(sequences):
+        trouble = _trouble_of_rows(x) if isinstance(x, pd.DataFrame) else None
+        if trouble:
+            warnings.warn(f"{called(i)}: {trouble}", UserWarning, stacklevel=3)
+            return
+
+
+def _trouble_of_rows(x):
+    """What is wrong with the rows of a table, and what to do, by its index; None if nothing is."""
+    index = _frame_level(x)
+    if index.dtype.kind not in "iufmM" or len(index) < 2:
+        return None
+    if isinstance(index, pd.RangeIndex) and index.step > 0:
+        return None
+    times = times_as_numbers(index, "The index")
+    if not np.isfinite(times).all():
+        return None
+    name, steps = FRAME if index.name is None else index.name, np.diff(times)
+    if (steps < 0).any():
+        row = int((steps < 0).argmax())
+        return (
+            f"its rows are not in order of time. By the level {name!r} of its index "
+            f"{times[row + 1]:.10g} follows {times[row]:.10g}. Sort it by x.sort_index(); if the "
+            "order is meant, number the rows by x.reset_index(drop=True)."
+        )
+    rate = x.attrs.get("frame_rate")
+    # Whole numbers are numbers of frames; those of a recording at a frame rate tell its time.
+    timed = index.dtype.kind in "fmM" or _is_rate(rate)
+    if timed and (steps != steps[0]).any() and not is_even(times):
+        worst = steps.argmax()
+        return (
+            f"the times of its rows, level {name!r} of the index, are not even: from "
+            f"{times[worst]:.10g} to {times[worst + 1]:.10g} it is {steps[worst]:.4g}, mostly "
+            f"{np.median(steps):.4g}. Frames count as evenly spaced: "
+            f"to_sequences(df, time={name!r}) makes them so."
+        )
+    own = _rate_of_seconds(index) if _is_rate(rate) and recorded_frames(x) is None else None
+    if own is not None and not is_thinned(own, rate):
+        return (
+            f"its index has {own:g} frames a second, and x.attrs['frame_rate'] is {rate:g}. The "
+            "index is taken. Correct the wrong one."
+        )
+    return None
+
+
+def is_thinned(rate, recorded):
+    """Whether a frame rate is that of every k-th frame of a recording; False if one is None."""
+    if not rate or not recorded:
+        return False
+    k = round(recorded / rate)
+    return k >= 1 and abs(rate * k - recorded) < SAME_RATE * recorded
 
 
 def timeless(x):

@@ -1,7 +1,6 @@
 """The times of frames: as numbers, in order, without gaps, and evenly spaced or made so."""
 
 import reprlib
-import warnings
 
 import numpy as np
 import pandas as pd
@@ -17,7 +16,6 @@ __all__ = [
     "is_even",
     "rounded_rate",
     "times_as_numbers",
-    "warn_of_uneven",
 ]
 
 # Steps of time longer than so many median steps are gaps.
@@ -101,36 +99,6 @@ def even_grid(times, frame_rate, what):
     if frame_rate is None:
         return np.linspace(times[0], times[-1], n_steps + 1)
     return np.minimum(times[0] + np.arange(n_steps + 1) / frame_rate, times[-1])
-
-
-def warn_of_uneven(sequences):
-    """Warn of performances whose index is a time that is not even.
-
-    Whole numbers are numbers of frames, some of which may be missing.
-
-    Parameters
-    ----------
-    sequences : list of DataFrame
-        As `split_table` gives them.
-    """
-    for x in sequences:
-        if x.index.dtype.kind not in "fmM" or len(x) < 2:
-            continue
-        label, name = x.attrs["performance"], x.index.name
-        times = times_as_numbers(x.index, f"The time of performance {label!r}")
-        if not np.isfinite(times).all() or is_even(times):
-            continue
-        steps = np.diff(times)
-        worst, what = steps.argmax(), "frame" if name is None else name
-        warnings.warn(
-            f"The times of performance {label!r}, level {what!r} of the index, are not even: from "
-            f"{times[worst]:.10g} to {times[worst + 1]:.10g} it is {steps[worst]:.4g}, mostly "
-            f"{np.median(steps):.4g}. Frames count as evenly spaced: to_sequences(df, "
-            f"time={what!r}) makes them so.",
-            UserWarning,
-            stacklevel=3,
-        )
-        return
 
 
 def interpolate(column, times, grid):

@@ -33,6 +33,7 @@ __all__ = [
     "read_collection",
     "read_source",
     "restore",
+    "warn_of_clocks",
 ]
 
 # Attribute of estimators: ``feature_names_in_``, but of any type.
@@ -92,12 +93,22 @@ class SequenceLevelMixin:
         performances = check_performances(self, X, reset=True, level="sequence", numbers=numbers)
         self._fitted_on_rows = performances.kind == "rows"
         if not self._fitted_on_rows:
-            _warn_of_clocks(performances, names_of_input(self))
+            warn_of_clocks(performances, names_of_input(self))
         return performances
 
 
 def check_performances(
-    estimator, X, *, reset, level, on_rows=None, finite=True, numbers=None, dtype=None, facts=None
+    estimator,
+    X,
+    *,
+    reset,
+    level,
+    on_rows=None,
+    finite=True,
+    numbers=None,
+    dtype=None,
+    facts=None,
+    timed=False,
 ):
     """Check the input of an estimator against the contract.
 
@@ -118,6 +129,8 @@ def check_performances(
         Of some of those that were given, as for `check_members`.
     facts : sequence of str, default=None
         The known facts that matter, as for `check_facts`.
+    timed : bool, default=False
+        As for `check_members`.
 
     Returns
     -------
@@ -137,7 +150,7 @@ def check_performances(
             f"{estimator.n_features_in_}) and got a collection of performances. Give it 2-D "
             "input, or fit it on a collection."
         )
-    how = {"numbers": numbers, "dtype": dtype}
+    how = {"numbers": numbers, "dtype": dtype, "timed": timed}
     how |= {} if reset else {"names": names_of_input(estimator)}
     out = check_members(sequences, finite=finite, training=reset, **how)
     width = out[0].shape[1]
@@ -347,7 +360,7 @@ def _smoothness(arrays):
     return steps[0] / steps[1] if min(steps) > 0 else np.nan
 
 
-def _warn_of_clocks(performances, names):
+def warn_of_clocks(performances, names):
     """Warn of a feature, one of several, that only counts the time."""
     n_features = performances[0].shape[1]
     if n_features == 1 or min(map(len, performances)) < _CLOCK_FRAMES:

@@ -6,7 +6,7 @@ from numbers import Real
 import numpy as np
 import pandas as pd
 
-from ..inputs.facts import SAME_RATE
+from ..inputs.recorded import is_thinned
 from ..inputs.tables import FRAME, label_of_part
 from .gaps import check_max_gap, fill_gaps
 from .text import make_unique
@@ -105,7 +105,7 @@ def from_poses(poses, *, min_confidence=None, frame_rate=None, max_gap=0, perfor
         facts["frame_rate"] = fps if frame_rate is None else float(frame_rate)
     else:
         facts |= describe_times("The poses", times, stated=fps, frame_rate=frame_rate, unit=unit)
-        if frame_rate is None and not _is_thinned(facts["frame_rate"], fps):
+        if frame_rate is None and not is_thinned(facts["frame_rate"], fps):
             warn_of_other_rate("The poses", fps, facts["frame_rate"])
     joints = make_unique(_read_names(position, "keypoint"))
     facts |= {"kind": "keypoints", "joints": joints, "parents": [-1] * len(joints)}
@@ -177,14 +177,6 @@ def _read_axes(position):
             "other coordinates to these."
         )
     return axes
-
-
-def _is_thinned(rate, fps):
-    """Whether every k-th frame of ``fps`` makes this frame rate."""
-    if not rate or not fps:
-        return False
-    k = round(fps / rate)
-    return k >= 1 and abs(rate * k - fps) < SAME_RATE * fps
 
 
 def _read_times(position, attrs):

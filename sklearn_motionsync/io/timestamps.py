@@ -6,7 +6,7 @@ from numbers import Real
 
 import numpy as np
 
-from ..inputs.facts import SAME_RATE
+from ..inputs.recorded import SAME_RATE
 
 # A share of a step by which even times may miss their places, beside rounding.
 _JITTER = 0.1

@@ -313,6 +313,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
             on_rows=self._fitted_on_rows,
             finite="allow-nan",
             facts=None if times is None else TIMELESS,
+            timed=times is not None,
         )
         tracks, times = [], times_of_each(times, len(performances))
         for i, (x, t) in enumerate(zip(performances, times, strict=True)):

@@ -11,6 +11,7 @@ from sklearn.utils.validation import check_is_fitted
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS, check_facts, facts_of
 from ..inputs.numbers import LARGEST, as_numbers, check_finite, check_magnitude
+from ..inputs.recorded import warn_of_rows
 from ..inputs.tables import as_pandas, labels_of, name_performance
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
@@ -340,6 +341,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
             *(TIMELESS if projection is None else ()),
             *(["frame_rate"] if times is None else ()),
         ]
+        if times is None:
+            warn_of_rows(sequences, labels.__getitem__)
         facts = [facts_of(x) for x in sequences]
         check_facts(self, facts, labels.__getitem__, reset=False, which=which)
         times = [times] if single else times_of_each(times, len(sequences))

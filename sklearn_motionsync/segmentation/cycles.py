@@ -18,7 +18,7 @@ from ..body.skeleton import Skeleton
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.validation import check_performances
+from ..inputs.validation import check_performances, names_of_input, warn_of_clocks
 from ..matching.costs import StepTable, step_table
 from ..matching.filters import smooth
 from ..matching.trellis import Trellis
@@ -356,6 +356,8 @@ def check_takes(segmenter, X, *, reset):
     # A period is that of its take, at any frame rate.
     facts = TIMELESS if segmenter.period is None else None
     takes = check_performances(segmenter, X, reset=reset, level="sequence", facts=facts)
+    if reset:
+        warn_of_clocks(takes, names_of_input(segmenter))
     return as_collection(X), takes
 
 

@@ -14,9 +14,9 @@ from sklearn.utils._param_validation import Interval, StrOptions, validate_param
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
-from ..inputs.facts import SAME_RATE, facts_in_fit, facts_of
+from ..inputs.facts import facts_in_fit, facts_of
 from ..inputs.numbers import as_numbers, check_finite
-from ..inputs.recorded import timeless
+from ..inputs.recorded import SAME_RATE, timeless
 from ..inputs.tables import FRAME, as_pandas
 from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..inputs.wording import counted

@@ -12,9 +12,9 @@ from ..body.direction_cosines import DirectionCosines
 from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
 from ..inputs.collections import NOT_ONE, as_collection, check_members
-from ..inputs.facts import SAME_RATE, compare_facts
+from ..inputs.facts import compare_facts
 from ..inputs.numbers import as_numbers, check_finite, check_names
-from ..inputs.recorded import timeless
+from ..inputs.recorded import SAME_RATE, timeless
 from ..inputs.tables import FRAME, labels_of
 from ..inputs.wording import counted
 from ..utils.pipelines import flat_steps, route_to_synchronizer, union_transformers

@@ -210,3 +210,27 @@ def test_blends_have_the_facts_that_performances_share():
     X[1].attrs = {"units": "m"}
     with pytest.raises(ValueError, match="Performance 1 has the unit 'm', and performance 0"):
         blend_performances(fitted.match(X[:1] * 6), X, {0: 0.5, 1: 0.5})
+
+
+UNITS = {"force": "N", "moment": "Nm", "emg": "V"}
+
+
+def channels(names, units=None, **facts):
+    x = pd.DataFrame(
+        np.cumsum(np.random.default_rng(0).normal(size=(40, 3)), axis=0), columns=UNITS
+    )
+    x = x[list(names)]
+    x.attrs = {"units": [UNITS[name] for name in names] if units is None else units} | facts
+    return x
+
+
+def test_units_of_columns_are_compared_by_name():
+    first, other = ["force", "moment", "emg"], ["emg", "force", "moment"]
+    kept = channels(other, ["N", "Nm", "V"], channels=first)
+    LinearSynchronizer().fit([channels(first), channels(other), kept, channels(first)])
+    for wrong in (["Nm", "N", "V"], ["N", "N", "V"], ["N", "Nmm", "V"]):
+        with pytest.raises(
+            ValueError, match=r"Performance 1 has the unit .* and performance 0 has"
+        ):
+            LinearSynchronizer().fit([channels(first), channels(first, wrong)])
+    assert len(to_frame([channels(first, ["N"] * 3), channels(first, "N")])) == 80

@@ -55,7 +55,8 @@ def test_events_and_times_are_those_of_the_performance(step):
     assert "first_frame" not in later.attrs
     assert (first.attrs["first_frame"], first.attrs["first_time"]) == (7, 2.0)
     # An index in seconds tells a frame rate, but not where the events are.
-    part = cut([timed.iloc[::step]] * 2)[0][0]
+    with pytest.warns(UserWarning, match=r"index has .* frames a second, .* is 120"):
+        part = cut([timed.iloc[::step]] * 2)[0][0]
     assert part.attrs["frame_rate"] == pytest.approx(50 / step)
     assert "events" not in part.attrs
 

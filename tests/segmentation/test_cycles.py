@@ -384,3 +384,10 @@ def test_cycles_work_in_pipelines_and_cross_validation(gait):
     pipe = make_pipeline(ASpace(3), DenseSynchronizer(30), ActionModel())
     scores = cross_val_score(pipe, cycles, groups=locations["take"], cv=GroupKFold(3))
     assert np.isfinite(scores).all()
+
+
+def test_a_feature_that_counts_the_time_is_warned_of():
+    takes = make_gait(2, n_cycles=4, takes=True, random_state=0).data
+    timed = [np.column_stack([x, np.arange(len(x)) / 100]) for x in takes]
+    with pytest.warns(UserWarning, match="Feature 4 increases evenly"):
+        CycleSegmenter(start=0).fit(timed)

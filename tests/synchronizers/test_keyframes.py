@@ -266,6 +266,10 @@ def test_events_of_other_rows_are_no_keyframes():
         for call in (KeyframeSynchronizer().fit, sync.match, sync.transform):
             with pytest.raises(ValueError, match=f"Performance 2: .*{words} of the recording"):
                 call(X, keyframes=keyframes)
+            table = pd.concat(X, keys=range(3))
+            table.attrs = takes[0].attrs
+            with pytest.raises(ValueError, match=f"Performance 2: .*{words} of the recording"):
+                call(table, keyframes=keyframes)
             call([x.reset_index(drop=True) for x in X], keyframes=[[30.5], [30.5], [20.5]])
         # Without key-frames, or events to take them from, rows count.
         KeyframeSynchronizer().fit(X)
