@@ -183,8 +183,7 @@ def _is_thinned(rate, fps):
     """Whether every k-th frame of ``fps`` makes this frame rate."""
     if not rate or not fps:
         return False
-    k = round(fps / rate)
-    return k >= 1 and abs(rate * k - fps) < SAME_RATE * fps
+    return abs(rate * round(fps / rate) - fps) < SAME_RATE * fps
 
 
 def _read_times(position, attrs):
