@@ -65,7 +65,7 @@ def find_gaps(df):
     joint, first, last = _find(_missing(values, n_dims))
     return pd.DataFrame(
         {
-            "joint": np.array(joints, dtype=object)[joint],
+            "joint": np.array(joints)[joint],
             "first": first,
             "last": last,
             "n_frames": last - first + 1,

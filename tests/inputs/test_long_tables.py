@@ -469,6 +469,7 @@ REFUSED = [
     (lambda df: df[:0], BY, ["no rows"]),
     (lambda df: df, {"by": ["subject", "take"]}, ["['take']", "'trial'", CALL]),
     (lambda df: df, {"by": []}, ["no column", CALL]),
+    (lambda df: df.drop(columns="time"), {"by": KEYS, "time": "frame"}, ["['frame']", "levels []"]),
     (lambda df: df, {"by": ["trial", "trial"]}, ["different"]),
     (lambda df: df, {"by": "trial", "time": "trial"}, ["different"]),
     (lambda df: df.rename(columns={"hip": "subject"}), BY, ["by=['subject', 'trial']", "once"]),

@@ -80,13 +80,16 @@ def test_number_of_frames_may_be_that_of_the_limits_of_the_trial(tmp_path, first
 
 @pytest.mark.parametrize("machine", [84, 85, 86])
 def test_a_parameter_may_have_its_length_in_the_other_byte_order(tmp_path, machine):
-    content = c3d(tracks(), machine)
-    for name in (b"LABELS", b"UNITS"):
+    others = {"LONG": {"NOTE": texts("x" * 250, "y" * 250)}}
+    others["FORCE_PLATFORM"] = {"USED": (1, [], b"\2")}
+    content = c3d(tracks(), machine, others=others)
+    for name in (b"LABELS", b"UNITS", b"NOTE"):
         at = content.index(name) + len(name)
         content = content[:at] + content[at : at + 2][::-1] + content[at + 2 :]
     df = read_motion(put(tmp_path, content, "a.c3d"))
     pd.testing.assert_frame_equal(df, read_motion(put(tmp_path, c3d(tracks(), machine), "a.c3d")))
     assert (df.attrs["joints"], df.attrs["units"]) == (["M0", "M1", "M2"], "mm")
+    assert df.attrs["left_out"] == "the geometry of 2 force plates"
 
 
 def test_of_two_scales_that_of_the_header_is_used_with_a_warning(tmp_path):

@@ -28,6 +28,8 @@ def test_find_gaps_lists_joint_frames_and_place():
     assert gaps.to_numpy().tolist() == expected
     assert list(gaps.columns) == ["joint", "first", "last", "n_frames", "inside"]
     assert find_gaps(with_gaps().dropna()).empty
+    for table in (gaps, find_gaps(with_gaps().dropna())):
+        assert [dtype.kind for dtype in table.dtypes] == ["O", "i", "i", "i", "b"]
 
 
 def test_fill_gaps_fills_inner_gaps_up_to_max_gap():
