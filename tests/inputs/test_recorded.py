@@ -101,6 +101,7 @@ def test_numbers_that_may_be_seconds_are_in_steps_below_one(seconds, rate):
         pd.Index(SECONDS, name="phase"),
         pd.Index(1000 * SECONDS, name="time"),
         pd.Index(10 * np.arange(60), name="time"),
+        pd.Index(2 * np.arange(60), name="time"),
         pd.Index(np.arange(60.0), name="time"),
         pd.RangeIndex(0, 600, 10, name="time"),
         pd.RangeIndex(-3, 57),
