@@ -575,6 +575,13 @@ def test_the_header_has_up_to_18_events(tmp_path, n, width):
     assert {event["frame"] for event in events} <= {1.0}
 
 
+def test_events_of_the_header_without_a_rate_have_their_own_times(tmp_path):
+    header = {"first": 101, "last": 140, "events": [("RHS", 0.5)]}
+    content = c3d(tracks(), header=header, changes={"RATE": floats(0)})
+    events = read_motion(put(tmp_path, content, "a.c3d")).attrs["events"]
+    assert events == [{"label": "RHS", "context": None, "time": 0.5, "frame": None}]
+
+
 def test_first_frame_may_take_one_word_or_two_or_be_0(tmp_path):
     trial = {"ACTUAL_START_FIELD": words(10, 2), "ACTUAL_END_FIELD": words(49, 2)}
     events = {"EVENT": event_parameters()}
