@@ -264,7 +264,7 @@ class Recorded:
         if start is not None and (_is_rate(rate) or first == 0):
             facts["first_time"] = start + (first / rate if first else 0)
         if seconds is not None and frames.max() < len(seconds):
-            seconds = np.asarray(seconds, dtype=np.float64)[frames]
+            seconds = np.asarray(seconds)[frames]
             facts |= _clock_of(seconds if grid is None else np.interp(grid, times, seconds))
         elif _is_rate(rate):
             facts["frame_rate"] = self._rate_of(rate, frames, times, grid)
@@ -314,8 +314,7 @@ def _on_line(x, xs, ys):
     """Interpolate between points that increase, and extrapolate at their mean slope."""
     if xs[0] <= x <= xs[-1]:
         return np.interp(x, xs, ys)
-    end = 0 if x < xs[0] else -1
-    return ys[end] + (x - xs[end]) * (ys[-1] - ys[0]) / max(xs[-1] - xs[0], 1e-300)
+    return ys[0] + (x - xs[0]) * (ys[-1] - ys[0]) / max(xs[-1] - xs[0], 1e-300)
 
 
 def _frame_level(df):

@@ -206,7 +206,7 @@ class _Frames(Recorded):
         frames = self.frames[0] + places * self.step
         if frames[0] < self.frames[0] or frames[-1] > self.frames[-1]:
             return None
-        rows = np.minimum(np.searchsorted(self.frames, frames), len(self.frames) - 1)
+        rows = np.searchsorted(self.frames, frames)
         missing = frames[self.frames[rows] != frames]
         if len(missing):
             raise ValueError(

@@ -65,7 +65,7 @@ def find_gaps(df):
     joint, first, last = _find(_missing(values, n_dims))
     return pd.DataFrame(
         {
-            "joint": np.array(joints, dtype=object)[joint],
+            "joint": np.array(joints)[joint],
             "first": first,
             "last": last,
             "n_frames": last - first + 1,
@@ -151,7 +151,7 @@ def fill_gaps(df, max_gap, *, ends="keep"):
     missing = _missing(values, n_dims)
     joint, first, last = _find(missing)
     places = _places(df)
-    before, after = places.take(first - 1, mode="clip"), places.take(last + 1, mode="clip")
+    before, after = places[first - 1], places.take(last + 1, mode="clip")
     short = (first > 0) & (last < len(df) - 1) & (after - before <= max_gap + 1)
     # By the joint's index: names may be repeated.
     for j in np.unique(joint[short]):

@@ -172,6 +172,17 @@ def test_a_refit_forgets_what_was_known():
         fitted.transform([x.set_axis(x.columns, axis=1) for x in tables(ASpace(), RATES[0][0])])
 
 
+def test_messages_keep_the_names_of_performances():
+    X = tables(ASpace(), {"units": "m"}, {"units": "mm"})
+    for df, name in zip(X, ["Pat", "Pia", "Paul", "Pip", "Per", "Pop"], strict=True):
+        df.attrs["performance"] = name
+    message = (
+        r"^Performance 5 \('Pop'\) has the unit 'mm', and performance 0 \('Pat'\) has the unit"
+    )
+    with pytest.raises(ValueError, match=message):
+        to_frame(X)
+
+
 def test_more_than_one_difference_is_counted():
     with pytest.warns(UserWarning, match=r"Performance 4 has 60 .* 30 frames a second\. 1 more"):
         LinearSynchronizer().fit(tables(ASpace(), RATE, {"frame_rate": 60}, {"frame_rate": 60}))

@@ -398,6 +398,36 @@ def test_parts_of_a_recording_have_their_own_times(time):
     assert "first_frame" not in second.attrs
 
 
+@pytest.mark.parametrize("frame", [-7.0, -0.5, 0.0, 0.4, 1.5, 16.9, 38.5, 39.0, 39.3, 55.0])
+def test_events_stay_at_their_times_between_and_beyond_uneven_frames(frame):
+    """On a straight line between frames, and at the mean step beyond them."""
+    seconds = 2 + np.cumsum(np.random.default_rng(0).uniform(0.009, 0.016, 40))
+    df = recording(seconds, times=seconds.tolist(), events=events_at(frame))
+    (x,) = to_sequences(df.assign(t=seconds), time="t")
+    assert x.attrs["resampled"]
+    pace = (seconds[-1] - seconds[0]) / 39
+    time = np.interp(frame, np.arange(40), seconds)
+    time += pace * (min(frame, 0) + max(frame - 39, 0))
+    step = x.index[1] - x.index[0]
+    (event,) = x.attrs["events"]
+    assert event["frame"] == pytest.approx((time - seconds[0]) / step, abs=1e-4)
+
+
+def test_a_performance_of_one_row_has_a_clock():
+    df = pd.DataFrame({"k": ["a", "a", "b"], "t": [0.0, 0.5, 3.0], "knee": [1.0, 2, 3]})
+    found = to_sequences(df, by="k", time="t")
+    assert [x.attrs["clock"] for x in found] == [(0.0, 0.5), (3.0, 1.0)]
+
+
+def test_levels_without_a_name_have_a_number():
+    index = pd.MultiIndex.from_product([["a", "b"], range(4)])
+    df = pd.DataFrame({"t": [0.0, 1, 2, 3] * 2, "knee": np.arange(8.0)}, index=index)
+    for given in ({"by": "performance"}, {"by": ["performance"], "time": "t"}, {"time": "t"}):
+        found = to_sequences(df, **given)
+        assert [x.attrs["performance"] for x in found] == ["a", "b"]
+        assert found[0].attrs["levels"][0] == "performance"
+
+
 def test_a_recording_keeps_its_name():
     df = recording(np.arange(9.0), performance="walk1", levels=["recording", "frame"])
     (x,) = to_sequences(df.assign(t=np.arange(9)), time="t")
@@ -439,10 +469,17 @@ REFUSED = [
     (lambda df: df[:0], BY, ["no rows"]),
     (lambda df: df, {"by": ["subject", "take"]}, ["['take']", "'trial'", CALL]),
     (lambda df: df, {"by": []}, ["no column", CALL]),
+    (lambda df: df.drop(columns="time"), {"by": KEYS, "time": "frame"}, ["['frame']", "levels []"]),
     (lambda df: df, {"by": ["trial", "trial"]}, ["different"]),
     (lambda df: df, {"by": "trial", "time": "trial"}, ["different"]),
+    (lambda df: df.rename(columns={"hip": "subject"}), BY, ["by=['subject', 'trial']", "once"]),
+    (lambda df: df.rename(columns={"hip": "time"}), BY, ["different columns", "once"]),
     (lambda df: df, {"by": [*KEYS, "time"]}, ["of one row each", CALL]),
     (lambda df: df, {**BY, "max_gap_time": -1}, ["max_gap_time", "above 0", "-1"]),
+    (lambda df: df, {**BY, "max_gap_time": 0}, ["max_gap_time must be a number above 0", "got 0"]),
+    (lambda df: df, {**BY, "frame_rate": 0}, ["frame_rate must be a number above 0", "got 0"]),
+    (lambda df: df, {**BY, "frame_rate": np.inf}, ["frame_rate must be a number above 0"]),
+    (lambda df: df, {**BY, "frame_rate": True}, ["frame_rate must be a number above 0"]),
     (lambda df: df, {**BY, "frame_rate": "fast"}, ["frame_rate", "'fast'"]),
     (lambda df: df, {**BY, "frame_rate": 1e9}, ["frame_rate=1e+09", "frames from 0 to", "units"]),
     (lambda df: df, {**BY, "frame_rate": 0.1}, ["frame_rate=0.1", "units"]),

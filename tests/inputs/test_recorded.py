@@ -9,7 +9,14 @@ import pandas as pd
 import pytest
 from sklearn.base import clone
 from sklearn_motionsync import MotionTracker, OnlineSynchronizer, find_performances, to_frame
-from sklearn_motionsync.inputs.recorded import frame_rate_of_rows, recorded_frames
+from sklearn_motionsync.inputs.recorded import (
+    Recorded,
+    frame_rate_of_rows,
+    recorded_frames,
+    refuse_moved_events,
+    refuse_seconds,
+    timeless,
+)
 
 from estimators import EVERY, by_name, data_for, outputs
 
@@ -31,6 +38,8 @@ ROWS = [
     ("reversed", slice(None, None, -1), RATE),
     ("thinned out backwards", slice(None, None, -3), RATE / 3),
     ("one", slice(7, 8), RATE),
+    ("two", [3, 8], RATE / 5),
+    ("the same two", [3, 3], None),
     ("with a hole", [0, 1, 2, 5, 6], None),
     ("shuffled", [4, 0, 2, 1, 3], None),
     ("twice", [1, 1, 1], None),
@@ -64,6 +73,33 @@ def test_an_index_in_seconds_has_a_frame_rate(index, step):
         df.attrs = attrs
         assert frame_rate_of_rows(df) == pytest.approx(RATE / abs(step), rel=1e-3)
     assert frame_rate_of_rows(df.drop(df.index[5])) is None
+    assert frame_rate_of_rows(df.iloc[:2]) == pytest.approx(RATE / abs(step), rel=0.02)
+    assert frame_rate_of_rows(df.iloc[:1]) is None
+
+
+@pytest.mark.parametrize("name", ["time", "s", None])
+def test_whole_numbers_one_by_one_are_frames_under_any_name(name):
+    for index in (pd.Index(np.arange(3, 63), name=name), pd.RangeIndex(3, 63, name=name)):
+        assert recorded_frames(recording(index)).tolist() == list(range(3, 63))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "rate"),
+    [
+        # Steps of a second are of another unit, and 0 to 1 are shares of a movement.
+        (np.arange(9) * 0.999, 1 / 0.999),
+        (np.arange(9) * 1.0, None),
+        (np.arange(9) / 8, None),
+        (np.arange(9) / 8 + 1, 8),
+        (np.arange(10) / 8, 8),
+        (np.zeros(9), None),
+    ],
+    ids=str,
+)
+def test_numbers_that_may_be_seconds_are_in_steps_below_one(seconds, rate):
+    for times in (seconds, seconds[::-1]):
+        found = frame_rate_of_rows(pd.DataFrame({"knee": times}, index=pd.Index(times, name="t")))
+        assert found == (rate if rate is None else pytest.approx(rate, rel=1e-8))
 
 
 @pytest.mark.parametrize(
@@ -73,8 +109,11 @@ def test_an_index_in_seconds_has_a_frame_rate(index, step):
         pd.Index(SECONDS, name="phase"),
         pd.Index(1000 * SECONDS, name="time"),
         pd.Index(10 * np.arange(60), name="time"),
+        pd.Index(2 * np.arange(60), name="time"),
         pd.Index(np.arange(60.0), name="time"),
+        pd.RangeIndex(0, 600, 10, name="time"),
         pd.RangeIndex(-3, 57),
+        pd.Index(np.arange(-3, 57)),
         pd.Index([np.nan, *SECONDS[1:]], name="time"),
         pd.Index([np.inf, *SECONDS[1:]], name="time"),
         pd.Index([None, *range(59)], dtype="Int64"),
@@ -188,3 +227,167 @@ def test_rows_of_tracks_are_even_steps_unless_their_times_are_given():
 def test_the_order_of_rows_may_be_meant():
     df = pd.DataFrame({"knee": np.arange(60.0)}).iloc[::-1].reset_index(drop=True)
     assert to_frame([df])["knee"].iloc[0] == 59
+
+
+# -- the attrs of some rows ---------------------------------------------------------------------
+
+EVENTS = [
+    {"label": "Strike", "frame": frame} for frame in (-1.0, 0.0, 12.5, None, 30.0, 59.0, 61.0)
+]
+
+
+def described(index=None, **facts):
+    df = recording(index)
+    df.attrs = {"units": "mm", "frame_rate": RATE, "first_time": 2.0} | facts
+    return df
+
+
+@pytest.mark.parametrize(
+    ("index", "facts", "rate"),
+    [
+        # Text tells nothing; seconds tell the rate of rows that follow each other.
+        (list(map(str, range(60))), {}, None),
+        (list(map(str, range(60))), {"frame_rate": None}, "left out"),
+        (pd.Index(SECONDS, name="time"), {}, RATE),
+        (pd.Index(SECONDS, name="time"), {"frame_rate": None}, RATE),
+    ],
+)
+def test_where_the_index_does_not_tell_frames_only_the_rate_is_kept(index, facts, rate):
+    part = Recorded(described(index, events=EVENTS, first_frame=1, **facts))
+    nothing = {"units": "mm", "frame_rate": None}
+    if rate == "left out":
+        assert part.attrs_of(np.arange(4, 9)) == nothing
+    else:
+        assert part.attrs_of(np.arange(4, 9)) == nothing | {"frame_rate": rate}
+    for rows in ([4, 6, 8], [4, 5, 7], [5, 4]):
+        assert part.attrs_of(np.array(rows)) == nothing
+    times = np.arange(5) / 60
+    assert part.attrs_of(np.arange(4, 9), times, times) == nothing
+
+
+def test_a_table_without_a_rate_gets_none():
+    df = recording(list(map(str, range(60))))
+    df.attrs = {"units": "mm"}
+    assert Recorded(df).attrs_of(np.arange(4, 9)) == {"units": "mm"}
+    df.index = pd.Index(SECONDS, name="time")
+    assert Recorded(df).attrs_of(np.arange(4, 9)) == {"units": "mm", "frame_rate": RATE}
+    assert Recorded(df).attrs_of(np.array([4, 6])) == {"units": "mm"}
+    df.index = range(60)
+    assert Recorded(df).attrs_of(np.arange(4, 9)) == {"units": "mm"}
+
+
+@pytest.mark.parametrize(
+    ("first", "stop", "step"), [(0, 60, 1), (0, 60, 2), (10, 50, 1), (7, 46, 3)]
+)
+def test_rows_have_the_events_and_the_clock_of_their_frames(first, stop, step):
+    """Straight from the frames: an event is at its frame less the first, in steps."""
+    rows = np.arange(first, stop, step)
+    for df, places in (
+        (described(events=EVENTS, first_frame=5), rows),
+        (described(events=EVENTS, first_frame=5).iloc[rows], np.arange(len(rows))),
+    ):
+        facts = Recorded(df).attrs_of(places)
+        assert facts["units"] == "mm"
+        assert facts["first_time"] == pytest.approx(2 + first / RATE)
+        assert facts.get("first_frame") == (5 if first == 0 else None)
+        whole = len(places) == len(df)
+        # A whole table may hold several performances, rows mixed, and the rate is that of each.
+        assert facts["frame_rate"] == (RATE if len(df) == 60 else RATE / step)
+        moved = [x if x is None else (x - first) / step for x in (e["frame"] for e in EVENTS)]
+        last = len(rows) - 1
+        if not whole:
+            moved = [x for x in moved if x is None or 0 <= x <= last]
+        assert [e["frame"] for e in facts["events"]] == [
+            x if x is None else pytest.approx(x, abs=1e-5) for x in moved
+        ]
+
+
+def test_rows_out_of_order_have_no_events_and_rows_of_no_rate_no_first_time():
+    rows = np.array([5, 4, 3])
+    facts = Recorded(described(events=EVENTS)).attrs_of(rows)
+    assert "events" not in facts
+    assert facts["first_time"] == pytest.approx(2 + 5 / RATE)
+    facts = Recorded(described(events=EVENTS, frame_rate=None)).attrs_of(np.arange(5, 9))
+    assert "first_time" not in facts
+    facts = Recorded(described(events=EVENTS, frame_rate=None)).attrs_of(np.arange(9))
+    assert facts["first_time"] == 2
+    facts = Recorded(described(events="none")).attrs_of(np.arange(9))
+    assert "events" not in facts
+
+
+@pytest.mark.parametrize("rows", [range(60), range(59)])
+def test_rows_of_a_trimmed_recording_stay_while_all_are_there(rows):
+    facts = Recorded(described(rows=[100, 159])).attrs_of(np.array(rows))
+    assert facts.get("rows") == ([100, 159] if len(rows) == 60 else None)
+
+
+def test_even_times_become_a_rate_and_others_stay():
+    uneven = 2 + np.cumsum(np.arange(60) % 3 + 1.0) / 100
+    even = 2 + SECONDS
+    for seconds, rate in ((uneven, None), (even, RATE)):
+        df = described(times=seconds.tolist(), frame_rate=None)
+        facts = Recorded(df).attrs_of(np.arange(10, 31))
+        assert facts["first_time"] == seconds[10]
+        assert facts["frame_rate"] == (rate if rate is None else pytest.approx(rate))
+        assert facts.get("times") == (seconds[10:31].tolist() if rate is None else None)
+        (one,) = Recorded(df).attrs_of(np.array([7]))["times"]
+        assert one == seconds[7]
+    # Fewer times than frames are of another table.
+    df = described(times=even[:20].tolist())
+    assert Recorded(df).attrs_of(np.arange(20))["first_time"] == 2
+    facts = Recorded(df).attrs_of(np.arange(21))
+    assert (facts["frame_rate"], facts["first_time"]) == (RATE, 2)
+
+
+def test_attrs_that_are_true_of_any_rows():
+    df = described(events=EVENTS, times=SECONDS.tolist(), first_frame=1, rows=[0, 59], clock=(0, 1))
+    assert timeless(df.iloc[::2]) == {"units": "mm", "frame_rate": RATE / 2}
+    df.attrs = {"units": "mm", "rows": [0, 59]}
+    assert timeless(df) == {"units": "mm"}
+
+
+# -- key-frames that cannot be meant ------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("frames", "n_frames", "refused"),
+    [
+        ([0.5], 10, True),
+        ([0.5], 9, False),
+        ([0.1, 0.999], 20, True),
+        ([0.1, 1.0], 20, False),
+        ([0.5, 3.99], 201, True),
+        ([0.5, 4.0], 201, False),
+        ([0.5, 8.3], 100, False),
+        ([0.0, 1.0], 1000, False),
+        ([], 100, False),
+    ],
+)
+def test_key_frames_are_seconds_if_all_are_in_the_first_fiftieth(frames, n_frames, refused):
+    frames = np.array(frames)
+    if not refused:
+        refuse_seconds(frames, n_frames, "Performance 3")
+        return
+    with pytest.raises(
+        ValueError, match=rf"^Performance 3: its key-frames .* has {n_frames} frame"
+    ):
+        refuse_seconds(frames, n_frames, "Performance 3")
+
+
+def test_events_of_other_rows_are_refused_by_row_and_frame():
+    good = described(events=EVENTS)
+    unknown = described(list(map(str, range(60))), events=EVENTS)
+    for X in ([good, unknown], (good,), [good.iloc[:20]], None, np.zeros((2, 9, 1)), [[0.0]], good):
+        refuse_moved_events(X)
+    silent = good.iloc[5:].copy()
+    silent.attrs = {}
+    refuse_moved_events([silent])
+    for rows, row, frame in (
+        (slice(5, None), 0, 5),
+        ([0, 1, 2, 9], 3, 9),
+        (slice(None, None, 2), 1, 2),
+    ):
+        with pytest.raises(
+            ValueError, match=rf"^Performance 2: by its index row {row} is frame {frame} "
+        ):
+            refuse_moved_events([good, np.zeros((9, 1)), good.iloc[rows]])

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 from sklearn_motionsync.io import read_motion
 
 from motion_files import AMC, ASF, joint, put
@@ -80,19 +81,60 @@ def test_angles_may_be_radians(tmp_path):
     pd.testing.assert_frame_equal(acclaim(tmp_path, asf), expected)
 
 
+@pytest.mark.parametrize(("word", "unit"), [(":DEGREES", 1), (":radians", np.pi / 180)])
+def test_the_motion_says_its_own_unit_of_angles(tmp_path, word, unit):
+    expected = acclaim(tmp_path)
+    for asf in (ASF, ASF.replace("angle deg", "angle rad").replace("0 0 90", f"0 0 {np.pi / 2}")):
+        df = acclaim(tmp_path, asf, AMC.replace("90", f"{90 * unit}").replace(":DEGREES", word))
+        np.testing.assert_allclose(df, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_axes_in_any_order_that_turn_alike_give_the_same_positions(tmp_path, seed):
+    """Angles about fixed axes in one order or another, those of SciPy."""
+    rng = np.random.default_rng(seed)
+    orders = ["xyz", "xzy", "yxz", "yzx", "zxy", "zyx"]
+    turns = Rotation.random(3, random_state=seed)
+    asf = ASF.replace("orientation 0 0 0", "orientation {0}").replace("axis XYZ\n", "axis {1}\n")
+    asf = asf.replace("axis 0 0 90 XYZ", "axis {2} {3}")
+    asf = asf.replace("axis 0 0 0 XYZ", "axis {4} {5}\n    dof rz ry")
+    amc = AMC.replace("thigh 0 0", "thigh 20 -30\nshin 5 70")
+    amc = amc.replace("thigh 90 0", "thigh -80 10\nshin -40 33")
+    frames = []
+    for given in (["xyz"] * 3, *(rng.choice(orders, 3) for _ in range(6))):
+        words = []
+        for turn, order in zip(turns, given, strict=True):
+            angles = turn.as_euler(order, degrees=True)
+            words += [" ".join(f"{angle:.12f}" for angle in angles), order.upper()]
+        frames.append(acclaim(tmp_path, asf.format(*words), amc))
+    for df in frames[1:]:
+        np.testing.assert_allclose(df, frames[0], atol=1e-10)
+
+
+def test_small_file_with_a_huge_result_is_refused(tmp_path):
+    bones = "".join(f"begin\nname b{i}\ndirection 0 1 0\nlength 1\nend\n" for i in range(1000))
+    head = ASF[: ASF.index(":bonedata")].replace("TX TY TZ RX RY RZ", "TX")
+    names = " ".join(f"b{i}" for i in range(1000))
+    asf = f"{head}:bonedata\n{bones}:hierarchy\nbegin\nroot {names}\nend\n"
+    amc = "".join(f"{i}\nroot 0\n" for i in range(1, 4000))
+    with pytest.raises(ValueError, match=r"3999 frames of 1001 joints would take 92 MB, from a"):
+        acclaim(tmp_path, asf, amc)
+
+
 def test_frame_rate_is_the_stated_one(tmp_path):
     amc = AMC.replace(":DEGREES", ":DEGREES\n:SAMPLES-PER-SECOND 60")
     assert acclaim(tmp_path, amc=amc).attrs["frame_rate"] == 60
 
 
-def test_skeleton_is_found_by_its_name(tmp_path):
+@pytest.mark.parametrize("between", ["_", "-", " "])
+def test_skeleton_is_found_by_its_name(tmp_path, between):
     put(tmp_path, ASF.replace("length 0.5", "length 1"), "HDM.asf")
-    put(tmp_path, ASF, "HDM_bd.ASF")
-    amc = put(tmp_path, AMC.replace("\n", "\r\n"), "HDM_bd_sneak_120.AMC")
+    put(tmp_path, ASF, f"HDM{between}bd.ASF")
+    amc = put(tmp_path, AMC.replace("\n", "\r\n"), f"HDM{between}bd_sneak_120.AMC")
     assert read_motion(amc).iloc[0, 0] == pytest.approx(INCH)
     assert read_motion(amc, asf=tmp_path / "HDM.asf").iloc[0, 0] == pytest.approx(INCH / 2)
     other = put(tmp_path, AMC, "other.amc")
-    with pytest.raises(ValueError, match=r"none of the \.asf files .* \(HDM.asf, .*give asf="):
+    with pytest.raises(ValueError, match=r"none of the \.asf files .* \(HDM.*, HDM.*give asf="):
         read_motion(other)
     (tmp_path / "HDM.asf").unlink()
     assert read_motion(other).shape == (2, 9)

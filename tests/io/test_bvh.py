@@ -57,9 +57,8 @@ def test_repeated_names_are_numbered(tmp_path):
     assert df.columns.is_unique
 
 
-@pytest.mark.parametrize("deep", [True, False])
-def test_many_joints_deep_and_wide(tmp_path, deep):
-    n = 6000
+@pytest.mark.parametrize(("deep", "n"), [(True, 6000), (False, 40000)])
+def test_many_joints_deep_and_wide(tmp_path, deep, n):
     head = "HIERARCHY\nROOT a { OFFSET 0 0 0 CHANNELS 1 Xposition\n"
     one = "JOINT a { OFFSET 0 1 0 "
     inner = one * n + "} " * n if deep else (one + "} ") * n
@@ -182,6 +181,9 @@ def small(channels="3 Xrotation Yrotation Zrotation", motion="Frames: 1\nFrame T
         (small("0"), "no joint has CHANNELS"),
         (small().replace("}", "End Site { OFFSET 0 0 0 CHANNELS 1 Xrotation } }"), "End Site has"),
         (small(motion=""), "line 7: expected 'Frames: <number>', got ''"),
+        (small(motion="Frame: 1\nFrame Time: 1\n1 2 3\n"), "expected 'Frames: <number>', got 'Fr"),
+        (small(motion="Frames 1\nFrame Time: 1\n1 2 3\n"), "expected 'Frames: <number>', got 'Fr"),
+        (small(motion="Frames: 1\nTime: 1\n1 2 3\n"), "expected 'Frame Time: <number>', got 'Ti"),
         (small(motion="Frames: -1\n"), "Frames: needs a whole number above 0, got '-1'"),
         (small(motion="Frames: 1\nFrame Time: 0\n1 2 3"), "Frame Time: must be above 0"),
         (small(motion="Frames: 1\nFrame Time: inf\n1 2 3"), "Frame Time: needs finite numbers"),

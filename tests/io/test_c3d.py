@@ -11,6 +11,14 @@ from sklearn_motionsync.io import fill_gaps, read_motion
 from motion_files import c3d, put, texts, tracks
 
 
+def floats(*values):
+    return 4, [len(values)], struct.pack(f"<{len(values)}f", *values)
+
+
+def words(*values):
+    return 2, [len(values)], struct.pack(f"<{len(values)}H", *(v % 65536 for v in values))
+
+
 @pytest.mark.parametrize("machine", [84, 85, 86])
 @pytest.mark.parametrize("real", [True, False])
 def test_files_of_every_processor_are_the_same(tmp_path, machine, real):
@@ -72,13 +80,16 @@ def test_number_of_frames_may_be_that_of_the_limits_of_the_trial(tmp_path, first
 
 @pytest.mark.parametrize("machine", [84, 85, 86])
 def test_a_parameter_may_have_its_length_in_the_other_byte_order(tmp_path, machine):
-    content = c3d(tracks(), machine)
-    for name in (b"LABELS", b"UNITS"):
+    others = {"LONG": {"NOTE": texts("x" * 250, "y" * 250)}}
+    others["FORCE_PLATFORM"] = {"USED": (1, [], b"\2")}
+    content = c3d(tracks(), machine, others=others)
+    for name in (b"LABELS", b"UNITS", b"NOTE"):
         at = content.index(name) + len(name)
         content = content[:at] + content[at : at + 2][::-1] + content[at + 2 :]
     df = read_motion(put(tmp_path, content, "a.c3d"))
     pd.testing.assert_frame_equal(df, read_motion(put(tmp_path, c3d(tracks(), machine), "a.c3d")))
     assert (df.attrs["joints"], df.attrs["units"]) == (["M0", "M1", "M2"], "mm")
+    assert df.attrs["left_out"] == "the geometry of 2 force plates"
 
 
 def test_of_two_scales_that_of_the_header_is_used_with_a_warning(tmp_path):
@@ -145,6 +156,114 @@ def test_bytes_too_few_for_a_parameter_are_none(tmp_path):
         read_motion(filled(b"\1\xfeA\xff\1"))
 
 
+def entry(name, group, block=b"", step=None):
+    """A parameter, or a group of a negative number, without a description."""
+    step = 2 + len(block) if step is None else step
+    return bytes([len(name), group % 256]) + name + struct.pack("<H", step) + block
+
+
+def sectioned(*entries, fill=b"\0", n_blocks=0):
+    """A file with these entries, `fill` behind them and the data in the next block."""
+    whole = c3d(tracks())
+    section = bytes([1, 0x50, n_blocks, 84]) + b"".join(entries)
+    n = -(-len(section) // 512)
+    head = whole[:16] + struct.pack("<H", 2 + n) + whole[18:512]
+    return head + section.ljust(512 * n, fill) + whole[512 * (whole[16] - 1) :]
+
+
+POINT = entry(b"POINT", -1, b"\0")
+LABELS = entry(b"LABELS", 1, bytes([255, 2, 4, 3]) + b"LANKRANKLTOE")
+# The section has 4 bytes before the first entry; a name of one letter has 5 beside its block.
+FULL = 512 - 4 - len(POINT + LABELS)
+
+
+@pytest.mark.parametrize("n_blocks", [0, 1, 2, 255])
+@pytest.mark.parametrize(
+    "entries",
+    [
+        (POINT, LABELS),
+        (LABELS, POINT),
+        # A group of 2 bytes behind its name, and a parameter of no texts.
+        (entry(b"POINT", -1), LABELS),
+        (POINT, LABELS, entry(b"NONE", 1, bytes([255, 2, 4, 0]))),
+        # The first of a name counts.
+        (POINT, LABELS, entry(b"LABELS", 1, b"\xff\2\1\3abc"), entry(b"OTHER", -1)),
+        # The last says 0 where the next is, or ends where the data begin.
+        (POINT, entry(b"LABELS", 1, bytes([255, 2, 4, 3]) + b"LANKRANKLTOE", step=0)),
+        (POINT, LABELS, entry(b"X", 1, bytes([255, 2, 1, 99]) + b"x" * (FULL - 9))),
+        (
+            POINT,
+            LABELS,
+            entry(b"X", 1, b"\xff\2\1\1" + b"x" * (FULL - 16)),
+            entry(b"Y", -2, step=0),
+        ),
+    ],
+    ids=range(8),
+)
+def test_parameters_are_found_to_their_end(tmp_path, entries, n_blocks):
+    df = read_motion(put(tmp_path, sectioned(*entries, n_blocks=n_blocks), "a.c3d"))
+    assert df.attrs["joints"] == ["LANK", "RANK", "LTOE"]
+
+
+def test_what_follows_the_stated_blocks_is_no_parameter(tmp_path):
+    full = entry(b"X", 1, bytes([255, 2, 1, 99]) + b"x" * (FULL - 9))
+    content = sectioned(POINT, LABELS, full, b"\1\1" + b"\xff" * 99, n_blocks=1)
+    df = read_motion(put(tmp_path, content, "a.c3d"))
+    assert df.attrs["joints"] == ["LANK", "RANK", "LTOE"]
+    with pytest.raises(ValueError, match="at byte 1024 leads out of the parameters"):
+        read_motion(put(tmp_path, content[:514] + b"\2" + content[515:], "a.c3d"))
+
+
+@pytest.mark.parametrize(
+    ("entries", "message"),
+    [
+        ((POINT, entry(b"X", 1, b"\xff\0x", step=1), LABELS), "at byte 526 leads out of the par"),
+        # Three numbers are said, one is there; the next parameter does not belong to it.
+        ((POINT, entry(b"RATE", 1, b"\4\1\3" + bytes(4)), LABELS), "says 12 bytes of type 4, wh"),
+        ((POINT, entry(b"RATE", 1, b"\4\2\1"), LABELS), "is not complete, or no parameter"),
+        ((POINT, entry(b"RATE", 1, b"\4"), LABELS), "is not complete, or no parameter"),
+        ((POINT, entry(b"RATE", 1, b"\3\0" + bytes(9)), LABELS), "says 3 bytes of type 3, which"),
+        ((POINT, entry(b"RATE", 1, b"\0\0" + bytes(9)), LABELS), "says 0 bytes of type 0, which"),
+        ((POINT, entry(b"RATE", 1, b"\4\x08" + bytes(9)), LABELS), "is not complete, or no par"),
+    ],
+)
+def test_wrong_parameters_are_refused(tmp_path, entries, message):
+    with pytest.raises(ValueError, match=message):
+        read_motion(put(tmp_path, sectioned(*entries), "a.c3d"))
+
+
+def test_a_parameter_has_up_to_seven_dimensions(tmp_path):
+    rate = entry(b"RATE", 1, b"\4\7" + b"\1" * 7 + struct.pack("<f", 25))
+    df = read_motion(put(tmp_path, sectioned(POINT, rate, LABELS), "a.c3d"))
+    assert df.attrs["frame_rate"] == 25
+
+
+@pytest.mark.parametrize("rate", [0.5, 1.0, 29.97, -3.0, 0.0, np.inf, np.nan])
+def test_a_rate_is_any_number_above_0(tmp_path, rate):
+    df = read_motion(put(tmp_path, c3d(tracks(), changes={"RATE": floats(rate)}), "a.c3d"))
+    known = 0 < rate < np.inf
+    assert df.attrs["frame_rate"] == (pytest.approx(rate) if known else None)
+
+
+def test_numbers_that_are_none_are_nan(tmp_path):
+    """Not-a-numbers that signal, infinite analog values, and zero as DEC machines wrote it."""
+    content = c3d(tracks(), analog=np.full((40, 1, 2), 7))
+    data = 512 * (content[16] - 1)
+
+    def patched(content, at, number):
+        return put(tmp_path, content[: data + at] + number + content[data + at + 4 :], "a.c3d")
+
+    for number in (b"\1\0\x80\x7f", struct.pack("<f", np.inf)):
+        with pytest.warns(UserWarning, match=r"of 1 of 3 markers \(M0\): 1 gap"):
+            assert read_motion(patched(content, 4, number)).iloc[0, :3].isna().all()
+        with pytest.warns(UserWarning, match=r"of 1 of 2 analog \(channel_1\)"):
+            df = read_motion(patched(content, 48, number), group="analog")
+        assert df.isna().to_numpy().nonzero() == ([0], [0])
+    df = read_motion(patched(c3d(tracks(), 85), 0, b"\x7f\0\xff\xff"))
+    assert df.iloc[0, 0] == 0
+    assert df.iloc[0, 1] == tracks()[0, 0, 1]
+
+
 @pytest.mark.parametrize(("machine", "order"), [(86, "<"), (84, ">")])
 @pytest.mark.parametrize("real", [True, False])
 def test_integers_may_have_another_byte_order_than_floats(tmp_path, machine, order, real):
@@ -172,10 +291,18 @@ def test_points_at_the_origin_without_a_camera_are_nan(tmp_path, real):
 
 def test_other_marks_of_unseen_points_are_nan(tmp_path):
     positions, words = tracks(), np.zeros((40, 3))
-    positions[5:9, 0], words[5:9, 0] = 0, 65535  # -1 in 16 bits
+    positions[5:9, 0], words[5:9, 0] = 0, [65535, 32768, 0, 0.5]  # 16 bits, the first the sign
+    words[8, 0] = -0.5
+    positions[12:14, 0], words[12:14, 0] = 0, [1, 32767]  # of cameras
     positions[20:22, 1] = 9999999
-    with pytest.warns(UserWarning, match=r"of 2 of 3 markers \(M0, M1\): 2 gaps"):
-        read_motion(put(tmp_path, c3d(positions, words=words), "a.c3d"))
+    with pytest.warns(UserWarning, match=r"of 2 of 3 markers \(M0, M1\): 2 gaps, .* of 4 frames"):
+        df = read_motion(put(tmp_path, c3d(positions, words=words), "a.c3d"))
+    assert (df.iloc[12:14, :3] == 0).all(axis=None)
+
+
+def with_scale(header, parameter):
+    content = c3d(tracks(), changes={"SCALE": floats(parameter)})
+    return content[:12] + struct.pack("<f", header) + content[16:]
 
 
 @pytest.mark.parametrize(
@@ -183,12 +310,19 @@ def test_other_marks_of_unseen_points_are_nan(tmp_path):
     [
         (b"", "byte 1 must be hexadecimal 50 and the file 1024 bytes or more, got nothing and 0"),
         (b"\x02\x51" + bytes(2000), "got 51 and 2002 bytes; it is no C3D file"),
+        (b"\x02\x50" + bytes(1021), "got 50 and 1023 bytes; it is no C3D file"),
+        (b"\x02\x50" + bytes(1022), "byte 515 says processor 0"),
+        (b"\x01\x50" + bytes(2000), "parameters begin in block 1, but the file has 3 blocks"),
         (b"\xff\x50" + bytes(2000), "parameters begin in block 255, but the file has 3 blocks"),
         (c3d(tracks(), machine=87), "says processor 87; 84 .Intel., 85 .DEC. and 86 .MIPS."),
         (c3d(tracks(), header={"points": 9}), "header says 9 markers, POINT:USED says 3"),
         (c3d(tracks(0), header={"points": 0}), "header says 0 markers"),
         (c3d(tracks(), header={"start": 900}), "data begin at byte 460288, POINT:DATA_START"),
         (c3d(tracks(), header={"start": 5}), "data begin at byte 2048, POINT:DATA_START says 1536"),
+        (c3d(tracks(), header={"start": 2}, changes={"DATA_START": None}), "begin at byte 512, PO"),
+        (with_scale(0.0, -1.0), "the header says scale 0, POINT:SCALE says -1; both must be below"),
+        (with_scale(-1.0, 0.0), "the header says scale -1, POINT:SCALE says 0; both must be"),
+        (with_scale(np.inf, 1.0), "the header says scale inf, POINT:SCALE says 1"),
         (c3d(tracks(), header={"last": 9999}, changes={"FRAMES": None}), "it says 9999 frames of"),
         (c3d(tracks(40))[:2000], "it says 40 frames of 48 bytes, but holds 9.7 frames; it is not"),
         (c3d(tracks(), header={"last": 20}, tail=bytes(5000)), "it says 20 or 40 frames"),
@@ -204,19 +338,30 @@ def test_wrong_files_are_refused(tmp_path, content, message):
 
 
 def test_header_counts_where_several_numbers_of_frames_fit(tmp_path):
-    assert len(read_motion(put(tmp_path, c3d(tracks(), header={"last": 39}), "a.c3d"))) == 39
-    assert len(read_motion(put(tmp_path, c3d(tracks(), header={"last": 4}), "a.c3d"))) == 40
+    for last, stated, expected in (
+        (39, {}, 39),
+        (40, {"FRAMES": words(39)}, 40),
+        (4, {}, 40),
+        # The larger of others.
+        (4, {"FRAMES": words(39), "LONG_FRAMES": floats(40)}, 40),
+        (4, {"FRAMES": words(40), "LONG_FRAMES": floats(39)}, 40),
+        (4, {"FRAMES": words(40), "LONG_FRAMES": floats(39.5)}, 40),
+        (4, {"FRAMES": words(40), "LONG_FRAMES": floats(np.inf)}, 40),
+    ):
+        content = c3d(tracks(), header={"last": last}, changes=stated)
+        assert len(read_motion(put(tmp_path, content, "a.c3d"))) == expected
+    content = c3d(tracks(), header={"last": 4})
+    content = content[: 512 * (content[16] - 1) + 40 * 48]
+    for n_more in (0, 1, 511):
+        assert len(read_motion(put(tmp_path, content + bytes(n_more), "a.c3d"))) == 40
+    with pytest.raises(ValueError, match=r"it says 4 or 40 frames of 48 bytes, but holds 50\.7"):
+        read_motion(put(tmp_path, content + bytes(512), "a.c3d"))
+    # One number is enough if the file has as many.
+    alone = c3d(tracks(), header={"last": 4}, changes={"FRAMES": None})
+    assert len(read_motion(put(tmp_path, alone, "a.c3d"))) == 4
 
 
 # -- groups of points ------------------------------------------------------------------
-
-
-def floats(*values):
-    return 4, [len(values)], struct.pack(f"<{len(values)}f", *values)
-
-
-def words(*values):
-    return 2, [len(values)], struct.pack(f"<{len(values)}H", *(v % 65536 for v in values))
 
 
 MODELLED = {
@@ -281,7 +426,7 @@ def test_missing_groups_are_refused(tmp_path):
     with pytest.raises(ValueError, match=message):
         read_motion(path, group="forces")
     path = put(tmp_path, c3d(tracks(), changes={"ANGLES": texts("M0", "M1", "M2")}), "a.c3d")
-    with pytest.raises(ValueError, match=r"no markers in this file; .* 'angles' \(3\)\."):
+    with pytest.raises(ValueError, match=r"no markers in this file; .* reads 'angles' \(3\)\."):
         read_motion(path)
 
 
@@ -345,10 +490,13 @@ def test_of_two_numbers_of_analog_values_the_size_tells_the_right_one(tmp_path, 
     content = c3d(tracks(), real=real, analog=raw, others=others, header={"analog": header})
     path = put(tmp_path, content, "a.c3d")
     right = put(tmp_path, c3d(tracks(), real=real, analog=raw, others=analog_parameters()), "b.c3d")
+    size = 40 * (24 if not real else 48) + raw.size * (4 if real else 2)
+    exact = put(tmp_path, content[: 512 * (content[16] - 1) + size], "c.c3d")  # no padding
     for group in ("analog", "markers"):
-        np.testing.assert_array_equal(
-            read_motion(path, group=group), read_motion(right, group=group)
-        )
+        for other in (path, exact):
+            np.testing.assert_array_equal(
+                read_motion(other, group=group), read_motion(right, group=group)
+            )
 
 
 @pytest.mark.parametrize(("header", "used"), [(9, 7), (24, 4)])
@@ -413,6 +561,27 @@ def test_events_of_the_header_count_from_the_first_frame(tmp_path):
         ]
 
 
+@pytest.mark.parametrize("width", [2, 4])
+@pytest.mark.parametrize("n", [0, 1, 17, 18, 19])
+def test_the_header_has_up_to_18_events(tmp_path, n, width):
+    labels = [f"{i:02d}ab"[:width] for i in range(n)]
+    content = c3d(tracks(), header={"events": [(label, 0.02) for label in labels]})
+    if width == 2:
+        tail = "".join(labels).encode().ljust(116, b"\0")[:116]
+        content = content[:298] + bytes(2) + content[300:396] + tail + content[512:]
+    events = read_motion(put(tmp_path, content[:512] + content[-len(content) + 512 :], "a.c3d"))
+    events = events.attrs["events"]
+    assert [event["label"] for event in events] == (labels if n < 19 else [])
+    assert {event["frame"] for event in events} <= {1.0}
+
+
+def test_events_of_the_header_without_a_rate_have_their_own_times(tmp_path):
+    header = {"first": 101, "last": 140, "events": [("RHS", 0.5)]}
+    content = c3d(tracks(), header=header, changes={"RATE": floats(0)})
+    events = read_motion(put(tmp_path, content, "a.c3d")).attrs["events"]
+    assert events == [{"label": "RHS", "context": None, "time": 0.5, "frame": None}]
+
+
 def test_first_frame_may_take_one_word_or_two_or_be_0(tmp_path):
     trial = {"ACTUAL_START_FIELD": words(10, 2), "ACTUAL_END_FIELD": words(49, 2)}
     events = {"EVENT": event_parameters()}
@@ -441,6 +610,25 @@ def test_events_without_a_time_are_left_out_and_have_no_frame_without_a_rate(tmp
     assert [event["frame"] for event in df.attrs["events"]] == [None] * 3
     df = read_motion(put(tmp_path, c3d(tracks(), others=others), "a.c3d"), frame_rate=25)
     assert df.attrs["events"][0]["frame"] == 110  # the file's own clock
+
+
+def test_events_at_any_time_have_frames_of_five_decimals(tmp_path):
+    times = np.random.default_rng(0).uniform(0, 60, 18).astype("f4")
+    changes = {"RATE": floats(59.94)}
+    columns = {"USED": words(18), "LABELS": texts(*"abcdefghijklmnopqr"), "CONTEXTS": None}
+    minutes = np.column_stack([np.zeros(18, "f4"), times]).ravel()
+    for extra in (b"", struct.pack("<f", 3.0)):  # half a pair is none
+        values = minutes.tobytes() + extra
+        columns["TIMES"] = (4, [len(values) // 4], values)
+        content = c3d(tracks(), changes=changes, others={"EVENT": columns})
+        events = read_motion(put(tmp_path, content, "a.c3d")).attrs["events"]
+        assert [event["label"] for event in events] == [
+            "abcdefghijklmnopqr"[i] for i in times.argsort()
+        ]
+        for event, time in zip(events, np.sort(times).tolist(), strict=True):
+            assert event["time"] == round(time, 6)
+            assert event["frame"] == pytest.approx(time * float(np.float32(59.94)), abs=5e-5)
+            assert event["frame"] == round(event["frame"], 5)
 
 
 @pytest.mark.parametrize("used", [-3, 0.5, np.nan])

@@ -1,5 +1,7 @@
 """find_gaps and fill_gaps."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -26,6 +28,8 @@ def test_find_gaps_lists_joint_frames_and_place():
     assert gaps.to_numpy().tolist() == expected
     assert list(gaps.columns) == ["joint", "first", "last", "n_frames", "inside"]
     assert find_gaps(with_gaps().dropna()).empty
+    for table in (gaps, find_gaps(with_gaps().dropna())):
+        assert [dtype.kind for dtype in table.dtypes] == ["O", "i", "i", "i", "b"]
 
 
 def test_fill_gaps_fills_inner_gaps_up_to_max_gap():
@@ -46,6 +50,9 @@ def test_fill_gaps_fills_inner_gaps_up_to_max_gap():
 def test_two_known_frames_are_joined_by_a_line_and_none_stay_missing():
     df = pd.DataFrame({f"a_{axis}": [np.nan, 4.0, np.nan, np.nan, 7.0] for axis in "xyz"})
     np.testing.assert_allclose(fill_gaps(df, 2)["a_z"], [np.nan, 4, 5, 6, 7])
+    # No line leads beyond them.
+    ends = pd.DataFrame({f"a_{axis}": [np.nan, 4.0, np.nan, 7.0, np.nan] for axis in "xyz"})
+    np.testing.assert_allclose(fill_gaps(ends, 9)["a_x"], [np.nan, 4, 5.5, 7, np.nan])
     df[:] = np.nan
     assert fill_gaps(df, 9).isna().all(axis=None)
     assert find_gaps(df).to_numpy().tolist() == [["a", 0, 4, 5, False]]
@@ -139,6 +146,17 @@ def test_the_warning_says_how_much_is_missing_of_what(kind, share, words):
         warn_of_gaps(df, "a.c3d")
 
 
+def test_the_warning_names_four_joints_of_the_most_gaps_in_their_order():
+    names = [f"{k:02d}{'n' * (38 + k % 3)}" for k in range(40)]
+    df = pd.DataFrame({f"{name}_{axis}": np.zeros(10) for name in names for axis in "xyz"})
+    df.iloc[3] = np.nan
+    df.iloc[5:7, -3:] = np.nan
+    shown = ", ".join(re.escape(name[:40]) for name in [names[-1], *names[:3]])
+    message = rf"of 40 of 40 joints \({shown}, \.\.\.\): 41 gaps, the longest of 2 frames\. Inter"
+    with pytest.warns(UserWarning, match=message):
+        warn_of_gaps(df, "a.c3d")
+
+
 # -- ends -----------------------------------------------------------------------------------
 
 
@@ -168,8 +186,9 @@ def test_events_and_clock_of_a_trimmed_recording(even):
     df.attrs["events"] = [{"label": str(f), "context": None, "frame": f} for f in frames]
     df.attrs |= {"first_frame": 11, "frame_rate": 50.0 if even else None}
     df.attrs |= {"first_time": 2.0} if even else {"times": times.tolist()}
+    df.index.name = "frame"
     trimmed = fill_gaps(df, 5, ends="trim")
-    assert trimmed.index.equals(pd.RangeIndex(46))
+    pd.testing.assert_index_equal(trimmed.index, pd.RangeIndex(46, name="frame"))
     assert [event["frame"] + 4 for event in trimmed.attrs["events"]] == frames[3:6]
     assert trimmed.attrs["rows"] == [4, 49]
     assert trimmed.attrs["first_frame"] == 15

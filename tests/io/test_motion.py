@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn_motionsync import to_frame
-from sklearn_motionsync.io import read_motion
+from sklearn_motionsync.io import fill_gaps, read_motion
 from sklearn_motionsync.io.motion import READERS
 
 import fuzz_readers
@@ -226,6 +226,41 @@ def test_common_columns_of_several_files(tmp_path):
     for x in read_motion(sorted(tmp_path.glob("force*")), group="analog", columns="common"):
         assert list(x) == x.attrs["channels"] == ["a", "b", "c"]
         assert x.attrs["units"] == ["N", "V", "m"]
+
+
+def test_ends_of_a_file_are_trimmed_as_those_of_a_table(tmp_path):
+    x = np.random.default_rng(0).integers(-900, 900, (40, 3, 3)) / 2
+    x[:4, 1] = x[20:23, 0] = np.nan
+    path = put(tmp_path, c3d(x), "a.c3d")
+    with pytest.warns(UserWarning, match="2 gaps"):
+        df = read_motion(path)
+    for given in (path, [path]):
+        for trimmed in [read_motion(given, max_gap=3, ends="trim")]:
+            one = trimmed[0] if isinstance(trimmed, list) else trimmed
+            pd.testing.assert_frame_equal(one, fill_gaps(df, 3, ends="trim"))
+            assert one.attrs["rows"] == [4, 39]
+    with pytest.warns(UserWarning, match=r"1 gap, the longest of 3 frames\. Inter"):
+        assert len(read_motion(path, ends="trim")) == 36
+    with pytest.raises(ValueError, match="ends must be 'keep' or 'trim', got 'cut'"):
+        read_motion(path, ends="cut")
+    path = put(tmp_path, c3d(x, analog=np.ones((40, 1, 2))), "b.c3d")
+    with pytest.raises(ValueError, match=r"got max_gap=0 frames for the analog .* ends='trim'"):
+        read_motion(path, group="analog", ends="trim")
+
+
+@pytest.mark.parametrize(("n", "more"), [(1, ""), (3, ""), (4, "; and some of 1 more"), (5, "2 m")])
+def test_three_files_that_lose_columns_are_named(tmp_path, n, more):
+    paths = [
+        put(tmp_path, c3d(np.ones((2, 2, 3)), changes={"LABELS": texts("A", f"B{i}")}), f"w{i}.c3d")
+        for i in range(n)
+    ]
+    paths.append(put(tmp_path, c3d(np.ones((2, 1, 3)), changes={"LABELS": texts("A")}), "x.c3d"))
+    with pytest.warns(UserWarning, match="have 3 columns in common") as caught:
+        read_motion(paths, columns="common")
+    message = str(caught[0].message)
+    assert [f"3 of 'w{i}'" in message for i in range(n)] == [i < 3 for i in range(n)]
+    assert more in message
+    assert ("more" in message) == bool(more)
 
 
 def test_messages_about_several_files_are_short(tmp_path):

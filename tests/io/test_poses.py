@@ -77,6 +77,27 @@ def test_variants_of_datasets_are_the_same(change):
         assert df.attrs == expected.attrs
 
 
+@pytest.mark.parametrize("dtype", ["f4", "i8", "u1", "?"])
+def test_positions_of_any_numbers_are_float64(dtype):
+    positions = (9 * np.abs(POSITIONS)).astype(dtype)
+    for i, df in enumerate(from_poses(poses(positions))):
+        assert set(df.dtypes) == {np.dtype(np.float64)}
+        np.testing.assert_array_equal(df, positions[..., i].swapaxes(1, 2).reshape(40, 6))
+
+
+@pytest.mark.parametrize("start", [pd.Timestamp("2024-01-01"), pd.Timedelta(7, "s")])
+def test_dates_and_durations_count_from_the_first_frame(start):
+    for df in from_poses(poses(times=start + pd.to_timedelta(np.arange(40) / 50, "s"))):
+        assert (df.attrs["first_time"], df.attrs["frame_rate"]) == (0, 50)
+
+
+def test_equal_times_are_uneven():
+    times = np.arange(40) / 50
+    times[7] = times[6]
+    with pytest.warns(UserWarning, match=r"in steps of 0 to 0\.04 s"):
+        assert from_poses(poses(times=times))[0].attrs["frame_rate"] is None
+
+
 def test_selected_individuals_and_keypoints_keep_their_names():
     expected = from_poses(poses())[1]
     for ds in (poses().sel(individual="bob"), poses().rename(OLD).sel(individuals="bob")):
@@ -124,6 +145,14 @@ def test_positions_of_low_confidence_are_gaps(order):
         (poses(fps=30, unit="frames").isel(time=slice(1, None, 3)), 10),
         (poses(fps=30, unit="frames").assign_attrs(fps=" 29.97 "), 29.97),
         (poses(fps=30, unit="frames").assign_attrs(fps="not known"), None),
+        *(
+            (poses(fps=30, unit="frames").assign_attrs(fps=fps), None)
+            for fps in (0, -30, np.inf, np.nan, None, [30, 30])
+        ),
+        (poses(fps=0.5, unit="frames"), 0.5),
+        # From any time on, in dates and durations.
+        (poses(times=pd.Timestamp("2024-01-01") + pd.to_timedelta(np.arange(40) / 50, "s")), 50),
+        (poses(times=pd.to_timedelta(7 + np.arange(40) / 50, "s"), fps=None), 50),
         (poses().drop_vars("time"), 50),
         (poses().isel(time=[3]), 50),
     ],
@@ -173,6 +202,7 @@ def test_uneven_times_are_kept_with_a_warning(fps, unit, words):
         (poses().position, {"min_confidence": 0.5}, "needs a Dataset with the variable 'confid"),
         (poses(), {"min_confidence": "high"}, r"must be a number such as 0\.6, got 'high'"),
         (poses(), {"frame_rate": 0}, "frame_rate must be frames a second, above 0, got 0"),
+        (poses(), {"max_gap": None}, "max_gap must be a whole number of frames"),
         (poses(), {"max_gap": -1}, "max_gap must be a whole number of frames"),
     ],
 )

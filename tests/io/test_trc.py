@@ -42,6 +42,8 @@ LABELS, AXES = HEAD.split("\n")[3:5]
         TEXT.replace(LABELS, "Frame# \t Time\t" + "\t\t\t".join(NAMES)),
         TEXT.replace("X2\tY2\tZ2", "X17\tY17\tZ17").replace("X1\tY1\tZ1", "x0\ty0\tz0"),
         TEXT.replace(AXES + "\n", ""),
+        TEXT.replace(AXES + "\n", "").replace("NumMarkers", "Markers"),
+        TEXT.replace("NumMarkers", "Markers"),
         # Fewer words in the header, blanks in it, and numbers that were never brought up to date.
         TEXT.replace("\tOrigNumFrames", "").replace("\t1\t40\nFrame", "\t1\nFrame"),
         TEXT.replace("mm\t50.00", "mm   50.00"),
@@ -108,6 +110,29 @@ def test_rows_may_end_behind_a_marker_but_the_last(tmp_path):
     whole = TEXT.split("\n")
     with pytest.raises(ValueError, match=r"line 46: .* 11 in all, got 8"):
         read(tmp_path, "\n".join([*whole[:45], "\t".join(whole[45].split("\t")[:-3])]))
+
+
+@pytest.mark.parametrize(("number", "first"), [("1", 1), ("7", 7), ("0", 0), ("", None)])
+def test_the_first_frame_has_the_number_of_its_row(tmp_path, number, first):
+    text = TEXT.replace("\n1\t0.000\t", f"\n{number}\t0.000\t")
+    assert read(tmp_path, text).attrs["first_frame"] == first
+
+
+@pytest.mark.parametrize("unit", ["mm", "m", "", "f\xfc\xdfe"])
+def test_the_unit_is_the_stated_one_or_none(tmp_path, unit):
+    text = trc(tracks(), NAMES, units=unit)
+    assert read(tmp_path, text).attrs["units"] == (unit or None)
+    assert read(tmp_path, text.replace("Units", "Other")).attrs["units"] is None
+
+
+@pytest.mark.parametrize("n", [1, 2])
+@pytest.mark.parametrize("blank", [[], [0], [1]])
+def test_one_marker_or_two(tmp_path, n, blank):
+    """Between tabs a marker may have no name."""
+    names = ["" if k in blank else f"M{k}" for k in range(n)]
+    df = read(tmp_path, trc(tracks()[:, :n], names))
+    np.testing.assert_array_equal(df, tracks()[:, :n].reshape(40, -1))
+    assert df.attrs["joints"] == [name or f"marker_{k + 1}" for k, name in enumerate(names)]
 
 
 def test_markers_are_kept_if_all_are_at_the_origin(tmp_path):

@@ -76,6 +76,18 @@ def test_postures_have_the_covariance_of_the_training_ones():
     assert np.abs((drawn.mean(axis=0) - X.mean(axis=0)) / X.std(axis=0)).max() < 0.01
 
 
+def test_deviations_of_a_part_of_the_training_set_are_centred():
+    """Those kept may have another mean than all."""
+    X = np.random.default_rng(0).standard_normal((12, 3)) + 5
+    mean, variance, deviations = moments(X)
+
+    def drawn(deviations):
+        random_state = np.random.RandomState(0)
+        return sample_postures(mean, variance, deviations, 500, 3.0, random_state)
+
+    np.testing.assert_allclose(drawn(deviations + [1, -2, 7]), drawn(deviations), rtol=1e-12)
+
+
 @pytest.mark.parametrize("n_std", [0.3, 1.5])
 def test_normal_features_are_cut_off_like_normal_distributions(n_std):
     X = np.random.default_rng(0).standard_normal((2000, 2)) @ [[1.0, 0.9], [0.0, 0.1]]
@@ -285,6 +297,27 @@ def test_directions_in_finds_unit_vectors():
     for numbers in (X[..., [0, 7]], 2 * X, waves(9), X[..., [1, 3, 2, 5]] + 0.01):
         assert not [c for c in directions_in(numbers) if c.stop - c.start == 3]
     assert directions_in(waves(9)) == directions_in(np.ones((2, 3, 1))) == []
+
+
+@pytest.mark.parametrize(
+    ("share", "length", "is_direction"),
+    [
+        # Some may be short, as where a tracker jumps, while most are not.
+        (0.4, 0.06, True),
+        (0.4, 0.0011, True),
+        (0.4, 0.0009, False),
+        (0.6, 0.991, True),
+        (0.6, 0.989, False),
+        (0.01, 1.0009, True),
+        (0.01, 1.0011, False),
+    ],
+)
+def test_directions_have_the_length_1_but_for_short_ones(share, length, is_direction):
+    X = turning().astype(np.float64)[..., 1:4]
+    X /= np.linalg.norm(X, axis=2, keepdims=True)
+    flat = X.reshape(-1, 3)
+    flat[: int(np.ceil(share * len(flat)))] *= length
+    assert directions_in(flat.reshape(X.shape)) == ([slice(0, 3)] if is_direction else [])
 
 
 # -- people -----------------------------------------------------------------------------

@@ -1,0 +1,285 @@
+"""What the readers of text files share: words and their lines, numbers and their limits, names."""
+
+import numpy as np
+import pytest
+from sklearn_motionsync.io.text import (
+    MotionText,
+    check_result_size,
+    decode,
+    make_unique,
+    quote,
+    read_rate,
+    read_timed_rows,
+    split_fields,
+)
+
+from motion_files import put
+
+
+def opened(tmp_path, content):
+    return MotionText(put(tmp_path, content, "a.txt"))
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("mark", ["", "\xef\xbb\xbf"])
+def test_words_come_with_the_number_of_their_line(tmp_path, end, mark):
+    content = mark + end.join(["", "a b", "  ", "c{d}", "e f g", "", "h", "i"])
+    text = opened(tmp_path, content)
+    words = [(text.word("one"), text.line_number) for _ in range(7)]
+    expected = [(b"a", 2), (b"b", 2), (b"c", 4), (b"{", 4), (b"d", 4), (b"}", 4), (b"e", 5)]
+    assert words == expected
+    # What is left of the line, and the lines behind it.
+    assert text.line() == [b"f", b"g"]
+    assert (text.row(), text.line_number, text.is_whole) == (b"h", 7, True)
+    assert text.n_left == 1
+    assert (text.line(), text.line_number, text.is_whole) == ([b"i"], 8, False)
+    assert (text.n_left, text.line(), text.row()) == (0, [], b"")
+    with pytest.raises(ValueError, match=r"a\.txt, line 8: the file ends where one should follow"):
+        text.word("one")
+    text = opened(tmp_path, content)
+    lines = [(words, text.line_number) for words in text.lines()]
+    assert lines == [
+        ([b"a", b"b"], 2),
+        ([b"c{d}"], 4),
+        ([b"e", b"f", b"g"], 5),
+        ([b"h"], 7),
+        ([b"i"], 8),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("word", "good"),
+    [
+        (b"0", True),
+        (b"-999999999999", True),
+        (b"1e12", False),
+        (b"-1e12", False),
+        (b"inf", False),
+        (b"nan", False),
+        (b"1_0", False),
+        (b"x", False),
+        (b"\xff", False),
+        (b"1e-300", True),
+    ],
+)
+def test_numbers_are_finite_and_below_a_limit(tmp_path, word, good):
+    text = opened(tmp_path, "")
+    for words in ([word], [b"1", word], [word, b"-2.5"]):
+        if good:
+            assert list(text.numbers(words, len(words), "it")) == list(map(float, words))
+            continue
+        with pytest.raises(ValueError, match="it needs finite numbers below 1e") as caught:
+            text.numbers(words, len(words), "it")
+        caught.match("got '" + ("ÿ" if word == b"\xff" else word.decode()))
+    with pytest.raises(ValueError, match=r"it needs 2 numbers, got 1 \("):
+        text.numbers([word], 2, "it")
+
+
+def test_many_numbers_below_the_limit_are_read(tmp_path):
+    words = [b"9e11"] * 4
+    assert list(opened(tmp_path, "").numbers(words, 4, "it")) == [9e11] * 4
+    text = opened(tmp_path, "9e11 9e11\n-9e11 9e11\n")
+    assert text.table(2, "a frame").tolist() == [[9e11, 9e11], [-9e11, 9e11]]
+
+
+@pytest.mark.parametrize(
+    ("word", "number"),
+    [("1", 1), ("1.1e-12", 1.1e-12), ("9e11", 9e11), ("1e-12", 0), ("0", 0), ("-1", 0)],
+)
+def test_positive_numbers_have_an_inverse_below_the_limit(tmp_path, word, number):
+    text = opened(tmp_path, "")
+    if number:
+        assert text.positive([word.encode()], "it") == number
+    else:
+        with pytest.raises(ValueError, match="it must be above 0, got"):
+            text.positive([word.encode()], "it")
+
+
+@pytest.mark.parametrize(
+    ("word", "count"),
+    [("1", 1), ("3.0", 3), ("1e12", 10**12), ("0", 0), ("-1", 0), ("1.5", 0), ("1e13", 0)]
+    + [(word, 0) for word in ("nan", "inf", "x", "")],
+)
+def test_counts_are_whole_numbers_above_0(tmp_path, word, count):
+    text = opened(tmp_path, "")
+    if count:
+        assert text.count(word.encode(), "it") == count
+    else:
+        with pytest.raises(ValueError, match=f"it needs a whole number above 0, got '{word}'"):
+            text.count(word.encode(), "it")
+
+
+@pytest.mark.parametrize(
+    ("word", "rate"), [("50", 50), ("0.5", 0.5), ("1e-9", 1e-9), ("0", None), ("-2", None)]
+)
+def test_a_rate_is_a_number_above_0(word, rate):
+    assert read_rate(word.encode()) == rate
+    for nothing in (b"", b"fast", b"inf", b"nan"):
+        assert read_rate(nothing) is None
+
+
+# -- tables ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("blank", [" ", "\t", "  ", " \t"])
+def test_tables_are_read_and_the_line_of_an_error_is_named(tmp_path, seed, blank):
+    rng = np.random.default_rng(seed)
+    n_rows, n = int(rng.integers(1, 30)), int(rng.integers(1, 5))
+    values = rng.normal(size=(n_rows, n)) * 10.0 ** rng.integers(-9, 9, (n_rows, n))
+    lines = [blank.join(map(repr, row)) for row in values.tolist()]
+    if seed % 2:
+        lines = [line + " " * int(rng.integers(3)) for line in lines]
+    end = "\n" * (seed % 3 > 0)
+    text = opened(tmp_path, "head\n" + "\n".join(lines) + end)
+    assert text.line() == [b"head"]
+    np.testing.assert_array_equal(text.table(n, "a frame"), values)
+    assert (text.n_left, text.line_number) == (0, n_rows + 1)
+    # One word too many, or a wrong one.
+    for k in {0, n_rows - 1, n_rows // 2}:
+        for wrong, message in ((lines[k] + " 1", f"got {n + 1}"), ("x " * n, "got 'x'")):
+            other = "\n".join([*lines[:k], wrong, *lines[k + 1 :]])
+            text = opened(tmp_path, "head\n" + other + end)
+            text.line()
+            with pytest.raises(ValueError, match=rf"line {k + 2}: a frame needs .*{message}"):
+                text.table(n, "a frame")
+
+
+@pytest.mark.parametrize("end", ["", "\n"])
+def test_tables_of_several_portions_are_one(tmp_path, end):
+    """Of 4 MB each, and 5 numbers of 9 bytes a line."""
+    values = np.random.default_rng(0).integers(10**7, 10**8, (200_000, 5)).astype(float)
+    lines = [" ".join(f"{x:.0f}" for x in row) for row in values.tolist()]
+    text = opened(tmp_path, "\n".join(lines) + end)
+    np.testing.assert_array_equal(text.table(5, "a frame"), values)
+    assert (text.n_left, text.line_number) == (0, len(lines))
+    for k in (93_207, 199_999):
+        other = "\n".join([*lines[:k], lines[k] + " 1", *lines[k + 1 :]]) + end
+        with pytest.raises(ValueError, match=rf"line {k + 1}: a frame needs 5 numbers, got 6"):
+            opened(tmp_path, other).table(5, "a frame")
+    # A portion that is not plain has no influence on the others.
+    lines[3] = "+" + lines[3].replace(" ", "  ") + "\f"
+    text = opened(tmp_path, "\n".join(lines) + end)
+    np.testing.assert_array_equal(text.table(5, "a frame"), values)
+    assert text.line_number == len(lines)
+
+
+def test_an_empty_table_has_its_columns(tmp_path):
+    for content in ("", " \n\n", "\n"):
+        assert opened(tmp_path, content).table(3, "a frame").shape == (0, 3)
+
+
+@pytest.mark.parametrize(
+    ("n_bytes", "file_size", "refused"),
+    [
+        (2**26, 1, False),
+        (2**26 + 1, 1, True),
+        (2**26 + 1, 2**21, True),
+        (2**26 + 1, 2**21 + 1, False),
+        (2**30, 2**25, False),
+        (2**30 + 1, 2**25, True),
+    ],
+)
+def test_results_are_in_proportion_to_their_file(n_bytes, file_size, refused):
+    if not refused:
+        check_result_size("a.x", file_size, n_bytes, "it")
+        return
+    message = (
+        rf"^a\.x: it would take {round(n_bytes / 2**20)} MB, from a file of {file_size / 2**20:.2f}"
+    )
+    with pytest.raises(ValueError, match=message):
+        check_result_size("a.x", file_size, n_bytes, "it")
+
+
+# -- rows with a time -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("row", "n", "fields"),
+    [
+        (b"a b  c", None, [b"a", b"b", b"c"]),
+        (b"a\tb c\t d ", None, [b"a", b"b c", b"d"]),
+        (b"a\t\tb\t\t", None, [b"a", b"", b"b", b"", b""]),
+        (b"a\t\tb\t\t", 4, [b"a", b"", b"b", b""]),
+        (b"a\t\tb\t\t", 2, [b"a", b"", b"b"]),
+        (b"a\t\t", 0, [b"a"]),
+        (b"\t\t", 0, []),
+        (b"", None, []),
+    ],
+)
+def test_fields_between_tabs_may_be_blank(row, n, fields):
+    assert split_fields(row, n) == fields
+
+
+@pytest.mark.parametrize(
+    ("times", "decimals"),
+    [
+        (["0", "1"], 0),
+        (["0.", "1.5"], 1),
+        (["0.25 ", "1.5"], 2),
+        (["0", "1.000", "2"], 3),
+        (["0.1", "1e0"], 17),
+        (["0.1", "1E0"], 17),
+        (["-1.5", "-1.25", "-1.25"], 2),
+    ],
+)
+def test_times_have_so_many_decimals(tmp_path, times, decimals):
+    rows = [[b"x", b"nan", b"-N/A", b"", time.encode(), b"7"][1:] for time in times]
+    numbers, found = read_timed_rows(opened(tmp_path, ""), rows, 3)
+    assert found == decimals
+    for row, time in zip(numbers, times, strict=True):
+        np.testing.assert_array_equal(row, [np.nan, np.nan, np.nan, float(time), 7])
+
+
+@pytest.mark.parametrize(
+    "times", [["1e12"], ["-1e12"], ["inf"], ["nan"], [""], ["1", "0.999"], ["-1", "-1.5"]]
+)
+def test_times_that_are_none_or_decrease_are_refused(tmp_path, times):
+    with pytest.raises(ValueError, match="the time of a row must be a number of seconds"):
+        read_timed_rows(opened(tmp_path, ""), [[time.encode()] for time in times], 0)
+    good = [[b"-9e11"], [b"9e11"], [b"9e11"]]
+    assert [row[0] for row in read_timed_rows(opened(tmp_path, ""), good, 0)[0]] == [
+        -9e11,
+        9e11,
+        9e11,
+    ]
+    with pytest.raises(ValueError, match="the file ends where frames should follow"):
+        read_timed_rows(opened(tmp_path, ""), [], 0)
+
+
+@pytest.mark.parametrize("wrong", ["1_0", "x", "1e999", "0x1", "nan1"])
+def test_fields_that_are_no_numbers_are_refused(tmp_path, wrong):
+    with pytest.raises(ValueError, match=f"a frame needs numbers, or nothing .* got '{wrong}'"):
+        read_timed_rows(opened(tmp_path, ""), [[b"1", b"nan", wrong.encode()]], 0)
+
+
+# -- names ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_names_that_come_again_get_the_next_free_number(seed):
+    rng = np.random.default_rng(seed)
+    names = [
+        rng.choice(["a", "b", "a_2", "a_3", "a_2_2", "b_2"]) for _ in range(rng.integers(1, 12))
+    ]
+    names = list(map(str, names))
+    expected, last = [], {}
+    for k, name in enumerate(names):
+        if name not in names[:k]:
+            expected.append(name)
+            continue
+        taken = {*names, *expected}
+        number = next(n for n in range(last.get(name, 1) + 1, 99) if f"{name}_{n}" not in taken)
+        last[name] = number
+        expected.append(f"{name}_{number}")
+    assert make_unique(names) == expected
+    assert len(set(expected)) == len(names)
+
+
+def test_words_in_messages_are_short():
+    assert quote([]) == "''"
+    assert quote([b"a", b"b"]) == "'a b'"
+    assert quote([b"x" * 60]) == repr("x" * 60)
+    assert quote([b"x" * 61]) == repr("x" * 60 + "...")
+    assert quote([b"a"] * 9) == repr(" ".join("a" * 8))
+    assert decode("f\xfc".encode()) == decode(b"f\xfc") == "f\xfc"

@@ -1,0 +1,138 @@
+"""Times of frames: the frame rate of even ones, whatever their digits, and what is not even."""
+
+import warnings
+
+import numpy as np
+import pytest
+from sklearn_motionsync.io.timestamps import describe_times, warn_of_other_rate
+
+RATES = [0.5, 10, 23.976, 29.97, 50, 59.94, 100, 120, 250, 1000]
+STEP = 0.02
+
+
+def described(times, **params):
+    """The attrs, which name no uneven times, without a warning."""
+    facts = describe_times("a.trc", np.asarray(times, dtype=float), **params)
+    assert "times" not in facts
+    return facts
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("n_frames", [2, 3, 40, 1000])
+@pytest.mark.parametrize("start", [0, -1, 417])
+def test_even_times_have_their_rate(rate, n_frames, start):
+    times = start + np.arange(n_frames) / rate
+    for decimals in (4, 6, 17):
+        written = np.round(times, decimals)
+        facts = described(written, decimals=decimals)
+        blur = rate * 10.0**-decimals / (n_frames - 1)
+        assert facts["frame_rate"] == pytest.approx(rate, rel=1.1 * blur + 1e-5)
+        assert facts["first_time"] == written[0]
+        # The stated one has more digits, and one per cent is no contradiction.
+        for stated in (rate, 0.995 * rate, 1.005 * rate):
+            facts = described(written, decimals=decimals, stated=stated)
+            assert facts["frame_rate"] == stated
+
+
+@pytest.mark.parametrize("share", [0.5, 0.8, 0.95, 0.98, 1.02, 1.05, 1.2, 2])
+@pytest.mark.parametrize("n_frames", [2, 40])
+def test_exact_times_count_more_than_another_stated_rate(share, n_frames):
+    times = np.arange(n_frames) * STEP
+    assert described(times, stated=50 * share)["frame_rate"] == 50
+    # In frames they say nothing of seconds, and the caller's rate replaces all others.
+    assert described(times, stated=50 * share, unit="frames") == {"frame_rate": None}
+    given = described(times, stated=50 * share, frame_rate=7)["frame_rate"]
+    assert (given, type(given)) == (7.0, float)
+
+
+@pytest.mark.parametrize("decimals", [2, 3])
+@pytest.mark.parametrize("n_frames", [2, 3, 5, 12])
+def test_the_digits_bound_how_well_times_contradict_a_rate(decimals, n_frames):
+    """A digit more or less of the duration is no contradiction, up to a quarter of a step."""
+    for rate in (11, 24, 30, 60):
+        times = np.round(3 + np.arange(n_frames) / rate, decimals)
+        step = (times[-1] - times[0]) / (n_frames - 1)
+        tolerance = min(10.0**-decimals / (n_frames - 1), step / 4)
+        for share in (-1.1, -0.9, -0.3, 0.3, 0.9, 1.1):
+            stated = 1 / (step + share * tolerance)
+            agrees = abs(share) < 1 or abs(step * stated - 1) < 0.01
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                found = describe_times("a", times, decimals=decimals, stated=stated)["frame_rate"]
+            if not agrees:
+                assert found != stated
+            elif np.diff(times).max() < 1.9 * step:
+                assert found == stated
+
+
+@pytest.mark.parametrize("lost", [1, 2, 17, 38])
+@pytest.mark.parametrize("stated", [None, 50])
+def test_a_lost_frame_makes_times_uneven(lost, stated):
+    times = np.delete(np.arange(41) * STEP, lost)
+    message = r"^a\.trc: its times are uneven, in steps of 0\.02 to 0\.04 s, but frames count as"
+    with pytest.warns(UserWarning, match=message):
+        facts = describe_times("a.trc", times, stated=stated, decimals=3)
+    assert facts == {"frame_rate": None, "first_time": 0.0, "times": times.tolist()}
+    facts = describe_times("a.trc", times, stated=stated, decimals=3, frame_rate=50)
+    assert facts == {"frame_rate": 50.0, "first_time": 0.0, "times": times.tolist()}
+    with pytest.warns(UserWarning, match=r"in steps of 1 to 2 frames, but"):
+        facts = describe_times("a.trc", times / STEP, unit="frames")
+    assert facts == {"frame_rate": None, "times": (times / STEP).tolist()}
+
+
+@pytest.mark.parametrize(
+    ("decimals", "off", "even"),
+    [
+        # A tenth of a step and half a digit; at most 0.45 of a step.
+        (17, 0.09, True),
+        (17, 0.11, False),
+        (3, 0.12, True),
+        (3, 0.13, False),
+        (2, 0.34, True),
+        (2, 0.36, False),
+        (1, 0.44, True),
+        (1, 0.46, False),
+    ],
+)
+def test_even_times_miss_their_places_by_a_tenth_of_a_step_and_half_a_digit(decimals, off, even):
+    times = (np.arange(41) + off * (-1.0) ** np.arange(41)) * STEP
+    if even:
+        assert described(times, decimals=decimals)["frame_rate"] == 50
+    else:
+        with pytest.warns(UserWarning, match="uneven"):
+            facts = describe_times("a.trc", times, decimals=decimals)
+        assert facts["frame_rate"] is None
+
+
+@pytest.mark.parametrize(("gap", "kept"), [(1.85, True), (1.95, False)])
+def test_the_stated_rate_is_kept_in_steps_without_a_gap(gap, kept):
+    """Times of a rate that jitter more than a tenth of a step."""
+    steps = np.full(40, STEP)
+    steps[10:12] = gap * STEP, (2 - gap) * STEP
+    times = np.r_[0, np.cumsum(steps)]
+    if kept:
+        assert described(times, stated=50.0)["frame_rate"] == 50
+    else:
+        with pytest.warns(UserWarning, match="uneven"):
+            assert describe_times("a.trc", times, stated=50.0)["frame_rate"] is None
+
+
+def test_times_without_a_duration_have_the_stated_rate():
+    for times in ([3.0], [3.0, 3.0], np.zeros(9), np.arange(9) * 1e-10):
+        assert described(times, stated=50.0) == {"frame_rate": 50.0, "first_time": times[0]}
+    assert described([3.0]) == {"frame_rate": None, "first_time": 3.0}
+    with pytest.warns(UserWarning, match="in steps of 0 to 0 s"):
+        facts = describe_times("a.trc", np.zeros(2))
+    assert facts == {"frame_rate": None, "first_time": 0.0, "times": [0.0, 0.0]}
+    assert described(np.arange(9) * 2e-9)["frame_rate"] == 5e8
+
+
+@pytest.mark.parametrize(
+    ("stated", "rate", "warned"),
+    [(50, 60.0, True), (50.0, 50, False), (None, 50, False), (50, None, False), (0, 9.0, False)],
+)
+def test_a_rate_is_another_one_if_both_are_known_and_differ(stated, rate, warned):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        warn_of_other_rate("a.trc", stated, rate)
+    assert len(caught) == warned
