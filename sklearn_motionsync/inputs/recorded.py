@@ -179,7 +179,8 @@ def _trouble_of_rows(x):
     rate = x.attrs.get("frame_rate")
     # Whole numbers are numbers of frames; those of a recording at a frame rate tell its time.
     timed = index.dtype.kind in "fmM" or _is_rate(rate)
-    if timed and (steps != steps[0]).any() and not is_even(times):
+    own = _rate_of_seconds(index)
+    if own is None and timed and (steps != steps[0]).any() and not is_even(times):
         worst = steps.argmax()
         return (
             f"the times of its rows, level {name!r} of the index, are not even: from "
@@ -187,8 +188,8 @@ def _trouble_of_rows(x):
             f"{np.median(steps):.4g}. Frames count as evenly spaced: "
             f"to_sequences(df, time={name!r}) makes them so."
         )
-    own = _rate_of_seconds(index) if _is_rate(rate) and recorded_frames(x) is None else None
-    if own is not None and not is_thinned(own, rate):
+    known = own is not None and _is_rate(rate) and recorded_frames(x) is None
+    if known and not is_thinned(own, rate):
         return (
             f"its index has {own:g} frames a second, and x.attrs['frame_rate'] is {rate:g}. The "
             "index is taken. Correct the wrong one."
