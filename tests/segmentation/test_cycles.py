@@ -159,9 +159,16 @@ def test_score_is_the_cosine_with_the_template(size):
     rows = list(locate_cycles(take, phases, template, False))
     assert len(rows) == 8
     np.testing.assert_allclose([score for *_, score in rows], 1)
-    take.values = -take.values
+    # A cycle has the sample at its first frame, and not that of the next one.
+    plain, odd = take.values, take.values.copy()
+    odd[: len(odd) // 2 : 32] *= -1
+    inside = np.square(template).sum(axis=1)
+    take.values, first = odd, 1 - 2 * inside[0] / inside.sum()
+    scores = [r[-1] for r in locate_cycles(take, phases, template, False)]
+    np.testing.assert_allclose(scores, [first] * 4 + [1] * 4)
+    take.values = -plain
     np.testing.assert_allclose([r[-1] for r in locate_cycles(take, phases, template, False)], -1)
-    take.values = 0 * take.values
+    take.values = 0 * plain
     assert [r[-1] for r in locate_cycles(take, phases, template, False)] == [0] * 8
 
 
