@@ -348,6 +348,8 @@ def compared_pairs(monkeypatch, work):
     counts, block = [], PairwiseDistance.block
 
     def counted(self, bases, moving):
+        # Six digits of a distance are enough of a kernel, in half the memory.
+        assert bases.dtype == moving.dtype == np.float32
         counts.append(len(bases) * len(moving))
         return block(self, bases, moving)
 
