@@ -169,7 +169,7 @@ def find_performances(
     }
     for i, (take, pace) in enumerate(zip(takes, paces, strict=True)):
         take, propose = take.astype(np.float64, copy=False), proposers[pace]
-        search = _Search(take, dissimilarity, propose.shortest, propose.longest)
+        search = WindowSearch(take, dissimilarity, propose.shortest, propose.longest)
         hits = search.hits(propose(take), lowest, max_hits)
         rows += [(i, *hit) for hit in in_frames_given(hits, pace, len(given[i]), durations)]
     rows = pd.DataFrame(rows, columns=["take", "start", "stop", "score"])
@@ -266,7 +266,7 @@ def in_frames_given(hits, pace, n_frames, durations=None):
     ]
 
 
-class _Search:
+class WindowSearch:
     """The best windows of a take that do not overlap."""
 
     def __init__(self, take, dissimilarity, shortest, longest):

@@ -407,6 +407,10 @@ def test_single_precision_and_single_training_performance():
     (found,) = live.track(X[1:])
     assert np.median(error(found, performance(50, 0.3)[1])) < 1.5
     assert found.confidence.mean() > 0.5
+    # Frames of single precision are interpolated in double precision.
+    times = 0.7 * np.arange(len(X[1]))
+    again = copy.deepcopy(live)
+    assert step_all(live, X[1], times) == step_all(again, X[1].astype(np.float64), times)
 
 
 def test_constant_and_equal_training_performances():
@@ -417,6 +421,14 @@ def test_constant_and_equal_training_performances():
     (found,) = OnlineSynchronizer(LinearSynchronizer()).fit([x] * 3).track([x])
     np.testing.assert_array_equal(found.phase, np.arange(40))
     assert found.confidence.min() > 0.9
+    # Another movement is as unlike them in any unit.
+    other = performance(40, 0.4)[0][::-1]
+    many, few = (
+        OnlineSynchronizer(LinearSynchronizer()).fit([x * unit] * 3).track([other * unit])[0]
+        for unit in (1, 2.0**-20)
+    )
+    np.testing.assert_allclose(few.confidence, many.confidence, rtol=1e-6, atol=1e-9)
+    assert many.confidence[20:].max() < 0.1
 
 
 def test_max_rate_is_bounded_by_the_pattern():
@@ -478,6 +490,7 @@ def test_refused_frame_changes_nothing(fitted, live):
             (["a", "b", "c"], None, "The frame"),
             (np.stack([frame, frame]), None, r"had the shape \(3,\), this one has \(2, 3\)"),
             (np.append(frame[:2], 1e10), None, r"largest magnitude of all, 1e\+10"),
+            ([np.nan, -1e10, 0.0], None, r"largest magnitude of all, 1e\+10"),
             (frame, k - 1.0, "time stamps must increase"),
             (frame, k - 1 + 1e-12, "by 1e-09 to 1e\\+09 frames"),
             (frame, 1e10, r"but 1e\+10 follows"),

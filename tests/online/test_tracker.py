@@ -53,6 +53,26 @@ def assert_same(a, b):
 # -- equal results on all ways in ---------------------------------------------------------
 
 
+def test_facts_of_takes_are_compared_where_they_matter():
+    def tables(X, **attrs):
+        out = [pd.DataFrame(x) for x in X]
+        for df in out:
+            df.attrs |= attrs
+        return out
+
+    facts = {"frame_rate": 50, "units": "m", "up": "y"}
+    fitted = MotionTracker(LinearSynchronizer(), 30, noise=0.02).fit(tables(TRAINING, **facts))
+    (fast,) = tables([movement(1.0, 120)], **facts | {"frame_rate": 100})
+    (turned,) = tables([movement(1.0)], **facts | {"units": "mm", "up": "z"})
+    # With times the frame rate does not matter, with a projection neither do unit and axis.
+    assert len(fitted.track(fast, times=np.arange(120) / 2).phases) == 120
+    assert len(fitted.track(turned, projection=np.eye(3)).phases) == 60
+    with pytest.warns(UserWarning, match="100 frames a second"):
+        fitted.track(fast)
+    with pytest.raises(ValueError, match="mm"):
+        fitted.track(turned)
+
+
 def test_step_equals_track(tracker, running, take):
     """To the last bit, also through a pickle, beside other takes, and after a reset."""
     track = tracker.track(take)

@@ -10,7 +10,9 @@ from sklearn.neighbors import KNeighborsClassifier
 from sklearn_motionsync import DirectionCosines, synchronization_distances, to_frame
 from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.pairwise import BLOCK, PairwiseDistance, blocks_of_pairs
+from sklearn_motionsync.recognition import distances
 from sklearn_motionsync.recognition.distances import normalise_time
+from sklearn_motionsync.utils.parallel import run
 
 import oracle
 
@@ -155,6 +157,20 @@ def test_jobs_give_the_same_distances(backend):
     D = synchronization_distances(X, n_frames=12)
     with parallel_config(backend=backend):
         np.testing.assert_array_equal(synchronization_distances(X, n_frames=12, n_jobs=2), D)
+
+
+def test_jobs_share_the_pairs_and_none_is_compared_twice(monkeypatch):
+    blocks, jobs = [], []
+
+    def recorded(function, portions, *, common, n_jobs, step):
+        jobs.append(n_jobs)
+        blocks.extend(str(block) for portion in portions for block in portion[0])
+        return run(function, portions, common=common, step=step)
+
+    monkeypatch.setattr(distances, "run", recorded)
+    synchronization_distances(walks(BLOCK * 8), n_frames=4, n_jobs=2)
+    assert jobs == [2]
+    assert len(blocks) == len(set(blocks)) == 64
 
 
 def test_verbose_prints_progress(capsys):

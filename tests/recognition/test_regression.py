@@ -56,6 +56,16 @@ def test_fit_of_some_rows_equals_a_fit_without_the_others():
     np.testing.assert_allclose(decision_values(K, A, b), expected, atol=2e-3)
 
 
+def test_a_kernel_of_zeros_adds_nothing():
+    K, codes = points()
+    landmarks = np.arange(0, len(K), 2)
+    own = K[:, landmarks]
+    expected = decision_values(own, *KernelRegression(own, 5, landmarks).fit(codes))
+    both = np.hstack([own, np.zeros_like(own)])
+    found = decision_values(both, *KernelRegression(both, 5, landmarks).fit(codes))
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
 def low_rank(n, n_kernels, rank=4, seed=3):
     """Kernels of few features each, side by side, and classes that they tell."""
     rng = np.random.default_rng(seed)

@@ -22,6 +22,7 @@ from sklearn_motionsync import (
     to_sequences,
 )
 from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.segmentation.cycles import SampledTake, locate_cycles
 
 HIP = 0
 
@@ -116,6 +117,11 @@ def test_cycles_begin_by_default_with_the_feature_that_repeats_best():
     drift = np.sin(t / 7.3)
     take = np.column_stack([3 * np.sin(t) + drift, 2 * np.cos(t), 4 * np.sin(t) - 2 * drift])
     assert CycleSegmenter().fit(take).start_ == "x1"
+    # At its maximum, wherever in the cycle a take begins.
+    for first in (0, 17, 40):
+        segmenter = CycleSegmenter().fit(take[first:])
+        starts = segmenter.segment(take[first:])[1]["start"] + first
+        assert ((starts + 25) % 50 - 25).abs().max() <= 1
 
 
 def test_takes_of_other_frame_rates_are_cut_at_the_same_phase(gait, fitted):
@@ -140,6 +146,30 @@ def test_a_template_of_constant_periods_is_blurred():
         for refine in (False, True)
     ]
     assert sizes[0] < 0.9 * sizes[1]
+
+
+@pytest.mark.parametrize("size", [1e-6, 1, 1e6])
+def test_score_is_the_cosine_with_the_template(size):
+    take, template = (
+        SampledTake(slowing_take()[0], 100),
+        np.random.default_rng(0).normal(size=(32, 6)),
+    )
+    take.values = size * template[np.arange(len(take.times)) % 32]
+    phases = np.arange(len(take.times)) / 32
+    rows = list(locate_cycles(take, phases, template, False))
+    assert len(rows) == 8
+    np.testing.assert_allclose([score for *_, score in rows], 1)
+    # A cycle has the sample at its first frame, and not that of the next one.
+    plain, odd = take.values, take.values.copy()
+    odd[: len(odd) // 2 : 32] *= -1
+    inside = np.square(template).sum(axis=1)
+    take.values, first = odd, 1 - 2 * inside[0] / inside.sum()
+    scores = [r[-1] for r in locate_cycles(take, phases, template, False)]
+    np.testing.assert_allclose(scores, [first] * 4 + [1] * 4)
+    take.values = -plain
+    np.testing.assert_allclose([r[-1] for r in locate_cycles(take, phases, template, False)], -1)
+    take.values = 0 * plain
+    assert [r[-1] for r in locate_cycles(take, phases, template, False)] == [0] * 8
 
 
 def test_incomplete_adds_the_first_and_last_part_cycle():
@@ -273,6 +303,8 @@ def test_refuses_wrong_input_and_parameters(gait, fitted):
         fitted.segment(3.0)
     with pytest.raises(ValueError, match="3 features a frame, but CycleSegmenter is expecting 4"):
         fitted.segment([x[:, :3] for x in gait.data])
+    with pytest.raises(ValueError, match="3 features a frame, but CycleSegmenter is expecting 4"):
+        fitted.phases([x[:, :3] for x in gait.data])
     with pytest.raises(NotFittedError):
         CycleSegmenter().segment(gait.data)
     joints = ["pelvis", "neck", "left_knee", "left_ankle", "right_knee", "right_ankle"]
@@ -282,7 +314,8 @@ def test_refuses_wrong_input_and_parameters(gait, fitted):
     for params in ({"threshold": 2}, {"not_cyclic": "drop"}, {"skeleton": "paper"}, {"start": 1.5}):
         with pytest.raises(ValueError, match=f"The '{next(iter(params))}' parameter"):
             CycleSegmenter(**params).report(gait.data)
-    for period in ((40,), (60, 40), (0.5, 1.5), (2, np.nan), ("20", "60")):
+    CycleSegmenter(period=(2, 60)).report(gait.data)
+    for period in ((40,), (60, 40), (1.9, 60), (2, np.nan), ("20", "60")):
         with pytest.raises(ValueError, match="period must be two numbers of frames, the least"):
             CycleSegmenter(period=period).report(gait.data)
 

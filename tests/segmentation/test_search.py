@@ -20,10 +20,12 @@ from sklearn_motionsync import (
 from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.costs import step_table
 from sklearn_motionsync.matching.trellis import Trellis
+from sklearn_motionsync.matching.warps import normalise
 from sklearn_motionsync.model.similarity import log_moments
 from sklearn_motionsync.segmentation.search import (
     Proposer,
     WindowDissimilarity,
+    WindowSearch,
     in_frames_given,
     random_movements,
 )
@@ -123,11 +125,13 @@ def test_best_window_is_that_of_an_exhaustive_search():
     np.testing.assert_allclose(locations["score"], scores[best], rtol=1e-9)
 
 
-def brute_unlikeness(window, pattern):
+def brute_unlikeness(window, pattern, n=None):
     """Dissimilarity of a window to a single pattern, by the formulas of the docstrings."""
-    n = len(pattern)
-    at = np.linspace(0, len(window) - 1, n)
-    x = np.column_stack([np.interp(at, np.arange(len(window)), column) for column in window.T])
+    n, given = n or len(pattern), len(pattern)
+    x, pattern = (
+        np.transpose([np.interp(np.linspace(0, len(y) - 1, n), np.arange(len(y)), c) for c in y.T])
+        for y in (window, pattern)
+    )
     ratios = []
     views = [
         [y - y.mean(axis=0) for y in (x, pattern)],
@@ -137,9 +141,80 @@ def brute_unlikeness(window, pattern):
     for (a, b), more in zip(views, (stood, 0), strict=True):
         ratios.append((np.square(a - b).sum() + more) / (np.square(a).sum() + np.square(b).sum()))
     energy = np.log(np.square(views[0][0]).sum() / np.square(views[0][1]).sum())
-    length = np.log(len(window) / n)
+    length = np.log(len(window) / given)
     # A single performance: the usual variance 0.07 counts like three, the own one is 0.
-    return np.mean(ratios) * np.exp(0.05 * (energy**2 + length**2) / (0.07 * 3 / 4))
+    return np.mean(ratios) * np.exp(min(0.05 * (energy**2 + length**2) / (0.07 * 3 / 4), 3))
+
+
+def test_windows_are_compared_at_no_more_than_a_hundred_positions():
+    pattern = movement(150)
+    take = take_of({0: movement(150, 1.1), 200: 1000 * pattern}, 400, noise=0.1)
+    windows = np.array([[0, 150], [10, 130], [3, 160], [200, 350]])
+    sync = DenseSynchronizer(150, pattern=0).fit([pattern])
+    expected = [brute_unlikeness(take[a:b], pattern, 100) for a, b in windows]
+    # However large the movement is, the factor is at most e to the third.
+    assert 10 < expected[-1] < 2 * np.exp(3)
+    np.testing.assert_allclose(WindowDissimilarity(sync)(take, windows), expected, rtol=1e-9)
+
+
+def search_of(scores, n_frames, shortest=1, longest=90):
+    """A search of a take in which windows have these scores, by (start, stop), and others 0.01."""
+
+    def dissimilarity(take, windows):
+        return np.array([-np.log(scores.get(tuple(w), 0.01)) for w in windows.tolist()])
+
+    return WindowSearch(np.zeros((n_frames, 1)), dissimilarity, shortest, longest)
+
+
+def hits_of(scores, proposed, n_frames=60, threshold=0.5, count=None, **limits):
+    return search_of(scores, n_frames, **limits).hits(np.array(proposed), threshold, count)
+
+
+def test_hits_may_touch_each_other_and_the_ends_of_the_take():
+    scores = {(0, 20): 0.9, (20, 40): 0.8, (40, 60): 0.7}
+    expected = [(*window, pytest.approx(score)) for window, score in scores.items()]
+    for order in ([0, 1, 2], [2, 0, 1], [1, 2, 0]):
+        assert hits_of(scores, np.array(list(scores))[order]) == expected
+    assert hits_of(scores, list(scores), count=2) == expected[:2]
+    assert hits_of(scores, list(scores), threshold=0.75) == expected[:2]
+    # The second overlaps the first by a frame, so it is none.
+    assert hits_of({(0, 21): 0.9, (20, 40): 0.8}, [(0, 21), (20, 40)])[1:] == []
+    assert hits_of({(0, 20): 0.8, (19, 40): 0.9}, [(0, 20), (19, 40)])[1:] == []
+
+
+def test_ends_are_moved_by_an_eighth_and_by_less():
+    # From 32 frames by 4, then by 4 no more; by 2; by 1.
+    scores = {(10, 42): 0.6, (14, 42): 0.7, (14, 44): 0.8, (13, 45): 0.9, (12, 45): 0.95}
+    assert hits_of(scores, [(10, 42)]) == [(12, 45, pytest.approx(0.95))]
+    # Neither by 8 nor by 5, nor both ends by different numbers.
+    for far in ((2, 42), (10, 47), (6, 44)):
+        assert hits_of({(10, 42): 0.6, far: 0.9}, [(10, 42)])[0][:2] == (10, 42)
+    # Short windows are moved, too: by 1.
+    assert hits_of({(10, 13): 0.6, (11, 14): 0.9}, [(10, 13)])[0][:2] == (11, 14)
+    # Into no other hit, to no length that is not allowed, and not out of the take.
+    scores = {(10, 42): 0.9, (42, 60): 0.6, (41, 60): 0.7, (42, 59): 0.65, (42, 61): 0.8}
+    assert [hit[:2] for hit in hits_of(scores, [(10, 42), (42, 60)])] == [(10, 42), (42, 59)]
+    assert hits_of(scores, [(42, 60)], shortest=18, longest=18)[0][:2] == (42, 60)
+    assert hits_of({(0, 9): 0.6, (-1, 9): 0.9, (0, 10): 0.7}, [(0, 9)])[0][:2] == (0, 10)
+
+
+def test_windows_of_twice_the_dissimilarity_of_the_threshold_are_not_refined():
+    for proposed, found in ((0.26, True), (0.24, False)):
+        hits = hits_of({(10, 42): proposed, (10, 41): 0.9}, [(10, 42)])
+        assert [hit[:2] for hit in hits] == [(10, 41)] * found
+
+
+def test_proposer_has_the_smoothness_and_the_filter_of_the_method():
+    sync = DenseSynchronizer(40).fit(TRAINING)
+    learnt = Proposer.of(sync, 30, 80)
+    size = np.square(learnt.base).sum(axis=2).mean()
+    np.testing.assert_allclose(learnt.trellis.mu, 0.003 * size)
+    # The Gaussian has as many frames in a portion, which is longer by the free ends.
+    n_frames = 39 + 2 * learnt.trellis.width
+    width = learnt.features.velocity_smoothing * n_frames
+    np.testing.assert_allclose(width, sync.features_.velocity_smoothing * 39)
+    # What is nowhere long enough has no windows.
+    assert learnt(np.zeros((29, 3))).shape == (0, 2)
 
 
 def test_proposals_are_the_best_paths_of_their_portions():
@@ -282,6 +357,9 @@ def test_durations_and_patterns_have_frame_rates(at_30):
     take, detector = table(TAKE, 120), ActionDetector(at_30).fit([table(x, 30) for x in TRAINING])
     _, locations = find_performances(detector, take, durations=(80, 228), threshold=None)
     assert (locations["stop"] - locations["start"]).between(80, 228).all()
+    # At 45 frames a second 92 frames are 61.67 of those that are searched.
+    (span,) = spans(find_performances(at_30, table(TAKE, 45), durations=(92, 92), max_hits=1)[1])
+    assert span[1] - span[0] == 92
     pattern = table(movement(60), 30)
     found = np.array(spans(find_performances(pattern, take)[1]))
     np.testing.assert_allclose(found / 4, TRUE, atol=6)
@@ -362,6 +440,11 @@ def test_auto_threshold_falls_with_coverage():
     thresholds = [locations["threshold"].iloc[0] for locations in origins]
     assert 0.87 > thresholds[0] > thresholds[1] > thresholds[2] > 0.5
     assert all((locations["score"] >= locations["threshold"]).all() for locations in origins)
+    # The model knows the groups; by themselves performances of a subject resemble each other.
+    model = ActionModel().fit(sync.transform(noisy), groups=SUBJECTS)
+    for pattern, equal in ((make_pipeline(sync, model), True), (sync, False)):
+        found = find_performances(pattern, noisy, coverage=0.7)[1]["threshold"].iloc[0]
+        assert (found == thresholds[1]) == equal
 
 
 def wander(n_frames, rng):
@@ -380,6 +463,21 @@ def test_auto_threshold_rejects_random_movements():
     chance = dissimilarity(take * frames.std(axis=0) + frames.mean(axis=0), windows)
     assert (chance < dissimilarity.threshold(0.6)).mean() < 0.02
     assert (chance < log_moments(dissimilarity.known).upper_limit(0.6)).mean() > 0.1
+    # One in 200 random movements is below it; their length costs nothing.
+    shorter = [x[: 12 + k] for k, x in enumerate(training[:9])]
+    sync = DenseSynchronizer(20, metric=None).fit(shorter)
+    measure = WindowDissimilarity(sync, length=False)
+    positions = normalise(list(sync.examples_.astype(float)), 20)
+    (some,) = random_movements(positions, [1000])
+    windows = np.arange(0, 20000, 20)[:, np.newaxis] + [0, 20]
+    limit = np.quantile(measure(some.reshape(20000, 2), windows), 0.005)
+    np.testing.assert_allclose(WindowDissimilarity(sync).threshold(0.99), limit, rtol=1e-6)
+
+
+def test_auto_threshold_of_performances_that_share_nothing_is_at_most_half_of_all_scores():
+    noise = list(np.random.default_rng(0).standard_normal((12, 40, 30)))
+    dissimilarity = WindowDissimilarity(DenseSynchronizer(40, metric=None).fit(noise))
+    assert dissimilarity.threshold(0.95) == 0.7
 
 
 def test_chance_movements_have_mean_covariance_and_autocorrelation_of_the_postures():

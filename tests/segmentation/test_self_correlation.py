@@ -190,6 +190,13 @@ def test_noise_in_few_features_is_rejected():
     assert rejection_reason(correlate(one), 0.4) == ""
 
 
+def test_breadth_is_that_of_postures():
+    t = 2 * np.pi * np.arange(1000) / 200
+    # Velocities have the variances 1 and 4.
+    found = self_correlation(np.column_stack([np.sin(t), np.sin(2 * t)]))
+    assert found.breadth == pytest.approx(2, abs=0.05)
+
+
 def test_breadth_is_the_effective_number_of_dimensions():
     found = correlate(np.eye(8)[np.arange(160) // 5 % 8])
     assert 5 < found.breadth <= 7
