@@ -62,7 +62,7 @@ table.round(2)
 # The paper's own cost compares heights. Those differ between speeds, so it looks for equal heights
 # where there are none: the valley stays nearly as far apart as it was, and the first peak is worse.
 
-paper = DenseSynchronizer(101, cost="posture", max_rate=2, consensus=0, metric=None).fit(steps)
+paper = DenseSynchronizer.paper(n_frames=101).fit(steps)
 times = paper.match(steps).times
 placed = np.array([np.interp(at, tau, clock) for at, tau in zip(frames, times, strict=True)])
 table["one clock, by height"] = placed.std(axis=0)

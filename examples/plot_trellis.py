@@ -23,7 +23,7 @@ points = ASpace(0.95).fit_transform(postures)
 # Postures are compared (Eq. 12), the rate is 0, 1 or 2 (Eq. 13), and nothing else is done to
 # the path.
 
-paper = DenseSynchronizer(100, cost="posture", max_rate=2, subframes=1, consensus=0).fit(points)
+paper = DenseSynchronizer.paper(n_frames=100).fit(points)
 performance = int(np.abs(paper.match(points).offsets).mean(axis=1).argmax())
 TrellisDisplay.from_estimator(paper, points, performance=performance)
 

@@ -83,8 +83,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     The defaults suit most data. Three parameters depend on them: ``n_frames``, the resolution of
     the clock; ``refine=True``, for trials of a single source; ``max_offset``, the largest
     difference in timing. ``pattern`` keeps an existing clock. The defaults of the seven from
-    ``metric`` to ``subframes`` were set by measurements; the paper's exact method is
-    ``DenseSynchronizer(cost="posture", max_rate=2, subframes=1, consensus=0)``. The
+    ``metric`` to ``subframes`` were set by measurements; `paper` has those of the paper. The
     last five are for many performances and long jobs.
 
     Parameters
@@ -312,6 +311,30 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         self.random_state = random_state
         self.n_jobs = n_jobs
         self.verbose = verbose
+
+    @classmethod
+    def paper(cls, **params):
+        """Make a synchronizer with the settings of the paper.
+
+        Postures are compared, rates end at 2, and a warp is the direct path to the pattern: no
+        metric is learnt, no exemplars vote, and nothing is refined.
+
+        Parameters
+        ----------
+        **params : dict
+            Other parameters, such as ``n_frames``, or other values of these.
+
+        Returns
+        -------
+        DenseSynchronizer
+
+        Examples
+        --------
+        >>> from sklearn_motionsync import DenseSynchronizer
+        >>> DenseSynchronizer.paper(n_frames=100)
+        DenseSynchronizer(consensus=0, cost='posture', max_rate=2, n_frames=100)
+        """
+        return cls(**{"cost": "posture", "max_rate": 2, "consensus": 0} | params)
 
     @snapshot
     def match(self, X):

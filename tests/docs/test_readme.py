@@ -1,0 +1,21 @@
+"""The README: its size, its commands and its links."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_readme_is_short():
+    assert len(TEXT.encode()) <= 6_000
+
+
+def test_links_of_the_readme_are_files_of_a_checkout():
+    links = re.findall(r"\]\(([^)]+)\)", TEXT)
+    assert len(links) > 15
+    assert [link for link in links if not (ROOT / link).is_file()] == []
+
+
+def test_two_commands_make_an_environment():
+    assert len(re.findall(r"^python3 -m venv", TEXT, flags=re.MULTILINE)) == 2
