@@ -29,9 +29,8 @@ def main():
 
     folder = Path(spm1d.__file__).parent / "data" / "datafiles"
     forces = np.load(folder / f"ex_grf_subj{SUBJECT:03}.npy")
-    match = (
-        DenseSynchronizer(n_frames=101).fit(forces[..., np.newaxis]).match(forces[..., np.newaxis])
-    )
+    X = forces[..., np.newaxis]
+    match = DenseSynchronizer(n_frames=101).fit(X).match(X)
     percent = np.arange(101)
     found = np.array([moments(curve) for curve in forces], dtype=float)
     moved = [np.interp(at, times, percent) for at, times in zip(found, match.times, strict=True)]
