@@ -1,5 +1,6 @@
 """Running performances, frame by frame: streams matched by rows of the trellis (Eqs. 16 and 17)."""
 
+import warnings
 from collections import deque
 from typing import NamedTuple
 
@@ -17,6 +18,9 @@ _WINDOW, _TOLERANCE = 0.1, 0.05
 _HISTORY_LENGTH = 100_000
 # Gaps longer than this share of the clock are not interpolated.
 _LONGEST_GAP = 0.25
+# Times that pass by more training frames a frame, or less than the inverse, are of another unit:
+# seconds taken for frames do, at 25 frames a second and more. So many frames tell.
+_OTHER_UNIT, _FEW = 24, 4
 # After so many clocks without a frame a stream has forgotten what was before.
 _FORGETTING = 3
 
@@ -388,6 +392,12 @@ def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
     ValueError
         If there is not one time a frame, or times are not finite, or do not increase, by 1e-9 to
         1e9 frames.
+
+    Warns
+    -----
+    UserWarning
+        If frames are more than 24 frames of the training performances apart, or less than 1/24, in
+        the median: times in milliseconds where seconds are meant.
     """
     if times is None:
         return np.arange(n_frames) + (0.0 if after is None else after + 1)
@@ -413,6 +423,16 @@ def check_times(times, n_frames, frame_rate=None, what="The frame", after=None):
         raise ValueError(
             f"{what}: time stamps must increase{by}, but {now:.10g} follows {before:.10g}. Leave "
             "out a frame that comes twice or late; begin another performance with reset()."
+        )
+    step = 1.0 if n_frames < _FEW else float(np.median(np.diff(frames)))
+    if not 1 / _OTHER_UNIT < step < _OTHER_UNIT:
+        unit = "frames of the training performances" if frame_rate is None else "seconds"
+        warnings.warn(
+            f"{what}: times are in {unit}, and {step / scale:.4g} of them from one frame to the "
+            f"next are {step:.4g} frames of the training performances. Give them in this unit, and "
+            "the frame_rate of the training performances.",
+            UserWarning,
+            stacklevel=4,
         )
     return frames
 

@@ -604,3 +604,17 @@ def test_check_times_returns_frames_of_the_training_performances():
 def test_check_times_refuses(times, after, message):
     with pytest.raises(ValueError, match=message):
         check_times(times, 3, frame_rate=None if after is None else 10, what="Take 4", after=after)
+
+
+def test_times_of_another_unit_are_warned_of():
+    """Milliseconds where seconds are meant, and seconds where frames are."""
+    X = [performance(30)[0] for _ in range(3)]
+    live = OnlineSynchronizer(LinearSynchronizer(), frame_rate=50).fit(X)
+    seconds = np.arange(30) / 50
+    with pytest.warns(UserWarning, match="Performance 0: times are in seconds, and 20 of them"):
+        live.track(X[:1], [1000 * seconds])
+    live.track(X[:1], [seconds / 10])
+    live.track(X[:1], [10 * seconds])
+    in_frames = OnlineSynchronizer(LinearSynchronizer()).fit(X)
+    with pytest.warns(UserWarning, match="are in frames of the training performances, and 0.02 of"):
+        in_frames.track(X[:1], [seconds])
