@@ -10,6 +10,7 @@ import pytest
 from scipy.special import softmax
 from sklearn import config_context
 from sklearn.ensemble import StackingClassifier
+from sklearn.exceptions import NotFittedError
 from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import log_loss, roc_auc_score
 from sklearn.model_selection import (
@@ -596,3 +597,8 @@ def test_new_people_and_an_unknown_action(real_data):
         moving = classifier.score_samples(new)
         is_known = np.repeat([1, 0], [len(moving), len(still)])
         assert roc_auc_score(is_known, np.concatenate([moving, still])) > 0.95
+
+
+def test_no_threshold_before_a_fit():
+    with pytest.raises(NotFittedError):
+        ActionClassifier().threshold_at(0.9)

@@ -270,3 +270,10 @@ def test_nearest_neighbours_among_new_people(real_data):
         right[normalize] = np.mean(found == bunch.target)
     assert right[True] > 0.8
     assert right[False] < 0.75
+
+
+def test_single_precision_is_normalised_in_double():
+    x = np.cumsum(np.random.default_rng(0).standard_normal((30, 2)), axis=0).astype(np.float32)
+    double = normalise_time([x.astype(np.float64)], 47)
+    np.testing.assert_array_equal(normalise_time([x], 47), double)
+    assert normalise_time([x], 47).dtype == np.float64
