@@ -36,7 +36,7 @@ from .numbers import (
 )
 from .recorded import warn_of_rows
 from .tables import INDEX_NAMES, as_pandas, labels_of, name_performance, split_table
-from .wording import counted
+from .wording import counted, within
 
 __all__ = [
     "ACCEPTED",
@@ -177,7 +177,7 @@ def check_members(
         if own != names and fitted is not None and names is fitted:
             check_names(x, names, what(i))
         elif own != names:
-            _refuse_columns(own, names, what(i), what(0).replace("P", "p", 1))
+            _refuse_columns(own, names, what(i), within(what(0)))
         arrays.append(array)
         if array.shape[1] != arrays[0].shape[1]:
             turned = all(len(other) == len(arrays[0]) < min(other.shape[1:]) for other in arrays)

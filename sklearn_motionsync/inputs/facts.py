@@ -9,6 +9,7 @@ import warnings
 import pandas as pd
 
 from .recorded import SAME_RATE, frame_rate_of_rows
+from .wording import within
 
 __all__ = ["TIMELESS", "check_facts", "compare_facts", "facts_in_fit", "facts_of"]
 
@@ -118,7 +119,7 @@ def compare_facts(facts, called, which=None, known=None, sources=None):
             if values:
                 different[i] = value
             else:
-                values, source = [value], f"{called(i)} has".replace("P", "p", 1)
+                values, source = [value], f"{within(called(i))} has"
         if values:
             found[fact] = tuple(dict.fromkeys([*values, *different.values()]))
         if different:

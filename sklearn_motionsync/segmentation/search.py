@@ -19,7 +19,7 @@ from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import SAME_RATE, timeless
 from ..inputs.tables import FRAME, as_pandas
 from ..inputs.validation import SequenceLevelMixin, check_performances
-from ..inputs.wording import counted
+from ..inputs.wording import counted, within
 from ..matching.filters import SMOOTHING, smooth
 from ..matching.matcher import Features
 from ..matching.trellis import Trellis
@@ -194,7 +194,7 @@ def _at_rate_of(pattern, X, given):
         rate = rates[unsure[0]]
         first, second = ("The pattern", given.called(unsure[0]))[:: 1 if known is None else -1]
         warnings.warn(
-            f"{first} has no known frame rate, {second[0].lower() + second[1:]} has "
+            f"{first} has no known frame rate, {within(second)} has "
             f"{known or rate:g} frames a second: both are taken to have the same. Resample if they "
             "differ, or set x.attrs['frame_rate'] of tables, of performances before the fit.",
             UserWarning,
