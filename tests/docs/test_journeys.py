@@ -17,6 +17,7 @@ from sklearn_motionsync.io import read_motion
 from motion_files import c3d, texts, trc
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "howto" / "journeys.md").read_text("utf-8")
+PAGE_OF_FILES = Path(__file__).resolve().parents[2] / "docs" / "howto" / "motion_files.md"
 BLOCK = re.compile(r"^```python\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
 SECTIONS = {part.split("\n")[0]: BLOCK.findall(part) for part in PAGE.split("\n## ")[1:]}
 BLOCKS = [(title, k) for title, blocks in SECTIONS.items() for k in range(len(blocks))]
@@ -125,7 +126,7 @@ def test_long_table(title, curves, tmp_path, monkeypatch):
     table = long_table(curves)
     table.to_csv(tmp_path / "trials.csv", index=False)
     left = go(title, tmp_path, monkeypatch)
-    saved = pd.read_csv("same_clock.csv", index_col=["subject", "trial", "frame"])
+    saved = pd.read_csv("aligned.csv", index_col=["subject", "trial", "frame"])
     assert list(saved.columns) == ["hip", "knee"]
     found = {key: curves[key] for key in table[["subject", "trial"]].itertuples(index=False)}
     found = {tuple(key): x for key, x in found.items()}
@@ -140,7 +141,7 @@ def test_wide_table_of_one_feature(curves, tmp_path, monkeypatch):
     wide = pd.DataFrame.from_dict(rows, orient="index")
     wide.to_csv(tmp_path / "knee.csv", index_label="trial")
     left = go("A wide table", tmp_path, monkeypatch)
-    saved = pd.read_csv("same_clock.csv", index_col="trial")
+    saved = pd.read_csv("aligned.csv", index_col="trial")
     match = left["synchronizer"].match(left["curves"])
     assert saved.shape == match.times.shape
     assert match.offsets.any()
@@ -158,7 +159,7 @@ def test_wide_table_of_several_features(curves, tmp_path, monkeypatch):
         rows.append({"subject": subject, "trial": trial} | cells)
     pd.DataFrame(rows).to_csv(tmp_path / "trials.csv", index=False)
     left = go("A wide table", tmp_path, monkeypatch, 1)
-    saved = pd.read_csv("same_clock.csv", index_col=["subject", "trial", "frame"])
+    saved = pd.read_csv("aligned.csv", index_col=["subject", "trial", "frame"])
     check_saved(saved, curves, left["synchronizer"].match(left["trials"]))
 
 
@@ -168,7 +169,7 @@ def test_wide_table_of_a_column_a_trial(curves, tmp_path, monkeypatch):
     columns.insert(0, "time", np.arange(len(columns)) / 100)
     columns.to_csv(tmp_path / "columns.csv", index=False)
     left = go("A wide table", tmp_path, monkeypatch, 2)
-    saved = pd.read_csv("same_clock.csv", index_col=["trial", "frame"])
+    saved = pd.read_csv("aligned.csv", index_col=["trial", "frame"])
     originals = {name: knee.to_frame("knee") for name, knee in knees.items()}
     check_saved(saved, originals, left["synchronizer"].match(left["trials"]))
 
@@ -425,6 +426,45 @@ def test_angles_of_several_laboratories(curves, tmp_path, monkeypatch):
     saved = pd.read_csv("strides.csv", index_col=["recording", "part", "frame"])
     check_saved(saved, strides, left["synchronizer"].match(left["strides"]))
     check_picture("strides.png")
+
+
+# -- reading files --------------------------------------------------------------------------------
+
+
+def test_page_of_motion_files_runs_in_order(curves, bodies, tmp_path, monkeypatch, capsys):
+    write_takes(tmp_path / "walks", "c3d", bodies)
+    strides = write_strides(curves, tmp_path / "gait")
+    (tmp_path / "opensim").mkdir()
+    rng = np.random.default_rng(0)
+    heads = {
+        "walk0_ik.mot": ["hip_flexion_r", "knee_angle_r", "pelvis_tx"],
+        "walk1_ik.mot": ["hip_flexion_r", "knee_angle_r", "pelvis_tx"],
+        "muscles.sto": ["soleus_r"],
+    }
+    for name, columns in heads.items():
+        times = np.arange(60) / 100 + (rng.uniform(0, 0.004, 60) if name == "muscles.sto" else 0)
+        rows = np.column_stack([times, np.sin(np.outer(times, range(4, 4 + len(columns))))])
+        head = [name, "version=1", f"nRows={len(rows)}", f"nColumns={len(columns) + 1}"]
+        head += ["inDegrees=yes", "endheader", "\t".join(["time", *columns])]
+        body = ["\t".join(f"{value:.5f}" for value in row) for row in rows]
+        (tmp_path / "opensim" / name).write_text("\n".join(head + body) + "\n", encoding="utf-8")
+    page = PAGE_OF_FILES.read_text(encoding="utf-8")
+    *blocks, uneven = BLOCK.findall(page)
+    monkeypatch.chdir(tmp_path)
+    left = {}
+    for block in blocks:
+        exec(block, left)
+    with pytest.warns(UserWarning, match="evenly spaced"):
+        exec(uneven, left)
+    assert [x.shape[1] for x in left["poses"]] == [22] * 4
+    assert len(left["strides"]) == len(strides)
+    assert left["aligned"].shape[0::2] == (2, 2)
+    assert np.ptp(np.diff(left["even"].index)) < 1e-12
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0] == "50.0 mm z"
+    assert "angles" in printed[1]
+    assert printed[2] == "['LHipAngles_x', 'LHipAngles_y'] deg"
+    assert printed[3] == "deg 100.0"
 
 
 # -- key-points -----------------------------------------------------------------------------------

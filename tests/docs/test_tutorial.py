@@ -10,13 +10,15 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = {
-    name: (ROOT / "docs" / name).read_text(encoding="utf-8")
-    for name in ("tutorial.md", "howto/timing.md", "method.md")
-}
+TEXTS = {
+    str(path.relative_to(ROOT / "docs")): path.read_text(encoding="utf-8")
+    for folder in ("", "howto")
+    for path in sorted((ROOT / "docs" / folder).glob("*.md"))
+} | {"README.md": (ROOT / "README.md").read_text(encoding="utf-8")}
+PAGES = {name: page for name, page in TEXTS.items() if "```{plot}" in page}
 # A block, and what is said to come out of it.
 BLOCK = re.compile(
-    r"^```\{plot\}\n(?::[^\n]*\n)+\n(.*?)^```\n"
+    r"^```(?:\{plot\}\n(?::[^\n]*\n)+\n|python\n)(.*?)^```\n"
     r"(?:\n```text\n(.*?)^```\n)?",
     re.MULTILINE | re.DOTALL,
 )
@@ -51,7 +53,7 @@ def paste(blocks, folder):
 @pytest.mark.parametrize("name", PAGES)
 def test_every_block_of_the_tutorial_is_parsed(name):
     page, blocks = PAGES[name], BLOCKS[name]
-    assert len(blocks) == page.count("```{plot}") >= 2
+    assert len(blocks) == page.count("```{plot}") + page.count("```python")
     assert sum(printed is not None for _, printed in blocks) == page.count("```text")
     assert all(("print(" in code) == (printed is not None) for code, printed in blocks)
     assert ">>>" not in page
@@ -71,6 +73,43 @@ def test_tutorial_block_prints_the_documented_output(sessions, name, number):
         assert re.fullmatch(r"(\w+Display\(.*\)\n)?", printed), printed
     else:
         assert doctest.OutputChecker().check_output(expected, printed, FLAGS), printed
+
+
+# -- every other page ---------------------------------------------------------------------
+
+# Blocks of Python that no test pastes, and why.
+NOT_RUN = {
+    "howto/cluster.md": 2,  # Ray is no requirement, and progress bars need scikit-learn 1.9
+    "scaling.md": 2,  # as on that page
+}
+# Files for these are made by tests/docs/test_journeys.py.
+RUN_ON_FILES = ("howto/journeys.md", "howto/motion_files.md")
+CODE = re.compile(r"^ *```+(pycon|python|sh)\n(.*?)^ *```+$", re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r"^ *```+(?!\{(?!plot|code))(\S+)", re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_every_block_is_run_by_a_test(name):
+    """Doctest runs ``pycon``; this file ``{plot}``, and ``python`` on the same pages."""
+    page = TEXTS[name]
+    blocks = CODE.findall(page)
+    assert set(FENCE.findall(page)) <= {"pycon", "python", "sh", "text", "{plot}"}
+    assert [code for kind, code in blocks if kind == "pycon" and code[:4] != ">>> "] == []
+    if name not in (*PAGES, *RUN_ON_FILES):
+        assert [kind for kind, _ in blocks].count("python") == NOT_RUN.get(name, 0)
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_scripts_of_commands_exist(name):
+    """CI runs the commands that install; a script has tests of its own."""
+    commands = "".join(code for kind, code in CODE.findall(TEXTS[name]) if kind == "sh")
+    scripts = re.findall(r"python3? (\S+\.py)", commands)
+    found = {
+        path.name: path
+        for room in ("examples", "benchmarks", "docs")
+        for path in (ROOT / room).glob("*.py")
+    }
+    assert [script for script in scripts if Path(script).name not in found] == []
 
 
 def test_tutorial_installs_the_declared_extras():

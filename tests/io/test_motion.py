@@ -15,7 +15,7 @@ from fuzz_readers import DAMAGES
 from motion_files import AMC, EXAMPLES, body, c3d, put, texts
 
 ROOT = Path(__file__).resolve().parents[2]
-MANUAL = (ROOT / "docs" / "howto" / "own_data.md").read_text(encoding="utf-8")
+MANUAL = (ROOT / "docs" / "howto" / "motion_files.md").read_text(encoding="utf-8")
 DOC = read_motion.__doc__
 
 
@@ -34,7 +34,7 @@ def read_example(folder, ending, **params):
     [
         ("EXAMPLES of tests/io/motion_files.py has no {} file", lambda end: end in EXAMPLES),
         ("DAMAGES of tests/io/fuzz_readers.py has no {} file", lambda end: end in DAMAGES),
-        ("docs/howto/own_data.md does not mention `{}`", lambda end: f"`{end}`" in MANUAL),
+        ("docs/howto/motion_files.md does not mention `{}`", lambda end: f"`{end}`" in MANUAL),
         ("the docstring of read_motion does not mention ``{}``", lambda end: f"``{end}``" in DOC),
         (
             "the docstring of read_motion does not list {}, without the dot, as a format",
