@@ -10,10 +10,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = {
-    name: (ROOT / "docs" / name).read_text(encoding="utf-8")
-    for name in ("tutorial.md", "howto/timing.md")
-}
+NAMES = (
+    "tutorial.md",
+    "howto/timing.md",
+    "howto/neuroscience.md",
+    "howto/speech.md",
+    "howto/sport.md",
+)
+PAGES = {name: (ROOT / "docs" / name).read_text(encoding="utf-8") for name in NAMES}
 # A block, and what is said to come out of it.
 BLOCK = re.compile(
     r"^```\{plot\}\n(?::[^\n]*\n)+\n(.*?)^```\n"
