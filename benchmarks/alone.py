@@ -1,4 +1,4 @@
-"""Whether warps depend on what else is warped (docs/method.md, "Eq. 17: back-tracking").
+"""Whether warps depend on what else is warped (docs/design.md).
 
 Performances whose costs tie are matched all together, and again one by one, in threes and in
 thirteens: counts the cases in which a warp, or a distance, is not the same to the last bit. Real

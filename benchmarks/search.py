@@ -1,4 +1,4 @@
-"""Where in whole recordings an action happens, beside subsequence DTW: the table of docs/method.md.
+"""Where in whole recordings an action happens, beside subsequence DTW: the table of docs/design.md.
 
 UTKinect's 20 recordings hold ten actions each, once, labelled by hand. All but two actors at a time
 teach an action by their clips, and the recordings of these two are searched. A hit is right if it

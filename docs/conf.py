@@ -135,6 +135,6 @@ html_theme_options = {
     "pygments_light_style": "friendly",
 }
 html_sidebars = {
-    page: [] for page in ("index", "tutorial", "method", "field", "glossary", "changelog")
+    page: [] for page in ("index", "tutorial", "method", "design", "field", "glossary", "changelog")
 }
 html_context = {"default_mode": "light"}

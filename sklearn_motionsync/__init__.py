@@ -1,4 +1,4 @@
-"""Several recordings of the same movement, on one clock.
+"""Repeated trials of one movement, aligned in time.
 
 >>> from sklearn.pipeline import make_pipeline
 >>> from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
@@ -89,4 +89,4 @@ from .display import SynchronizationDisplay as SynchronizationDisplay
 from .display import TrackingDisplay as TrackingDisplay
 from .display import TrellisDisplay as TrellisDisplay
 
-__version__ = "0.1.0.dev0"
+__version__ = "0.1.0"

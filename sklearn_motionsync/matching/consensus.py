@@ -8,7 +8,7 @@ from .warps import evaluate_warps
 __all__ = ["choose_exemplars", "smooth_warps", "vote"]
 
 # Decay of the weight of a route with its length: exp(-1.5) for one of typical length beside
-# one without any distance. Measured in docs/method.md.
+# one without any distance. Measured in docs/design.md.
 _DECAY = 1.5
 # Share of the weight by which rounding may move a half.
 _ROUNDING = {np.dtype(np.float64): 2.0**-40, np.dtype(np.float32): 2.0**-18}

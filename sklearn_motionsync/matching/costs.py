@@ -7,7 +7,7 @@ import numpy as np
 
 __all__ = ["COSTS", "RATE_WEIGHT", "Cost", "StepGroup", "StepTable", "group_steps", "step_table"]
 
-# w of the velocity cost, from the measurement in docs/method.md.
+# w of the velocity cost, from the measurement in docs/design.md.
 RATE_WEIGHT = 0.2
 
 

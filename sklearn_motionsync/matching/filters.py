@@ -10,7 +10,7 @@ from sklearn import get_config
 __all__ = ["SMOOTHING", "choose_smoothing", "smooth"]
 
 # Standard deviation of a Gaussian, as a share of the clip, that preserves human movement
-# and removes the noise of motion capture: docs/method.md, flat from 0.02 to 0.05.
+# and removes the noise of motion capture: docs/design.md.
 SMOOTHING = 0.03
 # Standard deviation, in samples, from which Fourier transforms are the faster filter.
 _WIDE = 10

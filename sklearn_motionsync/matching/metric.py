@@ -123,7 +123,7 @@ _RELIABLE = 2.0
 # Share of a feature's mean variance that is added to all of them, before anything is inverted.
 _RIDGE = 0.03
 # Eigenvalues of a metric are raised to this power: half-way to equal weights of all directions,
-# the prior. Measured in docs/method.md.
+# the prior. Measured in docs/design.md.
 _SHRINKAGE = 0.6
 # Eigenvalues below this share of their sum are rounding.
 _LEAST_EIGENVALUE = 1e-6

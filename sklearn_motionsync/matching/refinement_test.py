@@ -25,7 +25,7 @@ _CONSTANT = 1e-20
 _LEVEL = 0.003
 # Degrees of freedom, and standard deviation of the logarithms, of the prior variance.
 _PRIOR = 2, 0.1
-# Steps and level of the first pass: docs/method.md.
+# Steps and level of the first pass: docs/design.md.
 _FIRST_STEPS, _FIRST_LEVEL = 3, 0.1
 # Warps matched by all features have seen the noise of the test features: the ratio that allows.
 _LARGEST_RATIO = 1.2

@@ -261,7 +261,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
 
         A weighted mean of what is left of the mean duration after the elapsed time, and of what is
         left of the phase at the mean pace; the phase, as a share of the clock, is the weight of the
-        second. docs/method.md has a table of its errors.
+        second. docs/design.md has a table of its errors.
 
         Returns
         -------
@@ -326,7 +326,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
 
 # -- the reference: what running performances are matched to -------------------------------
 
-# Positions a frame of the pattern: docs/method.md.
+# Positions a frame of the pattern.
 _SUBFRAMES = 2
 # After the end the last posture is held for so many widths of the velocity filters, after which
 # these have forgotten the movement.

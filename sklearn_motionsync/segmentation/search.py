@@ -130,7 +130,7 @@ def find_performances(
     -----
     The threshold of ``"auto"`` depends on how subjects differ, and not on what else in a take
     resembles the action, which is unknown. Raise ``coverage`` to miss less, or the threshold for
-    fewer false hits; docs/method.md has figures. Actions that subjects perform in entirely
+    fewer false hits; docs/design.md has figures. Actions that subjects perform in entirely
     different ways are found rarely.
 
     Examples

@@ -37,9 +37,9 @@ from .portions import FeatureStore, TrainingPortions, measure_in_portions, warp_
 __all__ = ["DenseSynchronizer"]
 
 # max_offset="auto". A wide band leads paths astray without a learnt metric; with one, gestures
-# need it: docs/method.md.
+# need it: docs/design.md.
 _NARROW, _WIDE = 0.25, 0.4
-# The largest offset while the metric is learnt: docs/method.md.
+# The largest offset while the metric is learnt: docs/design.md.
 _LEARNING_OFFSET = 0.2
 # velocity_smoothing="auto": a metric weights noise down; without one it is smoothed away.
 _SMOOTH, _SHARP = SMOOTHING, 0.02

@@ -41,7 +41,7 @@ def test_correlation_is_that_of_the_formula():
 
 @pytest.mark.parametrize("drift", [0.0, 3.0, 40.0])
 def test_correlation_of_a_drifting_curve_is_pearsons_at_every_lag(drift):
-    """Of the curve smoothed as docs/method.md says, and of its derivative."""
+    """Of the curve smoothed as docs/design.md says, and of its derivative."""
     t = np.arange(400) / 400
     x = np.sin(14 * np.pi * t) + 0.5 * np.cos(28 * np.pi * t**1.1) + drift * (t - t**2 / 3)
     found = self_correlation(x[:, np.newaxis])
