@@ -6,6 +6,7 @@ from ..body.formats import SIDES
 from ..inputs.features import choose_features
 from ..segmentation.cycles import (
     CycleSegmenter,
+    as_learnt,
     check_takes,
     compared_names,
     correlate_takes,
@@ -120,6 +121,7 @@ class CycleDisplay:
         given, takes = check_takes(segmenter, X, reset=True)
         i = as_index(take, len(takes), "take")
         (x,), (found,) = correlate_takes(segmenter, given[i : i + 1], takes[i : i + 1])
+        found = as_learnt(estimator, x, found) if fitted else found
         row = segmenter.report(given[i : i + 1]).iloc[0]
         name, curve = _curve_of(segmenter, estimator if fitted else None, given[i], x, feature)
         cuts = np.array([], dtype=int)

@@ -162,6 +162,11 @@ def _refuse_items(values, what):
 
 
 def _not_numeric(values, what, reason):
+    if "inhomogeneous" in reason:
+        reason = (
+            "whose parts differ in length. Give every frame the same features; of events, such as "
+            "times of spikes, make a rate at every frame"
+        )
     return f"{what} is not a numeric array: got {type(values).__name__}, {reason}."
 
 

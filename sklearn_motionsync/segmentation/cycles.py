@@ -28,7 +28,14 @@ from ..utils.doc_links import DocumentedMixin
 from .cutting import as_takes, cut_takes
 from .self_correlation import LEAST_CYCLES, correlate, rejection_reason
 
-__all__ = ["CycleSegmenter", "check_takes", "compared_names", "correlate_takes", "start_curves"]
+__all__ = [
+    "CycleSegmenter",
+    "as_learnt",
+    "check_takes",
+    "compared_names",
+    "correlate_takes",
+    "start_curves",
+]
 
 # A fit matches the takes to the template, and estimates it again, so many times.
 _ROUNDS = 2
@@ -38,6 +45,8 @@ PHASES, _SUBFRAMES = 32, 4
 _WIDTH = 1
 # Weight of (rho - 1)^2, for postures and velocities of mean square 1 each; the largest rate rho.
 _SMOOTHNESS, _FASTEST = 0.3, 2
+# Cycles are as long as the learnt ones up to the first ratio, and the same up to the second.
+_AS_LONG, _SAME = 1.25, 1.001
 # Largest offset of a path from the mean pace, in cycles: at its beginning, and more per cycle.
 _BEGIN, _DRIFT = 0.55, 0.3
 # Cycles of the portions in which long takes are matched, and of their overlap.
@@ -83,7 +92,8 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
     period : (float, float), default=None
         Least and largest number of frames of a cycle, for takes in which several cycles fit: a step
         and two, where every second one is stronger. None takes the shortest of those that repeat
-        best, and warns of the others.
+        best, and warns of the others. After ``fit`` it is the only one as long as the cycles that
+        were learnt, within a quarter, if there is one, without a warning.
 
     Attributes
     ----------
@@ -308,6 +318,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
     def _phases(self, given, takes):
         """Yield the index, the samples, and their phases, of every take that is cyclic."""
         features, found = correlate_takes(self, given, takes)
+        found = [as_learnt(self, x, f) for x, f in zip(features, found, strict=True)]
         align = match_phases if self.refine else constant_phases
         for i in self._select_cyclic(takes, found):
             take = SampledTake(features[i], found[i].period)
@@ -372,6 +383,20 @@ def correlate_takes(segmenter, given, takes):
         takes = cosines.fit_transform(given)
     features = [np.asarray(x, dtype=np.float64) for x in takes]
     return features, [correlate(x, limits) for x in features]
+
+
+def as_learnt(segmenter, features, found):
+    """The self-correlation of a take at the only cycle that is as long as those of the fit.
+
+    It is returned as found if one cycle fits, or none or several are as long.
+    """
+    learnt, fits = segmenter.periods_, found.periods
+    near = (fits >= np.nanmin(learnt) / _AS_LONG) & (fits <= np.nanmax(learnt) * _AS_LONG)
+    if len(fits) < 2 or near.sum() != 1:
+        return found
+    (period,) = fits[near]
+    chosen = correlate(features, (period / _SAME, period * _SAME))
+    return found if rejection_reason(chosen, segmenter.threshold) else chosen
 
 
 def _check_period(period):

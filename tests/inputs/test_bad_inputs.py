@@ -121,7 +121,11 @@ PERFORMANCES = [
     (np.full((4, 9), 2e9), ALL, ["Row 0", "2e+09", "unit"]),
     (one(lambda x: x[:1]), ALL, ["Performance 2", "(1, 3)", "at least 2 frames"]),
     (one(lambda x: x[:, :0]), ALL, ["Performance 2", "(20, 0)", "1 feature"]),
-    (one(lambda x: [[1, 2, 3], [4, 5]]), ALL, ["Performance 2", "not a numeric array"]),
+    (
+        one(lambda x: [[1, 2, 3], [4, 5]]),
+        ALL,
+        ["Performance 2", "not a numeric array", "parts differ in length", "times of spikes"],
+    ),
     (LABELLED.mask(LABELLED["knee"] == X[1][4, 1]), ALL, ["'bob'", "frame 4", "'hip'", "NaN"]),
     ([*FRAMES[:2], FRAMES[2][NAMES[:2]]], ALL, ["Performance 2", "it lacks ['ankle']", "common"]),
     ([*FRAMES[:2], MORE[2]], ALL, ["Performance 2", "has besides ['toe']", "columns='common'"]),

@@ -22,6 +22,7 @@ from sklearn_motionsync import (
     to_sequences,
 )
 from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.display import CycleDisplay
 from sklearn_motionsync.segmentation.cycles import SampledTake, locate_cycles
 
 HIP = 0
@@ -229,6 +230,31 @@ def test_warns_where_several_cycles_fit_and_period_selects_one():
     assert len(chosen.segment([beat])[0]) >= 14
     with pytest.raises(ValueError, match=r"not cyclic within period=\(8, 12\)"):
         CycleSegmenter(period=(8, 12)).fit(X)
+
+
+def test_of_several_cycles_that_fit_the_learnt_one_is_taken():
+    """The fit has seen steps that are alike; later every second one is stronger."""
+    angle = 2 * np.pi * np.arange(640)[:, np.newaxis] / 40
+    steady = np.sin(angle + np.arange(3)) + 0.5 * np.cos(2 * angle)
+    beat = steady * np.repeat(np.tile([1, 0.4], 8), 40)[:, np.newaxis]
+    segmenter = CycleSegmenter(start=0).fit([steady])
+    assert segmenter.report([beat])["period"][0] == pytest.approx(80, rel=0.05)
+    _, locations = segmenter.segment([beat])  # a warning is an error
+    np.testing.assert_allclose(np.diff(locations["start"]), 40, atol=4)
+    assert len(locations) >= 14
+    display = CycleDisplay.from_estimator(segmenter, [beat])
+    assert display.period == pytest.approx(40, rel=0.1)
+    # A step and two are both as long as what this one has learnt, and neither as this one has.
+    with pytest.warns(UserWarning, match="several cycles fit"):
+        mixed = CycleSegmenter(start=0).fit([steady, beat])
+    slow = CycleSegmenter(start=0).fit([np.repeat(steady, 8, axis=0)])
+    for other in (mixed, slow):
+        with pytest.warns(UserWarning, match=r"several cycles fit, of .* 80\.0 is taken"):
+            other.segment([beat])
+    # Alone, the weaker steps would not make a take cyclic.
+    faint = steady * np.repeat(np.tile([1, 0.15], 8), 40)[:, np.newaxis]
+    with pytest.warns(UserWarning, match=r"several cycles fit, of .* 80\.\d is taken"):
+        segmenter.segment([faint])
 
 
 # -- errors ---------------------------------------------------------------------------------

@@ -1,0 +1,78 @@
+"""Trials of spike counts, as the benchmark makes and judges them."""
+
+import sys
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope="module")
+def neuroscience(benchmark):
+    return benchmark("neuroscience")
+
+
+def test_template_is_sampled_between_bins_and_held_beyond_its_ends(neuroscience):
+    rng = np.random.default_rng(0)
+    template = rng.random((neuroscience.BINS, 3))
+    positions = rng.uniform(-20, neuroscience.BINS + 20, (4, 50))
+    bins = np.arange(neuroscience.BINS)
+    expected = [[np.interp(one, bins, neuron) for neuron in template.T] for one in positions]
+    found = neuroscience.sample(template, positions)
+    np.testing.assert_allclose(found, np.swapaxes(expected, 1, 2), rtol=0, atol=1e-12)
+
+
+def test_average_of_trials_without_warp_is_their_smoothed_mean(neuroscience):
+    counts, positions = neuroscience.make_trials(0, "no warp")
+    mean = counts.mean(axis=0)
+    width = neuroscience.AVERAGED
+    kernel = np.exp(-0.5 * (np.arange(-4, 5) / width) ** 2)
+    expected = np.apply_along_axis(np.convolve, 0, mean, kernel / kernel.sum(), mode="valid")
+    found = neuroscience.average(counts, positions)[4:-4]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["one knot", "shift"])
+def test_true_warps_explain_most_of_counts_that_were_held_out(neuroscience, kind):
+    counts, positions = neuroscience.make_trials(1, kind)
+    assert (np.diff(positions, axis=1) >= 0).all()
+    true = neuroscience.held_out_r2(counts, positions)
+    wrong = neuroscience.held_out_r2(counts, positions[::-1])
+    assert true > 5 * max(wrong, neuroscience.held_out_r2(counts, neuroscience.unaligned(counts)))
+
+
+def test_held_out_share_equals_its_definition(neuroscience):
+    rng = np.random.default_rng(2)
+    counts = rng.poisson(0.5, (10, neuroscience.BINS, 2)).astype(float)
+    positions = neuroscience.unaligned(counts)
+    missed = total = 0.0
+    for k in range(neuroscience.FOLDS):
+        known = np.delete(counts, slice(k, None, neuroscience.FOLDS), axis=0)
+        template = neuroscience.average(known, positions[: len(known)])
+        for trial in counts[k :: neuroscience.FOLDS]:
+            missed += ((trial - template) ** 2).sum()
+            total += ((trial - known.mean(axis=(0, 1))) ** 2).sum()
+    assert neuroscience.held_out_r2(counts, positions) == pytest.approx(1 - missed / total)
+    assert missed > total  # there is nothing to be explained
+
+
+def test_margins_are_cut_off_again(neuroscience):
+    counts, positions = neuroscience.make_trials(0, "shift")
+    counts, positions = counts[:12], positions[:12]
+    for margin in (0, 15):
+        found = neuroscience.dense(2, margin)(counts)
+        assert found.shape == positions.shape
+        off = found - positions
+        assert np.abs(off - off.mean(axis=0))[:, 40:110].mean() < 3  # of 7 bins as recorded
+
+
+def test_table_has_a_row_a_method(neuroscience, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["neuroscience.py", "--sets", "1"])
+    monkeypatch.setattr(neuroscience, "PEERS", {})
+    monkeypatch.setattr(neuroscience, "METHODS", {"as recorded": neuroscience.unaligned})
+    neuroscience.main()
+    head, _, *rows = capsys.readouterr().out.splitlines()
+    assert head.split(" | ")[1:] == ["one knot", "shift", "no warp |"]
+    assert [row.split(" | ")[0] for row in rows] == ["| true warps", "| as recorded"]
+    true, recorded = ([float(x) for x in row.strip("| ").split(" | ")[1:]] for row in rows)
+    assert true[0] > recorded[0]
+    assert true[2] == recorded[2]
