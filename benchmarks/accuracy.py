@@ -190,14 +190,13 @@ def best_peer(people):
 
     best, single = {}, {}
     for label, actions in best_of_peers(row).items():
-        for (text, *_), parts in zip(
-            peers.settings(label), zip(*actions, strict=True), strict=True
-        ):
-            of_setting = {key: pair for part in parts for key, pair in part}
-            some = {key: of_setting[key] for key in with_peer() if key in of_setting}
+        by_setting = zip(*actions, strict=True)
+        for (text, *_), parts in zip(peers.settings(label), by_setting, strict=True):
+            errors = {event: pair for part in parts for event, pair in part}
+            some = {event: errors[event] for event in with_peer()}
             single[f"{label}, {text}"] = geometric_means(some)
-            for key, pair in of_setting.items():
-                best[key] = np.min([pair, best.get(key, pair)], axis=0)
+            for event, pair in errors.items():
+                best[event] = np.min([pair, best.get(event, pair)], axis=0)
     if single:
         label = min(single, key=lambda name: single[name][0])
         print_head("the best single setting of a peer", [f"geometric mean, {WITH_PEER}"])
