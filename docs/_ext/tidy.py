@@ -17,7 +17,7 @@ def strip_blocks(app, doctree):
 
 
 def mark_numbers(app, doctree):
-    """Cells of numbers, such as "3.34 / 0.95 / 16%" or "18 ms", are kept on one line by the style sheet."""
+    """Cells of numbers, such as "3.34 / 16%" or "18 ms": the style sheet keeps them on one line."""
     from docutils import nodes
 
     for entry in doctree.findall(nodes.entry):
