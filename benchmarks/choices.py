@@ -63,7 +63,7 @@ def row(label, people, times_to=matched, **params):
 def main():
     """Print the table."""
     people = read_people(Path(sys.argv[1]), [event for event in EVENTS if event.peers], PATTERNS)
-    print("| setting | error | stand still | hurry | spread of velocity |\n" + "|---" * 5 + "|")
+    print("| setting | error | stands still | hurries | spread of velocity |\n" + "|---" * 5 + "|")
     of_defaults = row("defaults", people)
     for name, values in CHOICES.items():
         for value in values:
