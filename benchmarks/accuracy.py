@@ -36,6 +36,7 @@ from sklearn_motionsync.matching.matcher import cost_features
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error, timing_error
 
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
+WITH_PEER = "moments with a peer"
 LINEAR, PLAIN, DEFAULTS = "linear normalisation", "`metric=None`", "`DenseSynchronizer()`"
 OURS = {
     LINEAR: lambda **kw: LinearSynchronizer(P, **kw),
@@ -119,26 +120,27 @@ def known_table():
 
 
 def people_tables(folder):
-    """Actors held out, all ordered pairs, and the other settings."""
+    """People held out, all ordered pairs, and the other settings."""
     people = read_people(folder)
     work = [delayed(judge)(one, make) for make in OURS.values() for one in people]
     done = Parallel(n_jobs=-1)(work)
-    strangers, pairs, health = {}, {}, {}
+    held_out, pairs, health = {}, {}, {}
     for i, name in enumerate(OURS):
         parts = zip(*done[i * len(people) : (i + 1) * len(people)], strict=True)
-        held_out, everyone, health[name] = parts
-        strangers[name], pairs[name] = merged(held_out), merged(everyone)
-    event_table("actors held out", strangers)
-    event_table("all ordered pairs", pairs, {"best peer": best_peer(people)})
+        of_others, of_all, health[name] = parts
+        held_out[name], pairs[name] = merged(of_others), merged(of_all)
+    of_peers = best_peer(people)
+    event_table("people held out", held_out)
+    event_table("all ordered pairs", pairs, {"best peer": of_peers})
     print_head("ratio of geometric means", ["of the mean errors", "of the median errors"])
-    for label, errors in (("actors held out", strangers), ("all ordered pairs", pairs)):
-        for keys, which in ((list(errors[LINEAR]), "all"), (with_peer(), "with a peer")):
-            print_row(f"{label}, events: {which}", compared(errors, PLAIN, keys))
-    header = ["actors held out", "all ordered pairs", "stand still", "hurry", "spread of velocity"]
-    print_head("geometric means", header)
+    for label, errors in (("people held out", held_out), ("all ordered pairs", pairs)):
+        for keys, which in ((list(errors[LINEAR]), "all moments"), (with_peer(), WITH_PEER)):
+            print_row(f"{label}, {which}", compared(errors, PLAIN, keys))
+    header = ["people held out", "all ordered pairs", "stand still", "hurry", "spread of velocity"]
+    print_head("geometric mean", header)
     for name in OURS:
         still, hurry, spread = np.mean(health[name], axis=0)
-        cells = [show_pair(geometric_means(figures(of[name]))) for of in (strangers, pairs)]
+        cells = [show_pair(geometric_means(figures(of[name]))) for of in (held_out, pairs)]
         cells += [f"{still:.0%}", f"{hurry:.0%}", f"{spread:.2f}"]
         print_row(name, cells)
 
@@ -160,12 +162,12 @@ def event_table(corner, errors, others=None):
     for key, found in errors[LINEAR].items():
         cells = [show_pair(column[key]) if key in column else "-" for column in columns.values()]
         print_row(f"`{key[0]}`, {key[1]}", [str(len(found)), *cells])
-    for label, keys in (("all", list(errors[LINEAR])), ("with a peer", with_peer())):
+    for label, keys in (("all moments", list(errors[LINEAR])), (WITH_PEER, with_peer())):
         cells = [""]
         for column in columns.values():
             some = {key: column[key] for key in keys if key in column}
             cells.append(show_pair(geometric_means(some)) if len(some) == len(keys) else "-")
-        print_row(f"geometric means, events: {label}", cells)
+        print_row(f"geometric mean, {label}", cells)
 
 
 def compared(errors, name, keys):
@@ -186,10 +188,19 @@ def best_peer(people):
         warps = [one.to_patterns(partial(peer_to, align, kind)) for one in people]
         return [list(figures(one.errors()).items()) for one in warps]
 
-    best: dict = {}
-    for actions in best_of_peers(row).values():
-        for cell in (item for settings in actions for one in settings for item in one):
-            best[cell[0]] = np.min([cell[1], best.get(cell[0], cell[1])], axis=0)
+    best, single = {}, {}
+    for label, actions in best_of_peers(row).items():
+        by_setting = zip(*actions, strict=True)
+        for (text, *_), parts in zip(peers.settings(label), by_setting, strict=True):
+            errors = {event: pair for part in parts for event, pair in part}
+            some = {event: errors[event] for event in with_peer()}
+            single[f"{label}, {text}"] = geometric_means(some)
+            for event, pair in errors.items():
+                best[event] = np.min([pair, best.get(event, pair)], axis=0)
+    if single:
+        label = min(single, key=lambda name: single[name][0])
+        print_head("the best single setting of a peer", [f"geometric mean, {WITH_PEER}"])
+        print_row(label, [show_pair(single[label])])
     return best or {(event.action, event.name): event.peers for event in EVENTS if event.peers}
 
 
@@ -224,14 +235,14 @@ def refinement_cases(folder):
     for one in read_people(folder) if folder is not None else ():
         everyone = np.arange(len(one.X))
         for n_features in (None, 3, 2, 1):
-            some = "" if n_features is None else f", {n_features} dimension(s)"
+            some = "" if n_features is None else f", first {n_features} feature(s)"
             X = [x[:, :n_features] for x in one.X]
             yield f"`{one.name}`{some}", X, "median", error_of_events(one, everyone)
         for actor in sorted(set(one.actors)) if one.archive == "hdm05" else ():
             own = np.flatnonzero(one.actors == actor)
             X = [one.X[i] for i in own]
             if len(own) > 2:
-                yield f"`{one.name}`, actor {actor} alone", X, "median", error_of_events(one, own)
+                yield f"`{one.name}`, subject {actor} alone", X, "median", error_of_events(one, own)
 
 
 def error_of_events(one, chosen):

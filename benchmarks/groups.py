@@ -50,7 +50,7 @@ LINEAR, CURVE, OFFSET, JOINT = (
     "synchronised, offset alone",
     "synchronised, curve and offset",
 )
-TRUE = "the true clock, curve and offset"
+TRUE = "true times, curve and offset"
 TESTS = (LINEAR, CURVE, OFFSET, JOINT, TRUE)
 
 

@@ -144,8 +144,8 @@ def main():
         kinds["variations of clips"] = hard["variations of clips"] = clips.variations
         hard |= {"six clips": clips.few, "two clips": clips.two, "one clip": clips.one}
     print(
-        "| sets | performances | settings | searches | right | certified | certified but wrong "
-        "| matches a performance | in doubt, at most | excess, of what was said, at most |"
+        "| sets | trials | settings | searches | right | certified | certified but wrong "
+        "| matches a trial | in doubt, at most | excess, of what was said, at most |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|")
     both = {"paper": PAPER, "without a metric": PLAIN}

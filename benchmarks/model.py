@@ -205,7 +205,7 @@ def verdict_tables(name, found):
         for judge, setting in best.items()
     }
     header = ["own", "lowest action", *KINDS]
-    header += [f"{BACKWARDS}: {apart} apart" for apart in ("bends", "there and back")]
+    header += [f"{BACKWARDS}, {some}" for some in ("without bends", "one-way actions")]
     print_head(f"{name}: accepted / refused", header)
     for label, actions in decided.items():
         own = list(accepted(actions).values())
@@ -227,7 +227,7 @@ def verdict_tables(name, found):
 
 def action_table(found_by_set, judge):
     """What a judge of ours accepts and refuses, action by action."""
-    header = ["performances", "own", *KINDS, "border", "unlike itself backwards"]
+    header = ["trials", "own", *KINDS, "threshold", "dissimilarity to itself backwards"]
     print_head(f"{judge}: accepted / refused", header)
     for name, found in found_by_set.items():
         for action, by in pooled(found, judge, "").items():
@@ -247,20 +247,18 @@ def border_table(found_by_set):
         for key in REACHED:
             shares, n_actions = by_action(found, lambda one, key=key: one.reached.get(key))
             if n_actions:
-                label = (
-                    f"{name}, {key[0]} performances, {'groups given' if key[1] else 'no groups'}"
-                )
+                label = f"{name}, {key[0]} trials, {'groups given' if key[1] else 'no groups'}"
                 print_row(label, [str(n_actions), *map(one_digit, shares)])
 
 
 def band_table(found_by_set):
     """The share of right points and whole performances that bands hold."""
-    header = [f"{what}, {c:.4g}" for what in ("points", "performances") for c in HELD]
+    header = [f"{what}, {c:.4g}" for what in ("points", "trials") for c in HELD]
     print_head("held", header)
     for name, found in found_by_set.items():
         for band in found[0].held:
             shares, _ = by_action(found, lambda one, band=band: one.held[band])
-            print_row(f"{name}, band of {band}", map(one_digit, shares.T.ravel()))
+            print_row(f'{name}, `band="{band}"`', map(one_digit, shares.T.ravel()))
 
 
 def by_action(found, rows_of):
@@ -310,8 +308,8 @@ def counted(table, n):
 
 def departure_table(sets):
     """Of right performances, accepted or not, and of those of other kinds that are refused."""
-    header = ["performances", "with a departure", "with a rare one", "departures each"]
-    print_head("departures of whole postures", header)
+    header = ["trials", "with a departure", "with a rare one", "departures each"]
+    print_head("departures of whole poses", header)
     for clips in sets:
         work = [delayed(departures_of)(clips, *fold) for fold in clips.folds()]
         found: dict = {}
@@ -341,7 +339,7 @@ def feet_table(folder):
     ankles = [Skeleton.paper().index_of(side + "_ankle") for side in ("left", "right")]
     rng = np.random.RandomState(0)
     drawn = {
-        "training performances": lambda frame: on_clock[:, frame],
+        "training trials": lambda frame: on_clock[:, frame],
         "every feature by itself": lambda frame: by_feature(model, frame, rng),
         "`sample(200, frame)`": lambda frame: model.sample(SAMPLES, frame=frame, random_state=rng),
     }
@@ -396,7 +394,7 @@ REPETITIONS = 50
 
 def time_table(folds):
     """predict over score_samples, in alternation."""
-    print_head("time of `predict` / of the density", ["performances", "together", "alone"])
+    print_head("time of `predict` / of the density", ["trials", "together", "alone"])
     for fold in folds:
         model = ActionModel().fit(fold.on_clock, groups=fold.groups)
         tried = np.concatenate(list(fold.synchronised.values()))

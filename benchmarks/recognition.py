@@ -66,7 +66,7 @@ def actors_alone(actors):
 
 # -- what is found on a fold ------------------------------------------------------------
 
-SPLITS, LEFT_OUT, ALONE = "ten splits", "leave one actor out", "learn from one actor"
+SPLITS, LEFT_OUT, ALONE = "ten splits", "leave one subject out", "learn from one subject"
 LOSS, ERROR, AREA = "log-loss", "ECE", "AUC of unknown actions"
 
 

@@ -28,15 +28,15 @@ from sklearn_motionsync.model.sampling import sample_performances, sample_postur
 FOLDS, P, N = 4, 100, 150
 POSTURES = {
     "feature by feature": (0, 0, 1),
-    "normal, half shrunk": (0, 0.5, 0.5),
-    "normal": (0, 1, 0),
-    "about one, half": (0.5, 0.45, 0.05),
-    "about one": (0.84, 0.14, 0.02),
-    "about one, shrunk": (0.84, 0.08, 0.08),
-    "training postures": (1, 0, 0),
+    "normal, covariance half shrunk": (0, 0.5, 0.5),
+    "normal, covariance as it is": (0, 1, 0),
+    "about one trial's pose, widely": (0.5, 0.45, 0.05),
+    "about one trial's pose": (0.84, 0.14, 0.02),
+    "about one trial's pose, shrunk": (0.84, 0.08, 0.08),
+    "poses of training trials": (1, 0, 0),
 }
 PERFORMANCES = {name: (a, 1 - a) for name, a in (("mixtures", 0), ("0.36", 0.36), ("0.64", 0.64))}
-PERFORMANCES |= {"0.84": (0.84, 0.16), "training performances": (1, 0)}
+PERFORMANCES |= {"0.84": (0.84, 0.16), "training trials": (1, 0)}
 
 
 def moments(X):

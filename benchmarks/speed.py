@@ -202,7 +202,7 @@ def pair(peers):
     )
     wide = Trellis(step_table("velocity", 4), 0.01, 40)
     compare(
-        "Forty to a fitted pattern of 100 x 16, and the share of the trellis",
+        "Forty trials to a fitted template of 100 x 16",
         {
             "its trellis, the paper's settings": lambda: timed(lambda: trellis.paths(X[:1], X)),
             "`transform` of 40, the paper's settings": lambda: timed(lambda: paper.transform(X)),
@@ -297,9 +297,9 @@ def sources(peers, data):
         if actor is None and len(X) > 23:
             X = LinearSynchronizer(100).fit_transform(X[:: max(1, len(X) // 40)])[:40]
             sets[f"{archive}, {label}, {len(X)}"] = X.astype(float)
-    print("\n## Trials of one source, where refining is on, beside people\n")
+    print("\n## Trials of one source, and of people\n")
     print(
-        "| performances of 100 x 16 | refined | dtaidistance, pairs, ms | `fit`, ms | ratio ",
+        "| trials of 100 x 16 | refined | dtaidistance, pairs, ms | `fit`, ms | ratio ",
         end="",
     )
     print(
@@ -338,7 +338,7 @@ def whole(peers):
         "`fit_transform`, defaults": lambda: timed(lambda: DenseSynchronizer().fit_transform(X)),
     }
     jobs = ("dtaidistance DBA", "tslearn DBA", "aeon DBA")
-    title = "The whole job: pattern and all warps of 40 performances of 100 x 16"
+    title = "The whole job: template and all warps of 40 trials of 100 x 16"
     compare(
         title,
         {**ours, **{job: partial(peers, job, path) for job in jobs}},
@@ -371,7 +371,7 @@ def cold(peers):
         subprocess.run(command, check=True, capture_output=True)
 
     jobs = {
-        "ours, defaults, pattern and all warps": [sys.executable, "-c", ours, str(path)],
+        "ours, defaults, template and all warps": [sys.executable, "-c", ours, str(path)],
         "`import sklearn_motionsync`": [sys.executable, "-c", "import sklearn_motionsync"],
         "importing what it needs of scikit-learn, pandas, scipy": [sys.executable, "-c", base],
     }
@@ -423,7 +423,7 @@ def bends(n):
 
 def many(peers):
     """Thousands of performances."""
-    print("\n## Many performances of 100 x 16: time, memory, matches\n")
+    print("\n## Many trials of 100 x 16: time, memory, matches\n")
     print("| N | settings | fit, s | transform, s | peak MB | MB before | matches | certified |")
     print("|---|---|---|---|---|---|---|---|")
     for n in (100, 200, 400, 1000, 2000, 5000, 10000):
@@ -508,17 +508,17 @@ def workers(peers):
             "`n_jobs=2`: threads": shared,
             "`n_jobs=2`: processes, already running": in_processes,
         }
-        compare(f"Workers: `fit` of {n} performances, {name}, exhaustive", jobs, rounds=3)
+        compare(f"Workers: `fit` of {n} trials, {name}, exhaustive", jobs, rounds=3)
 
 
 SECTIONS = {
     "pair": pair,
-    "pairs": partial(pairs, title="All pairs of 40 performances of 100 x 16"),
-    "n10": partial(pairs, title="All pairs of 10 performances", n=10),
-    "n100": partial(pairs, title="All pairs of 100 performances", n=100, rounds=5),
-    "n200": partial(pairs, title="All pairs of 200 performances (`fit` samples)", n=200, rounds=3),
-    "frames": partial(pairs, title="All pairs of 40 performances of 200 x 16", n_frames=200),
-    "features": partial(pairs, title="All pairs of 40 performances of 100 x 60", n_features=60),
+    "pairs": partial(pairs, title="All pairs of 40 trials of 100 x 16"),
+    "n10": partial(pairs, title="All pairs of 10 trials", n=10),
+    "n100": partial(pairs, title="All pairs of 100 trials", n=100, rounds=5),
+    "n200": partial(pairs, title="All pairs of 200 trials (`fit` samples)", n=200, rounds=3),
+    "frames": partial(pairs, title="All pairs of 40 trials of 200 x 16", n_frames=200),
+    "features": partial(pairs, title="All pairs of 40 trials of 100 x 60", n_features=60),
     "sources": sources,
     "whole": whole,
     "cold": cold,
