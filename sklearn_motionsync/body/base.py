@@ -9,6 +9,7 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.numbers import column_names
+from ..inputs.types import PerformancesLike, Transformed
 from ..inputs.validation import check_performances, names_of_input, restore
 from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
@@ -224,7 +225,7 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
     fit_transform = atomic_fit(TransformerMixin.fit_transform)
 
     @snapshot
-    def transform(self, X):
+    def transform(self, X: PerformancesLike) -> Transformed:
         """Features of joint positions.
 
         Parameters

@@ -1,9 +1,13 @@
 """CycleDisplay: the self-correlation of a take, and the cuts between its cycles."""
 
+from typing import Self
+
 import numpy as np
+from sklearn.base import BaseEstimator
 
 from ..body.formats import SIDES
 from ..inputs.features import choose_features
+from ..inputs.types import PerformancesLike, Unit, ValuesLike
 from ..segmentation.cycles import (
     CycleSegmenter,
     check_takes,
@@ -13,7 +17,7 @@ from ..segmentation.cycles import (
 )
 from ..segmentation.self_correlation import required_strength
 from ..synchronizers.match import rates_of
-from .arguments import as_index
+from .arguments import AxesLike, as_index
 from .drawing import COLORS, panels
 from .time_axis import TimeAxis
 
@@ -70,8 +74,17 @@ class CycleDisplay:
     """
 
     def __init__(
-        self, correlation, peaks, curve, cuts=(), *, threshold=0.4, period=None, name="", reason=""
-    ):
+        self,
+        correlation: ValuesLike,
+        peaks: ValuesLike,
+        curve: ValuesLike,
+        cuts: ValuesLike = (),
+        *,
+        threshold: float = 0.4,
+        period: float | None = None,
+        name: str = "",
+        reason: str = "",
+    ) -> None:
         self.correlation, self.curve = np.asarray(correlation), np.asarray(curve)
         self.peaks, self.cuts = np.asarray(peaks, dtype=int), np.asarray(cuts, dtype=int)
         self.threshold, self.period, self.name, self.reason = threshold, period, name, reason
@@ -81,8 +94,16 @@ class CycleDisplay:
 
     @classmethod
     def from_estimator(
-        cls, estimator, X, *, take=0, feature=None, unit="frames", frame_rate=None, ax=None
-    ):
+        cls,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
+        *,
+        take: int = 0,
+        feature: int | str | None = None,
+        unit: Unit = "frames",
+        frame_rate: float | None = None,
+        ax: AxesLike | None = None,
+    ) -> Self:
         """Draw the self-correlation and the cuts of a take.
 
         Parameters
@@ -140,7 +161,9 @@ class CycleDisplay:
         )
         return display.plot(ax, unit=unit, frame_rate=rates_of([given[i]], frame_rate, unit))
 
-    def plot(self, ax=None, *, unit="frames", frame_rate=None):
+    def plot(
+        self, ax: AxesLike | None = None, *, unit: Unit = "frames", frame_rate: float | None = None
+    ) -> Self:
         """Draw.
 
         Parameters

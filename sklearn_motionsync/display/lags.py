@@ -1,12 +1,17 @@
 """LagDisplay: the lags of parts of the body, with their confidence intervals."""
 
-import numpy as np
+from typing import Any, Self
 
+import numpy as np
+from sklearn.base import BaseEstimator
+
+from ..inputs.types import Labels, PerformancesLike, Unit, ValuesLike
 from ..inputs.wording import counted
 from ..synchronizers.lags import Lags
 from ..synchronizers.match import rates_of
 from ..synchronizers.parts import PartSynchronizer
 from ..utils.pipelines import route_to_synchronizer
+from .arguments import AxesLike
 from .drawing import COLORS, curves, front_line, legend_above, panels
 from .time_axis import TimeAxis
 
@@ -61,7 +66,7 @@ class LagDisplay:
     LagDisplay(5 parts behind the rest of the body, 6 performances of 4 people)
     """
 
-    def __init__(self, lags):
+    def __init__(self, lags: Lags) -> None:
         self.lags = lags
 
     def __repr__(self):
@@ -70,17 +75,17 @@ class LagDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
         *,
-        groups=None,
-        against="rest",
-        unit="percent",
-        frame_rate=None,
-        ax=None,
-        colorbar=True,
-        **params,
-    ):
+        groups: Labels | None = None,
+        against: str = "rest",
+        unit: Unit = "percent",
+        frame_rate: float | ValuesLike | None = None,
+        ax: AxesLike | None = None,
+        colorbar: bool = True,
+        **params: Any,
+    ) -> Self:
         """Draw the lags of performances.
 
         Parameters
@@ -117,7 +122,9 @@ class LagDisplay:
         return cls(lags).plot(ax, colorbar=colorbar)
 
     @classmethod
-    def from_predictions(cls, lags, *, ax=None, colorbar=True):
+    def from_predictions(
+        cls, lags: Lags, *, ax: AxesLike | None = None, colorbar: bool = True
+    ) -> Self:
         """Draw lags that are known already.
 
         Parameters
@@ -145,7 +152,7 @@ class LagDisplay:
             )
         return cls(lags).plot(ax, colorbar=colorbar)
 
-    def plot(self, ax=None, *, colorbar=True):
+    def plot(self, ax: AxesLike | None = None, *, colorbar: bool = True) -> Self:
         """Draw.
 
         Parameters

@@ -1,18 +1,38 @@
 """PhaseDisplay: the phase of running performances, and the predicted rest of them."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from textwrap import fill
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
+from sklearn.base import BaseEstimator
 
 from ..body.direction_cosines import DirectionCosines
+from ..body.skeleton import Skeleton
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.types import (
+    Features,
+    Indexed,
+    PerformanceLike,
+    PerformancesLike,
+    SupportsArray,
+    ValuesLike,
+)
 from ..online.stream import LivePhase, time_left
 from ..online.synchronizer import OnlineSynchronizer
 from ..utils.pipelines import find_step
 from .animation import animate
-from .arguments import TIME_LABELS, Takes, as_index, as_indices, as_names, times_from_zero
+from .arguments import (
+    TIME_LABELS,
+    Animation,
+    AxesLike,
+    Takes,
+    as_index,
+    as_indices,
+    as_names,
+    times_from_zero,
+)
 from .bodies import bones_by_side, bounds, invert_postures, landmark_track, project
 from .drawing import COLORS, bone_lines, front_line, legend_above, panels, stage
 
@@ -100,22 +120,22 @@ class PhaseDisplay:
 
     def __init__(
         self,
-        phases,
-        n_frames,
+        phases: LivePhase | Sequence[LivePhase],
+        n_frames: int,
         *,
-        times=None,
-        duration=None,
-        seen=None,
-        mean=None,
-        spread=None,
-        afterwards=None,
-        features=None,
-        bodies=None,
-        mean_body=None,
-        skeleton=None,
-        names=None,
-        unit="frames",
-    ):
+        times: Indexed[ValuesLike] | None = None,
+        duration: float | None = None,
+        seen: PerformancesLike | None = None,
+        mean: PerformanceLike | None = None,
+        spread: PerformanceLike | None = None,
+        afterwards: Indexed[ValuesLike | None] | None = None,
+        features: Sequence[str] | None = None,
+        bodies: Indexed[SupportsArray] | None = None,
+        mean_body: SupportsArray | None = None,
+        skeleton: Skeleton | None = None,
+        names: Sequence[str] | None = None,
+        unit: Literal["frames", "seconds"] = "frames",
+    ) -> None:
         phases = _as_list_of_phases(phases)
         count, nothing = len(phases), [None] * len(phases)
         self.names = list(map(str, range(count))) if names is None else names
@@ -141,19 +161,19 @@ class PhaseDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
         *,
-        times=None,
-        performances=None,
-        features=None,
-        training=None,
-        body=None,
-        names=None,
-        frame=None,
-        ax=None,
-        azimuth=-60,
-    ):
+        times: Indexed[ValuesLike] | None = None,
+        performances: int | Sequence[int] | None = None,
+        features: Features | None = None,
+        training: PerformancesLike | None = None,
+        body: BaseEstimator | None = None,
+        names: Sequence[str] | None = None,
+        frame: int | None = None,
+        ax: AxesLike | None = None,
+        azimuth: float = -60,
+    ) -> Self:
         """Follow performances, and draw their phases.
 
         Parameters
@@ -240,7 +260,16 @@ class PhaseDisplay:
         return display.plot(ax, frame=frame, azimuth=azimuth)
 
     @classmethod
-    def from_predictions(cls, phases, n_frames, *, frame=None, ax=None, azimuth=-60, **known):
+    def from_predictions(
+        cls,
+        phases: LivePhase | Sequence[LivePhase],
+        n_frames: int,
+        *,
+        frame: int | None = None,
+        ax: AxesLike | None = None,
+        azimuth: float = -60,
+        **known: Any,
+    ) -> Self:
         """Draw phases that are known already, such as ``live.history``.
 
         Parameters
@@ -271,7 +300,9 @@ class PhaseDisplay:
         """
         return cls(phases, n_frames, **known).plot(ax, frame=frame, azimuth=azimuth)
 
-    def plot(self, ax=None, *, frame=None, azimuth=-60):
+    def plot(
+        self, ax: AxesLike | None = None, *, frame: int | None = None, azimuth: float = -60
+    ) -> Self:
         """Draw the state at a frame.
 
         Parameters
@@ -324,7 +355,14 @@ class PhaseDisplay:
             legend_above([axis], handles, labels, n_cols=2)
         return self
 
-    def animate(self, ax=None, *, seconds=5.0, fps=15, azimuth=-60):
+    def animate(
+        self,
+        ax: AxesLike | None = None,
+        *,
+        seconds: float = 5.0,
+        fps: int = 15,
+        azimuth: float = -60,
+    ) -> Animation:
         """Animate the performances.
 
         Parameters

@@ -1,12 +1,18 @@
 """MetricDisplay: the weight of each feature in the learnt metric."""
 
+from collections.abc import Sequence
+from typing import Self
+
 import numpy as np
+from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.types import Features, ValuesLike
 from ..inputs.wording import counted
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import find_step
+from .arguments import AxesLike
 from .drawing import COLORS, panels
 
 __all__ = ["MetricDisplay"]
@@ -58,7 +64,14 @@ class MetricDisplay:
     (True, True)
     """
 
-    def __init__(self, share, energy, *, feature_names, n_performances=None):
+    def __init__(
+        self,
+        share: ValuesLike,
+        energy: ValuesLike,
+        *,
+        feature_names: Sequence[str],
+        n_performances: int | None = None,
+    ) -> None:
         self.share, self.energy = np.asarray(share), np.asarray(energy)
         self.feature_names, self.n_performances = feature_names, n_performances
 
@@ -66,7 +79,13 @@ class MetricDisplay:
         return f"MetricDisplay({counted(len(self.feature_names), 'row')}, {self._describe()})"
 
     @classmethod
-    def from_estimator(cls, estimator, *, features=None, ax=None):
+    def from_estimator(
+        cls,
+        estimator: BaseEstimator,
+        *,
+        features: Features | None = None,
+        ax: AxesLike | None = None,
+    ) -> Self:
         """Draw the metric of a fitted synchronizer, or of a pipeline with one.
 
         Parameters
@@ -105,7 +124,7 @@ class MetricDisplay:
         display = cls(*shares.T, feature_names=names, n_performances=len(metric.performances))
         return display.plot(ax)
 
-    def plot(self, ax=None):
+    def plot(self, ax: AxesLike | None = None) -> Self:
         """Draw.
 
         Parameters

@@ -1,16 +1,19 @@
 """ActionModelDisplay: the mean of a learnt action, a band, and departures from it (Fig. 3d)."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, clone
 
 from ..inputs.collections import as_collection
 from ..inputs.features import choose_features
+from ..inputs.types import Features, Labels, PerformanceLike, PerformancesLike, Unit, ValuesLike
 from ..inputs.wording import counted
 from ..model.views import view_of
 from ..synchronizers.match import rates_of
 from ..utils.groups import names_of_groups
+from .arguments import AxesLike
 from .drawing import (
     COLORS,
     curves,
@@ -103,21 +106,21 @@ class ActionModelDisplay:
 
     def __init__(
         self,
-        mean,
-        lower,
-        upper,
+        mean: PerformanceLike,
+        lower: PerformanceLike,
+        upper: PerformanceLike,
         *,
-        feature_names,
-        n_std=None,
-        performances=None,
-        band="points",
-        coverage=None,
-        departures=True,
-        groups=None,
-        people=None,
-        unit="frames",
-        frame_rate=None,
-    ):
+        feature_names: Sequence[str],
+        n_std: float | None = None,
+        performances: PerformancesLike | None = None,
+        band: Literal["points", "performances", "mean"] = "points",
+        coverage: float | None = None,
+        departures: bool = True,
+        groups: Labels | None = None,
+        people: Labels | None = None,
+        unit: Unit = "frames",
+        frame_rate: float | None = None,
+    ) -> None:
         self.mean, self.lower, self.upper = np.asarray(mean), np.asarray(lower), np.asarray(upper)
         self.feature_names, self.n_std = feature_names, n_std
         self.performances = None if performances is None else np.asarray(performances)
@@ -134,19 +137,19 @@ class ActionModelDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X=None,
+        estimator: BaseEstimator,
+        X: PerformancesLike | None = None,
         *,
-        features=None,
-        band=None,
-        departures=True,
-        groups=None,
-        people=None,
-        unit="frames",
-        frame_rate=None,
-        ax=None,
-        **params,
-    ):
+        features: Features | None = None,
+        band: Literal["points", "performances", "mean"] | None = None,
+        departures: bool = True,
+        groups: Labels | None = None,
+        people: Labels | None = None,
+        unit: Unit = "frames",
+        frame_rate: float | ValuesLike | None = None,
+        ax: AxesLike | None = None,
+        **params: Any,
+    ) -> Self:
         """Draw a fitted model, or a pipeline that ends in one.
 
         Parameters
@@ -256,7 +259,7 @@ class ActionModelDisplay:
         )
         return display.plot(ax)
 
-    def plot(self, ax=None):
+    def plot(self, ax: AxesLike | None = None) -> Self:
         """Draw.
 
         Parameters

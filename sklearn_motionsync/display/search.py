@@ -1,12 +1,17 @@
 """SearchDisplay: the hits of a search along takes, with their scores and the true segments."""
 
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any, Self
+
 import numpy as np
 import pandas as pd
+from sklearn.base import BaseEstimator
 
 from ..inputs.tables import labels_of
+from ..inputs.types import PerformanceLike, PerformancesLike
 from ..inputs.wording import counted
 from ..segmentation.search import find_performances
-from .arguments import as_performances
+from .arguments import AxesLike, as_performances
 from .drawing import COLORS, panels
 
 __all__ = ["SearchDisplay"]
@@ -52,7 +57,13 @@ class SearchDisplay:
     SearchDisplay(1 hit in 1 take)
     """
 
-    def __init__(self, origin, lengths, *, segments=None):
+    def __init__(
+        self,
+        origin: pd.DataFrame,
+        lengths: Mapping[Any, int],
+        *,
+        segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
+    ) -> None:
         self.origin, self.lengths, self.segments = origin, dict(lengths), None
         if segments is not None:
             self.segments = pd.DataFrame(segments, columns=["take", "start", "stop"])
@@ -62,7 +73,15 @@ class SearchDisplay:
         return f"SearchDisplay({counted(count, 'hit')} in {counted(takes, 'take')})"
 
     @classmethod
-    def from_estimator(cls, pattern, X, *, segments=None, ax=None, **params):
+    def from_estimator(
+        cls,
+        pattern: BaseEstimator | PerformanceLike,
+        X: PerformancesLike,
+        *,
+        segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
+        ax: AxesLike | None = None,
+        **params: Any,
+    ) -> Self:
         """Search takes, and draw the hits above and below the threshold.
 
         Parameters
@@ -88,7 +107,14 @@ class SearchDisplay:
         return cls.from_predictions(origin, X, segments=segments, ax=ax)
 
     @classmethod
-    def from_predictions(cls, origin, X, *, segments=None, ax=None):
+    def from_predictions(
+        cls,
+        origin: pd.DataFrame,
+        X: PerformancesLike,
+        *,
+        segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
+        ax: AxesLike | None = None,
+    ) -> Self:
         """Draw the result of `find_performances`.
 
         Parameters
@@ -123,7 +149,7 @@ class SearchDisplay:
                 )
         return display.plot(ax)
 
-    def plot(self, ax=None):
+    def plot(self, ax: AxesLike | None = None) -> Self:
         """Draw.
 
         Parameters

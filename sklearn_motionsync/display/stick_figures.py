@@ -1,14 +1,19 @@
 """SkeletonDisplay: stick figures of postures, models (Fig. 4), and performances in motion."""
 
+from collections.abc import Sequence
 from functools import partial
 from numbers import Real
+from typing import Any, Self
 
 import numpy as np
+from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
+from ..body.skeleton import Skeleton
 from ..inputs.tables import name_performance
+from ..inputs.types import NumbersLike, PerformancesLike, RandomState
 from ..inputs.wording import counted
 from ..model.action_model import ActionModel
 from ..model.views import models_of_classes
@@ -23,6 +28,8 @@ from ..utils.pipelines import (
 )
 from .animation import animate
 from .arguments import (
+    Animation,
+    AxesLike,
     as_frames,
     as_index,
     as_indices,
@@ -118,16 +125,16 @@ class SkeletonDisplay:
 
     def __init__(
         self,
-        scenes,
-        skeleton,
-        titles,
+        scenes: Sequence[Sequence[np.ndarray]],
+        skeleton: Skeleton | None,
+        titles: Sequence[str],
         *,
-        durations=None,
-        labels=None,
-        marked=None,
-        behind=None,
-        heading=None,
-    ):
+        durations: Sequence[Sequence[float]] | None = None,
+        labels: Sequence[str] | None = None,
+        marked: Sequence[Sequence[tuple[int, int]]] | None = None,
+        behind: Sequence[Sequence[np.ndarray]] | None = None,
+        heading: str | None = None,
+    ) -> None:
         self.scenes, self.skeleton, self.titles = scenes, skeleton, titles
         self.durations, self.labels, self.heading = durations, labels, heading
         self.marked, self.behind = marked, behind
@@ -136,7 +143,15 @@ class SkeletonDisplay:
         return f"SkeletonDisplay({len(self.scenes)} panels)"
 
     @classmethod
-    def from_positions(cls, X, skeleton, *, frames=6, ax=None, **view):
+    def from_positions(
+        cls,
+        X: PerformancesLike,
+        skeleton: Skeleton | None,
+        *,
+        frames: int | Sequence[int] | np.ndarray = 6,
+        ax: AxesLike | None = None,
+        **view: Any,
+    ) -> Self:
         """Draw postures of one performance, or of synchronised ones over each other.
 
         Parameters
@@ -167,7 +182,15 @@ class SkeletonDisplay:
         return cls(postures_at(frames, *bodies), skeleton, titles).plot(ax, **view)
 
     @classmethod
-    def from_postures(cls, X, cosines, *, frames=6, ax=None, **view):
+    def from_postures(
+        cls,
+        X: PerformancesLike,
+        cosines: DirectionCosines,
+        *,
+        frames: int | Sequence[int] | np.ndarray = 6,
+        ax: AxesLike | None = None,
+        **view: Any,
+    ) -> Self:
         """Draw postures given by their direction cosines.
 
         Parameters
@@ -200,7 +223,15 @@ class SkeletonDisplay:
         return cls.from_positions(X, cosines.skeleton.body(), frames=frames, ax=ax, **view)
 
     @classmethod
-    def from_performances(cls, X, skeleton, *, names=None, ax=None, **view):
+    def from_performances(
+        cls,
+        X: PerformancesLike,
+        skeleton: Skeleton | None,
+        *,
+        names: Sequence[str] | None = None,
+        ax: AxesLike | None = None,
+        **view: Any,
+    ) -> Self:
         """Draw performances side by side, each at its own pace, such as two subjects and a blend.
 
         Parameters
@@ -225,7 +256,16 @@ class SkeletonDisplay:
         return cls([bodies], skeleton, ["each at its own pace"], labels=labels).plot(ax, **view)
 
     @classmethod
-    def from_predictions(cls, X, times, skeleton, *, names=None, ax=None, **view):
+    def from_predictions(
+        cls,
+        X: PerformancesLike,
+        times: NumbersLike,
+        skeleton: Skeleton | None,
+        *,
+        names: Sequence[str] | None = None,
+        ax: AxesLike | None = None,
+        **view: Any,
+    ) -> Self:
         """Draw performances as recorded above the same ones synchronised by known warps.
 
         Parameters
@@ -262,8 +302,16 @@ class SkeletonDisplay:
 
     @classmethod
     def from_estimator(
-        cls, estimator, X, *, performances=None, ax=None, at=0.0, azimuth=-60, **params
-    ):
+        cls,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
+        *,
+        performances: Sequence[int] | np.ndarray | None = None,
+        ax: AxesLike | None = None,
+        at: float = 0.0,
+        azimuth: float = -60,
+        **params: Any,
+    ) -> Self:
         """Draw performances as recorded above the same ones synchronised by a pipeline.
 
         Parameters
@@ -309,8 +357,15 @@ class SkeletonDisplay:
 
     @classmethod
     def from_model(
-        cls, estimator, *, frames=(0.1, 0.4), n_samples=12, random_state=None, ax=None, **view
-    ):
+        cls,
+        estimator: BaseEstimator,
+        *,
+        frames: Sequence[float] | np.ndarray = (0.1, 0.4),
+        n_samples: int = 12,
+        random_state: RandomState = None,
+        ax: AxesLike | None = None,
+        **view: Any,
+    ) -> Self:
         """Draw mean postures of a model, and random postures that it accepts (Fig. 4).
 
         Parameters
@@ -370,17 +425,17 @@ class SkeletonDisplay:
     @classmethod
     def from_departures(
         cls,
-        estimator,
-        X,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
         *,
-        performance=0,
-        frames=6,
-        limit=None,
-        ax=None,
-        at=0.0,
-        azimuth=-60,
-        **params,
-    ):
+        performance: int = 0,
+        frames: int | Sequence[int] | np.ndarray = 6,
+        limit: float | None = None,
+        ax: AxesLike | None = None,
+        at: float = 0.0,
+        azimuth: float = -60,
+        **params: Any,
+    ) -> Self:
         """Draw when a performance departs from an action, and with which limbs.
 
         The figure shows postures of the performance on the clock of the model, before pale shadows
@@ -484,7 +539,7 @@ class SkeletonDisplay:
         )
         return display.plot(ax, at=at, azimuth=azimuth)
 
-    def plot(self, ax=None, *, at=0.0, azimuth=-60):
+    def plot(self, ax: AxesLike | None = None, *, at: float = 0.0, azimuth: float = -60) -> Self:
         """Draw.
 
         Parameters
@@ -544,7 +599,14 @@ class SkeletonDisplay:
         self._show(at)
         return self
 
-    def animate(self, ax=None, *, seconds=5.0, fps=15, azimuth=-60):
+    def animate(
+        self,
+        ax: AxesLike | None = None,
+        *,
+        seconds: float = 5.0,
+        fps: int = 15,
+        azimuth: float = -60,
+    ) -> Animation:
         """Animate the performances.
 
         Parameters

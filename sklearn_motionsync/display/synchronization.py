@@ -1,15 +1,28 @@
 """SynchronizationDisplay: features before and after synchronisation, and the warps (Figs. 1, 3)."""
 
+from collections.abc import Sequence
+from typing import Any, Self
+
 import numpy as np
+from sklearn.base import BaseEstimator
 
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.types import (
+    Features,
+    Labels,
+    NumbersLike,
+    PerformanceLike,
+    PerformancesLike,
+    Unit,
+    ValuesLike,
+)
 from ..inputs.validation import read_collection
 from ..inputs.wording import counted
 from ..synchronizers.match import match_of_times, rates_of
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
-from .arguments import as_names
+from .arguments import AxesLike, as_names
 from .drawing import (
     COLORS,
     curves,
@@ -88,17 +101,17 @@ class SynchronizationDisplay:
 
     def __init__(
         self,
-        before,
-        after,
-        times,
+        before: PerformancesLike,
+        after: PerformancesLike,
+        times: NumbersLike,
         *,
-        feature_names,
-        pattern=None,
-        pattern_index=None,
-        groups=None,
-        unit="frames",
-        frame_rate=None,
-    ):
+        feature_names: Sequence[str],
+        pattern: PerformanceLike | None = None,
+        pattern_index: int | None = None,
+        groups: Labels | None = None,
+        unit: Unit = "frames",
+        frame_rate: float | ValuesLike | None = None,
+    ) -> None:
         self.before = [np.asarray(x) for x in before]
         self.after, self.times = np.asarray(after), np.asarray(times)
         self.feature_names = feature_names
@@ -115,17 +128,17 @@ class SynchronizationDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
         *,
-        features=None,
-        groups=None,
-        unit="frames",
-        frame_rate=None,
-        warps=True,
-        ax=None,
-        **params,
-    ):
+        features: Features | None = None,
+        groups: Labels | None = None,
+        unit: Unit = "frames",
+        frame_rate: float | ValuesLike | None = None,
+        warps: bool = True,
+        ax: AxesLike | None = None,
+        **params: Any,
+    ) -> Self:
         """Draw performances before and after synchronisation.
 
         Parameters
@@ -180,18 +193,18 @@ class SynchronizationDisplay:
     @classmethod
     def from_predictions(
         cls,
-        X,
-        times,
+        X: PerformancesLike,
+        times: NumbersLike,
         *,
-        pattern=None,
-        features=None,
-        feature_names=None,
-        groups=None,
-        unit="frames",
-        frame_rate=None,
-        warps=True,
-        ax=None,
-    ):
+        pattern: PerformanceLike | None = None,
+        features: Features | None = None,
+        feature_names: Sequence[str] | None = None,
+        groups: Labels | None = None,
+        unit: Unit = "frames",
+        frame_rate: float | ValuesLike | None = None,
+        warps: bool = True,
+        ax: AxesLike | None = None,
+    ) -> Self:
         """Draw performances and warps that are known already.
 
         Parameters
@@ -257,7 +270,7 @@ class SynchronizationDisplay:
         )
         return display.plot(ax, warps=warps)
 
-    def plot(self, ax=None, *, warps=True):
+    def plot(self, ax: AxesLike | None = None, *, warps: bool = True) -> Self:
         """Draw.
 
         Parameters

@@ -1,9 +1,14 @@
 """TrellisDisplay: the disparity space of one pair, and the path through it (Fig. 2)."""
 
-import numpy as np
+from typing import Any, Self
 
+import numpy as np
+from sklearn.base import BaseEstimator
+
+from ..inputs.types import PerformanceLike, PerformancesLike, ValuesLike
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
+from .arguments import AxesLike
 from .drawing import COLORS, panels
 
 __all__ = ["TrellisDisplay"]
@@ -55,7 +60,16 @@ class TrellisDisplay:
     (50, 41)
     """
 
-    def __init__(self, frames, offsets, costs, path, warp, *, names=("pattern", "performance")):
+    def __init__(
+        self,
+        frames: ValuesLike,
+        offsets: ValuesLike,
+        costs: PerformanceLike,
+        path: ValuesLike,
+        warp: ValuesLike,
+        *,
+        names: tuple[str, str] = ("pattern", "performance"),
+    ) -> None:
         self.frames, self.offsets = np.asarray(frames, dtype=np.float64), np.asarray(offsets)
         self.costs, self.path, self.warp = np.asarray(costs), np.asarray(path), np.asarray(warp)
         self.names = names
@@ -64,7 +78,16 @@ class TrellisDisplay:
         return f"TrellisDisplay({self.names[1]} matched to {self.names[0]})"
 
     @classmethod
-    def from_estimator(cls, estimator, X, *, performance=0, ax=None, colorbar=True, **params):
+    def from_estimator(
+        cls,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
+        *,
+        performance: int = 0,
+        ax: AxesLike | None = None,
+        colorbar: bool = True,
+        **params: Any,
+    ) -> Self:
         """Draw the disparity space of the pattern and one performance.
 
         Parameters
@@ -96,7 +119,7 @@ class TrellisDisplay:
         names = ("pattern" if index is None else f"pattern {index}", f"performance {performance}")
         return cls(**space, warp=warp, names=names).plot(ax, colorbar=colorbar)
 
-    def plot(self, ax=None, *, colorbar=True):
+    def plot(self, ax: AxesLike | None = None, *, colorbar: bool = True) -> Self:
         """Draw.
 
         Parameters

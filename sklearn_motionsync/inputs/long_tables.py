@@ -1,6 +1,7 @@
 """Tables of frames to performances, in order of an even time, and back."""
 
 import reprlib
+from collections.abc import Hashable, Sequence
 from numbers import Real
 
 import numpy as np
@@ -31,12 +32,20 @@ from .tables import (
     split_table,
     stack_frame,
 )
+from .types import Labels, PerformancesLike, Table
 from .wording import counted
 
 __all__ = ["to_frame", "to_sequences"]
 
 
-def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
+def to_sequences(
+    df: Table,
+    by: str | Sequence[str] | None = None,
+    time: str | None = None,
+    *,
+    frame_rate: float | None = None,
+    max_gap_time: float | None = None,
+) -> list[pd.DataFrame]:
     """Turn a table of frames into a list of performances.
 
     Do this *before* cross-validation: scikit-learn would split the table by row.
@@ -197,7 +206,12 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
     return sequences
 
 
-def to_frame(sequences, *, performances=None, columns=None):
+def to_frame(
+    sequences: PerformancesLike,
+    *,
+    performances: Labels | None = None,
+    columns: Sequence[Hashable] | pd.Index | None = None,
+) -> pd.DataFrame:
     """Turn performances into one frame that is indexed by performance and frame.
 
     Parameters

@@ -21,6 +21,7 @@ from .numbers import (
     refuse_non_numeric,
 )
 from .tables import FRAME, INDEX_NAMES, PERFORMANCE, SPLIT, as_pandas, labels_of, stack_frame
+from .types import PerformancesLike
 from .wording import counted
 
 __all__ = [
@@ -54,7 +55,7 @@ _ENOUGH = 100
 class SequenceLevelMixin:
     """Input checks of estimators whose samples are whole performances."""
 
-    def check_performances(self, X):
+    def check_performances(self, X: PerformancesLike) -> Performances:
         """Check performances against the input contract, and against those of ``fit``.
 
         Parameters

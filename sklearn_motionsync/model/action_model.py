@@ -2,19 +2,23 @@
 
 from dataclasses import replace
 from numbers import Integral, Real
+from typing import Self
 
 import numpy as np
-from sklearn.base import BaseEstimator, _fit_context
+from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 from sklearn.utils import check_consistent_length, check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.collections import Performances
 from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.types import Labels, PerformanceLike, PerformancesLike, RandomState, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..utils.atomic import atomic_fit, atomic_partial_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
+from ..utils.parameters import validated
 from .sampling import sample_performances, sample_postures
 from .similarity import Neighbours, PerformanceStream, log_moments
 from .variation import mean_band, predictive_variance, simultaneous_factor
@@ -110,15 +114,15 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         "coverage": [Interval(Real, 0, 1, closed="neither")],
     }
 
-    def __init__(self, n_std=3.0, coverage=0.95):
+    def __init__(self, n_std: float = 3.0, coverage: float = 0.95) -> None:
         self.n_std = n_std
         self.coverage = coverage
 
     # -- fitting ------------------------------------------------------------------------------
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None, groups=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: object = None, groups: Labels | None = None) -> Self:
         """Estimate the mean performance, the variances and the threshold.
 
         Parameters
@@ -152,8 +156,10 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self
 
     @atomic_partial_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def partial_fit(self, X, y=None, groups=None):
+    @validated
+    def partial_fit(
+        self, X: PerformancesLike, y: object = None, groups: Labels | None = None
+    ) -> Self:
         """Update the model with more performances.
 
         For more data than memory holds, and for data that come in later. The model keeps at most
@@ -215,12 +221,12 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
 
     @property
     @snapshot
-    def deviations_(self):
+    def deviations_(self) -> np.ndarray:
         """Training performances that are kept, less the mean: (n_kept, P, n_features)."""
         check_is_fitted(self)
         return self._stream.kept - self.mean_
 
-    def check_performances(self, X):
+    def check_performances(self, X: PerformancesLike) -> Performances:
         """Check that performances are synchronised, and to the clock of the model.
 
         Parameters
@@ -244,7 +250,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     # -- whole performances -------------------------------------------------------------------
 
     @snapshot
-    def score_samples(self, X):
+    def score_samples(self, X: PerformancesLike) -> np.ndarray:
         """Log-density of performances: independent normal distributions at every posture.
 
         For the choice between models of different actions. Not for whether a performance is the
@@ -267,7 +273,12 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return -0.5 * squares - log_std - 0.5 * self.mean_.size * np.log(2 * np.pi)
 
     @snapshot
-    def score(self, X, y=None, sample_weight=None):
+    def score(
+        self,
+        X: PerformancesLike,
+        y: object = None,
+        sample_weight: ValuesLike | None = None,
+    ) -> float:
         """Mean log-density of performances.
 
         Parameters
@@ -290,7 +301,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return float(np.average(densities, weights=sample_weight))
 
     @snapshot
-    def dissimilarity(self, X):
+    def dissimilarity(self, X: PerformancesLike) -> np.ndarray:
         """Mean dissimilarity of performances to the two most similar training performances.
 
         Parameters
@@ -307,7 +318,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self._neighbours.dissimilarity(performances)
 
     @snapshot
-    def threshold_at(self, coverage):
+    def threshold_at(self, coverage: float) -> float:
         """The threshold of another coverage.
 
         Parameters
@@ -331,7 +342,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self._neighbours.limit(self._log_moments, coverage)
 
     @snapshot
-    def decision_function(self, X):
+    def decision_function(self, X: PerformancesLike) -> np.ndarray:
         """How far below the threshold the dissimilarity of performances is.
 
         Parameters
@@ -348,7 +359,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self.threshold_ - dissimilarity
 
     @snapshot
-    def predict(self, X):
+    def predict(self, X: PerformancesLike) -> np.ndarray:
         """Whether performances are the action.
 
         Parameters
@@ -364,7 +375,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return np.where(self.decision_function(X) >= 0, 1, -1)
 
     @snapshot
-    def standard_scores(self, X):
+    def standard_scores(self, X: PerformancesLike) -> np.ndarray:
         """Deviations of performances from the mean, in predicted standard deviations.
 
         Parameters
@@ -387,7 +398,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     # -- postures, bands and samples ----------------------------------------------------------
 
     @snapshot
-    def accepts(self, postures, frame):
+    def accepts(self, postures: PerformanceLike, frame: int) -> np.ndarray:
         """Whether postures lie inside the envelope at a frame.
 
         For a tracker, which prunes postures that are not possible at this instant. It does not
@@ -421,7 +432,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return ((postures >= mean - half_width) & (postures <= mean + half_width)).all(axis=1)
 
     @snapshot
-    def envelope(self, simultaneous=False):
+    def envelope(self, simultaneous: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """A band about the mean performance, for postures or for whole performances.
 
         Parameters
@@ -449,7 +460,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self.mean_ - half_width, self.mean_ + half_width
 
     @snapshot
-    def mean_envelope(self, random_state=0):
+    def mean_envelope(self, random_state: RandomState = 0) -> tuple[np.ndarray, np.ndarray]:
         """A confidence band of the population's mean, at all frames and in all features.
 
         It holds that mean with probability ``coverage``, by a bootstrap over groups: the mean to
@@ -473,7 +484,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self.mean_ - half_width, self.mean_ + half_width
 
     @snapshot
-    def simultaneous_factor(self):
+    def simultaneous_factor(self) -> float:
         """How many predicted standard deviations the performances of new people stay within.
 
         Whole performances, at all frames and in all features, with probability ``coverage``:
@@ -489,7 +500,9 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return simultaneous_factor(kept, self.groups_, self.coverage)
 
     @snapshot
-    def sample(self, n=1, frame=None, random_state=None):
+    def sample(
+        self, n: int = 1, frame: int | None = None, random_state: RandomState = None
+    ) -> np.ndarray:
         """Draw accepted postures at a frame (Fig. 4), or whole performances.
 
         Both are drawn about those of training performances chosen at random, with mean, variance

@@ -1,20 +1,23 @@
 """ActionDetector: whether performances as they were recorded are the action, and why not."""
 
 from numbers import Real
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 from sklearn import get_config
-from sklearn.base import BaseEstimator, MetaEstimatorMixin, _fit_context, clone
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, clone
 from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.metadata_routing import MetadataRouter, MethodMapping
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.tables import index_of
+from ..inputs.types import Labels, PerformancesLike
 from ..inputs.validation import labels_of_input
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups, sums_of_groups
+from ..utils.parameters import validated_with_nested
 from ..utils.pipelines import (
     MissingMetadata,
     accepted_params,
@@ -113,14 +116,18 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         "duration": ["boolean"],
     }
 
-    def __init__(self, estimator, coverage=0.95, duration=True):
+    def __init__(
+        self, estimator: BaseEstimator, coverage: float = 0.95, duration: bool = True
+    ) -> None:
         self.estimator = estimator
         self.coverage = coverage
         self.duration = duration
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y=None, groups=None, **params):
+    @validated_with_nested
+    def fit(
+        self, X: PerformancesLike, y: object = None, groups: Labels | None = None, **params: Any
+    ) -> Self:
         """Fit the pipeline, and estimate the acceptance regions.
 
         Parameters
@@ -165,7 +172,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         return self
 
     @snapshot
-    def predict(self, X, **params):
+    def predict(self, X: PerformancesLike, **params: Any) -> np.ndarray:
         """Whether performances are the action.
 
         Parameters
@@ -183,7 +190,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         return np.where(self._largest_statistic(X, params, "predict") <= 1, 1, -1)
 
     @snapshot
-    def decision_function(self, X, **params):
+    def decision_function(self, X: PerformancesLike, **params: Any) -> np.ndarray:
         """Distance of the largest test statistic of performances from its limit.
 
         Parameters
@@ -201,7 +208,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         return 1 - self._largest_statistic(X, params, "decision_function")
 
     @snapshot
-    def score_samples(self, X, **params):
+    def score_samples(self, X: PerformancesLike, **params: Any) -> np.ndarray:
         """The largest absolute test statistic of performances, negated.
 
         Parameters
@@ -219,7 +226,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         return -self._largest_statistic(X, params, "score_samples")
 
     @snapshot
-    def report(self, X, **params):
+    def report(self, X: PerformancesLike, **params: Any) -> pd.DataFrame:
         """The test statistics of performances, and the reason for a rejection.
 
         Parameters

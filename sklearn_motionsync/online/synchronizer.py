@@ -1,15 +1,18 @@
 """OnlineSynchronizer: the phase of performances that are still running."""
 
 import math
+from collections.abc import Sequence
 from numbers import Real
+from typing import Any, Self
 
 import numpy as np
-from sklearn.base import BaseEstimator, MetaEstimatorMixin, _fit_context, clone
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, clone
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.facts import TIMELESS
 from ..inputs.numbers import check_magnitude
+from ..inputs.types import Indexed, NumbersLike, PerformancesLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
 from ..inputs.wording import counted
 from ..matching.causal import causal_costs, causal_velocity
@@ -24,6 +27,7 @@ from ..synchronizers.base import Synchronizer
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.atomic import atomic_fit
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parameters import validated_with_nested
 from .stream import (
     LivePhase,
     Session,
@@ -142,12 +146,12 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
 
     def __init__(
         self,
-        synchronizer=None,
-        frame_rate=None,
-        smoothness=0.1,
-        velocity_smoothing=SMOOTHING,
-        max_rate=3,
-    ):
+        synchronizer: Synchronizer | None = None,
+        frame_rate: float | None = None,
+        smoothness: float = 0.1,
+        velocity_smoothing: float = SMOOTHING,
+        max_rate: float = 3,
+    ) -> None:
         self.synchronizer = synchronizer
         self.frame_rate = frame_rate
         self.smoothness = smoothness
@@ -155,8 +159,8 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         self.max_rate = max_rate
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y=None):
+    @validated_with_nested
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Learn the mean performance, its duration, and the scale of path costs.
 
         Parameters
@@ -194,7 +198,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         self._session = None
         return self
 
-    def step(self, frame, time=None):
+    def step(self, frame: NumbersLike, time: float | None = None) -> LivePhase:
         """Take the next frame, and estimate the phase.
 
         Parameters
@@ -232,7 +236,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
             session = self._session = Session(self._reference, frame, time)
         return session.step(frame, time)
 
-    def reset(self, stream=None):
+    def reset(self, stream: int | Sequence[int] | np.ndarray | None = None) -> None:
         """Begin another performance with the next frame.
 
         Parameters
@@ -256,7 +260,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         for n in streams:
             self._session.restart(int(n))
 
-    def time_left(self):
+    def time_left(self) -> Any:
         """Estimate the time until the performance ends.
 
         A weighted mean of what is left of the mean duration after the elapsed time, and of what is
@@ -274,7 +278,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         return left if self.frame_rate is None else left / self.frame_rate
 
     @property
-    def history(self):
+    def history(self) -> LivePhase:
         """Phases, rates and confidences since the last ``reset`` of all: `LivePhase` of arrays.
 
         Of a long stream these are the last 100,000 frames.
@@ -284,7 +288,11 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
             return LivePhase(*np.empty((3, 0)))
         return stack_phases(self._session.history)
 
-    def track(self, X, times=None):
+    def track(
+        self,
+        X: PerformancesLike,
+        times: Indexed[ValuesLike] | ValuesLike | None = None,
+    ) -> list[LivePhase]:
         """The phases of whole performances, as ``step`` estimates them frame by frame.
 
         Parameters

@@ -1,9 +1,10 @@
 """MotionTracker: a body that is partly hidden, by a state-space model of its action."""
 
 from numbers import Integral, Real
+from typing import Any, Self
 
 import numpy as np
-from sklearn.base import BaseEstimator, _fit_context, clone
+from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.validation import check_is_fitted
@@ -13,12 +14,14 @@ from ..inputs.facts import TIMELESS, check_facts, facts_of
 from ..inputs.numbers import LARGEST, as_numbers, check_finite, check_magnitude
 from ..inputs.recorded import warn_of_rows
 from ..inputs.tables import as_pandas, labels_of, name_performance
+from ..inputs.types import Indexed, Labels, NumbersLike, PerformancesLike, RandomState, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
 from ..synchronizers.match import check_match
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
+from ..utils.parameters import validated
 from ..utils.threads import on_one_thread
 from .particle_filter import ParticleFilter, Track, filter_take, smooth_take, stack_frames
 from .state_space import Clock, TrackerModel
@@ -152,13 +155,13 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
 
     def __init__(
         self,
-        synchronizer=None,
-        n_particles=500,
-        noise=0.05,
-        tempering=10.0,
-        frame_rate=None,
-        random_state=0,
-    ):
+        synchronizer: BaseEstimator | None = None,
+        n_particles: int = 500,
+        noise: float = 0.05,
+        tempering: float = 10.0,
+        frame_rate: float | None = None,
+        random_state: RandomState = 0,
+    ) -> None:
         self.synchronizer = synchronizer
         self.n_particles = n_particles
         self.noise = noise
@@ -167,8 +170,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         self.random_state = random_state
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None, groups=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: object = None, groups: Labels | None = None) -> Self:
         """Learn the mean, the deviations of people, and their rates.
 
         Parameters
@@ -221,7 +224,12 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self
 
     @snapshot
-    def track(self, X, times=None, projection=None):
+    def track(
+        self,
+        X: PerformancesLike,
+        times: Indexed[ValuesLike] | ValuesLike | None = None,
+        projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
+    ) -> Any:
         """Track takes: postures and phases at every frame, given the observations up to it.
 
         Parameters
@@ -249,7 +257,12 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self._estimate(filter_take, X, times, projection)
 
     @snapshot
-    def smooth(self, X, times=None, projection=None):
+    def smooth(
+        self,
+        X: PerformancesLike,
+        times: Indexed[ValuesLike] | ValuesLike | None = None,
+        projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
+    ) -> Any:
         """Smooth whole takes: postures and phases at every frame, given all observations.
 
         20 paths of phases are drawn by forward filtering and backward simulation, and a
@@ -277,12 +290,17 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         """
         return self._estimate(smooth_take, X, times, projection)
 
-    def reset(self):
+    def reset(self) -> None:
         """End the running take: the next observation of ``step`` is the first of another."""
         check_is_fitted(self)
         self._running = None
 
-    def step(self, observation, time=None, projection=None):
+    def step(
+        self,
+        observation: ValuesLike,
+        time: float | None = None,
+        projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
+    ) -> Track:
         """Take the next observation of a running take.
 
         Parameters

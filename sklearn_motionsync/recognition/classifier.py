@@ -1,18 +1,21 @@
 """ActionClassifier: which of several actions a performance is, and whether it is any of them."""
 
 import warnings
+from collections.abc import Hashable, Sequence
 from functools import partial
 from numbers import Integral, Real
+from typing import Literal, Self
 
 import numpy as np
 import pandas as pd
 from scipy.spatial.distance import cdist
 from scipy.special import softmax
-from sklearn.base import BaseEstimator, ClassifierMixin, _fit_context
+from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.pipeline import Pipeline
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.types import Cost, Labels, PerformancesLike
 from ..inputs.validation import SequenceLevelMixin
 from ..matching.costs import COSTS
 from ..matching.pairwise import PairwiseDistance
@@ -22,6 +25,7 @@ from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import add_unknown_label, encode_classes, encode_groups
 from ..utils.parallel import LongWorkMixin, run
+from ..utils.parameters import validated
 from .distances import SETTINGS, normalise_time, pairwise_distances
 from .regression import assign_folds, decision_values, fit_regression
 
@@ -157,22 +161,22 @@ class ActionClassifier(
 
     def __init__(
         self,
-        costs=("velocity", "elastic", "posture"),
+        costs: Cost | Sequence[Cost] = ("velocity", "elastic", "posture"),
         *,
-        C=10,
-        gamma=1,
-        summaries=True,
-        n_landmarks=250,
-        n_frames=50,
-        velocity_smoothing=0.06,
-        max_offset=0.4,
-        smoothness=0.003,
-        max_rate=4,
-        reject_below=None,
-        unknown_label=None,
-        n_jobs=None,
-        verbose=0,
-    ):
+        C: float = 10,
+        gamma: float = 1,
+        summaries: bool = True,
+        n_landmarks: int | None = 250,
+        n_frames: int = 50,
+        velocity_smoothing: float = 0.06,
+        max_offset: float = 0.4,
+        smoothness: float = 0.003,
+        max_rate: float = 4,
+        reject_below: float | Literal["auto"] | None = None,
+        unknown_label: str | float | None = None,
+        n_jobs: int | None = None,
+        verbose: int = 0,
+    ) -> None:
         self.costs = costs
         self.C = C
         self.gamma = gamma
@@ -189,8 +193,8 @@ class ActionClassifier(
         self.verbose = verbose
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y, groups=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: Labels, groups: Labels | None = None) -> Self:
         """Fit the kernel, the regression and the temperature.
 
         Parameters
@@ -233,7 +237,7 @@ class ActionClassifier(
         return self
 
     @snapshot
-    def predict(self, X):
+    def predict(self, X: PerformancesLike) -> np.ndarray:
         """The class of each performance.
 
         Parameters
@@ -258,7 +262,7 @@ class ActionClassifier(
         return add_unknown_label(self.classes_, self.unknown_label)[codes]
 
     @snapshot
-    def predict_proba(self, X):
+    def predict_proba(self, X: PerformancesLike) -> np.ndarray:
         """The probability of each class, given that a performance is one of them.
 
         Parameters
@@ -275,7 +279,7 @@ class ActionClassifier(
         return softmax(self.temperature_ * decisions, axis=1)
 
     @snapshot
-    def decision_function(self, X):
+    def decision_function(self, X: PerformancesLike) -> np.ndarray:
         """Decision values of the classes.
 
         Parameters
@@ -292,7 +296,7 @@ class ActionClassifier(
         return decisions if len(self.classes_) > 2 else decisions[:, 1] - decisions[:, 0]
 
     @snapshot
-    def score_samples(self, X):
+    def score_samples(self, X: PerformancesLike) -> np.ndarray:
         """The largest decision value of performances: their similarity to any class.
 
         Parameters
@@ -308,7 +312,7 @@ class ActionClassifier(
         return self._decisions(X).max(axis=1)
 
     @snapshot
-    def threshold_at(self, coverage):
+    def threshold_at(self, coverage: float) -> float:
         """The ``reject_below`` that keeps a share of performances of the known actions.
 
         Parameters
@@ -339,7 +343,7 @@ class ActionClassifier(
         return float(known[max(rank - 1, 0)])
 
     @snapshot
-    def model_of(self, label):
+    def model_of(self, label: Hashable) -> Pipeline:
         """Fit a model of a class, to explain a prediction.
 
         It does not decide: performances of other classes that are synchronised to its pattern

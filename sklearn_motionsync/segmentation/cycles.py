@@ -1,13 +1,15 @@
 """CycleSegmenter: long takes of a movement that repeats, cut into its cycles."""
 
 import warnings
+from collections.abc import Sequence
 from itertools import pairwise
 from numbers import Integral, Real
+from typing import Any, Literal, Self
 
 import numpy as np
 import pandas as pd
 from scipy.fft import irfft, rfft
-from sklearn.base import BaseEstimator, _fit_context, clone
+from sklearn.base import BaseEstimator, clone
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
@@ -18,6 +20,7 @@ from ..body.skeleton import Skeleton
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.types import PerformancesLike
 from ..inputs.validation import check_performances, names_of_input, warn_of_clocks
 from ..matching.costs import StepTable, step_table
 from ..matching.filters import smooth
@@ -25,6 +28,7 @@ from ..matching.trellis import Trellis
 from ..matching.warps import normalise
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parameters import validated
 from .cutting import as_takes, cut_takes
 from .self_correlation import LEAST_CYCLES, correlate, rejection_reason
 
@@ -137,14 +141,14 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
 
     def __init__(
         self,
-        skeleton=None,
-        start=None,
-        threshold=0.4,
-        refine=True,
-        incomplete=False,
-        not_cyclic="raise",
-        period=None,
-    ):
+        skeleton: Skeleton | None = None,
+        start: str | int | None = None,
+        threshold: float = 0.4,
+        refine: bool = True,
+        incomplete: bool = False,
+        not_cyclic: Literal["raise", "skip"] = "raise",
+        period: Sequence[float] | np.ndarray | None = None,
+    ) -> None:
         self.skeleton = skeleton
         self.start = start
         self.threshold = threshold
@@ -154,8 +158,8 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         self.period = period
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Learn one cycle, and where it begins.
 
         Parameters
@@ -194,7 +198,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         return self
 
     @snapshot
-    def segment(self, X):
+    def segment(self, X: PerformancesLike) -> tuple[list[Any], pd.DataFrame]:
         """Cut takes into cycles.
 
         Parameters
@@ -229,7 +233,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         return cut_takes(given, takes, table)
 
     @snapshot
-    def phases(self, X):
+    def phases(self, X: PerformancesLike) -> list[np.ndarray]:
         """The phase of every frame.
 
         Parameters
@@ -250,7 +254,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
             out[i] = np.interp(np.arange(len(takes[i])), take.times, phases)
         return out
 
-    def report(self, X):
+    def report(self, X: PerformancesLike) -> pd.DataFrame:
         """Whether takes are cyclic, by their self-correlation; no fit is needed.
 
         Parameters

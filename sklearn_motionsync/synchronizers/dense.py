@@ -1,18 +1,14 @@
 """DenseSynchronizer: dense matching to the median performance (Eqs. 7-19)."""
 
-import warnings
 from functools import partial
 from numbers import Integral, Real
+from typing import Any, Literal, Self
 
 import numpy as np
-import pandas as pd
-from scipy.special import betaincinv
 from sklearn.utils import Bunch, check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
 
-from ..inputs.collections import as_collection, as_source, count_of, gives_rows, select
-from ..inputs.tables import as_pandas
-from ..inputs.validation import names_of_input
+from ..inputs.types import Cost, PerformanceLike, PerformancesLike, RandomState
 from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
 from ..matching.filters import SMOOTHING, choose_smoothing
@@ -26,13 +22,15 @@ from ..matching.median import (
 )
 from ..matching.refinement_test import RefinementTest, Verdict, split_features
 from ..matching.trellis import Trellis
-from ..matching.warps import even_slices, normalise, sample
+from ..matching.warps import normalise, sample
 from ..utils.atomic import snapshot
 from ..utils.parallel import LongWorkMixin
 from ..utils.threads import on_one_thread
+from .balance import warn_of_one_feature
 from .base import Synchronizer
 from .match import Match
 from .portions import FeatureStore, TrainingPortions, measure_in_portions, warp_in_portions
+from .subsamples import subsample, typical_share
 
 __all__ = ["DenseSynchronizer"]
 
@@ -53,8 +51,6 @@ _EXHAUSTIVE = 100
 # Most performances for the refinement test; fewer than the second number have no first pass, and
 # with twice as many it takes every second one.
 _TESTED, _SEVERAL = 12, 3
-# Confidence of ``typical_share_``.
-_CONFIDENCE = 0.95
 
 
 class DenseSynchronizer(LongWorkMixin, Synchronizer):
@@ -271,29 +267,31 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         "verbose": ["verbose"],
     }
 
+    metric_: Any
+
     _SMALLER = "fewer frames, subframes or performances. Or learn from some: max_fit=1000"
 
     def __init__(
         self,
-        n_frames=None,
-        pattern="median",
+        n_frames: int | None = None,
+        pattern: PerformanceLike | int | Literal["median"] = "median",
         *,
-        velocity_smoothing="auto",
-        refine="auto",
-        max_offset="auto",
-        metric="learned",
-        consensus=8,
-        warp_smoothing=0.02,
-        cost="velocity",
-        smoothness=0.003,
-        max_rate=4,
-        subframes=1,
-        search="auto",
-        max_fit=None,
-        random_state=0,
-        n_jobs=None,
-        verbose=0,
-    ):
+        velocity_smoothing: float | Literal["auto"] = "auto",
+        refine: bool | Literal["auto"] = "auto",
+        max_offset: float | Literal["auto"] = "auto",
+        metric: Literal["learned"] | None = "learned",
+        consensus: int = 8,
+        warp_smoothing: float = 0.02,
+        cost: Cost = "velocity",
+        smoothness: float = 0.003,
+        max_rate: float = 4,
+        subframes: int = 1,
+        search: Literal["auto", "exhaustive", "sampled"] = "auto",
+        max_fit: int | None = None,
+        random_state: RandomState = 0,
+        n_jobs: int | None = None,
+        verbose: int = 0,
+    ) -> None:
         self.n_frames = n_frames
         self.pattern = pattern
         self.velocity_smoothing = velocity_smoothing
@@ -313,7 +311,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         self.verbose = verbose
 
     @classmethod
-    def paper(cls, **params):
+    def paper(cls, **params: Any) -> Self:
         """Make a synchronizer with the settings of the paper.
 
         Postures are compared, rates end at 2, and a warp is the direct path to the pattern: no
@@ -337,7 +335,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         return cls(**{"cost": "posture", "max_rate": 2, "consensus": 0} | params)
 
     @snapshot
-    def match(self, X):
+    def match(self, X: PerformancesLike) -> Match:
         """Match performances to the pattern: the warps of ``transform`` (Eqs. 12-17).
 
         Parameters
@@ -369,7 +367,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             return warp_in_portions(self._warper, performances, **portions)
 
     @snapshot
-    def disparity_space(self, X, performance=0):
+    def disparity_space(self, X: PerformancesLike, performance: int = 0) -> Bunch:
         """The disparity space of the pattern and one performance, and the path through it (Fig. 2).
 
         Parameters
@@ -436,7 +434,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             settings = self._settings()
             searched = features.for_search(self.n_frames_, settings["max_offset"])
             store = FeatureStore(searched, positions)
-            _warn_of_one_feature(self, performances, store)
+            warn_of_one_feature(self, performances, store)
             searcher, shared, median = self._search(searched, store, positions, progress)
             matcher = searcher
             if searched is not features:
@@ -600,146 +598,3 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         if not verdict.may_help:
             return verdict
         return verdict_of(by_fold, misfits("misfits_by_all", "refinement test, unrefined"))
-
-
-# -- a fit to a random sample of many performances ---------------------------------------------
-
-
-def subsample(X, size, pattern, random_state):
-    """A random sample of performances; the others are not read.
-
-    Parameters
-    ----------
-    X : performances of any kind
-    size : int or None
-        Size of the sample; None for all.
-    pattern : as of a synchronizer
-        A pattern given by its index is always in the sample.
-    random_state : as of a synchronizer
-
-    Returns
-    -------
-    some : performances of any kind
-    sample : ndarray of int or None
-        Their indices, which increase; None if they are all.
-    population : int or None
-        Size of the population.
-    """
-    if size is None:
-        return X, None, None
-    given = _indexable(as_pandas(X))
-    population = 0 if given is None else count_of(given)
-    is_index = isinstance(pattern, Integral) and not isinstance(pattern, bool)
-    if size >= population or (is_index and pattern >= population):
-        return X if given is None else given, None, None
-    # An independent stream: the search uses the same state.
-    seed = check_random_state(random_state).randint(np.iinfo(np.int32).max)
-    drawn = np.random.RandomState(seed).permutation(population)
-    if is_index:
-        drawn = np.concatenate([[pattern], drawn[drawn != pattern]])
-    sample = np.sort(drawn[:size])
-    return select(given, sample), sample, population
-
-
-def _indexable(X):
-    """Performances, or rows, by index; None for input that has to be refused."""
-    source = as_source(X)
-    if source is not None:
-        return source
-    if isinstance(X, pd.DataFrame):
-        return X if X.index.nlevels == 1 else as_collection(X)
-    known = isinstance(X, (list, tuple)) or (isinstance(X, np.ndarray) and X.ndim > 0)
-    return X if known or gives_rows(X) else None
-
-
-def typical_share(in_doubt, n, population):
-    """Upper 95 % confidence bound of the share of a population more typical than the pattern.
-
-    At most ``in_doubt`` of a random sample of n are more typical than its pattern: it is one
-    of the ``in_doubt + 1`` most typical of the sample. The share of the population that is
-    more typical than the last of these follows a beta distribution if the sample is drawn with
-    replacement; it is smaller without.
-
-    Parameters
-    ----------
-    in_doubt : int
-    n, population : int
-        If they are equal nothing is estimated.
-    """
-    if n == population:
-        return in_doubt / n
-    return float(betaincinv(in_doubt + 1, n - in_doubt, _CONFIDENCE)) if in_doubt < n else 1.0
-
-
-# -- whether one of several features dominates the energy that is compared -----------------
-
-# Of 112 sets of features of people, one action each, the largest share of velocities is 0.93:
-# positions, direction cosines, and their first components, two or more (HDM05, UTKinect).
-_DOMINANT = 0.95
-# A feature with a smaller share of the energy is constant but for rounding.
-_CONSTANT = 1e-24
-# Largest correlation of principal components due to rounding.
-_UNCORRELATED = 1e-5
-# Performances processed at a time.
-BATCH = 256
-
-
-def _warn_of_one_feature(synchronizer, performances, store):
-    """Warn if one of several features has nearly all of the energy, as with mixed units.
-
-    Parameters
-    ----------
-    synchronizer : DenseSynchronizer
-        Its metric is learnt.
-    performances : sequence of ndarray (n_frames_i, n_features)
-    store : FeatureStore
-        Their features, used without a metric.
-    """
-    metric, names = synchronizer.metric_, names_of_input(synchronizer)
-    shares = metric.energy if metric else _shares(store, synchronizer.cost)
-    if shares.max() <= _DOMINANT or (shares > _CONSTANT).sum() < 2:
-        return
-    if _are_principal_components(performances):
-        return
-    k = int(shares.argmax())
-    name = k if names is None else repr(names[k])
-    warnings.warn(
-        f"Feature {name} holds {100 * shares[k]:.4g} % of the energy that is compared: of "
-        f"{len(shares)} features the others hardly count. If units differ, scale them: "
-        "make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer()). If it alone shall tell "
-        "the moments, leave the others out, and warp them by Match.warp.",
-        UserWarning,
-        stacklevel=2,
-    )
-
-
-def _shares(store, cost):
-    """The share of every feature in the energy that is compared without a metric."""
-    total, energy, count = 0, 0, 0
-    for features in store.portions():
-        total += features.sum(axis=(0, 1), dtype=np.float64)
-        energy += np.einsum("npk,npk->k", features, features, dtype=np.float64)
-        count += features[:, :, 0].size
-    if cost == "posture":
-        # A common offset changes no distance.
-        energy = np.maximum(energy - total**2 / count, 0)
-    return energy / (energy.sum() or 1.0)
-
-
-def _are_principal_components(performances):
-    """Whether features are uncorrelated, the largest first, as those of an aSpace are.
-
-    They have one unit, and the first has most of the variance by construction.
-    """
-    # From a posture near the mean, so that no digits are lost.
-    origin = performances[0].mean(axis=0, dtype=np.float64)
-    arrays, total, products, count = list(performances), 0, 0, 0
-    for rows in even_slices(len(arrays), BATCH):
-        frames = np.concatenate(arrays[rows]).astype(np.float64) - origin
-        total, products = total + frames.sum(axis=0), products + frames.T @ frames
-        count += len(frames)
-    covariance = products - np.outer(total, total) / count
-    variance = np.diag(covariance)
-    bound = _UNCORRELATED * np.sqrt(np.outer(variance, variance))
-    others = np.abs(covariance - np.diag(variance))
-    return bool((others <= bound).all() and (np.diff(variance) <= 0).all())

@@ -5,14 +5,16 @@ import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Real
+from typing import Self
 
 import numpy as np
-from sklearn.base import _fit_context, clone
+from sklearn.base import clone
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
 from ..body.limbs import parts_of_names, parts_of_postures
 from ..inputs.features import choose_features
+from ..inputs.types import Features, Labels, PerformancesLike, Unit, ValuesLike
 from ..inputs.validation import names_of_input
 from ..matching.matcher import Matcher, Warper
 from ..matching.trellis import Coupling
@@ -20,6 +22,7 @@ from ..matching.warps import evaluate_warps, normalise
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.groups import encode_groups
 from ..utils.parallel import Progress, run
+from ..utils.parameters import validated, validated_with_nested
 from .base import Synchronizer
 from .dense import DenseSynchronizer
 from .lags import Lags
@@ -149,14 +152,19 @@ class PartSynchronizer(Synchronizer):
         "synchronizer": [DenseSynchronizer, None],
     }
 
-    def __init__(self, parts=None, coupling=0.001, synchronizer=None):
+    def __init__(
+        self,
+        parts: Mapping[str, Features] | None = None,
+        coupling: float = 0.001,
+        synchronizer: DenseSynchronizer | None = None,
+    ) -> None:
         self.parts = parts
         self.coupling = coupling
         self.synchronizer = synchronizer
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y=None):
+    @validated_with_nested
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Learn the whole body, then every part.
 
         Parameters
@@ -186,7 +194,7 @@ class PartSynchronizer(Synchronizer):
         return self
 
     @snapshot
-    def match(self, X):
+    def match(self, X: PerformancesLike) -> Match:
         """Match the whole body of performances to the pattern.
 
         Parameters
@@ -203,7 +211,7 @@ class PartSynchronizer(Synchronizer):
         return self.synchronizer_.match(X)
 
     @snapshot
-    def match_parts(self, X):
+    def match_parts(self, X: PerformancesLike) -> dict[str, Match]:
         """Match every part of performances to that of the pattern.
 
         Parameters
@@ -221,7 +229,15 @@ class PartSynchronizer(Synchronizer):
         return self._match_parts(performances, self.match(performances), "part")
 
     @snapshot
-    def lags(self, X, groups=None, *, against="rest", unit="frames", frame_rate=None):
+    def lags(
+        self,
+        X: PerformancesLike,
+        groups: Labels | None = None,
+        *,
+        against: str = "rest",
+        unit: Unit = "frames",
+        frame_rate: float | ValuesLike | None = None,
+    ) -> Lags:
         """How much later than the rest of the body each part is, at every frame of the pattern.
 
         Parameters
@@ -308,7 +324,7 @@ class PartSynchronizer(Synchronizer):
 
 
 @atomic_fit
-@_fit_context(prefer_skip_nested_validation=True)
+@validated
 def fit_body_and_parts(self, X, parts, coupling):
     """A ``fit`` of the synchronizer of the whole body, which also learns the parts.
 

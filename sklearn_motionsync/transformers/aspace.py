@@ -1,23 +1,25 @@
 """aSpace: the principal components of the postures of an action (Eqs. 3-5)."""
 
 from numbers import Integral
+from typing import Self
 
 import numpy as np
 from sklearn.base import (
     BaseEstimator,
     ClassNamePrefixFeaturesOutMixin,
     TransformerMixin,
-    _fit_context,
 )
 from sklearn.decomposition import PCA
 from sklearn.utils._param_validation import Interval, RealNotInt
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
+from ..inputs.types import NamesLike, PerformancesLike, Transformed
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parameters import validated
 
 __all__ = ["ASpace"]
 
@@ -81,12 +83,12 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         ],
     }
 
-    def __init__(self, n_components=0.95):
+    def __init__(self, n_components: float = 0.95) -> None:
         self.n_components = n_components
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Find the components.
 
         Parameters
@@ -134,7 +136,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     fit_transform = atomic_fit(TransformerMixin.fit_transform)
 
     @snapshot
-    def transform(self, X):
+    def transform(self, X: PerformancesLike) -> Transformed:
         """Project postures into the aSpace (Eq. 5).
 
         Parameters
@@ -155,7 +157,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         return restore(self, performances, arrays)
 
     @snapshot
-    def inverse_transform(self, X):
+    def inverse_transform(self, X: PerformancesLike) -> Transformed:
         """Reconstruct postures from points of the aSpace; exact if all components were kept.
 
         Parameters
@@ -176,7 +178,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         names = getattr(self, "feature_names_in_", range(self.n_features_in_))
         return restore(self, performances, arrays, columns=names)
 
-    def get_feature_names_out(self, input_features=None):
+    def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
         """Names of the coordinates: ``aspace0``, ``aspace1``, ...
 
         Parameters

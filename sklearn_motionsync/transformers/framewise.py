@@ -1,9 +1,11 @@
 """FrameWise: any transformer of rows, applied to the frames of performances."""
 
+from typing import Self
+
 import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
-from sklearn.base import BaseEstimator, TransformerMixin, _fit_context, clone
+from sklearn.base import BaseEstimator, TransformerMixin, clone
 from sklearn.compose import ColumnTransformer
 from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
@@ -13,9 +15,11 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers, column_names
+from ..inputs.types import NamesLike, PerformancesLike, Transformed
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parameters import validated_with_nested
 
 __all__ = ["FrameWise"]
 
@@ -76,12 +80,12 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
 
     _parameter_constraints: dict = {"transformer": [HasMethods(["fit", "transform"])]}
 
-    def __init__(self, transformer):
+    def __init__(self, transformer: BaseEstimator) -> None:
         self.transformer = transformer
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y=None):
+    @validated_with_nested
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Fit a clone of the transformer on all frames.
 
         Parameters
@@ -117,7 +121,7 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
     fit_transform = atomic_fit(TransformerMixin.fit_transform)
 
     @snapshot
-    def transform(self, X):
+    def transform(self, X: PerformancesLike) -> Transformed:
         """Transform the frames of performances.
 
         Parameters
@@ -143,7 +147,7 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
 
     @available_if(_goes_back)
     @snapshot
-    def inverse_transform(self, X):
+    def inverse_transform(self, X: PerformancesLike) -> Transformed:
         """Invert the transform of frames, if the transformer can.
 
         Parameters
@@ -166,7 +170,7 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
         columns = getattr(self, "feature_names_in_", range(self.n_features_in_))
         return restore(self, performances, arrays, columns=columns)
 
-    def get_feature_names_out(self, input_features=None):
+    def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
         """Names of the features that the transformer gives.
 
         Parameters
