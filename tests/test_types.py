@@ -119,6 +119,7 @@ sync.transform(np.stack(X)).shape
 sync.transform(tuple(X)).mean(axis=0)
 sync.transform([x.tolist() for x in X]).shape
 sync.fit([x.tolist() for x in X])
+LinearSynchronizer().fit_transform(X).shape
 LinearSynchronizer().fit(tables).match(tables).to_frame("percent", tables)
 LinearSynchronizer().fit(to_frame(tables)).set_output(transform="pandas")
 LinearSynchronizer().fit(np.stack(X)[:, :, 0])
@@ -160,6 +161,7 @@ DenseSynchronizer().fit({"ann": X[0], "bob": X[1]})
 LinearSynchronizer().fit([1.0, 2.0, 3.0])
 LinearSynchronizer().fit(X).match("trials.csv")
 LinearSynchronizer().fit()
+LinearSynchronizer().fit_transform("trials.csv")
 sync.match(X).offsets_in("minutes")
 sync.match(X).seconds(X, frame_rate="fast")
 Match("0 1 2")

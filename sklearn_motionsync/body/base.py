@@ -2,14 +2,14 @@
 
 import functools
 import warnings
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.numbers import column_names
-from ..inputs.types import PerformancesLike, Transformed
+from ..inputs.types import FitTransform, PerformancesLike, Transformed
 from ..inputs.validation import check_performances, names_of_input, restore
 from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
@@ -222,7 +222,7 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
     # Lengths count in those of the body, so units do not matter.
     _facts = "frame_rate", "up"
 
-    fit_transform = atomic_fit(TransformerMixin.fit_transform)
+    fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
 
     @snapshot
     def transform(self, X: PerformancesLike) -> Transformed:

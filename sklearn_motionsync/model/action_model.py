@@ -31,23 +31,19 @@ _VARIANCE_FLOOR = 1e-9
 
 
 class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
-    """What an action looks like at every instant, and how much people vary there.
+    """The mean movement, how much people vary about it, and whether a trial is that movement.
 
-    1. The mean performance and the variance of every posture, over synchronised
-       performances (Fig. 3d), and with them the density of a performance: independent normal
-       distributions.
-    2. The envelope: the mean, plus and minus ``n_std`` standard deviations. A posture is
-       accepted at a frame if all of its features lie inside.
-    3. Whether a performance is the action. Its dissimilarity is the mean over the two most similar
-       training performances of
+    It learns from aligned trials. Those that are unlike them are refused:
 
-       ``r(y, y_i) = |y - y_i|^2 / (|y|^2 + |y_i|^2)``,
-
-       half of postures less their own mean over time, to which a tenth of the squared distance of
-       these means is added, half of velocities: 0 is equal, 1 as dissimilar as standing still.
-    4. The threshold. Every training performance is compared with those of *other groups*; a
-       performance of a new person stays below the threshold with probability ``coverage``.
-       Standing still is always above, unless no training performance moves.
+    >>> import numpy as np
+    >>> from sklearn_motionsync import ActionModel
+    >>> t = np.linspace(0, 1, 20)[:, np.newaxis]
+    >>> performances = [a * np.sin(3 * t) for a in (0.9, 1.0, 1.1, 1.2)]
+    >>> model = ActionModel().fit(performances)
+    >>> model.predict([1.05 * np.sin(3 * t), 0 * t, np.sin(6 * t)]).tolist()
+    [1, -1, -1]
+    >>> model.accepts([[0.15], [0.9]], frame=19).tolist()
+    [True, False]
 
     Parameters
     ----------
@@ -90,23 +86,26 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
 
     Notes
     -----
+    1. The mean trial and the variance of every pose give the density of a trial, by independent
+       normal distributions (Fig. 3d).
+    2. The envelope is the mean, plus and minus ``n_std`` standard deviations. A pose is accepted at
+       a frame if all of its features lie inside.
+    3. The dissimilarity of a trial y is the mean over the two most similar training trials y_i of
+
+       ``r(y, y_i) = |y - y_i|^2 / (|y|^2 + |y_i|^2)``.
+
+       Half of it is of poses less their own mean over time, to which a tenth of the squared
+       distance of these means is added. Half of it is of velocities. 0 is equal, and 1 as
+       dissimilar as standing still.
+    4. For the threshold every training trial is compared with those of *other groups*. A trial of a
+       new person stays below it with probability ``coverage``. Standing still is always above,
+       unless no training trial moves.
+
     Give ``groups``, such as subjects, whenever people come more than once. Without them the
     threshold rests on how people repeat themselves, and new people are rejected too often:
     docs/accuracy.md. In a pipeline they are given as ``pipe.fit(X, actionmodel__groups=groups)``,
     or with scikit-learn's metadata routing as ``pipe.fit(X, groups=groups)`` after
     ``set_fit_request(groups=True)``.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from sklearn_motionsync import ActionModel
-    >>> t = np.linspace(0, 1, 20)[:, np.newaxis]
-    >>> performances = [a * np.sin(3 * t) for a in (0.9, 1.0, 1.1, 1.2)]
-    >>> model = ActionModel().fit(performances)
-    >>> model.predict([1.05 * np.sin(3 * t), 0 * t, np.sin(6 * t)]).tolist()
-    [1, -1, -1]
-    >>> model.accepts([[0.15], [0.9]], frame=19).tolist()
-    [True, False]
     """
 
     _parameter_constraints: dict = {

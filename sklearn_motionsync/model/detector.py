@@ -42,18 +42,25 @@ _REASONS = {
 
 
 class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
-    """Whether performances are the action, including their timing and size.
+    """Whether trials are the movement, by its shape, timing and size.
 
-    Synchronisation removes differences of pace, and an `ActionModel` compares shapes more than
-    sizes. The detector makes four tests of a performance, each with an acceptance region that is
-    estimated from how people differ. A performance must pass all of them.
+    It learns from trials of one movement, by a pipeline with a synchronizer and an `ActionModel`.
+    A trial four times as fast, and one without movement, are refused:
 
-    1. **movement**: its dissimilarity to the model *after* synchronisation,
-       `ActionModel.dissimilarity`.
-    2. **course**: the same after linear normalisation alone, which keeps the timing of its parts.
-    3. **duration**: its number of frames, as a ratio to the geometric mean.
-    4. **energy**: the mean squared distance of its postures from their own mean, as a ratio to the
-       geometric mean.
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from sklearn_motionsync import (
+    ...     ActionDetector, ActionModel, ASpace, DenseSynchronizer, DirectionCosines
+    ... )
+    >>> from sklearn_motionsync.datasets import make_bending
+    >>> bunch = make_bending(12, random_state=0)
+    >>> steps = DirectionCosines(bunch.skeleton), ASpace(0.95), DenseSynchronizer(50)
+    >>> detector = ActionDetector(make_pipeline(*steps, ActionModel()))
+    >>> detector = detector.fit(bunch.data, groups=bunch.actor)
+    >>> bend = bunch.data[0]
+    >>> detector.predict([bend, bend[::4], bend[:1].repeat(90, axis=0)]).tolist()
+    [1, -1, -1]
+    >>> detector.report([bend, bend[::4]])["reason"].tolist()
+    ['', 'too short']
 
     Parameters
     ----------
@@ -88,26 +95,17 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
 
     Notes
     -----
+    A trial must pass four tests. The acceptance region of each is estimated from how people differ.
+
+    1. **movement**: the dissimilarity to the model *after* alignment, `ActionModel.dissimilarity`.
+    2. **course**: the same after linear normalisation alone, which keeps the timing of its parts.
+    3. **duration**: the number of frames, as a ratio to the geometric mean.
+    4. **energy**: the mean squared distance of the poses from their own mean, as a ratio to the
+       geometric mean.
+
     Give ``groups``, such as subjects, whenever people come more than once: acceptance regions
     are then those of differences between people. Variation between people is accepted: copies
     at half or double speed are rejected only where people agree on the duration of the action.
-
-    Examples
-    --------
-    >>> from sklearn.pipeline import make_pipeline
-    >>> from sklearn_motionsync import (
-    ...     ActionDetector, ActionModel, ASpace, DenseSynchronizer, DirectionCosines
-    ... )
-    >>> from sklearn_motionsync.datasets import make_bending
-    >>> bunch = make_bending(12, random_state=0)
-    >>> steps = DirectionCosines(bunch.skeleton), ASpace(0.95), DenseSynchronizer(50)
-    >>> detector = ActionDetector(make_pipeline(*steps, ActionModel()))
-    >>> detector = detector.fit(bunch.data, groups=bunch.actor)
-    >>> bend = bunch.data[0]
-    >>> detector.predict([bend, bend[::4], bend[:1].repeat(90, axis=0)]).tolist()
-    [1, -1, -1]
-    >>> detector.report([bend, bend[::4]])["reason"].tolist()
-    ['', 'too short']
     """
 
     _parameter_constraints: dict = {

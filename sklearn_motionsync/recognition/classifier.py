@@ -44,13 +44,30 @@ _GOLDEN = (5**0.5 - 1) / 2
 class ActionClassifier(
     DocumentedMixin, LongWorkMixin, SequenceLevelMixin, ClassifierMixin, BaseEstimator
 ):
-    """Which of several actions performances are, and whether they are any of them.
+    """Which of several movements trials are, and whether they are any of them.
 
-    The similarity of two performances is the mean of four kernels: three of their synchronisation
-    distances, one a cost, with velocities normalised by each performance's own energy; and one of
-    summary statistics, without any warp. A multinomial logistic regression with this kernel
-    separates the classes. Performances are not warped to the pattern of a class: that makes
-    unknown actions resemble it.
+    It learns bends and half bends, and is given one of each, and standing still, of a new person:
+
+    >>> import numpy as np
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from sklearn_motionsync import ActionClassifier, DirectionCosines
+    >>> from sklearn_motionsync.datasets import make_bending
+    >>> bunch = make_bending(12, n_actors=4, n_frames=40, random_state=0)
+    >>> X = bunch.data + [x[: len(x) // 2] for x in bunch.data]
+    >>> y = np.repeat(["bend", "half"], 12)
+    >>> pipe = make_pipeline(DirectionCosines(bunch.skeleton), ActionClassifier())
+    >>> pipe = pipe.fit(X, y, actionclassifier__groups=np.tile(bunch.actor, 2))
+    >>> new = make_bending(1, n_frames=40, random_state=7).data[0]
+    >>> still = new[:1].repeat(40, axis=0)
+    >>> pipe.predict([new, new[:20], still]).tolist()
+    ['bend', 'half', 'half']
+
+    A trial of neither gets the more likely class, unless unknown movements are rejected:
+
+    >>> pipe[-1].set_params(reject_below="auto").predict(
+    ...     pipe[:-1].transform([new, new[:20], still])
+    ... ).tolist()
+    ['bend', 'half', 'unknown']
 
     Parameters
     ----------
@@ -115,37 +132,18 @@ class ActionClassifier(
 
     Notes
     -----
+    The similarity of two trials is the mean of four kernels. Three are of their synchronisation
+    distances, one a cost, with velocities normalised by each trial's own energy. One is of summary
+    statistics, without any warp. A multinomial logistic regression with this kernel separates the
+    classes. Trials are not warped to the template of a class: that makes unknown movements resemble
+    it.
+
     Give ``groups``, such as subjects, whenever people come more than once: probabilities
     and thresholds are then those of new people. Under metadata routing
     ``set_fit_request(groups=True)``; otherwise a pipeline takes ``actionclassifier__groups``.
 
     Time and memory of a fit grow with the square of the number of performances where all are
     compared, and with their number where landmarks are; those of a prediction with ``landmarks_``.
-
-    Examples
-    --------
-    Bends and half bends of a new person.
-
-    >>> import numpy as np
-    >>> from sklearn.pipeline import make_pipeline
-    >>> from sklearn_motionsync import ActionClassifier, DirectionCosines
-    >>> from sklearn_motionsync.datasets import make_bending
-    >>> bunch = make_bending(12, n_actors=4, n_frames=40, random_state=0)
-    >>> X = bunch.data + [x[: len(x) // 2] for x in bunch.data]
-    >>> y = np.repeat(["bend", "half"], 12)
-    >>> pipe = make_pipeline(DirectionCosines(bunch.skeleton), ActionClassifier())
-    >>> pipe = pipe.fit(X, y, actionclassifier__groups=np.tile(bunch.actor, 2))
-    >>> new = make_bending(1, n_frames=40, random_state=7).data[0]
-    >>> still = new[:1].repeat(40, axis=0)
-    >>> pipe.predict([new, new[:20], still]).tolist()
-    ['bend', 'half', 'half']
-
-    A performance of neither is given the more likely class, unless unknown actions are rejected.
-
-    >>> pipe[-1].set_params(reject_below="auto").predict(
-    ...     pipe[:-1].transform([new, new[:20], still])
-    ... ).tolist()
-    ['bend', 'half', 'unknown']
     """
 
     _parameter_constraints: dict = {

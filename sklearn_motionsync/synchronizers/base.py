@@ -1,7 +1,7 @@
 """Synchronizer: the clock, the pattern and the warp to it, which all share (Eqs. 6, 7, 18)."""
 
 from numbers import Integral
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from sklearn.base import (
@@ -15,7 +15,7 @@ from sklearn.utils.validation import check_is_fitted
 from ..inputs.collections import Performances, as_source
 from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers, check_finite, check_magnitude, check_names
-from ..inputs.types import NamesLike, PerformanceLike, PerformancesLike, Transformed
+from ..inputs.types import FitTransform, NamesLike, PerformanceLike, PerformancesLike, Transformed
 from ..inputs.validation import (
     SequenceLevelMixin,
     labels_of_parts,
@@ -177,7 +177,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         self._number_as_given()
         return self
 
-    fit_transform = atomic_fit(TransformerMixin.fit_transform)
+    fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
 
     def transform(self, X: PerformancesLike) -> Transformed:
         """Warp performances onto the clock of the pattern (Eq. 18).

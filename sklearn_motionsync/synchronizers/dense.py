@@ -54,174 +54,198 @@ _TESTED, _SEVERAL = 12, 3
 
 
 class DenseSynchronizer(LongWorkMixin, Synchronizer):
-    """Synchronise performances by dense matching to the median one.
+    """Align trials in time: warp all of them to the most typical one.
 
-    1. Normalise all performances linearly to ``P`` frames (Eq. 7).
-    2. Learn the metric: weights of features, and of combinations of them, by how reliably they
-       identify a moment of the action in these performances (see ``metric``).
-    3. Match ordered pairs: dynamic programming finds the offsets Delta(p) that
-       minimise the synchronisation distance ``D_{n,m}`` (Eqs. 12-17)::
+    That trial is the template, here the *pattern*. Every trial is matched to it by all of its
+    signals at once. A warp then brings the same moments together. The time shifts are a result,
+    too.
 
-           sum_p |x_n(p) - x_m(p + Delta(p))|^2 + mu sum_p phi(rate)
+    One signal peaks at frame 40, 50 or 62 of three trials:
 
-       with both ends pinned and the local rate between 0 and ``max_rate``. By default
-       the points x are velocities and postures in the learnt metric (see ``cost``).
-    4. The pattern has the smallest global distance ``C_n = sum_m D_{n,m}`` (Eq. 19): it is the
-       "median" performance, among more than 100 found by a part of all matches (see ``search``).
-    5. Consensus: the time of the pattern reaches a performance directly, or by way of
-       one of ``consensus`` exemplars, typical performances of the training set. The median
-       of these routes, weighted by the similarity of the performances along them, outvotes a path
-       that took a wrong valley. It is then smoothed.
-    6. Refinement: if it helps, as it does for repeated trials of a single source, whose postures
-       agree but for noise and gain, Gauss-Newton steps place every moment to a fraction of a frame.
-    7. ``transform`` samples performances at ``tau(p) = p + Delta(p)`` (Eq. 18).
+    >>> import numpy as np
+    >>> from sklearn_motionsync import DenseSynchronizer
+    >>> frames = np.arange(101)
+    >>> trials = [np.exp(-(((frames[:, None] - peak) / 12) ** 2)) for peak in (40, 50, 62)]
+    >>> sync = DenseSynchronizer().fit(trials)
+    >>> aligned = sync.transform(trials)
+    >>> aligned.shape  # trials, frames, signals
+    (3, 101, 1)
+    >>> aligned.argmax(axis=1).ravel().tolist()  # where the peaks are now
+    [50, 50, 50]
+    >>> sync.match(trials).offsets[:, 50].round().tolist()  # how late they were, in frames
+    [-10.0, 0.0, 12.0]
 
-    The defaults suit most data. Three parameters depend on them: ``n_frames``, the resolution of
-    the clock; ``refine=True``, for trials of a single source; ``max_offset``, the largest
-    difference in timing. ``pattern`` keeps an existing clock. The defaults of the seven from
-    ``metric`` to ``subframes`` were set by measurements; `paper` has those of the paper. The
-    last five are for many performances and long jobs.
+    A trial with a gap is refused:
+
+    >>> trials[2][7] = np.nan
+    >>> sync.transform(trials)
+    Traceback (most recent call last):
+        ...
+    ValueError: Performance 2, frame 7, feature 0 is NaN; the input must be finite. ...
+
+    The defaults suit most data. Four parameters depend on the data or on the question. The others
+    were set by measurements, or are for many trials and long jobs.
 
     Parameters
     ----------
     n_frames : int, default=None
-        ``P``, frames of the common clock; by default the median length of the performances,
-        or the length of a pattern given as an array. Time grows with its square, as
-        ``max_offset`` is a share of it.
+        Frames of every aligned trial. Set it if you want a number of your own, such as 101 for 0 to
+        100 %. By default it is the median length of the trials, or the length of a template that is
+        given as an array. Time grows with its square.
     pattern : "median", int or array (n_frames, n_features), default="median"
-        The median performance, one chosen by its index, or another one.
-    velocity_smoothing : "auto" or float, default="auto"
-        Standard deviation of the Gaussian under which velocities are taken, as a share of the
-        clip, so that it does not depend on the frame rate; beyond its ends a clip is
-        continued by its point reflection. ``"auto"``: 0.02 with a learnt metric, which weights
-        noise down, and 0.03 without.
+        The template: the most typical trial, a trial by its index, or an array. Set it if new
+        trials are to be aligned to a template that you have.
     refine : "auto" or bool, default="auto"
-        Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and a test on
-        the training set shows that it helps, by features that had no part in it (see
-        ``refinement_``). A single feature, or correlated ones, cannot be tested.
+        Whether to place every moment to a fraction of a frame. Set it to True for repeated trials
+        of a single source, which differ by noise and gain only. With ``"auto"`` a test on the
+        trials decides (see ``refinement_``). A single signal, or correlated ones, cannot be tested,
+        and without a vote there is no test.
     max_offset : "auto" or float, default="auto"
-        Largest offset, as a share of ``n_frames``, in [0, 1]. ``"auto"``: 0.4 with a learnt
-        metric, 0.25 without, where a wider band leads paths astray.
+        Largest time shift, as a share of ``n_frames``, in [0, 1]. Lower it for long trials of
+        nearly the same pace: that saves time and memory. ``"auto"`` is 0.4 with a learnt metric,
+        and 0.25 without, where larger shifts lead astray.
+
+    Other Parameters
+    ----------------
+    velocity_smoothing : "auto" or float, default="auto"
+        Standard deviation of the Gaussian that smooths velocities, as a share of the trial. So it
+        does not depend on the frame rate. Beyond its ends a trial is continued by its point
+        reflection. ``"auto"`` is 0.02 with a learnt metric, which gives noise less weight, and 0.03
+        without.
     metric : "learned" or None, default="learned"
-        The metric of the velocity cost. ``"learned"``: of compressed velocities, and postures less
-        their own mean, weighted by their agreement at the same moment; learnt in ``fit`` from
-        3 to 20 performances, and off without a vote (``consensus=0``). Distances are then pure
-        numbers. None: of velocities, with equal weights. Other costs have no metric.
+        How signals are weighted by the velocity cost. ``"learned"``: compressed velocities, and
+        poses less their own mean, count by how well trials agree at the same moment. ``fit`` learns
+        this from 3 to 20 trials, and not without a vote (``consensus=0``). Distances are then pure
+        numbers. None: velocities, with equal weights. Other costs have no metric.
     consensus : int, default=8
-        Number of exemplars that vote on a warp; 0 for the direct path only, as in the paper, which
-        is then neither smoothed nor, unless ``refine=True``, refined.
+        Number of typical trials that vote on a warp. 0 takes the direct path, as in the paper,
+        which is not smoothed, and refined only by ``refine=True``.
     warp_smoothing : float, default=0.02
-        Standard deviation of the Gaussian under which the offsets are smoothed after the
-        vote, as a share of the clip. A larger value gives smoother synchronised movements and
-        less accurate key moments.
+        Standard deviation of the Gaussian that smooths time shifts after the vote, as a share of
+        the trial. More gives smoother movements, and less accurate key moments.
     cost : {"velocity", "elastic", "posture"}, default="velocity"
-        The features that are compared. ``"velocity"``: the velocity of the point; at the local
-        rate rho, ``v_n`` with ``(0.8 + 0.2 rho) v_m``. ``"elastic"``: the velocity
-        divided by the square root of the speed, with weights that make the distance (of
-        Fisher and Rao) independent of the timing of either sequence. ``"posture"``: the
-        point, as in the paper.
+        What is compared. ``"velocity"``: velocities; at the local rate rho, ``v_n`` with ``(0.8 +
+        0.2 rho) v_m``. ``"elastic"``: velocities divided by the square root of the speed. Its
+        weights make the distance, of Fisher and Rao, independent of the timing of either trial.
+        ``"posture"``: poses, as in the paper.
     smoothness : float, default=0.003
-        Weight of the changes of pace, a pure number: ``mu`` is ``smoothness`` times the
-        mean squared norm of the compared features over the training set.
+        Weight of changes of pace, a pure number. ``mu`` is ``smoothness`` times the mean squared
+        norm of what is compared.
     max_rate : float, default=4
-        Largest local rate of a path; 2 is the limit of Eq. 13. The vote and the refinement
-        may exceed it.
+        Largest local rate of a path; 2 in Eq. 13. The vote and the refinement may exceed it.
     subframes : int, default=1
         Positions a frame at which a path may stand. More than 1 serves direct paths
-        (``consensus=0``); the vote, its smoothing and the refinement are finer anyway.
+        (``consensus=0``); vote, smoothing and refinement are finer anyway.
     search : {"auto", "exhaustive", "sampled"}, default="auto"
-        The search for the median: by all matches, or by a sequential test on matches with random
-        references (see ``search_``). ``"auto"``: by all matches of up to 100 performances.
+        The search for the most typical trial: by all matches, or by a sequential test on matches
+        with random references (see ``search_``). ``"auto"``: by all, for up to 100 trials.
     max_fit : int, default=None
-        Size of a random sample, at least 2, from which ``fit`` learns everything: clock,
-        metric, pattern, exemplars, whether to refine. The others are not checked, nor read if
-        ``X`` gives performances by index: time and memory of a fit do not depend on their number.
-        A pattern given by its index is in the sample. None: all performances. See
-        ``typical_share_``.
+        Size, at least 2, of a random sample from which ``fit`` learns everything. The other trials
+        are not checked. They are not even read if ``X`` gives trials by index, so time and memory
+        of a fit do not grow with their number. A template given by its index is in the sample.
+        None takes all trials. See ``typical_share_``.
     random_state : int, RandomState instance or None, default=0
-        Draws the references of a sampled search, and the sample of ``max_fit``. With the default
+        Draws the references of a sampled search, and the sample of ``max_fit``. With the default,
         equal input gives equal results.
     n_jobs : int, default=None
-        Number of parallel jobs in ``fit``, ``transform`` and ``match``. None means 1
-        unless in a ``joblib.parallel_config`` context, -1 all cores. Results are the same to the
-        last bit.
+        Number of parallel jobs in ``fit``, ``transform`` and ``match``. None means 1 unless in a
+        ``joblib.parallel_config`` context, -1 all cores. Results are the same to the last bit.
     verbose : int, default=0
         Above 0, print the progress of a long job, at most once a second.
 
     Attributes
     ----------
     pattern_ : ndarray, shape (P, n_features)
-        The pattern on the common clock.
+        The template, of ``P`` frames.
     pattern_index_ : int or None
         Its index in the training set; None if it was given as an array.
     n_frames_ : int
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
-        ``C_n`` of Eq. 19 by all matches: of every performance after an exhaustive search, of
-        the best few after a sampled one; else NaN. With a
-        learnt metric the search compares only as many frames as the smoothing of velocities leaves
-        independent (51 by default; more for a narrow band), if ``P`` is at least 1.5 times as many,
-        and in single precision, if that tells the most typical ones apart; sums are scaled to
-        ``P``. Sums of the ``distances`` of `match`, at all frames, are within 12 % of them on ten
-        actions of people, and smallest for the same performance; the precision makes 2e-7.
+        ``C_n`` of Eq. 19 by all matches. After an exhaustive search every trial has one, after a
+        sampled one the best few; the others are NaN. With a learnt metric the search may compare
+        fewer frames, in single precision, and scales the sums to ``P``. So they differ a little
+        from sums of the ``distances`` of `match`.
     certified_ : bool
-        Whether the pattern is the median of Eq. 19: by all matches, or because paired tests, with a
-        family-wise error rate of 1 %, rejected every other performance. False if the pattern was
-        given, or a search has spent its 150 matches a performance. After a fit to a sample: whether
-        no other performance of the sample may be more typical of all.
+        Whether the template is the median of Eq. 19: by all matches, or because paired tests
+        rejected every other trial, with a family-wise error rate of 1 %. False if the template was
+        given, or a search has spent its 150 matches a trial. After a fit to a sample: whether no
+        other trial of the sample may be more typical of all.
     n_matches_ : int
-        Number of matches to choose the pattern and the exemplars.
+        Number of matches to choose the template and the trials that vote.
     search_ : Bunch
-        ``n_matches``, ``certified``, as above; ``in_doubt``, the number of others that no test
-        rejected; ``excess``: with a probability of 99 % the pattern's ``C_n`` is at most
-        ``1 + excess`` times the smallest. If the pattern was given, all are in doubt and the excess
-        is NaN.
+        ``n_matches`` and ``certified``, as above. ``in_doubt``: the number of others that no test
+        rejected. ``excess``: the template's ``C_n`` is at most ``1 + excess`` times the smallest,
+        with a probability of 99 %. If the template was given, all are in doubt and the excess is
+        NaN.
     sample_ : ndarray of int
-        Indices of the training performances: all, or ``max_fit`` of them. ``global_distances_`` are
-        sums over these, and NaN for all others; ``lengths_`` and ``examples_`` are theirs.
+        Indices of the training trials: all, or ``max_fit`` of them. ``global_distances_`` are sums
+        over these, and NaN for all others; ``lengths_`` and ``examples_`` are theirs.
     typical_share_ : float
-        Upper bound of the share of all performances that are more typical than the pattern, with a
-        smaller global distance in the metric of this fit. 0 if that is the certified median of
-        all. After a fit to a random sample its confidence is 95 % (beside the 1 % of the
-        search); it is 0.006 for a sample of 500 with none in doubt. NaN if the pattern was given.
+        Upper bound of the share of all trials that are more typical than the template, by the
+        metric of this fit. 0 if the template is the certified median of all. After a fit to a
+        random sample its confidence is 95 %, beside the 1 % of the search. NaN if the template was
+        given.
     metric_ : Bunch or None
-        The learnt metric: ``share``, the share of every feature in what is compared, about 0 for
-        noise; ``energy``, its share in the velocities, which are compared without a
-        metric: above 0.95 of one of several there is a warning; ``performances``, the indices of
-        those it was learnt from. It is learnt in single precision. None without a metric.
+        The learnt metric, in single precision; None without one. ``share``: the share of every
+        signal in what is compared, about 0 for noise. ``energy``: its share in the velocities,
+        which are compared without a metric; if one of several exceeds 0.95 there is a warning.
+        ``performances``: the indices of the trials it was learnt from.
     mu_ : float
-        Absolute weight of the changes of pace, by the frames that the search compares: within
-        1 % of that by all frames.
+        Absolute weight of the changes of pace, by the frames that the search compares.
     exemplars_ : ndarray of int
-        Indices of the performances that vote.
+        Indices of the trials that vote.
     misfit_ : float
-        Median share of the variance of the pattern in the smoothed residuals of matched postures;
+        Median share of the variance of the template in the smoothed residuals of matched poses;
         NaN unless ``refine="auto"`` finds that refining may help.
     refinement_ : Bunch
-        The test of ``refine="auto"``, by features that had no part in the warps:
-        ``ratio``, their misfit after refining by the other features to that after matching by the
-        others alone; ``p_value``, of a t test that refining does not help; both after the first
-        pass of the test if that rejects refining; ``ratio_to_all``, to the misfit after matching by
-        all features. NaN where there is no test.
+        The test of ``refine="auto"``, by signals that had no part in the warps. ``ratio``: their
+        misfit after refining by the other signals, to that after matching by the others alone.
+        ``p_value``: of a t test that refining does not help. Both are of the first pass if that
+        rejects refining. ``ratio_to_all``: to the misfit after matching by all signals. NaN where
+        there is no test.
     refines_ : bool
         Whether warps are refined.
     lengths_ : ndarray of int, shape (n_samples_fit,)
-        Numbers of frames of the training performances.
+        Numbers of frames of the training trials.
     examples_ : ndarray, shape (min(n_samples_fit, 64), P, n_features)
-        Training performances linearly normalised: all, or 64 of them, evenly spaced.
+        Training trials linearly normalised: all, or 64 of them, evenly spaced.
     features_ : callable
-        Turns postures on the clock into the features that are compared.
+        Turns poses on the frames of the template into what is compared.
     n_features_in_ : int
-        Features of a frame (columns, for 2-D input).
+        Signals of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
-        Names of the features; only if the input had names.
+        Names of the signals; only if the input had names.
 
     See Also
     --------
     LinearSynchronizer : The baseline without matching.
     KeyframeSynchronizer : Matching by key-frames.
-    ActionModel : Mean and variation of synchronised performances.
-    sklearn_motionsync.display.MetricDisplay : Draws the weights of the features in the metric.
+    ActionModel : Mean and variation of aligned trials.
+    sklearn_motionsync.display.MetricDisplay : Draws the weights of the signals in the metric.
+
+    Notes
+    -----
+    A fit has six steps. Those of the paper are 1, 3 and 4, and `paper` has its settings.
+
+    1. All trials are linearly normalised to ``P`` frames (Eq. 7).
+    2. The metric is learnt: how well each signal, and combinations of them, tell the moments of the
+       movement (see ``metric``).
+    3. Pairs of trials are matched. Dynamic programming finds the time shifts Delta(p) with the
+       smallest distance ``D_{n,m}`` (Eqs. 12-17)::
+
+           sum_p |x_n(p) - x_m(p + Delta(p))|^2 + mu sum_p phi(rate)
+
+       Both ends are pinned, and the local rate is between 0 and ``max_rate``. The points x are
+       velocities and poses in the metric (see ``cost``).
+    4. The template is the trial with the smallest sum ``C_n = sum_m D_{n,m}`` (Eq. 19), the
+       "median".
+    5. Some typical trials, the exemplars, vote. The template is matched to a trial directly, and by
+       way of each exemplar. The weighted median of these paths outvotes a path that went astray. It
+       is then smoothed.
+    6. If that helps, Gauss-Newton steps refine the warps.
+
+    ``transform`` samples a trial at ``tau(p) = p + Delta(p)`` (Eq. 18).
 
     References
     ----------
@@ -230,8 +254,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
     Examples
     --------
-    A known warp is recovered. The second performance is up to 8 frames ahead in its first
-    half, and behind in its second.
+    A known warp is recovered. The second trial is up to 8 frames ahead in its first half, and
+    behind in its second.
 
     >>> import numpy as np
     >>> from sklearn_motionsync import DenseSynchronizer
@@ -244,8 +268,6 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     >>> truth = 100 * (np.interp(t, phase, t) - t)
     >>> float(np.abs(sync.match(X).offsets[1] - truth).mean().round(1))
     0.0
-    >>> sync.transform(X).shape
-    (2, 101, 2)
     """
 
     _parameter_constraints: dict = {

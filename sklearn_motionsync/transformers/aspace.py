@@ -1,7 +1,7 @@
 """aSpace: the principal components of the postures of an action (Eqs. 3-5)."""
 
 from numbers import Integral
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from sklearn.base import (
@@ -14,7 +14,7 @@ from sklearn.utils._param_validation import Interval, RealNotInt
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
-from ..inputs.types import NamesLike, PerformancesLike, Transformed
+from ..inputs.types import FitTransform, NamesLike, PerformancesLike, Transformed
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
@@ -25,12 +25,20 @@ __all__ = ["ASpace"]
 
 
 class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
-    """The space of an action: principal components of all its postures.
+    """Principal components of all poses of a movement: few numbers instead of many.
 
-    1. Pool the postures of all performances and diagonalise their covariance (Eq. 3).
-    2. Keep the first ``b`` eigenvectors, the fewest that reach the share of the variance to be
-       kept (Eq. 4).
-    3. Project postures onto them (Eq. 5).
+    The second of these signals is twice the first, and the third is constant. One number a frame
+    tells all:
+
+    >>> import numpy as np
+    >>> from sklearn_motionsync import ASpace
+    >>> t = np.linspace(0, 1, 50)
+    >>> performances = [np.column_stack([x, 2 * x, 0 * x]) for x in (t, t**2)]
+    >>> aspace = ASpace(0.95).fit(performances)
+    >>> aspace.n_components_
+    1
+    >>> [x.shape for x in aspace.transform(performances)]
+    [(50, 1), (50, 1)]
 
     Parameters
     ----------
@@ -63,17 +71,11 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     DirectionCosines : Postures from joint positions.
     DenseSynchronizer : Synchronises the projected performances.
 
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from sklearn_motionsync import ASpace
-    >>> t = np.linspace(0, 1, 50)
-    >>> performances = [np.column_stack([x, 2 * x, 0 * x]) for x in (t, t**2)]
-    >>> aspace = ASpace(0.95).fit(performances)
-    >>> aspace.n_components_
-    1
-    >>> [x.shape for x in aspace.transform(performances)]
-    [(50, 1), (50, 1)]
+    Notes
+    -----
+    The poses of all trials are pooled, and their covariance is diagonalised (Eq. 3). The first
+    ``b`` eigenvectors are kept, the fewest that reach the share of the variance (Eq. 4). Poses are
+    projected onto them (Eq. 5).
     """
 
     _parameter_constraints: dict = {
@@ -133,7 +135,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         self.n_components_ = b
         return self
 
-    fit_transform = atomic_fit(TransformerMixin.fit_transform)
+    fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
 
     @snapshot
     def transform(self, X: PerformancesLike) -> Transformed:

@@ -1,6 +1,6 @@
 """FrameWise: any transformer of rows, applied to the frames of performances."""
 
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 import pandas as pd
@@ -15,7 +15,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers, column_names
-from ..inputs.types import NamesLike, PerformancesLike, Transformed
+from ..inputs.types import FitTransform, NamesLike, PerformancesLike, Transformed
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
@@ -118,7 +118,7 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
         self._n_features_out, self._inverts = rows.shape[1], _inverts(self.transformer_, rows[:1])
         return self
 
-    fit_transform = atomic_fit(TransformerMixin.fit_transform)
+    fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
 
     @snapshot
     def transform(self, X: PerformancesLike) -> Transformed:
