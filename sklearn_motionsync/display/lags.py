@@ -165,9 +165,11 @@ class LagDisplay:
         n_parts, n_frames = self.lags.values.shape[1:]
         n_cols = min(n_parts, _CURVES_A_ROW)
         n_rows = -(-n_parts // n_cols)
-        cells = [(0, slice(None)), *((1 + i // n_cols, i % n_cols) for i in range(n_parts))]
-        size = (WIDTH, 1.2 + 0.4 * n_parts + 1.8 * n_rows)
-        self.figure_, (self.map_ax_, *self.axes_) = panels(ax, cells, 1 + n_rows, n_cols, size)
+        # The map is as high as two rows of curves.
+        curves_at = ((2 + i // n_cols, i % n_cols) for i in range(n_parts))
+        cells = [(slice(0, 2), slice(None)), *curves_at]
+        size = (WIDTH, 0.6 + 1.6 * (2 + n_rows))
+        self.figure_, (self.map_ax_, *self.axes_) = panels(ax, cells, 2 + n_rows, n_cols, size)
         axis = TimeAxis("frames" if self.lags.unit == "frames" else "percent", n_frames)
         table = self.lags.over_time()
         columns = {

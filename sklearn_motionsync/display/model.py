@@ -276,7 +276,7 @@ class ActionModelDisplay:
         n_rows = -(-count // n_cols)
         cells = [divmod(i, n_cols) for i in range(count)]
         parts = self._parts()
-        height = max(3, 2.2 * n_rows + 0.6) + 0.2 * max(len(parts) - 3, 0)
+        height = max(3, 1.9 * n_rows + 1.4) + 0.2 * max(len(parts) - 3, 0)
         self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, (WIDTH, height))
         self.mean_, self.envelope_, self.performances_, self.departures_ = [], [], [], []
         for i, (axis, name) in enumerate(zip(self.axes_, self.feature_names, strict=True)):
