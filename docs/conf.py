@@ -82,6 +82,7 @@ sphinx_gallery_conf = {
     "ignore_pattern": r"(^|/)(?!plot_)[^/]*$",
     # examples/index.rst orders the pages by task.
     "copyfile_regex": r"index\.rst",
+    "minigallery_sort_order": "gallery_order.gallery_order",
     "within_subsection_order": "FileNameSortKey",
     "backreferences_dir": "reference/backreferences",
     "doc_module": ("sklearn_motionsync",),

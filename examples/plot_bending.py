@@ -201,6 +201,13 @@ for name, value, paper in rows:
     print(f"{name:28s} {value:{width}s}  {paper}")
 
 # %%
+# What is refused
+# ---------------
+# The rows "accepted" judge each person by a model of the others. Trials that run backwards, stop
+# half-way or stand still should be refused. On synthetic trials they are. Real bends are accepted
+# backwards, because the way down is much like the way up.
+
+# %%
 # Fig. 3: the first dimensions of the aSpace
 # -------------------------------------------
 # The first row shows the trials as recorded, the second one aligned. For the third row, key-frames

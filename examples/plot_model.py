@@ -129,7 +129,7 @@ _ = display.figure_.suptitle("The left arm leaves the band; the torso does not")
 # Synthetic bends differ little. In real bends of HDM05 the way down is much like the way up. This
 # command counts what a model of the other people accepts: ``python examples/plot_bending.py
 # --data hdm05_positions.npz --action depositFloorR``. It accepts 23 of 24 bends as they are, but
-# also 21 backwards. It accepts no first half, and none standing still. :doc:`/accuracy` has
+# also 22 backwards. It accepts no first half, and none standing still. :doc:`/accuracy` has
 # sixteen actions of real people, and other detectors.
 
 plt.show()

@@ -528,7 +528,9 @@ class SkeletonDisplay:
         )
         width, height = high - low
         # All panels have one scale.
-        scale = min((WIDTH - 0.15 * n_cols) / (1.1 * n_cols * width), 2.6 / height)
+        scale = min(
+            (WIDTH - 0.15 * n_cols) / (1.1 * n_cols * width), (2.6 if n_rows == 1 else 2) / height
+        )
         size = n_cols * (1.1 * width * scale + 0.15), n_rows * (1.1 * height * scale + 0.8) + 0.25
         # Titles have the room of short words.
         size = max(size[0], min(WIDTH, 1.5 * n_cols)), size[1]
