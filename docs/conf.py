@@ -82,6 +82,9 @@ sphinx_gallery_conf = {
     "gallery_dirs": "auto_examples",
     "filename_pattern": r"/plot_",
     "ignore_pattern": r"(^|/)(?!plot_)[^/]*$",
+    # examples/index.rst orders the pages by task.
+    "copyfile_regex": r"index\.rst",
+    "minigallery_sort_order": "gallery_order.gallery_order",
     "within_subsection_order": "FileNameSortKey",
     "backreferences_dir": "reference/backreferences",
     "doc_module": ("sklearn_motionsync",),
@@ -103,7 +106,7 @@ plot_rcparams = {
     "axes.spines.right": False,
     "axes.spines.top": False,
     "figure.constrained_layout.use": True,
-    "figure.figsize": (7, 3.2),
+    "figure.figsize": (6.4, 3.2),
     "font.size": 10,
     "grid.alpha": 0.3,
     "legend.frameon": False,

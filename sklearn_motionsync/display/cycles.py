@@ -18,7 +18,7 @@ from ..segmentation.cycles import (
 from ..segmentation.self_correlation import required_strength
 from ..synchronizers.match import rates_of
 from .arguments import AxesLike, as_index
-from .drawing import COLORS, panels
+from .drawing import COLORS, WIDTH, legend_above, panels
 from .time_axis import TimeAxis
 
 __all__ = ["CycleDisplay"]
@@ -182,7 +182,7 @@ class CycleDisplay:
         """
         axis = TimeAxis(unit, len(self.curve), [len(self.curve)], frame_rate)
         (times,) = axis.performances()
-        self.figure_, self.axes_ = panels(ax, [0, 1], 2, 1, (7, 5))
+        self.figure_, self.axes_ = panels(ax, [0, 1], 2, 1, (WIDTH, 4.8))
         upper, lower = self.axes_
         lags = times[: len(self.correlation)]
         blue, black, orange = (COLORS[k] for k in ("performance", "pattern", "mean"))
@@ -206,13 +206,13 @@ class CycleDisplay:
         )
         upper.set_ylabel("self-correlation")
         upper.set_title(self._describe(), fontsize="medium")
-        upper.legend(loc="upper right", fontsize="small")
+        legend_above([upper], *upper.get_legend_handles_labels())
         (self.curve_,) = lower.plot(times, self.curve, color=blue)
         self.cuts_ = lower.vlines(
             times[self.cuts], 0, 1, transform=lower.get_xaxis_transform(), color=black, linewidth=1
         )
         lower.set_xlim(0, times[-1])
-        lower.set_xlabel(axis.performance_label.replace("performance", "take"))
+        lower.set_xlabel(axis.performance_label.replace("trial", "take"))
         lower.set_ylabel(self.name)
         return self
 

@@ -1,7 +1,6 @@
 """PhaseDisplay: the phase of running performances, and the predicted rest of them."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 from textwrap import fill
 from typing import Any, Literal, NamedTuple, Self
 
@@ -34,16 +33,14 @@ from .arguments import (
     times_from_zero,
 )
 from .bodies import bones_by_side, bounds, invert_postures, landmark_track, project
-from .drawing import COLORS, bone_lines, front_line, legend_above, panels, stage
+from .drawing import COLORS, WIDTH, bone_lines, front_line, legend_above, panels, stage
 
 __all__ = ["PhaseDisplay"]
 
 # The number of performances by default.
 _N_PERFORMANCES = 4
-# The widths of panels in columns of the grid: a body, a dial, the phase, a curve.
-_BODY, _DIAL, _PHASE, _CURVE = 3, 3, 5, 5
-# The width of a column and the height of a row in inches.
-_COLUMN, _ROW = 0.72, 2.35
+# The height of a row of panels in inches.
+_ROW = 2.2
 # Characters a line of a title or an axis label.
 _LINE_LENGTH = 24
 # The interval of the arc of a dial, as a share of the mean duration.
@@ -57,7 +54,7 @@ _N_POINTS = 60
 class PhaseDisplay:
     """Running performances: their phase, its confidence, and a prediction.
 
-    A row for each performance: a dial of its phase, with an arc that ends at the phase after a
+    Panels for each performance: a dial of its phase, with an arc that ends at the phase after a
     tenth of the mean duration at the present rate; the phase over time with its confidence; and
     features, as far as they were observed, with the predicted rest: the mean from the phase on,
     for as long as `OnlineSynchronizer.time_left` estimates. With ``body`` also a stick figure,
@@ -326,16 +323,17 @@ class PhaseDisplay:
             frame = len(longest) - 1
         frame = as_index(frame, len(longest), "frame")
         has_body = self._performances[0].body is not None
-        widths = [_BODY] * has_body + [_DIAL, _PHASE] + [_CURVE] * len(self.features)
-        edges = np.cumsum([0, *widths])
-        columns = [slice(a, b) for a, b in pairwise(edges)]
-        n_rows, n_cols = len(self._performances), int(edges[-1])
-        cells = [(row, column) for row in range(n_rows) for column in columns]
-        size = n_cols * _COLUMN, n_rows * _ROW + 0.5
-        before = getattr(self, "axes_", ())
-        self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, size, before)
+        # Two panels beside each other; an odd last one has the whole width.
+        n_panels, count = has_body + 2 + len(self.features), len(self._performances)
+        places = [divmod(i, 2) for i in range(n_panels)]
+        if n_panels % 2:
+            places[-1] = (n_panels // 2, slice(None))
+        each = -(-n_panels // 2)
+        cells = [(each * k + row, column) for k in range(count) for row, column in places]
+        size, before = (WIDTH, count * each * _ROW + 0.3), getattr(self, "axes_", ())
+        self.figure_, self.axes_ = panels(ax, cells, count * each, 2, size, before)
         end = max(self._action.end_of(p) for p in self._performances)
-        by_row = np.array(self.axes_, dtype=object).reshape(n_rows, -1)
+        by_row = np.array(self.axes_, dtype=object).reshape(count, -1)
         self.rows_ = [
             PerformanceRow(
                 axes, p, self._action, self.skeleton, self.features, 1.02 * end or 1.0, azimuth
@@ -344,9 +342,7 @@ class PhaseDisplay:
         ]
         for axes, name in zip(by_row, self.names, strict=True):
             axes[0].set_title(fill(name, _LINE_LENGTH), fontsize="medium", parse_math=False)
-        for axis in by_row[:-1, has_body + 1 :].flat:
-            axis.tick_params(labelbottom=False)
-        for axis in by_row[-1, has_body + 1 :]:
+        for axis in by_row[:, has_body + 1 :].flat:
             axis.set_xlabel(TIME_LABELS[self.unit])
         self._show(longest[frame])
         # One legend for all curves.
@@ -543,12 +539,12 @@ class PerformanceRow:
             style = {"color": COLORS["pattern"], "linewidth": 0.9, "linestyle": "--"}
             ys = percent * performance.afterwards
             (self.afterwards,) = axis.plot(performance.times, ys, label="afterwards", **style)
-        label = _label("guess", self._action.duration)
+        label = _label("predicted", self._action.duration)
         (self.rest,) = axis.plot([], [], color=orange, linestyle=":", label=label)
-        self.phase = front_line(axis, [], [], color=blue, label="phase, live")
+        self.phase = front_line(axis, [], [], color=blue, label="phase")
         axis.set_xlim(0, end)
         axis.set_ylim(0, 105)
-        axis.set_ylabel("%")
+        axis.set_ylabel("phase (%)")
 
     def show(self, time):
         """Move to a time."""

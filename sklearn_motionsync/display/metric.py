@@ -13,7 +13,7 @@ from ..inputs.wording import counted
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import find_step
 from .arguments import AxesLike
-from .drawing import COLORS, panels
+from .drawing import COLORS, WIDTH, legend_above, panels
 
 __all__ = ["MetricDisplay"]
 
@@ -138,7 +138,7 @@ class MetricDisplay:
             The display itself.
         """
         rows = np.arange(len(self.share))
-        size = (7, max(2.2, 0.27 * len(rows) + 1.3))
+        size = (WIDTH, max(2.2, 0.27 * len(rows) + 1.3))
         self.figure_, (self.ax_,) = panels(ax, [(0, 0)], 1, 1, size)
         self.energy_ = self.ax_.barh(
             rows,
@@ -146,7 +146,7 @@ class MetricDisplay:
             height=0.8,
             color=COLORS["envelope"],
             alpha=0.6,
-            label="of plain velocities, without a metric",
+            label="without weights",
         )
         # Narrower and in front: both bars are visible, whichever is longer.
         self.share_ = self.ax_.barh(
@@ -154,21 +154,21 @@ class MetricDisplay:
             self.share,
             height=0.4,
             color=COLORS["performance"],
-            label="with the learnt metric",
+            label="with the learnt weights",
         )
         self.ax_.axvline(0, color="0.3", linewidth=0.8)
         self.ax_.set_yticks(rows, self.feature_names)
         self.ax_.set_ylim(len(rows) - 0.4, -0.6)
-        self.ax_.set_xlabel("share of what is compared")
+        self.ax_.set_xlabel("share of what is compared (0 to 1)")
         self.ax_.set_title(self._describe(), fontsize="medium")
-        self.ax_.legend(loc="best", fontsize="small", frameon=True)
+        legend_above([self.ax_], *self.ax_.get_legend_handles_labels())
         self.ax_.grid(False, axis="y")
         return self
 
     def _describe(self):
         if self.n_performances is None:
             return "learnt metric"
-        return f"metric learnt from {counted(self.n_performances, 'performance')}"
+        return f"metric learnt from {counted(self.n_performances, 'trial')}"
 
 
 def _sort_and_sum(names, shares):

@@ -12,7 +12,7 @@ from ..inputs.types import PerformanceLike, PerformancesLike
 from ..inputs.wording import counted
 from ..segmentation.search import find_performances
 from .arguments import AxesLike, as_performances
-from .drawing import COLORS, panels
+from .drawing import COLORS, WIDTH, legend_above, panels
 
 __all__ = ["SearchDisplay"]
 
@@ -167,7 +167,7 @@ class SearchDisplay:
 
         shown = list(self.lengths)[:_MAX_PANELS]
         cells = [(i, 0) for i in range(len(shown))]
-        size = (8, 1.1 + 1.3 * len(shown))
+        size = (WIDTH, 1.1 + 1.3 * len(shown))
         self.figure_, self.axes_ = panels(ax, cells, len(shown), 1, size)
         accepted, self.hits_ = self._accepted(), []
         for axis, take in zip(self.axes_, shown, strict=True):
@@ -187,9 +187,9 @@ class SearchDisplay:
                 axis.axhline(level, color=COLORS["mean"], linestyle="--", linewidth=1)
             axis.set_xlim(0, self.lengths[take])
             axis.set_ylim(_BOTTOM - _STRIP * (self.segments is not None), 1)
-            axis.set_ylabel("score")
+            axis.set_ylabel("score (1: alike)")
             title = f"take {take}" if len(self.lengths) > 1 else ""
-            axis.set_title(title, fontsize="medium", loc="left")
+            axis.set_title(title, fontsize="medium")
         self.axes_[-1].set_xlabel("frame of the take")
         self._draw_legend()
         return self
@@ -217,12 +217,4 @@ class SearchDisplay:
         ]
         if self.segments is not None:
             handles.append(Patch(facecolor=COLORS["pattern"], label="known to be there"))
-        self.axes_[0].legend(
-            handles=handles,
-            ncols=len(handles),
-            loc="lower right",
-            bbox_to_anchor=(1, 1),
-            fontsize="small",
-            frameon=False,
-            borderaxespad=0.2,
-        )
+        legend_above(self.axes_[:1], handles, [handle.get_label() for handle in handles])

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from functools import partial
 from numbers import Real
+from textwrap import fill
 from typing import Any, Self
 
 import numpy as np
@@ -45,15 +46,15 @@ from .bodies import (
     project,
     read_positions,
 )
-from .drawing import COLORS, bone_lines, panels, stage
+from .drawing import COLORS, WIDTH, bone_lines, panels, stage
 from .limb_departures import departs_outside_aspace, limb_departures, view_of_limbs
 
 __all__ = ["SkeletonDisplay", "postures_at"]
 
 # The largest number of panels in a row.
-_PANELS_A_ROW = 6
-# The width and the height of a heading in inches.
-_HEADING = 7.8, 0.4
+_PANELS_A_ROW = 4
+# The height of a heading in inches, and its characters a line.
+_HEADING, _LINE_LENGTH = 0.6, 78
 # The distance of bodies side by side, in heights of the tallest.
 _SPACING = 0.7
 # The number of performances by default.
@@ -295,7 +296,7 @@ class SkeletonDisplay:
         return cls(
             [bodies, list(warped)],
             skeleton,
-            ["as recorded: each at its own pace", "synchronised: all on one clock"],
+            ["as recorded", "aligned"],
             durations=[durations, [float(np.median(durations))] * len(bodies)],
             labels=labels,
         ).plot(ax, **view)
@@ -349,7 +350,7 @@ class SkeletonDisplay:
             [as_performances(X)[i] for i in performances],
             match.times[performances],
             views[0].skeleton,
-            names=[f"{i} (pattern)" if i == pattern else str(i) for i in performances],
+            names=[f"{i} (template)" if i == pattern else str(i) for i in performances],
             ax=ax,
             at=at,
             azimuth=azimuth,
@@ -417,7 +418,7 @@ class SkeletonDisplay:
             for points in (mean[[frame]], samples[accepted, :width]):
                 scenes.append([x[np.newaxis] - floor for x in bodies_of(points)])
             titles += [
-                f"frame {frame}\nmean posture",
+                f"frame {frame}\nmean pose",
                 f"frame {frame}\n{counted(sum(accepted), 'sample')}",
             ]
         return cls(scenes, skeleton, titles).plot(ax, **view)
@@ -525,7 +526,7 @@ class SkeletonDisplay:
             shadows[..., 1] -= floor
         verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
         if verdict == "accepted" and departs_outside_aspace(view, i, limbs.columns):
-            note += ": the model sees what the aSpace keeps,\n"
+            note += ": the model sees what the aSpace keeps, "
             note += "which leaves out how far some limbs depart"
         display = cls(
             postures_at(shown, bodies),
@@ -533,9 +534,10 @@ class SkeletonDisplay:
             titles,
             marked=marked,
             behind=postures_at(shown, shadows),
-            heading=f"{name} is {verdict}{note}.\nViolet: limbs more than {limit:.3g} standard "
-            "deviations from what is expected of a new person, at or around\nthat frame; beyond "
-            f"{view.model.simultaneous_factor():.2g} is rare. Pale: the mean performance.",
+            heading=f"{name.replace('Performance', 'Trial', 1)} is {verdict}{note}.\n"
+            f"Violet: limbs more than {limit:.3g} standard deviations from what is expected of a "
+            "new person, at or around that frame; beyond "
+            f"{view.model.simultaneous_factor():.2g} is rare. Pale: the mean.",
         )
         return display.plot(ax, at=at, azimuth=azimuth)
 
@@ -572,23 +574,30 @@ class SkeletonDisplay:
                 [[x + [gap * i, 0] for i, x in enumerate(scene)] for scene in scenes]
                 for scenes in (drawn, behind)
             )
-        n_cols = 1 if self.labels is not None else min(len(drawn), _PANELS_A_ROW)
+        n_cols = 1
+        if self.labels is None:
+            n_cols = -(-len(drawn) // -(-len(drawn) // _PANELS_A_ROW))
         n_rows = -(-len(drawn) // n_cols)
         low, high = bounds(
             np.concatenate([x.reshape(-1, 2) for scene in drawn + behind for x in scene])
         )
         width, height = high - low
-        # All panels have one scale; a figure is about 10 inches wide.
-        scale = min(9.5 / (1.1 * n_cols * width), 3 / height)
-        size = n_cols * (1.1 * width * scale + 0.15), n_rows * (1.1 * height * scale + 0.75)
-        if self.heading is not None:
-            size = max(size[0], _HEADING[0]), size[1] + _HEADING[1]
+        # All panels have one scale.
+        scale = min(
+            (WIDTH - 0.15 * n_cols) / (1.1 * n_cols * width), (2.6 if n_rows == 1 else 2) / height
+        )
+        size = n_cols * (1.1 * width * scale + 0.15), n_rows * (1.1 * height * scale + 0.8) + 0.25
+        # Titles have the room of short words.
+        size = max(size[0], min(WIDTH, 1.5 * n_cols)), size[1]
+        if self.labels is not None or self.heading is not None:
+            size = WIDTH, size[1] + _HEADING * (self.heading is not None)
         cells = [divmod(i, n_cols) for i in range(len(drawn))]
         before = getattr(self, "axes_", ())
         self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, size, before)
         self.heading_ = None
         if ax is None and self.heading is not None:
-            self.heading_ = self.figure_.suptitle(self.heading, fontsize="medium")
+            lines = [fill(line, _LINE_LENGTH) for line in self.heading.splitlines()]
+            self.heading_ = self.figure_.suptitle("\n".join(lines), fontsize="medium")
         self._drawn, self._behind, self._bones = drawn, behind, self._bones_of_panels()
         self.bones_, self.heads_, self.behind_ = [], [], []
         for axis, title, scene in zip(self.axes_, self.titles, drawn, strict=True):

@@ -31,7 +31,7 @@ from .arguments import (
     times_from_zero,
 )
 from .bodies import invert_postures
-from .drawing import COLORS, legend_above, panels
+from .drawing import COLORS, WIDTH, legend_above, panels
 from .limb_departures import bones_of_limbs, limb_of
 from .stick_figures import SkeletonDisplay, postures_at
 
@@ -41,8 +41,8 @@ __all__ = ["TrackingDisplay"]
 _N_FEATURES = 4
 # Standard deviations on each side that contain 90 %.
 _BAND = 1.645
-# The height of a panel and the width of the figure in inches.
-_PANEL, _WIDTH = 1.15, 8.5
+# The height of a panel in inches.
+_PANEL = 1.15
 # Characters a line of an axis label.
 _LINE_LENGTH = 18
 
@@ -269,7 +269,7 @@ class TrackingDisplay:
         """
         shown = self._most_varied() if features is None else choose_features(features, self.names)
         count = len(shown) + 2
-        size = _WIDTH, _PANEL * count + 0.6
+        size = WIDTH, _PANEL * count + 0.6
         cells, before = [(i, 0) for i in range(count)], getattr(self, "axes_", ())
         self.figure_, self.axes_ = panels(ax, cells, count, 1, size, before)
         self.estimates_, self.bands_, self.truths_, self.observed_ = [], [], [], []
