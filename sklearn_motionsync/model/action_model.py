@@ -15,6 +15,7 @@ from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..utils.atomic import atomic_fit, atomic_partial_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
+from ..utils.parallel import LongWorkMixin
 from .sampling import sample_performances, sample_postures
 from .similarity import Neighbours, PerformanceStream, log_moments
 from .variation import mean_band, predictive_variance, simultaneous_factor
@@ -26,7 +27,7 @@ __all__ = ["ActionModel"]
 _VARIANCE_FLOOR = 1e-9
 
 
-class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
+class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstimator):
     """What an action looks like at every instant, and how much people vary there.
 
     1. The mean performance and the variance of every posture, over synchronised
@@ -148,7 +149,8 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
                 "A model of how performances vary needs at least 2 performances, got n_samples = 1."
             )
         encode_groups(groups, len(performances), at_least=2)
-        self._update(PerformanceStream.starting_at(performances[0]), performances, groups)
+        with self._progress(fits=True):
+            self._update(PerformanceStream.starting_at(performances[0]), performances, groups)
         return self
 
     @atomic_partial_fit

@@ -18,11 +18,18 @@ from ..inputs.validation import check_performances, check_transformed, restore
 from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
 
 __all__ = ["ASpace"]
 
 
-class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
+class ASpace(
+    DocumentedMixin,
+    LongWorkMixin,
+    ClassNamePrefixFeaturesOutMixin,
+    TransformerMixin,
+    BaseEstimator,
+):
     """The space of an action: principal components of all its postures.
 
     1. Pool the postures of all performances and diagonalise their covariance (Eq. 3).
@@ -118,7 +125,8 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
                 f"{counted(len(postures), 'posture')} of {counted(postures.shape[1], 'feature')} "
                 f"can span; use at most {most}, or a share of the variance such as 0.95."
             )
-        with np.errstate(invalid="ignore"):  # of postures all equal: PCA divides 0 by 0
+        # Of postures that are all equal PCA divides 0 by 0.
+        with self._progress(fits=True), np.errstate(invalid="ignore"):
             pca = PCA().set_output(transform="default").fit(postures)
         variance = pca.explained_variance_
         b = self._count(variance)
