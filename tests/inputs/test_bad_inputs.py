@@ -159,7 +159,13 @@ PERFORMANCES = [
     (FDataGrid(), ALL, ["got FDataGrid", "list(X.data_matrix)"]),
     ([Dataset(), Dataset()], ALL, ["got Dataset", "from_poses(poses)]"]),
     (Dataset(), ALL, ["got Dataset", "from_poses(X)"]),
-    (NESTED, ALL, ["[np.column_stack(row) for row in X.to_numpy()]"]),
+    (NESTED.assign(age=30), ALL, ["Column 'age' of performance 0 holds 30", "drop"]),
+    (
+        NESTED.assign(knee=NESTED["knee"].map(lambda x: x[:9])),
+        ALL,
+        ["'knee' of performance 0", "9"],
+    ),
+    (NESTED.assign(hip=[x.set_axis(x.index + 1) for x in NESTED["hip"]]), ALL, ["same frames"]),
 ]
 
 
