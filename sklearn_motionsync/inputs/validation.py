@@ -228,7 +228,8 @@ def restore(estimator, performances, arrays, *, frames=None, columns=None):
         raise ValueError(
             f"{type(estimator).__name__} has no {container!r} output for a collection of "
             "performances, as such a table has no index to tell them apart. Use "
-            "set_output(transform='pandas'), and pl.from_pandas(table.reset_index()) on its result."
+            "set_output(transform='pandas'), and pl.DataFrame(table.reset_index().to_dict('list')) "
+            "on its result."
         )
     if performances.kind == "array" or isinstance(arrays, np.ndarray):
         return np.stack(arrays) if isinstance(arrays, list) else arrays

@@ -375,7 +375,7 @@ def test_fit_warns_of_one_trial_that_is_taken_as_many(estimator):
 def test_polars_output_of_a_collection_is_refused(estimator):
     if hasattr(estimator, "transform"):
         polars = clone(estimator).set_output(transform="polars")
-        refuses(lambda: polars.fit_transform(X), ["'polars'", "pl.from_pandas(", "'pandas'"])
+        refuses(lambda: polars.fit_transform(X), ["'polars'", "pl.DataFrame(", "'pandas'"])
 
 
 @pytest.mark.parametrize("estimator", ALL, ids=by_name)
