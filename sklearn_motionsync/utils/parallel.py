@@ -205,13 +205,15 @@ class Progress:
             self._end_tasks(1)
             stage = self._tasks[0].subcontext(task_name=name, max_subtasks=n_portions)
             stage = self._begin_task(stage)
+        # Without callbacks a portion is no task: thousands of tasks take longer than short portions.
+        is_watched = stage is not None and getattr(stage, "_callbacks", True)
         begin = printed = time.perf_counter()
         done = 0
 
         def step():
             nonlocal done, printed
             done += 1
-            if stage is not None:
+            if is_watched:
                 self._begin_task(stage.subcontext(task_name="portion"))
                 self._end_tasks(2)
             now = time.perf_counter()
