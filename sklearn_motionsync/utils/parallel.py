@@ -205,7 +205,7 @@ class Progress:
             self._end_tasks(1)
             stage = self._tasks[0].subcontext(task_name=name, max_subtasks=n_portions)
             stage = self._begin_task(stage)
-        # Without callbacks a portion is no task: thousands of tasks take longer than short portions.
+        # Without callbacks a portion is no task: thousands of tasks take long.
         is_watched = stage is not None and getattr(stage, "_callbacks", True)
         begin = printed = time.perf_counter()
         done = 0
