@@ -14,6 +14,7 @@ from ..inputs.validation import check_performances, names_of_input, restore
 from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
 from .axes import fill_heading, heading_axes, to_y_up
 from .formats import AXES, LANDMARKS, SIDES
 from .limbs import (
@@ -209,7 +210,7 @@ class Body:
             )
 
 
-class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
+class PositionsTransformer(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator):
     """Base of the transformers that compute features of joint positions, body by body.
 
     A subclass has a ``skeleton``, a ``fit`` that calls ``_check(X, reset=True)``, a

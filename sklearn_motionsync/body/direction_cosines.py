@@ -168,7 +168,11 @@ class DirectionCosines(PositionsTransformer):
         """
         performances = self._check(X, reset=True)
         limbs = self.skeleton.limbs
-        lengths = [self._body(performances, i).lengths for i in range(len(performances))]
+        with self._progress(fits=True) as progress:
+            step, lengths = progress.stage("measuring limbs", len(performances)), []
+            for i in range(len(performances)):
+                lengths.append(self._body(performances, i).lengths)
+                step()
         lengths = np.concatenate(lengths) if len(lengths) > 1 else lengths[0]
         found = median_lengths(lengths)[limb_indices(limbs)]
         if np.isnan(found).any():

@@ -119,8 +119,11 @@ class JointPositions(PositionsTransformer):
             As from ``transform``.
         """
         performances = self._check(X, reset=True)
-        for i in range(len(performances)):
-            self._body(performances, i)
+        with self._progress(fits=True) as progress:
+            step = progress.stage("checking bodies", len(performances))
+            for i in range(len(performances)):
+                self._body(performances, i)
+                step()
         return self
 
     def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:

@@ -18,6 +18,7 @@ from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..utils.atomic import atomic_fit, atomic_partial_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
+from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .sampling import sample_performances, sample_postures
 from .similarity import Neighbours, PerformanceStream, log_moments
@@ -30,7 +31,7 @@ __all__ = ["ActionModel"]
 _VARIANCE_FLOOR = 1e-9
 
 
-class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
+class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstimator):
     """The mean movement, how much people vary about it, and whether a trial is that movement.
 
     It learns from aligned trials. Those that are unlike them are refused:
@@ -151,7 +152,8 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
                 "A model of how performances vary needs at least 2 performances, got n_samples = 1."
             )
         encode_groups(groups, len(performances), at_least=2)
-        self._update(PerformanceStream.starting_at(performances[0]), performances, groups)
+        with self._progress(fits=True):
+            self._update(PerformanceStream.starting_at(performances[0]), performances, groups)
         return self
 
     @atomic_partial_fit

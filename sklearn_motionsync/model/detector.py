@@ -17,6 +17,7 @@ from ..inputs.validation import labels_of_input
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups, sums_of_groups
+from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
 from ..utils.pipelines import (
     MissingMetadata,
@@ -41,7 +42,7 @@ _REASONS = {
 }
 
 
-class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
+class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEstimator):
     """Whether trials are the movement, by its shape, timing and size.
 
     It learns from trials of one movement, by a pipeline with a synchronizer and an `ActionModel`.
@@ -157,13 +158,16 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         name = self._check_steps()
         groups = params.pop(name, None) if groups is None else groups
         given = {} if groups is None else {name: groups}
-        self.estimator_.fit(X, y, **given, **params)
-        before, synchronizer = find_synchronizer(self.estimator_)
-        also = {name.rpartition("__")[2]: value for name, value in params.items()}
-        steps = [] if before is None else flat_steps(before)
-        also = {k: v for step in steps for k, v in accepted_params(step.transform, also).items()}
-        reached = route_to_synchronizer(self.estimator_, X, also, "ActionDetector.fit")
-        self._learn(reached.performances, synchronizer, groups)
+        with self._progress(fits=True) as progress:
+            with progress.fitting(self.estimator_, "fitting the pipeline"):
+                self.estimator_.fit(X, y, **given, **params)
+            before, synchronizer = find_synchronizer(self.estimator_)
+            also = {name.rpartition("__")[2]: value for name, value in params.items()}
+            steps = [] if before is None else flat_steps(before)
+            taken = [accepted_params(step.transform, also) for step in steps]
+            also = {name: value for params in taken for name, value in params.items()}
+            reached = route_to_synchronizer(self.estimator_, X, also, "ActionDetector.fit")
+            self._learn(reached.performances, synchronizer, groups)
         for name in ("n_features_in_", "feature_names_in_"):
             if hasattr(self.estimator_, name):
                 setattr(self, name, getattr(self.estimator_, name))

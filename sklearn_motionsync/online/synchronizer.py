@@ -27,6 +27,7 @@ from ..synchronizers.base import Synchronizer
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.atomic import atomic_fit
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
 from .stream import (
     LivePhase,
@@ -42,7 +43,9 @@ from .stream import (
 __all__ = ["OnlineSynchronizer", "Reference"]
 
 
-class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin, BaseEstimator):
+class OnlineSynchronizer(
+    DocumentedMixin, LongWorkMixin, SequenceLevelMixin, MetaEstimatorMixin, BaseEstimator
+):
     """The phase of a performance while it runs, frame by frame, however long it will last.
 
     The frames so far are the base of the trellis, and the mean of the synchronised training
@@ -182,20 +185,22 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         """
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
         performances = self._check_training_set(X)
-        self.synchronizer_ = sync.fit(X, y)
-        match = sync.match(X)
-        warped = match.warp(performances)
-        self.n_frames_ = sync.n_frames_
-        self.mean_ = warped.mean(axis=0)
-        self.duration_ = float(np.mean([len(x) for x in performances]) - 1)
-        settings = self.duration_, self.smoothness, self.velocity_smoothing, self.max_rate
+        with self._progress(fits=True) as progress:
+            with progress.fitting(sync, "synchronizing"):
+                self.synchronizer_ = sync.fit(X, y)
+            match = sync.match(X)
+            warped = match.warp(performances)
+            self.n_frames_ = sync.n_frames_
+            self.mean_ = warped.mean(axis=0)
+            self.duration_ = float(np.mean([len(x) for x in performances]) - 1)
+            settings = self.duration_, self.smoothness, self.velocity_smoothing, self.max_rate
 
-        def reference_of(mean, *calibration):
-            return Reference(sync.features_, mean, *settings, *calibration)
+            def reference_of(mean, *calibration):
+                return Reference(sync.features_, mean, *settings, *calibration)
 
-        calibration = calibrate(reference_of, performances, warped, match.times)
-        self._reference = reference_of(self.mean_, *calibration)
-        self._session = None
+            calibration = calibrate(reference_of, performances, warped, match.times, progress)
+            self._reference = reference_of(self.mean_, *calibration)
+            self._session = None
         return self
 
     def step(self, frame: NumbersLike, time: float | None = None) -> LivePhase:
@@ -471,7 +476,7 @@ _MIN_PROBABILITY = 1e-12
 _DEFAULT_TEMPERATURE, _DEFAULT_COST = 0.7, 0.5
 
 
-def calibrate(reference_of, performances, warped, times):
+def calibrate(reference_of, performances, warped, times, progress):
     """Learn the temperature and the typical cost of a `Reference`.
 
     Each training performance is matched to the mean of the others. The temperature maximises the
@@ -486,6 +491,7 @@ def calibrate(reference_of, performances, warped, times):
         The synchronised performances.
     times : ndarray, shape (n_sequences, P)
         ``tau`` of each.
+    progress : Progress
 
     Returns
     -------
@@ -498,6 +504,7 @@ def calibrate(reference_of, performances, warped, times):
     energy = float(np.square(reference_of(total / n).moving).sum(axis=1).mean()) or 1.0
     if n == 1:
         return energy * _DEFAULT_TEMPERATURE, energy * _DEFAULT_COST
+    step = progress.stage("calibrating", len(chosen))
     for i in chosen:
         reference = reference_of((total - warped[i]) / (n - 1))
         costs, truth, largest_cost = _match_live(reference, performances[i], times[i])
@@ -505,6 +512,7 @@ def calibrate(reference_of, performances, warped, times):
         for k, temperature in enumerate((energy * _TEMPERATURES).tolist()):
             right = phase_probabilities(costs, temperature)[np.arange(len(costs)), truth]
             scores[k] += np.log(np.maximum(right, _MIN_PROBABILITY)).mean()
+        step()
     # Copies of one performance have no costs but rounding.
     typical_cost = max(np.median(largest), _MIN_PROBABILITY * energy)
     return float(energy * _TEMPERATURES[scores.argmax()]), float(typical_cost)

@@ -21,6 +21,7 @@ from ..synchronizers.match import check_match
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
+from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from ..utils.threads import on_one_thread
 from .particle_filter import ParticleFilter, Track, filter_take, smooth_take, stack_frames
@@ -30,7 +31,7 @@ from .stream import check_observations, check_times, times_of_each
 __all__ = ["MotionTracker"]
 
 
-class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
+class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstimator):
     """Track a body that is partly hidden, by the mean of its action and the variation of people.
 
     Given the phase p of the action, a posture is ``mean(p) + deviation``, and an observation
@@ -203,24 +204,28 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
             )
         codes, _ = encode_groups(groups, n, at_least=2, sort=True)
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
-        self.synchronizer_ = sync.fit(X)
-        match = sync.match(X)
-        check_match(match, n, sync.n_frames_, type(sync).__name__)
-        warped = match.warp(performances)
-        durations = np.array([len(x) for x in performances], dtype=np.float64) - 1
-        self.n_frames_, self.duration_ = int(sync.n_frames_), float(durations.mean())
-        clock = Clock(self.n_frames_ - 1.0, self.duration_)
-        rates = clock.duration / durations[:, np.newaxis] / match.rates
-        settings = self.noise, self.tempering, self.n_particles
-        given = warped.astype(np.float64), rates, codes, clock
-        self._model = on_one_thread(TrackerModel.learn, *given, *settings)
-        self.mean_ = self._model.mean.astype(performances[0].dtype)
-        self.covariance_ = self._model.process.covariance
-        self.length_scale_ = float(np.sqrt(3) / self._model.process.decay)
-        self.rate_spread_, self.rate_memory_ = self._model.rates
-        self.surprise_limit_, self.departure_limit_ = map(float, self._model.nis_limits)
-        self._seed = int(check_random_state(self.random_state).randint(2**31 - 1))
-        self._running = None
+        with self._progress(fits=True) as progress:
+            with progress.fitting(sync, "synchronizing"):
+                self.synchronizer_ = sync.fit(X)
+            match = sync.match(X)
+            check_match(match, n, sync.n_frames_, type(sync).__name__)
+            warped = match.warp(performances)
+            durations = np.array([len(x) for x in performances], dtype=np.float64) - 1
+            self.n_frames_, self.duration_ = int(sync.n_frames_), float(durations.mean())
+            clock = Clock(self.n_frames_ - 1.0, self.duration_)
+            rates = clock.duration / durations[:, np.newaxis] / match.rates
+            settings = self.noise, self.tempering, self.n_particles
+            given = warped.astype(np.float64), rates, codes, clock
+            learnt = progress.stage("learning how people vary", 1)
+            self._model = on_one_thread(TrackerModel.learn, *given, *settings)
+            learnt()
+            self.mean_ = self._model.mean.astype(performances[0].dtype)
+            self.covariance_ = self._model.process.covariance
+            self.length_scale_ = float(np.sqrt(3) / self._model.process.decay)
+            self.rate_spread_, self.rate_memory_ = self._model.rates
+            self.surprise_limit_, self.departure_limit_ = map(float, self._model.nis_limits)
+            self._seed = int(check_random_state(self.random_state).randint(2**31 - 1))
+            self._running = None
         return self
 
     @snapshot

@@ -224,11 +224,11 @@ class ActionClassifier(
         with self._progress(fits=True) as progress:
             jobs = {"n_jobs": self.n_jobs, "progress": progress}
             matrix = kernel.fit(performances, self.landmarks_, **jobs)
-        folds = assign_folds(codes, groups)
-        fit_in_portion = partial(fit_regression, self.C, folds, self.landmarks_)
-        ((self._regression, self.temperature_, self.held_out_),) = run(
-            fit_in_portion, [(matrix, codes)]
-        )
+            folds = assign_folds(codes, groups)
+            fit_in_portion = partial(fit_regression, self.C, folds, self.landmarks_)
+            ((self._regression, self.temperature_, self.held_out_),) = run(
+                fit_in_portion, [(matrix, codes)], step=progress.stage("regression", 1)
+            )
         self._kernel = kernel
         # Copies, which do not change with the user's arrays.
         self._training = [np.array(x) for x in performances], codes, groups

@@ -28,6 +28,7 @@ from ..matching.trellis import Trellis
 from ..matching.warps import normalise
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .cutting import as_takes, cut_takes
 from .self_correlation import LEAST_CYCLES, correlate, rejection_reason
@@ -49,7 +50,7 @@ _PORTION, _OVERLAP = 16, 2
 _COLUMNS = {"take": int, "start": int, "stop": int, "complete": bool, "score": float}
 
 
-class CycleSegmenter(DocumentedMixin, BaseEstimator):
+class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     """Cut long takes of walking, running, or any movement that repeats, into its cycles.
 
     1. `self_correlation` gives the period of each take, and whether it is cyclic.
@@ -181,20 +182,23 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
             ``not_cyclic="raise"``; no take is left; or there is no such `start`.
         """
         given, takes = check_takes(self, X, reset=True)
-        features, found = correlate_takes(self, given, takes)
-        kept = self._select_cyclic(takes, found)
-        if not kept:
-            none = "The take is not" if len(takes) == 1 else f"None of the {len(takes)} takes is"
-            raise ValueError(
-                f"{none} cyclic. See report(X); give takes that repeat, or another threshold."
-            )
-        curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
-        sampled = [SampledTake(features[i], found[i].period) for i in kept]
-        phases = self._learn_phases(sampled)
-        self.start_, start = self._find_start(curves, sampled, phases)
-        self.template_ = average_cycle([t.values for t in sampled], [p - start for p in phases])
-        self.periods_ = np.full(len(takes), np.nan)
-        self.periods_[kept] = [found[i].period for i in kept]
+        with self._progress(fits=True) as progress:
+            step = progress.stage("correlating takes", len(takes))
+            features, found = correlate_takes(self, given, takes, step)
+            kept = self._select_cyclic(takes, found)
+            if not kept:
+                n = len(takes)
+                none = "The take is not" if n == 1 else f"None of the {n} takes is"
+                raise ValueError(
+                    f"{none} cyclic. See report(X); give takes that repeat, or another threshold."
+                )
+            curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
+            sampled = [SampledTake(features[i], found[i].period) for i in kept]
+            phases = self._learn_phases(sampled, progress)
+            self.start_, start = self._find_start(curves, sampled, phases)
+            self.template_ = average_cycle([t.values for t in sampled], [p - start for p in phases])
+            self.periods_ = np.full(len(takes), np.nan)
+            self.periods_[kept] = [found[i].period for i in kept]
         return self
 
     @snapshot
@@ -318,16 +322,20 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
             phases = align(self.template_, take)
             yield i, take, phases - np.floor(phases[0])
 
-    def _learn_phases(self, sampled):
+    def _learn_phases(self, sampled, progress):
         """Phases of takes without a template: at constant pace one by one, then matched."""
         values, phases = [take.values for take in sampled], []
         for k, take in enumerate(sampled):
             phases.append(
                 constant_phases(average_cycle(values[:k], phases), take) if k else take.mean_phases
             )
-        for _ in range(_ROUNDS if self.refine else 0):
-            template = average_cycle(values, phases)
-            phases = [match_phases(template, take) for take in sampled]
+        rounds = _ROUNDS if self.refine else 0
+        step = progress.stage("matching takes", rounds * len(sampled))
+        for _ in range(rounds):
+            template, phases = average_cycle(values, phases), []
+            for take in sampled:
+                phases.append(match_phases(template, take))
+                step()
         return phases
 
     def _find_start(self, curves, sampled, phases):
@@ -365,7 +373,7 @@ def check_takes(segmenter, X, *, reset):
     return as_collection(X), takes
 
 
-def correlate_takes(segmenter, given, takes):
+def correlate_takes(segmenter, given, takes, step=None):
     """The compared features of takes, in float64, and their self-correlations.
 
     The features are the directions of limbs if there is a skeleton, else those of the takes.
@@ -375,7 +383,12 @@ def correlate_takes(segmenter, given, takes):
         cosines = DirectionCosines(segmenter.skeleton).set_output(transform="default")
         takes = cosines.fit_transform(given)
     features = [np.asarray(x, dtype=np.float64) for x in takes]
-    return features, [correlate(x, limits) for x in features]
+    found = []
+    for x in features:
+        found.append(correlate(x, limits))
+        if step is not None:
+            step()
+    return features, found
 
 
 def _check_period(period):

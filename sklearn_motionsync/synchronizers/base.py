@@ -31,6 +31,7 @@ from ..matching.units import Unit
 from ..matching.warps import normalise
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .match import Match, check_match
 
@@ -62,7 +63,9 @@ class TrainingSet(NamedTuple):
     given: np.ndarray | None
 
 
-class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEstimator):
+class Synchronizer(
+    DocumentedMixin, LongWorkMixin, SequenceLevelMixin, TransformerMixin, BaseEstimator
+):
     """Base class of all synchronizers: a subclass defines ``match``.
 
     It inherits ``fit``, which chooses the pattern after linear normalisation,
@@ -173,8 +176,9 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         ValueError
             If the input breaks the contract, or the pattern does not exist or fit.
         """
-        self._learn(self._check_training_set(X))
-        self._number_as_given()
+        with self._progress(fits=True) as progress:
+            self._learn(self._check_training_set(X), progress)
+            self._number_as_given()
         return self
 
     fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
@@ -264,7 +268,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         pattern = state.get("pattern")
         return {**state, "pattern": pattern.to_numpy()} if hasattr(pattern, "columns") else state
 
-    def _learn(self, performances):
+    def _learn(self, performances, progress):
         """Learn from checked performances."""
         training = self._set_clock(performances)
         self._set_pattern(training, self._plain_median(training.scaled))

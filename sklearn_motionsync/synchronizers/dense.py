@@ -24,7 +24,6 @@ from ..matching.refinement_test import RefinementTest, Verdict, split_features
 from ..matching.trellis import Trellis
 from ..matching.warps import normalise, sample
 from ..utils.atomic import snapshot
-from ..utils.parallel import LongWorkMixin
 from ..utils.threads import on_one_thread
 from .balance import warn_of_one_feature
 from .base import Synchronizer
@@ -53,7 +52,7 @@ _EXHAUSTIVE = 100
 _TESTED, _SEVERAL = 12, 3
 
 
-class DenseSynchronizer(LongWorkMixin, Synchronizer):
+class DenseSynchronizer(Synchronizer):
     """Align trials in time: warp all of them to the most typical one.
 
     That trial is the template, here the *pattern*. Every trial is matched to it by all of its
@@ -445,32 +444,31 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         if self.metric_ is not None:
             self.metric_.performances = sample[self.metric_.performances]
 
-    def _learn(self, performances):
-        with self._progress(fits=True) as progress:
-            training = self._set_clock(performances, self.subframes)
-            positions = training.scaled
-            if self.subframes > 1:
-                positions = normalise(performances, self.n_frames_, self.subframes)
-                training.unit(positions, out=positions)
-            features = self._learn_metric(training.unit, positions)
-            settings = self._settings()
-            searched = features.for_search(self.n_frames_, settings["max_offset"])
-            store = FeatureStore(searched, positions)
-            warn_of_one_feature(self, performances, store)
-            searcher, shared, median = self._search(searched, store, positions, progress)
-            matcher = searcher
-            if searched is not features:
-                reach = {name: settings[name] for name in ("max_offset", "max_rate")}
-                sizes = self.n_frames_, searcher.trellis.mu
-                trellis = Trellis.on_clock(self.cost, *sizes, subframes=self.subframes, **reach)
-                matcher = Matcher(features, trellis)
-            self.features_ = features
-            self.mu_ = float(features.back(matcher.trellis.mu))
-            source = self._set_pattern(training, median, features.degree)
-            # Sums over fewer frames, scaled to all.
-            self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
-            warper = self._choose_exemplars(training, matcher, source, median.estimates)
-            self._warper = self._decide_on_refinement(training, warper, source, progress, shared)
+    def _learn(self, performances, progress):
+        training = self._set_clock(performances, self.subframes)
+        positions = training.scaled
+        if self.subframes > 1:
+            positions = normalise(performances, self.n_frames_, self.subframes)
+            training.unit(positions, out=positions)
+        features = self._learn_metric(training.unit, positions)
+        settings = self._settings()
+        searched = features.for_search(self.n_frames_, settings["max_offset"])
+        store = FeatureStore(searched, positions)
+        warn_of_one_feature(self, performances, store)
+        searcher, shared, median = self._search(searched, store, positions, progress)
+        matcher = searcher
+        if searched is not features:
+            reach = {name: settings[name] for name in ("max_offset", "max_rate")}
+            sizes = self.n_frames_, searcher.trellis.mu
+            trellis = Trellis.on_clock(self.cost, *sizes, subframes=self.subframes, **reach)
+            matcher = Matcher(features, trellis)
+        self.features_ = features
+        self.mu_ = float(features.back(matcher.trellis.mu))
+        source = self._set_pattern(training, median, features.degree)
+        # Sums over fewer frames, scaled to all.
+        self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
+        warper = self._choose_exemplars(training, matcher, source, median.estimates)
+        self._warper = self._decide_on_refinement(training, warper, source, progress, shared)
 
     def _settings(self, learnt=None):
         """The settings of `Matcher.learn`, for a learnt metric or none; by default as fitted."""

@@ -149,7 +149,8 @@ class KeyframeSynchronizer(Synchronizer):
         """
         if keyframes is not None:
             refuse_moved_events(X)
-        self._learn(self._check_training_set(X), keyframes)
+        with self._progress(fits=True) as progress:
+            self._learn(self._check_training_set(X), progress, keyframes)
         return self
 
     @atomic_fit
@@ -244,7 +245,7 @@ class KeyframeSynchronizer(Synchronizer):
             distances[rows] = differences.sum(axis=(1, 2), dtype=np.float64)
         return Match(np.concatenate(times), distances)
 
-    def _learn(self, performances, keyframes):
+    def _learn(self, performances, progress, keyframes):
         self._given = keyframes is not None
         training = self._set_clock(performances)
         comparable = training.scaled

@@ -186,7 +186,11 @@ class PartSynchronizer(Synchronizer):
             such parts.
         """
         body = clone(DenseSynchronizer() if self.synchronizer is None else self.synchronizer)
-        self.parts_, self._warpers = fit_body_and_parts(body, X, self.parts, self.coupling)
+        with (
+            self._progress(fits=True) as progress,
+            progress.fitting(body, "learning the body and its parts"),
+        ):
+            self.parts_, self._warpers = fit_body_and_parts(body, X, self.parts, self.coupling)
         self.synchronizer_ = body
         for name in _SHARED:
             if hasattr(body, name):
@@ -345,28 +349,31 @@ def fit_body_and_parts(self, X, parts, coupling):
     """
     performances = self._check_training_set(X)
     parts = choose_parts(parts, performances, names_of_input(self))
-    self._learn(performances)
-    warpers = {"part": {}, "rest": {}}
-    if coupling < math.inf:
-        source = self._given_pattern(performances)
-        if source is None:
-            source = performances[self.pattern_index_]
-        chosen = [source, *(performances[k] for k in self.exemplars_)]
-        # In double precision, as all that is warped.
-        chosen = [x.astype(np.float64, copy=False) for x in chosen]
-        chosen = normalise(chosen, self.n_frames_, self.subframes)
-        (times,) = run(_warp_pattern_and_exemplars, [(self._warper, chosen)])
-        training = normalise(performances, self.n_frames_, self.subframes)
-        common = self._warper, times, training, chosen, coupling, self._settings()
-        everything = np.arange(performances[0].shape[1])
-        for what, columns in {
-            "part": parts,
-            "rest": {name: np.setdiff1d(everything, part) for name, part in parts.items()},
-        }.items():
-            portions = [(x, *common) for x in columns.values()]
-            found = run(PartWarper.of, portions, n_jobs=self.n_jobs, prefer="threads")
-            warpers[what] = dict(zip(parts, found, strict=True))
-    self._number_as_given()
+    with self._progress(fits=True) as progress:
+        self._learn(performances, progress)
+        warpers = {"part": {}, "rest": {}}
+        if coupling < math.inf:
+            source = self._given_pattern(performances)
+            if source is None:
+                source = performances[self.pattern_index_]
+            chosen = [source, *(performances[k] for k in self.exemplars_)]
+            # In double precision, as all that is warped.
+            chosen = [x.astype(np.float64, copy=False) for x in chosen]
+            chosen = normalise(chosen, self.n_frames_, self.subframes)
+            (times,) = run(_warp_pattern_and_exemplars, [(self._warper, chosen)])
+            training = normalise(performances, self.n_frames_, self.subframes)
+            common = self._warper, times, training, chosen, coupling, self._settings()
+            everything = np.arange(performances[0].shape[1])
+            for what, columns in {
+                "part": parts,
+                "rest": {name: np.setdiff1d(everything, part) for name, part in parts.items()},
+            }.items():
+                portions = [(x, *common) for x in columns.values()]
+                stage = "learning parts" if what == "part" else "learning the rest of each part"
+                jobs = {"n_jobs": self.n_jobs, "step": progress.stage(stage, len(portions))}
+                found = run(PartWarper.of, portions, prefer="threads", **jobs)
+                warpers[what] = dict(zip(parts, found, strict=True))
+        self._number_as_given()
     return parts, warpers
 
 

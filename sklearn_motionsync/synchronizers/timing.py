@@ -19,6 +19,7 @@ from ..inputs.types import NamesLike, PerformancesLike, Transformed, Unit
 from ..inputs.validation import restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
 from .base import Synchronizer
 from .match import UNITS, Match, check_match
@@ -26,7 +27,9 @@ from .match import UNITS, Match, check_match
 __all__ = ["TimingChannel"]
 
 
-class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseEstimator):
+class TimingChannel(
+    DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEstimator
+):
     """Synchronised performances, with their timing as an additional feature.
 
     Synchronisation removes differences in timing from the curves. Here they are appended to the
@@ -134,7 +137,9 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         """
         if self.channel == "offset" and self.unit == "seconds" and self.frame_rate is None:
             raise ValueError("unit='seconds' needs frame_rate, frames per second of X.")
-        sync = clone(self.synchronizer).fit(X, y, **self._route("fit", params))
+        sync, given = clone(self.synchronizer), self._route("fit", params)
+        with self._progress(fits=True) as progress, progress.fitting(sync, "synchronizing"):
+            sync.fit(X, y, **given)
         if self.channel in getattr(sync, "feature_names_in_", ()):
             raise ValueError(
                 f"A feature of X has the name of the channel, {self.channel!r}: rename it."

@@ -19,12 +19,19 @@ from ..inputs.validation import check_performances, check_transformed, restore
 from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 
 __all__ = ["ASpace"]
 
 
-class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
+class ASpace(
+    DocumentedMixin,
+    LongWorkMixin,
+    ClassNamePrefixFeaturesOutMixin,
+    TransformerMixin,
+    BaseEstimator,
+):
     """Principal components of all poses of a movement: few numbers instead of many.
 
     The second of these signals is twice the first, and the third is constant. One number a frame
@@ -122,7 +129,8 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
                 f"{counted(len(postures), 'posture')} of {counted(postures.shape[1], 'feature')} "
                 f"can span; use at most {most}, or a share of the variance such as 0.95."
             )
-        with np.errstate(invalid="ignore"):  # of postures all equal: PCA divides 0 by 0
+        # Of postures that are all equal PCA divides 0 by 0.
+        with self._progress(fits=True), np.errstate(invalid="ignore"):
             pca = PCA().set_output(transform="default").fit(postures)
         variance = pca.explained_variance_
         b = self._count(variance)

@@ -19,6 +19,7 @@ from ..inputs.types import FitTransform, NamesLike, PerformancesLike, Transforme
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
 
 __all__ = ["FrameWise"]
@@ -29,7 +30,7 @@ def _goes_back(self):
     return vars(self).get("_inverts", hasattr(self.transformer, "inverse_transform"))
 
 
-class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
+class FrameWise(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator):
     """Apply a transformer of rows, such as ``StandardScaler``, to the frames of performances.
 
     The transformer is fitted on the pooled frames of all performances. A scaler therefore scales a
@@ -110,7 +111,9 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
             self, X, reset=True, level="posture", finite=self._finite()
         )
         self.transformer_ = clone(self.transformer)
-        self.transformer_.fit(self._named(np.concatenate(performances)))
+        name = "fitting the transformer"
+        with self._progress(fits=True) as progress, progress.fitting(self.transformer_, name):
+            self.transformer_.fit(self._named(np.concatenate(performances)))
         rows = self.transformer_.transform(self._named(performances[0]))
         # The names of FunctionTransformer are those of the table that it returns.
         self._names_out = column_names(rows)
