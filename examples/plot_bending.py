@@ -1,14 +1,14 @@
 """
-Bending down, by many people, on one clock (Figs. 3 and 4)
-==========================================================
+Bending down, by many people (Figs. 3 and 4)
+============================================
 
-From joint positions to a model of an action: the postures of all performances become points of an
-aSpace, dense matching puts them on the clock of the median performance, and what they have in
-common is learnt. The figures are the paper's third and fourth.
+You get a report, and two figures: forty bends before and after their alignment, and the poses that
+a model of them accepts. The joint positions become principal components of poses, the aSpace.
+Dense matching aligns them with the most typical trial, the template. `ActionModel` then learns the
+mean and how much people vary. The figures are the paper's third and fourth.
 
-By default the performances are the embedded synthetic ones. As a script it also takes an archive
-of real ones, ``python examples/plot_bending.py --data hdm05_positions.npz --action
-depositFloorR``.
+The trials are synthetic by default. As a script it also takes an archive of real ones:
+``python examples/plot_bending.py --data hdm05_positions.npz --action depositFloorR``.
 """
 
 import argparse
@@ -34,9 +34,9 @@ from sklearn_motionsync.display import ActionModelDisplay, SkeletonDisplay, Sync
 from sklearn_motionsync.metrics import keyframe_error, sobolev_least_squares
 
 parser = argparse.ArgumentParser(
-    description="Synchronise and model performances of an action.", allow_abbrev=False
+    description="Align and model trials of an action.", allow_abbrev=False
 )
-parser.add_argument("--data", help="archive of performances (.npz); by default synthetic ones")
+parser.add_argument("--data", help="archive of trials (.npz); by default synthetic ones")
 parser.add_argument("--action", help="which action of the archive")
 parser.add_argument("--output", default=".", help="folder of the figures")
 
@@ -55,19 +55,19 @@ is_script = "__file__" in globals() or Path(sys.argv[0]).name == "plot_bending.p
 options = parser.parse_args(sys.argv[1:] if is_script else [])
 output = Path(options.output)
 if options.action and not options.data:
-    stop("--action chooses among the performances of an archive: give --data, too.")
+    stop("--action chooses among the trials of an archive: give --data, too.")
 if output.exists() and not output.is_dir():
     stop(f"--output must be a folder, {output} is a file.")
 
 # %%
-# The performances
-# ----------------
-# A list of arrays, one a performance, each with its own number of frames. Each row holds x, y
+# The trials
+# ----------
+# They are a list of arrays, one for each trial, with any number of frames. Each row holds x, y
 # and z of every joint.
 
 
 def read_performances(path=None, action=None):
-    """Performances of one action, as a Bunch."""
+    """Trials of one action, as a Bunch."""
     if path is None:
         return make_bending(random_state=0)
     try:
@@ -80,7 +80,7 @@ def read_performances(path=None, action=None):
     chosen = np.flatnonzero(bunch.target == (action or actions[0]))
     if len(chosen) < 2:
         names = ", ".join(actions)
-        stop(f"There are {len(chosen)} performances of {action or actions[0]!r} among {names}.")
+        stop(f"There are {len(chosen)} trials of {action or actions[0]!r} among {names}.")
     if bunch.skeleton is None:
         stop("The names of the joints do not tell which ones are the body's.")
     bunch.data = [bunch.data[i] for i in chosen]
@@ -91,14 +91,14 @@ def read_performances(path=None, action=None):
 
 bunch = read_performances(options.data, options.action)
 lengths = [len(x) for x in bunch.data]
-print(f"{len(bunch.data)} performances of {min(lengths)} to {max(lengths)} frames")
+print(f"{len(bunch.data)} trials of {min(lengths)} to {max(lengths)} frames")
 
 # %%
-# From performances to a model
-# ----------------------------
-# Four steps: postures (Eq. 1), their principal components (Eqs. 3 to 5), one clock (Eqs. 7 to
-# 19), and what the action looks like at every frame of it. ``pipe.fit(bunch.data)`` would do
-# all of them; here the third is timed by itself.
+# From trials to a model
+# ----------------------
+# The four steps are poses (Eq. 1), their principal components (Eqs. 3 to 5), alignment (Eqs. 7 to
+# 19), and the model. ``pipe.fit(bunch.data)`` does all of them. Here they are called one by one, to
+# time the third.
 
 pipe = make_pipeline(
     DirectionCosines(bunch.skeleton), ASpace(0.95), DenseSynchronizer(n_frames=100), ActionModel()
@@ -110,7 +110,7 @@ dense.fit(points)
 fitted = time.perf_counter()
 synchronised = dense.transform(points)
 warped = time.perf_counter()
-# Who performed tells the model how people differ.
+# The subjects tell the model how people differ.
 groups = bunch.actor if len(set(bunch.actor)) > 2 else None
 model.fit(synchronised, groups=groups)
 pipe
@@ -118,14 +118,14 @@ pipe
 # %%
 # The report
 # ----------
-# Beside the figures of the paper, where it gives any.
+# The last column holds the numbers of the paper, where it has any.
 
 
-def spread(performances):
-    """RMS distance from the mean of the performances still running at each frame."""
+def spread(trials):
+    """RMS distance from the mean of the trials still running at each frame."""
     total = count = 0
-    for frame in range(max(len(x) for x in performances)):
-        now = np.array([x[frame] for x in performances if len(x) > frame])
+    for frame in range(max(len(x) for x in trials)):
+        now = np.array([x[frame] for x in trials if len(x) > frame])
         total += np.square(now - now.mean(axis=0)).sum()
         count += len(now)
     return np.sqrt(total / count)
@@ -139,7 +139,7 @@ def missed_by(synchronizer):
 
 
 def accepted():
-    """How many performances a model of the other actors accepts: as they are, and spoilt."""
+    """How many trials a model of the other subjects accepts: as they are, and spoilt."""
     spoil = {
         "as they are": lambda x: x,
         "backwards": lambda x: x[::-1],
@@ -162,19 +162,19 @@ calmer = sobolev_least_squares(stretched, synchronised)
 median = dense.pattern_index_
 order = np.argsort(dense.global_distances_)
 margin = dense.global_distances_[order[1]] / dense.global_distances_[order[0]] - 1
-# Among many performances, only the best few are compared with all others.
+# Among many trials, only the best few are compared with all others.
 lead = f"{margin:.1%} below the next" if np.isfinite(margin) else "the others: rejected sooner"
 rows = [
-    ("performances", f"{len(points)} of {bunch.target[0]}", "40 of bending"),
-    ("actors", f"{len(set(bunch.actor))}", "-"),
+    ("trials", f"{len(points)} of {bunch.target[0]}", "40 of bending"),
+    ("subjects", f"{len(set(bunch.actor))}", "-"),
     ("frames, shortest", f"{min(lengths)}", "-"),
     ("frames, median", f"{np.median(lengths):.0f}", "100 on average"),
     ("frames, longest", f"{max(lengths)}", "-"),
     ("eigenvectors b", f"{aspace.n_components_}", "16"),
     ("variance kept", f"{aspace.explained_variance_ratio_.sum():.1%}", "95%"),
-    ("median performance", f"{median} ({bunch.actor[median]}, take {bunch.take[median]})", "-"),
+    ("template", f"{median} ({bunch.actor[median]}, take {bunch.take[median]})", "-"),
     ("its global distance", lead, "-"),
-    ("refined by postures", "yes" if dense.refines_ else "no: no help", "-"),
+    ("refined by poses", "yes" if dense.refines_ else "no: no help", "-"),
     ("spread before", f"{spread(points):.3f}", "-"),
     ("spread, linear", f"{spread(stretched):.3f}", "-"),
     ("spread, dense", f"{spread(synchronised):.3f}", "-"),
@@ -187,7 +187,7 @@ if "keyframes" in bunch:
     ]
 if groups is not None:
     rows += [
-        (f"accepted, {name}", f"{count} of {len(points)}, actors held out", "-")
+        (f"accepted, {name}", f"{count} of {len(points)}, subjects held out", "-")
         for name, count in accepted().items()
     ]
 rows += [
@@ -201,40 +201,61 @@ for name, value, paper in rows:
     print(f"{name:28s} {value:{width}s}  {paper}")
 
 # %%
-# Fig. 3: the first dimensions of the aSpace
-# -------------------------------------------
-# As recorded; synchronised, the median performance in black; by hand, where key-frames are
-# known: stretched evenly between them; and the learnt model. The dense matching knows nothing
-# of the key-frames.
-
-n_dims = min(4, aspace.n_components_)
-dimensions, axes = plt.subplots(
-    n_dims, 4, figsize=(12, 2.1 * n_dims), sharey="row", squeeze=False, layout="constrained"
-)
-SynchronizationDisplay.from_estimator(
-    pipe, bunch.data, features=range(n_dims), warps=False, ax=axes[:, :2]
-)
-by_hand = KeyframeSynchronizer(n_frames=100).fit_transform(points, keyframes=bunch.get("keyframes"))
-for row, axis in enumerate(axes[:, 2]):
-    axis.plot(by_hand[:, :, row].T, color="#009E73", alpha=0.5, linewidth=0.9)
-given = "given" if "keyframes" in bunch else "found"
-axes[0, 2].set_title(f"with key-frames\n{given}, 5 in each", fontsize="medium")
-axes[-1, 2].set_xlabel("frame of its pattern")
-shown = ActionModelDisplay.from_estimator(pipe, bunch.data, features=range(n_dims), ax=axes[:, 3])
-shown.axes_[0].get_legend().remove()
-shown.axes_[0].set_title("the model\nmean, three standard deviations", fontsize="medium")
-for axis in shown.axes_[:-1]:
-    axis.set_xlabel("")
-for axis in shown.axes_:
-    axis.set_ylabel("")
+# What is refused
+# ---------------
+# The rows "accepted" judge each person by a model of the others. Trials that run backwards, stop
+# half-way or stand still should be refused. On synthetic trials they are. Real bends are accepted
+# backwards, because the way down is much like the way up.
 
 # %%
-# Fig. 4: mean postures, and postures that the model accepts
-# -----------------------------------------------------------
-# Each lies about a posture that somebody was in at that frame, within three standard deviations of
-# the mean.
+# Fig. 3: the first dimensions of the aSpace
+# -------------------------------------------
+# The first row shows the trials as recorded, the second one aligned. For the third row, key-frames
+# are known, and the trials are stretched evenly between them. The dense matching of the second row
+# does not use them. The last row is the model.
 
-postures = SkeletonDisplay.from_model(pipe, frames=(0.1, 0.4, 0.6), random_state=0).figure_
+n_dims = min(2, aspace.n_components_)
+dimensions, axes = plt.subplots(
+    4, n_dims, figsize=(6.4, 8.6), sharey="col", squeeze=False, layout="constrained"
+)
+SynchronizationDisplay.from_estimator(
+    pipe, bunch.data, features=range(n_dims), warps=False, ax=axes[:2].T
+)
+by_hand = KeyframeSynchronizer(n_frames=100).fit_transform(points, keyframes=bunch.get("keyframes"))
+for column, axis in enumerate(axes[2]):
+    axis.plot(by_hand[:, :, column].T, color="#009E73", alpha=0.5, linewidth=0.9)
+    axis.set_xlabel("frame of the template")
+shown = ActionModelDisplay.from_estimator(pipe, bunch.data, features=range(n_dims), ax=axes[3])
+shown.axes_[0].get_legend().remove()
+given = "given" if "keyframes" in bunch else "found"
+titles = (
+    f"as recorded: {len(points)} trials",
+    "aligned by dense matching; black: the template",
+    f"aligned by 5 {given} key-frames in each",
+    "the model: mean and three standard deviations",
+)
+for place, (row, title) in enumerate(zip(axes, titles, strict=True)):
+    for column, axis in enumerate(row):
+        axis.set_title("")
+        axis.set_xlabel(f"frame of the {'template' if place else 'trial'}")
+        axis.set_ylabel("" if column else "first dimension")
+    row[0].set_title(title, loc="left", fontsize="medium")
+for axis in axes[:, 1:].flat:
+    axis.set_ylabel("second dimension")
+dimensions.suptitle(
+    f"Aligned, the trials differ less:\nspread {spread(points):.2f} before, "
+    f"{spread(synchronised):.2f} after"
+)
+
+# %%
+# Fig. 4: mean poses, and poses that the model accepts
+# ----------------------------------------------------
+# The random poses lie within three standard deviations of the mean. Each is near a pose of a
+# training trial at that frame.
+
+display = SkeletonDisplay.from_model(pipe, frames=(0.1, 0.4), random_state=0)
+postures = display.figure_
+postures.suptitle("The model accepts poses that are close to its mean")
 
 # %%
 

@@ -2,14 +2,16 @@
 From a CSV file to a figure, and back
 =====================================
 
-A table as laboratories keep it: one row a frame, columns that say whose it is and when it was, and
-one column a signal. What comes out is a table again, with the names that went in.
+You get aligned trials, a figure and two new tables from one CSV file. The file is as laboratories
+keep it: a row for each frame, and a column for each signal. Further columns hold subject, trial and
+time.
 """
 
 import tempfile
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pandas as pd
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -20,7 +22,7 @@ from sklearn_motionsync.display import SynchronizationDisplay
 # %%
 # The file
 # --------
-# Made up here, so that the page needs nothing; yours is there already.
+# It is made here, so that the page runs everywhere. Replace it by your own.
 
 folder = Path(tempfile.mkdtemp())
 gait = make_gait(6, n_cycles=3, timing=5, random_state=0)
@@ -32,34 +34,54 @@ table.to_csv(folder / "trials.csv", index=False)
 table.head()
 
 # %%
-# Trials, on one clock
-# --------------------
-# Which columns are what is said once. Degrees and body weights are brought to one scale first.
+# Read and align
+# --------------
+# ``by`` names the columns of subject and trial, and ``time`` that of the time. Degrees and body
+# weights are first brought to one scale.
 
 trials = to_sequences(pd.read_csv(folder / "trials.csv"), by=["subject", "trial"], time="time")
 pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(n_frames=101)).fit(trials)
 match = Match.from_estimator(pipe, trials)
+
+# %%
+# The figure shows two of the four signals. How far apart are the trials in the peak of the knee?
+# The spread is the standard deviation of its time.
+
+aligned = match.warp(trials)
+before = [100 * x["knee_flexion"].argmax() / (len(x) - 1) for x in trials]
+after = aligned[:, :, 1].argmax(axis=1)
+
 display = SynchronizationDisplay.from_predictions(
-    trials, match.times, groups=gait.group, unit="percent"
+    trials,
+    match.times,
+    features=["knee_flexion", "vertical_force"],
+    groups=gait.group,
+    unit="percent",
+)
+display.axes_[0].set_ylabel("knee flexion (degrees)")
+display.axes_[2].set_ylabel("vertical force\n(body weights)")
+display.figure_.suptitle(
+    f"Aligned, the knee's peaks meet:\nspread {np.std(before):.1f} before, "
+    f"{np.std(after):.1f} % of the cycle after"
 )
 display.figure_.savefig(folder / "trials.png")
 
 # %%
 # Back to a table
 # ---------------
-# The curves in the unit in which they were measured, and the timing in per cent: positive is later
-# than the pattern.
+# The first table holds the aligned signals in their own units. The second one holds the time shifts
+# in per cent of the cycle. A positive shift means later than the template.
 
-curves = to_frame(match.warp(trials), performances=trials, columns=trials[0].columns)
-curves.to_csv(folder / "on_one_clock.csv")
+curves = to_frame(aligned, performances=trials, columns=trials[0].columns)
+curves.to_csv(folder / "aligned.csv")
 timing = match.to_frame("percent", trials)
 timing.to_csv(folder / "timing.csv")
 timing["offset"].unstack()[[0, 20, 40, 60, 80, 100]].groupby("subject").mean().round(1)
 
 # %%
-# What goes wrong
+# What is refused
 # ---------------
-# A file in which a stretch of a trial is missing is not stretched over the hole:
+# In this file, a stretch of one trial is missing. The reader does not stretch the rest over it:
 
 broken = table.drop(index=table.index[40:60])
 try:

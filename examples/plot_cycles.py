@@ -2,9 +2,9 @@
 Long takes cut into cycles
 ==========================
 
-A walk is recorded as one take of many cycles. Its self-correlation tells the period, and whether
-there is one; dense matching to a repeated cycle then tells where each one begins. Here the moments
-are known, so both can be judged.
+You get single gait cycles from takes of several steps, without any event marked by hand. The
+self-correlation of a take gives the period, if there is one. Dense matching to a template cycle
+then finds where each cycle begins. The true moments are known here, so both can be judged.
 """
 
 import matplotlib.pyplot as plt
@@ -21,58 +21,71 @@ takes = FrameWise(StandardScaler()).fit_transform(gait.data)  # degrees and body
 # %%
 # The period, and the cuts
 # ------------------------
-# Half of the people give the template of one cycle, which begins where the hip is flexed most. The
-# others are cut at the same phase. Above the self-correlation, below the hip of somebody new.
+# Half of the people give the template of one cycle. It begins where the hip is flexed most. The
+# takes of the others are cut at the same moment. The upper panel shows the self-correlation of one
+# take, and the lower one its hip.
 
 segmenter = CycleSegmenter(start=0).fit(takes[:3])
 new, times = takes[3:], gait.times[3:]
-CycleDisplay.from_estimator(segmenter, new, unit="seconds", frame_rate=gait.frame_rate)
+display = CycleDisplay.from_estimator(segmenter, new, unit="seconds", frame_rate=gait.frame_rate)
+display.axes_[1].set_ylabel("hip flexion\n(standard deviations)")
+_ = display.figure_.suptitle("Each cycle of a new person is cut\nwhere the hip is flexed most")
 
 # %%
-# Self-correlation beside dense matching
-# --------------------------------------
-# How far the phase of every frame is from the true one, in hundredths of a cycle. A constant period
-# drifts off as the pace changes from cycle to cycle, and knows nothing of the pace within one.
+# How well the cuts agree
+# -----------------------
+# All cuts should be at the same moment of the cycle. The figure shows the true moment of each cut,
+# as its distance from the median. With ``refine=False`` the cuts follow a constant period. They
+# drift, because the pace changes from cycle to cycle.
+
+
+def places_of_cuts(segmenter):
+    """The true moments of the cuts, in per cent of a cycle from their median."""
+    _, origin = segmenter.segment(new)
+    starts, stops = (
+        list(zip(origin["take"], origin[name], strict=True)) for name in ("start", "stop")
+    )
+    cuts = sorted({*starts, *((take, min(stop, len(times[take]) - 1)) for take, stop in stops)})
+    phases = np.array([times[take][frame] % 1 for take, frame in cuts])
+    return 100 * ((phases - np.median(phases) + 0.5) % 1 - 0.5)
+
 
 steady = CycleSegmenter(start=0, refine=False).fit(takes[:3])
-figure, axis = plt.subplots(figsize=(7, 3), layout="constrained")
-for name, color, each in (
-    ("constant period", "#D55E00", steady),
-    ("dense matching", "#0072B2", segmenter),
-):
-    off = [
-        (phases - true + 0.5) % 1 - 0.5
-        for phases, true in zip(each.phases(new), times, strict=True)
-    ]
-    middle = np.median(np.concatenate(off))
-    for i, (x, true) in enumerate(zip(off, times, strict=True)):
-        label = f"{name}: {100 * np.abs(np.concatenate(off) - middle).mean():.2f}"
-        axis.plot(true, 100 * (x - middle), color=color, label=None if i else label)
-axis.set_xlabel("true cycles since the first heel strike")
-axis.set_ylabel("off the true phase (%)")
-axis.legend()
+cuts = {"constant period": places_of_cuts(steady), "dense matching": places_of_cuts(segmenter)}
+figure, axis = plt.subplots(figsize=(6.4, 2.6), layout="constrained")
+for row, (places, color) in enumerate(zip(cuts.values(), ("#D55E00", "#0072B2"), strict=True)):
+    axis.plot(places, np.full(len(places), row), "o", color=color, alpha=0.6, markersize=9)
+axis.set_yticks([0, 1], [f"{name}:\nspread {places.std():.1f} %" for name, places in cuts.items()])
+axis.set_ylim(1.6, -0.6)
+axis.set_xlabel("true moment of the cut, from the median (% of a cycle)")
+_ = axis.set_title("Dense matching cuts closer to the same moment")
 
 # %%
-# Cycles are performances
-# -----------------------
-# The cycles go into any pipeline; ``locations`` says which take each comes from, to keep the
-# cycles of one person together in cross-validation.
+# From cycles to a model
+# ----------------------
+# The cycles are trials for any pipeline. ``locations`` holds the take of each. Given as groups, it
+# keeps the cycles of one person together.
 
 cycles, locations = segmenter.segment(takes)
 print(locations.head(3))
 pipe = make_pipeline(DenseSynchronizer(101), ActionModel()).fit(
     cycles, actionmodel__groups=locations["take"]
 )
-ActionModelDisplay.from_estimator(pipe, cycles, features=[0, 1])
+display = ActionModelDisplay.from_estimator(pipe, cycles, features=[0, 1], unit="percent")
+for axis, joint in zip(display.axes_, ("hip", "knee"), strict=True):
+    axis.set_ylabel(f"{joint} flexion\n(standard deviations)")
+_ = display.figure_.suptitle(f"{len(cycles)} cycles of six people, aligned: none leaves the band")
 
 # %%
-# What does not repeat
-# --------------------
-# A bend is no cycle: there is no time after which it is like itself. A walk of one cycle and a half
-# is like itself, but too short to say that it repeats.
+# What is refused
+# ---------------
+# A bend is no cycle. Its self-correlation falls, and has no second peak. A walk of one cycle and a
+# half is too short to show that it repeats.
 
 bend = make_bending(1, random_state=0)
 display = CycleDisplay.from_estimator(CycleSegmenter(bend.skeleton), bend.data)
+display.axes_[1].set_ylabel("left ankle ahead\n(leg lengths)")
+display.figure_.suptitle("A bend does not repeat, and is refused")
 short = takes[0][: int(1.5 * segmenter.periods_[0])]
 for estimator, take in ((CycleSegmenter(bend.skeleton), bend.data[0]), (CycleSegmenter(), short)):
     try:

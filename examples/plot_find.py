@@ -2,9 +2,8 @@
 Where in a recording it happens
 ===============================
 
-Recordings are long, and the action happens somewhere in them. A pipeline that was fitted on
-performances, cut out by hand, finds it in takes of people it has never seen, and
-cuts it out.
+You get the frames where an action begins and ends in long recordings. The pipeline learns the
+action from trials that were cut out by hand. It then finds the action in takes of new people.
 """
 
 import matplotlib.pyplot as plt
@@ -23,8 +22,8 @@ from sklearn_motionsync.display import SearchDisplay
 # %%
 # What to look for
 # ----------------
-# Twelve bends of four people. The groups say who performed: how people differ is the
-# threshold of the search.
+# The pipeline learns from twelve bends of four people. ``groups`` names the person of each, and the
+# threshold of the search follows from how much people differ.
 
 bending = make_bending(12, random_state=0)
 cosines = DirectionCosines(bending.skeleton)
@@ -34,8 +33,8 @@ pipe.fit(cosines.fit_transform(bending.data), actionmodel__groups=bending.actor)
 # %%
 # Two takes of others
 # -------------------
-# Both stand, bend and nod (a quarter of a bend). In the first there are three bends, two of
-# them one right after the other. In the second everybody stops half-way: it holds no bend.
+# The first take holds three bends, two of them in direct succession. It also holds standing, and
+# one nod, which is a quarter of a bend. The second take holds no whole bend: two stop half-way.
 
 new = cosines.transform(make_bending(3, random_state=1).data)
 rng = np.random.default_rng(0)
@@ -64,24 +63,25 @@ second = np.concatenate([*second, standing(100)])
 # %%
 # What is found
 # -------------
-# A score of 1 is equal to the two most similar bends of the training set, 0.37 as unlike as
-# standing still.
+# The score is 1 for a trial that equals the two most similar bends of the training set. It is 0.37
+# for one that differs from them as much as standing still.
 
 performances, locations = find_performances(pipe, [first, second])
 print(locations.round(2).to_string())
 print("true:", [part[1:] for part in true])
 
 # %%
-# The performances go on like any others: to the synchronizer, or into a data frame.
+# The trials that were found can be aligned, or written to a table, as any others.
 
 print("frames of each:", [len(x) for x in performances])
-print("on the common clock:", pipe[:-1].transform(performances).shape)
+print("aligned:", pipe[:-1].transform(performances).shape)
 
 # %%
-# Along the takes
+# What is refused
 # ---------------
-# Grey is what the threshold refuses: bends that stop half-way. Nods are too unlike to be seen.
+# Grey segments are below the threshold: these bends stop half-way. The nods are too unlike a bend
+# to be drawn at all.
 
-
-SearchDisplay.from_estimator(pipe, [first, second], segments=true)
+display = SearchDisplay.from_estimator(pipe, [first, second], segments=true)
+_ = display.figure_.suptitle("All three bends are found, and both half bends are refused")
 plt.show()

@@ -2,13 +2,12 @@
 Choosing parameters with GridSearchCV
 =====================================
 
-A pipeline with a synchronizer is searched like any other. Two questions have two kinds of score:
-how probable new performances are under the model (``ActionModel.score``, the default), and how
-well features that had no say in the matching agree afterwards (``FeatureHoldoutScorer``).
+You get the best parameters of a pipeline by cross-validation, as for any scikit-learn estimator.
+Two scores answer two questions. ``ActionModel.score``, the default, is how probable new trials are.
+``FeatureHoldoutScorer`` is how well signals agree that were not used in the matching.
 """
 
 import matplotlib.pyplot as plt
-import numpy as np
 from sklearn.model_selection import GridSearchCV, GroupKFold
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ActionModel, ASpace, DenseSynchronizer, DirectionCosines
@@ -18,11 +17,10 @@ from sklearn_motionsync.metrics import FeatureHoldoutScorer, group_timing_error
 bunch = make_bending(24, n_frames=60, random_state=1)
 
 # %%
-# How many dimensions, how long a clock
-# -------------------------------------
-# Whole actors are held out: a model of people should know people it has not seen. Scores of
-# different dimensions are densities of different spaces and cannot be compared, so b is fixed
-# here.
+# How probable new trials are
+# ---------------------------
+# Whole subjects are held out, because a model should hold for new people. The number of dimensions
+# is fixed: likelihoods in spaces of different dimensions cannot be compared.
 
 pipe = make_pipeline(
     DirectionCosines(bunch.skeleton), ASpace(6), DenseSynchronizer(n_frames=60), ActionModel()
@@ -35,11 +33,11 @@ search = GridSearchCV(pipe, grid, cv=GroupKFold(4)).fit(bunch.data, groups=bunch
 search.best_params_
 
 # %%
-# A score that over-warping does not please
-# -----------------------------------------
-# The postures of a set can always be made more alike by warping more. `FeatureHoldoutScorer`
-# matches by some of the features and judges by the others. Here the true timing is known, so
-# both can be held against it.
+# How well held-out signals agree
+# -------------------------------
+# More warping always makes the matched signals more alike, so they cannot judge it.
+# `FeatureHoldoutScorer` matches by some signals and judges by the others. The true timing is known
+# here, and shows whether the choice is right.
 
 postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
 offsets = [0, 0.03, 0.06, 0.1, 0.15, 0.25, 0.4]
@@ -53,19 +51,29 @@ error = [
     )
     for m in offsets
 ]
+chosen = blind.best_params_["max_offset"]
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
-left.plot(offsets, -blind.cv_results_["mean_test_score"], "o-", color="#0072B2")
-left.set_ylabel("spread of the features held out,\nas a share of that before")
-right.plot(offsets, error, "o-", color="#D55E00")
-right.set_ylabel("true timing error, frames")
-for axis in (left, right):
-    axis.axvline(blind.best_params_["max_offset"], color="0.6", linestyle="--", zorder=0)
-    axis.set_xlabel("max_offset (dashed: chosen)")
+figure, (upper, lower) = plt.subplots(2, 1, figsize=(6.4, 5), sharex=True, layout="constrained")
+upper.plot(offsets, -blind.cv_results_["mean_test_score"], "o-", color="#0072B2")
+upper.set_ylabel("spread of held-out signals\n(share of that before)")
+lower.plot(offsets, error, "o-", color="#D55E00")
+lower.set_ylabel("true timing error\n(frames)")
+lower.set_xlabel("max_offset (share of the length); dashed: chosen")
+for axis in (upper, lower):
+    axis.axvline(chosen, color="0.6", linestyle="--", zorder=0)
     axis.set_ylim(bottom=0)
+_ = figure.suptitle(
+    f"The score chooses {chosen}, without knowing the timing:\n"
+    f"error {error[blind.best_index_]:.2f}, the smallest possible is {min(error):.2f} frames"
+)
 
 # %%
+# What is refused
+# ---------------
+# A name that no step has, or a value out of range, fails in the search as in a fit:
 
-print(f"chosen: {blind.best_params_}, error there {error[blind.best_index_]:.2f} frames,")
-print(f"smallest error {min(error):.2f} frames at max_offset={offsets[int(np.argmin(error))]}")
+try:
+    pipe.set_params(densesynchronizer__max_offset=2).fit(bunch.data)
+except ValueError as refusal:
+    print(refusal)
 plt.show()

@@ -2,9 +2,9 @@
 The action, or something else
 =============================
 
-A model of an action is only worth something if it can say no. Here it has learnt how two dozen
-bends look and how much *people* differ, and is shown a bend by somebody else, and eight
-performances that are something else, or a bend that went wrong.
+You get a verdict for each new trial: the action that was learnt, or something else. The model
+learns how two dozen bends look, and how much people differ. It then judges a bend of a new
+person, and eight altered versions of it.
 """
 
 import matplotlib.pyplot as plt
@@ -29,7 +29,7 @@ pipe = make_pipeline(*steps).fit(bunch.data, actionmodel__groups=bunch.actor)
 # %%
 # Right and wrong
 # ---------------
-# All of them are made of one bend by an actor whom the model has not seen.
+# All nine are made of one bend. Its person is not in the training set.
 
 bend = make_bending(1, random_state=1).data[0]
 n = len(bend)
@@ -61,12 +61,11 @@ shown = {
 performances = list(shown.values())
 
 # %%
-# The model sees performances after synchronisation, where nobody is slow: half the speed is all the
-# same to it, and that is the one that it accepts though it may be wrong. A detector around the same
-# pipeline sees how they were recorded as well, and says why it refuses.
+# The model compares aligned trials. Alignment removes the pace, so the model accepts a bend at half
+# speed. The detector also looks at the pace, and gives a reason for each refusal.
 
 detector = ActionDetector(pipe).fit(bunch.data, groups=bunch.actor)
-pd.DataFrame(
+verdicts = pd.DataFrame(
     {
         "model": pipe.predict(performances),
         "detector": detector.predict(performances),
@@ -74,37 +73,63 @@ pd.DataFrame(
     },
     index=list(shown),
 )
+verdicts
 
 # %%
-# Where it goes wrong
-# -------------------
-# When, with which limbs, and by how many of the standard deviations that are to be expected of a
-# new person; rare is what 95 % of new people do nowhere.
+# ``score_samples`` is the log likelihood of each trial. The distance from the best one shows how
+# clear each verdict of the model is.
 
-find_departures(pipe, [shown["left arm lifted"]]).head().round(1)
+unlike = pipe.score_samples(performances)
+unlike = unlike.max() - unlike + 1
+rows = np.argsort(unlike)
+colors = np.where(verdicts["model"] == 1, "#0072B2", "#D55E00")
+figure, axis = plt.subplots(figsize=(6.4, 3.4), layout="constrained")
+axis.barh(np.arange(len(rows)), unlike[rows], color=colors[rows])
+axis.set_yticks(np.arange(len(rows)), np.array(list(shown))[rows])
+axis.set_xscale("log")
+axis.invert_yaxis()
+axis.set_xlabel("how unlike a bend (log likelihood below the best, plus 1)")
+refused = int((verdicts["model"] == -1).sum())
+_ = figure.suptitle(f"The model refuses {refused} of {len(shown)} (orange)")
 
 # %%
-# The same on stick figures; the mean performance stands behind.
+# What is wrong
+# -------------
+# The table tells when a trial departs, in which signals, and by how many standard deviations of a
+# new person. A departure is rare if 95 % of new people have none as large.
 
-SkeletonDisplay.from_departures(pipe, [shown["left arm lifted"]])
+departures = find_departures(pipe, [shown["left arm lifted"]])
+departures.head().round(1)
 
 # %%
-# And as curves, in the band that holds 95 % of the whole performances of new people.
+# The same as stick figures. Violet limbs depart; the mean is pale.
 
-ActionModelDisplay.from_estimator(
-    pipe,
-    [bend, shown["left arm lifted"]],
-    features=["left_arm_y", "left_arm_z", "left_forearm_y", "torso_z"],
-    band="performances",
+display = SkeletonDisplay.from_departures(pipe, [shown["left arm lifted"]], frames=[25, 50, 62, 85])
+_ = display.heading_.set_text(
+    "The left arm is held up for a while, and found (violet).\nPale: the mean bend"
 )
 
 # %%
-# Real people are harder
-# ----------------------
-# Synthetic bends differ little. In bends of HDM05 the way down is much like the way up: of 24, with
-# their actors held out, the model accepts 23 as they are and 21 backwards, but none of the first
-# halves and none standing still; ``python examples/plot_bending.py --data hdm05_positions.npz
-# --action depositFloorR`` counts them. :doc:`/accuracy` has sixteen actions of real people, and
-# what other detectors make of them.
+# The same as curves. The band holds 95 % of the whole trials of new people.
+
+display = ActionModelDisplay.from_estimator(
+    pipe,
+    [bend, shown["left arm lifted"]],
+    features=["left_arm_y", "torso_z"],
+    band="performances",
+    unit="percent",
+)
+for axis, name in zip(display.axes_, ("left arm upwards", "torso forward"), strict=True):
+    axis.set_ylabel(f"{name} (cosine)")
+_ = display.figure_.suptitle("The left arm leaves the band; the torso does not")
+
+# %%
+# Where it fails
+# --------------
+# Synthetic bends differ little. In real bends of HDM05 the way down is much like the way up. This
+# command counts what a model of the other people accepts: ``python examples/plot_bending.py
+# --data hdm05_positions.npz --action depositFloorR``. It accepts 23 of 24 bends as they are, but
+# also 22 backwards. It accepts no first half, and none standing still. :doc:`/accuracy` has
+# sixteen actions of real people, and other detectors.
 
 plt.show()

@@ -1,10 +1,10 @@
 """
-One dimension of two performances (Fig. 1)
-==========================================
+One dimension of two trials (Fig. 1)
+====================================
 
-Two performances of the same action as the paper shows them first: not synchronised, normalised
-linearly, synchronised by key-frames, and by dense matching. The true timing is known here, so
-each picture comes with the error it leaves.
+You get four views of the same two trials: as recorded, and aligned in three ways. They are linear
+normalisation, key-frames, and dense matching. The true timing is known here, so each view has its
+error. The figure is the paper's first.
 """
 
 import matplotlib.pyplot as plt
@@ -26,20 +26,20 @@ points = ASpace(0.95).fit_transform(postures)
 # %%
 # Two of the twelve
 # -----------------
-# The pattern, and the performance whose pace differs most from it.
+# They are the template, and the trial whose pace differs most from it.
 
 dense = DenseSynchronizer(n_frames=100).fit(points)
 base = dense.pattern_index_
 other = np.abs(dense.match(points).offsets).mean(axis=1).argmax()
 pair = [base, other]
-print(f"the pattern is performance {base}, the other one performance {other}")
+print(f"the template is trial {base}, the other one trial {other}")
 
 # %%
-# Four ways to compare them
-# -------------------------
-# The linear one assumes that the pace differs by one factor (Eq. 7). Key-frames, here the true
-# ones, correct that in five moments; between them the pace is taken to be even. Dense matching
-# finds a time for each frame (Eqs. 12 to 17).
+# Three alignments
+# ----------------
+# Linear normalisation assumes that the pace differs by one factor (Eq. 7). Five key-frames, here
+# the true ones, correct five moments, and assume an even pace between them. Dense matching finds
+# a time for each frame (Eqs. 12 to 17).
 
 linear = LinearSynchronizer(n_frames=100, pattern=base).fit(points)
 manual = KeyframeSynchronizer(n_frames=100, pattern=base).fit(points, keyframes=bunch.keyframes)
@@ -54,27 +54,39 @@ warped = {
     "dense": dense.transform(points),
 }
 
-figure, axes = plt.subplots(2, 2, figsize=(9, 5.2), sharey=True, layout="constrained")
-styles = [("black", "-", f"pattern ({base})"), ("#0072B2", "--", f"performance {other}")]
+figure, axes = plt.subplots(2, 2, figsize=(6.4, 5), sharey=True, layout="constrained")
+styles = [("black", "-", "template"), ("#0072B2", "--", "other trial")]
 for i, (color, line, label) in zip(pair, styles, strict=True):
     axes[0, 0].plot(points[i][:, 0], line, color=color, label=label)
     for axis, result in zip(axes.flat[1:], warped.values(), strict=True):
         axis.plot(result[i, :, 0], line, color=color)
-axes[0, 0].set_title("(a) not synchronised")
+axes[0, 0].set_title("(a) as recorded", fontsize="medium")
 for axis, (name, tau), letter in zip(axes.flat[1:], times.items(), "bcd", strict=True):
     error = group_timing_error(tau[pair], [bunch.times[i] for i in pair])
-    axis.set_title(f"({letter}) {name}: {error:.2f} frames apart")
+    axis.set_title(f"({letter}) {name}:\n{error:.2f} frames apart", fontsize="medium")
 for axis in axes[1]:
     axis.set_xlabel("frame")
 for axis in axes[:, 0]:
-    axis.set_ylabel("first dimension of the aSpace")
-axes[0, 0].legend()
+    axis.set_ylabel("first dimension")
+axes[0, 0].legend(frameon=False, fontsize="small")
+_ = figure.suptitle("Dense matching aligns two trials best")
 
 # %%
 # All twelve
 # ----------
-# How far all performances are from showing the same moment at every frame.
+# The error is how far apart all trials show the same moment, on average over the frames.
 
 for name, tau in times.items():
     print(f"{name:16s} {group_timing_error(tau, bunch.times):.2f} frames")
+
+# %%
+# Where it fails
+# --------------
+# A trial may be shifted by more than ``max_offset``, a share of the length. Dense matching then
+# cannot reach the right frame.
+
+for max_offset in (0.05, 0.4):
+    narrow = DenseSynchronizer(n_frames=100, pattern=base, max_offset=max_offset).fit(points)
+    error = group_timing_error(narrow.match(points).times, bunch.times)
+    print(f"max_offset={max_offset}: {error:.2f} frames")
 plt.show()

@@ -47,7 +47,11 @@ class AlternatingClassifier(ActionClassifier):
 
     def fit(self, X, y=None):
         if y is None:
-            n = X.index.levshape[0] if isinstance(X, pd.DataFrame) else len(list(X))
+            n = (
+                X.index.get_level_values(0).nunique()
+                if isinstance(X, pd.DataFrame)
+                else len(list(X))
+            )
             y = np.arange(n) % 2
         return super().fit(X, y)
 

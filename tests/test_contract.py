@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import skops.io
+import xarray as xr
 from sklearn import clone, config_context
 from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
@@ -110,6 +111,10 @@ KINDS = {
     "frames": lambda X: [pd.DataFrame(x, columns=NAMES) for x in X],
     "nested lists": lambda X: [x.tolist() for x in X],
     "multiindex": lambda X: to_frame(X, columns=NAMES),
+    "nested table": lambda X: pd.DataFrame({n: [x[:, k] for x in X] for k, n in enumerate(NAMES)}),
+    "labelled array": lambda X: xr.DataArray(
+        np.stack(X), dims=("trial", "time", "axis"), coords={"axis": NAMES}
+    ),
     "read-only": lambda X: [read_only(x) for x in X],
     "column order": lambda X: [np.asfortranarray(x) for x in X],
 }
@@ -167,7 +172,7 @@ def test_every_kind_of_collection_gives_equal_results(estimator, kind, performan
     fitted = clone(estimator).fit(X)
     assert_same(outputs(fitted, X), expected)
     assert fitted.n_features_in_ == WIDTH
-    named = kind in ("frames", "multiindex")
+    named = kind in ("frames", "multiindex", "nested table", "labelled array")
     assert hasattr(fitted, "feature_names_in_") is named
     if named:
         assert list(fitted.feature_names_in_) == NAMES

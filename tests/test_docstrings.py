@@ -33,11 +33,13 @@ def callables():
 CALLABLES = dict(callables())
 
 
-def described(docstring):
+def described(docstring, heading=r"(?:Other )?Parameters"):
     """The parameters of a docstring, and what stands behind the colon of each."""
-    section = re.search(r"^Parameters\n-+\n(.*?)(\n\n\w[\w ]*\n-+\n|\Z)", docstring, re.S | re.M)
+    sections = re.finditer(
+        rf"^{heading}\n-+\n(.*?)(?=\n\n\w[\w ]*\n-+\n|\Z)", docstring, re.S | re.M
+    )
     found = re.findall(
-        r"^(\**\w[\w, *]*) : ((?:.|\n(?= {8}))*)", section[1] if section else "", re.M
+        r"^(\**\w[\w, *]*) : ((?:.|\n(?= {8}))*)", "\n".join(each[1] for each in sections), re.M
     )
     return {
         name.strip("* "): " ".join(kind.split())
@@ -58,7 +60,10 @@ def test_every_parameter_is_documented(name):
     assert docstring, f"{name} has no docstring"
     if inspect.isclass(each) and issubclass(each, tuple):
         return  # a result: its fields are attributes
-    assert list(described(docstring)) == list(parameters(each))
+    sections = [list(described(docstring, name)) for name in ("Parameters", "Other Parameters")]
+    assert sorted([*sections[0], *sections[1]]) == sorted(parameters(each))
+    for section in sections:
+        assert section == [key for key in parameters(each) if key in section]
 
 
 @pytest.mark.parametrize("name", CALLABLES)

@@ -328,7 +328,7 @@ def test_example_on_the_embedded_data(monkeypatch, capsys, tmp_path):
     out = run_example(monkeypatch, capsys, "--output", tmp_path)
     for words in (
         "40 of bending",
-        "median performance",
+        "template",
         "spread, dense",
         "key-frames missed",
         "time of warping all",
@@ -350,5 +350,5 @@ def test_example_lists_the_known_actions(monkeypatch, capsys, real_data):
     path = real_data / "hdm05" / "hdm05_positions.npz"
     with pytest.raises(SystemExit, match="depositFloorR"):
         run_example(monkeypatch, capsys, "--data", path)
-    with pytest.raises(SystemExit, match="0 performances of 'bowing'"):
+    with pytest.raises(SystemExit, match="0 trials of 'bowing'"):
         run_example(monkeypatch, capsys, "--data", path, "--action", "bowing")

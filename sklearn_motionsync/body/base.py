@@ -2,17 +2,19 @@
 
 import functools
 import warnings
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.numbers import column_names
+from ..inputs.types import FitTransform, PerformancesLike, Transformed
 from ..inputs.validation import check_performances, names_of_input, restore
 from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
 from .axes import fill_heading, heading_axes, to_y_up
 from .formats import AXES, LANDMARKS, SIDES
 from .limbs import (
@@ -208,7 +210,7 @@ class Body:
             )
 
 
-class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
+class PositionsTransformer(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator):
     """Base of the transformers that compute features of joint positions, body by body.
 
     A subclass has a ``skeleton``, a ``fit`` that calls ``_check(X, reset=True)``, a
@@ -221,10 +223,10 @@ class PositionsTransformer(DocumentedMixin, TransformerMixin, BaseEstimator):
     # Lengths count in those of the body, so units do not matter.
     _facts = "frame_rate", "up"
 
-    fit_transform = atomic_fit(TransformerMixin.fit_transform)
+    fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
 
     @snapshot
-    def transform(self, X):
+    def transform(self, X: PerformancesLike) -> Transformed:
         """Features of joint positions.
 
         Parameters

@@ -1,15 +1,18 @@
 """DirectionCosines: postures of joint positions (Eq. 1), and joint positions of postures."""
 
+from typing import Literal, Self
+
 import numpy as np
 import pandas as pd
-from sklearn.base import _fit_context
 from sklearn.utils._param_validation import StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers
+from ..inputs.types import NamesLike, PerformancesLike, Transformed, ValuesLike
 from ..inputs.validation import check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
+from ..utils.parameters import validated
 from .axes import convert_to_parent_axes, project_on_axes
 from .base import PositionsTransformer, mask_hidden
 from .formats import AXES, LANDMARKS, SIDES
@@ -131,14 +134,19 @@ class DirectionCosines(PositionsTransformer):
         "hidden": [StrOptions({"raise", "nan"})],
     }
 
-    def __init__(self, skeleton, reference="heading", hidden="raise"):
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        reference: Literal["heading", "parent", "world"] = "heading",
+        hidden: Literal["raise", "nan"] = "raise",
+    ) -> None:
         self.skeleton = skeleton
         self.reference = reference
         self.hidden = hidden
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Learn the limb lengths.
 
         Parameters
@@ -160,7 +168,11 @@ class DirectionCosines(PositionsTransformer):
         """
         performances = self._check(X, reset=True)
         limbs = self.skeleton.limbs
-        lengths = [self._body(performances, i).lengths for i in range(len(performances))]
+        with self._progress(fits=True) as progress:
+            step, lengths = progress.stage("measuring limbs", len(performances)), []
+            for i in range(len(performances)):
+                lengths.append(self._body(performances, i).lengths)
+                step()
         lengths = np.concatenate(lengths) if len(lengths) > 1 else lengths[0]
         found = median_lengths(lengths)[limb_indices(limbs)]
         if np.isnan(found).any():
@@ -174,7 +186,9 @@ class DirectionCosines(PositionsTransformer):
         return self
 
     @snapshot
-    def inverse_transform(self, X, limb_lengths=None):
+    def inverse_transform(
+        self, X: PerformancesLike, limb_lengths: ValuesLike | None = None
+    ) -> Transformed:
         """Joint positions of postures: the paper's fifteen joints.
 
         Of a skeleton that lacks landmarks they are those that its limbs join,
@@ -221,7 +235,9 @@ class DirectionCosines(PositionsTransformer):
         return restore(self, performances, arrays, columns=self.skeleton.body().column_names)
 
     @snapshot
-    def position_matrix(self, limb_lengths=None):
+    def position_matrix(
+        self, limb_lengths: ValuesLike | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The matrix of the linear map from postures to joint positions.
 
         The pelvis is at its height above the origin, and each joint at the end of its limb. That
@@ -280,7 +296,7 @@ class DirectionCosines(PositionsTransformer):
         matrix = _forward_matrix(self._all_lengths(lengths), self.skeleton)
         return matrix, self.skeleton.body().column_names
 
-    def get_feature_names_out(self, input_features=None):
+    def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
         """Names of the 37 parameters: ``pelvis_height``, ``hip_x``, ..., ``right_forearm_z``.
 
         Parameters

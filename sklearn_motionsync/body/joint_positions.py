@@ -1,11 +1,14 @@
 """JointPositions: positions of the joints of a body relative to its pelvis."""
 
+from typing import Literal, Self
+
 import numpy as np
-from sklearn.base import _fit_context
 from sklearn.utils._param_validation import StrOptions
 
 from ..inputs.features import check_input_features
+from ..inputs.types import NamesLike, PerformancesLike
 from ..utils.atomic import atomic_fit
+from ..utils.parameters import validated
 from .axes import project_on_axes
 from .base import PositionsTransformer
 from .formats import AXES, LANDMARKS, SIDES
@@ -87,13 +90,15 @@ class JointPositions(PositionsTransformer):
         "reference": [StrOptions({"heading", "world"})],
     }
 
-    def __init__(self, skeleton, reference="heading"):
+    def __init__(
+        self, skeleton: Skeleton, reference: Literal["heading", "world"] = "heading"
+    ) -> None:
         self.skeleton = skeleton
         self.reference = reference
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Check the performances, and store the number and the names of the columns.
 
         Parameters
@@ -114,11 +119,14 @@ class JointPositions(PositionsTransformer):
             As from ``transform``.
         """
         performances = self._check(X, reset=True)
-        for i in range(len(performances)):
-            self._body(performances, i)
+        with self._progress(fits=True) as progress:
+            step = progress.stage("checking bodies", len(performances))
+            for i in range(len(performances)):
+                self._body(performances, i)
+                step()
         return self
 
-    def get_feature_names_out(self, input_features=None):
+    def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
         """Names of the 42 coordinates: ``neck_x``, ``neck_y``, ..., ``right_ankle_z``.
 
         Parameters

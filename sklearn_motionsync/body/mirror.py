@@ -8,6 +8,7 @@ import pandas as pd
 from ..inputs.collections import as_collection
 from ..inputs.numbers import as_numbers, column_names
 from ..inputs.tables import as_pandas
+from ..inputs.types import PerformancesLike, Transformed
 from .axes import UP_AXES, heading_axes, to_y_up
 from .formats import LANDMARKS
 from .landmarks import as_tuple, other_side
@@ -21,7 +22,7 @@ __all__ = ["mirror"]
 _OFF_CENTRE = 0.25
 
 
-def mirror(X, skeleton):
+def mirror(X: PerformancesLike, skeleton: Skeleton) -> Transformed:
     """Exchange left and right: the mirror images of performances.
 
     It joins performances with the left and with the right hand to one set, or shows how

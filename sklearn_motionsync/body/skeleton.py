@@ -1,11 +1,14 @@
 """Skeleton: which columns are which joints, and which joints are the landmarks of the body."""
 
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, Self
 
 import numpy as np
+import pandas as pd
 
 from ..inputs.numbers import as_numbers, is_integer
+from ..inputs.types import UpAxis
 from ..inputs.wording import counted
 from .axes import UP_AXES
 from .formats import AXES, FORMATS, LANDMARKS
@@ -34,6 +37,12 @@ class _ReadOnly(dict):
 
     def __reduce__(self):
         return type(self), (dict(self),)
+
+
+class _Constructor(Protocol):
+    """A class method that makes a known skeleton."""
+
+    def __call__(self, *, n_dims: Literal[3, 2] = 3, up: UpAxis | None = None) -> "Skeleton": ...
 
 
 @dataclass(frozen=True)
@@ -98,11 +107,36 @@ class Skeleton:
     ['left_thigh', 'left_leg']
     """
 
-    joints: tuple
-    parents: tuple
-    landmarks: Mapping | None = None
-    up: str = "y"
-    n_dims: int = 3
+    joints: tuple[str, ...]
+    parents: tuple[int, ...]
+    # None, and lists of names, can be given.
+    landmarks: Mapping[str, Any] | Any = None
+    up: UpAxis = "y"
+    n_dims: Literal[3, 2] = 3
+
+    # Made below, of `FORMATS`.
+    acclaim: ClassVar[_Constructor]
+    coco: ClassVar[_Constructor]
+    kinect: ClassVar[_Constructor]
+    kinect_v2: ClassVar[_Constructor]
+    mediapipe: ClassVar[_Constructor]
+    opencap: ClassVar[_Constructor]
+    openpose: ClassVar[_Constructor]
+    optitrack: ClassVar[_Constructor]
+    paper: ClassVar[_Constructor]
+    plug_in_gait: ClassVar[_Constructor]
+    unreal: ClassVar[_Constructor]
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            joints: Sequence[str],
+            parents: Sequence[int],
+            landmarks: Mapping[str, str | Sequence[str] | None] | None = None,
+            up: UpAxis = "y",
+            n_dims: Literal[3, 2] = 3,
+        ) -> None: ...
 
     def __post_init__(self):
         joints, parents = _as_joints(self.joints), _as_parents(self.parents)
@@ -155,7 +189,13 @@ class Skeleton:
         return f"Skeleton(<{len(self.joints)} joints{partial}>, up={self.up!r}{plane})"
 
     @classmethod
-    def from_frame(cls, df, *, landmarks=None, up=None):
+    def from_frame(
+        cls,
+        df: pd.DataFrame,
+        *,
+        landmarks: Mapping[str, str | Sequence[str] | None] | None = None,
+        up: UpAxis | None = None,
+    ) -> Self:
         """The skeleton of a DataFrame of positions, such as `io.read_motion` returns.
 
         Parameters
@@ -218,7 +258,7 @@ class Skeleton:
         estimate = _estimate_up(df, skeleton) if up is None else None
         return skeleton if estimate is None else cls(joints, parents, landmarks, estimate, n_dims)
 
-    def index_of(self, landmark):
+    def index_of(self, landmark: str) -> int:
         """Index of the joint at a landmark.
 
         Parameters
@@ -244,7 +284,7 @@ class Skeleton:
             )
         return indices[0]
 
-    def indices_of(self, landmark):
+    def indices_of(self, landmark: str) -> tuple[int, ...]:
         """Indices of the joints whose mean is a landmark.
 
         Parameters
@@ -270,7 +310,7 @@ class Skeleton:
             )
         return tuple(self.joints.index(joint) for joint in as_tuple(self.landmarks[landmark]))
 
-    def body(self):
+    def body(self) -> Self:
         """The skeleton of the landmarks that the limbs join, with "y" up.
 
         Returns
@@ -288,7 +328,7 @@ class Skeleton:
         parents = _nearest_parents(joints, paper.joints, paper.parents)
         return type(self)(joints, parents, {name: name for name in joints}, "y", self.n_dims)
 
-    def parts(self):
+    def parts(self) -> dict[str, list[int]]:
         """The features of `DirectionCosines` of each arm, each leg and the trunk.
 
         For `PartSynchronizer`. The trunk is hip line, torso, shoulder line and neck. The height of
@@ -309,22 +349,22 @@ class Skeleton:
         return features_of_parts(self.limbs, self.n_dims, int(self.has_height))
 
     @property
-    def limbs(self):
+    def limbs(self) -> list[str]:
         """Names of the limbs both of whose ends are landmarks; twelve for the whole body."""
         return limbs_between(self.landmarks)
 
     @property
-    def has_height(self):
+    def has_height(self) -> bool:
         """Whether the height of the pelvis is a feature: a pelvis and a complete leg are there."""
         return "pelvis" in self.landmarks and bool(complete_legs(self.limbs))
 
     @property
-    def bones(self):
+    def bones(self) -> list[tuple[int, int]]:
         """Pairs (parent, joint) of indices of joints."""
         return [(p, j) for j, p in enumerate(self.parents) if p >= 0]
 
     @property
-    def column_names(self):
+    def column_names(self) -> list[str]:
         """Names of the position columns, ``<joint>_x``, ``<joint>_y``, ``<joint>_z``, ..."""
         return [f"{joint}_{axis}" for joint in self.joints for axis in AXES[self.n_dims]]
 
@@ -336,7 +376,9 @@ def _constructor(name):
     """The class method of `Skeleton` that makes the skeleton of one of `FORMATS`."""
     known = FORMATS[name]
 
-    def constructor(cls, *, n_dims=3, up=None):
+    def constructor(
+        cls: type[Skeleton], *, n_dims: Literal[3, 2] = 3, up: UpAxis | None = None
+    ) -> Skeleton:
         """{known.summary}
 
         Parameters

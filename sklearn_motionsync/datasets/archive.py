@@ -18,7 +18,7 @@ _NEEDED = ("positions", "offsets", "label", "actor", "take", "fps", "joints", "p
 _TEXTS = ("label", "actor", "take", "joints")
 
 
-def load_performances(path):
+def load_performances(path: Path) -> Bunch:
     """Read an archive of performances.
 
     Parameters

@@ -5,10 +5,12 @@ from numbers import Integral
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from sklearn.utils import Bunch, check_random_state
-from sklearn.utils._param_validation import Interval, validate_params
+from sklearn.utils._param_validation import Interval
 
 from ..body.skeleton import Skeleton
+from ..inputs.types import RandomState
 from ..inputs.wording import counted
+from ..utils.parameters import validated_function
 from .limits import LIMITS, check_size
 
 # The five moments, as shares of the action.
@@ -45,26 +47,25 @@ _ANGLES = {
 }
 
 
-@validate_params(
+@validated_function(
     {
         "n_performances": [Interval(Integral, 1, 10**6, closed="both")],
         "n_frames": [Interval(Integral, 10, 10**6, closed="both")],
         "n_actors": [Interval(Integral, 1, 10**6, closed="both")],
         **LIMITS,
-    },
-    prefer_skip_nested_validation=True,
+    }
 )
 def make_bending(
-    n_performances=40,
+    n_performances: int = 40,
     *,
-    n_frames=100,
-    n_actors=4,
-    style=1.0,
-    warp=1.0,
-    noise=0.002,
-    frame_rate=50.0,
-    random_state=None,
-):
+    n_frames: int = 100,
+    n_actors: int = 4,
+    style: float = 1.0,
+    warp: float = 1.0,
+    noise: float = 0.002,
+    frame_rate: float = 50.0,
+    random_state: RandomState = None,
+) -> Bunch:
     """Performances of a bending action, with the true warps and key-frames.
 
     A skeleton of fifteen joints stands, bends down until its right hand is near the

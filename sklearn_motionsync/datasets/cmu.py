@@ -2,17 +2,18 @@
 
 import hashlib
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 from sklearn.utils import Bunch
-from sklearn.utils._param_validation import Interval, validate_params
+from sklearn.utils._param_validation import Interval
 
 from ..body.skeleton import Skeleton
 from ..io.motion import read_motion
+from ..utils.parameters import validated_function
 
 _FRAME_RATE = 120.0
 _DESCR = """\
@@ -29,27 +30,26 @@ The database was created with funding from NSF EIA-0196217."
 """
 
 
-@validate_params(
+@validated_function(
     {
         "download_if_missing": ["boolean"],
         "url": [str],
         "sha256": [Mapping, None],
         "n_retries": [Interval(Integral, 0, None, closed="left")],
         "delay": [Interval(Real, 0, 3600, closed="both")],
-    },
-    prefer_skip_nested_validation=True,
+    }
 )
 def fetch_cmu(
-    subject,
-    trials,
+    subject: int | str,
+    trials: int | str | Sequence[int | str],
     *,
-    data_home=None,
-    download_if_missing=True,
-    url="http://mocap.cs.cmu.edu/subjects",
-    sha256=None,
-    n_retries=3,
-    delay=1.0,
-):
+    data_home: Path | None = None,
+    download_if_missing: bool = True,
+    url: str = "http://mocap.cs.cmu.edu/subjects",
+    sha256: Mapping[str, str] | None = None,
+    n_retries: int = 3,
+    delay: float = 1.0,
+) -> Bunch:
     """Load trials of one subject of the CMU motion capture database, downloaded where needed.
 
     Parameters

@@ -6,9 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from sklearn.utils import Bunch, check_random_state
-from sklearn.utils._param_validation import Interval, validate_params
+from sklearn.utils._param_validation import Interval
 
+from ..inputs.types import RandomState
 from ..inputs.wording import counted
+from ..utils.parameters import validated_function
 from .limits import LIMITS, check_size
 
 _GROUPS = ("A", "B")
@@ -55,7 +57,7 @@ _N_PACE = 501
 _N_MOMENTS = 101
 
 
-@validate_params(
+@validated_function(
     {
         "n_people": [Interval(Integral, 1, 10**6, closed="both")],
         "n_cycles": [Interval(Integral, 1, 10**4, closed="both")],
@@ -64,23 +66,22 @@ _N_MOMENTS = 101
         "takes": ["boolean"],
         "n_frames": [Interval(Integral, 20, 10**6, closed="both")],
         **LIMITS,
-    },
-    prefer_skip_nested_validation=True,
+    }
 )
 def make_gait(
-    n_people=10,
-    n_cycles=3,
+    n_people: int = 10,
+    n_cycles: int = 3,
     *,
-    amplitude=0.0,
-    timing=0.0,
-    takes=False,
-    n_frames=100,
-    style=1.0,
-    warp=1.0,
-    noise=0.3,
-    frame_rate=100.0,
-    random_state=None,
-):
+    amplitude: float = 0.0,
+    timing: float = 0.0,
+    takes: bool = False,
+    n_frames: int = 100,
+    style: float = 1.0,
+    warp: float = 1.0,
+    noise: float = 0.3,
+    frame_rate: float = 100.0,
+    random_state: RandomState = None,
+) -> Bunch:
     """Gait cycles of people in two groups with known differences in shape and timing.
 
     Flexion of hip, knee and ankle in the sagittal plane and the vertical force under the foot, from

@@ -46,7 +46,16 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
     display.plot(getattr(display, "axes_", None) if ax is None else ax, azimuth=azimuth)
     figure = display.figure_.canvas.figure
     # Looked up here: nothing can be imported while Python shuts down.
-    figure_exists = pyplot().fignum_exists
+    exists, numbered, current = pyplot().fignum_exists, pyplot().figure, pyplot().gcf
+
+    def is_open():
+        """Whether the figure is not closed; its number may be that of a later one by then."""
+        if not exists(getattr(figure, "number", None)):
+            return False
+        before = current().number
+        found = numbered(figure.number) is figure
+        numbered(before)
+        return found
 
     class NotebookAnimation(FuncAnimation):
         """An animation that computes the layout once and needs no network."""
@@ -70,7 +79,7 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
 
         def __del__(self):
             # Matplotlib warns of an animation that was not shown, unless its figure is closed.
-            if figure_exists(getattr(figure, "number", None)):
+            if is_open():
                 super().__del__()
 
         def _repr_html_(self):

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Set
 from numbers import Real
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -12,8 +13,19 @@ from ..inputs.numbers import is_integer
 from ..inputs.tables import labels_of
 from ..online.stream import check_times
 
+if TYPE_CHECKING:
+    from matplotlib.animation import Animation
+    from matplotlib.axes import Axes
+
+    AxesLike: TypeAlias = Axes | Iterable[Axes] | np.ndarray
+else:
+    # matplotlib is imported on drawing.
+    Animation = AxesLike = Any
+
 __all__ = [
     "TIME_LABELS",
+    "Animation",
+    "AxesLike",
     "Takes",
     "as_frames",
     "as_index",

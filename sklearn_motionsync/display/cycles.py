@@ -1,9 +1,13 @@
 """CycleDisplay: the self-correlation of a take, and the cuts between its cycles."""
 
+from typing import Self
+
 import numpy as np
+from sklearn.base import BaseEstimator
 
 from ..body.formats import SIDES
 from ..inputs.features import choose_features
+from ..inputs.types import PerformancesLike, Unit, ValuesLike
 from ..segmentation.cycles import (
     CycleSegmenter,
     as_learnt,
@@ -14,8 +18,8 @@ from ..segmentation.cycles import (
 )
 from ..segmentation.self_correlation import required_strength
 from ..synchronizers.match import rates_of
-from .arguments import as_index
-from .drawing import COLORS, panels
+from .arguments import AxesLike, as_index
+from .drawing import COLORS, WIDTH, legend_above, panels
 from .time_axis import TimeAxis
 
 __all__ = ["CycleDisplay"]
@@ -71,8 +75,17 @@ class CycleDisplay:
     """
 
     def __init__(
-        self, correlation, peaks, curve, cuts=(), *, threshold=0.4, period=None, name="", reason=""
-    ):
+        self,
+        correlation: ValuesLike,
+        peaks: ValuesLike,
+        curve: ValuesLike,
+        cuts: ValuesLike = (),
+        *,
+        threshold: float = 0.4,
+        period: float | None = None,
+        name: str = "",
+        reason: str = "",
+    ) -> None:
         self.correlation, self.curve = np.asarray(correlation), np.asarray(curve)
         self.peaks, self.cuts = np.asarray(peaks, dtype=int), np.asarray(cuts, dtype=int)
         self.threshold, self.period, self.name, self.reason = threshold, period, name, reason
@@ -82,8 +95,16 @@ class CycleDisplay:
 
     @classmethod
     def from_estimator(
-        cls, estimator, X, *, take=0, feature=None, unit="frames", frame_rate=None, ax=None
-    ):
+        cls,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
+        *,
+        take: int = 0,
+        feature: int | str | None = None,
+        unit: Unit = "frames",
+        frame_rate: float | None = None,
+        ax: AxesLike | None = None,
+    ) -> Self:
         """Draw the self-correlation and the cuts of a take.
 
         Parameters
@@ -142,7 +163,9 @@ class CycleDisplay:
         )
         return display.plot(ax, unit=unit, frame_rate=rates_of([given[i]], frame_rate, unit))
 
-    def plot(self, ax=None, *, unit="frames", frame_rate=None):
+    def plot(
+        self, ax: AxesLike | None = None, *, unit: Unit = "frames", frame_rate: float | None = None
+    ) -> Self:
         """Draw.
 
         Parameters
@@ -161,7 +184,7 @@ class CycleDisplay:
         """
         axis = TimeAxis(unit, len(self.curve), [len(self.curve)], frame_rate)
         (times,) = axis.performances()
-        self.figure_, self.axes_ = panels(ax, [0, 1], 2, 1, (7, 5))
+        self.figure_, self.axes_ = panels(ax, [0, 1], 2, 1, (WIDTH, 4.8))
         upper, lower = self.axes_
         lags = times[: len(self.correlation)]
         blue, black, orange = (COLORS[k] for k in ("performance", "pattern", "mean"))
@@ -185,13 +208,13 @@ class CycleDisplay:
         )
         upper.set_ylabel("self-correlation")
         upper.set_title(self._describe(), fontsize="medium")
-        upper.legend(loc="upper right", fontsize="small")
+        legend_above([upper], *upper.get_legend_handles_labels())
         (self.curve_,) = lower.plot(times, self.curve, color=blue)
         self.cuts_ = lower.vlines(
             times[self.cuts], 0, 1, transform=lower.get_xaxis_transform(), color=black, linewidth=1
         )
         lower.set_xlim(0, times[-1])
-        lower.set_xlabel(axis.performance_label.replace("performance", "take"))
+        lower.set_xlabel(axis.performance_label.replace("trial", "take"))
         lower.set_ylabel(self.name)
         return self
 

@@ -7,6 +7,7 @@ import numpy as np
 
 __all__ = [
     "COLORS",
+    "WIDTH",
     "bone_lines",
     "curves",
     "front_line",
@@ -34,6 +35,8 @@ COLORS = {
     "quiet": "#808080",
     "shadow": "#D9D9D9",
 }
+# The width of a new figure in inches: its text is still readable on a phone.
+WIDTH = 6.4
 # Colours of groups, without black, which is the pattern.
 _GROUPS = ["#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"]
 # Line styles of the means of more groups, whose colours are similar.
@@ -165,12 +168,12 @@ def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
         if box.height <= height:
             break
     in_row = [a for a in top if abs(a.get_window_extent().y1 - extents[0].y1) < 1]
-    if any(a.get_title() for a in in_row):
-        # The padding of the titles reserves the space.
+    if any(a.get_title() for a in in_row) or box.width > extents[0].width:
+        # The padding of the titles reserves the space; a wide legend would part the panels.
         legend.set_in_layout(False)
         pad = box.height * 72 / axis.figure.dpi + _GAP
         for a in in_row:
-            a.set_title(a.get_title(), fontsize=a.title.get_fontsize(), pad=pad)
+            a.set_title(a.get_title() or " ", fontsize=a.title.get_fontsize(), pad=pad)
     if axis.figure.get_layout_engine() is None:
         for a in in_row:
             _lower(a, box.height)

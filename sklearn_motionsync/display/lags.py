@@ -1,19 +1,26 @@
 """LagDisplay: the lags of parts of the body, with their confidence intervals."""
 
-import numpy as np
+from typing import Any, Self
 
+import numpy as np
+from sklearn.base import BaseEstimator
+
+from ..inputs.types import Labels, PerformancesLike, Unit, ValuesLike
 from ..inputs.wording import counted
 from ..synchronizers.lags import Lags
 from ..synchronizers.match import rates_of
 from ..synchronizers.parts import PartSynchronizer
 from ..utils.pipelines import route_to_synchronizer
-from .drawing import COLORS, curves, front_line, legend_above, panels
+from .arguments import AxesLike
+from .drawing import COLORS, WIDTH, curves, front_line, legend_above, panels
 from .time_axis import TimeAxis
 
 __all__ = ["LagDisplay"]
 
-_UNITS = {"frames": "frames", "percent": "% of clock", "seconds": "s"}
+_UNITS = {"frames": "frames", "percent": "% of the time", "seconds": "s"}
 _REFERENCES = {"rest": "the rest of the body", "body": "the whole body"}
+# The largest number of curves in a row.
+_CURVES_A_ROW = 3
 
 
 class LagDisplay:
@@ -58,10 +65,10 @@ class LagDisplay:
     >>> X = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
     >>> sync = PartSynchronizer().fit(X)
     >>> LagDisplay.from_estimator(sync, X, groups=bunch.actor)
-    LagDisplay(5 parts behind the rest of the body, 6 performances of 4 people)
+    LagDisplay(5 parts behind the rest of the body, 6 trials of 4 people)
     """
 
-    def __init__(self, lags):
+    def __init__(self, lags: Lags) -> None:
         self.lags = lags
 
     def __repr__(self):
@@ -70,17 +77,17 @@ class LagDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
         *,
-        groups=None,
-        against="rest",
-        unit="percent",
-        frame_rate=None,
-        ax=None,
-        colorbar=True,
-        **params,
-    ):
+        groups: Labels | None = None,
+        against: str = "rest",
+        unit: Unit = "percent",
+        frame_rate: float | ValuesLike | None = None,
+        ax: AxesLike | None = None,
+        colorbar: bool = True,
+        **params: Any,
+    ) -> Self:
         """Draw the lags of performances.
 
         Parameters
@@ -117,7 +124,9 @@ class LagDisplay:
         return cls(lags).plot(ax, colorbar=colorbar)
 
     @classmethod
-    def from_predictions(cls, lags, *, ax=None, colorbar=True):
+    def from_predictions(
+        cls, lags: Lags, *, ax: AxesLike | None = None, colorbar: bool = True
+    ) -> Self:
         """Draw lags that are known already.
 
         Parameters
@@ -145,7 +154,7 @@ class LagDisplay:
             )
         return cls(lags).plot(ax, colorbar=colorbar)
 
-    def plot(self, ax=None, *, colorbar=True):
+    def plot(self, ax: AxesLike | None = None, *, colorbar: bool = True) -> Self:
         """Draw.
 
         Parameters
@@ -161,9 +170,13 @@ class LagDisplay:
             The display itself.
         """
         n_parts, n_frames = self.lags.values.shape[1:]
-        cells = [(0, slice(None)), *((1, i) for i in range(n_parts))]
-        size = (max(5.0, 1.9 * n_parts), 3.4 + 0.25 * n_parts)
-        self.figure_, (self.map_ax_, *self.axes_) = panels(ax, cells, 2, n_parts, size)
+        n_cols = min(n_parts, _CURVES_A_ROW)
+        n_rows = -(-n_parts // n_cols)
+        # The map is as high as two rows of curves.
+        curves_at = ((2 + i // n_cols, i % n_cols) for i in range(n_parts))
+        cells = [(slice(0, 2), slice(None)), *curves_at]
+        size = (WIDTH, 0.6 + 1.6 * (2 + n_rows))
+        self.figure_, (self.map_ax_, *self.axes_) = panels(ax, cells, 2 + n_rows, n_cols, size)
         axis = TimeAxis("frames" if self.lags.unit == "frames" else "percent", n_frames)
         table = self.lags.over_time()
         columns = {
@@ -203,16 +216,18 @@ class LagDisplay:
             )
             for i, where in enumerate(unsure)
         ]
-        top.set_yticks(range(len(mean)), self._names())
+        top.set_yticks(range(len(mean)), self._names(), fontsize="small")
         top.set_ylim(len(mean) - 0.5, -0.5)
         top.set_xlim(axis.clock[0], axis.clock[-1])
         top.set_xlabel(axis.label)
-        top.set_title(self._describe(), fontsize="medium")
+        top.set_title(self._describe(), fontsize="small")
         top.grid(False)
         self.colorbar_ = None
         if colorbar:
-            self.colorbar_ = self.figure_.colorbar(self.map_, ax=top)
-            self.colorbar_.set_label(f"mean lag, {_UNITS[self.lags.unit]}")
+            self.colorbar_ = self.figure_.colorbar(
+                self.map_, ax=top, location="top", aspect=40, pad=0.02
+            )
+            self.colorbar_.set_label(f"mean lag ({_UNITS[self.lags.unit]})", fontsize="small")
 
     def _draw_curves(self, axis, columns):
         self.means_, self.intervals_, self.spreads_ = [], [], []
@@ -230,16 +245,18 @@ class LagDisplay:
             ax.set_title(self.lags.parts[i], fontsize="small")
             ax.set_xlim(axis.clock[0], axis.clock[-1])
             ax.set_ylim(-reach, reach)
-            ax.set_xlabel(axis.label, fontsize="small")
-            if i:
+            if i + _CURVES_A_ROW >= len(mean):
+                ax.set_xlabel(axis.label, fontsize="small")
+            if i % _CURVES_A_ROW:
                 ax.tick_params(labelleft=False)
-        self.axes_[0].set_ylabel(f"late by, {_UNITS[self.lags.unit]}")
-        units = "performances" if self.lags.groups is None else "people"
+            else:
+                ax.set_ylabel(f"late by\n({_UNITS[self.lags.unit]})", fontsize="small")
+        units = "trials" if self.lags.groups is None else "people"
         handles = [self.means_[0], self.intervals_[0], self.spreads_[0]]
         labels = [
             "mean",
-            f"95 % interval of the mean, over {units}",
-            "an SD of performances beside it",
+            f"95 % interval ({units})",
+            "± 1 SD of trials",
         ]
         legend_above(self.axes_, handles, labels)
 
@@ -248,7 +265,7 @@ class LagDisplay:
         if self.lags.groups is None:
             return list(self.lags.parts)
         icc = self.lags.summary()["icc"]
-        return [f"{part} (ICC {x:.2f})" if x == x else part for part, x in icc.items()]
+        return [f"{part}\nICC {x:.2f}" if x == x else part for part, x in icc.items()]
 
     def _describe(self):
         n_sequences, n_parts = self.lags.values.shape[:2]
@@ -258,5 +275,5 @@ class LagDisplay:
         if self.lags.groups is not None:
             n_people = len(np.unique(self.lags.groups))
             people = " of 1 person" if n_people == 1 else f" of {n_people} people"
-        count = counted(n_sequences, "performance")
+        count = counted(n_sequences, "trial")
         return f"{parts} behind {behind}, {count}{people}"

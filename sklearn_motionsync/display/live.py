@@ -1,29 +1,46 @@
 """PhaseDisplay: the phase of running performances, and the predicted rest of them."""
 
-from itertools import pairwise
+from collections.abc import Sequence
 from textwrap import fill
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
+from sklearn.base import BaseEstimator
 
 from ..body.direction_cosines import DirectionCosines
+from ..body.skeleton import Skeleton
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.types import (
+    Features,
+    Indexed,
+    PerformanceLike,
+    PerformancesLike,
+    SupportsArray,
+    ValuesLike,
+)
 from ..online.stream import LivePhase, time_left
 from ..online.synchronizer import OnlineSynchronizer
 from ..utils.pipelines import find_step
 from .animation import animate
-from .arguments import TIME_LABELS, Takes, as_index, as_indices, as_names, times_from_zero
+from .arguments import (
+    TIME_LABELS,
+    Animation,
+    AxesLike,
+    Takes,
+    as_index,
+    as_indices,
+    as_names,
+    times_from_zero,
+)
 from .bodies import bones_by_side, bounds, invert_postures, landmark_track, project
-from .drawing import COLORS, bone_lines, front_line, legend_above, panels, stage
+from .drawing import COLORS, WIDTH, bone_lines, front_line, legend_above, panels, stage
 
 __all__ = ["PhaseDisplay"]
 
 # The number of performances by default.
 _N_PERFORMANCES = 4
-# The widths of panels in columns of the grid: a body, a dial, the phase, a curve.
-_BODY, _DIAL, _PHASE, _CURVE = 3, 3, 5, 5
-# The width of a column and the height of a row in inches.
-_COLUMN, _ROW = 0.72, 2.35
+# The height of a row of panels in inches.
+_ROW = 2.2
 # Characters a line of a title or an axis label.
 _LINE_LENGTH = 24
 # The interval of the arc of a dial, as a share of the mean duration.
@@ -37,7 +54,7 @@ _N_POINTS = 60
 class PhaseDisplay:
     """Running performances: their phase, its confidence, and a prediction.
 
-    A row for each performance: a dial of its phase, with an arc that ends at the phase after a
+    Panels for each performance: a dial of its phase, with an arc that ends at the phase after a
     tenth of the mean duration at the present rate; the phase over time with its confidence; and
     features, as far as they were observed, with the predicted rest: the mean from the phase on,
     for as long as `OnlineSynchronizer.time_left` estimates. With ``body`` also a stick figure,
@@ -100,22 +117,22 @@ class PhaseDisplay:
 
     def __init__(
         self,
-        phases,
-        n_frames,
+        phases: LivePhase | Sequence[LivePhase],
+        n_frames: int,
         *,
-        times=None,
-        duration=None,
-        seen=None,
-        mean=None,
-        spread=None,
-        afterwards=None,
-        features=None,
-        bodies=None,
-        mean_body=None,
-        skeleton=None,
-        names=None,
-        unit="frames",
-    ):
+        times: Indexed[ValuesLike] | None = None,
+        duration: float | None = None,
+        seen: PerformancesLike | None = None,
+        mean: PerformanceLike | None = None,
+        spread: PerformanceLike | None = None,
+        afterwards: Indexed[ValuesLike | None] | None = None,
+        features: Sequence[str] | None = None,
+        bodies: Indexed[SupportsArray] | None = None,
+        mean_body: SupportsArray | None = None,
+        skeleton: Skeleton | None = None,
+        names: Sequence[str] | None = None,
+        unit: Literal["frames", "seconds"] = "frames",
+    ) -> None:
         phases = _as_list_of_phases(phases)
         count, nothing = len(phases), [None] * len(phases)
         self.names = list(map(str, range(count))) if names is None else names
@@ -141,19 +158,19 @@ class PhaseDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
         *,
-        times=None,
-        performances=None,
-        features=None,
-        training=None,
-        body=None,
-        names=None,
-        frame=None,
-        ax=None,
-        azimuth=-60,
-    ):
+        times: Indexed[ValuesLike] | None = None,
+        performances: int | Sequence[int] | None = None,
+        features: Features | None = None,
+        training: PerformancesLike | None = None,
+        body: BaseEstimator | None = None,
+        names: Sequence[str] | None = None,
+        frame: int | None = None,
+        ax: AxesLike | None = None,
+        azimuth: float = -60,
+    ) -> Self:
         """Follow performances, and draw their phases.
 
         Parameters
@@ -240,7 +257,16 @@ class PhaseDisplay:
         return display.plot(ax, frame=frame, azimuth=azimuth)
 
     @classmethod
-    def from_predictions(cls, phases, n_frames, *, frame=None, ax=None, azimuth=-60, **known):
+    def from_predictions(
+        cls,
+        phases: LivePhase | Sequence[LivePhase],
+        n_frames: int,
+        *,
+        frame: int | None = None,
+        ax: AxesLike | None = None,
+        azimuth: float = -60,
+        **known: Any,
+    ) -> Self:
         """Draw phases that are known already, such as ``live.history``.
 
         Parameters
@@ -271,7 +297,9 @@ class PhaseDisplay:
         """
         return cls(phases, n_frames, **known).plot(ax, frame=frame, azimuth=azimuth)
 
-    def plot(self, ax=None, *, frame=None, azimuth=-60):
+    def plot(
+        self, ax: AxesLike | None = None, *, frame: int | None = None, azimuth: float = -60
+    ) -> Self:
         """Draw the state at a frame.
 
         Parameters
@@ -295,16 +323,17 @@ class PhaseDisplay:
             frame = len(longest) - 1
         frame = as_index(frame, len(longest), "frame")
         has_body = self._performances[0].body is not None
-        widths = [_BODY] * has_body + [_DIAL, _PHASE] + [_CURVE] * len(self.features)
-        edges = np.cumsum([0, *widths])
-        columns = [slice(a, b) for a, b in pairwise(edges)]
-        n_rows, n_cols = len(self._performances), int(edges[-1])
-        cells = [(row, column) for row in range(n_rows) for column in columns]
-        size = n_cols * _COLUMN, n_rows * _ROW + 0.5
-        before = getattr(self, "axes_", ())
-        self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, size, before)
+        # Two panels beside each other; an odd last one has the whole width.
+        n_panels, count = has_body + 2 + len(self.features), len(self._performances)
+        places = [divmod(i, 2) for i in range(n_panels)]
+        if n_panels % 2:
+            places[-1] = (n_panels // 2, slice(None))
+        each = -(-n_panels // 2)
+        cells = [(each * k + row, column) for k in range(count) for row, column in places]
+        size, before = (WIDTH, count * each * _ROW + 0.3), getattr(self, "axes_", ())
+        self.figure_, self.axes_ = panels(ax, cells, count * each, 2, size, before)
         end = max(self._action.end_of(p) for p in self._performances)
-        by_row = np.array(self.axes_, dtype=object).reshape(n_rows, -1)
+        by_row = np.array(self.axes_, dtype=object).reshape(count, -1)
         self.rows_ = [
             PerformanceRow(
                 axes, p, self._action, self.skeleton, self.features, 1.02 * end or 1.0, azimuth
@@ -313,9 +342,7 @@ class PhaseDisplay:
         ]
         for axes, name in zip(by_row, self.names, strict=True):
             axes[0].set_title(fill(name, _LINE_LENGTH), fontsize="medium", parse_math=False)
-        for axis in by_row[:-1, has_body + 1 :].flat:
-            axis.tick_params(labelbottom=False)
-        for axis in by_row[-1, has_body + 1 :]:
+        for axis in by_row[:, has_body + 1 :].flat:
             axis.set_xlabel(TIME_LABELS[self.unit])
         self._show(longest[frame])
         # One legend for all curves.
@@ -324,7 +351,14 @@ class PhaseDisplay:
             legend_above([axis], handles, labels, n_cols=2)
         return self
 
-    def animate(self, ax=None, *, seconds=5.0, fps=15, azimuth=-60):
+    def animate(
+        self,
+        ax: AxesLike | None = None,
+        *,
+        seconds: float = 5.0,
+        fps: int = 15,
+        azimuth: float = -60,
+    ) -> Animation:
         """Animate the performances.
 
         Parameters
@@ -505,12 +539,12 @@ class PerformanceRow:
             style = {"color": COLORS["pattern"], "linewidth": 0.9, "linestyle": "--"}
             ys = percent * performance.afterwards
             (self.afterwards,) = axis.plot(performance.times, ys, label="afterwards", **style)
-        label = _label("guess", self._action.duration)
+        label = _label("predicted", self._action.duration)
         (self.rest,) = axis.plot([], [], color=orange, linestyle=":", label=label)
-        self.phase = front_line(axis, [], [], color=blue, label="phase, live")
+        self.phase = front_line(axis, [], [], color=blue, label="phase")
         axis.set_xlim(0, end)
         axis.set_ylim(0, 105)
-        axis.set_ylabel("%")
+        axis.set_ylabel("phase (%)")
 
     def show(self, time):
         """Move to a time."""

@@ -1,13 +1,19 @@
 """MetricDisplay: the weight of each feature in the learnt metric."""
 
+from collections.abc import Sequence
+from typing import Self
+
 import numpy as np
+from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.types import Features, ValuesLike
 from ..inputs.wording import counted
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import find_step
-from .drawing import COLORS, panels
+from .arguments import AxesLike
+from .drawing import COLORS, WIDTH, legend_above, panels
 
 __all__ = ["MetricDisplay"]
 
@@ -58,7 +64,14 @@ class MetricDisplay:
     (True, True)
     """
 
-    def __init__(self, share, energy, *, feature_names, n_performances=None):
+    def __init__(
+        self,
+        share: ValuesLike,
+        energy: ValuesLike,
+        *,
+        feature_names: Sequence[str],
+        n_performances: int | None = None,
+    ) -> None:
         self.share, self.energy = np.asarray(share), np.asarray(energy)
         self.feature_names, self.n_performances = feature_names, n_performances
 
@@ -66,7 +79,13 @@ class MetricDisplay:
         return f"MetricDisplay({counted(len(self.feature_names), 'row')}, {self._describe()})"
 
     @classmethod
-    def from_estimator(cls, estimator, *, features=None, ax=None):
+    def from_estimator(
+        cls,
+        estimator: BaseEstimator,
+        *,
+        features: Features | None = None,
+        ax: AxesLike | None = None,
+    ) -> Self:
         """Draw the metric of a fitted synchronizer, or of a pipeline with one.
 
         Parameters
@@ -105,7 +124,7 @@ class MetricDisplay:
         display = cls(*shares.T, feature_names=names, n_performances=len(metric.performances))
         return display.plot(ax)
 
-    def plot(self, ax=None):
+    def plot(self, ax: AxesLike | None = None) -> Self:
         """Draw.
 
         Parameters
@@ -119,7 +138,7 @@ class MetricDisplay:
             The display itself.
         """
         rows = np.arange(len(self.share))
-        size = (7, max(2.2, 0.27 * len(rows) + 1.3))
+        size = (WIDTH, max(2.2, 0.27 * len(rows) + 1.3))
         self.figure_, (self.ax_,) = panels(ax, [(0, 0)], 1, 1, size)
         self.energy_ = self.ax_.barh(
             rows,
@@ -127,7 +146,7 @@ class MetricDisplay:
             height=0.8,
             color=COLORS["envelope"],
             alpha=0.6,
-            label="of plain velocities, without a metric",
+            label="without weights",
         )
         # Narrower and in front: both bars are visible, whichever is longer.
         self.share_ = self.ax_.barh(
@@ -135,21 +154,21 @@ class MetricDisplay:
             self.share,
             height=0.4,
             color=COLORS["performance"],
-            label="with the learnt metric",
+            label="with the learnt weights",
         )
         self.ax_.axvline(0, color="0.3", linewidth=0.8)
         self.ax_.set_yticks(rows, self.feature_names)
         self.ax_.set_ylim(len(rows) - 0.4, -0.6)
-        self.ax_.set_xlabel("share of what is compared")
+        self.ax_.set_xlabel("share of what is compared (0 to 1)")
         self.ax_.set_title(self._describe(), fontsize="medium")
-        self.ax_.legend(loc="best", fontsize="small", frameon=True)
+        legend_above([self.ax_], *self.ax_.get_legend_handles_labels())
         self.ax_.grid(False, axis="y")
         return self
 
     def _describe(self):
         if self.n_performances is None:
             return "learnt metric"
-        return f"metric learnt from {counted(self.n_performances, 'performance')}"
+        return f"metric learnt from {counted(self.n_performances, 'trial')}"
 
 
 def _sort_and_sum(names, shares):

@@ -1,18 +1,22 @@
 """ActionModelDisplay: the mean of a learnt action, a band, and departures from it (Fig. 3d)."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, clone
 
 from ..inputs.collections import as_collection
 from ..inputs.features import choose_features
+from ..inputs.types import Features, Labels, PerformanceLike, PerformancesLike, Unit, ValuesLike
 from ..inputs.wording import counted
 from ..model.views import view_of
 from ..synchronizers.match import rates_of
 from ..utils.groups import names_of_groups
+from .arguments import AxesLike
 from .drawing import (
     COLORS,
+    WIDTH,
     curves,
     front_line,
     group_styles,
@@ -26,13 +30,13 @@ __all__ = ["ActionModelDisplay"]
 
 # Titles of the legend, without and with groups.
 _BAND_TITLES = {
-    "points": "band holds single postures, not performances",
-    "performances": "band holds {share:.3g} % of new people's performances",
+    "points": "band holds single poses, not whole trials",
+    "performances": "band holds {share:.3g} % of new people's trials",
     "mean": "band holds the mean of all people, {share:.3g} % sure",
 }
 _GROUP_BAND_TITLES = {
-    "points": "bands hold single postures, not performances",
-    "performances": "bands hold {share:.3g} % of new people's performances",
+    "points": "bands hold single poses, not whole trials",
+    "performances": "bands hold {share:.3g} % of new people's trials",
     "mean": "bands hold the mean of all people, {share:.3g} % sure",
 }
 # Rounding of the largest bound, in units of the last place.
@@ -103,21 +107,21 @@ class ActionModelDisplay:
 
     def __init__(
         self,
-        mean,
-        lower,
-        upper,
+        mean: PerformanceLike,
+        lower: PerformanceLike,
+        upper: PerformanceLike,
         *,
-        feature_names,
-        n_std=None,
-        performances=None,
-        band="points",
-        coverage=None,
-        departures=True,
-        groups=None,
-        people=None,
-        unit="frames",
-        frame_rate=None,
-    ):
+        feature_names: Sequence[str],
+        n_std: float | None = None,
+        performances: PerformancesLike | None = None,
+        band: Literal["points", "performances", "mean"] = "points",
+        coverage: float | None = None,
+        departures: bool = True,
+        groups: Labels | None = None,
+        people: Labels | None = None,
+        unit: Unit = "frames",
+        frame_rate: float | None = None,
+    ) -> None:
         self.mean, self.lower, self.upper = np.asarray(mean), np.asarray(lower), np.asarray(upper)
         self.feature_names, self.n_std = feature_names, n_std
         self.performances = None if performances is None else np.asarray(performances)
@@ -134,19 +138,19 @@ class ActionModelDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X=None,
+        estimator: BaseEstimator,
+        X: PerformancesLike | None = None,
         *,
-        features=None,
-        band=None,
-        departures=True,
-        groups=None,
-        people=None,
-        unit="frames",
-        frame_rate=None,
-        ax=None,
-        **params,
-    ):
+        features: Features | None = None,
+        band: Literal["points", "performances", "mean"] | None = None,
+        departures: bool = True,
+        groups: Labels | None = None,
+        people: Labels | None = None,
+        unit: Unit = "frames",
+        frame_rate: float | ValuesLike | None = None,
+        ax: AxesLike | None = None,
+        **params: Any,
+    ) -> Self:
         """Draw a fitted model, or a pipeline that ends in one.
 
         Parameters
@@ -256,7 +260,7 @@ class ActionModelDisplay:
         )
         return display.plot(ax)
 
-    def plot(self, ax=None):
+    def plot(self, ax: AxesLike | None = None) -> Self:
         """Draw.
 
         Parameters
@@ -275,15 +279,15 @@ class ActionModelDisplay:
         n_rows = -(-count // n_cols)
         cells = [divmod(i, n_cols) for i in range(count)]
         parts = self._parts()
-        height = max(3, 2.2 * n_rows + 0.6) + 0.2 * max(len(parts) - 3, 0)
-        self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, (5 * n_cols, height))
+        height = max(3, 1.9 * n_rows + 1.4) + 0.2 * max(len(parts) - 3, 0)
+        self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, (WIDTH, height))
         self.mean_, self.envelope_, self.performances_, self.departures_ = [], [], [], []
         for i, (axis, name) in enumerate(zip(self.axes_, self.feature_names, strict=True)):
             self._draw_feature(axis, parts, i)
             axis.set_ylabel(name)
             if i + n_cols >= count:
                 axis.set_xlabel(self._axis.label)
-        self._draw_legend(parts)
+        self._draw_legend(parts, n_cols)
         return self
 
     def _parts(self):
@@ -309,7 +313,7 @@ class ActionModelDisplay:
                 self.departures_ += [part.draw_departures(axis, self._axis, i) for part in banded]
         self.mean_ += [part.draw_mean(axis, clock, i) for part in parts]
 
-    def _draw_legend(self, parts):
+    def _draw_legend(self, parts, n_cols):
         """Draw a legend above the panels, with the meaning of the band as its title."""
         if self.groups is None:
             label = "where the mean may be"
@@ -319,7 +323,7 @@ class ActionModelDisplay:
             handles, labels = [self.envelope_[0]], [label]
             if self.performances is not None:
                 handles.append(self.performances_[0])
-                labels.append(counted(len(self.performances), "performance"))
+                labels.append(counted(len(self.performances), "trial"))
         else:
             handles, labels = [], []
             bands = iter(self.envelope_)
@@ -333,10 +337,10 @@ class ActionModelDisplay:
             labels.append(f"outside the band{of_group}: {count} of them")
         if self.groups is None:
             handles.append(self.mean_[0])
-            labels.append("mean performance")
+            labels.append("mean")
         titles = _BAND_TITLES if self.groups is None else _GROUP_BAND_TITLES
         title = titles[self.band].format(share=100 * (self.coverage or 0))
-        legend_above(self.axes_, handles, labels, title, below=self.axes_[:1], n_cols=1)
+        legend_above(self.axes_, handles, labels, title, below=self.axes_[:n_cols], n_cols=1)
 
 
 def _lengths(X):
@@ -469,7 +473,7 @@ class SubjectGroups:
     def describe(self, name, has_band):
         """The entry of a group in the legend: its performances and subjects."""
         count, people = len(self.members(name)), len(set(self.people_of(name)))
-        text = f"{name}: {count} performance{'s' * (count != 1)}"
+        text = f"{name}: {count} trial{'s' * (count != 1)}"
         if self.people is not None:
             text += f" of {people} {'person' if people == 1 else 'people'}"
         return text if has_band else f"{text}, no band"

@@ -1,13 +1,18 @@
 """SearchDisplay: the hits of a search along takes, with their scores and the true segments."""
 
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any, Self
+
 import numpy as np
 import pandas as pd
+from sklearn.base import BaseEstimator
 
 from ..inputs.tables import labels_of
+from ..inputs.types import PerformanceLike, PerformancesLike
 from ..inputs.wording import counted
 from ..segmentation.search import find_performances
-from .arguments import as_performances
-from .drawing import COLORS, panels
+from .arguments import AxesLike, as_performances
+from .drawing import COLORS, WIDTH, legend_above, panels
 
 __all__ = ["SearchDisplay"]
 
@@ -52,7 +57,13 @@ class SearchDisplay:
     SearchDisplay(1 hit in 1 take)
     """
 
-    def __init__(self, origin, lengths, *, segments=None):
+    def __init__(
+        self,
+        origin: pd.DataFrame,
+        lengths: Mapping[Any, int],
+        *,
+        segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
+    ) -> None:
         self.origin, self.lengths, self.segments = origin, dict(lengths), None
         if segments is not None:
             self.segments = pd.DataFrame(segments, columns=["take", "start", "stop"])
@@ -62,7 +73,15 @@ class SearchDisplay:
         return f"SearchDisplay({counted(count, 'hit')} in {counted(takes, 'take')})"
 
     @classmethod
-    def from_estimator(cls, pattern, X, *, segments=None, ax=None, **params):
+    def from_estimator(
+        cls,
+        pattern: BaseEstimator | PerformanceLike,
+        X: PerformancesLike,
+        *,
+        segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
+        ax: AxesLike | None = None,
+        **params: Any,
+    ) -> Self:
         """Search takes, and draw the hits above and below the threshold.
 
         Parameters
@@ -88,7 +107,14 @@ class SearchDisplay:
         return cls.from_predictions(origin, X, segments=segments, ax=ax)
 
     @classmethod
-    def from_predictions(cls, origin, X, *, segments=None, ax=None):
+    def from_predictions(
+        cls,
+        origin: pd.DataFrame,
+        X: PerformancesLike,
+        *,
+        segments: pd.DataFrame | Sequence[tuple[Hashable, int, int]] | None = None,
+        ax: AxesLike | None = None,
+    ) -> Self:
         """Draw the result of `find_performances`.
 
         Parameters
@@ -123,7 +149,7 @@ class SearchDisplay:
                 )
         return display.plot(ax)
 
-    def plot(self, ax=None):
+    def plot(self, ax: AxesLike | None = None) -> Self:
         """Draw.
 
         Parameters
@@ -141,7 +167,7 @@ class SearchDisplay:
 
         shown = list(self.lengths)[:_MAX_PANELS]
         cells = [(i, 0) for i in range(len(shown))]
-        size = (8, 1.1 + 1.3 * len(shown))
+        size = (WIDTH, 1.1 + 1.3 * len(shown))
         self.figure_, self.axes_ = panels(ax, cells, len(shown), 1, size)
         accepted, self.hits_ = self._accepted(), []
         for axis, take in zip(self.axes_, shown, strict=True):
@@ -161,9 +187,9 @@ class SearchDisplay:
                 axis.axhline(level, color=COLORS["mean"], linestyle="--", linewidth=1)
             axis.set_xlim(0, self.lengths[take])
             axis.set_ylim(_BOTTOM - _STRIP * (self.segments is not None), 1)
-            axis.set_ylabel("score")
+            axis.set_ylabel("score (1: alike)")
             title = f"take {take}" if len(self.lengths) > 1 else ""
-            axis.set_title(title, fontsize="medium", loc="left")
+            axis.set_title(title, fontsize="medium")
         self.axes_[-1].set_xlabel("frame of the take")
         self._draw_legend()
         return self
@@ -191,12 +217,4 @@ class SearchDisplay:
         ]
         if self.segments is not None:
             handles.append(Patch(facecolor=COLORS["pattern"], label="known to be there"))
-        self.axes_[0].legend(
-            handles=handles,
-            ncols=len(handles),
-            loc="lower right",
-            bbox_to_anchor=(1, 1),
-            fontsize="small",
-            frameon=False,
-            borderaxespad=0.2,
-        )
+        legend_above(self.axes_[:1], handles, [handle.get_label() for handle in handles])

@@ -1,14 +1,20 @@
 """SkeletonDisplay: stick figures of postures, models (Fig. 4), and performances in motion."""
 
+from collections.abc import Sequence
 from functools import partial
 from numbers import Real
+from textwrap import fill
+from typing import Any, Self
 
 import numpy as np
+from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
+from ..body.skeleton import Skeleton
 from ..inputs.tables import name_performance
+from ..inputs.types import NumbersLike, PerformancesLike, RandomState
 from ..inputs.wording import counted
 from ..model.action_model import ActionModel
 from ..model.views import models_of_classes
@@ -23,6 +29,8 @@ from ..utils.pipelines import (
 )
 from .animation import animate
 from .arguments import (
+    Animation,
+    AxesLike,
     as_frames,
     as_index,
     as_indices,
@@ -38,15 +46,15 @@ from .bodies import (
     project,
     read_positions,
 )
-from .drawing import COLORS, bone_lines, panels, stage
+from .drawing import COLORS, WIDTH, bone_lines, panels, stage
 from .limb_departures import departs_outside_aspace, limb_departures, view_of_limbs
 
 __all__ = ["SkeletonDisplay", "postures_at"]
 
 # The largest number of panels in a row.
-_PANELS_A_ROW = 6
-# The width and the height of a heading in inches.
-_HEADING = 7.8, 0.4
+_PANELS_A_ROW = 4
+# The height of a heading in inches, and its characters a line.
+_HEADING, _LINE_LENGTH = 0.6, 78
 # The distance of bodies side by side, in heights of the tallest.
 _SPACING = 0.7
 # The number of performances by default.
@@ -118,16 +126,16 @@ class SkeletonDisplay:
 
     def __init__(
         self,
-        scenes,
-        skeleton,
-        titles,
+        scenes: Sequence[Sequence[np.ndarray]],
+        skeleton: Skeleton | None,
+        titles: Sequence[str],
         *,
-        durations=None,
-        labels=None,
-        marked=None,
-        behind=None,
-        heading=None,
-    ):
+        durations: Sequence[Sequence[float]] | None = None,
+        labels: Sequence[str] | None = None,
+        marked: Sequence[Sequence[tuple[int, int]]] | None = None,
+        behind: Sequence[Sequence[np.ndarray]] | None = None,
+        heading: str | None = None,
+    ) -> None:
         self.scenes, self.skeleton, self.titles = scenes, skeleton, titles
         self.durations, self.labels, self.heading = durations, labels, heading
         self.marked, self.behind = marked, behind
@@ -136,7 +144,15 @@ class SkeletonDisplay:
         return f"SkeletonDisplay({len(self.scenes)} panels)"
 
     @classmethod
-    def from_positions(cls, X, skeleton, *, frames=6, ax=None, **view):
+    def from_positions(
+        cls,
+        X: PerformancesLike,
+        skeleton: Skeleton | None,
+        *,
+        frames: int | Sequence[int] | np.ndarray = 6,
+        ax: AxesLike | None = None,
+        **view: Any,
+    ) -> Self:
         """Draw postures of one performance, or of synchronised ones over each other.
 
         Parameters
@@ -167,7 +183,15 @@ class SkeletonDisplay:
         return cls(postures_at(frames, *bodies), skeleton, titles).plot(ax, **view)
 
     @classmethod
-    def from_postures(cls, X, cosines, *, frames=6, ax=None, **view):
+    def from_postures(
+        cls,
+        X: PerformancesLike,
+        cosines: DirectionCosines,
+        *,
+        frames: int | Sequence[int] | np.ndarray = 6,
+        ax: AxesLike | None = None,
+        **view: Any,
+    ) -> Self:
         """Draw postures given by their direction cosines.
 
         Parameters
@@ -200,7 +224,15 @@ class SkeletonDisplay:
         return cls.from_positions(X, cosines.skeleton.body(), frames=frames, ax=ax, **view)
 
     @classmethod
-    def from_performances(cls, X, skeleton, *, names=None, ax=None, **view):
+    def from_performances(
+        cls,
+        X: PerformancesLike,
+        skeleton: Skeleton | None,
+        *,
+        names: Sequence[str] | None = None,
+        ax: AxesLike | None = None,
+        **view: Any,
+    ) -> Self:
         """Draw performances side by side, each at its own pace, such as two subjects and a blend.
 
         Parameters
@@ -225,7 +257,16 @@ class SkeletonDisplay:
         return cls([bodies], skeleton, ["each at its own pace"], labels=labels).plot(ax, **view)
 
     @classmethod
-    def from_predictions(cls, X, times, skeleton, *, names=None, ax=None, **view):
+    def from_predictions(
+        cls,
+        X: PerformancesLike,
+        times: NumbersLike,
+        skeleton: Skeleton | None,
+        *,
+        names: Sequence[str] | None = None,
+        ax: AxesLike | None = None,
+        **view: Any,
+    ) -> Self:
         """Draw performances as recorded above the same ones synchronised by known warps.
 
         Parameters
@@ -255,15 +296,23 @@ class SkeletonDisplay:
         return cls(
             [bodies, list(warped)],
             skeleton,
-            ["as recorded: each at its own pace", "synchronised: all on one clock"],
+            ["as recorded", "aligned"],
             durations=[durations, [float(np.median(durations))] * len(bodies)],
             labels=labels,
         ).plot(ax, **view)
 
     @classmethod
     def from_estimator(
-        cls, estimator, X, *, performances=None, ax=None, at=0.0, azimuth=-60, **params
-    ):
+        cls,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
+        *,
+        performances: Sequence[int] | np.ndarray | None = None,
+        ax: AxesLike | None = None,
+        at: float = 0.0,
+        azimuth: float = -60,
+        **params: Any,
+    ) -> Self:
         """Draw performances as recorded above the same ones synchronised by a pipeline.
 
         Parameters
@@ -301,7 +350,7 @@ class SkeletonDisplay:
             [as_performances(X)[i] for i in performances],
             match.times[performances],
             views[0].skeleton,
-            names=[f"{i} (pattern)" if i == pattern else str(i) for i in performances],
+            names=[f"{i} (template)" if i == pattern else str(i) for i in performances],
             ax=ax,
             at=at,
             azimuth=azimuth,
@@ -309,8 +358,15 @@ class SkeletonDisplay:
 
     @classmethod
     def from_model(
-        cls, estimator, *, frames=(0.1, 0.4), n_samples=12, random_state=None, ax=None, **view
-    ):
+        cls,
+        estimator: BaseEstimator,
+        *,
+        frames: Sequence[float] | np.ndarray = (0.1, 0.4),
+        n_samples: int = 12,
+        random_state: RandomState = None,
+        ax: AxesLike | None = None,
+        **view: Any,
+    ) -> Self:
         """Draw mean postures of a model, and random postures that it accepts (Fig. 4).
 
         Parameters
@@ -362,7 +418,7 @@ class SkeletonDisplay:
             for points in (mean[[frame]], samples[accepted, :width]):
                 scenes.append([x[np.newaxis] - floor for x in bodies_of(points)])
             titles += [
-                f"frame {frame}\nmean posture",
+                f"frame {frame}\nmean pose",
                 f"frame {frame}\n{counted(sum(accepted), 'sample')}",
             ]
         return cls(scenes, skeleton, titles).plot(ax, **view)
@@ -370,17 +426,17 @@ class SkeletonDisplay:
     @classmethod
     def from_departures(
         cls,
-        estimator,
-        X,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
         *,
-        performance=0,
-        frames=6,
-        limit=None,
-        ax=None,
-        at=0.0,
-        azimuth=-60,
-        **params,
-    ):
+        performance: int = 0,
+        frames: int | Sequence[int] | np.ndarray = 6,
+        limit: float | None = None,
+        ax: AxesLike | None = None,
+        at: float = 0.0,
+        azimuth: float = -60,
+        **params: Any,
+    ) -> Self:
         """Draw when a performance departs from an action, and with which limbs.
 
         The figure shows postures of the performance on the clock of the model, before pale shadows
@@ -470,7 +526,7 @@ class SkeletonDisplay:
             shadows[..., 1] -= floor
         verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
         if verdict == "accepted" and departs_outside_aspace(view, i, limbs.columns):
-            note += ": the model sees what the aSpace keeps,\n"
+            note += ": the model sees what the aSpace keeps, "
             note += "which leaves out how far some limbs depart"
         display = cls(
             postures_at(shown, bodies),
@@ -478,13 +534,14 @@ class SkeletonDisplay:
             titles,
             marked=marked,
             behind=postures_at(shown, shadows),
-            heading=f"{name} is {verdict}{note}.\nViolet: limbs more than {limit:.3g} standard "
-            "deviations from what is expected of a new person, at or around\nthat frame; beyond "
-            f"{view.model.simultaneous_factor():.2g} is rare. Pale: the mean performance.",
+            heading=f"{name.replace('Performance', 'Trial', 1)} is {verdict}{note}.\n"
+            f"Violet: limbs more than {limit:.3g} standard deviations from what is expected of a "
+            "new person, at or around that frame; beyond "
+            f"{view.model.simultaneous_factor():.2g} is rare. Pale: the mean.",
         )
         return display.plot(ax, at=at, azimuth=azimuth)
 
-    def plot(self, ax=None, *, at=0.0, azimuth=-60):
+    def plot(self, ax: AxesLike | None = None, *, at: float = 0.0, azimuth: float = -60) -> Self:
         """Draw.
 
         Parameters
@@ -517,23 +574,30 @@ class SkeletonDisplay:
                 [[x + [gap * i, 0] for i, x in enumerate(scene)] for scene in scenes]
                 for scenes in (drawn, behind)
             )
-        n_cols = 1 if self.labels is not None else min(len(drawn), _PANELS_A_ROW)
+        n_cols = 1
+        if self.labels is None:
+            n_cols = -(-len(drawn) // -(-len(drawn) // _PANELS_A_ROW))
         n_rows = -(-len(drawn) // n_cols)
         low, high = bounds(
             np.concatenate([x.reshape(-1, 2) for scene in drawn + behind for x in scene])
         )
         width, height = high - low
-        # All panels have one scale; a figure is about 10 inches wide.
-        scale = min(9.5 / (1.1 * n_cols * width), 3 / height)
-        size = n_cols * (1.1 * width * scale + 0.15), n_rows * (1.1 * height * scale + 0.75)
-        if self.heading is not None:
-            size = max(size[0], _HEADING[0]), size[1] + _HEADING[1]
+        # All panels have one scale.
+        scale = min(
+            (WIDTH - 0.15 * n_cols) / (1.1 * n_cols * width), (2.6 if n_rows == 1 else 2) / height
+        )
+        size = n_cols * (1.1 * width * scale + 0.15), n_rows * (1.1 * height * scale + 0.8) + 0.25
+        # Titles have the room of short words.
+        size = max(size[0], min(WIDTH, 1.5 * n_cols)), size[1]
+        if self.labels is not None or self.heading is not None:
+            size = WIDTH, size[1] + _HEADING * (self.heading is not None)
         cells = [divmod(i, n_cols) for i in range(len(drawn))]
         before = getattr(self, "axes_", ())
         self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, size, before)
         self.heading_ = None
         if ax is None and self.heading is not None:
-            self.heading_ = self.figure_.suptitle(self.heading, fontsize="medium")
+            lines = [fill(line, _LINE_LENGTH) for line in self.heading.splitlines()]
+            self.heading_ = self.figure_.suptitle("\n".join(lines), fontsize="medium")
         self._drawn, self._behind, self._bones = drawn, behind, self._bones_of_panels()
         self.bones_, self.heads_, self.behind_ = [], [], []
         for axis, title, scene in zip(self.axes_, self.titles, drawn, strict=True):
@@ -544,7 +608,14 @@ class SkeletonDisplay:
         self._show(at)
         return self
 
-    def animate(self, ax=None, *, seconds=5.0, fps=15, azimuth=-60):
+    def animate(
+        self,
+        ax: AxesLike | None = None,
+        *,
+        seconds: float = 5.0,
+        fps: int = 15,
+        azimuth: float = -60,
+    ) -> Animation:
         """Animate the performances.
 
         Parameters

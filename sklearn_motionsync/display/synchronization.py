@@ -1,17 +1,31 @@
 """SynchronizationDisplay: features before and after synchronisation, and the warps (Figs. 1, 3)."""
 
+from collections.abc import Sequence
+from typing import Any, Self
+
 import numpy as np
+from sklearn.base import BaseEstimator
 
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.types import (
+    Features,
+    Labels,
+    NumbersLike,
+    PerformanceLike,
+    PerformancesLike,
+    Unit,
+    ValuesLike,
+)
 from ..inputs.validation import read_collection
 from ..inputs.wording import counted
 from ..synchronizers.match import match_of_times, rates_of
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
-from .arguments import as_names
+from .arguments import AxesLike, as_names
 from .drawing import (
     COLORS,
+    WIDTH,
     curves,
     front_line,
     group_styles,
@@ -25,9 +39,9 @@ __all__ = ["SynchronizationDisplay"]
 
 # Labels of the vertical axis of the warps.
 _WARP_LABELS = {
-    "frames": "frame tau(p) of the performance,\nevenly stretched to the clock",
-    "percent": "% of the performance",
-    "seconds": "time of the performance (s),\nevenly stretched to the clock",
+    "frames": "frame of the trial,\nstretched to the template",
+    "percent": "% of the trial",
+    "seconds": "time of the trial (s),\nstretched to the template",
 }
 
 
@@ -88,17 +102,17 @@ class SynchronizationDisplay:
 
     def __init__(
         self,
-        before,
-        after,
-        times,
+        before: PerformancesLike,
+        after: PerformancesLike,
+        times: NumbersLike,
         *,
-        feature_names,
-        pattern=None,
-        pattern_index=None,
-        groups=None,
-        unit="frames",
-        frame_rate=None,
-    ):
+        feature_names: Sequence[str],
+        pattern: PerformanceLike | None = None,
+        pattern_index: int | None = None,
+        groups: Labels | None = None,
+        unit: Unit = "frames",
+        frame_rate: float | ValuesLike | None = None,
+    ) -> None:
         self.before = [np.asarray(x) for x in before]
         self.after, self.times = np.asarray(after), np.asarray(times)
         self.feature_names = feature_names
@@ -115,17 +129,17 @@ class SynchronizationDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
         *,
-        features=None,
-        groups=None,
-        unit="frames",
-        frame_rate=None,
-        warps=True,
-        ax=None,
-        **params,
-    ):
+        features: Features | None = None,
+        groups: Labels | None = None,
+        unit: Unit = "frames",
+        frame_rate: float | ValuesLike | None = None,
+        warps: bool = True,
+        ax: AxesLike | None = None,
+        **params: Any,
+    ) -> Self:
         """Draw performances before and after synchronisation.
 
         Parameters
@@ -180,18 +194,18 @@ class SynchronizationDisplay:
     @classmethod
     def from_predictions(
         cls,
-        X,
-        times,
+        X: PerformancesLike,
+        times: NumbersLike,
         *,
-        pattern=None,
-        features=None,
-        feature_names=None,
-        groups=None,
-        unit="frames",
-        frame_rate=None,
-        warps=True,
-        ax=None,
-    ):
+        pattern: PerformanceLike | None = None,
+        features: Features | None = None,
+        feature_names: Sequence[str] | None = None,
+        groups: Labels | None = None,
+        unit: Unit = "frames",
+        frame_rate: float | ValuesLike | None = None,
+        warps: bool = True,
+        ax: AxesLike | None = None,
+    ) -> Self:
         """Draw performances and warps that are known already.
 
         Parameters
@@ -257,7 +271,7 @@ class SynchronizationDisplay:
         )
         return display.plot(ax, warps=warps)
 
-    def plot(self, ax=None, *, warps=True):
+    def plot(self, ax: AxesLike | None = None, *, warps: bool = True) -> Self:
         """Draw.
 
         Parameters
@@ -273,14 +287,16 @@ class SynchronizationDisplay:
         SynchronizationDisplay
             The display itself.
         """
-        n_rows, n_cols = len(self.feature_names), 2 + bool(warps)
+        n_rows = len(self.feature_names)
         cells = [(row, column) for row in range(n_rows) for column in (0, 1)]
-        cells += [(slice(None), 2)] * bool(warps)
+        cells += [(slice(n_rows, None), slice(None))] * bool(warps)
         styles = {} if self.groups is None else group_styles(self.groups)
         colors = [styles[group][0] for group in self.groups or ()] or COLORS["performance"]
         n_lines = -(-len(styles) // 3)
-        size = (3.2 * n_cols, max(2.6, 1.6 * n_rows + 0.8) + 0.2 * n_lines)
-        self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, size)
+        # The warps are as high as two rows of features.
+        n_all = n_rows + bool(warps) * min(n_rows, 2)
+        size = (WIDTH, max(2.6, 1.6 * n_all + 0.8) + bool(warps) + 0.2 * n_lines)
+        self.figure_, self.axes_ = panels(ax, cells, n_all, 2, size)
         style = {"colors": colors, "linewidths": 0.9, "alpha": 0.35 if styles else 0.55}
         clock, own = self._axis.clock, self._axis.performances()
         self.before_, self.after_, self.pattern_, self.group_means_ = [], [], [], []
@@ -295,9 +311,9 @@ class SynchronizationDisplay:
             right.sharey(left)
             right.autoscale_view()
             if row == 0:
-                left.set_title(f"as recorded\n{counted(len(self.before), 'performance')}")
-                means = ", thick: means of groups" if styles else ""
-                right.set_title(f"synchronised{means}\n{self._describe_pattern()}")
+                left.set_title(f"as recorded\n{counted(len(self.before), 'trial')}")
+                means = ", thick: group means" if styles else ""
+                right.set_title(f"aligned{means}\n{self._describe_pattern()}")
         left.set_xlabel(self._axis.performance_label)
         right.set_xlabel(self._axis.label)
         self.warps_ = self._draw_warps(self.axes_[-1], clock, style) if warps else None
@@ -311,8 +327,8 @@ class SynchronizationDisplay:
     def _describe_pattern(self):
         if self.pattern is None:
             return "black: their mean"
-        which = "" if self.pattern_index is None else f", performance {self.pattern_index}"
-        return f"black: the pattern{which}"
+        which = "" if self.pattern_index is None else f", trial {self.pattern_index}"
+        return f"black: the template{which}"
 
     def _draw_means(self, axis, clock, row, styles):
         """Draw the mean of each group in front of its performances."""
@@ -335,10 +351,10 @@ class SynchronizationDisplay:
         times = self._axis.convert(self.times)
         lines = curves(axis, [clock] * len(times), times, **style)
         axis.plot(clock, clock, "--", color=COLORS["pattern"], linewidth=1)
-        axis.set_title("warps\ndashed: an even pace")
+        axis.set_title("warps; dashed: an even pace")
         axis.set_xlabel(self._axis.label)
         axis.set_ylabel(_WARP_LABELS[self.unit])
         place = {"transform": axis.transAxes, "fontsize": "small", "color": "0.3"}
-        axis.text(0.04, 0.96, "later than\nthe pattern", va="top", **place)
-        axis.text(0.96, 0.04, "earlier than\nthe pattern", ha="right", **place)
+        axis.text(0.04, 0.96, "later than\nthe template", va="top", **place)
+        axis.text(0.96, 0.04, "earlier than\nthe template", ha="right", **place)
         return lines

@@ -8,14 +8,14 @@ from ..synchronizers.match import check_unit
 __all__ = ["TimeAxis"]
 
 _PERFORMANCE_LABELS = {
-    "frames": "frame of the performance",
-    "percent": "% of the performance",
-    "seconds": "time of the performance (s)",
+    "frames": "frame of the trial",
+    "percent": "% of the trial",
+    "seconds": "time of the trial (s)",
 }
 _CLOCK_LABELS = {
-    "frames": "frame of the pattern",
-    "percent": "% of the pattern",
-    "seconds": "time (s), of median duration",
+    "frames": "frame of the template",
+    "percent": "% of the template",
+    "seconds": "time of the median trial (s)",
 }
 
 

@@ -1,17 +1,37 @@
 """TrackingDisplay: the estimated postures of a tracked body, and what was observed of it."""
 
+from collections.abc import Sequence
 from textwrap import fill
+from typing import Any, Literal, Self
 
 import numpy as np
+from sklearn.base import BaseEstimator
 
 from ..body.direction_cosines import DirectionCosines
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.types import (
+    Features,
+    Indexed,
+    NumbersLike,
+    PerformanceLike,
+    PerformancesLike,
+    ValuesLike,
+)
 from ..inputs.wording import counted
 from ..online.particle_filter import Track
 from ..online.tracker import MotionTracker
-from .arguments import TIME_LABELS, Takes, as_frames, as_index, as_names, one_each, times_from_zero
+from .arguments import (
+    TIME_LABELS,
+    AxesLike,
+    Takes,
+    as_frames,
+    as_index,
+    as_names,
+    one_each,
+    times_from_zero,
+)
 from .bodies import invert_postures
-from .drawing import COLORS, legend_above, panels
+from .drawing import COLORS, WIDTH, legend_above, panels
 from .limb_departures import bones_of_limbs, limb_of
 from .stick_figures import SkeletonDisplay, postures_at
 
@@ -21,8 +41,8 @@ __all__ = ["TrackingDisplay"]
 _N_FEATURES = 4
 # Standard deviations on each side that contain 90 %.
 _BAND = 1.645
-# The height of a panel and the width of the figure in inches.
-_PANEL, _WIDTH = 1.15, 8.5
+# The height of a panel in inches.
+_PANEL = 1.15
 # Characters a line of an axis label.
 _LINE_LENGTH = 18
 
@@ -83,15 +103,15 @@ class TrackingDisplay:
 
     def __init__(
         self,
-        track,
+        track: Track,
         *,
-        truth=None,
-        observed=None,
-        times=None,
-        n_frames=None,
-        names=None,
-        unit="frames",
-    ):
+        truth: PerformanceLike | None = None,
+        observed: PerformanceLike | None = None,
+        times: ValuesLike | None = None,
+        n_frames: int | None = None,
+        names: Sequence[str] | None = None,
+        unit: Literal["frames", "seconds"] = "frames",
+    ) -> None:
         shape = np.shape(track.postures)
         self.track, self.n_frames, self.unit = track, n_frames, unit
         self.truth = None if truth is None else np.asarray(truth, dtype=np.float64)
@@ -113,18 +133,18 @@ class TrackingDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
         *,
-        truth=None,
-        smooth=False,
-        times=None,
-        projection=None,
-        take=0,
-        features=None,
-        names=None,
-        ax=None,
-    ):
+        truth: PerformancesLike | None = None,
+        smooth: bool = False,
+        times: Indexed[ValuesLike] | ValuesLike | None = None,
+        projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
+        take: int = 0,
+        features: Features | None = None,
+        names: Sequence[str] | None = None,
+        ax: AxesLike | None = None,
+    ) -> Self:
         """Track a take, and draw the estimate.
 
         Parameters
@@ -191,7 +211,14 @@ class TrackingDisplay:
         return display.plot(ax, features=features)
 
     @classmethod
-    def from_predictions(cls, track, *, features=None, ax=None, **known):
+    def from_predictions(
+        cls,
+        track: Track,
+        *,
+        features: Features | None = None,
+        ax: AxesLike | None = None,
+        **known: Any,
+    ) -> Self:
         """Draw a track that is known already.
 
         Parameters
@@ -223,7 +250,7 @@ class TrackingDisplay:
             )
         return cls(track, **known).plot(ax, features=features)
 
-    def plot(self, ax=None, *, features=None):
+    def plot(self, ax: AxesLike | None = None, *, features: Features | None = None) -> Self:
         """Draw.
 
         Parameters
@@ -242,7 +269,7 @@ class TrackingDisplay:
         """
         shown = self._most_varied() if features is None else choose_features(features, self.names)
         count = len(shown) + 2
-        size = _WIDTH, _PANEL * count + 0.6
+        size = WIDTH, _PANEL * count + 0.6
         cells, before = [(i, 0) for i in range(count)], getattr(self, "axes_", ())
         self.figure_, self.axes_ = panels(ax, cells, count, 1, size, before)
         self.estimates_, self.bands_, self.truths_, self.observed_ = [], [], [], []
@@ -270,7 +297,14 @@ class TrackingDisplay:
         legend_above(self.axes_[:1], list(of_label.values()), list(of_label))
         return self
 
-    def strip(self, cosines, *, frames=6, ax=None, **view):
+    def strip(
+        self,
+        cosines: DirectionCosines,
+        *,
+        frames: int | Sequence[int] | np.ndarray = 6,
+        ax: AxesLike | None = None,
+        **view: Any,
+    ) -> SkeletonDisplay:
         """Draw estimated bodies at some frames, before the true ones; hidden limbs are violet.
 
         Parameters
@@ -304,7 +338,9 @@ class TrackingDisplay:
             behind=None if truth is None else postures_at(shown, truth),
         ).plot(ax, **view)
 
-    def side_by_side(self, cosines, *, ax=None, **view):
+    def side_by_side(
+        self, cosines: DirectionCosines, *, ax: AxesLike | None = None, **view: Any
+    ) -> SkeletonDisplay:
         """Draw the observed, the estimated and the true body side by side.
 
         Parameters

@@ -1,10 +1,15 @@
 """TrellisDisplay: the disparity space of one pair, and the path through it (Fig. 2)."""
 
-import numpy as np
+from typing import Any, Self
 
+import numpy as np
+from sklearn.base import BaseEstimator
+
+from ..inputs.types import PerformanceLike, PerformancesLike, ValuesLike
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
-from .drawing import COLORS, panels
+from .arguments import AxesLike
+from .drawing import COLORS, WIDTH, legend_above, panels
 
 __all__ = ["TrellisDisplay"]
 
@@ -27,7 +32,7 @@ class TrellisDisplay:
         The offsets of the best path between the pattern and the performance.
     warp : array-like, shape (P,)
         The final offsets Delta(p), after consensus, smoothing and refinement.
-    names : (str, str), default=("pattern", "performance")
+    names : (str, str), default=("template", "trial")
         Names of the pattern and of the performance.
 
     Attributes
@@ -55,7 +60,16 @@ class TrellisDisplay:
     (50, 41)
     """
 
-    def __init__(self, frames, offsets, costs, path, warp, *, names=("pattern", "performance")):
+    def __init__(
+        self,
+        frames: ValuesLike,
+        offsets: ValuesLike,
+        costs: PerformanceLike,
+        path: ValuesLike,
+        warp: ValuesLike,
+        *,
+        names: tuple[str, str] = ("template", "trial"),
+    ) -> None:
         self.frames, self.offsets = np.asarray(frames, dtype=np.float64), np.asarray(offsets)
         self.costs, self.path, self.warp = np.asarray(costs), np.asarray(path), np.asarray(warp)
         self.names = names
@@ -64,7 +78,16 @@ class TrellisDisplay:
         return f"TrellisDisplay({self.names[1]} matched to {self.names[0]})"
 
     @classmethod
-    def from_estimator(cls, estimator, X, *, performance=0, ax=None, colorbar=True, **params):
+    def from_estimator(
+        cls,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
+        *,
+        performance: int = 0,
+        ax: AxesLike | None = None,
+        colorbar: bool = True,
+        **params: Any,
+    ) -> Self:
         """Draw the disparity space of the pattern and one performance.
 
         Parameters
@@ -93,10 +116,10 @@ class TrellisDisplay:
         space = synchronizer.disparity_space(performances, performance)
         warp = synchronizer.match(performances.take([performance])).offsets[0]
         index = index_of_pattern(synchronizer, performances)
-        names = ("pattern" if index is None else f"pattern {index}", f"performance {performance}")
+        names = ("template" if index is None else f"template {index}", f"trial {performance}")
         return cls(**space, warp=warp, names=names).plot(ax, colorbar=colorbar)
 
-    def plot(self, ax=None, *, colorbar=True):
+    def plot(self, ax: AxesLike | None = None, *, colorbar: bool = True) -> Self:
         """Draw.
 
         Parameters
@@ -115,7 +138,7 @@ class TrellisDisplay:
         from matplotlib.patches import Patch
         from matplotlib.patheffects import Normal, Stroke
 
-        self.figure_, (self.ax_,) = panels(ax, [(0, 0)], 1, 1, (7, 4))
+        self.figure_, (self.ax_,) = panels(ax, [(0, 0)], 1, 1, (WIDTH, 4))
         frames = np.arange(len(self.path))
         # Low costs are dark; the square root resolves differences among them.
         self.image_ = self.ax_.imshow(
@@ -143,16 +166,15 @@ class TrellisDisplay:
         )
         self.ax_.set_title(f"{self.names[1]} matched to {self.names[0]}", fontsize="medium")
         self.ax_.set_xlabel(f"frame p of {self.names[0]}")
-        self.ax_.set_ylabel(f"offset d of {self.names[1]}, frames")
+        self.ax_.set_ylabel(f"offset d of {self.names[1]} (frames)")
         outside = Patch(facecolor="0.85", edgecolor="0.6", label="no path can pass")
         handles = [self.path_, self.warp_, outside]
-        # A frame and no grid, whatever the style: the legend covers an image.
-        self.ax_.legend(handles=handles, loc="best", fontsize="small", frameon=True)
+        legend_above([self.ax_], handles, [handle.get_label() for handle in handles])
         self.ax_.grid(False)
         self.colorbar_ = None
         if colorbar:
             self.colorbar_ = self.figure_.colorbar(self.image_, ax=self.ax_)
-            self.colorbar_.set_label("disparity E(p, d); dark: alike")
+            self.colorbar_.set_label("difference E(p, d); dark: alike")
         return self
 
 

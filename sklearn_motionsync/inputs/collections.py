@@ -2,8 +2,9 @@
 
 A set of performances is a list of 2-D arrays ``(n_frames_i, n_features)``. A 3-D array, a 1-D
 object array, a list of DataFrames (of pandas or polars) and a DataFrame indexed by performance, in
-one level or more, and frame are the same thing. A 2-D array is read by rows: postures for the
-posture-level estimators, univariate sequences for the sequence-level ones.
+one level or more, and frame are the same thing; so are a table with a series in each cell, and a
+DataArray of xarray (`containers`). A 2-D array is read by rows: postures for the posture-level
+estimators, univariate sequences for the sequence-level ones.
 
 Any other sequence that gives performances by index, ``len(X)`` and ``X[i]``, such as one that opens
 a file for each, or a 3-D data set on disk, is a list of them, too: each is read once, one after the
@@ -22,6 +23,7 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 
+from .containers import as_table, check_dimensions, is_nested, split_nested
 from .facts import facts_of
 from .numbers import (
     FLOATS,
@@ -172,7 +174,7 @@ def check_members(
             raise ValueError(
                 f"{what(i)} has shape {array.shape}, expected (n_frames, n_features) with at least "
                 "2 frames and 1 feature. Give a univariate performance as a column, "
-                "x[:, np.newaxis]."
+                "x[:, np.newaxis]; if all are (n_features, n_frames), give [x.T for x in X]."
             )
         if own != names and fitted is not None and names is fitted:
             check_names(x, names, what(i))
@@ -247,9 +249,9 @@ def as_collection(X):
     _refuse_containers(X)
     X = as_pandas(X)
     if isinstance(X, pd.DataFrame):
-        if X.index.nlevels < 2:
-            return None
-        return split_table(X)
+        if is_nested(X):
+            return split_nested(X)
+        return split_table(X) if X.index.nlevels > 1 else None
     if isinstance(X, np.ndarray):
         if X.ndim == 3:
             return list(X)
@@ -272,10 +274,10 @@ def as_collection(X):
 # Containers of other packages, by package and class, and the way from them to a list.
 _CONTAINERS = {
     ("xarray", "Dataset"): "sklearn_motionsync.io.from_poses(X) gives the performances of one; of "
-    "several, [x for poses in X for x in from_poses(poses)].",
+    "several, [x for poses in X for x in from_poses(poses)]. Of variables that are features, "
+    "to_sequences(X.to_dataframe(dim_order=[..., 'time'])).",
     ("skfda", "FDataGrid"): "Give list(X.data_matrix).",
 }
-_NESTED = "A cell of the table holds a series. Give [np.column_stack(row) for row in X.to_numpy()]."
 
 
 def _refuse_containers(X):
@@ -285,16 +287,13 @@ def _refuse_containers(X):
         way = _CONTAINERS.get((kind.__module__.partition(".")[0], kind.__name__))
         if way:
             raise ValueError(f"{ACCEPTED}, got {kind.__name__}. {way}")
-    table = isinstance(X, pd.DataFrame) and X.shape[1] > 0
-    if table and X.dtypes.iloc[0].kind == "O" and any(map(_depth, X.iloc[:1, 0])):
-        raise ValueError(f"{ACCEPTED}. {_NESTED}")
 
 
 def _members(X):
     """The performances of a list; None for the rows of a matrix."""
     if set(map(type, X)) == {np.ndarray} and max([x.ndim for x in X]) >= 2:
         return list(X)
-    items = [as_pandas(x) for x in X]
+    items = [as_table(x) for x in X]
     for i, item in enumerate(items):
         if not _depth(item) and not isinstance(item, (Number, str, bytes, PathLike, np.generic)):
             raise ValueError(f"Performance {i} is of type {type(item).__name__}. {ACCEPTED}.")
@@ -327,7 +326,8 @@ def as_source(X):
     # An array-like of other dimensions is no collection.
     if not _has_items(X) or (hasattr(X, "__array__") and getattr(X, "ndim", 0) != 3):
         return None
-    first = as_pandas(X[0]) if len(X) else None
+    check_dimensions(X)
+    first = as_table(X[0]) if len(X) else None
     return _Source(X, first) if first is None or _depth(first) >= 2 else None
 
 
@@ -369,7 +369,7 @@ class _Source:
         if i == 0 and self._first is not None:
             first, self._first = self._first, None
             return first
-        return as_pandas(self._given[i])
+        return as_table(self._given[i])
 
 
 def count_of(X):

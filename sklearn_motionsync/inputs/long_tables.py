@@ -1,12 +1,14 @@
 """Tables of frames to performances, in order of an even time, and back."""
 
 import reprlib
+from collections.abc import Hashable, Sequence
 from numbers import Real
 
 import numpy as np
 import pandas as pd
 
 from .collections import NOT_ONE, as_collection, check_members
+from .containers import is_labelled_array, is_nested
 from .facts import TIMELESS, compare_facts
 from .numbers import refuse_non_numeric
 from .recorded import CLOCK, Recorded, frame_rate_of_rows, warn_of_rows
@@ -31,22 +33,32 @@ from .tables import (
     split_table,
     stack_frame,
 )
+from .types import Labels, PerformancesLike, Table
 from .wording import counted
 
 __all__ = ["to_frame", "to_sequences"]
 
 
-def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
+def to_sequences(
+    df: Table,
+    by: str | Sequence[str] | None = None,
+    time: str | None = None,
+    *,
+    frame_rate: float | None = None,
+    max_gap_time: float | None = None,
+) -> list[pd.DataFrame]:
     """Turn a table of frames into a list of performances.
 
     Do this *before* cross-validation: scikit-learn would split the table by row.
 
     Parameters
     ----------
-    df : DataFrame of pandas or polars
+    df : DataFrame of pandas or polars, or DataArray of xarray
         One row a frame. Without ``by`` and ``time`` its index has two levels or more: the last is
         the frame, increasing within each performance, and those before it name the performance.
-        Times there that are not even are warned of.
+        Times there that are not even are warned of. Such a table is made of one with a row a
+        performance and a series in each cell, and of an array whose dimensions are those of
+        performances, ``time`` and features.
     by : str or list of str, default=None
         Columns or index levels that together tell performances apart; rows of one performance
         need not be neighbours. By default the levels of the index before the last; a table
@@ -125,12 +137,16 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
     ([0.0, 2.0, 4.0], 50.0)
     """
     df = as_pandas(df)
+    if is_labelled_array(df):
+        df = to_frame([df] if df.ndim == 2 else df)
     if not isinstance(df, pd.DataFrame):
         raise ValueError(
             f"to_sequences needs a DataFrame of pandas or polars, got {type(df).__name__}. Several "
             f"tables make one: pd.concat(tables, names={list(INDEX_NAMES)}); arrays that are "
             "performances already need no table."
         )
+    if is_nested(df):
+        df = to_frame(df)
     for name, value in (("frame_rate", frame_rate), ("max_gap_time", max_gap_time)):
         if value is None:
             continue
@@ -197,7 +213,12 @@ def to_sequences(df, by=None, time=None, *, frame_rate=None, max_gap_time=None):
     return sequences
 
 
-def to_frame(sequences, *, performances=None, columns=None):
+def to_frame(
+    sequences: PerformancesLike,
+    *,
+    performances: Labels | None = None,
+    columns: Sequence[Hashable] | pd.Index | None = None,
+) -> pd.DataFrame:
     """Turn performances into one frame that is indexed by performance and frame.
 
     Parameters

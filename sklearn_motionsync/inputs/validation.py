@@ -21,6 +21,7 @@ from .numbers import (
     refuse_non_numeric,
 )
 from .tables import FRAME, INDEX_NAMES, PERFORMANCE, SPLIT, as_pandas, labels_of, stack_frame
+from .types import PerformancesLike
 from .wording import counted
 
 __all__ = [
@@ -49,12 +50,16 @@ _NO_TIME = 0.9
 _TIME = 0.05
 # So many performances tell.
 _ENOUGH = 100
+_EXCHANGED = (
+    " If it is (n_features, n_frames), exchange the axes: give np.swapaxes(X, 1, 2), or "
+    "[x.T for x in X]."
+)
 
 
 class SequenceLevelMixin:
     """Input checks of estimators whose samples are whole performances."""
 
-    def check_performances(self, X):
+    def check_performances(self, X: PerformancesLike) -> Performances:
         """Check performances against the input contract, and against those of ``fit``.
 
         Parameters
@@ -158,6 +163,7 @@ def check_performances(
         raise ValueError(
             f"Performance {out.numbers[0]} has {counted(width, 'feature')} a frame, but {name} is "
             f"expecting {estimator.n_features_in_} features as input."
+            + (_EXCHANGED if {len(x) for x in out} == {estimator.n_features_in_} else "")
         )
     if reset:
         _check_names(estimator, sequences[0], reset)
@@ -223,7 +229,8 @@ def restore(estimator, performances, arrays, *, frames=None, columns=None):
         raise ValueError(
             f"{type(estimator).__name__} has no {container!r} output for a collection of "
             "performances, as such a table has no index to tell them apart. Use "
-            "set_output(transform='pandas'), and pl.from_pandas(table.reset_index()) on its result."
+            "set_output(transform='pandas'), and pl.DataFrame(table.reset_index().to_dict('list')) "
+            "on its result."
         )
     if performances.kind == "array" or isinstance(arrays, np.ndarray):
         return np.stack(arrays) if isinstance(arrays, list) else arrays
@@ -326,8 +333,7 @@ def _warn_of_exchanged_axes(performances):
     if _smoothness(np.stack(some)) > _NO_TIME:
         warnings.warn(
             f"Every performance has {n_frames} frames of {width} features, and its features change "
-            "more smoothly than its frames. If it is (n_features, n_frames), exchange the axes: "
-            "give np.swapaxes(X, 1, 2), or [x.T for x in X].",
+            f"more smoothly than its frames.{_EXCHANGED}",
             UserWarning,
             stacklevel=2,
         )

@@ -3,6 +3,7 @@
 import math
 import warnings
 from collections import Counter
+from collections.abc import Hashable
 from numbers import Real
 
 import numpy as np
@@ -17,7 +18,13 @@ _HELP = (
 )
 
 
-def cut_at_events(df, start, stop=None, *, performance=None):
+def cut_at_events(
+    df: pd.DataFrame,
+    start: str | tuple[str, str],
+    stop: str | tuple[str, str] | None = None,
+    *,
+    performance: Hashable = None,
+) -> list[pd.DataFrame]:
     """Cut a recording into performances at its events, such as gait cycles at heel strikes.
 
     Parameters

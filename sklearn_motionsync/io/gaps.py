@@ -2,6 +2,7 @@
 
 import warnings
 from numbers import Integral
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -16,7 +17,7 @@ from .events import name_recording
 _POSITIONS = ("joints", "markers", "keypoints")
 
 
-def find_gaps(df):
+def find_gaps(df: pd.DataFrame) -> pd.DataFrame:
     """List the gaps of a recording.
 
     Parameters
@@ -74,7 +75,9 @@ def find_gaps(df):
     )
 
 
-def fill_gaps(df, max_gap, *, ends="keep"):
+def fill_gaps(
+    df: pd.DataFrame, max_gap: int, *, ends: Literal["keep", "trim"] = "keep"
+) -> pd.DataFrame:
     """Interpolate short gaps of a recording, and trim it to what was seen.
 
     Parameters

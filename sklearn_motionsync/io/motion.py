@@ -3,7 +3,9 @@
 import inspect
 import os
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any, Literal
 
 import pandas as pd
 
@@ -46,8 +48,15 @@ READERS = {
 
 
 def read_motion(
-    path, *, asf=None, frame_rate=None, max_gap=0, ends="keep", group=None, columns=None
-):
+    path: Path | Iterable[Path],
+    *,
+    asf: Path | None = None,
+    frame_rate: float | None = None,
+    max_gap: int = 0,
+    ends: Literal["keep", "trim"] = "keep",
+    group: str | None = None,
+    columns: Literal["common"] | None = None,
+) -> Any:
     """Read recordings from files of motion capture (BVH, AMC, C3D, TRC, MOT or STO).
 
     Parameters

@@ -1,7 +1,9 @@
 """Poses in labelled arrays: key-points that `movement` and other programs track in videos."""
 
 import math
+from collections.abc import Hashable
 from numbers import Real
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,7 +19,14 @@ _DIMENSIONS = ("time", "individual", "keypoint", "space")
 _RENAMED = {"individuals": "individual", "keypoints": "keypoint"}
 
 
-def from_poses(poses, *, min_confidence=None, frame_rate=None, max_gap=0, performance=None):
+def from_poses(
+    poses: Any,
+    *,
+    min_confidence: float | None = None,
+    frame_rate: float | None = None,
+    max_gap: int = 0,
+    performance: Hashable = None,
+) -> list[pd.DataFrame]:
     """Convert an xarray Dataset of poses, such as one of `movement`, into recordings.
 
     Parameters

@@ -10,6 +10,7 @@ import pandas as pd
 from ..inputs.numbers import as_numbers
 from ..inputs.recorded import refuse_seconds
 from ..inputs.resampling import as_frame_rates
+from ..inputs.types import Indexed, NumbersLike, ValuesLike
 from ..inputs.wording import counted
 from ..matching.warps import evaluate_warps
 
@@ -28,7 +29,9 @@ _ROUNDING = 1e-9
 # -- timing errors against known warps, moments and key-frames -----------------------------
 
 
-def timing_error(times, true_times, *, quantile=None):
+def timing_error(
+    times: NumbersLike, true_times: NumbersLike, *, quantile: float | None = None
+) -> float:
     """Mean absolute difference of warps from known ones, in frames of the clock.
 
     ``mean_{m,p} |tau_m(p) - tau*_m(p)|``
@@ -60,7 +63,12 @@ def timing_error(times, true_times, *, quantile=None):
     return _summary(np.abs(times - true_times), quantile)
 
 
-def group_timing_error(times, moments, *, quantile=None):
+def group_timing_error(
+    times: NumbersLike,
+    moments: Indexed[ValuesLike],
+    *,
+    quantile: float | None = None,
+) -> float:
     """Mean absolute difference of the moments that a group shows at the same frame of the clock.
 
     With ``phi_m`` the true share of the action that is completed at each frame of performance m:
@@ -108,8 +116,14 @@ def group_timing_error(times, moments, *, quantile=None):
 
 
 def keyframe_error(
-    times, keyframes, pattern_keyframes, n_frames, *, frame_rate=None, quantile=None
-):
+    times: NumbersLike,
+    keyframes: NumbersLike,
+    pattern_keyframes: ValuesLike,
+    n_frames: ValuesLike,
+    *,
+    frame_rate: float | ValuesLike | None = None,
+    quantile: float | None = None,
+) -> float:
     """Mean absolute difference between matched and true key-frames.
 
     ``mean_{m,k} |tau_m(k_n) - k_m|``, with all key-frames on the clock: frame f of F is
@@ -164,7 +178,7 @@ def keyframe_error(
 # -- regularity of warps ------------------------------------------------------------------
 
 
-def pause_share(times):
+def pause_share(times: NumbersLike) -> float:
     """Share of the steps of a warp that do not advance: ``mean [tau(p+1) <= tau(p) + 1e-9]``.
 
     Parameters
@@ -191,7 +205,7 @@ def pause_share(times):
     return float((np.diff(_as_warps(times)) <= _ROUNDING).mean())
 
 
-def roughness(times):
+def roughness(times: NumbersLike) -> float:
     """Root mean square of the second differences ``tau(p+1) - 2 tau(p) + tau(p-1)``.
 
     Parameters
@@ -219,7 +233,7 @@ def roughness(times):
     return float(np.sqrt(np.square(changes).mean())) if changes.size else 0.0
 
 
-def inverse_consistency(times, back):
+def inverse_consistency(times: NumbersLike, back: NumbersLike) -> float:
     """Mean absolute error of warps composed with their inverses, ``mean |tau_mn(tau_nm(p)) - p|``.
 
     Parameters

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..inputs.types import PerformancesLike
 from .spread import check_pair
 
 __all__ = ["AmplitudePhase", "amplitude_phase_variance"]
@@ -39,7 +40,7 @@ class AmplitudePhase(NamedTuple):
     constant: float
 
 
-def amplitude_phase_variance(before, after):
+def amplitude_phase_variance(before: PerformancesLike, after: PerformancesLike) -> AmplitudePhase:
     """Split the variance of performances into that of their shapes and that of their timing.
 
     With ``x_i`` before and ``y_i`` after synchronising, means over the N performances written as

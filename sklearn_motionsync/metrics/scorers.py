@@ -2,6 +2,7 @@
 
 from copy import deepcopy
 from numbers import Integral
+from typing import Any, Literal
 
 import numpy as np
 from sklearn import get_config
@@ -9,6 +10,7 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
 from sklearn.utils.metadata_routing import MetadataRequest
 
+from ..inputs.types import PerformancesLike, RandomState
 from ..matching.warps import normalise
 from ..utils.pipelines import accepted_params, route_to_synchronizer
 from .spread import least_squares, pairwise_correlation, sobolev_least_squares
@@ -146,11 +148,15 @@ class SpreadScorer(_SynchronizerScorer):
     (2,)
     """
 
-    def __init__(self, spread="least_squares"):
+    def __init__(
+        self, spread: Literal["least_squares", "sobolev", "correlation"] = "least_squares"
+    ) -> None:
         self.spread = spread
         self._measure()
 
-    def __call__(self, estimator, X, y=None, **params):
+    def __call__(
+        self, estimator: BaseEstimator, X: PerformancesLike, y: object = None, **params: Any
+    ) -> float:
         """Score a fitted estimator on performances.
 
         Parameters
@@ -214,13 +220,20 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
     {'max_offset': 0.25}
     """
 
-    def __init__(self, spread="least_squares", n_folds=3, random_state=0):
+    def __init__(
+        self,
+        spread: Literal["least_squares", "sobolev", "correlation"] = "least_squares",
+        n_folds: int = 3,
+        random_state: RandomState = 0,
+    ) -> None:
         self.spread = spread
         self.n_folds = n_folds
         self.random_state = random_state
         self._measure()
 
-    def __call__(self, estimator, X, y=None, **params):
+    def __call__(
+        self, estimator: BaseEstimator, X: PerformancesLike, y: object = None, **params: Any
+    ) -> float:
         """Score a fitted estimator on performances.
 
         Parameters

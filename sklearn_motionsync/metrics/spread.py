@@ -9,6 +9,7 @@ import pandas as pd
 
 from ..inputs.collections import as_collection
 from ..inputs.numbers import as_numbers, check_finite
+from ..inputs.types import PerformancesLike
 
 __all__ = [
     "check_pair",
@@ -18,7 +19,7 @@ __all__ = [
 ]
 
 
-def least_squares(before, after):
+def least_squares(before: PerformancesLike, after: PerformancesLike) -> float:
     """Ratio of squared differences after and before: 1 for no gain, 0 for identical performances.
 
     ``mean_i  int |y_i - mean_{j != i} y_j|^2 dt / int |x_i - mean_{j != i} x_j|^2 dt``, the norm
@@ -66,7 +67,7 @@ def least_squares(before, after):
     return float(np.mean(new[counts] / old[counts]))
 
 
-def sobolev_least_squares(before, after):
+def sobolev_least_squares(before: PerformancesLike, after: PerformancesLike) -> float:
     """Ratio of squared differences of velocities after and before; 1 for no gain.
 
     ``sum_i int |y_i' - mean_j y_j'|^2 dt / sum_i int |x_i' - mean_j x_j'|^2 dt``
@@ -104,7 +105,7 @@ def sobolev_least_squares(before, after):
     return float(new / old)
 
 
-def pairwise_correlation(before, after):
+def pairwise_correlation(before: PerformancesLike, after: PerformancesLike) -> float:
     """Ratio of the correlations of pairs after and before: above 1 for a gain.
 
     ``sum_{i != j} cc(y_i, y_j) / sum_{i != j} cc(x_i, x_j)``, where cc is the correlation over

@@ -2,19 +2,24 @@
 
 from dataclasses import replace
 from numbers import Integral, Real
+from typing import Self
 
 import numpy as np
-from sklearn.base import BaseEstimator, _fit_context
+from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 from sklearn.utils import check_consistent_length, check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.collections import Performances
 from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.types import Labels, PerformanceLike, PerformancesLike, RandomState, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..utils.atomic import atomic_fit, atomic_partial_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
+from ..utils.parallel import LongWorkMixin
+from ..utils.parameters import validated
 from .sampling import sample_performances, sample_postures
 from .similarity import Neighbours, PerformanceStream, log_moments
 from .variation import mean_band, predictive_variance, simultaneous_factor
@@ -26,24 +31,20 @@ __all__ = ["ActionModel"]
 _VARIANCE_FLOOR = 1e-9
 
 
-class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
-    """What an action looks like at every instant, and how much people vary there.
+class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstimator):
+    """The mean movement, how much people vary about it, and whether a trial is that movement.
 
-    1. The mean performance and the variance of every posture, over synchronised
-       performances (Fig. 3d), and with them the density of a performance: independent normal
-       distributions.
-    2. The envelope: the mean, plus and minus ``n_std`` standard deviations. A posture is
-       accepted at a frame if all of its features lie inside.
-    3. Whether a performance is the action. Its dissimilarity is the mean over the two most similar
-       training performances of
+    It learns from aligned trials. Those that are unlike them are refused:
 
-       ``r(y, y_i) = |y - y_i|^2 / (|y|^2 + |y_i|^2)``,
-
-       half of postures less their own mean over time, to which a tenth of the squared distance of
-       these means is added, half of velocities: 0 is equal, 1 as dissimilar as standing still.
-    4. The threshold. Every training performance is compared with those of *other groups*; a
-       performance of a new person stays below the threshold with probability ``coverage``.
-       Standing still is always above, unless no training performance moves.
+    >>> import numpy as np
+    >>> from sklearn_motionsync import ActionModel
+    >>> t = np.linspace(0, 1, 20)[:, np.newaxis]
+    >>> performances = [a * np.sin(3 * t) for a in (0.9, 1.0, 1.1, 1.2)]
+    >>> model = ActionModel().fit(performances)
+    >>> model.predict([1.05 * np.sin(3 * t), 0 * t, np.sin(6 * t)]).tolist()
+    [1, -1, -1]
+    >>> model.accepts([[0.15], [0.9]], frame=19).tolist()
+    [True, False]
 
     Parameters
     ----------
@@ -86,23 +87,26 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
 
     Notes
     -----
+    1. The mean trial and the variance of every pose give the density of a trial, by independent
+       normal distributions (Fig. 3d).
+    2. The envelope is the mean, plus and minus ``n_std`` standard deviations. A pose is accepted at
+       a frame if all of its features lie inside.
+    3. The dissimilarity of a trial y is the mean over the two most similar training trials y_i of
+
+       ``r(y, y_i) = |y - y_i|^2 / (|y|^2 + |y_i|^2)``.
+
+       Half of it is of poses less their own mean over time, to which a tenth of the squared
+       distance of these means is added. Half of it is of velocities. 0 is equal, and 1 as
+       dissimilar as standing still.
+    4. For the threshold every training trial is compared with those of *other groups*. A trial of a
+       new person stays below it with probability ``coverage``. Standing still is always above,
+       unless no training trial moves.
+
     Give ``groups``, such as subjects, whenever people come more than once. Without them the
     threshold rests on how people repeat themselves, and new people are rejected too often:
     docs/accuracy.md. In a pipeline they are given as ``pipe.fit(X, actionmodel__groups=groups)``,
     or with scikit-learn's metadata routing as ``pipe.fit(X, groups=groups)`` after
     ``set_fit_request(groups=True)``.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from sklearn_motionsync import ActionModel
-    >>> t = np.linspace(0, 1, 20)[:, np.newaxis]
-    >>> performances = [a * np.sin(3 * t) for a in (0.9, 1.0, 1.1, 1.2)]
-    >>> model = ActionModel().fit(performances)
-    >>> model.predict([1.05 * np.sin(3 * t), 0 * t, np.sin(6 * t)]).tolist()
-    [1, -1, -1]
-    >>> model.accepts([[0.15], [0.9]], frame=19).tolist()
-    [True, False]
     """
 
     _parameter_constraints: dict = {
@@ -110,15 +114,15 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         "coverage": [Interval(Real, 0, 1, closed="neither")],
     }
 
-    def __init__(self, n_std=3.0, coverage=0.95):
+    def __init__(self, n_std: float = 3.0, coverage: float = 0.95) -> None:
         self.n_std = n_std
         self.coverage = coverage
 
     # -- fitting ------------------------------------------------------------------------------
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None, groups=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: object = None, groups: Labels | None = None) -> Self:
         """Estimate the mean performance, the variances and the threshold.
 
         Parameters
@@ -148,12 +152,15 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
                 "A model of how performances vary needs at least 2 performances, got n_samples = 1."
             )
         encode_groups(groups, len(performances), at_least=2)
-        self._update(PerformanceStream.starting_at(performances[0]), performances, groups)
+        with self._progress(fits=True):
+            self._update(PerformanceStream.starting_at(performances[0]), performances, groups)
         return self
 
     @atomic_partial_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def partial_fit(self, X, y=None, groups=None):
+    @validated
+    def partial_fit(
+        self, X: PerformancesLike, y: object = None, groups: Labels | None = None
+    ) -> Self:
         """Update the model with more performances.
 
         For more data than memory holds, and for data that come in later. The model keeps at most
@@ -215,12 +222,12 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
 
     @property
     @snapshot
-    def deviations_(self):
+    def deviations_(self) -> np.ndarray:
         """Training performances that are kept, less the mean: (n_kept, P, n_features)."""
         check_is_fitted(self)
         return self._stream.kept - self.mean_
 
-    def check_performances(self, X):
+    def check_performances(self, X: PerformancesLike) -> Performances:
         """Check that performances are synchronised, and to the clock of the model.
 
         Parameters
@@ -244,7 +251,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     # -- whole performances -------------------------------------------------------------------
 
     @snapshot
-    def score_samples(self, X):
+    def score_samples(self, X: PerformancesLike) -> np.ndarray:
         """Log-density of performances: independent normal distributions at every posture.
 
         For the choice between models of different actions. Not for whether a performance is the
@@ -267,7 +274,12 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return -0.5 * squares - log_std - 0.5 * self.mean_.size * np.log(2 * np.pi)
 
     @snapshot
-    def score(self, X, y=None, sample_weight=None):
+    def score(
+        self,
+        X: PerformancesLike,
+        y: object = None,
+        sample_weight: ValuesLike | None = None,
+    ) -> float:
         """Mean log-density of performances.
 
         Parameters
@@ -290,7 +302,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return float(np.average(densities, weights=sample_weight))
 
     @snapshot
-    def dissimilarity(self, X):
+    def dissimilarity(self, X: PerformancesLike) -> np.ndarray:
         """Mean dissimilarity of performances to the two most similar training performances.
 
         Parameters
@@ -307,7 +319,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self._neighbours.dissimilarity(performances)
 
     @snapshot
-    def threshold_at(self, coverage):
+    def threshold_at(self, coverage: float) -> float:
         """The threshold of another coverage.
 
         Parameters
@@ -331,7 +343,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self._neighbours.limit(self._log_moments, coverage)
 
     @snapshot
-    def decision_function(self, X):
+    def decision_function(self, X: PerformancesLike) -> np.ndarray:
         """How far below the threshold the dissimilarity of performances is.
 
         Parameters
@@ -348,7 +360,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self.threshold_ - dissimilarity
 
     @snapshot
-    def predict(self, X):
+    def predict(self, X: PerformancesLike) -> np.ndarray:
         """Whether performances are the action.
 
         Parameters
@@ -364,7 +376,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return np.where(self.decision_function(X) >= 0, 1, -1)
 
     @snapshot
-    def standard_scores(self, X):
+    def standard_scores(self, X: PerformancesLike) -> np.ndarray:
         """Deviations of performances from the mean, in predicted standard deviations.
 
         Parameters
@@ -387,7 +399,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
     # -- postures, bands and samples ----------------------------------------------------------
 
     @snapshot
-    def accepts(self, postures, frame):
+    def accepts(self, postures: PerformanceLike, frame: int) -> np.ndarray:
         """Whether postures lie inside the envelope at a frame.
 
         For a tracker, which prunes postures that are not possible at this instant. It does not
@@ -421,7 +433,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return ((postures >= mean - half_width) & (postures <= mean + half_width)).all(axis=1)
 
     @snapshot
-    def envelope(self, simultaneous=False):
+    def envelope(self, simultaneous: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """A band about the mean performance, for postures or for whole performances.
 
         Parameters
@@ -449,7 +461,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self.mean_ - half_width, self.mean_ + half_width
 
     @snapshot
-    def mean_envelope(self, random_state=0):
+    def mean_envelope(self, random_state: RandomState = 0) -> tuple[np.ndarray, np.ndarray]:
         """A confidence band of the population's mean, at all frames and in all features.
 
         It holds that mean with probability ``coverage``, by a bootstrap over groups: the mean to
@@ -473,7 +485,7 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self.mean_ - half_width, self.mean_ + half_width
 
     @snapshot
-    def simultaneous_factor(self):
+    def simultaneous_factor(self) -> float:
         """How many predicted standard deviations the performances of new people stay within.
 
         Whole performances, at all frames and in all features, with probability ``coverage``:
@@ -489,7 +501,9 @@ class ActionModel(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return simultaneous_factor(kept, self.groups_, self.coverage)
 
     @snapshot
-    def sample(self, n=1, frame=None, random_state=None):
+    def sample(
+        self, n: int = 1, frame: int | None = None, random_state: RandomState = None
+    ) -> np.ndarray:
         """Draw accepted postures at a frame (Fig. 4), or whole performances.
 
         Both are drawn about those of training performances chosen at random, with mean, variance

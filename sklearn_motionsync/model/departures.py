@@ -1,18 +1,27 @@
 """Departures of performances from a model: runs of frames beyond a limit."""
 
 from numbers import Real
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from sklearn.base import BaseEstimator
 
 from ..inputs.features import choose_features
+from ..inputs.types import Features, PerformancesLike
 from .views import models_of_classes, view_of
 
 __all__ = ["find_departures"]
 
 
-def find_departures(estimator, X, *, features=None, limit=None, **params):
+def find_departures(
+    estimator: BaseEstimator,
+    X: PerformancesLike,
+    *,
+    features: Features | None = None,
+    limit: float | None = None,
+    **params: Any,
+) -> pd.DataFrame:
     """Departures of performances from a model: when, in which feature, and how far.
 
     A posture departs if its deviation from the mean exceeds a limit, in the standard deviations

@@ -1,20 +1,24 @@
 """ActionDetector: whether performances as they were recorded are the action, and why not."""
 
 from numbers import Real
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 from sklearn import get_config
-from sklearn.base import BaseEstimator, MetaEstimatorMixin, _fit_context, clone
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, clone
 from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.metadata_routing import MetadataRouter, MethodMapping
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.tables import index_of
+from ..inputs.types import Labels, PerformancesLike
 from ..inputs.validation import labels_of_input
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups, sums_of_groups
+from ..utils.parallel import LongWorkMixin
+from ..utils.parameters import validated_with_nested
 from ..utils.pipelines import (
     MissingMetadata,
     accepted_params,
@@ -38,19 +42,26 @@ _REASONS = {
 }
 
 
-class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
-    """Whether performances are the action, including their timing and size.
+class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEstimator):
+    """Whether trials are the movement, by its shape, timing and size.
 
-    Synchronisation removes differences of pace, and an `ActionModel` compares shapes more than
-    sizes. The detector makes four tests of a performance, each with an acceptance region that is
-    estimated from how people differ. A performance must pass all of them.
+    It learns from trials of one movement, by a pipeline with a synchronizer and an `ActionModel`.
+    A trial four times as fast, and one without movement, are refused:
 
-    1. **movement**: its dissimilarity to the model *after* synchronisation,
-       `ActionModel.dissimilarity`.
-    2. **course**: the same after linear normalisation alone, which keeps the timing of its parts.
-    3. **duration**: its number of frames, as a ratio to the geometric mean.
-    4. **energy**: the mean squared distance of its postures from their own mean, as a ratio to the
-       geometric mean.
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from sklearn_motionsync import (
+    ...     ActionDetector, ActionModel, ASpace, DenseSynchronizer, DirectionCosines
+    ... )
+    >>> from sklearn_motionsync.datasets import make_bending
+    >>> bunch = make_bending(12, random_state=0)
+    >>> steps = DirectionCosines(bunch.skeleton), ASpace(0.95), DenseSynchronizer(50)
+    >>> detector = ActionDetector(make_pipeline(*steps, ActionModel()))
+    >>> detector = detector.fit(bunch.data, groups=bunch.actor)
+    >>> bend = bunch.data[0]
+    >>> detector.predict([bend, bend[::4], bend[:1].repeat(90, axis=0)]).tolist()
+    [1, -1, -1]
+    >>> detector.report([bend, bend[::4]])["reason"].tolist()
+    ['', 'too short']
 
     Parameters
     ----------
@@ -85,26 +96,17 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
 
     Notes
     -----
+    A trial must pass four tests. The acceptance region of each is estimated from how people differ.
+
+    1. **movement**: the dissimilarity to the model *after* alignment, `ActionModel.dissimilarity`.
+    2. **course**: the same after linear normalisation alone, which keeps the timing of its parts.
+    3. **duration**: the number of frames, as a ratio to the geometric mean.
+    4. **energy**: the mean squared distance of the poses from their own mean, as a ratio to the
+       geometric mean.
+
     Give ``groups``, such as subjects, whenever people come more than once: acceptance regions
     are then those of differences between people. Variation between people is accepted: copies
     at half or double speed are rejected only where people agree on the duration of the action.
-
-    Examples
-    --------
-    >>> from sklearn.pipeline import make_pipeline
-    >>> from sklearn_motionsync import (
-    ...     ActionDetector, ActionModel, ASpace, DenseSynchronizer, DirectionCosines
-    ... )
-    >>> from sklearn_motionsync.datasets import make_bending
-    >>> bunch = make_bending(12, random_state=0)
-    >>> steps = DirectionCosines(bunch.skeleton), ASpace(0.95), DenseSynchronizer(50)
-    >>> detector = ActionDetector(make_pipeline(*steps, ActionModel()))
-    >>> detector = detector.fit(bunch.data, groups=bunch.actor)
-    >>> bend = bunch.data[0]
-    >>> detector.predict([bend, bend[::4], bend[:1].repeat(90, axis=0)]).tolist()
-    [1, -1, -1]
-    >>> detector.report([bend, bend[::4]])["reason"].tolist()
-    ['', 'too short']
     """
 
     _parameter_constraints: dict = {
@@ -113,14 +115,18 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         "duration": ["boolean"],
     }
 
-    def __init__(self, estimator, coverage=0.95, duration=True):
+    def __init__(
+        self, estimator: BaseEstimator, coverage: float = 0.95, duration: bool = True
+    ) -> None:
         self.estimator = estimator
         self.coverage = coverage
         self.duration = duration
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y=None, groups=None, **params):
+    @validated_with_nested
+    def fit(
+        self, X: PerformancesLike, y: object = None, groups: Labels | None = None, **params: Any
+    ) -> Self:
         """Fit the pipeline, and estimate the acceptance regions.
 
         Parameters
@@ -152,20 +158,23 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         name = self._check_steps()
         groups = params.pop(name, None) if groups is None else groups
         given = {} if groups is None else {name: groups}
-        self.estimator_.fit(X, y, **given, **params)
-        before, synchronizer = find_synchronizer(self.estimator_)
-        also = {name.rpartition("__")[2]: value for name, value in params.items()}
-        steps = [] if before is None else flat_steps(before)
-        also = {k: v for step in steps for k, v in accepted_params(step.transform, also).items()}
-        reached = route_to_synchronizer(self.estimator_, X, also, "ActionDetector.fit")
-        self._learn(reached.performances, synchronizer, groups)
+        with self._progress(fits=True) as progress:
+            with progress.fitting(self.estimator_, "fitting the pipeline"):
+                self.estimator_.fit(X, y, **given, **params)
+            before, synchronizer = find_synchronizer(self.estimator_)
+            also = {name.rpartition("__")[2]: value for name, value in params.items()}
+            steps = [] if before is None else flat_steps(before)
+            taken = [accepted_params(step.transform, also) for step in steps]
+            also = {name: value for params in taken for name, value in params.items()}
+            reached = route_to_synchronizer(self.estimator_, X, also, "ActionDetector.fit")
+            self._learn(reached.performances, synchronizer, groups)
         for name in ("n_features_in_", "feature_names_in_"):
             if hasattr(self.estimator_, name):
                 setattr(self, name, getattr(self.estimator_, name))
         return self
 
     @snapshot
-    def predict(self, X, **params):
+    def predict(self, X: PerformancesLike, **params: Any) -> np.ndarray:
         """Whether performances are the action.
 
         Parameters
@@ -183,7 +192,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         return np.where(self._largest_statistic(X, params, "predict") <= 1, 1, -1)
 
     @snapshot
-    def decision_function(self, X, **params):
+    def decision_function(self, X: PerformancesLike, **params: Any) -> np.ndarray:
         """Distance of the largest test statistic of performances from its limit.
 
         Parameters
@@ -201,7 +210,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         return 1 - self._largest_statistic(X, params, "decision_function")
 
     @snapshot
-    def score_samples(self, X, **params):
+    def score_samples(self, X: PerformancesLike, **params: Any) -> np.ndarray:
         """The largest absolute test statistic of performances, negated.
 
         Parameters
@@ -219,7 +228,7 @@ class ActionDetector(DocumentedMixin, MetaEstimatorMixin, BaseEstimator):
         return -self._largest_statistic(X, params, "score_samples")
 
     @snapshot
-    def report(self, X, **params):
+    def report(self, X: PerformancesLike, **params: Any) -> pd.DataFrame:
         """The test statistics of performances, and the reason for a rejection.
 
         Parameters

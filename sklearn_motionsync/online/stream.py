@@ -2,7 +2,7 @@
 
 import warnings
 from collections import deque
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -48,9 +48,10 @@ class LivePhase(NamedTuple):
     12.5
     """
 
-    phase: float | np.ndarray
-    rate: float | np.ndarray
-    confidence: float | np.ndarray
+    # Numbers of a frame, arrays of several.
+    phase: Any
+    rate: Any
+    confidence: Any
 
 
 class Session:

@@ -1,15 +1,18 @@
 """OnlineSynchronizer: the phase of performances that are still running."""
 
 import math
+from collections.abc import Sequence
 from numbers import Real
+from typing import Any, Self
 
 import numpy as np
-from sklearn.base import BaseEstimator, MetaEstimatorMixin, _fit_context, clone
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, clone
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.facts import TIMELESS
 from ..inputs.numbers import check_magnitude
+from ..inputs.types import Indexed, NumbersLike, PerformancesLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
 from ..inputs.wording import counted
 from ..matching.causal import causal_costs, causal_velocity
@@ -24,6 +27,8 @@ from ..synchronizers.base import Synchronizer
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.atomic import atomic_fit
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
+from ..utils.parameters import validated_with_nested
 from .stream import (
     LivePhase,
     Session,
@@ -38,7 +43,9 @@ from .stream import (
 __all__ = ["OnlineSynchronizer", "Reference"]
 
 
-class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin, BaseEstimator):
+class OnlineSynchronizer(
+    DocumentedMixin, LongWorkMixin, SequenceLevelMixin, MetaEstimatorMixin, BaseEstimator
+):
     """The phase of a performance while it runs, frame by frame, however long it will last.
 
     The frames so far are the base of the trellis, and the mean of the synchronised training
@@ -142,12 +149,12 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
 
     def __init__(
         self,
-        synchronizer=None,
-        frame_rate=None,
-        smoothness=0.1,
-        velocity_smoothing=SMOOTHING,
-        max_rate=3,
-    ):
+        synchronizer: Synchronizer | None = None,
+        frame_rate: float | None = None,
+        smoothness: float = 0.1,
+        velocity_smoothing: float = SMOOTHING,
+        max_rate: float = 3,
+    ) -> None:
         self.synchronizer = synchronizer
         self.frame_rate = frame_rate
         self.smoothness = smoothness
@@ -155,8 +162,8 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         self.max_rate = max_rate
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y=None):
+    @validated_with_nested
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Learn the mean performance, its duration, and the scale of path costs.
 
         Parameters
@@ -178,23 +185,25 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         """
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
         performances = self._check_training_set(X)
-        self.synchronizer_ = sync.fit(X, y)
-        match = sync.match(X)
-        warped = match.warp(performances)
-        self.n_frames_ = sync.n_frames_
-        self.mean_ = warped.mean(axis=0)
-        self.duration_ = float(np.mean([len(x) for x in performances]) - 1)
-        settings = self.duration_, self.smoothness, self.velocity_smoothing, self.max_rate
+        with self._progress(fits=True) as progress:
+            with progress.fitting(sync, "synchronizing"):
+                self.synchronizer_ = sync.fit(X, y)
+            match = sync.match(X)
+            warped = match.warp(performances)
+            self.n_frames_ = sync.n_frames_
+            self.mean_ = warped.mean(axis=0)
+            self.duration_ = float(np.mean([len(x) for x in performances]) - 1)
+            settings = self.duration_, self.smoothness, self.velocity_smoothing, self.max_rate
 
-        def reference_of(mean, *calibration):
-            return Reference(sync.features_, mean, *settings, *calibration)
+            def reference_of(mean, *calibration):
+                return Reference(sync.features_, mean, *settings, *calibration)
 
-        calibration = calibrate(reference_of, performances, warped, match.times)
-        self._reference = reference_of(self.mean_, *calibration)
-        self._session = None
+            calibration = calibrate(reference_of, performances, warped, match.times, progress)
+            self._reference = reference_of(self.mean_, *calibration)
+            self._session = None
         return self
 
-    def step(self, frame, time=None):
+    def step(self, frame: NumbersLike, time: float | None = None) -> LivePhase:
         """Take the next frame, and estimate the phase.
 
         Parameters
@@ -232,7 +241,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
             session = self._session = Session(self._reference, frame, time)
         return session.step(frame, time)
 
-    def reset(self, stream=None):
+    def reset(self, stream: int | Sequence[int] | np.ndarray | None = None) -> None:
         """Begin another performance with the next frame.
 
         Parameters
@@ -256,7 +265,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         for n in streams:
             self._session.restart(int(n))
 
-    def time_left(self):
+    def time_left(self) -> Any:
         """Estimate the time until the performance ends.
 
         A weighted mean of what is left of the mean duration after the elapsed time, and of what is
@@ -274,7 +283,7 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
         return left if self.frame_rate is None else left / self.frame_rate
 
     @property
-    def history(self):
+    def history(self) -> LivePhase:
         """Phases, rates and confidences since the last ``reset`` of all: `LivePhase` of arrays.
 
         Of a long stream these are the last 100,000 frames.
@@ -284,7 +293,11 @@ class OnlineSynchronizer(DocumentedMixin, SequenceLevelMixin, MetaEstimatorMixin
             return LivePhase(*np.empty((3, 0)))
         return stack_phases(self._session.history)
 
-    def track(self, X, times=None):
+    def track(
+        self,
+        X: PerformancesLike,
+        times: Indexed[ValuesLike] | ValuesLike | None = None,
+    ) -> list[LivePhase]:
         """The phases of whole performances, as ``step`` estimates them frame by frame.
 
         Parameters
@@ -463,7 +476,7 @@ _MIN_PROBABILITY = 1e-12
 _DEFAULT_TEMPERATURE, _DEFAULT_COST = 0.7, 0.5
 
 
-def calibrate(reference_of, performances, warped, times):
+def calibrate(reference_of, performances, warped, times, progress):
     """Learn the temperature and the typical cost of a `Reference`.
 
     Each training performance is matched to the mean of the others. The temperature maximises the
@@ -478,6 +491,7 @@ def calibrate(reference_of, performances, warped, times):
         The synchronised performances.
     times : ndarray, shape (n_sequences, P)
         ``tau`` of each.
+    progress : Progress
 
     Returns
     -------
@@ -490,6 +504,7 @@ def calibrate(reference_of, performances, warped, times):
     energy = float(np.square(reference_of(total / n).moving).sum(axis=1).mean()) or 1.0
     if n == 1:
         return energy * _DEFAULT_TEMPERATURE, energy * _DEFAULT_COST
+    step = progress.stage("calibrating", len(chosen))
     for i in chosen:
         reference = reference_of((total - warped[i]) / (n - 1))
         costs, truth, largest_cost = _match_live(reference, performances[i], times[i])
@@ -497,6 +512,7 @@ def calibrate(reference_of, performances, warped, times):
         for k, temperature in enumerate((energy * _TEMPERATURES).tolist()):
             right = phase_probabilities(costs, temperature)[np.arange(len(costs)), truth]
             scores[k] += np.log(np.maximum(right, _MIN_PROBABILITY)).mean()
+        step()
     # Copies of one performance have no costs but rounding.
     typical_cost = max(np.median(largest), _MIN_PROBABILITY * energy)
     return float(energy * _TEMPERATURES[scores.argmax()]), float(typical_cost)

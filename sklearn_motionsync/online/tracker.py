@@ -1,9 +1,10 @@
 """MotionTracker: a body that is partly hidden, by a state-space model of its action."""
 
 from numbers import Integral, Real
+from typing import Any, Self
 
 import numpy as np
-from sklearn.base import BaseEstimator, _fit_context, clone
+from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.validation import check_is_fitted
@@ -13,12 +14,15 @@ from ..inputs.facts import TIMELESS, check_facts, facts_of
 from ..inputs.numbers import LARGEST, as_numbers, check_finite, check_magnitude
 from ..inputs.recorded import warn_of_rows
 from ..inputs.tables import as_pandas, labels_of, name_performance
+from ..inputs.types import Indexed, Labels, NumbersLike, PerformancesLike, RandomState, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
 from ..synchronizers.match import check_match
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
+from ..utils.parallel import LongWorkMixin
+from ..utils.parameters import validated
 from ..utils.threads import on_one_thread
 from .particle_filter import ParticleFilter, Track, filter_take, smooth_take, stack_frames
 from .state_space import Clock, TrackerModel
@@ -27,7 +31,7 @@ from .stream import check_observations, check_times, times_of_each
 __all__ = ["MotionTracker"]
 
 
-class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
+class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstimator):
     """Track a body that is partly hidden, by the mean of its action and the variation of people.
 
     Given the phase p of the action, a posture is ``mean(p) + deviation``, and an observation
@@ -152,13 +156,13 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
 
     def __init__(
         self,
-        synchronizer=None,
-        n_particles=500,
-        noise=0.05,
-        tempering=10.0,
-        frame_rate=None,
-        random_state=0,
-    ):
+        synchronizer: BaseEstimator | None = None,
+        n_particles: int = 500,
+        noise: float = 0.05,
+        tempering: float = 10.0,
+        frame_rate: float | None = None,
+        random_state: RandomState = 0,
+    ) -> None:
         self.synchronizer = synchronizer
         self.n_particles = n_particles
         self.noise = noise
@@ -167,8 +171,8 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         self.random_state = random_state
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None, groups=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: object = None, groups: Labels | None = None) -> Self:
         """Learn the mean, the deviations of people, and their rates.
 
         Parameters
@@ -200,28 +204,37 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
             )
         codes, _ = encode_groups(groups, n, at_least=2, sort=True)
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
-        self.synchronizer_ = sync.fit(X)
-        match = sync.match(X)
-        check_match(match, n, sync.n_frames_, type(sync).__name__)
-        warped = match.warp(performances)
-        durations = np.array([len(x) for x in performances], dtype=np.float64) - 1
-        self.n_frames_, self.duration_ = int(sync.n_frames_), float(durations.mean())
-        clock = Clock(self.n_frames_ - 1.0, self.duration_)
-        rates = clock.duration / durations[:, np.newaxis] / match.rates
-        settings = self.noise, self.tempering, self.n_particles
-        given = warped.astype(np.float64), rates, codes, clock
-        self._model = on_one_thread(TrackerModel.learn, *given, *settings)
-        self.mean_ = self._model.mean.astype(performances[0].dtype)
-        self.covariance_ = self._model.process.covariance
-        self.length_scale_ = float(np.sqrt(3) / self._model.process.decay)
-        self.rate_spread_, self.rate_memory_ = self._model.rates
-        self.surprise_limit_, self.departure_limit_ = map(float, self._model.nis_limits)
-        self._seed = int(check_random_state(self.random_state).randint(2**31 - 1))
-        self._running = None
+        with self._progress(fits=True) as progress:
+            with progress.fitting(sync, "synchronizing"):
+                self.synchronizer_ = sync.fit(X)
+            match = sync.match(X)
+            check_match(match, n, sync.n_frames_, type(sync).__name__)
+            warped = match.warp(performances)
+            durations = np.array([len(x) for x in performances], dtype=np.float64) - 1
+            self.n_frames_, self.duration_ = int(sync.n_frames_), float(durations.mean())
+            clock = Clock(self.n_frames_ - 1.0, self.duration_)
+            rates = clock.duration / durations[:, np.newaxis] / match.rates
+            settings = self.noise, self.tempering, self.n_particles
+            given = warped.astype(np.float64), rates, codes, clock
+            learnt = progress.stage("learning how people vary", 1)
+            self._model = on_one_thread(TrackerModel.learn, *given, *settings)
+            learnt()
+            self.mean_ = self._model.mean.astype(performances[0].dtype)
+            self.covariance_ = self._model.process.covariance
+            self.length_scale_ = float(np.sqrt(3) / self._model.process.decay)
+            self.rate_spread_, self.rate_memory_ = self._model.rates
+            self.surprise_limit_, self.departure_limit_ = map(float, self._model.nis_limits)
+            self._seed = int(check_random_state(self.random_state).randint(2**31 - 1))
+            self._running = None
         return self
 
     @snapshot
-    def track(self, X, times=None, projection=None):
+    def track(
+        self,
+        X: PerformancesLike,
+        times: Indexed[ValuesLike] | ValuesLike | None = None,
+        projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
+    ) -> Any:
         """Track takes: postures and phases at every frame, given the observations up to it.
 
         Parameters
@@ -249,7 +262,12 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         return self._estimate(filter_take, X, times, projection)
 
     @snapshot
-    def smooth(self, X, times=None, projection=None):
+    def smooth(
+        self,
+        X: PerformancesLike,
+        times: Indexed[ValuesLike] | ValuesLike | None = None,
+        projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
+    ) -> Any:
         """Smooth whole takes: postures and phases at every frame, given all observations.
 
         20 paths of phases are drawn by forward filtering and backward simulation, and a
@@ -277,12 +295,17 @@ class MotionTracker(DocumentedMixin, SequenceLevelMixin, BaseEstimator):
         """
         return self._estimate(smooth_take, X, times, projection)
 
-    def reset(self):
+    def reset(self) -> None:
         """End the running take: the next observation of ``step`` is the first of another."""
         check_is_fitted(self)
         self._running = None
 
-    def step(self, observation, time=None, projection=None):
+    def step(
+        self,
+        observation: ValuesLike,
+        time: float | None = None,
+        projection: NumbersLike | tuple[NumbersLike, NumbersLike] | None = None,
+    ) -> Track:
         """Take the next observation of a running take.
 
         Parameters

@@ -1,18 +1,21 @@
 """ActionClassifier: which of several actions a performance is, and whether it is any of them."""
 
 import warnings
+from collections.abc import Hashable, Sequence
 from functools import partial
 from numbers import Integral, Real
+from typing import Literal, Self
 
 import numpy as np
 import pandas as pd
 from scipy.spatial.distance import cdist
 from scipy.special import softmax
-from sklearn.base import BaseEstimator, ClassifierMixin, _fit_context
+from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.pipeline import Pipeline
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.types import Cost, Labels, PerformancesLike
 from ..inputs.validation import SequenceLevelMixin
 from ..matching.costs import COSTS
 from ..matching.pairwise import PairwiseDistance
@@ -22,6 +25,7 @@ from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import add_unknown_label, encode_classes, encode_groups
 from ..utils.parallel import LongWorkMixin, run
+from ..utils.parameters import validated
 from .distances import SETTINGS, normalise_time, pairwise_distances
 from .regression import assign_folds, decision_values, fit_regression
 
@@ -40,13 +44,30 @@ _GOLDEN = (5**0.5 - 1) / 2
 class ActionClassifier(
     DocumentedMixin, LongWorkMixin, SequenceLevelMixin, ClassifierMixin, BaseEstimator
 ):
-    """Which of several actions performances are, and whether they are any of them.
+    """Which of several movements trials are, and whether they are any of them.
 
-    The similarity of two performances is the mean of four kernels: three of their synchronisation
-    distances, one a cost, with velocities normalised by each performance's own energy; and one of
-    summary statistics, without any warp. A multinomial logistic regression with this kernel
-    separates the classes. Performances are not warped to the pattern of a class: that makes
-    unknown actions resemble it.
+    It learns bends and half bends, and is given one of each, and standing still, of a new person:
+
+    >>> import numpy as np
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from sklearn_motionsync import ActionClassifier, DirectionCosines
+    >>> from sklearn_motionsync.datasets import make_bending
+    >>> bunch = make_bending(12, n_actors=4, n_frames=40, random_state=0)
+    >>> X = bunch.data + [x[: len(x) // 2] for x in bunch.data]
+    >>> y = np.repeat(["bend", "half"], 12)
+    >>> pipe = make_pipeline(DirectionCosines(bunch.skeleton), ActionClassifier())
+    >>> pipe = pipe.fit(X, y, actionclassifier__groups=np.tile(bunch.actor, 2))
+    >>> new = make_bending(1, n_frames=40, random_state=7).data[0]
+    >>> still = new[:1].repeat(40, axis=0)
+    >>> pipe.predict([new, new[:20], still]).tolist()
+    ['bend', 'half', 'half']
+
+    A trial of neither gets the more likely class, unless unknown movements are rejected:
+
+    >>> pipe[-1].set_params(reject_below="auto").predict(
+    ...     pipe[:-1].transform([new, new[:20], still])
+    ... ).tolist()
+    ['bend', 'half', 'unknown']
 
     Parameters
     ----------
@@ -111,37 +132,18 @@ class ActionClassifier(
 
     Notes
     -----
+    The similarity of two trials is the mean of four kernels. Three are of their synchronisation
+    distances, one a cost, with velocities normalised by each trial's own energy. One is of summary
+    statistics, without any warp. A multinomial logistic regression with this kernel separates the
+    classes. Trials are not warped to the template of a class: that makes unknown movements resemble
+    it.
+
     Give ``groups``, such as subjects, whenever people come more than once: probabilities
     and thresholds are then those of new people. Under metadata routing
     ``set_fit_request(groups=True)``; otherwise a pipeline takes ``actionclassifier__groups``.
 
     Time and memory of a fit grow with the square of the number of performances where all are
     compared, and with their number where landmarks are; those of a prediction with ``landmarks_``.
-
-    Examples
-    --------
-    Bends and half bends of a new person.
-
-    >>> import numpy as np
-    >>> from sklearn.pipeline import make_pipeline
-    >>> from sklearn_motionsync import ActionClassifier, DirectionCosines
-    >>> from sklearn_motionsync.datasets import make_bending
-    >>> bunch = make_bending(12, n_actors=4, n_frames=40, random_state=0)
-    >>> X = bunch.data + [x[: len(x) // 2] for x in bunch.data]
-    >>> y = np.repeat(["bend", "half"], 12)
-    >>> pipe = make_pipeline(DirectionCosines(bunch.skeleton), ActionClassifier())
-    >>> pipe = pipe.fit(X, y, actionclassifier__groups=np.tile(bunch.actor, 2))
-    >>> new = make_bending(1, n_frames=40, random_state=7).data[0]
-    >>> still = new[:1].repeat(40, axis=0)
-    >>> pipe.predict([new, new[:20], still]).tolist()
-    ['bend', 'half', 'half']
-
-    A performance of neither is given the more likely class, unless unknown actions are rejected.
-
-    >>> pipe[-1].set_params(reject_below="auto").predict(
-    ...     pipe[:-1].transform([new, new[:20], still])
-    ... ).tolist()
-    ['bend', 'half', 'unknown']
     """
 
     _parameter_constraints: dict = {
@@ -157,22 +159,22 @@ class ActionClassifier(
 
     def __init__(
         self,
-        costs=("velocity", "elastic", "posture"),
+        costs: Cost | Sequence[Cost] = ("velocity", "elastic", "posture"),
         *,
-        C=10,
-        gamma=1,
-        summaries=True,
-        n_landmarks=250,
-        n_frames=50,
-        velocity_smoothing=0.06,
-        max_offset=0.4,
-        smoothness=0.003,
-        max_rate=4,
-        reject_below=None,
-        unknown_label=None,
-        n_jobs=None,
-        verbose=0,
-    ):
+        C: float = 10,
+        gamma: float = 1,
+        summaries: bool = True,
+        n_landmarks: int | None = 250,
+        n_frames: int = 50,
+        velocity_smoothing: float = 0.06,
+        max_offset: float = 0.4,
+        smoothness: float = 0.003,
+        max_rate: float = 4,
+        reject_below: float | Literal["auto"] | None = None,
+        unknown_label: str | float | None = None,
+        n_jobs: int | None = None,
+        verbose: int = 0,
+    ) -> None:
         self.costs = costs
         self.C = C
         self.gamma = gamma
@@ -189,8 +191,8 @@ class ActionClassifier(
         self.verbose = verbose
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y, groups=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: Labels, groups: Labels | None = None) -> Self:
         """Fit the kernel, the regression and the temperature.
 
         Parameters
@@ -222,18 +224,18 @@ class ActionClassifier(
         with self._progress(fits=True) as progress:
             jobs = {"n_jobs": self.n_jobs, "progress": progress}
             matrix = kernel.fit(performances, self.landmarks_, **jobs)
-        folds = assign_folds(codes, groups)
-        fit_in_portion = partial(fit_regression, self.C, folds, self.landmarks_)
-        ((self._regression, self.temperature_, self.held_out_),) = run(
-            fit_in_portion, [(matrix, codes)]
-        )
+            folds = assign_folds(codes, groups)
+            fit_in_portion = partial(fit_regression, self.C, folds, self.landmarks_)
+            ((self._regression, self.temperature_, self.held_out_),) = run(
+                fit_in_portion, [(matrix, codes)], step=progress.stage("regression", 1)
+            )
         self._kernel = kernel
         # Copies, which do not change with the user's arrays.
         self._training = [np.array(x) for x in performances], codes, groups
         return self
 
     @snapshot
-    def predict(self, X):
+    def predict(self, X: PerformancesLike) -> np.ndarray:
         """The class of each performance.
 
         Parameters
@@ -258,7 +260,7 @@ class ActionClassifier(
         return add_unknown_label(self.classes_, self.unknown_label)[codes]
 
     @snapshot
-    def predict_proba(self, X):
+    def predict_proba(self, X: PerformancesLike) -> np.ndarray:
         """The probability of each class, given that a performance is one of them.
 
         Parameters
@@ -275,7 +277,7 @@ class ActionClassifier(
         return softmax(self.temperature_ * decisions, axis=1)
 
     @snapshot
-    def decision_function(self, X):
+    def decision_function(self, X: PerformancesLike) -> np.ndarray:
         """Decision values of the classes.
 
         Parameters
@@ -292,7 +294,7 @@ class ActionClassifier(
         return decisions if len(self.classes_) > 2 else decisions[:, 1] - decisions[:, 0]
 
     @snapshot
-    def score_samples(self, X):
+    def score_samples(self, X: PerformancesLike) -> np.ndarray:
         """The largest decision value of performances: their similarity to any class.
 
         Parameters
@@ -308,7 +310,7 @@ class ActionClassifier(
         return self._decisions(X).max(axis=1)
 
     @snapshot
-    def threshold_at(self, coverage):
+    def threshold_at(self, coverage: float) -> float:
         """The ``reject_below`` that keeps a share of performances of the known actions.
 
         Parameters
@@ -339,7 +341,7 @@ class ActionClassifier(
         return float(known[max(rank - 1, 0)])
 
     @snapshot
-    def model_of(self, label):
+    def model_of(self, label: Hashable) -> Pipeline:
         """Fit a model of a class, to explain a prediction.
 
         It does not decide: performances of other classes that are synchronised to its pattern

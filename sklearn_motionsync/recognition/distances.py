@@ -4,14 +4,16 @@ from numbers import Integral, Real
 
 import numpy as np
 from sklearn.base import BaseEstimator
-from sklearn.utils._param_validation import Interval, StrOptions, validate_params
+from sklearn.utils._param_validation import Interval, StrOptions
 
+from ..inputs.types import Cost, PerformancesLike
 from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..inputs.wording import counted
 from ..matching.costs import COSTS
 from ..matching.pairwise import PairwiseDistance, blocks_of_pairs
 from ..matching.warps import normalise
 from ..utils.parallel import Progress, SharedArgument, run
+from ..utils.parameters import validated_function
 
 __all__ = ["SETTINGS", "normalise_time", "pairwise_distances", "synchronization_distances"]
 
@@ -29,30 +31,29 @@ SETTINGS: dict = {
 _PORTION_BLOCKS = 32
 
 
-@validate_params(
+@validated_function(
     {
         "cost": [StrOptions(set(COSTS))],
         "normalize": ["boolean"],
         "symmetric": ["boolean"],
         **SETTINGS,
-    },
-    prefer_skip_nested_validation=True,
+    }
 )
 def synchronization_distances(
-    X,
-    Y=None,
+    X: PerformancesLike,
+    Y: PerformancesLike | None = None,
     *,
-    cost="elastic",
-    normalize=True,
-    symmetric=True,
-    n_frames=50,
-    velocity_smoothing=0.06,
-    max_offset=0.25,
-    smoothness=0.003,
-    max_rate=4,
-    n_jobs=None,
-    verbose=0,
-):
+    cost: Cost = "elastic",
+    normalize: bool = True,
+    symmetric: bool = True,
+    n_frames: int = 50,
+    velocity_smoothing: float = 0.06,
+    max_offset: float = 0.25,
+    smoothness: float = 0.003,
+    max_rate: float = 4,
+    n_jobs: int | None = None,
+    verbose: int = 0,
+) -> np.ndarray:
     """Synchronisation distances between all pairs of performances (Eq. 12).
 
     A distance is the difference of two performances after one is warped to the other: for nearest

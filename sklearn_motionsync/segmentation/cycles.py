@@ -1,13 +1,15 @@
 """CycleSegmenter: long takes of a movement that repeats, cut into its cycles."""
 
 import warnings
+from collections.abc import Sequence
 from itertools import pairwise
 from numbers import Integral, Real
+from typing import Any, Literal, Self
 
 import numpy as np
 import pandas as pd
 from scipy.fft import irfft, rfft
-from sklearn.base import BaseEstimator, _fit_context, clone
+from sklearn.base import BaseEstimator, clone
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
@@ -18,6 +20,7 @@ from ..body.skeleton import Skeleton
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS
 from ..inputs.features import choose_features, names_of_features
+from ..inputs.types import PerformancesLike
 from ..inputs.validation import check_performances, names_of_input, warn_of_clocks
 from ..matching.costs import StepTable, step_table
 from ..matching.filters import smooth
@@ -25,6 +28,8 @@ from ..matching.trellis import Trellis
 from ..matching.warps import normalise
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
+from ..utils.parameters import validated
 from .cutting import as_takes, cut_takes
 from .self_correlation import LEAST_CYCLES, correlate, rejection_reason
 
@@ -54,7 +59,7 @@ _PORTION, _OVERLAP = 16, 2
 _COLUMNS = {"take": int, "start": int, "stop": int, "complete": bool, "score": float}
 
 
-class CycleSegmenter(DocumentedMixin, BaseEstimator):
+class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     """Cut long takes of walking, running, or any movement that repeats, into its cycles.
 
     1. `self_correlation` gives the period of each take, and whether it is cyclic.
@@ -147,14 +152,14 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
 
     def __init__(
         self,
-        skeleton=None,
-        start=None,
-        threshold=0.4,
-        refine=True,
-        incomplete=False,
-        not_cyclic="raise",
-        period=None,
-    ):
+        skeleton: Skeleton | None = None,
+        start: str | int | None = None,
+        threshold: float = 0.4,
+        refine: bool = True,
+        incomplete: bool = False,
+        not_cyclic: Literal["raise", "skip"] = "raise",
+        period: Sequence[float] | np.ndarray | None = None,
+    ) -> None:
         self.skeleton = skeleton
         self.start = start
         self.threshold = threshold
@@ -164,8 +169,8 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         self.period = period
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Learn one cycle, and where it begins.
 
         Parameters
@@ -187,24 +192,27 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
             ``not_cyclic="raise"``; no take is left; or there is no such `start`.
         """
         given, takes = check_takes(self, X, reset=True)
-        features, found = correlate_takes(self, given, takes)
-        kept = self._select_cyclic(takes, found)
-        if not kept:
-            none = "The take is not" if len(takes) == 1 else f"None of the {len(takes)} takes is"
-            raise ValueError(
-                f"{none} cyclic. See report(X); give takes that repeat, or another threshold."
-            )
-        curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
-        sampled = [SampledTake(features[i], found[i].period) for i in kept]
-        phases = self._learn_phases(sampled)
-        self.start_, start = self._find_start(curves, sampled, phases)
-        self.template_ = average_cycle([t.values for t in sampled], [p - start for p in phases])
-        self.periods_ = np.full(len(takes), np.nan)
-        self.periods_[kept] = [found[i].period for i in kept]
+        with self._progress(fits=True) as progress:
+            step = progress.stage("correlating takes", len(takes))
+            features, found = correlate_takes(self, given, takes, step)
+            kept = self._select_cyclic(takes, found)
+            if not kept:
+                n = len(takes)
+                none = "The take is not" if n == 1 else f"None of the {n} takes is"
+                raise ValueError(
+                    f"{none} cyclic. See report(X); give takes that repeat, or another threshold."
+                )
+            curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
+            sampled = [SampledTake(features[i], found[i].period) for i in kept]
+            phases = self._learn_phases(sampled, progress)
+            self.start_, start = self._find_start(curves, sampled, phases)
+            self.template_ = average_cycle([t.values for t in sampled], [p - start for p in phases])
+            self.periods_ = np.full(len(takes), np.nan)
+            self.periods_[kept] = [found[i].period for i in kept]
         return self
 
     @snapshot
-    def segment(self, X):
+    def segment(self, X: PerformancesLike) -> tuple[list[Any], pd.DataFrame]:
         """Cut takes into cycles.
 
         Parameters
@@ -239,7 +247,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
         return cut_takes(given, takes, table)
 
     @snapshot
-    def phases(self, X):
+    def phases(self, X: PerformancesLike) -> list[np.ndarray]:
         """The phase of every frame.
 
         Parameters
@@ -260,7 +268,7 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
             out[i] = np.interp(np.arange(len(takes[i])), take.times, phases)
         return out
 
-    def report(self, X):
+    def report(self, X: PerformancesLike) -> pd.DataFrame:
         """Whether takes are cyclic, by their self-correlation; no fit is needed.
 
         Parameters
@@ -325,16 +333,20 @@ class CycleSegmenter(DocumentedMixin, BaseEstimator):
             phases = align(self.template_, take)
             yield i, take, phases - np.floor(phases[0])
 
-    def _learn_phases(self, sampled):
+    def _learn_phases(self, sampled, progress):
         """Phases of takes without a template: at constant pace one by one, then matched."""
         values, phases = [take.values for take in sampled], []
         for k, take in enumerate(sampled):
             phases.append(
                 constant_phases(average_cycle(values[:k], phases), take) if k else take.mean_phases
             )
-        for _ in range(_ROUNDS if self.refine else 0):
-            template = average_cycle(values, phases)
-            phases = [match_phases(template, take) for take in sampled]
+        rounds = _ROUNDS if self.refine else 0
+        step = progress.stage("matching takes", rounds * len(sampled))
+        for _ in range(rounds):
+            template, phases = average_cycle(values, phases), []
+            for take in sampled:
+                phases.append(match_phases(template, take))
+                step()
         return phases
 
     def _find_start(self, curves, sampled, phases):
@@ -372,7 +384,7 @@ def check_takes(segmenter, X, *, reset):
     return as_collection(X), takes
 
 
-def correlate_takes(segmenter, given, takes):
+def correlate_takes(segmenter, given, takes, step=None):
     """The compared features of takes, in float64, and their self-correlations.
 
     The features are the directions of limbs if there is a skeleton, else those of the takes.
@@ -382,7 +394,12 @@ def correlate_takes(segmenter, given, takes):
         cosines = DirectionCosines(segmenter.skeleton).set_output(transform="default")
         takes = cosines.fit_transform(given)
     features = [np.asarray(x, dtype=np.float64) for x in takes]
-    return features, [correlate(x, limits) for x in features]
+    found = []
+    for x in features:
+        found.append(correlate(x, limits))
+        if step is not None:
+            step()
+    return features, found
 
 
 def as_learnt(segmenter, features, found):

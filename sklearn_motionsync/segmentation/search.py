@@ -4,13 +4,13 @@ import reprlib
 import warnings
 from bisect import bisect, insort
 from numbers import Integral, Real
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 from sklearn.base import BaseEstimator
-from sklearn.utils._param_validation import Interval, StrOptions, validate_params
+from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import as_collection
@@ -18,6 +18,7 @@ from ..inputs.facts import facts_in_fit, facts_of
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import SAME_RATE, timeless
 from ..inputs.tables import FRAME, as_pandas
+from ..inputs.types import Labels, PerformanceLike, PerformancesLike
 from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..inputs.wording import counted, within
 from ..matching.filters import SMOOTHING, smooth
@@ -28,6 +29,7 @@ from ..model.action_model import ActionModel
 from ..model.similarity import DIFFERENCES, LogMoments, Neighbours, log_moments, movement_energies
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.groups import encode_groups
+from ..utils.parameters import validated_function
 from ..utils.pipelines import (
     find_synchronizer,
     flat_steps,
@@ -54,17 +56,23 @@ _MOVES = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (
 _HOPELESS = 2
 
 
-@validate_params(
+@validated_function(
     {
         "threshold": [Interval(Real, 0, 1, closed="both"), StrOptions({"auto"}), None],
         "coverage": [Interval(Real, 0, 1, closed="neither")],
         "max_hits": [Interval(Integral, 1, None, closed="left"), None],
-    },
-    prefer_skip_nested_validation=True,
+    }
 )
 def find_performances(
-    pattern, X, *, threshold="auto", coverage=0.6, max_hits=None, durations=None, groups=None
-):
+    pattern: BaseEstimator | PerformanceLike,
+    X: PerformancesLike,
+    *,
+    threshold: float | Literal["auto"] | None = "auto",
+    coverage: float = 0.6,
+    max_hits: int | None = None,
+    durations: tuple[int, int] | None = None,
+    groups: Labels | None = None,
+) -> tuple[list[Any], pd.DataFrame]:
     """Find an action in long takes, and cut its performances out of them.
 
     1. The pattern is matched to overlapping portions of a take, at several time scales. Both ends

@@ -7,8 +7,10 @@ import pandas as pd
 from scipy.fft import irfft, next_fast_len, rfft
 
 from ..body.direction_cosines import DirectionCosines
+from ..body.skeleton import Skeleton
 from ..inputs.collections import as_collection, check_members
 from ..inputs.tables import as_pandas
+from ..inputs.types import PerformanceLike
 from ..inputs.wording import counted
 from ..matching.filters import smooth
 
@@ -82,7 +84,7 @@ class SelfCorrelation(NamedTuple):
     periods: np.ndarray
 
 
-def self_correlation(take, skeleton=None):
+def self_correlation(take: PerformanceLike, skeleton: Skeleton | None = None) -> SelfCorrelation:
     r"""Correlate a take with itself at every lag, to find the period of what repeats.
 
     At lag :math:`L` it correlates the frames :math:`a(t) = x(t)` and :math:`b(t) = x(t + L)`, less

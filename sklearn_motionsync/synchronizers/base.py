@@ -1,14 +1,13 @@
 """Synchronizer: the clock, the pattern and the warp to it, which all share (Eqs. 6, 7, 18)."""
 
 from numbers import Integral
-from typing import NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from sklearn.base import (
     BaseEstimator,
     OneToOneFeatureMixin,
     TransformerMixin,
-    _fit_context,
 )
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
@@ -16,6 +15,7 @@ from sklearn.utils.validation import check_is_fitted
 from ..inputs.collections import Performances, as_source
 from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers, check_finite, check_magnitude, check_names
+from ..inputs.types import FitTransform, NamesLike, PerformanceLike, PerformancesLike, Transformed
 from ..inputs.validation import (
     SequenceLevelMixin,
     labels_of_parts,
@@ -31,6 +31,8 @@ from ..matching.units import Unit
 from ..matching.warps import normalise
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
+from ..utils.parameters import validated
 from .match import Match, check_match
 
 __all__ = ["Synchronizer", "TrainingSet"]
@@ -61,7 +63,9 @@ class TrainingSet(NamedTuple):
     given: np.ndarray | None
 
 
-class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEstimator):
+class Synchronizer(
+    DocumentedMixin, LongWorkMixin, SequenceLevelMixin, TransformerMixin, BaseEstimator
+):
     """Base class of all synchronizers: a subclass defines ``match``.
 
     It inherits ``fit``, which chooses the pattern after linear normalisation,
@@ -132,16 +136,27 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         ],
     }
 
+    pattern_: np.ndarray
+    pattern_index_: Any
+    n_frames_: int
+    global_distances_: np.ndarray
+    lengths_: np.ndarray
+    examples_: np.ndarray
+
     # Advice of the error if the training set does not fit into memory.
     _SMALLER = "fewer frames or performances"
 
-    def __init__(self, n_frames=None, pattern="median"):
+    def __init__(
+        self,
+        n_frames: int | None = None,
+        pattern: PerformanceLike | int | Literal["median"] = "median",
+    ) -> None:
         self.n_frames = n_frames
         self.pattern = pattern
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Choose the pattern, the performance to whose clock all others are warped.
 
         Parameters
@@ -161,13 +176,14 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         ValueError
             If the input breaks the contract, or the pattern does not exist or fit.
         """
-        self._learn(self._check_training_set(X))
-        self._number_as_given()
+        with self._progress(fits=True) as progress:
+            self._learn(self._check_training_set(X), progress)
+            self._number_as_given()
         return self
 
-    fit_transform = atomic_fit(TransformerMixin.fit_transform)
+    fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
 
-    def transform(self, X):
+    def transform(self, X: PerformancesLike) -> Transformed:
         """Warp performances onto the clock of the pattern (Eq. 18).
 
         Parameters
@@ -184,7 +200,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         """
         return self._warp(X)
 
-    def match(self, X):
+    def match(self, X: PerformancesLike) -> Match:
         """Match performances to the pattern.
 
         Parameters
@@ -205,7 +221,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         )
 
     @snapshot
-    def normalize(self, X):
+    def normalize(self, X: PerformancesLike) -> np.ndarray:
         """Normalise performances linearly to the clock of the pattern, without matching (Eq. 7).
 
         Parameters
@@ -220,7 +236,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         """
         return normalise(self.check_performances(X), self.n_frames_)
 
-    def get_feature_names_out(self, input_features=None):
+    def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
         """Names of the outputs: the features of a frame; for 2-D input, one name a frame.
 
         Parameters
@@ -252,7 +268,7 @@ class Synchronizer(DocumentedMixin, SequenceLevelMixin, TransformerMixin, BaseEs
         pattern = state.get("pattern")
         return {**state, "pattern": pattern.to_numpy()} if hasattr(pattern, "columns") else state
 
-    def _learn(self, performances):
+    def _learn(self, performances, progress):
         """Learn from checked performances."""
         training = self._set_clock(performances)
         self._set_pattern(training, self._plain_median(training.scaled))

@@ -1,10 +1,12 @@
 """blend_performances: weighted means of performances, in their postures and their timing."""
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from numbers import Integral
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from sklearn.base import BaseEstimator
 
 from ..body.base import PositionsTransformer
 from ..body.blends import blend_bodies, blend_numbers, blend_postures
@@ -16,6 +18,7 @@ from ..inputs.facts import compare_facts
 from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.recorded import SAME_RATE, timeless
 from ..inputs.tables import FRAME, labels_of
+from ..inputs.types import NumbersLike, PerformancesLike
 from ..inputs.wording import counted
 from ..utils.pipelines import flat_steps, route_to_synchronizer, union_transformers
 from .match import Match
@@ -35,8 +38,15 @@ _LABELS = ("performance", "levels")
 
 
 def blend_performances(
-    estimator, X, weights, *, timing=None, skeleton=None, lengths_of=None, **params
-):
+    estimator: BaseEstimator | Match,
+    X: PerformancesLike,
+    weights: NumbersLike | Mapping[Any, float],
+    *,
+    timing: NumbersLike | Mapping[Any, float] | None = None,
+    skeleton: Skeleton | DirectionCosines | None = None,
+    lengths_of: Hashable = None,
+    **params: Any,
+) -> np.ndarray | pd.DataFrame:
     """Blend performances: a weighted mean of their postures and of their timing.
 
     Frames that correspond on the clock of the pattern are averaged, and the blend has the averaged

@@ -1,18 +1,14 @@
 """DenseSynchronizer: dense matching to the median performance (Eqs. 7-19)."""
 
-import warnings
 from functools import partial
 from numbers import Integral, Real
+from typing import Any, Literal, Self
 
 import numpy as np
-import pandas as pd
-from scipy.special import betaincinv
 from sklearn.utils import Bunch, check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
 
-from ..inputs.collections import as_collection, as_source, count_of, gives_rows, select
-from ..inputs.tables import as_pandas
-from ..inputs.validation import names_of_input
+from ..inputs.types import Cost, PerformanceLike, PerformancesLike, RandomState
 from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
 from ..matching.filters import SMOOTHING, choose_smoothing
@@ -26,13 +22,14 @@ from ..matching.median import (
 )
 from ..matching.refinement_test import RefinementTest, Verdict, split_features
 from ..matching.trellis import Trellis
-from ..matching.warps import even_slices, normalise, sample
+from ..matching.warps import normalise, sample
 from ..utils.atomic import snapshot
-from ..utils.parallel import LongWorkMixin
 from ..utils.threads import on_one_thread
+from .balance import warn_of_one_feature
 from .base import Synchronizer
 from .match import Match
 from .portions import FeatureStore, TrainingPortions, measure_in_portions, warp_in_portions
+from .subsamples import subsample, typical_share
 
 __all__ = ["DenseSynchronizer"]
 
@@ -53,179 +50,201 @@ _EXHAUSTIVE = 100
 # Most performances for the refinement test; fewer than the second number have no first pass, and
 # with twice as many it takes every second one.
 _TESTED, _SEVERAL = 12, 3
-# Confidence of ``typical_share_``.
-_CONFIDENCE = 0.95
 
 
-class DenseSynchronizer(LongWorkMixin, Synchronizer):
-    """Synchronise performances by dense matching to the median one.
+class DenseSynchronizer(Synchronizer):
+    """Align trials in time: warp all of them to the most typical one.
 
-    1. Normalise all performances linearly to ``P`` frames (Eq. 7).
-    2. Learn the metric: weights of features, and of combinations of them, by how reliably they
-       identify a moment of the action in these performances (see ``metric``).
-    3. Match ordered pairs: dynamic programming finds the offsets Delta(p) that
-       minimise the synchronisation distance ``D_{n,m}`` (Eqs. 12-17)::
+    That trial is the template, here the *pattern*. Every trial is matched to it by all of its
+    signals at once. A warp then brings the same moments together. The time shifts are a result,
+    too.
 
-           sum_p |x_n(p) - x_m(p + Delta(p))|^2 + mu sum_p phi(rate)
+    One signal peaks at frame 40, 50 or 62 of three trials:
 
-       with both ends pinned and the local rate between 0 and ``max_rate``. By default
-       the points x are velocities and postures in the learnt metric (see ``cost``).
-    4. The pattern has the smallest global distance ``C_n = sum_m D_{n,m}`` (Eq. 19): it is the
-       "median" performance, among more than 100 found by a part of all matches (see ``search``).
-    5. Consensus: the time of the pattern reaches a performance directly, or by way of
-       one of ``consensus`` exemplars, typical performances of the training set. The median
-       of these routes, weighted by the similarity of the performances along them, outvotes a path
-       that took a wrong valley. It is then smoothed.
-    6. Refinement: if it helps, as it does for repeated trials of a single source, whose postures
-       agree but for noise and gain, Gauss-Newton steps place every moment to a fraction of a frame.
-    7. ``transform`` samples performances at ``tau(p) = p + Delta(p)`` (Eq. 18).
+    >>> import numpy as np
+    >>> from sklearn_motionsync import DenseSynchronizer
+    >>> frames = np.arange(101)
+    >>> trials = [np.exp(-(((frames[:, None] - peak) / 12) ** 2)) for peak in (40, 50, 62)]
+    >>> sync = DenseSynchronizer().fit(trials)
+    >>> aligned = sync.transform(trials)
+    >>> aligned.shape  # trials, frames, signals
+    (3, 101, 1)
+    >>> aligned.argmax(axis=1).ravel().tolist()  # where the peaks are now
+    [50, 50, 50]
+    >>> sync.match(trials).offsets[:, 50].round().tolist()  # how late they were, in frames
+    [-10.0, 0.0, 12.0]
 
-    The defaults suit most data. Three parameters depend on them: ``n_frames``, the resolution of
-    the clock; ``refine=True``, for trials of a single source; ``max_offset``, the largest
-    difference in timing. ``pattern`` keeps an existing clock. The defaults of the seven from
-    ``metric`` to ``subframes`` were set by measurements; `paper` has those of the paper. The
-    last five are for many performances and long jobs.
+    A trial with a gap is refused:
+
+    >>> trials[2][7] = np.nan
+    >>> sync.transform(trials)
+    Traceback (most recent call last):
+        ...
+    ValueError: Performance 2, frame 7, feature 0 is NaN; the input must be finite. ...
+
+    The defaults suit most data. Four parameters depend on the data or on the question. The others
+    were set by measurements, or are for many trials and long jobs.
 
     Parameters
     ----------
     n_frames : int, default=None
-        ``P``, frames of the common clock; by default the median length of the performances,
-        or the length of a pattern given as an array. Time grows with its square, as
-        ``max_offset`` is a share of it.
+        Frames of every aligned trial. Set it if you want a number of your own, such as 101 for 0 to
+        100 %. By default it is the median length of the trials, or the length of a template that is
+        given as an array. Time grows with its square.
     pattern : "median", int or array (n_frames, n_features), default="median"
-        The median performance, one chosen by its index, or another one.
-    velocity_smoothing : "auto" or float, default="auto"
-        Standard deviation of the Gaussian under which velocities are taken, as a share of the
-        clip, so that it does not depend on the frame rate; beyond its ends a clip is
-        continued by its point reflection. ``"auto"``: 0.02 with a learnt metric, which weights
-        noise down, and 0.03 without.
+        The template: the most typical trial, a trial by its index, or an array. Set it if new
+        trials are to be aligned to a template that you have.
     refine : "auto" or bool, default="auto"
-        Whether to refine warps by the postures. ``"auto"`` does so if there is a vote and a test on
-        the training set shows that it helps, by features that had no part in it (see
-        ``refinement_``). A single feature, or correlated ones, cannot be tested.
+        Whether to place every moment to a fraction of a frame. Set it to True for repeated trials
+        of a single source, which differ by noise and gain only. With ``"auto"`` a test on the
+        trials decides (see ``refinement_``). A single signal, or correlated ones, cannot be tested,
+        and without a vote there is no test.
     max_offset : "auto" or float, default="auto"
-        Largest offset, as a share of ``n_frames``, in [0, 1]. ``"auto"``: 0.4 with a learnt
-        metric, 0.25 without, where a wider band leads paths astray.
+        Largest time shift, as a share of ``n_frames``, in [0, 1]. Lower it for long trials of
+        nearly the same pace: that saves time and memory. ``"auto"`` is 0.4 with a learnt metric,
+        and 0.25 without, where larger shifts lead astray.
+
+    Other Parameters
+    ----------------
+    velocity_smoothing : "auto" or float, default="auto"
+        Standard deviation of the Gaussian that smooths velocities, as a share of the trial. So it
+        does not depend on the frame rate. Beyond its ends a trial is continued by its point
+        reflection. ``"auto"`` is 0.02 with a learnt metric, which gives noise less weight, and 0.03
+        without.
     metric : "learned" or None, default="learned"
-        The metric of the velocity cost. ``"learned"``: of compressed velocities, and postures less
-        their own mean, weighted by their agreement at the same moment; learnt in ``fit`` from
-        3 to 20 performances, and off without a vote (``consensus=0``). Distances are then pure
-        numbers. None: of velocities, with equal weights. Other costs have no metric.
+        How signals are weighted by the velocity cost. ``"learned"``: compressed velocities, and
+        poses less their own mean, count by how well trials agree at the same moment. ``fit`` learns
+        this from 3 to 20 trials, and not without a vote (``consensus=0``). Distances are then pure
+        numbers. None: velocities, with equal weights. Other costs have no metric.
     consensus : int, default=8
-        Number of exemplars that vote on a warp; 0 for the direct path only, as in the paper, which
-        is then neither smoothed nor, unless ``refine=True``, refined.
+        Number of typical trials that vote on a warp. 0 takes the direct path, as in the paper,
+        which is not smoothed, and refined only by ``refine=True``.
     warp_smoothing : float, default=0.02
-        Standard deviation of the Gaussian under which the offsets are smoothed after the
-        vote, as a share of the clip. A larger value gives smoother synchronised movements and
-        less accurate key moments.
+        Standard deviation of the Gaussian that smooths time shifts after the vote, as a share of
+        the trial. More gives smoother movements, and less accurate key moments.
     cost : {"velocity", "elastic", "posture"}, default="velocity"
-        The features that are compared. ``"velocity"``: the velocity of the point; at the local
-        rate rho, ``v_n`` with ``(0.8 + 0.2 rho) v_m``. ``"elastic"``: the velocity
-        divided by the square root of the speed, with weights that make the distance (of
-        Fisher and Rao) independent of the timing of either sequence. ``"posture"``: the
-        point, as in the paper.
+        What is compared. ``"velocity"``: velocities; at the local rate rho, ``v_n`` with ``(0.8 +
+        0.2 rho) v_m``. ``"elastic"``: velocities divided by the square root of the speed. Its
+        weights make the distance, of Fisher and Rao, independent of the timing of either trial.
+        ``"posture"``: poses, as in the paper.
     smoothness : float, default=0.003
-        Weight of the changes of pace, a pure number: ``mu`` is ``smoothness`` times the
-        mean squared norm of the compared features over the training set.
+        Weight of changes of pace, a pure number. ``mu`` is ``smoothness`` times the mean squared
+        norm of what is compared.
     max_rate : float, default=4
-        Largest local rate of a path; 2 is the limit of Eq. 13. The vote and the refinement
-        may exceed it.
+        Largest local rate of a path; 2 in Eq. 13. The vote and the refinement may exceed it.
     subframes : int, default=1
         Positions a frame at which a path may stand. More than 1 serves direct paths
-        (``consensus=0``); the vote, its smoothing and the refinement are finer anyway.
+        (``consensus=0``); vote, smoothing and refinement are finer anyway.
     search : {"auto", "exhaustive", "sampled"}, default="auto"
-        The search for the median: by all matches, or by a sequential test on matches with random
-        references (see ``search_``). ``"auto"``: by all matches of up to 100 performances.
+        The search for the most typical trial: by all matches, or by a sequential test on matches
+        with random references (see ``search_``). ``"auto"``: by all, for up to 100 trials.
     max_fit : int, default=None
-        Size of a random sample, at least 2, from which ``fit`` learns everything: clock,
-        metric, pattern, exemplars, whether to refine. The others are not checked, nor read if
-        ``X`` gives performances by index: time and memory of a fit do not depend on their number.
-        A pattern given by its index is in the sample. None: all performances. See
-        ``typical_share_``.
+        Size, at least 2, of a random sample from which ``fit`` learns everything. The other trials
+        are not checked. They are not even read if ``X`` gives trials by index, so time and memory
+        of a fit do not grow with their number. A template given by its index is in the sample.
+        None takes all trials. See ``typical_share_``.
     random_state : int, RandomState instance or None, default=0
-        Draws the references of a sampled search, and the sample of ``max_fit``. With the default
+        Draws the references of a sampled search, and the sample of ``max_fit``. With the default,
         equal input gives equal results.
     n_jobs : int, default=None
-        Number of parallel jobs in ``fit``, ``transform`` and ``match``. None means 1
-        unless in a ``joblib.parallel_config`` context, -1 all cores. Results are the same to the
-        last bit.
+        Number of parallel jobs in ``fit``, ``transform`` and ``match``. None means 1 unless in a
+        ``joblib.parallel_config`` context, -1 all cores. Results are the same to the last bit.
     verbose : int, default=0
         Above 0, print the progress of a long job, at most once a second.
 
     Attributes
     ----------
     pattern_ : ndarray, shape (P, n_features)
-        The pattern on the common clock.
+        The template, of ``P`` frames.
     pattern_index_ : int or None
         Its index in the training set; None if it was given as an array.
     n_frames_ : int
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
-        ``C_n`` of Eq. 19 by all matches: of every performance after an exhaustive search, of
-        the best few after a sampled one; else NaN. With a
-        learnt metric the search compares only as many frames as the smoothing of velocities leaves
-        independent (51 by default; more for a narrow band), if ``P`` is at least 1.5 times as many,
-        and in single precision, if that tells the most typical ones apart; sums are scaled to
-        ``P``. Sums of the ``distances`` of `match`, at all frames, are within 12 % of them on ten
-        actions of people, and smallest for the same performance; the precision makes 2e-7.
+        ``C_n`` of Eq. 19 by all matches. After an exhaustive search every trial has one, after a
+        sampled one the best few; the others are NaN. With a learnt metric the search may compare
+        fewer frames, in single precision, and scales the sums to ``P``. So they differ a little
+        from sums of the ``distances`` of `match`.
     certified_ : bool
-        Whether the pattern is the median of Eq. 19: by all matches, or because paired tests, with a
-        family-wise error rate of 1 %, rejected every other performance. False if the pattern was
-        given, or a search has spent its 150 matches a performance. After a fit to a sample: whether
-        no other performance of the sample may be more typical of all.
+        Whether the template is the median of Eq. 19: by all matches, or because paired tests
+        rejected every other trial, with a family-wise error rate of 1 %. False if the template was
+        given, or a search has spent its 150 matches a trial. After a fit to a sample: whether no
+        other trial of the sample may be more typical of all.
     n_matches_ : int
-        Number of matches to choose the pattern and the exemplars.
+        Number of matches to choose the template and the trials that vote.
     search_ : Bunch
-        ``n_matches``, ``certified``, as above; ``in_doubt``, the number of others that no test
-        rejected; ``excess``: with a probability of 99 % the pattern's ``C_n`` is at most
-        ``1 + excess`` times the smallest. If the pattern was given, all are in doubt and the excess
-        is NaN.
+        ``n_matches`` and ``certified``, as above. ``in_doubt``: the number of others that no test
+        rejected. ``excess``: the template's ``C_n`` is at most ``1 + excess`` times the smallest,
+        with a probability of 99 %. If the template was given, all are in doubt and the excess is
+        NaN.
     sample_ : ndarray of int
-        Indices of the training performances: all, or ``max_fit`` of them. ``global_distances_`` are
-        sums over these, and NaN for all others; ``lengths_`` and ``examples_`` are theirs.
+        Indices of the training trials: all, or ``max_fit`` of them. ``global_distances_`` are sums
+        over these, and NaN for all others; ``lengths_`` and ``examples_`` are theirs.
     typical_share_ : float
-        Upper bound of the share of all performances that are more typical than the pattern, with a
-        smaller global distance in the metric of this fit. 0 if that is the certified median of
-        all. After a fit to a random sample its confidence is 95 % (beside the 1 % of the
-        search); it is 0.006 for a sample of 500 with none in doubt. NaN if the pattern was given.
+        Upper bound of the share of all trials that are more typical than the template, by the
+        metric of this fit. 0 if the template is the certified median of all. After a fit to a
+        random sample its confidence is 95 %, beside the 1 % of the search. NaN if the template was
+        given.
     metric_ : Bunch or None
-        The learnt metric: ``share``, the share of every feature in what is compared, about 0 for
-        noise; ``energy``, its share in the velocities, which are compared without a
-        metric: above 0.95 of one of several there is a warning; ``performances``, the indices of
-        those it was learnt from. It is learnt in single precision. None without a metric.
+        The learnt metric, in single precision; None without one. ``share``: the share of every
+        signal in what is compared, about 0 for noise. ``energy``: its share in the velocities,
+        which are compared without a metric; if one of several exceeds 0.95 there is a warning.
+        ``performances``: the indices of the trials it was learnt from.
     mu_ : float
-        Absolute weight of the changes of pace, by the frames that the search compares: within
-        1 % of that by all frames.
+        Absolute weight of the changes of pace, by the frames that the search compares.
     exemplars_ : ndarray of int
-        Indices of the performances that vote.
+        Indices of the trials that vote.
     misfit_ : float
-        Median share of the variance of the pattern in the smoothed residuals of matched postures;
+        Median share of the variance of the template in the smoothed residuals of matched poses;
         NaN unless ``refine="auto"`` finds that refining may help.
     refinement_ : Bunch
-        The test of ``refine="auto"``, by features that had no part in the warps:
-        ``ratio``, their misfit after refining by the other features to that after matching by the
-        others alone; ``p_value``, of a t test that refining does not help; both after the first
-        pass of the test if that rejects refining; ``ratio_to_all``, to the misfit after matching by
-        all features. NaN where there is no test.
+        The test of ``refine="auto"``, by signals that had no part in the warps. ``ratio``: their
+        misfit after refining by the other signals, to that after matching by the others alone.
+        ``p_value``: of a t test that refining does not help. Both are of the first pass if that
+        rejects refining. ``ratio_to_all``: to the misfit after matching by all signals. NaN where
+        there is no test.
     refines_ : bool
         Whether warps are refined.
     lengths_ : ndarray of int, shape (n_samples_fit,)
-        Numbers of frames of the training performances.
+        Numbers of frames of the training trials.
     examples_ : ndarray, shape (min(n_samples_fit, 64), P, n_features)
-        Training performances linearly normalised: all, or 64 of them, evenly spaced.
+        Training trials linearly normalised: all, or 64 of them, evenly spaced.
     features_ : callable
-        Turns postures on the clock into the features that are compared.
+        Turns poses on the frames of the template into what is compared.
     n_features_in_ : int
-        Features of a frame (columns, for 2-D input).
+        Signals of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
-        Names of the features; only if the input had names.
+        Names of the signals; only if the input had names.
 
     See Also
     --------
     LinearSynchronizer : The baseline without matching.
     KeyframeSynchronizer : Matching by key-frames.
-    ActionModel : Mean and variation of synchronised performances.
-    sklearn_motionsync.display.MetricDisplay : Draws the weights of the features in the metric.
+    ActionModel : Mean and variation of aligned trials.
+    sklearn_motionsync.display.MetricDisplay : Draws the weights of the signals in the metric.
+
+    Notes
+    -----
+    A fit has six steps. Those of the paper are 1, 3 and 4, and `paper` has its settings.
+
+    1. All trials are linearly normalised to ``P`` frames (Eq. 7).
+    2. The metric is learnt: how well each signal, and combinations of them, tell the moments of the
+       movement (see ``metric``).
+    3. Pairs of trials are matched. Dynamic programming finds the time shifts Delta(p) with the
+       smallest distance ``D_{n,m}`` (Eqs. 12-17)::
+
+           sum_p |x_n(p) - x_m(p + Delta(p))|^2 + mu sum_p phi(rate)
+
+       Both ends are pinned, and the local rate is between 0 and ``max_rate``. The points x are
+       velocities and poses in the metric (see ``cost``).
+    4. The template is the trial with the smallest sum ``C_n = sum_m D_{n,m}`` (Eq. 19), the
+       "median".
+    5. Some typical trials, the exemplars, vote. The template is matched to a trial directly, and by
+       way of each exemplar. The weighted median of these paths outvotes a path that went astray. It
+       is then smoothed.
+    6. If that helps, Gauss-Newton steps refine the warps.
+
+    ``transform`` samples a trial at ``tau(p) = p + Delta(p)`` (Eq. 18).
 
     References
     ----------
@@ -234,8 +253,8 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
 
     Examples
     --------
-    A known warp is recovered. The second performance is up to 8 frames ahead in its first
-    half, and behind in its second.
+    A known warp is recovered. The second trial is up to 8 frames ahead in its first half, and
+    behind in its second.
 
     >>> import numpy as np
     >>> from sklearn_motionsync import DenseSynchronizer
@@ -248,8 +267,6 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
     >>> truth = 100 * (np.interp(t, phase, t) - t)
     >>> float(np.abs(sync.match(X).offsets[1] - truth).mean().round(1))
     0.0
-    >>> sync.transform(X).shape
-    (2, 101, 2)
     """
 
     _parameter_constraints: dict = {
@@ -271,29 +288,31 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         "verbose": ["verbose"],
     }
 
+    metric_: Any
+
     _SMALLER = "fewer frames, subframes or performances. Or learn from some: max_fit=1000"
 
     def __init__(
         self,
-        n_frames=None,
-        pattern="median",
+        n_frames: int | None = None,
+        pattern: PerformanceLike | int | Literal["median"] = "median",
         *,
-        velocity_smoothing="auto",
-        refine="auto",
-        max_offset="auto",
-        metric="learned",
-        consensus=8,
-        warp_smoothing=0.02,
-        cost="velocity",
-        smoothness=0.003,
-        max_rate=4,
-        subframes=1,
-        search="auto",
-        max_fit=None,
-        random_state=0,
-        n_jobs=None,
-        verbose=0,
-    ):
+        velocity_smoothing: float | Literal["auto"] = "auto",
+        refine: bool | Literal["auto"] = "auto",
+        max_offset: float | Literal["auto"] = "auto",
+        metric: Literal["learned"] | None = "learned",
+        consensus: int = 8,
+        warp_smoothing: float = 0.02,
+        cost: Cost = "velocity",
+        smoothness: float = 0.003,
+        max_rate: float = 4,
+        subframes: int = 1,
+        search: Literal["auto", "exhaustive", "sampled"] = "auto",
+        max_fit: int | None = None,
+        random_state: RandomState = 0,
+        n_jobs: int | None = None,
+        verbose: int = 0,
+    ) -> None:
         self.n_frames = n_frames
         self.pattern = pattern
         self.velocity_smoothing = velocity_smoothing
@@ -313,7 +332,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         self.verbose = verbose
 
     @classmethod
-    def paper(cls, **params):
+    def paper(cls, **params: Any) -> Self:
         """Make a synchronizer with the settings of the paper.
 
         Postures are compared, rates end at 2, and a warp is the direct path to the pattern: no
@@ -337,7 +356,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         return cls(**{"cost": "posture", "max_rate": 2, "consensus": 0} | params)
 
     @snapshot
-    def match(self, X):
+    def match(self, X: PerformancesLike) -> Match:
         """Match performances to the pattern: the warps of ``transform`` (Eqs. 12-17).
 
         Parameters
@@ -369,7 +388,7 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
             return warp_in_portions(self._warper, performances, **portions)
 
     @snapshot
-    def disparity_space(self, X, performance=0):
+    def disparity_space(self, X: PerformancesLike, performance: int = 0) -> Bunch:
         """The disparity space of the pattern and one performance, and the path through it (Fig. 2).
 
         Parameters
@@ -425,32 +444,31 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         if self.metric_ is not None:
             self.metric_.performances = sample[self.metric_.performances]
 
-    def _learn(self, performances):
-        with self._progress(fits=True) as progress:
-            training = self._set_clock(performances, self.subframes)
-            positions = training.scaled
-            if self.subframes > 1:
-                positions = normalise(performances, self.n_frames_, self.subframes)
-                training.unit(positions, out=positions)
-            features = self._learn_metric(training.unit, positions)
-            settings = self._settings()
-            searched = features.for_search(self.n_frames_, settings["max_offset"])
-            store = FeatureStore(searched, positions)
-            _warn_of_one_feature(self, performances, store)
-            searcher, shared, median = self._search(searched, store, positions, progress)
-            matcher = searcher
-            if searched is not features:
-                reach = {name: settings[name] for name in ("max_offset", "max_rate")}
-                sizes = self.n_frames_, searcher.trellis.mu
-                trellis = Trellis.on_clock(self.cost, *sizes, subframes=self.subframes, **reach)
-                matcher = Matcher(features, trellis)
-            self.features_ = features
-            self.mu_ = float(features.back(matcher.trellis.mu))
-            source = self._set_pattern(training, median, features.degree)
-            # Sums over fewer frames, scaled to all.
-            self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
-            warper = self._choose_exemplars(training, matcher, source, median.estimates)
-            self._warper = self._decide_on_refinement(training, warper, source, progress, shared)
+    def _learn(self, performances, progress):
+        training = self._set_clock(performances, self.subframes)
+        positions = training.scaled
+        if self.subframes > 1:
+            positions = normalise(performances, self.n_frames_, self.subframes)
+            training.unit(positions, out=positions)
+        features = self._learn_metric(training.unit, positions)
+        settings = self._settings()
+        searched = features.for_search(self.n_frames_, settings["max_offset"])
+        store = FeatureStore(searched, positions)
+        warn_of_one_feature(self, performances, store)
+        searcher, shared, median = self._search(searched, store, positions, progress)
+        matcher = searcher
+        if searched is not features:
+            reach = {name: settings[name] for name in ("max_offset", "max_rate")}
+            sizes = self.n_frames_, searcher.trellis.mu
+            trellis = Trellis.on_clock(self.cost, *sizes, subframes=self.subframes, **reach)
+            matcher = Matcher(features, trellis)
+        self.features_ = features
+        self.mu_ = float(features.back(matcher.trellis.mu))
+        source = self._set_pattern(training, median, features.degree)
+        # Sums over fewer frames, scaled to all.
+        self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
+        warper = self._choose_exemplars(training, matcher, source, median.estimates)
+        self._warper = self._decide_on_refinement(training, warper, source, progress, shared)
 
     def _settings(self, learnt=None):
         """The settings of `Matcher.learn`, for a learnt metric or none; by default as fitted."""
@@ -600,146 +618,3 @@ class DenseSynchronizer(LongWorkMixin, Synchronizer):
         if not verdict.may_help:
             return verdict
         return verdict_of(by_fold, misfits("misfits_by_all", "refinement test, unrefined"))
-
-
-# -- a fit to a random sample of many performances ---------------------------------------------
-
-
-def subsample(X, size, pattern, random_state):
-    """A random sample of performances; the others are not read.
-
-    Parameters
-    ----------
-    X : performances of any kind
-    size : int or None
-        Size of the sample; None for all.
-    pattern : as of a synchronizer
-        A pattern given by its index is always in the sample.
-    random_state : as of a synchronizer
-
-    Returns
-    -------
-    some : performances of any kind
-    sample : ndarray of int or None
-        Their indices, which increase; None if they are all.
-    population : int or None
-        Size of the population.
-    """
-    if size is None:
-        return X, None, None
-    given = _indexable(as_pandas(X))
-    population = 0 if given is None else count_of(given)
-    is_index = isinstance(pattern, Integral) and not isinstance(pattern, bool)
-    if size >= population or (is_index and pattern >= population):
-        return X if given is None else given, None, None
-    # An independent stream: the search uses the same state.
-    seed = check_random_state(random_state).randint(np.iinfo(np.int32).max)
-    drawn = np.random.RandomState(seed).permutation(population)
-    if is_index:
-        drawn = np.concatenate([[pattern], drawn[drawn != pattern]])
-    sample = np.sort(drawn[:size])
-    return select(given, sample), sample, population
-
-
-def _indexable(X):
-    """Performances, or rows, by index; None for input that has to be refused."""
-    source = as_source(X)
-    if source is not None:
-        return source
-    if isinstance(X, pd.DataFrame):
-        return X if X.index.nlevels == 1 else as_collection(X)
-    known = isinstance(X, (list, tuple)) or (isinstance(X, np.ndarray) and X.ndim > 0)
-    return X if known or gives_rows(X) else None
-
-
-def typical_share(in_doubt, n, population):
-    """Upper 95 % confidence bound of the share of a population more typical than the pattern.
-
-    At most ``in_doubt`` of a random sample of n are more typical than its pattern: it is one
-    of the ``in_doubt + 1`` most typical of the sample. The share of the population that is
-    more typical than the last of these follows a beta distribution if the sample is drawn with
-    replacement; it is smaller without.
-
-    Parameters
-    ----------
-    in_doubt : int
-    n, population : int
-        If they are equal nothing is estimated.
-    """
-    if n == population:
-        return in_doubt / n
-    return float(betaincinv(in_doubt + 1, n - in_doubt, _CONFIDENCE)) if in_doubt < n else 1.0
-
-
-# -- whether one of several features dominates the energy that is compared -----------------
-
-# Of 112 sets of features of people, one action each, the largest share of velocities is 0.93:
-# positions, direction cosines, and their first components, two or more (HDM05, UTKinect).
-_DOMINANT = 0.95
-# A feature with a smaller share of the energy is constant but for rounding.
-_CONSTANT = 1e-24
-# Largest correlation of principal components due to rounding.
-_UNCORRELATED = 1e-5
-# Performances processed at a time.
-BATCH = 256
-
-
-def _warn_of_one_feature(synchronizer, performances, store):
-    """Warn if one of several features has nearly all of the energy, as with mixed units.
-
-    Parameters
-    ----------
-    synchronizer : DenseSynchronizer
-        Its metric is learnt.
-    performances : sequence of ndarray (n_frames_i, n_features)
-    store : FeatureStore
-        Their features, used without a metric.
-    """
-    metric, names = synchronizer.metric_, names_of_input(synchronizer)
-    shares = metric.energy if metric else _shares(store, synchronizer.cost)
-    if shares.max() <= _DOMINANT or (shares > _CONSTANT).sum() < 2:
-        return
-    if _are_principal_components(performances):
-        return
-    k = int(shares.argmax())
-    name = k if names is None else repr(names[k])
-    warnings.warn(
-        f"Feature {name} holds {100 * shares[k]:.4g} % of the energy that is compared: of "
-        f"{len(shares)} features the others hardly count. If units differ, scale them: "
-        "make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer()). If it alone shall tell "
-        "the moments, leave the others out, and warp them by Match.warp.",
-        UserWarning,
-        stacklevel=2,
-    )
-
-
-def _shares(store, cost):
-    """The share of every feature in the energy that is compared without a metric."""
-    total, energy, count = 0, 0, 0
-    for features in store.portions():
-        total += features.sum(axis=(0, 1), dtype=np.float64)
-        energy += np.einsum("npk,npk->k", features, features, dtype=np.float64)
-        count += features[:, :, 0].size
-    if cost == "posture":
-        # A common offset changes no distance.
-        energy = np.maximum(energy - total**2 / count, 0)
-    return energy / (energy.sum() or 1.0)
-
-
-def _are_principal_components(performances):
-    """Whether features are uncorrelated, the largest first, as those of an aSpace are.
-
-    They have one unit, and the first has most of the variance by construction.
-    """
-    # From a posture near the mean, so that no digits are lost.
-    origin = performances[0].mean(axis=0, dtype=np.float64)
-    arrays, total, products, count = list(performances), 0, 0, 0
-    for rows in even_slices(len(arrays), BATCH):
-        frames = np.concatenate(arrays[rows]).astype(np.float64) - origin
-        total, products = total + frames.sum(axis=0), products + frames.T @ frames
-        count += len(frames)
-    covariance = products - np.outer(total, total) / count
-    variance = np.diag(covariance)
-    bound = _UNCORRELATED * np.sqrt(np.outer(variance, variance))
-    others = np.abs(covariance - np.diag(variance))
-    return bool((others <= bound).all() and (np.diff(variance) <= 0).all())

@@ -1,19 +1,28 @@
 """KeyframeSynchronizer: piecewise linear warps between key-frames (Figs. 1c and 3c)."""
 
 from numbers import Integral
+from typing import Literal, Self
 
 import numpy as np
 import pandas as pd
-from sklearn.base import _fit_context
 from sklearn.utils._param_validation import Interval
 
 from ..inputs.numbers import as_numbers
 from ..inputs.recorded import refuse_moved_events, refuse_seconds
+from ..inputs.types import (
+    Indexed,
+    PerformanceLike,
+    PerformancesLike,
+    SupportsArray,
+    Transformed,
+    ValuesLike,
+)
 from ..inputs.wording import counted
 from ..matching.filters import SMOOTHING, smooth
 from ..matching.units import Unit
 from ..matching.warps import even_slices, sample
 from ..utils.atomic import atomic_fit, snapshot
+from ..utils.parameters import validated
 from ..utils.pipelines import MissingMetadata
 from .base import Synchronizer
 from .match import Match
@@ -95,14 +104,24 @@ class KeyframeSynchronizer(Synchronizer):
         "n_keyframes": [Interval(Integral, 1, None, closed="left")],
     }
 
-    def __init__(self, n_frames=None, pattern="median", n_keyframes=5):
+    def __init__(
+        self,
+        n_frames: int | None = None,
+        pattern: PerformanceLike | int | Literal["median"] = "median",
+        n_keyframes: int = 5,
+    ) -> None:
         self.n_frames = n_frames
         self.pattern = pattern
         self.n_keyframes = n_keyframes
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None, keyframes=None):
+    @validated
+    def fit(
+        self,
+        X: PerformancesLike,
+        y: object = None,
+        keyframes: Indexed[ValuesLike] | SupportsArray | None = None,
+    ) -> Self:
         """Choose the pattern and its key-frames.
 
         Parameters
@@ -130,11 +149,17 @@ class KeyframeSynchronizer(Synchronizer):
         """
         if keyframes is not None:
             refuse_moved_events(X)
-        self._learn(self._check_training_set(X), keyframes)
+        with self._progress(fits=True) as progress:
+            self._learn(self._check_training_set(X), progress, keyframes)
         return self
 
     @atomic_fit
-    def fit_transform(self, X, y=None, keyframes=None):
+    def fit_transform(
+        self,
+        X: PerformancesLike,
+        y: object = None,
+        keyframes: Indexed[ValuesLike] | SupportsArray | None = None,
+    ) -> Transformed:
         """Fit, and warp the same performances.
 
         Parameters
@@ -153,7 +178,11 @@ class KeyframeSynchronizer(Synchronizer):
         """
         return self.fit(X, y, keyframes=keyframes).transform(X, keyframes=keyframes)
 
-    def transform(self, X, keyframes=None):
+    def transform(
+        self,
+        X: PerformancesLike,
+        keyframes: Indexed[ValuesLike] | SupportsArray | None = None,
+    ) -> Transformed:
         """Warp performances so that their key-frames coincide with those of the pattern.
 
         Parameters
@@ -174,7 +203,11 @@ class KeyframeSynchronizer(Synchronizer):
         return self._warp(X, keyframes=keyframes)
 
     @snapshot
-    def match(self, X, keyframes=None):
+    def match(
+        self,
+        X: PerformancesLike,
+        keyframes: Indexed[ValuesLike] | SupportsArray | None = None,
+    ) -> Match:
         """Match performances to the pattern.
 
         Parameters
@@ -212,7 +245,7 @@ class KeyframeSynchronizer(Synchronizer):
             distances[rows] = differences.sum(axis=(1, 2), dtype=np.float64)
         return Match(np.concatenate(times), distances)
 
-    def _learn(self, performances, keyframes):
+    def _learn(self, performances, progress, keyframes):
         self._given = keyframes is not None
         training = self._set_clock(performances)
         comparable = training.scaled

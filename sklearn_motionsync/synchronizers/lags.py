@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
+from ..inputs.types import Unit
 from ..inputs.wording import counted
 from .match import timing_table
 
@@ -59,14 +60,14 @@ class Lags(NamedTuple):
     """
 
     values: np.ndarray
-    parts: list
+    parts: list[str]
     against: str
-    unit: str
+    unit: Unit
     groups: np.ndarray | None = None
     people: list | None = None
     labels: list | None = None
 
-    def summary(self):
+    def summary(self) -> pd.DataFrame:
         """The mean lag of a performance over the clock, and its spread, part by part.
 
         Returns
@@ -82,7 +83,7 @@ class Lags(NamedTuple):
         columns = self._spread(self.values.mean(axis=2))
         return pd.DataFrame(columns, index=pd.Index(self.parts, name="part"))
 
-    def over_time(self):
+    def over_time(self) -> pd.DataFrame:
         """The lag at every frame of the pattern, and its spread.
 
         Returns
@@ -96,7 +97,7 @@ class Lags(NamedTuple):
         columns = self._spread(self.values.reshape(len(self.values), -1))
         return pd.DataFrame(columns, index=index)
 
-    def to_frame(self):
+    def to_frame(self) -> pd.DataFrame:
         """All lags as a table, such as for a CSV file.
 
         Returns

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..inputs.types import PerformancesLike
 from ..matching.warps import normalise
 from ..utils.atomic import snapshot
 from .base import Synchronizer
@@ -63,7 +64,7 @@ class LinearSynchronizer(Synchronizer):
     """
 
     @snapshot
-    def match(self, X):
+    def match(self, X: PerformancesLike) -> Match:
         """Match performances to the pattern without any warp.
 
         Parameters

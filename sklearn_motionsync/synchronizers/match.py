@@ -1,16 +1,26 @@
 """Match: warps of performances to the pattern, the result of every synchronizer."""
 
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
+from sklearn.base import BaseEstimator
 
 from ..inputs.collections import as_collection
 from ..inputs.long_tables import to_frame
 from ..inputs.numbers import as_numbers
 from ..inputs.recorded import frame_rate_of_rows
 from ..inputs.resampling import as_frame_rates
+from ..inputs.types import (
+    Labels,
+    NumbersLike,
+    PerformancesLike,
+    Transformed,
+    Unit,
+    ValuesLike,
+)
 from ..inputs.validation import read_collection
 from ..inputs.wording import counted
 from ..matching.warps import sample
@@ -93,7 +103,7 @@ class Match:
 
     __slots__ = ("distances", "times")
 
-    def __init__(self, times, distances=None):
+    def __init__(self, times: NumbersLike, distances: ValuesLike | None = None) -> None:
         times = np.array(as_numbers(times, "times", dtype=np.float64))
         if times.ndim != 2 or times.shape[1] < 2:
             raise ValueError(
@@ -127,7 +137,7 @@ class Match:
         self.times, self.distances = times, distances
 
     @property
-    def offsets(self):
+    def offsets(self) -> np.ndarray:
         """``Delta(p) = tau(p) - p``, in frames of the pattern: (n_sequences, P).
 
         Positive where a performance is later than the pattern, negative where it is earlier.
@@ -135,7 +145,7 @@ class Match:
         return self.times - np.arange(self.times.shape[1])
 
     @property
-    def rates(self):
+    def rates(self) -> np.ndarray:
         """Local rates ``d tau / dp``: (n_sequences, P).
 
         Central differences of ``times``, one-sided at both ends, and at least 0.01. The log rate,
@@ -144,7 +154,12 @@ class Match:
         """
         return np.maximum(np.gradient(self.times, axis=1), _SLOWEST)
 
-    def offsets_in(self, unit, X=None, frame_rate=None):
+    def offsets_in(
+        self,
+        unit: Unit,
+        X: PerformancesLike | ValuesLike | None = None,
+        frame_rate: float | ValuesLike | None = None,
+    ) -> np.ndarray:
         """How much later than the pattern performances are at every frame of it, in a unit of time.
 
         Offsets are relative to linear normalisation: all performances begin and end with the
@@ -174,7 +189,13 @@ class Match:
         """
         return self._in_unit(unit, X, frame_rate)[1]
 
-    def to_frame(self, unit="frames", X=None, frame_rate=None, labels=None):
+    def to_frame(
+        self,
+        unit: Unit = "frames",
+        X: PerformancesLike | ValuesLike | None = None,
+        frame_rate: float | ValuesLike | None = None,
+        labels: Labels | None = None,
+    ) -> pd.DataFrame:
         """The timing of all performances as a table, such as for a CSV file.
 
         Parameters
@@ -223,7 +244,7 @@ class Match:
         return timing_table(columns, X, labels)
 
     @classmethod
-    def from_estimator(cls, estimator, X, **params):
+    def from_estimator(cls, estimator: BaseEstimator, X: PerformancesLike, **params: Any) -> Self:
         """Match raw performances by a fitted synchronizer, or by a pipeline with one.
 
         Parameters
@@ -260,7 +281,7 @@ class Match:
         """
         return route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator").match()
 
-    def warp(self, X):
+    def warp(self, X: PerformancesLike) -> Transformed:
         """Warp sequences recorded with the performances onto the clock of the pattern (Eq. 18).
 
         Such as joint positions when the match was made in the aSpace, forces, or muscle signals, at
@@ -287,7 +308,7 @@ class Match:
         self._check_count(arrays, "sequence")
         return sample(arrays, self.times, self.times.shape[1])
 
-    def frames(self, X):
+    def frames(self, X: PerformancesLike | ValuesLike) -> np.ndarray:
         """The frame of each performance that corresponds to each frame of the pattern.
 
         Parameters
@@ -308,7 +329,11 @@ class Match:
         """
         return self._stretched(self.times, X)
 
-    def seconds(self, X, frame_rate=None):
+    def seconds(
+        self,
+        X: PerformancesLike | ValuesLike,
+        frame_rate: float | ValuesLike | None = None,
+    ) -> np.ndarray:
         """The time in each performance that corresponds to each frame of the pattern.
 
         Parameters
@@ -369,7 +394,7 @@ class Match:
         rates = as_frame_rates(frame_rate, len(self.times))
         return self._stretched(times, X) / rates
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[np.ndarray]:
         return iter((self.offsets, self.times, self.distances))
 
     def __repr__(self):

@@ -5,14 +5,16 @@ import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Real
+from typing import Self
 
 import numpy as np
-from sklearn.base import _fit_context, clone
+from sklearn.base import clone
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
 from ..body.limbs import parts_of_names, parts_of_postures
 from ..inputs.features import choose_features
+from ..inputs.types import Features, Labels, PerformancesLike, Unit, ValuesLike
 from ..inputs.validation import names_of_input
 from ..matching.matcher import Matcher, Warper
 from ..matching.trellis import Coupling
@@ -20,6 +22,7 @@ from ..matching.warps import evaluate_warps, normalise
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.groups import encode_groups
 from ..utils.parallel import Progress, run
+from ..utils.parameters import validated, validated_with_nested
 from .base import Synchronizer
 from .dense import DenseSynchronizer
 from .lags import Lags
@@ -149,14 +152,19 @@ class PartSynchronizer(Synchronizer):
         "synchronizer": [DenseSynchronizer, None],
     }
 
-    def __init__(self, parts=None, coupling=0.001, synchronizer=None):
+    def __init__(
+        self,
+        parts: Mapping[str, Features] | None = None,
+        coupling: float = 0.001,
+        synchronizer: DenseSynchronizer | None = None,
+    ) -> None:
         self.parts = parts
         self.coupling = coupling
         self.synchronizer = synchronizer
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y=None):
+    @validated_with_nested
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Learn the whole body, then every part.
 
         Parameters
@@ -178,7 +186,11 @@ class PartSynchronizer(Synchronizer):
             such parts.
         """
         body = clone(DenseSynchronizer() if self.synchronizer is None else self.synchronizer)
-        self.parts_, self._warpers = fit_body_and_parts(body, X, self.parts, self.coupling)
+        with (
+            self._progress(fits=True) as progress,
+            progress.fitting(body, "learning the body and its parts"),
+        ):
+            self.parts_, self._warpers = fit_body_and_parts(body, X, self.parts, self.coupling)
         self.synchronizer_ = body
         for name in _SHARED:
             if hasattr(body, name):
@@ -186,7 +198,7 @@ class PartSynchronizer(Synchronizer):
         return self
 
     @snapshot
-    def match(self, X):
+    def match(self, X: PerformancesLike) -> Match:
         """Match the whole body of performances to the pattern.
 
         Parameters
@@ -203,7 +215,7 @@ class PartSynchronizer(Synchronizer):
         return self.synchronizer_.match(X)
 
     @snapshot
-    def match_parts(self, X):
+    def match_parts(self, X: PerformancesLike) -> dict[str, Match]:
         """Match every part of performances to that of the pattern.
 
         Parameters
@@ -221,7 +233,15 @@ class PartSynchronizer(Synchronizer):
         return self._match_parts(performances, self.match(performances), "part")
 
     @snapshot
-    def lags(self, X, groups=None, *, against="rest", unit="frames", frame_rate=None):
+    def lags(
+        self,
+        X: PerformancesLike,
+        groups: Labels | None = None,
+        *,
+        against: str = "rest",
+        unit: Unit = "frames",
+        frame_rate: float | ValuesLike | None = None,
+    ) -> Lags:
         """How much later than the rest of the body each part is, at every frame of the pattern.
 
         Parameters
@@ -308,7 +328,7 @@ class PartSynchronizer(Synchronizer):
 
 
 @atomic_fit
-@_fit_context(prefer_skip_nested_validation=True)
+@validated
 def fit_body_and_parts(self, X, parts, coupling):
     """A ``fit`` of the synchronizer of the whole body, which also learns the parts.
 
@@ -329,28 +349,31 @@ def fit_body_and_parts(self, X, parts, coupling):
     """
     performances = self._check_training_set(X)
     parts = choose_parts(parts, performances, names_of_input(self))
-    self._learn(performances)
-    warpers = {"part": {}, "rest": {}}
-    if coupling < math.inf:
-        source = self._given_pattern(performances)
-        if source is None:
-            source = performances[self.pattern_index_]
-        chosen = [source, *(performances[k] for k in self.exemplars_)]
-        # In double precision, as all that is warped.
-        chosen = [x.astype(np.float64, copy=False) for x in chosen]
-        chosen = normalise(chosen, self.n_frames_, self.subframes)
-        (times,) = run(_warp_pattern_and_exemplars, [(self._warper, chosen)])
-        training = normalise(performances, self.n_frames_, self.subframes)
-        common = self._warper, times, training, chosen, coupling, self._settings()
-        everything = np.arange(performances[0].shape[1])
-        for what, columns in {
-            "part": parts,
-            "rest": {name: np.setdiff1d(everything, part) for name, part in parts.items()},
-        }.items():
-            portions = [(x, *common) for x in columns.values()]
-            found = run(PartWarper.of, portions, n_jobs=self.n_jobs, prefer="threads")
-            warpers[what] = dict(zip(parts, found, strict=True))
-    self._number_as_given()
+    with self._progress(fits=True) as progress:
+        self._learn(performances, progress)
+        warpers = {"part": {}, "rest": {}}
+        if coupling < math.inf:
+            source = self._given_pattern(performances)
+            if source is None:
+                source = performances[self.pattern_index_]
+            chosen = [source, *(performances[k] for k in self.exemplars_)]
+            # In double precision, as all that is warped.
+            chosen = [x.astype(np.float64, copy=False) for x in chosen]
+            chosen = normalise(chosen, self.n_frames_, self.subframes)
+            (times,) = run(_warp_pattern_and_exemplars, [(self._warper, chosen)])
+            training = normalise(performances, self.n_frames_, self.subframes)
+            common = self._warper, times, training, chosen, coupling, self._settings()
+            everything = np.arange(performances[0].shape[1])
+            for what, columns in {
+                "part": parts,
+                "rest": {name: np.setdiff1d(everything, part) for name, part in parts.items()},
+            }.items():
+                portions = [(x, *common) for x in columns.values()]
+                stage = "learning parts" if what == "part" else "learning the rest of each part"
+                jobs = {"n_jobs": self.n_jobs, "step": progress.stage(stage, len(portions))}
+                found = run(PartWarper.of, portions, prefer="threads", **jobs)
+                warpers[what] = dict(zip(parts, found, strict=True))
+        self._number_as_given()
     return parts, warpers
 
 

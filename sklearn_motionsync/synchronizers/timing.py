@@ -1,10 +1,11 @@
 """TimingChannel: synchronised performances with their timing as an additional feature."""
 
 from numbers import Real
+from typing import Any, Literal, Self
 
 import numpy as np
 from sklearn import get_config
-from sklearn.base import BaseEstimator, MetaEstimatorMixin, TransformerMixin, _fit_context, clone
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, TransformerMixin, clone
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.metadata_routing import (
     MetadataRouter,
@@ -14,16 +15,21 @@ from sklearn.utils.metadata_routing import (
 )
 from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.types import NamesLike, PerformancesLike, Transformed, Unit
 from ..inputs.validation import restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
+from ..utils.parameters import validated_with_nested
 from .base import Synchronizer
-from .match import UNITS, check_match
+from .match import UNITS, Match, check_match
 
 __all__ = ["TimingChannel"]
 
 
-class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseEstimator):
+class TimingChannel(
+    DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, TransformerMixin, BaseEstimator
+):
     """Synchronised performances, with their timing as an additional feature.
 
     Synchronisation removes differences in timing from the curves. Here they are appended to the
@@ -92,15 +98,21 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         "frame_rate": [Interval(Real, 0, None, closed="neither"), None],
     }
 
-    def __init__(self, synchronizer, channel="offset", unit="percent", frame_rate=None):
+    def __init__(
+        self,
+        synchronizer: Synchronizer,
+        channel: Literal["offset", "log_rate"] = "offset",
+        unit: Unit = "percent",
+        frame_rate: float | None = None,
+    ) -> None:
         self.synchronizer = synchronizer
         self.channel = channel
         self.unit = unit
         self.frame_rate = frame_rate
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y=None, **params):
+    @validated_with_nested
+    def fit(self, X: PerformancesLike, y: object = None, **params: Any) -> Self:
         """Fit a clone of the synchronizer.
 
         Parameters
@@ -125,7 +137,9 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         """
         if self.channel == "offset" and self.unit == "seconds" and self.frame_rate is None:
             raise ValueError("unit='seconds' needs frame_rate, frames per second of X.")
-        sync = clone(self.synchronizer).fit(X, y, **self._route("fit", params))
+        sync, given = clone(self.synchronizer), self._route("fit", params)
+        with self._progress(fits=True) as progress, progress.fitting(sync, "synchronizing"):
+            sync.fit(X, y, **given)
         if self.channel in getattr(sync, "feature_names_in_", ()):
             raise ValueError(
                 f"A feature of X has the name of the channel, {self.channel!r}: rename it."
@@ -137,7 +151,7 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         return self
 
     @atomic_fit
-    def fit_transform(self, X, y=None, **params):
+    def fit_transform(self, X: PerformancesLike, y: object = None, **params: Any) -> Transformed:
         """Fit, and transform the same performances.
 
         Parameters
@@ -163,7 +177,7 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         return self.fit(X, y, **to_fit).transform(X, **{name: params[name] for name in warps})
 
     @snapshot
-    def transform(self, X, **params):
+    def transform(self, X: PerformancesLike, **params: Any) -> Transformed:
         """Warp performances onto the clock of the pattern, and append the channel.
 
         Parameters
@@ -197,7 +211,7 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         out = np.concatenate([curves, channel[:, :, np.newaxis]], axis=2)
         return restore(self, performances, out, frames=range(self.n_frames_))
 
-    def match(self, X, **params):
+    def match(self, X: PerformancesLike, **params: Any) -> Match:
         """Match performances to the pattern, as the synchronizer does.
 
         Parameters
@@ -215,7 +229,7 @@ class TimingChannel(DocumentedMixin, MetaEstimatorMixin, TransformerMixin, BaseE
         check_is_fitted(self)
         return self.synchronizer_.match(X, **params)
 
-    def get_feature_names_out(self, input_features=None):
+    def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
         """Names of the outputs: those of the synchronizer, and ``"offset"`` or ``"log_rate"``.
 
         Parameters

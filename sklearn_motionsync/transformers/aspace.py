@@ -1,34 +1,51 @@
 """aSpace: the principal components of the postures of an action (Eqs. 3-5)."""
 
 from numbers import Integral
+from typing import ClassVar, Self
 
 import numpy as np
 from sklearn.base import (
     BaseEstimator,
     ClassNamePrefixFeaturesOutMixin,
     TransformerMixin,
-    _fit_context,
 )
 from sklearn.decomposition import PCA
 from sklearn.utils._param_validation import Interval, RealNotInt
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
+from ..inputs.types import FitTransform, NamesLike, PerformancesLike, Transformed
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
+from ..utils.parameters import validated
 
 __all__ = ["ASpace"]
 
 
-class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
-    """The space of an action: principal components of all its postures.
+class ASpace(
+    DocumentedMixin,
+    LongWorkMixin,
+    ClassNamePrefixFeaturesOutMixin,
+    TransformerMixin,
+    BaseEstimator,
+):
+    """Principal components of all poses of a movement: few numbers instead of many.
 
-    1. Pool the postures of all performances and diagonalise their covariance (Eq. 3).
-    2. Keep the first ``b`` eigenvectors, the fewest that reach the share of the variance to be
-       kept (Eq. 4).
-    3. Project postures onto them (Eq. 5).
+    The second of these signals is twice the first, and the third is constant. One number a frame
+    tells all:
+
+    >>> import numpy as np
+    >>> from sklearn_motionsync import ASpace
+    >>> t = np.linspace(0, 1, 50)
+    >>> performances = [np.column_stack([x, 2 * x, 0 * x]) for x in (t, t**2)]
+    >>> aspace = ASpace(0.95).fit(performances)
+    >>> aspace.n_components_
+    1
+    >>> [x.shape for x in aspace.transform(performances)]
+    [(50, 1), (50, 1)]
 
     Parameters
     ----------
@@ -61,17 +78,11 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
     DirectionCosines : Postures from joint positions.
     DenseSynchronizer : Synchronises the projected performances.
 
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from sklearn_motionsync import ASpace
-    >>> t = np.linspace(0, 1, 50)
-    >>> performances = [np.column_stack([x, 2 * x, 0 * x]) for x in (t, t**2)]
-    >>> aspace = ASpace(0.95).fit(performances)
-    >>> aspace.n_components_
-    1
-    >>> [x.shape for x in aspace.transform(performances)]
-    [(50, 1), (50, 1)]
+    Notes
+    -----
+    The poses of all trials are pooled, and their covariance is diagonalised (Eq. 3). The first
+    ``b`` eigenvectors are kept, the fewest that reach the share of the variance (Eq. 4). Poses are
+    projected onto them (Eq. 5).
     """
 
     _parameter_constraints: dict = {
@@ -81,12 +92,12 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         ],
     }
 
-    def __init__(self, n_components=0.95):
+    def __init__(self, n_components: float = 0.95) -> None:
         self.n_components = n_components
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None):
+    @validated
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Find the components.
 
         Parameters
@@ -118,7 +129,8 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
                 f"{counted(len(postures), 'posture')} of {counted(postures.shape[1], 'feature')} "
                 f"can span; use at most {most}, or a share of the variance such as 0.95."
             )
-        with np.errstate(invalid="ignore"):  # of postures all equal: PCA divides 0 by 0
+        # Of postures that are all equal PCA divides 0 by 0.
+        with self._progress(fits=True), np.errstate(invalid="ignore"):
             pca = PCA().set_output(transform="default").fit(postures)
         variance = pca.explained_variance_
         b = self._count(variance)
@@ -131,10 +143,10 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         self.n_components_ = b
         return self
 
-    fit_transform = atomic_fit(TransformerMixin.fit_transform)
+    fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
 
     @snapshot
-    def transform(self, X):
+    def transform(self, X: PerformancesLike) -> Transformed:
         """Project postures into the aSpace (Eq. 5).
 
         Parameters
@@ -155,7 +167,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         return restore(self, performances, arrays)
 
     @snapshot
-    def inverse_transform(self, X):
+    def inverse_transform(self, X: PerformancesLike) -> Transformed:
         """Reconstruct postures from points of the aSpace; exact if all components were kept.
 
         Parameters
@@ -176,7 +188,7 @@ class ASpace(DocumentedMixin, ClassNamePrefixFeaturesOutMixin, TransformerMixin,
         names = getattr(self, "feature_names_in_", range(self.n_features_in_))
         return restore(self, performances, arrays, columns=names)
 
-    def get_feature_names_out(self, input_features=None):
+    def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
         """Names of the coordinates: ``aspace0``, ``aspace1``, ...
 
         Parameters

@@ -1,9 +1,11 @@
 """FrameWise: any transformer of rows, applied to the frames of performances."""
 
+from typing import ClassVar, Self
+
 import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
-from sklearn.base import BaseEstimator, TransformerMixin, _fit_context, clone
+from sklearn.base import BaseEstimator, TransformerMixin, clone
 from sklearn.compose import ColumnTransformer
 from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
@@ -13,9 +15,12 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers, column_names
+from ..inputs.types import FitTransform, NamesLike, PerformancesLike, Transformed
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
+from ..utils.parallel import LongWorkMixin
+from ..utils.parameters import validated_with_nested
 
 __all__ = ["FrameWise"]
 
@@ -25,7 +30,7 @@ def _goes_back(self):
     return vars(self).get("_inverts", hasattr(self.transformer, "inverse_transform"))
 
 
-class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
+class FrameWise(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator):
     """Apply a transformer of rows, such as ``StandardScaler``, to the frames of performances.
 
     The transformer is fitted on the pooled frames of all performances. A scaler therefore scales a
@@ -76,12 +81,12 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
 
     _parameter_constraints: dict = {"transformer": [HasMethods(["fit", "transform"])]}
 
-    def __init__(self, transformer):
+    def __init__(self, transformer: BaseEstimator) -> None:
         self.transformer = transformer
 
     @atomic_fit
-    @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y=None):
+    @validated_with_nested
+    def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Fit a clone of the transformer on all frames.
 
         Parameters
@@ -106,7 +111,9 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
             self, X, reset=True, level="posture", finite=self._finite()
         )
         self.transformer_ = clone(self.transformer)
-        self.transformer_.fit(self._named(np.concatenate(performances)))
+        name = "fitting the transformer"
+        with self._progress(fits=True) as progress, progress.fitting(self.transformer_, name):
+            self.transformer_.fit(self._named(np.concatenate(performances)))
         rows = self.transformer_.transform(self._named(performances[0]))
         # The names of FunctionTransformer are those of the table that it returns.
         self._names_out = column_names(rows)
@@ -114,10 +121,10 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
         self._n_features_out, self._inverts = rows.shape[1], _inverts(self.transformer_, rows[:1])
         return self
 
-    fit_transform = atomic_fit(TransformerMixin.fit_transform)
+    fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
 
     @snapshot
-    def transform(self, X):
+    def transform(self, X: PerformancesLike) -> Transformed:
         """Transform the frames of performances.
 
         Parameters
@@ -143,7 +150,7 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
 
     @available_if(_goes_back)
     @snapshot
-    def inverse_transform(self, X):
+    def inverse_transform(self, X: PerformancesLike) -> Transformed:
         """Invert the transform of frames, if the transformer can.
 
         Parameters
@@ -166,7 +173,7 @@ class FrameWise(DocumentedMixin, TransformerMixin, BaseEstimator):
         columns = getattr(self, "feature_names_in_", range(self.n_features_in_))
         return restore(self, performances, arrays, columns=columns)
 
-    def get_feature_names_out(self, input_features=None):
+    def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
         """Names of the features that the transformer gives.
 
         Parameters

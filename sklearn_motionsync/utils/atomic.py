@@ -2,14 +2,20 @@
 
 import functools
 import threading
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
 
 __all__ = ["atomic_fit", "atomic_partial_fit", "snapshot"]
+
+# The decorated method has the type of the method.
+_Method = TypeVar("_Method", bound=Callable[..., Any])
+
 
 # Held while an estimator takes over a state.
 _LOCK = threading.Lock()
 
 
-def atomic_fit(method):
+def atomic_fit(method: _Method) -> _Method:
     """Decorate a ``fit`` or ``fit_transform``, so that other threads never see a partial state.
 
     Several threads may fit one estimator: each call has a state of its own, and the last to end
@@ -42,10 +48,10 @@ def atomic_fit(method):
             _take_over(self, copy, unfitted)
         return self if result is copy else result
 
-    return fit_copy
+    return cast(_Method, fit_copy)
 
 
-def atomic_partial_fit(method):
+def atomic_partial_fit(method: _Method) -> _Method:
     """Decorate a ``partial_fit``, so that a portion is learnt as a whole, once, or not at all.
 
     Several threads may give portions to one estimator: a portion that ends second is learnt again,
@@ -73,10 +79,10 @@ def atomic_partial_fit(method):
                     _take_over(self, copy, _unfitted(before))
                     return self
 
-    return partial_fit_copy
+    return cast(_Method, partial_fit_copy)
 
 
-def snapshot(method):
+def snapshot(method: _Method) -> _Method:
     """Decorate a method so that all it reads is of one fit, also if another thread fits meanwhile.
 
     Its ``self`` has the state at the call, and must not be written to.
@@ -87,7 +93,7 @@ def snapshot(method):
         # A fit replaces the state, and never writes to it.
         return method(_with_state(self, vars(self)), *args, **kwargs)
 
-    return call_on_snapshot
+    return cast(_Method, call_on_snapshot)
 
 
 def _take_over(estimator, copy, unfitted):

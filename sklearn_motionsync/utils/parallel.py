@@ -5,6 +5,7 @@ the linear algebra of a portion runs on one thread. So results are equal to the 
 portions are shared out.
 """
 
+import contextlib
 import sys
 import threading
 import time
@@ -161,19 +162,19 @@ def on_cluster():
 
 
 class LongWorkMixin(CallbackSupportMixin):
-    """Progress and callbacks for estimators with a parameter ``verbose``."""
+    """Progress of estimators: callbacks, and lines of text where there is a ``verbose``."""
 
     def _progress(self, *, fits):
         """The `Progress` of a job; callbacks only belong to ``fit``."""
         begin = getattr(self, "_init_callback_context", None) if fits else None
-        return Progress(self, self.verbose, begin)
+        return Progress(self, getattr(self, "verbose", 0), begin)
 
 
 class Progress:
     """The progress of a long job of an estimator: printed if verbose, and given to its callbacks.
 
     A context manager; ``stage`` begins the next part of the job and gives the function to call
-    after each of its portions.
+    after each of its portions. ``fitting`` is a part in which another estimator is fitted.
 
     Parameters
     ----------
@@ -204,13 +205,15 @@ class Progress:
             self._end_tasks(1)
             stage = self._tasks[0].subcontext(task_name=name, max_subtasks=n_portions)
             stage = self._begin_task(stage)
+        # Without callbacks a portion is no task: thousands of tasks take long.
+        is_watched = stage is not None and getattr(stage, "_callbacks", True)
         begin = printed = time.perf_counter()
         done = 0
 
         def step():
             nonlocal done, printed
             done += 1
-            if stage is not None:
+            if is_watched:
                 self._begin_task(stage.subcontext(task_name="portion"))
                 self._end_tasks(2)
             now = time.perf_counter()
@@ -223,6 +226,21 @@ class Progress:
                 )
 
         return step
+
+    @contextlib.contextmanager
+    def fitting(self, estimator, name):
+        """A stage in which another estimator is fitted, with these callbacks if it supports any."""
+        if not self._tasks:
+            yield
+            return
+        self._end_tasks(1)
+        context = self._tasks[0].subcontext(task_name=name)
+        supports = hasattr(estimator, "set_callbacks")
+        propagates = context.propagate_callback_context(estimator) if supports else None
+        with propagates or contextlib.nullcontext():
+            self._begin_task(context)
+            yield
+            self._end_tasks(1)
 
     def _begin_task(self, context):
         self._tasks.append(context.call_on_fit_task_begin(estimator=self._estimator))

@@ -36,6 +36,8 @@ def test_closing_the_figure_prevents_the_warning(bending):
             animation = display.animate(seconds=0.2, fps=10)
             if closes:
                 plt.close()
+                # It has the number of the closed one.
+                assert plt.figure().number == display.figure_.number
             del animation
             gc.collect()
             assert len(caught) == 1, closes

@@ -222,7 +222,7 @@ def test_from_model_refuses_unknown_frames(pipe, frames):
 def test_from_model_accepts_frames_and_shares(pipe):
     for frames in (0.5, [0.5], np.float32([0.5]), 10, [10.0]):
         titles = SkeletonDisplay.from_model(pipe, frames=frames, n_samples=2).titles
-        assert titles[0] == "frame 10\nmean posture"
+        assert titles[0] == "frame 10\nmean pose"
 
 
 def test_from_model_needs_inverse_transform():

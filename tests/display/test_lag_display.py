@@ -31,11 +31,11 @@ def test_map_shows_the_mean_and_hatches_intervals_around_zero(lags):
     assert max(path.vertices[:, 0].max() for path in arm) < 12
     assert max(path.vertices[:, 0].max() for path in leg) > 15
     assert all(patch.get_hatch() for patch in display.unsure_)
-    title = "2 parts behind the rest of the body, 12 performances of 4 people"
+    title = "2 parts behind the rest of the body, 12 trials of 4 people"
     assert display.map_ax_.get_title() == title
     names = [label.get_text() for label in display.map_ax_.get_yticklabels()]
     icc = lags.summary()["icc"]
-    assert names == [f"arm (ICC {icc['arm']:.2f})", f"leg (ICC {icc['leg']:.2f})"]
+    assert names == [f"arm\nICC {icc['arm']:.2f}", f"leg\nICC {icc['leg']:.2f}"]
 
 
 def test_curves_show_mean_interval_and_standard_deviation(lags):
@@ -52,12 +52,12 @@ def test_curves_show_mean_interval_and_standard_deviation(lags):
         assert (heights.min(), heights.max()) == pytest.approx(
             (table["low"].min(), table["high"].max())
         )
-    assert "over people" in display.axes_[0].get_legend().get_texts()[1].get_text()
+    assert "people" in display.axes_[0].get_legend().get_texts()[1].get_text()
 
 
 def test_a_single_performance_has_no_interval(lags):
     display = LagDisplay.from_predictions(Lags(lags.values[:1], lags.parts, "leg", "percent"))
-    assert display.map_ax_.get_title() == "2 parts behind the leg, 1 performance"
+    assert display.map_ax_.get_title() == "2 parts behind the leg, 1 trial"
     assert display.unsure_[0].get_paths()
     assert display.map_ax_.get_xlim() == (0, 100)
 

@@ -118,8 +118,8 @@ def test_standing_still_departs_from_bending(bunch, pipe):
     good, bad = (
         SkeletonDisplay.from_departures(pipe, people, performance=i, frames=3) for i in (0, 1)
     )
-    assert good.heading_.get_text().startswith("Performance 0 is accepted.")
-    assert bad.heading_.get_text().startswith("Performance 1 is not accepted.")
+    assert good.heading_.get_text().startswith("Trial 0 is accepted.")
+    assert bad.heading_.get_text().startswith("Trial 1 is not accepted.")
     assert sum(map(len, good.marked)) < 3 < sum(map(len, bad.marked))
     assert "neck" in marked_joints(bad, 1), "the torso"
     # The whole posture is drawn, with what the aSpace leaves out, and the mean at the frame.
@@ -161,7 +161,7 @@ def test_tables_and_key_frames_are_accepted(bunch):
         given = {"performance": 2, "limit": 1, "keyframes": bunch.keyframes}
         drawn.append(SkeletonDisplay.from_departures(pipe, X, **given))
     one, other = drawn
-    assert other.heading.startswith("Performance 2 ('c') is accepted.")
+    assert other.heading.startswith("Trial 2 ('c') is accepted.")
     assert one.titles == other.titles
     np.testing.assert_allclose(np.array(one.scenes), np.array(other.scenes), atol=1e-9)
     with pytest.raises(ValueError, match=r"from_departures\(estimator, X, keyframes=\[...\]\)"):
@@ -248,7 +248,7 @@ def test_heading_tells_departures_outside_the_aspace(bunch):
     plain = SkeletonDisplay.from_departures(
         pipe, [tilted.reshape(-1, 45), bunch.data[3]], performance=1
     )
-    assert "Performance 1 is accepted.\n" in plain.heading
+    assert "Trial 1 is accepted.\n" in plain.heading
 
 
 @pytest.fixture(scope="module")

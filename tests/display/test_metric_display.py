@@ -42,7 +42,7 @@ def test_bars_agree_with_the_metric(noisy):
     ):
         np.testing.assert_array_equal(widths(bars), numbers[[37, 0, 5]])
     assert labels(display) == display.feature_names == ["x37", "x0", "x5"]
-    assert repr(display) == "MetricDisplay(3 rows, metric learnt from 6 performances)"
+    assert repr(display) == "MetricDisplay(3 rows, metric learnt from 6 trials)"
 
 
 def test_noise_has_a_long_light_bar_and_a_short_dark_one(noisy):

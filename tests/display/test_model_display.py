@@ -29,7 +29,7 @@ def test_mean_envelope_and_performances(bunch, pipe):
             np.testing.assert_allclose(heights.min(), lower[p, feature])
             np.testing.assert_allclose(heights.max(), upper[p, feature])
         np.testing.assert_array_equal(ys(display.performances_[i]), warped[:, :, feature])
-    assert {"mean ± 3 standard deviations", "9 performances"} < set(texts(display.axes_[0]))
+    assert {"mean ± 3 standard deviations", "9 trials"} < set(texts(display.axes_[0]))
 
 
 def test_model_in_features_of_postures(bunch, pipe):
@@ -61,10 +61,10 @@ def test_each_band_has_its_bounds_and_legend(bunch, pipe):
     model = ActionModel(n_std=2, coverage=0.9).fit(pipe[:3].transform(bunch.data))
     factor = model.simultaneous_factor()
     expected = {
-        "points": (model.envelope(), "single postures", "mean ± 2 standard deviations"),
+        "points": (model.envelope(), "single poses", "mean ± 2 standard deviations"),
         "performances": (
             model.envelope(simultaneous=True),
-            "90 % of new people's performances",
+            "90 % of new people's trials",
             f"mean ± {factor:.3g} predicted standard deviations",
         ),
         "mean": (
@@ -163,16 +163,16 @@ def test_mean_and_band_of_each_group_are_those_of_its_own_model(bunch, pipe, ban
     assert len(display.mean_) == len(display.performances_) == 6
     assert len(display.envelope_) == 4
     assert texts(display.axes_[0])[:3] == [
-        "young: 4 performances of 3 people",
-        "old: 4 performances of 2 people",
-        "one: 1 performance of 1 person, no band",
+        "young: 4 trials of 3 people",
+        "old: 4 trials of 2 people",
+        "one: 1 trial of 1 person, no band",
     ]
 
 
 def test_default_band_of_groups_is_that_of_performances(bunch, pipe):
     alike = ActionModelDisplay.from_estimator(pipe, bunch.data, groups=["all"] * 9)
     assert alike.band == "performances"
-    assert "95 % of new people's performances" in legend_of(alike)[0]
+    assert "95 % of new people's trials" in legend_of(alike)[0]
     plain = ActionModelDisplay.from_estimator(
         pipe[-1], pipe[:3].transform(bunch.data), band="performances"
     )
@@ -184,9 +184,9 @@ def test_a_group_of_one_subject_has_no_band_of_performances(bunch, pipe):
     groups, people = ["a"] * 5 + ["b"] * 4, [1, 2, 3, 4, 5, 6, 6, 6, 6]
     given = {"groups": groups, "people": people, "features": [0]}
     display = ActionModelDisplay.from_estimator(pipe, bunch.data, **given)
-    assert "b: 4 performances of 1 person, no band" in texts(display.axes_[0])
+    assert "b: 4 trials of 1 person, no band" in texts(display.axes_[0])
     display = ActionModelDisplay.from_estimator(pipe, bunch.data, band="points", **given)
-    assert "b: 4 performances of 1 person" in texts(display.axes_[0])
+    assert "b: 4 trials of 1 person" in texts(display.axes_[0])
 
 
 def test_legend_counts_departures_from_the_band_of_the_own_group(bunch, pipe):
@@ -228,7 +228,7 @@ def test_many_groups_differ_in_color_or_line_style(bunch, pipe):
     assert len({(line.get_color().__str__(), line.get_linestyle()) for line in display.mean_}) == 9
     display.figure_.canvas.draw()
     assert [text.strip().replace("\\", "") for text in texts(display.axes_[0])] == [
-        f"{name}: 1 performance, no band" for name in names
+        f"{name}: 1 trial, no band" for name in names
     ]
     before = SynchronizationDisplay.from_estimator(pipe, bunch.data, groups=names, features=[0])
     assert len({line.get_linestyle() for line in before.group_means_[0]}) == 4
@@ -261,7 +261,7 @@ def test_a_model_of_univariate_rows_in_seconds():
     rows = np.random.default_rng(0).normal(size=(6, 21))
     given = {"unit": "seconds", "frame_rate": 10, "groups": list("aabbab")}
     display = ActionModelDisplay.from_estimator(ActionModel().fit(rows), rows, **given)
-    assert (display.feature_names, texts(display.axes_[0])[0]) == (["x0"], "a: 3 performances")
+    assert (display.feature_names, texts(display.axes_[0])[0]) == (["x0"], "a: 3 trials")
     np.testing.assert_allclose(display.mean_[0].get_xdata(), np.arange(21) / 10)
 
 
@@ -290,7 +290,7 @@ def test_legends_are_above_the_panels(bunch, pipe, layout, size, kind):
         panel = axis.get_window_extent()
         assert box.y0 >= panel.y1 - 1 or box.x1 < panel.x0
         assert panel.height > 20
-        if axis.get_title() and kind == "synchronization":
+        if axis in display.axes_[:2] and kind == "synchronization":
             assert axis.title.get_window_extent().y0 >= box.y1 - 1
     if size != (4.2, 3):
         assert box.y1 <= display.figure_.bbox.height + 1

@@ -31,7 +31,7 @@ def test_each_take_has_a_panel():
     takes = to_sequences(table.rename_axis(["take", "frame"]))
     _, origin = find_performances(pd.DataFrame(WAVE), takes)
     display = SearchDisplay.from_predictions(origin, takes)
-    assert [axis.get_title(loc="left") for axis in display.axes_] == ["take ann", "take bob"]
+    assert [axis.get_title() for axis in display.axes_] == ["take ann", "take bob"]
     assert [axis.get_xlim()[1] for axis in display.axes_] == [len(TAKE), 80]
 
 

@@ -175,7 +175,7 @@ def test_from_model_draws_mean_and_accepted_postures(pipe):
 
 def test_bodies_move_together_after_synchronisation(bunch, pipe):
     display = SkeletonDisplay.from_estimator(pipe, bunch.data)
-    assert display.labels[0] == f"{pipe[2].pattern_index_} (pattern)"
+    assert display.labels[0] == f"{pipe[2].pattern_index_} (template)"
     # Heights of heads relative to the first frame, as bodies differ in size.
     heights, standing = {"raw": [], "synchronised": []}, display.heads_[0].get_ydata()
     for at in np.linspace(0.1, 0.7, 7):

@@ -41,12 +41,12 @@ def test_features_before_and_after_and_warps(bunch, pipe):
 
 def test_title_names_the_pattern(bunch, pipe):
     display = SynchronizationDisplay.from_estimator(pipe, bunch.data)
-    assert f"performance {pipe[2].pattern_index_}" in display.axes_[1].get_title()
+    assert f"trial {pipe[2].pattern_index_}" in display.axes_[1].get_title()
     assert display.group_means_ == [[], [], []]
     others = [x for i, x in enumerate(bunch.data) if i != pipe[2].pattern_index_]
     title = SynchronizationDisplay.from_estimator(pipe, others).axes_[1].get_title()
-    assert "pattern" in title
-    assert "performance" not in title
+    assert "template" in title
+    assert "trial" not in title
 
 
 def test_the_mean_of_each_group_is_in_front(bunch, pipe):

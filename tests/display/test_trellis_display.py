@@ -58,8 +58,8 @@ def test_cells_of_the_image_are_centred_on_offsets(bunch, pipe):
     left, right, bottom, top = display.image_.get_extent()
     assert (left, right) == (-0.5, 29.5)
     assert (bottom, top) == (display.offsets[0] - 0.5, display.offsets[-1] + 0.5)
-    assert f"pattern {pipe[2].pattern_index_}" in display.ax_.get_xlabel()
-    assert "performance 1" in display.ax_.get_title()
+    assert f"template {pipe[2].pattern_index_}" in display.ax_.get_xlabel()
+    assert "trial 1" in display.ax_.get_title()
     points = pipe[:2].transform(bunch.data)
     np.testing.assert_array_equal(display.warp_.get_ydata(), pipe[2].match(points).offsets[1])
 

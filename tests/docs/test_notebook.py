@@ -106,7 +106,7 @@ def test_notebook_synchronises_trials(notebook):
         "".join(output["data"]["text/plain"])
         for cell in notebook[1]
         for output in cell["outputs"]
-        if "one clock" in "".join(output.get("data", {}).get("text/plain", ""))
+        if "aligned" in "".join(output.get("data", {}).get("text/plain", ""))
         and "%" in "".join(output["data"]["text/plain"])
     )
     left = [int(share) for share in re.findall(r"(\d+)%", table)]

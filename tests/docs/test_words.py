@@ -38,8 +38,8 @@ INSTEAD = {
     r"the like": "the other things, by name",
     r"as \w+ as you like": "any",
 }
-# Front matter, titles of references, code but for the definitions of a glossary, formulas, comments;
-# tables, headings, fences, options, targets.
+# Front matter, titles of references, code but for the definitions of a glossary, formulas,
+# comments; tables, headings, fences, options, targets.
 NO_PROSE = [
     r"\A---\n.*?\n---\n",
     r"^## References$.*\Z",

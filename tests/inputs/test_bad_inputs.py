@@ -163,7 +163,13 @@ PERFORMANCES = [
     (FDataGrid(), ALL, ["got FDataGrid", "list(X.data_matrix)"]),
     ([Dataset(), Dataset()], ALL, ["got Dataset", "from_poses(poses)]"]),
     (Dataset(), ALL, ["got Dataset", "from_poses(X)"]),
-    (NESTED, ALL, ["[np.column_stack(row) for row in X.to_numpy()]"]),
+    (NESTED.assign(age=30), ALL, ["Column 'age' of performance 0 holds 30", "drop"]),
+    (
+        NESTED.assign(knee=NESTED["knee"].map(lambda x: x[:9])),
+        ALL,
+        ["'knee' of performance 0", "9"],
+    ),
+    (NESTED.assign(hip=[x.set_axis(x.index + 1) for x in NESTED["hip"]]), ALL, ["same frames"]),
 ]
 
 
@@ -373,7 +379,7 @@ def test_fit_warns_of_one_trial_that_is_taken_as_many(estimator):
 def test_polars_output_of_a_collection_is_refused(estimator):
     if hasattr(estimator, "transform"):
         polars = clone(estimator).set_output(transform="polars")
-        refuses(lambda: polars.fit_transform(X), ["'polars'", "pl.from_pandas(", "'pandas'"])
+        refuses(lambda: polars.fit_transform(X), ["'polars'", "pl.DataFrame(", "'pandas'"])
 
 
 @pytest.mark.parametrize("estimator", ALL, ids=by_name)

@@ -23,6 +23,7 @@ from sklearn_motionsync.matching.matcher import Features
 from sklearn_motionsync.matching.units import Unit
 from sklearn_motionsync.online.stream import Resampler, Streams, check_times
 from sklearn_motionsync.online.synchronizer import Reference, calibrate
+from sklearn_motionsync.utils.parallel import Progress
 
 P = 60
 
@@ -471,7 +472,8 @@ def test_calibration_equals_streams_matched_to_the_mean_of_the_others():
         for k, temperature in enumerate(temperatures):
             found = log_softmax(-np.array(rows) / temperature, axis=1)[np.arange(len(rows)), right]
             scores[k] += np.maximum(found[::every], np.log(1e-12)).mean()
-    temperature, typical_cost = calibrate(reference_of, X, warped, match.times)
+    progress = Progress(None, verbose=0)
+    temperature, typical_cost = calibrate(reference_of, X, warped, match.times, progress)
     assert temperature == pytest.approx(temperatures[scores.argmax()])
     assert typical_cost == pytest.approx(np.median(largest), rel=1e-6)
 

@@ -9,7 +9,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, FrameWise, Skeleton
 from sklearn_motionsync.datasets import load_performances
-from sklearn_motionsync.synchronizers import dense as balance
+from sklearn_motionsync.synchronizers import balance
 from sklearn_motionsync.synchronizers import portions as compared
 
 SETTINGS = [

@@ -19,7 +19,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.inputs import validation as reading
 from sklearn_motionsync.synchronizers import portions
-from sklearn_motionsync.synchronizers.dense import typical_share
+from sklearn_motionsync.synchronizers.subsamples import typical_share
 
 from shift_synchronizer import ShiftSynchronizer
 

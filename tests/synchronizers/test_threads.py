@@ -134,11 +134,11 @@ def test_failed_fit_leaves_nothing_fitted(estimator, sets):
 
 def test_failed_fit_keeps_the_fit_of_another_thread(sets):
     class Meeting(LinearSynchronizer):
-        def _learn(self, performances):
+        def _learn(self, performances, progress):
             if len(performances) == len(sets[1]):
                 shared.fit(sets[0])
                 raise ValueError("too late")
-            super()._learn(performances)
+            super()._learn(performances, progress)
 
     shared = Meeting()
     with pytest.raises(ValueError, match="too late"):
@@ -152,8 +152,8 @@ def test_learnt_attributes_may_have_any_name(sets):
             super().__init__(n_frames, pattern)
             self.lambda_ = lambda_
 
-        def _learn(self, performances):
-            super()._learn(performances)
+        def _learn(self, performances, progress):
+            super()._learn(performances, progress)
             self.weights = np.ones(self.n_frames_)
 
     named = Named(lambda_=2.0).fit(sets[0])

@@ -1,0 +1,133 @@
+"""Every figure fits on a phone: it is narrow, and none of its text is cut or hidden."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.text import Text
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    CycleSegmenter,
+    DenseSynchronizer,
+    DirectionCosines,
+    MotionTracker,
+    OnlineSynchronizer,
+    PartSynchronizer,
+    display,
+)
+from sklearn_motionsync.datasets import make_bending, make_gait
+
+# At 388 pixels, the width of a page on a phone, letters of 10 points are still 8 pixels high.
+LARGEST_WIDTH = 6.5
+BUNCH = make_bending(8, n_frames=50, random_state=0)
+STEPS = DirectionCosines(BUNCH.skeleton), ASpace(4), DenseSynchronizer(30), ActionModel()
+
+
+@pytest.fixture(scope="module")
+def pipe():
+    return make_pipeline(*STEPS).fit(BUNCH.data)
+
+
+@pytest.fixture(scope="module")
+def postures(pipe):
+    return pipe[0].transform(BUNCH.data)
+
+
+def search(pipe, postures):
+    takes = [np.concatenate([postures[0]] * 3), postures[1]]
+    model = make_pipeline(*pipe[1:]).fit(postures)
+    segments = [(0, 0, len(postures[0]))]
+    return display.SearchDisplay.from_estimator(model, takes, segments=segments)
+
+
+def cycles(pipe, postures):
+    gait = make_gait(3, n_cycles=4, takes=True, random_state=0)
+    segmenter = CycleSegmenter(start=0).fit(gait.data)
+    return display.CycleDisplay.from_estimator(
+        segmenter, gait.data, unit="seconds", frame_rate=gait.frame_rate
+    )
+
+
+def phases(pipe, postures):
+    live = OnlineSynchronizer(frame_rate=50).fit(postures)
+    features = ["torso_y", "left_forearm_z"]
+    return display.PhaseDisplay.from_estimator(
+        live, postures[:2], training=postures, body=pipe[0], features=features, frame=30
+    )
+
+
+def tracking(pipe, postures):
+    seen = postures[0].copy()
+    seen[10:25, 6:20] = np.nan
+    names = list(pipe[0].get_feature_names_out())
+    tracker = MotionTracker(noise=0.05, random_state=0).fit(postures)
+    return display.TrackingDisplay.from_estimator(tracker, seen, truth=postures[0], names=names)
+
+
+def tracked_bodies(pipe, postures):
+    return tracking(pipe, postures).strip(pipe[0])
+
+
+DRAWN = {
+    "synchronization": lambda pipe, postures: display.SynchronizationDisplay.from_estimator(
+        pipe, BUNCH.data, groups=BUNCH.actor
+    ),
+    "synchronization in seconds": lambda pipe, postures: (
+        display.SynchronizationDisplay.from_estimator(
+            pipe, BUNCH.data, features=[0], unit="seconds", frame_rate=50
+        )
+    ),
+    "model": lambda pipe, postures: display.ActionModelDisplay.from_estimator(
+        pipe, BUNCH.data, band="performances"
+    ),
+    "model of groups": lambda pipe, postures: display.ActionModelDisplay.from_estimator(
+        pipe, BUNCH.data, groups=["young"] * 4 + ["old"] * 4
+    ),
+    "postures": lambda pipe, postures: display.SkeletonDisplay.from_positions(
+        BUNCH.data[0], BUNCH.skeleton
+    ),
+    "postures of a model": lambda pipe, postures: display.SkeletonDisplay.from_model(
+        pipe, random_state=0
+    ),
+    "departures": lambda pipe, postures: display.SkeletonDisplay.from_departures(
+        pipe, [BUNCH.data[0][::-1]]
+    ),
+    "bodies": lambda pipe, postures: display.SkeletonDisplay.from_estimator(pipe, BUNCH.data),
+    "lags": lambda pipe, postures: display.LagDisplay.from_estimator(
+        PartSynchronizer(synchronizer=DenseSynchronizer(30)).fit(postures),
+        postures,
+        groups=BUNCH.actor,
+        unit="percent",
+    ),
+    "metric": lambda pipe, postures: display.MetricDisplay.from_estimator(
+        make_pipeline(*pipe[:1], DenseSynchronizer(30)).fit(BUNCH.data)
+    ),
+    "trellis": lambda pipe, postures: display.TrellisDisplay.from_estimator(
+        pipe[:-1], BUNCH.data, performance=1
+    ),
+    "search": search,
+    "cycles": cycles,
+    "phases": phases,
+    "tracking": tracking,
+    "tracked bodies": tracked_bodies,
+}
+
+
+@pytest.mark.parametrize("kind", DRAWN)
+def test_new_figures_are_narrow_and_show_all_their_text(pipe, postures, kind):
+    figure = DRAWN[kind](pipe, postures).figure_
+    figure.canvas.draw()
+    assert figure.get_size_inches()[0] <= LARGEST_WIDTH
+    axes = [axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)]
+    # Matplotlib keeps tick labels beyond the limits of an axis, and does not draw them.
+    ticks = {label for axis in axes for label in axis.get_ticklabels()}
+    inner = figure.bbox.padded(1)
+    for text in set(figure.findobj(Text)) - ticks:
+        if text.get_visible() and text.get_text().strip():
+            box = text.get_window_extent()
+            assert inner.x0 <= box.x0, text
+            assert box.x1 <= inner.x1, text
+            assert inner.y0 <= box.y0, text
+            assert box.y1 <= inner.y1, text
+    plt.close(figure)

@@ -1,0 +1,266 @@
+"""Performances as other packages keep them: nested tables, labelled arrays, tables of two levels.
+
+The objects are made by hand, as sktime, aeon, xarray and polars make them.
+"""
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+import xarray as xr
+from sklearn.compose import make_column_transformer
+from sklearn.linear_model import LogisticRegression
+from sklearn.model_selection import cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
+from sklearn_motionsync import (
+    ActionClassifier,
+    DenseSynchronizer,
+    LinearSynchronizer,
+    Match,
+    TimingChannel,
+    to_frame,
+    to_sequences,
+)
+
+NAMES = ["hip", "knee", "ankle"]
+
+
+def sync():
+    return DenseSynchronizer(n_frames=30)
+
+
+@pytest.fixture(scope="module")
+def trials():
+    """Arrays of 24 to 35 frames."""
+    rng = np.random.default_rng(0)
+    return [np.cumsum(rng.normal(size=(n, 3)), axis=0) for n in range(24, 36)]
+
+
+def nested(trials, index=None, cell=pd.Series):
+    return pd.DataFrame({n: [cell(x[:, k]) for x in trials] for k, n in enumerate(NAMES)}, index)
+
+
+def same_bits(found, expected):
+    assert len(found) == len(expected)
+    for a, b in zip(found, expected, strict=True):
+        a = np.asarray(a)
+        assert a.dtype == b.dtype
+        assert a.tobytes() == np.ascontiguousarray(b).tobytes()
+
+
+# -- nested tables --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("cell", [pd.Series, np.asarray, list], ids=["Series", "array", "list"])
+def test_a_nested_table_is_a_performance_a_row(trials, cell):
+    people = pd.Index([f"person {i}" for i in range(12)], name="person")
+    table = nested(trials, people, cell)
+    found = to_sequences(table)
+    same_bits(found, trials)
+    assert [list(x.columns) for x in found] == [NAMES] * 12
+    assert [x.attrs["performance"] for x in found] == list(people)
+    whole = to_frame(table)
+    assert list(whole.index.names) == ["person", "frame"]
+    same_bits([whole.to_numpy()], [np.concatenate(trials)])
+    aligned = sync().set_output(transform="pandas").fit(table).transform(table)
+    assert aligned.index.names == ["person", "frame"]
+    same_bits([aligned.to_numpy().reshape(12, 30, 3)], [sync().fit(trials).transform(trials)])
+
+
+def test_a_nested_table_and_back(trials):
+    table = nested(trials, pd.RangeIndex(12))
+    rows = [{n: x[n].set_axis(pd.RangeIndex(len(x))) for n in x} for x in to_sequences(table)]
+    back = pd.DataFrame(rows)
+    for name in NAMES:
+        for a, b in zip(back[name], table[name], strict=True):
+            pd.testing.assert_series_equal(a, b, check_names=False, check_index_type="exact")
+
+
+def test_cells_keep_times_types_and_labels_of_several_levels(trials):
+    clock = pd.date_range("2026-01-01", periods=24, freq="10ms", name="clock")
+    single = [x[:24].astype(np.float32) for x in trials[:2]]
+    index = pd.MultiIndex.from_tuples([("ann", 1), ("ann", 2)], names=["person", "trial"])
+    found = to_sequences(nested(single, index, lambda x: pd.Series(x, clock)))
+    same_bits(found, single)
+    assert [x.attrs["performance"] for x in found] == [("ann", 1), ("ann", 2)]
+    assert to_frame(found).index.names == ["person", "trial", "clock"]
+    assert all(x.index.equals(clock) for x in found)
+    assert to_frame(found).attrs == {}
+    match = sync().fit(found).match(found)
+    seconds = match.to_frame("seconds", found)["time"]
+    assert seconds.max() == pytest.approx(0.23)
+
+
+def test_scikit_learn_splits_a_nested_table_by_performance(trials):
+    y = np.arange(12) % 2
+    classifier = ActionClassifier(n_frames=10)
+    scores = [cross_val_score(classifier, X, y, cv=3) for X in (nested(trials), trials)]
+    np.testing.assert_array_equal(*scores)
+
+
+def test_a_column_transformer_takes_curves_beside_numbers(trials):
+    table = nested(trials).assign(age=np.arange(20.0, 32))
+    flat = FunctionTransformer(lambda x: x.reshape(len(x), -1))
+    curves = make_pipeline(LinearSynchronizer(8), flat)
+    columns = make_column_transformer((curves, NAMES), ("passthrough", ["age"]))
+    found = columns.fit_transform(table)
+    expected = LinearSynchronizer(8).fit_transform(trials).reshape(12, -1)
+    np.testing.assert_array_equal(found, np.column_stack([expected, table["age"]]))
+    make_pipeline(columns, LogisticRegression(max_iter=5000)).fit(table, np.arange(12) % 2)
+
+
+def test_a_sample_of_a_nested_table(trials):
+    sync = DenseSynchronizer(n_frames=20, max_fit=5, random_state=0)
+    tables = sync.fit(nested(trials)).pattern_, sync.fit(trials).pattern_
+    np.testing.assert_array_equal(*tables)
+
+
+def test_lists_in_a_table_of_polars(trials):
+    rows = pl.DataFrame({"trial": np.repeat(np.arange(12), [len(x) for x in trials])})
+    rows = rows.with_columns(
+        **{name: np.concatenate([x[:, k] for x in trials]) for k, name in enumerate(NAMES)}
+    )
+    table = rows.group_by("trial", maintain_order=True).agg(pl.all()).drop("trial")
+    same_bits(to_sequences(table), trials)
+    same_bits([sync().fit(table).transform(table)], [sync().fit(trials).transform(trials)])
+
+
+# -- tables of two levels, as sktime makes them -------------------------------------------------
+
+
+@pytest.mark.parametrize("names", [[None, None], ["instances", "timepoints"]])
+def test_a_table_of_two_levels_and_back(trials, names):
+    index = pd.concat([pd.DataFrame(x) for x in trials], keys=range(12)).index.set_names(names)
+    table = pd.DataFrame(np.concatenate(trials), index=index, columns=NAMES)
+    same_bits(to_sequences(table), trials)
+    back = to_frame(to_sequences(table))
+    pd.testing.assert_frame_equal(back, table.rename_axis(back.index.names), check_exact=True)
+
+
+# -- arrays with channels before frames, as aeon and sktime have them -----------------------------
+
+
+def test_exchanged_axes_of_one_feature_are_named(trials):
+    with pytest.raises(ValueError, match=r"shape \(1, 24\).*\[x.T for x in X\]"):
+        sync().fit([x[:24, :1].T for x in trials])
+
+
+def test_exchanged_axes_after_a_fit_are_named(trials):
+    X = np.stack([x[:24] for x in trials])
+    with pytest.raises(ValueError, match=r"expecting 3 features .*np.swapaxes\(X, 1, 2\)"):
+        sync().fit(X).transform(X.swapaxes(1, 2))
+
+
+# -- labelled arrays of xarray ----------------------------------------------------------------
+
+
+def labelled(trials, **more):
+    """A DataArray of 24 frames of each, at 50 Hz."""
+    return xr.DataArray(
+        np.stack([x[:24] for x in trials]),
+        dims=("trial", "time", "angle"),
+        coords={
+            "trial": [f"walk {i}" for i in range(len(trials))],
+            "time": np.arange(24) / 50,
+            "angle": NAMES,
+            **more,
+        },
+        attrs={"units": "deg"},
+    )
+
+
+@pytest.mark.parametrize("order", [("trial", "time", "angle"), ("trial", "angle", "time")])
+def test_a_labelled_array_keeps_names_times_and_units(trials, order):
+    array = labelled(trials)
+    given = array.transpose(*order)
+    expected = [x[:24] for x in trials]
+    for found in (to_sequences(given), to_sequences(to_frame(list(given)))):
+        same_bits(found, expected)
+        assert [x.attrs["performance"] for x in found] == array["trial"].values.tolist()
+        assert list(found[0].columns) == NAMES
+        assert found[0].index.tolist() == array["time"].values.tolist()
+        assert found[0].attrs["units"] == "deg"
+    # pandas sorts the labels.
+    back = to_frame(given).to_xarray().to_dataarray("angle").sel(trial=array["trial"])
+    xr.testing.assert_equal(back.transpose("trial", "time", "angle"), array)
+    aligned = sync().set_output(transform="pandas").fit(given).transform(given)
+    assert aligned.index.names == ["trial", "frame"]
+    assert list(aligned.columns) == NAMES
+
+    same_bits([sync().fit(given).transform(given)], [sync().fit(expected).transform(expected)])
+
+
+def test_the_time_of_a_labelled_array_is_that_of_warps(trials):
+    array = labelled(trials)
+    seconds = Match.from_estimator(LinearSynchronizer().fit(array), array).to_frame(
+        "seconds", array
+    )
+    assert seconds["time"].max() == pytest.approx(23 / 50)
+    slower = to_sequences(array, frame_rate=25)
+    assert {len(x) for x in slower} == {12}
+    np.testing.assert_allclose([x.index for x in slower], [np.arange(12) / 25] * 12)
+
+
+def test_one_trial_of_a_labelled_array(trials):
+    array = labelled(trials)
+    (one,) = to_sequences(array.sel(trial="walk 3").transpose("angle", "time"))
+    same_bits([one], [trials[3][:24]])
+    assert one.attrs["performance"] == "walk 3"
+    several = [array.isel(trial=[i]).squeeze() for i in range(12)]
+    same_bits([sync().fit(several).transform(several)], [sync().fit(array).transform(array)])
+
+
+def test_several_coordinates_name_a_trial(trials):
+    people = ("trial", [f"person {i % 4}" for i in range(12)])
+    array = (
+        labelled(trials, person=people).drop_vars("trial").assign_coords(rep=("trial", range(12)))
+    )
+    found = to_sequences(array.set_index(trial=["person", "rep"]))
+    assert found[5].attrs["performance"] == ("person 1", 5)
+    assert to_frame(found).index.names == ["person", "rep", "time"]
+
+
+def test_a_labelled_array_without_labels(trials):
+    array = xr.DataArray(np.stack([x[:24] for x in trials]), dims=("trial", "sample", "angle"))
+    found = to_sequences(array)
+    same_bits(found, [x[:24] for x in trials])
+    assert [x.attrs["performance"] for x in found] == list(range(12))
+    assert list(found[0].columns) == [0, 1, 2]
+    assert not hasattr(LinearSynchronizer().fit(array), "feature_names_in_")
+
+
+def test_frames_that_only_fill_up_a_labelled_array(trials):
+    array = to_frame(trials, columns=NAMES).to_xarray().to_dataarray("angle")
+    array = array.transpose("performance", "frame", "angle")
+    assert array.shape == (12, 35, 3)
+    with pytest.raises(ValueError, match=r"frame 24, feature 0 \('hip'\) is NaN"):
+        sync().fit(array)
+    same_bits(to_sequences(to_frame(array).dropna(how="all")), trials)
+
+
+def test_frames_in_the_first_dimension_are_refused(trials):
+    array = labelled(trials).transpose("time", "trial", "angle")
+    for call in (sync().fit, to_sequences, to_frame, LinearSynchronizer().fit):
+        with pytest.raises(ValueError, match=r"X.transpose\('trial', 'time', 'angle'\)"):
+            call(array)
+
+
+def test_units_of_labelled_arrays_are_compared(trials):
+    arrays = list(labelled(trials))
+    arrays[3] = arrays[3].assign_attrs(units="rad")
+    with pytest.raises(ValueError, match="the unit 'rad'"):
+        sync().fit(arrays)
+
+
+def test_rows_of_a_labelled_array_of_two_dimensions_are_univariate(trials):
+    array = labelled(trials).sel(angle="knee", drop=True)
+    expected = LinearSynchronizer().fit_transform(array.values)
+    np.testing.assert_array_equal(LinearSynchronizer().fit_transform(array), expected)
+
+
+def test_timing_of_a_labelled_array(trials):
+    """What fits another estimator passes the array on."""
+    array = labelled(trials)
+    channel = TimingChannel(LinearSynchronizer()).set_output(transform="pandas")
+    assert list(channel.fit_transform(array).columns) == [*NAMES, "offset"]

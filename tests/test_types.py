@@ -1,0 +1,260 @@
+"""Types of public signatures: complete, equal to what is checked, and found wrong by mypy."""
+
+import inspect
+import os
+import re
+import subprocess
+import sys
+import types
+import typing
+from collections.abc import Hashable
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+import sklearn_motionsync
+from sklearn.utils._param_validation import StrOptions
+from sklearn_motionsync.body.formats import FORMATS
+
+from estimators import EVERY, by_name
+from test_docstrings import CALLABLES, described
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def annotations(each):
+    """The annotations of a function, a method, or the constructor of a class."""
+    if inspect.isclass(each) and issubclass(each, tuple):
+        return typing.get_type_hints(each)
+    each = each.__init__ if inspect.isclass(each) else each
+    return typing.get_type_hints(inspect.unwrap(getattr(each, "__func__", each)))
+
+
+def alternatives(annotation):
+    """The types of a union, and the values of its literals."""
+    if typing.get_origin(annotation) in (typing.Union, types.UnionType):
+        return [part for each in typing.get_args(annotation) for part in alternatives(each)]
+    if typing.get_origin(annotation) is typing.Literal:
+        return list(typing.get_args(annotation))
+    return [annotation]
+
+
+def strings(annotation):
+    return {each for each in alternatives(annotation) if isinstance(each, str)}
+
+
+def admits_none(annotation):
+    return bool({type(None), typing.Any, object, Hashable} & {*alternatives(annotation)})
+
+
+# -- signatures -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", CALLABLES)
+def test_every_public_signature_is_annotated(name):
+    each = CALLABLES[name]
+    hints = annotations(each)
+    known = inspect.signature(each).parameters.values()
+    assert {p.name for p in known} - {"self", "cls"} <= set(hints)
+    if not inspect.isclass(each):
+        assert "return" in hints
+    for parameter in known:
+        if parameter.default is None:
+            assert admits_none(hints[parameter.name]), f"{name}: {parameter.name}"
+
+
+@pytest.mark.parametrize("name", CALLABLES)
+def test_docstrings_name_the_strings_that_are_annotated(name):
+    hints = annotations(CALLABLES[name])
+    for key, kind in described(inspect.getdoc(CALLABLES[name])).items():
+        kind = re.sub(r",? *default=.*", "", kind)
+        if key in hints and str not in alternatives(hints[key]) and not kind.startswith("str "):
+            named = set(re.findall(r'"([\w-]+)"', kind))
+            assert named == strings(hints[key]), f"{name}: {key}"
+
+
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_annotations_are_the_constraints_of_estimators(estimator):
+    hints, constraints = annotations(type(estimator)), type(estimator)._parameter_constraints
+    assert set(hints) - {"return"} == set(constraints)
+    for name, allowed in constraints.items():
+        options = [each.options for each in allowed if isinstance(each, StrOptions)]
+        assert strings(hints[name]) == set().union(*options), name
+        takes_none = None in allowed or "random_state" in allowed
+        assert admits_none(hints[name]) == takes_none, name
+
+
+def test_skeletons_of_formats_are_declared():
+    hints = typing.get_type_hints(sklearn_motionsync.Skeleton)
+    declared = {name for name, each in hints.items() if typing.get_origin(each) is typing.ClassVar}
+    assert declared == set(FORMATS)
+
+
+def test_the_package_is_marked_as_typed():
+    assert files(sklearn_motionsync).joinpath("py.typed").is_file()
+
+
+# -- mypy -------------------------------------------------------------------------------------
+
+PREAMBLE = """\
+import numpy as np
+import pandas as pd
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import *
+from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.io import read_motion
+from sklearn_motionsync.metrics import SpreadScorer, least_squares, timing_error
+X = list(np.random.RandomState(0).standard_normal((3, 20, 2)).cumsum(axis=1))
+tables = [pd.DataFrame(x) for x in X]
+sync = LinearSynchronizer().fit(X)
+"""
+
+# Each of these is right: it runs, and mypy has nothing to say about it.
+RIGHT = """\
+DenseSynchronizer(n_frames=30, cost="posture", metric=None, refine=False, max_offset=0.2)
+DenseSynchronizer(pattern=X[0], random_state=np.random.RandomState(0), max_fit=None)
+DenseSynchronizer.paper(n_frames=30).fit(X).pattern_.mean(axis=0)
+LinearSynchronizer(pattern=sync.pattern_index_).fit(X)
+sync.transform(np.stack(X)).shape
+sync.transform(tuple(X)).mean(axis=0)
+sync.transform([x.tolist() for x in X]).shape
+sync.fit([x.tolist() for x in X])
+LinearSynchronizer().fit_transform(X).shape
+LinearSynchronizer().fit(tables).match(tables).to_frame("percent", tables)
+LinearSynchronizer().fit(to_frame(tables)).set_output(transform="pandas")
+LinearSynchronizer().fit(np.stack(X)[:, :, 0])
+LinearSynchronizer().fit([[1.0, 2.0, 4.0], [1.0, 3.0, 4.0]])
+LinearSynchronizer().fit(np.array([*X, X[0][:9]], dtype=object))
+offsets, times, distances = sync.match(X)
+sync.match(X).offsets_in("seconds", X, frame_rate=50)[0].tolist()
+Match.from_estimator(make_pipeline(sync), X).warp(X).shape
+KeyframeSynchronizer().fit(X, keyframes=[[5, 9], [6, 8], np.array([4, 9])])
+TimingChannel(LinearSynchronizer(), "log_rate").fit_transform(X).shape
+ActionModel(coverage=0.9).fit(X, groups=["ann", "ann", "bob"]).envelope()[0].shape
+ActionModel().fit(X, groups=pd.Series([0, 1, 2])).sample(2, random_state=0).tolist()
+ActionClassifier(costs=["velocity"], n_jobs=1)
+Skeleton.coco(n_dims=2, up="-y").landmarks["pelvis"]
+Skeleton(["hip", "knee"], [-1, 0], {"left_hip": "hip", "left_knee": ["knee"]}).column_names
+DirectionCosines(Skeleton.paper(), hidden="nan")
+FrameWise(sync)
+PartSynchronizer({"arm": [0], "leg": [1]}, synchronizer=DenseSynchronizer(n_frames=20))
+SpreadScorer("sobolev")(sync, X) + least_squares(np.stack(X), np.stack(X))
+timing_error(sync.match(X).times, sync.match(X).times.tolist(), quantile=0.9)
+make_gait(2, takes=True).data[0].shape
+to_sequences(pd.DataFrame({"trial": [1, 1, 2, 2], "x": [0.0, 1, 0, 1]}), by="trial")
+"""
+
+# Each of these is wrong: it raises an error, and mypy reports it.
+WRONG = """\
+DenseSynchronizer(n_frames="many").fit(X)
+DenseSynchronizer(cost="posure").fit(X)
+DenseSynchronizer(metric="learnt").fit(X)
+DenseSynchronizer(refine=None).fit(X)
+DenseSynchronizer(max_offset="wide").fit(X)
+DenseSynchronizer(30, "median", "auto").fit(X)
+DenseSynchronizer(pattern="mean").fit(X)
+DenseSynchronizer(random_state="0").fit(X)
+DenseSynchronizer(frames=30).fit(X)
+DenseSynchronizer().fit("trials.csv")
+DenseSynchronizer().fit(5)
+DenseSynchronizer().fit({"ann": X[0], "bob": X[1]})
+LinearSynchronizer().fit([1.0, 2.0, 3.0])
+LinearSynchronizer().fit(X).match("trials.csv")
+LinearSynchronizer().fit()
+LinearSynchronizer().fit_transform("trials.csv")
+sync.match(X).offsets_in("minutes")
+sync.match(X).seconds(X, frame_rate="fast")
+Match("0 1 2")
+KeyframeSynchronizer(n_keyframes="five").fit(X)
+TimingChannel(LinearSynchronizer(), "rate").fit(X)
+ActionModel(n_std="three").fit(X)
+ActionModel().fit(X, groups=3)
+ActionModel().fit(X).sample("all")
+ActionClassifier(costs="velocities").fit(X, [0, 1, 0])
+CycleSegmenter(not_cyclic="ignore").fit(X)
+OnlineSynchronizer(DenseSynchronizer).fit(X)
+Skeleton.paper(n_dims=4)
+Skeleton.paper(up="up")
+Skeleton.papers()
+DirectionCosines("paper").fit(X)
+JointPositions(Skeleton.paper(), "parent").fit(np.ones((3, 9, 45)))
+SpreadScorer("variance")(sync, X)
+make_bending(frame_rate="50 Hz")
+read_motion("trial.c3d", ends="cut")
+synchronization_distances(X, cost="euclidean")
+find_performances(sync, X, threshold="mean")
+to_sequences(tables[0], by=0)
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Where mypy runs, with what it has read of other packages."""
+    return tmp_path_factory.mktemp("mypy")
+
+
+def run_mypy(folder, *lines):
+    """The messages of mypy about lines after the preamble, by their numbers from 0."""
+    script = folder / "script.py"
+    script.write_text(PREAMBLE + "\n".join(lines) + "\n", encoding="utf-8")
+    command = [sys.executable, "-m", "mypy", "--config-file=", "--follow-imports=silent"]
+    command += ["--ignore-missing-imports", "--no-error-summary", "--cache-dir", str(folder)]
+    done = subprocess.run(
+        [*command, script.name],
+        cwd=folder,
+        env={**os.environ, "MYPYPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr == ""
+    first, found = PREAMBLE.count("\n") + 1, {}
+    for message in done.stdout.splitlines():
+        file, number, kind, text = re.fullmatch(r"(.+?):(\d+): (\w+): (.*)", message).groups()
+        assert file == script.name or kind == "note", message
+        if file == script.name:
+            found.setdefault(int(number) - first, []).append(text)
+    return found
+
+
+def context():
+    names = {}
+    exec(PREAMBLE, names)
+    return names
+
+
+def test_mypy_reports_every_wrong_line_and_no_right_one(folder):
+    right, wrong = RIGHT.splitlines(), WRONG.splitlines()
+    found = run_mypy(folder, *right, *wrong)
+    assert {right[i]: found[i] for i in sorted(found) if i < len(right)} == {}
+    missed = [line for i, line in enumerate(wrong, len(right)) if i not in found]
+    assert missed == []
+
+
+def test_mypy_knows_what_methods_return(folder):
+    kinds = {
+        "DenseSynchronizer().fit(X)": "DenseSynchronizer",
+        "DenseSynchronizer.paper()": "DenseSynchronizer",
+        "TimingChannel(sync).fit(X)": "TimingChannel",
+        "ActionModel().partial_fit(X)": "ActionModel",
+        "sync.match(X)": "Match",
+        "sync.match(X).rates": "ndarray",
+        "sync.match(X).to_frame()": "DataFrame|Any",
+        "Skeleton.paper()": "Skeleton",
+        "display.TrellisDisplay.from_estimator(sync, X)": "TrellisDisplay",
+    }
+    found = run_mypy(folder, *(f"reveal_type({each})" for each in kinds))
+    assert sorted(found) == list(range(len(kinds)))
+    for i, (line, kind) in enumerate(kinds.items()):
+        assert re.search(rf'Revealed type is "[\w.]*\b({kind})\b', found[i][0]), line
+
+
+@pytest.mark.parametrize("line", RIGHT.splitlines())
+def test_right_lines_run(line):
+    exec(line, context())
+
+
+@pytest.mark.parametrize("line", WRONG.splitlines())
+def test_wrong_lines_raise_errors(line):
+    with pytest.raises((AttributeError, TypeError, ValueError)):
+        exec(line, context())

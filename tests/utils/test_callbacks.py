@@ -1,0 +1,162 @@
+"""scikit-learn's callbacks on the fit of every estimator."""
+
+import numpy as np
+import pytest
+from sklearn import clone
+from sklearn.exceptions import NotFittedError
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
+from sklearn.utils.validation import check_is_fitted
+from sklearn_motionsync import (
+    ActionDetector,
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    FrameWise,
+    LinearSynchronizer,
+    MotionTracker,
+    OnlineSynchronizer,
+    PartSynchronizer,
+    Skeleton,
+    TimingChannel,
+)
+
+from estimators import EVERY, WHOLE, by_name, data_for, make_performances, outputs
+
+pytest.importorskip("sklearn.callback", reason="callbacks came with scikit-learn 1.9")
+
+
+class Recorder:
+    """Keeps what it is told, and fails at the event of a number."""
+
+    def __init__(self, fails_at=None):
+        self.fails_at = fails_at
+        self.contexts, self.open, self.torn_down = [], [], 0
+
+    @property
+    def events(self):
+        return [(hook, c.estimator_name, c.task_name) for hook, c in self.contexts]
+
+    def _record(self, hook, context):
+        self.contexts.append((hook, context))
+        if len(self.contexts) - 1 == self.fails_at:
+            raise StopFitError
+
+    def setup(self, estimator, context):
+        self._record("setup", context)
+
+    def on_fit_task_begin(self, estimator, context):
+        self.open.append(context)
+        self._record("begin", context)
+
+    def on_fit_task_end(self, estimator, context):
+        assert self.open.pop() is context
+        self._record("end", context)
+
+    def teardown(self, estimator, context):
+        self.torn_down += 1
+
+
+class Propagating(Recorder):
+    """A recorder that estimators pass on to those that they fit."""
+
+    max_propagation_depth = None
+
+
+class StopFitError(Exception):
+    """Raised to stop a fit."""
+
+
+def bits(estimator, X):
+    return [np.asarray(result).tobytes() for result in outputs(estimator, X)]
+
+
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_callbacks_follow_every_fit_and_change_no_bit(estimator):
+    X, recorder, name = data_for(estimator), Recorder(), type(estimator).__name__
+    watched = clone(estimator).set_callbacks(recorder).fit(X)
+    assert recorder.events[:2] == [("setup", name, "fit"), ("begin", name, "fit")]
+    assert recorder.events[-1] == ("end", name, "fit")
+    assert recorder.open == []
+    assert recorder.torn_down == 1
+    seen = len(recorder.contexts)
+    found = bits(watched, X)
+    assert len(recorder.contexts) == seen
+    assert found == bits(clone(estimator).fit(X), X)
+
+
+@pytest.mark.parametrize("where", ["setup", "first task", "middle", "last task"])
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_a_callback_that_raises_stops_the_fit(estimator, where):
+    X, all_of_it = data_for(estimator), Recorder()
+    fitted = clone(estimator).set_callbacks(all_of_it).fit(X)
+    last = len(all_of_it.contexts) - 1
+    fails_at = {"setup": 0, "first task": 1, "middle": last // 2, "last task": last}[where]
+    recorder = Recorder(fails_at)
+    with pytest.raises(StopFitError):
+        fitted.set_callbacks(recorder).fit(X)
+    assert len(recorder.contexts) == fails_at + 1
+    assert recorder.torn_down == 1
+    with pytest.raises(NotFittedError):
+        check_is_fitted(fitted)
+    fitted.set_callbacks().fit(X)
+    assert bits(fitted, X) == bits(clone(estimator).set_callbacks().fit(X), X)
+
+
+# -- estimators that fit others --------------------------------------------------------------
+
+DENSE = DenseSynchronizer(n_frames=30)
+PARTS = "learning the body and its parts"
+# What each fits within, and the stage of its own that this takes the place of.
+NESTED = [
+    (PartSynchronizer({"first": [0]}, synchronizer=WHOLE), "DenseSynchronizer", PARTS),
+    (TimingChannel(DENSE), "DenseSynchronizer", "synchronizing"),
+    (OnlineSynchronizer(DENSE), "DenseSynchronizer", "synchronizing"),
+    (MotionTracker(DENSE, n_particles=5), "DenseSynchronizer", "synchronizing"),
+    (ActionDetector(make_pipeline(DENSE, ActionModel())), "Pipeline", "fitting the pipeline"),
+    (FrameWise(ASpace(2)), "ASpace", "fitting the transformer"),
+]
+
+
+@pytest.mark.parametrize(("estimator", "within", "stage"), NESTED, ids=by_name)
+def test_callbacks_reach_what_is_fitted_within(estimator, within, stage):
+    X, recorder = make_performances(6), Propagating()
+    watched = clone(estimator).set_callbacks(recorder).fit(X)
+    begun = [context for hook, context in recorder.contexts if hook == "begin"]
+    (inner,) = [c for c in begun if c.estimator_name == within and c.task_name == "fit"]
+    assert (inner.source_estimator_name, inner.source_task_name) == (
+        type(estimator).__name__,
+        stage,
+    )
+    assert inner.parent is begun[0]
+    assert recorder.open == []
+    assert recorder.torn_down == 1
+    # What was fitted within keeps no callbacks.
+    found = [vars(watched)[name] for name in vars(watched) if name.endswith("r_")]
+    assert [type(each).__name__ for each in found] == [within]
+    assert not {"_skl_callbacks", "_parent_callback_ctx"} & vars(found[0]).keys()
+
+
+def test_a_callback_reaches_the_steps_of_a_detector():
+    recorder = Propagating()
+    detector = ActionDetector(make_pipeline(DENSE, ActionModel())).set_callbacks(recorder)
+    detector.fit(make_performances(6))
+    names = {context.estimator_name for _, context in recorder.contexts}
+    assert names == {"ActionDetector", "Pipeline", "DenseSynchronizer", "ActionModel"}
+
+
+def test_all_steps_of_a_pipeline_take_callbacks():
+    """A step that does not is warned of, and warnings are errors."""
+    steps = DirectionCosines(Skeleton.paper()), ASpace(3), LinearSynchronizer(), ActionModel()
+    recorder = Propagating()
+    make_pipeline(*steps).set_callbacks(recorder).fit(make_performances(6))
+    names = {context.estimator_name for _, context in recorder.contexts}
+    assert names == {"Pipeline", *(type(step).__name__ for step in steps)}
+
+
+def test_a_transformer_without_callbacks_is_a_task_like_any_other():
+    recorder = Propagating()
+    FrameWise(FunctionTransformer()).set_callbacks(recorder).fit(make_performances(3))
+    tasks = [context.task_name for hook, context in recorder.contexts if hook == "end"]
+    assert tasks == ["fitting the transformer", "fit"]
