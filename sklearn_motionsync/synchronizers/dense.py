@@ -96,9 +96,9 @@ class DenseSynchronizer(Synchronizer):
         trials are to be aligned to a template that you have.
     refine : "auto" or bool, default="auto"
         Whether to place every moment to a fraction of a frame. Set it to True for repeated trials
-        of a single source, which differ by noise and gain only. With ``"auto"`` a test on the
-        trials decides (see ``refinement_``). A single signal, or correlated ones, cannot be tested,
-        and without a vote there is no test.
+        of a single source, which differ by noise and gain only. For counts, such as spikes, it
+        harms. With ``"auto"`` a test on the trials decides (see ``refinement_``). A single signal,
+        or correlated ones, cannot be tested, and without a vote there is no test.
     max_offset : "auto" or float, default="auto"
         Largest time shift, as a share of ``n_frames``, in [0, 1]. Lower it for long trials of
         nearly the same pace: that saves time and memory. ``"auto"`` is 0.4 with a learnt metric,

@@ -547,7 +547,7 @@ def test_departures_are_those_from_the_predicted_class(bends):
     own = found[found["class"] == "half"].drop(columns=["class", "performance"])
     pd.testing.assert_frame_equal(own.reset_index(drop=True), expected)
     display = SkeletonDisplay.from_departures(pipe, new, performance=2, limit=1)
-    assert display.heading.startswith("Performance 2, most like 'half', is accepted by the model")
+    assert display.heading.startswith("Trial 2, most like 'half', is accepted by the model")
     alone = SkeletonDisplay.from_departures(half, [new[2]], limit=1)
     assert display.titles == alone.titles
     np.testing.assert_allclose(np.array(display.scenes), np.array(alone.scenes))
