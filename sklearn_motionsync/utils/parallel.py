@@ -30,6 +30,8 @@ except ImportError:  # scikit-learn before 1.9
 
 # Seconds between two lines of a verbose estimator.
 _INTERVAL = 1.0
+# Most tasks of a stage that callbacks see.
+_TASKS = 100
 
 
 def run(function, portions, *, common=(), n_jobs=None, prefer=None, step=None):
@@ -203,17 +205,16 @@ class Progress:
         stage = None
         if self._tasks:
             self._end_tasks(1)
-            stage = self._tasks[0].subcontext(task_name=name, max_subtasks=n_portions)
+            n_tasks = min(n_portions, _TASKS)
+            stage = self._tasks[0].subcontext(task_name=name, max_subtasks=n_tasks)
             stage = self._begin_task(stage)
-        # Without callbacks a portion is no task: thousands of tasks take long.
-        is_watched = stage is not None and getattr(stage, "_callbacks", True)
         begin = printed = time.perf_counter()
         done = 0
 
         def step():
             nonlocal done, printed
             done += 1
-            if is_watched:
+            if stage and done * n_tasks // n_portions > (done - 1) * n_tasks // n_portions:
                 self._begin_task(stage.subcontext(task_name="portion"))
                 self._end_tasks(2)
             now = time.perf_counter()

@@ -156,26 +156,28 @@ def test_verbose_prints_at_most_a_line_a_second(capsys, monkeypatch):
     assert [line.split("%")[0].split(":")[1].strip() for line in lines] == ["40", "80", "100"]
 
 
+class Recorder:
+    """A callback that notes the names of the tasks, as they end."""
+
+    def __init__(self):
+        self.open, self.seen = [], []
+
+    def setup(self, estimator, context):
+        self.seen.append("setup")
+
+    def on_fit_task_begin(self, estimator, context):
+        self.open.append(context.task_name)
+
+    def on_fit_task_end(self, estimator, context):
+        assert self.open.pop() == context.task_name
+        self.seen.append(context.task_name)
+
+    def teardown(self, estimator, context):
+        self.seen.append("teardown")
+
+
 def test_sklearn_callbacks_are_called_for_every_portion(walks):
     pytest.importorskip("sklearn.callback", reason="callbacks came with scikit-learn 1.9")
-
-    class Recorder:
-        def __init__(self):
-            self.open, self.seen = [], []
-
-        def setup(self, estimator, context):
-            self.seen.append("setup")
-
-        def on_fit_task_begin(self, estimator, context):
-            self.open.append(context.task_name)
-
-        def on_fit_task_end(self, estimator, context):
-            assert self.open.pop() == context.task_name
-            self.seen.append(context.task_name)
-
-        def teardown(self, estimator, context):
-            self.seen.append("teardown")
-
     recorder = Recorder()
     sync = DenseSynchronizer().set_callbacks(recorder).fit(walks)
     assert recorder.seen[0] == "setup"
@@ -186,6 +188,19 @@ def test_sklearn_callbacks_are_called_for_every_portion(walks):
     seen = len(recorder.seen)
     sync.transform(walks[:2])
     assert len(recorder.seen) == seen
+
+
+@pytest.mark.parametrize(("n_portions", "n_tasks"), [(7, 7), (100, 100), (101, 100), (1000, 100)])
+def test_callbacks_see_at_most_a_hundred_tasks_of_a_stage(n_portions, n_tasks):
+    pytest.importorskip("sklearn.callback", reason="callbacks came with scikit-learn 1.9")
+    recorder = Recorder()
+    sync = DenseSynchronizer().set_callbacks(recorder)
+    with sync._progress(fits=True) as progress:
+        step = progress.stage("a stage", n_portions)
+        for _ in range(n_portions):
+            step()
+    assert recorder.seen.count("portion") == n_tasks
+    assert recorder.seen[-2:] == ["a stage", "fit"]
 
 
 # -- interruption -----------------------------------------------------------------------------
