@@ -3,6 +3,7 @@
 import datetime
 import math
 import os
+import re
 from numbers import Integral, Real
 
 import numpy as np
@@ -32,10 +33,19 @@ SMALLEST, LARGEST = 1e-9, 1e9
 _TIMES = (np.datetime64, np.timedelta64, datetime.date, datetime.time, datetime.timedelta)
 _SECONDS = "Give seconds as numbers, (t - t[0]) / np.timedelta64(1, 's')"
 _TEXT = (
-    "Give numbers: read_motion(path) or pd.read_csv(path, decimal=',') reads files, "
+    "Give numbers: pd.read_csv(path, decimal=',') reads decimal commas, "
     "to_sequences(df, by=..., time=...) takes columns that name the performance or the time, and "
     "pd.to_numeric(column, errors='coerce') makes other text NaN"
 )
+_UNITS = (
+    "The first row looks like a row of units: leave it out, as by pd.read_csv(path, skiprows=[1])"
+)
+_LABEL = (
+    "It looks like a label, such as the trial's name: name it in by=, or drop it. "
+    "to_sequences(df, by=..., time=...) takes it"
+)
+# The name of a file, by its ending, which begins with a letter.
+_FILE = re.compile(r".*\.[a-z]\w{1,4}", re.IGNORECASE | re.DOTALL)
 
 
 def as_numbers(values, what, *, dtype=None):
@@ -115,6 +125,10 @@ def refuse_non_numeric(values, what):
     elif isinstance(values, pd.DataFrame):
         for name, column in values.items():
             _refuse_column(column, f"{what}, column {name!r},")
+    elif isinstance(values, np.ndarray) and values.ndim == 2 and values.dtype.kind in "OSU":
+        # As from a table.
+        for column in values.T:
+            _refuse_column(pd.Series(column), what)
     else:
         _refuse_items(values, what)
 
@@ -132,10 +146,31 @@ def _refuse_column(column, what):
     if column.dtype.kind in "Mm" or isinstance(column.dtype, pd.PeriodDtype):
         raise ValueError(f"{what} holds dates or durations. {_SECONDS}.")
     if column.dtype.kind in "OSUT":
-        _refuse_items(column.to_numpy(dtype=object), what)
+        _refuse_items(column.to_numpy(dtype=object), what, column)
 
 
-def _refuse_items(values, what):
+def _advice_on_text(text, column):
+    """What to do about a text, and the column of a table that it is in or None."""
+    advice = _TEXT
+    if isinstance(text, os.PathLike) or _FILE.fullmatch(str(text)):
+        reader = "pd.read_csv" if str(text).endswith((".csv", ".txt")) else "read_motion"
+        advice = f"Give what is in it: {reader}(path) reads files"
+    if column is None or len(column) < 2:
+        return advice
+    texts = column[column.notna()].astype(str)
+    numbers = pd.to_numeric(column, errors="coerce")
+    rows = np.flatnonzero(column.notna() & numbers.isna())
+    if len(rows) and rows[0] == 0 and numbers.notna().any():
+        # One a file in a table of several: the same text, and no two of them on end.
+        same = column.iloc[rows].nunique() == 1 and (np.diff(rows) > 1).all()
+        return _UNITS if same else advice
+    commas = pd.to_numeric(texts.str.replace(",", "."), errors="coerce")
+    if commas.isna().all() and texts.nunique() <= len(texts) / 2:
+        return _LABEL
+    return advice
+
+
+def _refuse_items(values, what, column=None):
     """Refuse text, dates and fields in arrays, and in lists of lists."""
     if isinstance(values, np.ndarray):
         kind = values.dtype.kind
@@ -153,7 +188,8 @@ def _refuse_items(values, what):
         values = [values]
     for value in values:
         if isinstance(value, (str, bytes, os.PathLike)):
-            raise ValueError(_not_numeric(value, what, f"{str(value)[:60]!r}. {_TEXT}"))
+            advice = _advice_on_text(value, column)
+            raise ValueError(_not_numeric(value, what, f"{str(value)[:60]!r}. {advice}"))
         if isinstance(value, _TIMES):
             kind = type(value).__name__
             raise ValueError(f"{what} holds dates or durations ({kind}). {_SECONDS}.")

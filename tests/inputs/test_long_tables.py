@@ -1,6 +1,8 @@
 """Tables to performances with labels, in order of an even time, and back."""
 
 import datetime as dt
+import io
+import re
 
 import numpy as np
 import pandas as pd
@@ -460,7 +462,7 @@ REFUSED = [
     (lambda df: df.drop(columns=KEYS), {"time": "time"}, ["twice", "by="]),
     (lambda df: df.assign(time=0), BY, ["twice", "the first is 0"]),
     (lambda df: df.drop(index=df.index[df["time"] == 0.1]), BY, ["a gap from 0.08 to 0.12"]),
-    (lambda df: df.assign(group="young"), BY, ["column 'group'", "'young'", CALL]),
+    (lambda df: df.assign(group="young"), BY, ["column 'group'", CALL, "name it in by="]),
     (lambda df: df.assign(day=pd.Timestamp(0)), BY, ["column 'day'", "dates"]),
     (lambda df: df.astype({"time": str}), BY, ["text", "pd.to_datetime"]),
     (lambda df: df.assign(knee="0,5"), BY, ["'knee'", "'0,5'", "decimal=','"]),
@@ -648,3 +650,65 @@ def test_performances_need_frames_and_features(shape):
             take([np.zeros((5, 2)), np.zeros(shape)])
     with pytest.raises(ValueError, match="0 performances"):
         to_frame([])
+
+
+# -- text as files of tables have it ----------------------------------------------------------
+
+
+def exported(i, header="time,knee,hip\ns,deg,deg\n", **how):
+    """A file as programs export it, with a row of units below the names."""
+    lines = [f"{k / 50},{np.sin(k / 9 + i):.4f},{np.cos(k / 7 + i):.4f}\n" for k in range(40)]
+    return pd.read_csv(io.StringIO(header + "".join(lines)), **how)
+
+
+UNITS = r"got str, '(s|deg)'\. The first row looks like a row of units.*skiprows=\[1\]"
+BY_TRIAL = {"by": "trial", "time": "time"}
+OF_UNITS = {
+    "list of tables": lambda files: DenseSynchronizer().fit(files),
+    "arrays of tables": lambda files: DenseSynchronizer().fit([df.to_numpy() for df in files]),
+    "an index": lambda files: ASpace().fit(pd.concat(files, keys=[*"abc"], names=["trial", "row"])),
+    "one file": lambda files: to_sequences(files[0], time="time"),
+    "several in one": lambda files: to_sequences(
+        pd.concat([df.assign(trial=i) for i, df in enumerate(files)], ignore_index=True), **BY_TRIAL
+    ),
+    "polars": lambda files: to_sequences(pl.DataFrame(files[0].to_dict("list")), time="time"),
+}
+
+
+@pytest.mark.parametrize("way", OF_UNITS)
+def test_a_row_of_units_is_told_of(way):
+    with pytest.raises(ValueError, match=UNITS) as caught:
+        OF_UNITS[way]([exported(i) for i in range(3)])
+    assert "read_motion" not in str(caught.value)
+    assert len(to_sequences(exported(0, skiprows=[1]), time="time")[0]) == 40
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        ["-", "-", *["0.5"] * 38],
+        ["0.5", "deg", *["0.5"] * 38],
+        ["deg", *["0,5"] * 39],
+        ["n", "0.5", "0.7", "m", *["0.5"] * 36],
+        [f"step {k}" for k in range(40)],
+    ],
+    ids=lambda column: "_".join(column[:4]),
+)
+def test_other_text_is_neither_units_nor_a_label(column):
+    df = exported(0, skiprows=[1]).assign(knee=column)
+    with pytest.raises(ValueError, match="column 'knee'") as caught:
+        to_sequences(df, time="time")
+    said = str(caught.value)
+    assert "pd.to_numeric" in said
+    assert not re.search("units|label|read_motion", said)
+
+
+@pytest.mark.parametrize("values", ["walk one", ["left", "right"] * 20, [None, "fast"] * 20])
+def test_a_label_that_is_no_feature_is_told_of(values):
+    files = [exported(i, skiprows=[1]).assign(note=values) for i in range(3)]
+    said = r"column 'note',.*looks like a label, .*: name it in by=, or drop it"
+    for refused in (DenseSynchronizer().fit, ASpace().fit):
+        with pytest.raises(ValueError, match=said):
+            refused(files)
+    with pytest.raises(ValueError, match=said):
+        to_sequences(pd.concat(files), time="time")
