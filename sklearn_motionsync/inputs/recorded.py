@@ -46,6 +46,9 @@ _ROUNDING = 0.4
 _IN_SECONDS = 1 / 50
 # In fewer frames than these a key-frame may be below 1.
 _FEW_FRAMES = 10
+# So many gaps, and such a share of the steps, are of random rows: of ten folds a training set has
+# gaps at 10 % of its steps.
+_FEW_GAPS, _SHARE_OF_GAPS = 3, 0.05
 
 
 def recorded_frames(df):
@@ -142,6 +145,8 @@ def refuse_moved_events(X):
 def warn_of_rows(sequences, called):
     """Warn of the first table whose index says that its rows are not even steps of time.
 
+    Every k-th row is a lower frame rate and passes. Random rows, as of folds of a table, do not;
+    nor do, where the index tells the time, rows with a gap.
     Or that they have a frame rate of which the one in ``attrs`` is no multiple: rows may have been
     left out since.
 
@@ -180,7 +185,16 @@ def _trouble_of_rows(x):
     # Whole numbers are numbers of frames; those of a recording at a frame rate tell its time.
     timed = index.dtype.kind in "fmM" or _is_rate(rate)
     own = _rate_of_seconds(index)
-    if own is None and timed and (steps != steps[0]).any() and not is_even(times):
+    is_uneven = own is None and (steps != steps[0]).any() and not is_even(times)
+    if is_uneven and _look_split(steps):
+        return (
+            f"rows look split, as by cross-validation of rows, which puts every trial into train "
+            f"and test: {len(times)} are left of {round(np.ptp(times) / steps.min()) + 1} between "
+            f"{times[0]:.10g} and {times[-1]:.10g}, level {name!r} of the index. Give "
+            "to_sequences(table), a list, which is split by trial. Rows left out on purpose are "
+            f"filled in by to_sequences(df, time={name!r}, max_gap_time=...)."
+        )
+    if is_uneven and timed:
         worst = steps.argmax()
         return (
             f"the times of its rows, level {name!r} of the index, are not even: from "
@@ -195,6 +209,14 @@ def _trouble_of_rows(x):
             "index is taken. Correct the wrong one."
         )
     return None
+
+
+def _look_split(steps):
+    """Whether rows were left out here and there, as random ones are, and not in a few gaps."""
+    left_out = steps / steps.min() if steps.min() > 0 else np.ones(1)
+    if (np.abs(left_out - np.round(left_out)) > _ROUNDING).any():
+        return False
+    return (left_out > 1.5).sum() >= max(_FEW_GAPS, _SHARE_OF_GAPS * len(steps))
 
 
 def is_thinned(rate, recorded):

@@ -8,7 +8,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.base import clone
-from sklearn_motionsync import MotionTracker, OnlineSynchronizer, find_performances, to_frame
+from sklearn.model_selection import KFold, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    LinearSynchronizer,
+    MotionTracker,
+    OnlineSynchronizer,
+    find_performances,
+    to_frame,
+    to_sequences,
+)
 from sklearn_motionsync.inputs.recorded import (
     Recorded,
     frame_rate_of_rows,
@@ -195,6 +205,71 @@ def test_rows_that_are_not_even_steps_of_time_are_warned_of(estimator, change, m
 def test_rows_that_are_even_steps_of_time_pass(change):
     df = change(pd.DataFrame({"knee": np.arange(60.0)}).rename_axis(index="frame"))
     df.attrs["frame_rate"] = 30
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        to_frame([df])
+
+
+def rows_of_fold(k, n, n_splits=3):
+    """The rows that one fold of a shuffled split leaves of so many, in order."""
+    order = np.random.default_rng(k).permutation(n)
+    return np.sort(order[: n - n // n_splits])
+
+
+SPLIT = r"Performance \d.*: rows look split, as by cross-validation of rows.*to_sequences\(table\)"
+
+
+@pytest.mark.parametrize("rate", [None, 30])
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_rows_split_by_cross_validation_are_warned_of(estimator, rate):
+    X = recordings(estimator)
+    split = [df.iloc[rows_of_fold(k, len(df))] for k, df in enumerate(X)]
+    for df in [*X, *split]:
+        df.attrs = {"frame_rate": rate} if rate else {}
+    fitted = clone(estimator).fit(X)
+    for called in (clone(estimator).fit, lambda table: outputs(fitted, table)):
+        for given in (split, pd.concat(split, keys=range(len(split)), names=["performance"])):
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                # A few rows may not be cyclic.
+                with contextlib.suppress(ValueError):
+                    called(given)
+            said = [str(warning.message) for warning in caught]
+            assert any(re.match(SPLIT, text) for text in said), said
+            assert max(map(len, said)) < 600
+
+
+@pytest.mark.parametrize(
+    "splits", [KFold(3, shuffle=True, random_state=0), KFold(10, shuffle=True, random_state=0)]
+)
+def test_cross_validation_of_a_table_is_warned_of(splits):
+    t = np.arange(90) / 30
+    table = to_frame([np.column_stack([np.sin(t + k), np.cos(2 * t + k)]) for k in range(6)])
+    pipe = make_pipeline(LinearSynchronizer(20), ActionModel())
+    with pytest.warns(UserWarning, match=SPLIT) as caught:
+        cross_val_score(pipe, table, cv=splits)
+    # In fit and in score.
+    assert sum("rows look split" in str(each.message) for each in caught) >= 2 * splits.n_splits - 2
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cross_val_score(pipe, to_sequences(table), cv=3)
+        pipe.fit(table.iloc[::2]).score(table.iloc[1::3])
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        [*range(20), *range(23, 60)],
+        [*range(20), *range(23, 40), *range(47, 60)],
+        range(0, 60, 7),
+        # Milliseconds of a camera.
+        np.round(np.arange(60) / 0.03).astype(int),
+        np.cumsum([0, *np.random.default_rng(0).integers(28, 39, 59)]),
+    ],
+    ids=["gap", "two gaps", "thinned out", "milliseconds", "of uneven steps"],
+)
+def test_whole_numbers_of_unknown_rate_with_few_gaps_pass(frames):
+    df = pd.DataFrame({"knee": np.sin(np.arange(len(frames)))}, index=pd.Index(frames))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         to_frame([df])
