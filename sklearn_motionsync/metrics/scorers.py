@@ -128,11 +128,13 @@ class SpreadScorer(_SynchronizerScorer):
     Parameters
     ----------
     spread : {"least_squares", "sobolev", "correlation"}, default="least_squares"
-        The measure; greater is better, so the first two are negated.
+        The measure; greater is better, so the first two are negated. "sobolev" depends
+        on ``n_frames``: compare it between equal ones.
 
     Notes
     -----
-    The spread of matched features rewards over-warping: prefer `FeatureHoldoutScorer` to choose
+    It judges the fitted pattern: performances are matched with it, and nothing is fitted anew. The
+    spread of matched features rewards over-warping: prefer `FeatureHoldoutScorer` to choose
     parameters. Scores need at least two performances, so ``LeaveOneOut`` cannot be used.
 
     Examples
@@ -190,17 +192,23 @@ class SpreadScorer(_SynchronizerScorer):
 
 
 class FeatureHoldoutScorer(_SynchronizerScorer):
-    """Scorer that synchronises by some features and measures the spread of the others.
+    """Scorer of the parameters of a synchronizer, by the spread of features that it does not see.
 
-    Features are divided into ``n_folds`` folds. For each fold a clone of the synchronizer is
-    fitted without it, to a median pattern, and its warps are scored by the spread of the fold
-    alone, which over-warping does not reduce. The clones are given the key-frames of the
-    performances that are scored.
+    It is right to choose parameters, as in a grid search. It ignores the pattern that was fitted,
+    and ``pattern=``: clones of the synchronizer are fitted anew, on the performances that are
+    scored. In cross-validation that is the test fold. Of a fit only ``n_frames_`` and the steps
+    before the synchronizer count. To judge a fitted pattern by people held out, use `SpreadScorer`,
+    or `group_timing_error` where the true moments are known.
+
+    Features are divided into ``n_folds`` folds. For each fold a clone is fitted without it, to a
+    median pattern. Its warps are scored by the spread of the fold alone, which over-warping does
+    not reduce. The clones are given the key-frames of the performances that are scored.
 
     Parameters
     ----------
     spread : {"least_squares", "sobolev", "correlation"}, default="least_squares"
-        The measure; greater is better, so the first two are negated.
+        The measure; greater is better, so the first two are negated. "sobolev" depends
+        on ``n_frames``: compare it between equal ones.
     n_folds : int, default=3
         At least 2, and at most the number of features.
     random_state : int, RandomState instance or None, default=0

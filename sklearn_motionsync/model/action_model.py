@@ -257,6 +257,9 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         For the choice between models of different actions. Not for whether a performance is the
         action at all, which `predict` tells: standing still at the mean posture is dense.
 
+        It is a sum over all frames and features, in the unit of the data. Compare it only between
+        models of equal ``P``, features and scaling. See `score` for what to use instead.
+
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
@@ -280,7 +283,14 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         y: object = None,
         sample_weight: ValuesLike | None = None,
     ) -> float:
-        """Mean log-density of performances.
+        """Mean log-density of performances, to compare models of equal ``P``, features and scaling.
+
+        It is a sum over all frames and features, in the unit of the data. So twice the frames
+        double it, and millimetres in place of metres lower it: a search by it chooses ``n_frames``,
+        features or scaling for that reason alone. To choose ``n_frames`` and the parameters of a
+        synchronizer, give the search ``scoring=FeatureHoldoutScorer()``, which has no unit and
+        hardly depends on ``P``. To choose features or scaling, score decisions: by the accuracy of
+        an `ActionClassifier`, or as the example of `ActionDetector` does.
 
         Parameters
         ----------

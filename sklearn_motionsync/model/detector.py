@@ -107,6 +107,23 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
     Give ``groups``, such as subjects, whenever people come more than once: acceptance regions
     are then those of differences between people. Variation between people is accepted: copies
     at half or double speed are rejected only where people agree on the duration of the action.
+
+    The detector has no ``score``, as one kind of trial alone cannot tell whether it is right. A
+    search needs a scorer, and trials that are to be refused. This one is the balanced accuracy. It
+    can be compared between all ``n_frames``, features and scalings:
+
+    Examples
+    --------
+    >>> from sklearn.model_selection import GridSearchCV, GroupKFold
+    >>> others = [x[::-1] for x in bunch.data]
+    >>> def balanced_accuracy(detector, X, y=None):
+    ...     accepted, refused = detector.predict(X) == 1, detector.predict(others) == -1
+    ...     return (accepted.mean() + refused.mean()) / 2
+    >>> search = GridSearchCV(
+    ...     detector, {"coverage": [0.5, 0.95]}, cv=GroupKFold(3), scoring=balanced_accuracy
+    ... )
+    >>> search.fit(bunch.data, groups=bunch.actor).best_params_
+    {'coverage': 0.95}
     """
 
     _parameter_constraints: dict = {

@@ -104,6 +104,37 @@ def test_holdout_score_does_not_reward_over_warping():
     assert FeatureHoldoutScorer()(sync, X) < -0.95
 
 
+def test_holdout_judges_parameters_and_spread_the_fitted_pattern(points):
+    train, test = points[:4], points[4:]
+    syncs = [
+        DenseSynchronizer(40).fit(train),
+        DenseSynchronizer(40, pattern=points[0]).fit(train),
+        DenseSynchronizer(40).fit(test),
+    ]
+    assert len({FeatureHoldoutScorer()(sync, test) for sync in syncs}) == 1
+    assert len({SpreadScorer()(sync, test) for sync in syncs}) == 3
+
+
+def test_holdout_score_has_no_unit_and_hardly_depends_on_frames_as_the_density_does(points):
+    def scores(n_frames, unit):
+        pipe = make_pipeline(DenseSynchronizer(n_frames), ActionModel())
+        X = [unit * x for x in points]
+        how = {"cv": 2, "scoring": {"density": _score, "holdout": FeatureHoldoutScorer()}}
+        found = cross_validate(pipe, X, **how)
+        return found["test_density"].mean(), found["test_holdout"].mean()
+
+    (density, holdout), thrice, millimetres = scores(40, 1), scores(120, 1), scores(40, 1000)
+    assert thrice[0] > 2 * density
+    # The logarithm of a density of 40 frames of 6 features falls by that of the unit.
+    assert millimetres[0] == pytest.approx(density - 40 * 6 * np.log(1000))
+    assert thrice[1] == pytest.approx(holdout, rel=0.1)
+    assert millimetres[1] == pytest.approx(holdout)
+
+
+def _score(pipe, X, y=None):
+    return pipe.score(X)
+
+
 def test_scorer_refuses_estimator_without_synchronizer(bending_aspace):
     with pytest.raises(ValueError, match="no synchronizer in ASpace"):
         SpreadScorer()(ASpace(2).fit(bending_aspace), bending_aspace)
