@@ -64,6 +64,22 @@ def test_every_public_signature_is_annotated(name):
 
 
 @pytest.mark.parametrize("name", CALLABLES)
+def test_help_shows_the_names_of_types_and_not_what_they_stand_for(name):
+    each = CALLABLES[name]
+    members = vars(each).values() if inspect.isclass(each) else ()
+    for shown in [each, *filter(inspect.isfunction, members)]:
+        assert "inputs.types" not in str(inspect.signature(shown))
+
+
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_help_speaks_of_performances(estimator):
+    for name in dir(type(estimator)):
+        if not name.startswith(("_", "set_", "get_")):
+            doc = inspect.getdoc(getattr(type(estimator), name)) or ""
+            assert "(n_samples, n_features)" not in doc, name
+
+
+@pytest.mark.parametrize("name", CALLABLES)
 def test_docstrings_name_the_strings_that_are_annotated(name):
     hints = annotations(CALLABLES[name])
     for key, kind in described(inspect.getdoc(CALLABLES[name])).items():

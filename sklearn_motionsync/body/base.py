@@ -1,5 +1,7 @@
 """The base of the transformers of joint positions: what they accept, and the body they see."""
 
+from __future__ import annotations
+
 import functools
 import warnings
 from typing import ClassVar, NamedTuple
@@ -12,7 +14,7 @@ from ..inputs.numbers import column_names
 from ..inputs.types import FitTransform, PerformancesLike, Transformed
 from ..inputs.validation import check_performances, names_of_input, restore
 from ..inputs.wording import counted
-from ..utils.atomic import atomic_fit, snapshot
+from ..utils.atomic import snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from .axes import fill_heading, heading_axes, to_y_up
@@ -223,7 +225,7 @@ class PositionsTransformer(DocumentedMixin, LongWorkMixin, TransformerMixin, Bas
     # Lengths count in those of the body, so units do not matter.
     _facts = "frame_rate", "up"
 
-    fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
+    fit_transform: ClassVar[FitTransform] = whole_fit_transform
 
     @snapshot
     def transform(self, X: PerformancesLike) -> Transformed:

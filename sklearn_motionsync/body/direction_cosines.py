@@ -1,5 +1,7 @@
 """DirectionCosines: postures of joint positions (Eq. 1), and joint positions of postures."""
 
+from __future__ import annotations
+
 from typing import Literal, Self
 
 import numpy as np

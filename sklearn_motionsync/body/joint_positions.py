@@ -1,5 +1,7 @@
 """JointPositions: positions of the joints of a body relative to its pelvis."""
 
+from __future__ import annotations
+
 from typing import Literal, Self
 
 import numpy as np

@@ -1,5 +1,7 @@
 """The mirror image of a body: left and right joints exchanged."""
 
+from __future__ import annotations
+
 import re
 
 import numpy as np

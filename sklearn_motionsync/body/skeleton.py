@@ -1,5 +1,7 @@
 """Skeleton: which columns are which joints, and which joints are the landmarks of the body."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, Self
@@ -42,7 +44,7 @@ class _ReadOnly(dict):
 class _Constructor(Protocol):
     """A class method that makes a known skeleton."""
 
-    def __call__(self, *, n_dims: Literal[3, 2] = 3, up: UpAxis | None = None) -> "Skeleton": ...
+    def __call__(self, *, n_dims: Literal[3, 2] = 3, up: UpAxis | None = None) -> Skeleton: ...
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """Synthetic performances of a skeleton that bends down and rises again."""
 
+from __future__ import annotations
+
 from numbers import Integral
 
 import numpy as np

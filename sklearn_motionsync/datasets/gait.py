@@ -1,5 +1,7 @@
 """Synthetic gait of people in two groups: angles of one leg and the force under the foot."""
 
+from __future__ import annotations
+
 from numbers import Integral, Real
 from typing import NamedTuple
 

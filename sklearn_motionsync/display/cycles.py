@@ -1,5 +1,7 @@
 """CycleDisplay: the self-correlation of a take, and the cuts between its cycles."""
 
+from __future__ import annotations
+
 from typing import Self
 
 import numpy as np

@@ -1,5 +1,7 @@
 """LagDisplay: the lags of parts of the body, with their confidence intervals."""
 
+from __future__ import annotations
+
 from typing import Any, Self
 
 import numpy as np

@@ -1,5 +1,7 @@
 """PhaseDisplay: the phase of running performances, and the predicted rest of them."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from textwrap import fill
 from typing import Any, Literal, NamedTuple, Self

@@ -1,5 +1,7 @@
 """MetricDisplay: the weight of each feature in the learnt metric."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Self
 

@@ -1,5 +1,7 @@
 """ActionModelDisplay: the mean of a learnt action, a band, and departures from it (Fig. 3d)."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple, Self
 

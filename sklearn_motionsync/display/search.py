@@ -1,5 +1,7 @@
 """SearchDisplay: the hits of a search along takes, with their scores and the true segments."""
 
+from __future__ import annotations
+
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, Self
 

@@ -1,5 +1,7 @@
 """SkeletonDisplay: stick figures of postures, models (Fig. 4), and performances in motion."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import partial
 from numbers import Real

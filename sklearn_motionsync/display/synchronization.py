@@ -1,5 +1,7 @@
 """SynchronizationDisplay: features before and after synchronisation, and the warps (Figs. 1, 3)."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any, Self
 

@@ -1,5 +1,7 @@
 """TrackingDisplay: the estimated postures of a tracked body, and what was observed of it."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from textwrap import fill
 from typing import Any, Literal, Self

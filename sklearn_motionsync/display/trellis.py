@@ -1,5 +1,7 @@
 """TrellisDisplay: the disparity space of one pair, and the path through it (Fig. 2)."""
 
+from __future__ import annotations
+
 from typing import Any, Self
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Tables of frames to performances, in order of an even time, and back."""
 
+from __future__ import annotations
+
 import reprlib
 from collections.abc import Hashable, Sequence
 from numbers import Real

@@ -1,5 +1,7 @@
 """Input checks of estimators, and outputs of the same kind as the input."""
 
+from __future__ import annotations
+
 import re
 import warnings
 

@@ -4,6 +4,8 @@ Warps are the ``times`` of a `Match`: tau(p), shape (n_sequences, P), from 0 to 
 the common clock. They may decrease.
 """
 
+from __future__ import annotations
+
 import numpy as np
 import pandas as pd
 

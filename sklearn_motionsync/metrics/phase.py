@@ -1,5 +1,7 @@
 """The variance of performances split into that of their shapes and that of their timing."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

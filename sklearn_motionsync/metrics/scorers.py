@@ -1,5 +1,7 @@
 """Scorers of synchronizers without ground truth, for ``cross_val_score`` and grid searches."""
 
+from __future__ import annotations
+
 from copy import deepcopy
 from numbers import Integral
 from typing import Any, Literal

@@ -4,6 +4,8 @@
 they are 0.25.
 """
 
+from __future__ import annotations
+
 import numpy as np
 import pandas as pd
 

@@ -1,5 +1,7 @@
 """The action model: mean performance, variance at every posture, envelope (section 4)."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from numbers import Integral, Real
 from typing import Self

@@ -1,5 +1,7 @@
 """Departures of performances from a model: runs of frames beyond a limit."""
 
+from __future__ import annotations
+
 from numbers import Real
 from typing import Any, NamedTuple
 

@@ -1,5 +1,7 @@
 """ActionDetector: whether performances as they were recorded are the action, and why not."""
 
+from __future__ import annotations
+
 from numbers import Real
 from typing import Any, Self
 

@@ -1,5 +1,7 @@
 """OnlineSynchronizer: the phase of performances that are still running."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from numbers import Real

@@ -1,5 +1,7 @@
 """MotionTracker: a body that is partly hidden, by a state-space model of its action."""
 
+from __future__ import annotations
+
 from numbers import Integral, Real
 from typing import Any, Self
 

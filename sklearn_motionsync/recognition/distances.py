@@ -1,5 +1,7 @@
 """synchronization_distances: the matrix of Eq. 12 between performances."""
 
+from __future__ import annotations
+
 from numbers import Integral, Real
 
 import numpy as np

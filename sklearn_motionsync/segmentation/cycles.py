@@ -1,5 +1,7 @@
 """CycleSegmenter: long takes of a movement that repeats, cut into its cycles."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Sequence
 from itertools import pairwise

@@ -1,5 +1,7 @@
 """find_performances: where in long takes an action happens."""
 
+from __future__ import annotations
+
 import reprlib
 import warnings
 from bisect import bisect, insort

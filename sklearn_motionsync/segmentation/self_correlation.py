@@ -1,5 +1,7 @@
 """Self-correlation of a take: its period, or whether it has one."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Synchronizer: the clock, the pattern and the warp to it, which all share (Eqs. 6, 7, 18)."""
 
+from __future__ import annotations
+
 from numbers import Integral
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
@@ -29,7 +31,7 @@ from ..matching.matcher import Features
 from ..matching.median import Median, linear_median
 from ..matching.units import Unit
 from ..matching.warps import normalise
-from ..utils.atomic import atomic_fit, snapshot
+from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
@@ -181,7 +183,7 @@ class Synchronizer(
             self._number_as_given()
         return self
 
-    fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
+    fit_transform: ClassVar[FitTransform] = whole_fit_transform
 
     def transform(self, X: PerformancesLike) -> Transformed:
         """Warp performances onto the clock of the pattern (Eq. 18).

@@ -1,5 +1,7 @@
 """blend_performances: weighted means of performances, in their postures and their timing."""
 
+from __future__ import annotations
+
 from collections.abc import Hashable, Mapping
 from numbers import Integral
 from typing import Any

@@ -1,5 +1,7 @@
 """DenseSynchronizer: dense matching to the median performance (Eqs. 7-19)."""
 
+from __future__ import annotations
+
 from functools import partial
 from numbers import Integral, Real
 from typing import Any, Literal, Self

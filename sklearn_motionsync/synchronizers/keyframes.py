@@ -1,5 +1,7 @@
 """KeyframeSynchronizer: piecewise linear warps between key-frames (Figs. 1c and 3c)."""
 
+from __future__ import annotations
+
 from numbers import Integral
 from typing import Literal, Self
 

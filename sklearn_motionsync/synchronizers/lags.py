@@ -1,5 +1,7 @@
 """Lags: delays of parts of the body, with their spread within and between subjects."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -1,5 +1,7 @@
 """LinearSynchronizer: linear normalisation, the baseline (Eq. 7)."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from ..inputs.types import PerformancesLike

@@ -1,5 +1,7 @@
 """Match: warps of performances to the pattern, the result of every synchronizer."""
 
+from __future__ import annotations
+
 import reprlib
 from collections.abc import Iterator, Mapping
 from typing import Any, Self

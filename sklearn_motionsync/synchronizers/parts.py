@@ -1,5 +1,7 @@
 """PartSynchronizer: a warp for each part of the body, coupled to the warp of the whole body."""
 
+from __future__ import annotations
+
 import math
 import reprlib
 from collections.abc import Mapping

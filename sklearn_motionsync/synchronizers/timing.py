@@ -1,5 +1,7 @@
 """TimingChannel: synchronised performances with their timing as an additional feature."""
 
+from __future__ import annotations
+
 from numbers import Real
 from typing import Any, Literal, Self
 

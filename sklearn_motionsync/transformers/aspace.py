@@ -1,5 +1,7 @@
 """aSpace: the principal components of the postures of an action (Eqs. 3-5)."""
 
+from __future__ import annotations
+
 from numbers import Integral
 from typing import ClassVar, Self
 
@@ -17,7 +19,7 @@ from ..inputs.features import check_input_features
 from ..inputs.types import FitTransform, NamesLike, PerformancesLike, Transformed
 from ..inputs.validation import check_performances, check_transformed, restore
 from ..inputs.wording import counted
-from ..utils.atomic import atomic_fit, snapshot
+from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
@@ -143,7 +145,7 @@ class ASpace(
         self.n_components_ = b
         return self
 
-    fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
+    fit_transform: ClassVar[FitTransform] = whole_fit_transform
 
     @snapshot
     def transform(self, X: PerformancesLike) -> Transformed:

@@ -1,5 +1,7 @@
 """FrameWise: any transformer of rows, applied to the frames of performances."""
 
+from __future__ import annotations
+
 from typing import ClassVar, Self
 
 import numpy as np
@@ -17,7 +19,7 @@ from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers, column_names
 from ..inputs.types import FitTransform, NamesLike, PerformancesLike, Transformed
 from ..inputs.validation import check_performances, check_transformed, restore
-from ..utils.atomic import atomic_fit, snapshot
+from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
@@ -121,7 +123,7 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator)
         self._n_features_out, self._inverts = rows.shape[1], _inverts(self.transformer_, rows[:1])
         return self
 
-    fit_transform: ClassVar[FitTransform] = atomic_fit(TransformerMixin.fit_transform)
+    fit_transform: ClassVar[FitTransform] = whole_fit_transform
 
     @snapshot
     def transform(self, X: PerformancesLike) -> Transformed:

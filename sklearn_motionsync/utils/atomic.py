@@ -5,7 +5,9 @@ import threading
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-__all__ = ["atomic_fit", "atomic_partial_fit", "snapshot"]
+from sklearn.base import TransformerMixin
+
+__all__ = ["atomic_fit", "atomic_partial_fit", "snapshot", "whole_fit_transform"]
 
 # The decorated method has the type of the method.
 _Method = TypeVar("_Method", bound=Callable[..., Any])
@@ -49,6 +51,26 @@ def atomic_fit(method: _Method) -> _Method:
         return self if result is copy else result
 
     return cast(_Method, fit_copy)
+
+
+# scikit-learn's, of performances.
+whole_fit_transform = atomic_fit(TransformerMixin.fit_transform)
+whole_fit_transform.__doc__ = """Fit to performances, then transform them.
+
+Parameters
+----------
+X : performances
+    As for ``fit``.
+y : array-like, default=None
+    As for ``fit``.
+**fit_params : dict
+    What ``fit`` takes besides.
+
+Returns
+-------
+ndarray, list of ndarray or DataFrame
+    As from ``transform``.
+"""
 
 
 def atomic_partial_fit(method: _Method) -> _Method:
