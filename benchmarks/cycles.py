@@ -14,11 +14,17 @@ Several cycles fit where every second or fourth repetition differs: exercises of
 from repetitions of one person, some of them done wrong. A period is right within 10 % of the mean
 repetition. Right periods that are warned of are false alarms; so are those of walks and jogs,
 whole, and of their single limbs, whose period is that of the whole body.
+
+A cut is right if it holds 0.7 to 1.3 repetitions, from foot strike to foot strike or along a chain.
+Its length is a share of the period of its take. Takes in which several cycles fit are left out:
+they have their own warning. In shallow chains the last but one repetitions have a part of their
+size, and the path of the phase may stand still through them.
 """
 
 import argparse
 import copy
 import functools
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +32,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 from sklearn.model_selection import LeaveOneGroupOut
 from sklearn_motionsync import CycleSegmenter, DirectionCosines
-from sklearn_motionsync.datasets import load_performances
+from sklearn_motionsync.datasets import load_performances, make_gait
 
 CYCLIC = {"cmu07_walk": "walk", "hdm05": "jogLeftCircle4StepsRstart"}
 ONE_CYCLE = "sneak2StepsLStart"
@@ -44,6 +50,10 @@ SINGLE = {
 SMOOTHING, APART = 0.02, 0.3
 # Of so many repetitions in a chain every so many is one done wrong; 0 is none.
 CHAIN, EVERY, DRAWS = 12, (0, 2, 4), 3
+# Sizes of the shallow repetitions of a chain, and how many there are before the last one.
+SHALLOW, N_SHALLOW = (1, 0.4, 0.2), 2
+# A cut holds one repetition if it holds so much more or less of one.
+RIGHT = 0.3
 
 
 def read(folder, archive, label):
@@ -136,6 +146,11 @@ def limbs(bunch):
 
 def chains(folder, every):
     """Repetitions of a person and an exercise, one after the other, and their mean length."""
+    for chain in _repetitions(folder, every):
+        yield np.concatenate(chain), np.mean([len(x) for x in chain])
+
+
+def _repetitions(folder, every):
     file = np.load(Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz")
     positions = file["positions"] - file["positions"].mean(axis=1, keepdims=True)
     parts = np.split(positions.reshape(len(positions), -1), file["offsets"][1:-1])
@@ -149,8 +164,17 @@ def chains(folder, every):
             for _ in range(DRAWS):
                 good, bad = (np.resize(rng.permutation(k), CHAIN) for k in (right, wrong))
                 chosen = [bad[k] if every and k % every == 0 else good[k] for k in range(CHAIN)]
-                chain = [parts[k] for k in chosen]
-                yield np.concatenate(chain), np.mean([len(x) for x in chain])
+                yield [parts[k] for k in chosen]
+
+
+def shallow_chains(folder, size):
+    """Chains whose last but one repetitions are shallow, and the frames at which each begins."""
+    for chain in _repetitions(folder, 0):
+        for k in range(CHAIN - 1 - N_SHALLOW, CHAIN - 1):
+            x = chain[k]
+            line = np.linspace(x[0], x[-1], len(x))
+            chain[k] = line + size * (x - line)
+        yield np.concatenate(chain), np.cumsum([0, *map(len, chain)])
 
 
 def several_fit(pairs, segmenter=None):
@@ -173,6 +197,56 @@ def warnings_of(folder):
     for every in EVERY:
         name = f"exercises, 1 of {every} wrong" if every else "exercises, none wrong"
         yield name, several_fit(chains(folder, every))
+
+
+def lengths(triples):
+    """Shares of the period that right cuts have, and counts of takes: right, warned; wrong, warned.
+
+    Parameters
+    ----------
+    triples : iterable of (take, frames at which its repetitions begin, segmenter)
+    """
+    shares, counts = [], np.zeros((2, 2), dtype=int)
+    for take, begins, segmenter in triples:
+        (row,) = segmenter.report([take]).itertuples()
+        if not row.cyclic or len(row.periods) > 1 or len(begins) < 2:
+            continue
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            table = segmenter.fit([take]).segment([take])[1]
+        first, last = table["start"].to_numpy(), table["stop"].to_numpy() - 1
+        # Before the first repetition that is known, and after the last, at the mean pace.
+        begins = [begins[0] - row.period, *begins, begins[-1] + row.period]
+        held = np.subtract(*(np.interp(k, begins, np.arange(len(begins))) for k in (last, first)))
+        inside = (first >= begins[0]) & (last <= begins[-1])
+        right = np.abs(held - 1) < RIGHT
+        shares += ((last - first) / row.period)[inside & right].tolist()
+        counts[int(not right[inside].all())] += [1, any("whole cycles" in str(w) for w in caught)]
+    return shares, counts.ravel().tolist()
+
+
+def warnings_of_lengths(folder):
+    """Names of sets of takes, and what `lengths` gives."""
+    gait = [make_gait(6, n_cycles=6, takes=True, random_state=seed) for seed in range(8)]
+    takes = [(x, np.linspace(0, len(x), 7)) for bunch in gait for x in bunch.data]
+    yield "make_gait", lengths((x, begins, CycleSegmenter(start=0)) for x, begins in takes)
+    for names in CYCLIC.items():
+        bunch = read(folder, *names)
+        pairs = list(zip(bunch.data, bunch.frame_rate, strict=True))
+        yield (
+            names[1],
+            lengths(
+                (x, begins, CycleSegmenter(bunch.skeleton, start=side))
+                for x, rate in pairs
+                for side, begins in zip(
+                    ("left", "right"), foot_strikes(x, bunch.skeleton, rate), strict=True
+                )
+            ),
+        )
+    for size in SHALLOW:
+        pairs = shallow_chains(folder, size)
+        name = "exercises" if size == 1 else f"exercises, {N_SHALLOW} of size {size}"
+        yield name, lengths((x, begins, CycleSegmenter()) for x, begins in pairs)
 
 
 def main():
@@ -216,6 +290,13 @@ def main():
     print("\nseveral cycles fit         period right, warned of; not right, warned of")
     for name, counts in warnings_of(folder):
         print(f"  {name:28}" + "".join(f"{count:8d}" for count in counts))
+    print(
+        "\nlengths of cycles    right cuts: number, shares of the period; takes right, warned of;"
+    )
+    print("                     takes with wrong cuts, warned of")
+    for name, (shares, counts) in warnings_of_lengths(folder):
+        print(f"  {name:28}{len(shares):6d} {min(shares):6.2f} {max(shares):6.2f}", end="")
+        print("".join(f"{count:8d}" for count in counts))
 
 
 if __name__ == "__main__":

@@ -34,6 +34,7 @@ from .numbers import (
     check_magnitude,
     check_names,
     column_names,
+    difference,
     listed,
 )
 from .recorded import warn_of_rows
@@ -228,16 +229,10 @@ def _are_same(own, names):
 
 def _refuse_columns(own, names, what, first):
     """Say which columns a performance lacks, and which it has besides, by the first one."""
-    own_names, known = own or [], names or []
-    lacks = [name for name in known if name not in own_names]
-    besides = [name for name in own_names if name not in known]
-    differ = (f"; it lacks {listed(lacks)}" if lacks else "") + (
-        f"; it has besides {listed(besides)}" if besides else ""
-    )
     raise ValueError(
-        f"{what} has the columns {listed(own)}, and {first} has {listed(names)}{differ}. All need "
-        "the same columns: select them by x[names]; of files, read_motion(paths, "
-        "columns='common') leaves out those that some lack."
+        f"{what} has the columns {listed(own)}, and {first} has {listed(names)}"
+        f"{difference(own, names)}. All need the same columns: select them by x[names]; of "
+        "files, read_motion(paths, columns='common') leaves out those that some lack."
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import reprlib
 from collections.abc import Hashable, Sequence
 from numbers import Real
@@ -18,6 +19,7 @@ from .resampling import (
     even_grid,
     find_time_gaps,
     interpolate,
+    look_like_events,
     times_as_numbers,
 )
 from .tables import (
@@ -96,8 +98,8 @@ def to_sequences(
     ------
     ValueError
         If there is no such column or level, a key or a time is missing, a time of a performance
-        comes twice, or there is a gap; without ``time``, if the frames of a performance do not
-        increase.
+        comes twice, there is a gap, or rows look like events, such as spikes, whose times are all
+        that is recorded; without ``time``, if the frames of a performance do not increase.
 
     See Also
     --------
@@ -188,6 +190,7 @@ def to_sequences(
     if not keys and own_label(df)[0] is not None:
         label, names = own_label(df)
         labels = [label]
+    _refuse_events(flat, keys, time, parts, max_gap_time)
     recording = Recorded(df)
     if time is None:
         level = ROW if FRAME in names else None
@@ -352,6 +355,41 @@ def _levels_as_columns(df, keys, times):
     if not len(flat):
         raise ValueError("The table has no rows, so there are no performances in it.")
     return flat
+
+
+def _refuse_events(flat, keys, time, parts, max_gap_time):
+    """Refuse rows that are events, such as spikes: a time and whole numbers, but no signal.
+
+    Where ``time`` is None, it may be left among the features.
+    """
+    features = flat.drop(columns=[*keys, *([] if time is None else [time])])
+    ids = [name for name in features if pd.api.types.is_integer_dtype(features[name])]
+    others = [name for name in features if name not in ids]
+    if time is None:
+        # A warp is a column of times that increase unevenly, too.
+        words = "time|spike" if features.shape[1] > 1 else "spike"
+        called = [name for name in features if re.search(words, str(name), re.IGNORECASE)]
+        if len(called) != 1 or set(others) - set(called):
+            return
+        time, ids = called[0], [name for name in ids if name not in called]
+        in_order = flat.groupby([*keys, *ids], observed=True)[time].is_monotonic_increasing
+        if not in_order.all() or 2 * len(in_order) > len(flat):
+            return
+    elif others or (ids and max_gap_time is not None):
+        return
+    if flat[time].dtype.kind not in "fiu":
+        return
+    clock = flat[time].to_numpy(dtype=np.float64)
+    if look_like_events([clock[rows] for rows in parts], with_signal=bool(ids)):
+        beside = f"whole numbers, {ids}," if ids else "labels"
+        raise ValueError(
+            f"Rows look like events, such as spikes: times in {time!r} are uneven or come twice, "
+            f"and beside them are only {beside} and no signal. Count the events of each "
+            "performance in bins of even time, with one column a source, such as a neuron, and "
+            "give these rates: see the page 'Align neural trials' (docs/howto/neuroscience.md). "
+            "If rows are frames, name the time in time=, all columns that tell performances apart "
+            "in by=, and bridge gaps with max_gap_time=."
+        )
 
 
 def _in_order(column, rows, label, name):

@@ -19,6 +19,7 @@ __all__ = [
     "check_magnitude",
     "check_names",
     "column_names",
+    "difference",
     "is_integer",
     "listed",
     "refuse_non_numeric",
@@ -279,9 +280,19 @@ def check_names(x, expected, what):
     if names is None or expected is None or names == list(expected):
         return
     raise ValueError(
-        f"{what} has the columns {listed(names)}, expected are {listed(expected)}. The feature "
-        "names should match those that were passed during fit, in the same order: select them by "
-        "df[names]."
+        f"{what} has the columns {listed(names)}, expected are {listed(expected)}"
+        f"{difference(names, expected)}. The feature names should match those that were passed "
+        "during fit, in the same order: select them by df[names]."
+    )
+
+
+def difference(names, expected):
+    """Which of the expected names a message says to lack, and which to be there besides."""
+    names, expected = list(names or []), list(expected if expected is not None else [])
+    lacks = [name for name in expected if name not in names]
+    besides = [name for name in names if name not in expected]
+    return (f"; it lacks {listed(lacks)}" if lacks else "") + (
+        f"; it has besides {listed(besides)}" if besides else ""
     )
 
 

@@ -54,6 +54,9 @@ _WIDTH = 1
 _SMOOTHNESS, _FASTEST = 0.3, 2
 # Cycles are as long as the learnt ones up to the first ratio, and the same up to the second.
 _AS_LONG, _SAME = 1.25, 1.001
+# Cycles are warned of outside these shares of the period of their take. Right cuts last 0.68 to
+# 1.31 of it, those through several repetitions more than 1.5 (``benchmarks/cycles.py``).
+_SHORT, _LONG = 0.6, 1.5
 # Largest offset of a path from the mean pace, in cycles: at its beginning, and more per cycle.
 _BEGIN, _DRIFT = 0.55, 0.3
 # Cycles of the portions in which long takes are matched, and of their overlap.
@@ -64,12 +67,18 @@ _COLUMNS = {"take": int, "start": int, "stop": int, "complete": bool, "score": f
 class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     """Cut long takes of walking, running, or any movement that repeats, into its cycles.
 
+    A take is one recording of several repetitions. A cycle is one repetition: it becomes one trial
+    (performance).
+
     1. `self_correlation` gives the period of each take, and whether it is cyclic.
     2. The template of one cycle is the mean of the cycles of all takes at constant period.
     3. Dense matching aligns every take with the template, repeated periodically: a path may begin
        and end at any phase. The template is averaged again, twice.
-    4. The template begins where a foot is farthest ahead, or where a feature has its maximum.
+    4. The template begins where a foot is farthest ahead, or where a feature is largest.
     5. Takes are cut where their phase is a whole number.
+
+    The pieces before the first cut and after the last one are left out, without a warning. Such a
+    piece can hold almost a whole repetition. ``incomplete=True`` returns both pieces, too.
 
     Takes that are segmented later are aligned with the template of ``fit``, so all are cut at the
     same phase. A take gives several performances, hence `segment` and no ``transform``.
@@ -83,8 +92,10 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     start : {"left", "right", "ahead"}, str or int, default=None
         Where cycles begin. With a skeleton ``"left"`` or ``"right"``: where that ankle is farthest
         ahead of the pelvis, about when the foot strikes; ``"ahead"``: the same for the foot that
-        comes farther. Or a compared feature, by name or index: where it has its maximum. None is
-        ``"ahead"`` if the skeleton has feet, otherwise the feature that repeats best.
+        comes farther. Or a compared feature, by name or index: where it is largest. In
+        pictures, where y runs down, the y of a hip is largest where the hip is lowest; change its
+        sign to cut where the hip is highest. None is ``"ahead"`` if the skeleton has feet in space,
+        otherwise the feature that repeats best: see ``start_``.
     threshold : float, default=0.4
         The self-correlation from which a take is cyclic, from 0 to 1. The limit is higher where
         chance correlations are larger: for movements in few directions (``breadth`` of
@@ -93,7 +104,8 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     refine : bool, default=True
         Whether takes are matched to the template; False cuts at their constant mean period.
     incomplete : bool, default=False
-        Whether to return what precedes the first and follows the last whole cycle, too.
+        Whether to return the pieces before the first and after the last whole cycle, too. They are
+        trials with ``complete`` False in the table of `segment`. False leaves them out.
     not_cyclic : {"raise", "skip"}, default="raise"
         What to do with a take that is not cyclic, or has fewer than 1.6 cycles.
     period : (float, float), default=None
@@ -217,6 +229,10 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     def segment(self, X: PerformancesLike) -> tuple[list[Any], pd.DataFrame]:
         """Cut takes into cycles.
 
+        Every cycle begins at the phase that `start` defines: about the frame where a foot is
+        farthest ahead, or where the feature is largest. What precedes the first such frame of a
+        take, and what follows the last one, is left out; ``incomplete=True`` returns it, too.
+
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or one take (n_frames, n_features)
@@ -225,9 +241,10 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         Returns
         -------
         performances : list of ndarray, or of DataFrame, (n_frames_i, n_features)
-            The cycles, take by take, in order of time. The last frame of a cycle is the first of
-            the next one, so both show the same phase. Cycles of DataFrames are labelled by the
-            label of the take and their number, and `to_frame` makes one table of them.
+            The cycles, one trial each, take by take, in order of time. The last frame of a cycle is
+            the first of the next one, so both show the same phase. Cycles of DataFrames are
+            labelled by the label of the take and their number, and `to_frame` makes one table of
+            them.
         locations : DataFrame
             One row a performance: ``take``, index or label of the take, to group by; ``start`` and
             ``stop``, frames of the take, ``stop`` excluded; ``complete``, whether it is a whole
@@ -237,15 +254,25 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         ------
         ValueError
             As from ``fit``; but the lists are empty if no take is left.
+
+        Warns
+        -----
+        UserWarning
+            If a whole cycle lasts less than 0.6 or more than 1.5 periods of its take. A long one
+            may hold several repetitions, or a rest; a short one may be a part of a repetition. A
+            take in which several cycles fit has the warning of ``fit`` instead.
         """
         check_is_fitted(self)
         given, takes = check_takes(self, X, reset=False)
-        rows = []
-        for i, take, phases in self._phases(given, takes):
+        rows, periods = [], np.full(len(takes), np.nan)
+        for i, take, phases, found in self._phases(given, takes):
+            # Where several cycles fit there was a warning of that.
+            periods[i] = found.period if len(found.periods) == 1 else np.nan
             rows += [
                 (i, *row) for row in locate_cycles(take, phases, self.template_, self.incomplete)
             ]
         table = pd.DataFrame(rows, columns=list(_COLUMNS)).astype(_COLUMNS)
+        _warn_of_lengths(takes, table[table["complete"]], periods)
         return cut_takes(given, takes, table)
 
     @snapshot
@@ -266,7 +293,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         check_is_fitted(self)
         given, takes = check_takes(self, X, reset=False)
         out = [np.full(len(take), np.nan) for take in takes]
-        for i, take, phases in self._phases(given, takes):
+        for i, take, phases, _ in self._phases(given, takes):
             out[i] = np.interp(np.arange(len(takes[i])), take.times, phases)
         return out
 
@@ -326,14 +353,14 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         return kept
 
     def _phases(self, given, takes):
-        """Yield the index, the samples, and their phases, of every take that is cyclic."""
+        """Yield index, samples, their phases, and self-correlation of every take that is cyclic."""
         features, found = correlate_takes(self, given, takes)
         found = [as_learnt(self, x, f) for x, f in zip(features, found, strict=True)]
         align = match_phases if self.refine else constant_phases
         for i in self._select_cyclic(takes, found):
             take = SampledTake(features[i], found[i].period)
             phases = align(self.template_, take)
-            yield i, take, phases - np.floor(phases[0])
+            yield i, take, phases - np.floor(phases[0]), found[i]
 
     def _learn_phases(self, sampled, progress):
         """Phases of takes without a template: at constant pace one by one, then matched."""
@@ -473,6 +500,25 @@ def _has_feet(skeleton):
         return False
     shows_heading = bool({"hip", "shoulder"} & set(skeleton.limbs))
     return shows_heading and {"pelvis", "left_ankle", "right_ankle"} <= set(skeleton.landmarks)
+
+
+def _warn_of_lengths(takes, table, periods):
+    """Warn of whole cycles that are far longer or far shorter than the period of their take."""
+    shares = (table["stop"] - 1 - table["start"]) / periods[table["take"]]
+    odd = shares[(shares < _SHORT) | (shares > _LONG)]
+    if odd.empty:
+        return
+    row = odd.index[0]
+    i, start, stop = table.loc[row, ["take", "start", "stop"]]
+    several = "several repetitions, or a rest" if odd[row] > 1 else "only a part of a repetition"
+    warnings.warn(
+        f"{takes.called(i)}: the cycle from start {start} to stop {stop} has {stop - start} "
+        f"frames, but the period of the take is {periods[i]:.1f}. It may hold {several}. This "
+        f"holds for {len(odd)} of {len(table)} whole cycles. Look at the cuts with CycleDisplay, "
+        "leave such cycles out by 'start' and 'stop' of the table, or cut by other features.",
+        UserWarning,
+        stacklevel=4,
+    )
 
 
 # -- phases of a take: matching with one cycle that is repeated periodically ---------------

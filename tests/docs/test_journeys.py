@@ -28,7 +28,7 @@ def test_journeys_page_has_ten_sections():
     assert (
         sum(bool(blocks) for blocks in SECTIONS.values()) == 11
     )  # landmarks in space, in pictures
-    assert PAGE.count("```python") == len(BLOCKS) == 13
+    assert PAGE.count("```python") == len(BLOCKS) == 14
     assert list(SECTIONS)[-1] == "What is refused"
 
 
@@ -274,6 +274,14 @@ def test_files_of_motion_capture(title, ending, name, bodies, tmp_path, monkeypa
     else:
         check_picture(f"{name}.png")
         assert len(plt.gcf().axes) == 2
+    if ending == "bvh":
+        exec(SECTIONS[title][1], left)
+        columns = list(left[name][0])
+        positions = pd.read_csv("positions.csv", index_col=[0, 1])
+        assert list(positions) == list(pd.read_csv("blend.csv", index_col=0)) == columns
+        aligned = match.warp(left[name])
+        np.testing.assert_allclose(positions.to_numpy(), aligned.reshape(-1, len(columns)))
+        assert (tmp_path / "bends.gif").stat().st_size > 1_000
 
 
 @pytest.mark.filterwarnings("ignore:.*positions are missing:UserWarning")

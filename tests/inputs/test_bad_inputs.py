@@ -243,6 +243,17 @@ def test_messages_about_columns_are_short():
         assert len(str(caught.value)) < 600
 
 
+def test_message_names_the_columns_that_differ_from_those_of_fit():
+    """Of hundreds of columns the first are alike."""
+    names = [f"rig_{k}" for k in range(300)]
+    x = pd.DataFrame(np.eye(300), columns=names)
+    other = x.rename(columns={"rig_7": "rig2_7"})
+    with pytest.raises(ValueError, match=r"lacks \['rig_7'\]; it has besides \['rig2_7'\]"):
+        ASpace().fit([x]).transform([x, other])
+    with pytest.raises(ValueError, match=r"lacks \['rig_7'\]; it has besides \['rig2_7'\]"):
+        ASpace().fit([x]).transform([other])
+
+
 # -- parameters -----------------------------------------------------------------------------
 
 PARAMETERS = [

@@ -712,3 +712,82 @@ def test_a_label_that_is_no_feature_is_told_of(values):
             refused(files)
     with pytest.raises(ValueError, match=said):
         to_sequences(pd.concat(files), time="time")
+
+
+# -- tables with a row an event -------------------------------------------------------------
+
+
+def spikes_of(n_units, digits, whole=False):
+    """Six trials of two seconds, with about seven spikes a second of each unit."""
+    rng = np.random.default_rng(n_units)
+    parts = [
+        pd.DataFrame({"trial": trial, "unit": unit, "spike_time": np.sort(rng.uniform(0, 2, 14))})
+        for trial in range(6)
+        for unit in range(n_units)
+    ]
+    df = pd.concat(parts, ignore_index=True).round({"spike_time": digits})
+    return df.assign(spike_time=(df["spike_time"] * 1000).astype(int)) if whole else df
+
+
+@pytest.mark.parametrize("n_units", [1, 24, 75, 150, 300])
+@pytest.mark.parametrize("whole", [False, True])
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"by": "trial", "time": "spike_time"},
+        {"by": ["trial", "unit"], "time": "spike_time"},
+        {"by": ["trial", "unit"], "time": "spike_time", "max_gap_time": 2000},
+        {"by": "trial"},
+        {"by": ["trial", "unit"]},
+    ],
+)
+def test_tables_of_spikes_are_refused(n_units, whole, given):
+    df = spikes_of(n_units, 3, whole)
+    with pytest.raises(ValueError, match=r"events, such as spikes: times in 'spike_time'.*rates"):
+        to_sequences(df, **given)
+
+
+def test_spikes_of_one_source_are_refused():
+    df = spikes_of(1, 6)[["trial", "spike_time"]]
+    with pytest.raises(ValueError, match=r"such as spikes.* only labels and no signal"):
+        to_sequences(df, by="trial", time="spike_time")
+
+
+@pytest.mark.parametrize(
+    ("lost", "message"), [(0.0, None), (0.1, "has a gap"), (0.25, "has a gap")]
+)
+def test_whole_numbers_of_frames_are_no_events(lost, message):
+    """A converter counts in whole numbers; some of its frames are lost."""
+    rng = np.random.default_rng(0)
+    time = np.arange(300) / 100
+    df = pd.DataFrame({"trial": 1, "time": time, "force": rng.integers(0, 4096, 300)})
+    kept = df[np.r_[True, rng.uniform(size=298) >= lost, True]]
+    if message is None:
+        assert to_sequences(kept, by="trial", time="time")[0].shape == (300, 1)
+    else:
+        with pytest.raises(ValueError, match=message):
+            to_sequences(kept, by="trial", time="time")
+    assert to_sequences(kept, by="trial", time="time", max_gap_time=1)[0].shape == (300, 1)
+    assert to_sequences(kept, by="trial")[0].shape == (len(kept), 2)
+
+
+def test_whole_numbers_of_several_recordings_are_no_events():
+    """A key is missing in by=: the advice is to name it."""
+    parts = [
+        pd.DataFrame({"subject": k, "time": np.arange(n) / 50, "count": np.arange(n) % 7})
+        for k, n in enumerate([80, 95, 120])
+    ]
+    df = pd.concat(parts).assign(trial=1)
+    with pytest.raises(ValueError, match=r"come twice.*Name in by= all columns"):
+        to_sequences(df, by="trial", time="time")
+
+
+def test_warps_and_counts_of_spikes_are_no_events():
+    rng = np.random.default_rng(0)
+    rise = np.cumsum(rng.exponential(size=(2, 50)), axis=1).ravel()
+    df = pd.DataFrame({"trial": np.repeat([1, 2], 50), "frame": np.tile(np.arange(50), 2)})
+    for column in (df.assign(time=rise), df[["trial"]].assign(time=rise)):
+        assert [len(x) for x in to_sequences(column, by="trial")] == [50, 50]
+    counts = df.assign(time=df["frame"] / 10, n_spikes=rng.poisson(2, 100))
+    assert [x.shape for x in to_sequences(counts, by="trial", time="time")] == [(50, 2)] * 2
+    assert [len(x) for x in to_sequences(counts.drop(columns="time"), by="trial")] == [50, 50]

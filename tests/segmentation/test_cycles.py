@@ -257,6 +257,51 @@ def test_of_several_cycles_that_fit_the_learnt_one_is_taken():
         segmenter.segment([faint])
 
 
+def squats(sizes, bounces=None):
+    """Squats of 80 frames each, standing between them; one may go down a second time half-way."""
+    depth = (1 - np.cos(2 * np.pi * np.arange(80) / 80)) / 2
+    one = np.column_stack([depth, depth**2, depth * (1 - depth)])
+    bounced = np.concatenate([one[:40], one[40:20:-1], one[20:]])
+    return np.concatenate([a * (bounced if k == bounces else one) for k, a in enumerate(sizes)])
+
+
+def labelled(take, label):
+    table = pd.DataFrame(take)
+    table.attrs["performance"] = label
+    return table
+
+
+def test_segment_warns_of_cycles_that_hold_several_repetitions():
+    """Two shallow squats are nearer to standing than to a squat: the phase stands still."""
+    tired, well = squats([1] * 6 + [0.2] * 2 + [1] * 2), squats([1] * 10)
+    segmenter = CycleSegmenter(start=0).fit([well])
+    segmenter.segment([well])  # a warning is an error
+    X = [labelled(well, "first"), labelled(tired, "second")]
+    message = (
+        r"Performance 1 \('second'\): the cycle from start 440 to stop 681 has 241 frames, but the "
+        r"period of the take is 80\.0\. It may hold several repetitions, .* 1 of 16 whole cycles\. "
+        "Look at the cuts with CycleDisplay"
+    )
+    with pytest.warns(UserWarning, match=message) as caught:
+        _, locations = segmenter.segment(X)
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+    lengths = locations["stop"] - locations["start"]
+    assert sorted(lengths)[-2:] == [81, 241]
+    # The pieces at both ends may be of any length.
+    pieces = segmenter.set_params(incomplete=True).segment([well])[1].iloc[[0, -1]]
+    assert not pieces["complete"].any()
+    assert (pieces["stop"] - pieces["start"] < 45).all()
+
+
+def test_segment_warns_of_cycles_that_hold_part_of_a_repetition():
+    take = squats([1] * 8, bounces=6)
+    segmenter = CycleSegmenter(start=0).fit(take)
+    message = "has 43 frames, .* only a part of a repetition.* holds for 1 of 8 whole"
+    with pytest.warns(UserWarning, match=message):
+        segmenter.segment(take)
+
+
 # -- errors ---------------------------------------------------------------------------------
 
 

@@ -78,3 +78,13 @@ def test_warnings_of_several_cycles_are_right(cycles, real_data):
     assert n_false.sum() <= 0.02 * n_right.sum()
     assert n_wrong.sum() > 100
     assert n_warned.sum() > 0.9 * n_wrong.sum()
+
+
+def test_cycles_through_several_repetitions_are_warned_of(cycles, real_data):
+    """Exercises with shallow repetitions; walks, jogs and whole exercises are cut right."""
+    found = [counts for _, (_, counts) in cycles.warnings_of_lengths(real_data)]
+    n_right, n_false, n_wrong, n_warned = np.sum(found, axis=0)
+    assert n_right > 300
+    assert n_false <= 0.01 * n_right
+    assert n_wrong > 100
+    assert n_warned > 0.9 * n_wrong
