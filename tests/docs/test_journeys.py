@@ -98,8 +98,8 @@ def check_saved(saved, originals, match):
     match : Match
     """
     keys = list(range(saved.index.nlevels - 1))
-    parts = {label: x.droplevel(keys) for label, x in saved.groupby(level=keys, sort=False)}
-    parts = {label if len(keys) > 1 else label[0]: x for label, x in parts.items()}
+    level = keys if len(keys) > 1 else 0
+    parts = {label: x.droplevel(keys) for label, x in saved.groupby(level=level, sort=False)}
     assert list(parts) == list(originals)
     n_frames = match.times.shape[1]
     for tau, (label, x) in zip(match.times, originals.items(), strict=True):
