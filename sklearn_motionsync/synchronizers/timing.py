@@ -262,6 +262,8 @@ class TimingChannel(
         mapping = MethodMapping()
         for method in ("fit", "transform"):
             mapping.add(caller=method, callee=method)
+            # scikit-learn 1.6 asks a step of a pipeline for this one.
+            mapping.add(caller="fit_transform", callee=method)
         router = MetadataRouter(owner=type(self).__name__)
         return router.add(synchronizer=self.synchronizer, method_mapping=mapping)
 
