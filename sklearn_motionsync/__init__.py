@@ -32,6 +32,7 @@ from .segmentation.self_correlation import self_correlation
 from .synchronizers.base import Synchronizer
 from .synchronizers.blending import blend_performances
 from .synchronizers.dense import DenseSynchronizer
+from .synchronizers.evidence import SynchronizationWarning
 from .synchronizers.keyframes import KeyframeSynchronizer
 from .synchronizers.lags import Lags
 from .synchronizers.linear import LinearSynchronizer
@@ -60,6 +61,7 @@ __all__ = [
     "OnlineSynchronizer",
     "PartSynchronizer",
     "Skeleton",
+    "SynchronizationWarning",
     "Synchronizer",
     "TimingChannel",
     "Track",

@@ -2,7 +2,7 @@
 
 What becomes known while a synchronizer is fitted is one object after the other: `Features`, before
 anything was matched; `Matcher`, which matches any two; `Warper`, which knows the pattern;
-`RefinedWarper`, which also knows the noise.
+`RefinedWarper`, which also knows the noise, or `LinearWarper`, if warps would harm.
 """
 
 import math
@@ -146,7 +146,7 @@ class Features(NamedTuple):
 
         Returns
         -------
-        tuple (Features, shares, energy), or None
+        tuple (Features, shares, energy, Evidence), or None
             The share of every feature in what is compared, and in the energy of velocities. None
             if there is nothing to learn.
         """
@@ -160,21 +160,20 @@ class Features(NamedTuple):
         # Where all frames lie among the few.
         within = np.interp(np.arange(len(some)), few, np.arange(len(few)))
 
-        def match(compared, others):
+        def match(compared):
             compared = compared[:, few]
             matcher = Matcher.of(self.at_pace(1), compared, **settings)
-            times = matcher.match_others(compared, others, consensus, warp_smoothing)
+            times = matcher.match_all(compared, consensus, warp_smoothing)
             times = np.interp(times, np.arange(len(few)), few)
             return evaluate_warps(times, within[np.newaxis, np.newaxis])
 
-        # Which one of a pair is the base does not depend on the order of performances.
-        order = np.argsort(np.einsum("npk,npk->n", velocity, velocity), kind="stable")
-        positions, velocity = (x[np.ix_(order, some)] for x in (positions, velocity))
-        metric = learn_metric(match, positions, velocity)
-        if metric is None:
+        positions, velocity = positions[:, some], velocity[:, some]
+        learnt = learn_metric(match, positions, velocity)
+        if learnt is None:
             return None
+        metric, evidence = learnt
         shares = metric.shares(velocity, positions), energy_shares(velocity)
-        return self._replace(metric=metric), *shares
+        return self._replace(metric=metric), *shares, evidence
 
     def part(self, columns, on_clock):
         """The features of some columns alone; None if these do not move.
@@ -262,30 +261,25 @@ class Matcher(NamedTuple):
         frames = np.arange(disparities.shape[-1])
         return frames + disparities / self.trellis.table.subframes
 
-    def match_others(self, sequences, others, n_exemplars, warp_smoothing):
-        """Warps after the vote of every sequence to others of its own.
+    def match_all(self, sequences, n_exemplars, warp_smoothing):
+        """Warps after the vote of all ordered pairs: (n_sequences, n_sequences, P).
 
         Parameters
         ----------
         sequences : ndarray, shape (n_sequences, P, n_compared)
-        others : ndarray of int, shape (n_sequences, n_others)
         n_exemplars : int
         warp_smoothing : float
-
-        Returns
-        -------
-        ndarray, shape (n_sequences, n_others, P)
         """
         disparities, costs = self.trellis.paths_and_costs(sequences, sequences)
         times = self.times(disparities).astype(costs.dtype)
         typical = costs.sum(axis=1, dtype=np.float64)
-        chosen = choose_exemplars(typical, n_exemplars, range(len(typical)))
-        # The base, the other and, (n_exemplars, n_pairs), the exemplars of every pair.
-        n, m = np.repeat(np.arange(len(others)), others.shape[1]), others.ravel()
-        k = chosen[:, n]
-        lengths = np.concatenate([costs[n, m][np.newaxis], costs[n, k] + costs[k, m]])
-        out = vote(times[n, m], times[n, k], times[k, m], lengths)
-        return smooth_warps(out, self.trellis.reach, warp_smoothing).reshape(*others.shape, -1)
+        exemplars = choose_exemplars(typical, n_exemplars, range(len(typical)))
+        out = np.empty_like(times)
+        for n, k in enumerate(exemplars.T):
+            lengths = np.concatenate([costs[n, np.newaxis], costs[n, k][:, np.newaxis] + costs[k]])
+            voted = vote(times[n], times[n, k][:, np.newaxis], times[k], lengths)
+            out[n] = smooth_warps(voted, self.trellis.reach, warp_smoothing)
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -444,6 +438,16 @@ def _share(bases, coupling):
     """The share w / (w + c) of a coupling of weight w, for features of mean squared slope c."""
     slope = np.square(np.diff(bases.sequences, axis=1)).sum(axis=2).mean(dtype=np.float64)
     return coupling.weight / (coupling.weight + slope)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearWarper(Warper):
+    """A warper that only measures distances: warps are those of linear normalisation."""
+
+    def warps(self, positions, coupling=None):
+        """Distances as of `Warper`, and the frames of the clock for every performance."""
+        distances, times = super().warps(positions, coupling)
+        return distances, np.broadcast_to(np.arange(times.shape[1], dtype=times.dtype), times.shape)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from .costs import RATE_WEIGHT
-from .warps import sample
+from .warps import evaluate_warps, sample
 
-__all__ = ["Metric", "compressed", "energy_shares", "learn_metric", "without_mean"]
+__all__ = ["Evidence", "Metric", "compressed", "energy_shares", "learn_metric", "without_mean"]
 
 
 class Metric(NamedTuple):
@@ -118,6 +118,43 @@ def compressed(velocity, energy):
 
 # -- learning the metric from a training set -----------------------------------------------
 
+
+class Evidence(NamedTuple):
+    """What the warps of a training set tell of themselves; NaN if they are hardly any.
+
+    Attributes
+    ----------
+    inconsistency : float
+        Mean distance of the warp by way of a third sequence from the warp itself, over the mean
+        offset. Warps of noise contradict each other: about 1.
+    remaining : float
+        Energy of the differences of matched moments, over that at equal times, in the metric.
+    """
+
+    inconsistency: float
+    remaining: float
+
+    @classmethod
+    def of(cls, times, remaining):
+        """The evidence of the warps (n_sequences, n_sequences, P) of all ordered pairs."""
+        n, _, n_frames = times.shape
+        times = times.astype(np.float64)
+        times[np.arange(n), np.arange(n)] = np.arange(n_frames)
+        # Warps are smooth: a quarter of the frames tells as much.
+        frames = np.arange(0, n_frames, 4)
+        some = times[:, :, frames]
+        offset = np.abs(some - frames).sum() / (n * (n - 1) * len(frames))
+        if n < 3 or offset < _LEAST_OFFSET * n_frames:
+            return cls(np.nan, np.nan)
+        # From every base by way of one in the middle to all others; on average over all three.
+        total = 0.0
+        for middle in range(n):
+            at = np.broadcast_to(some[:, middle, np.newaxis], some.shape)
+            onwards = np.broadcast_to(times[middle], times.shape)
+            total += np.abs(evaluate_warps(onwards, at) - some).sum()
+        return cls(float(total / (n**3 * len(frames)) / offset), remaining)
+
+
 # Standard errors of the agreement between performances from which on a feature is reliable.
 _RELIABLE = 2.0
 # Share of a feature's mean variance that is added to all of them, before anything is inverted.
@@ -129,6 +166,8 @@ _SHRINKAGE = 0.6
 _LEAST_EIGENVALUE = 1e-6
 # Share of the variance of the features that principal axes retain.
 _RETAINED = 0.99
+# Warps whose mean offset is smaller, as a share of the clip, are no evidence.
+_LEAST_OFFSET = 0.01
 # Largest lag, as a share of the clip, of the autocorrelation of differences.
 _LONGEST_LAG = 0.3
 
@@ -139,14 +178,13 @@ def learn_metric(match, positions, velocity):
     Parameters
     ----------
     match : callable
-        ``match(features, others)``: voted times (n_sequences, n_others, P) of all sequences as
-        bases, each with others of its own, by their indices (n_sequences, n_others).
+        ``match(features)``: voted times (n_sequences, n_sequences, P) of all ordered pairs.
     positions, velocity : ndarray, shape (n_sequences, P, n_features)
         Postures on the clock and their velocities, in the unit.
 
     Returns
     -------
-    Metric or None
+    tuple (Metric, Evidence), or None
         None if no feature moves.
     """
     moves = positions.any(axis=(0, 1)) & velocity.any(axis=(0, 1))
@@ -160,14 +198,13 @@ def learn_metric(match, positions, velocity):
     n, n_features = len(positions), len(moves)
     fast = compressed(velocity[:, :, used], _mean_square_speed(velocity[:, :, used]))
     first = _square_root(metric_matrix(fast, _unmatched_covariance(fast))).astype(fast.dtype)
-    # Of any two sequences one is the base, both of those that are opposite in the circle: the two
-    # directions carry nearly the same information.
-    others = (np.arange(n)[:, np.newaxis] + np.arange(1, n // 2 + 1)) % n
-    times = match(fast @ first if first.any() else fast, others)
+    times = match(fast @ first if first.any() else fast)
+    others = np.array([np.delete(np.arange(n), base) for base in range(n)])
+    to_others = np.stack([times[base, some] for base, some in enumerate(others)])
     # For every sequence its others at its times: (n_sequences, n_others, P, n_features).
     n_frames = times.shape[-1]
-    matched = sample(both[others.ravel()], times.reshape(-1, n_frames), n_frames)
-    matched = matched.reshape(*times.shape, 2 * n_features)
+    matched = sample(both[others.ravel()], to_others.reshape(-1, n_frames), n_frames)
+    matched = matched.reshape(*to_others.shape, 2 * n_features)
     if not used[moves].all():
         used |= moves & _are_reliable(_agreement(both, matched), errors)
     energy = _mean_square_speed(velocity[:, :, used])
@@ -175,7 +212,7 @@ def learn_metric(match, positions, velocity):
     parts = matched[..., :n_features], matched[..., n_features:]
     parts = parts if used.all() else [x[..., used] for x in parts]
     of_postures, posture_length = _differences(postures, parts[0])
-    of_fast, fast_length = _differences(fast, _at_rates(parts[1], energy, times))
+    of_fast, fast_length = _differences(fast, _at_rates(parts[1], energy, to_others))
     by_fast = _square_root(metric_matrix(fast, of_fast))
     # Differences of a longer correlation length are fewer independent observations.
     weight = np.sqrt(fast_length / posture_length)
@@ -185,7 +222,16 @@ def learn_metric(match, positions, velocity):
         return None
     n_used = len(by_fast)
     maps = by_fast @ axes[:n_used], by_postures @ axes[n_used:]
-    return Metric(np.flatnonzero(used), energy, *maps)
+    metric = Metric(np.flatnonzero(used), energy, *maps)
+    roots = by_fast, by_postures
+    before = _energy(roots, (_unmatched_covariance(fast), _unmatched_covariance(postures)))
+    left = _energy(roots, (of_fast, of_postures))
+    return metric, Evidence.of(times, left / before if before > 0 else np.nan)
+
+
+def _energy(roots, covariances):
+    """Mean squared differences of given covariances, in the metrics of these square roots."""
+    return float(sum(np.vdot(a @ a.T, c) for a, c in zip(roots, covariances, strict=True)))
 
 
 def _mean_square_speed(velocity):

@@ -14,7 +14,7 @@ from ..inputs.types import Cost, PerformanceLike, PerformancesLike, RandomState
 from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
 from ..matching.filters import SMOOTHING, choose_smoothing
-from ..matching.matcher import Features, Matcher, RefinedWarper, Warper
+from ..matching.matcher import Features, LinearWarper, Matcher, RefinedWarper, Warper
 from ..matching.median import (
     Median,
     estimate_distances,
@@ -29,6 +29,7 @@ from ..utils.atomic import snapshot
 from ..utils.threads import on_one_thread
 from .balance import warn_of_one_feature
 from .base import Synchronizer
+from .evidence import no_evidence, weigh_evidence
 from .match import Match
 from .portions import FeatureStore, TrainingPortions, measure_in_portions, warp_in_portions
 from .subsamples import subsample, typical_share
@@ -137,6 +138,10 @@ class DenseSynchronizer(Synchronizer):
     subframes : int, default=1
         Positions a frame at which a path may stand. More than 1 serves direct paths
         (``consensus=0``); vote, smoothing and refinement are finer anyway.
+    unsupported : {"linear", "warp"}, default="linear"
+        What becomes of ten or more trials that do not support their warps. ``"linear"``: there is a
+        warning, and if ``evidence_.harmful``, they are linearly normalised. ``"warp"``: they are
+        warped, without a warning. Set it if you know that they show one movement in loud noise.
     search : {"auto", "exhaustive", "sampled"}, default="auto"
         The search for the most typical trial: by all matches, or by a sequential test on matches
         with random references (see ``search_``). ``"auto"``: by all, for up to 100 trials.
@@ -192,6 +197,12 @@ class DenseSynchronizer(Synchronizer):
         signal in what is compared, about 0 for noise. ``energy``: its share in the velocities,
         which are compared without a metric; if one of several exceeds 0.95 there is a warning.
         ``performances``: the indices of the trials it was learnt from.
+    evidence_ : Bunch
+        Whether the trials that the metric is learnt from support their warps. ``remaining``: the
+        share of their differences that matching leaves. ``inconsistency``: how far, on average, the
+        warp by way of a third trial is from the warp itself, over the mean time shift. It is small
+        for one movement, and about 1 for noise. ``harmful``: whether there are ten trials, and both
+        exceed 0.7. NaN without a metric, and for time shifts below 1 % of a trial.
     mu_ : float
         Absolute weight of the changes of pace, by the frames that the search compares.
     exemplars_ : ndarray of int
@@ -283,6 +294,7 @@ class DenseSynchronizer(Synchronizer):
         "smoothness": [Interval(Real, 0, None, closed="left")],
         "max_rate": [Interval(Real, 1, None, closed="left")],
         "subframes": [Interval(Integral, 1, None, closed="left")],
+        "unsupported": [StrOptions({"linear", "warp"})],
         "search": [StrOptions({"auto", "exhaustive", "sampled"})],
         "max_fit": [Interval(Integral, 2, None, closed="left"), None],
         "random_state": ["random_state"],
@@ -309,6 +321,7 @@ class DenseSynchronizer(Synchronizer):
         smoothness: float = 0.003,
         max_rate: float = 4,
         subframes: int = 1,
+        unsupported: Literal["linear", "warp"] = "linear",
         search: Literal["auto", "exhaustive", "sampled"] = "auto",
         max_fit: int | None = None,
         random_state: RandomState = 0,
@@ -327,6 +340,7 @@ class DenseSynchronizer(Synchronizer):
         self.smoothness = smoothness
         self.max_rate = max_rate
         self.subframes = subframes
+        self.unsupported = unsupported
         self.search = search
         self.max_fit = max_fit
         self.random_state = random_state
@@ -484,11 +498,12 @@ class DenseSynchronizer(Synchronizer):
     def _learn_metric(self, unit, positions):
         """The features with the learnt metric, from evenly spaced performances if there are many.
 
-        Sets ``metric_``.
+        Sets ``metric_`` and ``evidence_``.
         """
         learns = self.metric == "learned" and self.cost == "velocity" and self.consensus > 0
         self._check_paths(self._settings(learns)["max_offset"])
         smoothing, self.metric_ = self.velocity_smoothing, None
+        self.evidence_ = no_evidence()
         sharp, smooth = (_SHARP, _SMOOTH) if smoothing == "auto" else (smoothing, smoothing)
         plain, n = Features(self.cost, self.subframes, smooth, unit), len(positions)
         if not learns or n < _FEWEST:
@@ -501,7 +516,8 @@ class DenseSynchronizer(Synchronizer):
         learnt = on_one_thread(partial(features.learn, **settings), positions[some])
         if learnt is None:
             return plain
-        features, share, energy = learnt
+        features, share, energy, evidence = learnt
+        self.evidence_ = weigh_evidence(evidence, len(some), self.unsupported)
         self.metric_ = Bunch(share=share, energy=energy, performances=some)
         return features
 
@@ -567,12 +583,14 @@ class DenseSynchronizer(Synchronizer):
         positions = matcher.features.positions(chosen, self.n_frames_)
         pattern, votes = positions[0, :: self.subframes], self.consensus > 0
         settings = pattern, positions, votes, self.warp_smoothing
-        return on_one_thread(Warper.to_pattern, matcher, *settings)
+        linear = self.evidence_.harmful and self.unsupported == "linear"
+        made = LinearWarper if linear else Warper
+        return on_one_thread(made.to_pattern, matcher, *settings)
 
     def _decide_on_refinement(self, training, warper, source, progress, portions):
         """Decide whether warps are refined by postures; the warper that does so or not."""
-        verdict = Verdict()
-        if self.refine == "auto" and self.consensus > 0:
+        verdict, linear = Verdict(), isinstance(warper, LinearWarper)
+        if self.refine == "auto" and self.consensus > 0 and not linear:
             others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
             some = others[:: -(-len(others) // _TESTED) or 1]
             verdict = self._test_refinement(
@@ -581,7 +599,8 @@ class DenseSynchronizer(Synchronizer):
         names = "ratio", "p_value", "ratio_to_all"
         self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
         self.misfit_ = verdict.misfit
-        self.refines_ = bool(verdict.helps if self.refine == "auto" else self.refine)
+        helps = verdict.helps if self.refine == "auto" else self.refine
+        self.refines_ = bool(helps and not linear)
         if not self.refines_:
             return warper
         return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.scaled))

@@ -1,11 +1,9 @@
 """The learnt metric against loops over pairs and frames; reliable and unreliable features."""
 
-from itertools import combinations
-
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync.matching.metric import Metric, learn_metric, metric_matrix
+from sklearn_motionsync.matching.metric import Evidence, Metric, learn_metric, metric_matrix
 
 P = 24
 
@@ -45,11 +43,11 @@ def slow_matrix(block, differences):
 
 
 def slow_differences(block, times, weight, compress=lambda x: x):
-    """Of all pairs of an odd number of performances, in a circle, at the times of the later one."""
+    """Of all ordered pairs, at the times of the second one."""
     out, frames = [], np.arange(P)
     for n, base in enumerate(compress(block)):
         for m, other in enumerate(block):
-            if 0 < (m - n) % len(block) <= len(block) // 2:
+            if m != n:
                 tau = times[n, m]
                 moving = np.column_stack([np.interp(tau, frames, c) for c in other.T])
                 (moving,) = compress([moving])
@@ -77,19 +75,18 @@ def some_times(n):
 
 def fixed_match(times):
     """A match with these times, whatever the features."""
-    return lambda features, others: np.take_along_axis(times, others[:, :, np.newaxis], axis=1)
+    return lambda features: times
 
 
 def test_metric_equals_loops_over_pairs_and_frames(curves):
     positions, velocity = curves
     times, seen = some_times(len(positions)), []
 
-    def match(features, others):
+    def match(features):
         seen.append(features)
-        assert sorted(map(sorted, pairs_of(others))) == sorted(map(list, combinations(range(5), 2)))
-        return fixed_match(times)(features, others)
+        return times
 
-    metric = learn_metric(match, positions, velocity)
+    metric, evidence = learn_metric(match, positions, velocity)
     fast = slow_compressed(velocity)
     unmatched = np.broadcast_to(np.arange(P, dtype=float), times.shape)
     first = slow_matrix(fast, slow_differences(fast, unmatched, 0))
@@ -99,18 +96,22 @@ def test_metric_equals_loops_over_pairs_and_frames(curves):
     of_fast = slow_differences(velocity, times, 0.2, lambda x: slow_compressed(x, energy))
     of_postures = slow_differences(postures, times, 0)
     weight = slow_length(of_fast) / slow_length(of_postures)
-    gram = fast_inner(fast, slow_matrix(fast, of_fast))
-    gram += weight * fast_inner(postures, slow_matrix(postures, of_postures))
+    by_fast, by_postures = slow_matrix(fast, of_fast), slow_matrix(postures, of_postures)
+    gram = fast_inner(fast, by_fast) + weight * fast_inner(postures, by_postures)
     # The largest of its principal parts that make 99 %, three at most.
     values, vectors = np.linalg.eigh(gram)
     count = min(3, 1 + np.searchsorted(np.cumsum(values[::-1]), 0.99 * values.sum()))
     expected = (vectors[:, -count:] * values[-count:]) @ vectors[:, -count:].T
     np.testing.assert_allclose(inner(metric(velocity, positions)), expected, atol=1e-9)
     assert metric.velocity.shape == metric.posture.shape == (3, count)
+    after = total(of_fast, by_fast) + weight * total(of_postures, by_postures)
+    before = total(slow_differences(fast, unmatched, 0), by_fast)
+    before += weight * total(slow_differences(postures, unmatched, 0), by_postures)
+    assert evidence.remaining == pytest.approx(after / before)
 
 
-def pairs_of(others):
-    return [(n, m) for n, some in enumerate(others.tolist()) for m in some]
+def total(differences, matrix):
+    return sum(x @ matrix @ x for one in differences for x in one)
 
 
 def inner(features):
@@ -145,7 +146,9 @@ def test_metric_does_not_depend_on_the_axes(curves):
     times = some_times(len(positions))
     turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
     one, other = (
-        learn_metric(fixed_match(times), positions @ a, velocity @ a)(velocity @ a, positions @ a)
+        learn_metric(fixed_match(times), positions @ a, velocity @ a)[0](
+            velocity @ a, positions @ a
+        )
         for a in (np.eye(3), turn)
     )
     np.testing.assert_allclose(inner(one), inner(other), atol=1e-9)
@@ -153,7 +156,7 @@ def test_metric_does_not_depend_on_the_axes(curves):
 
 def test_shares_add_up_to_one(curves):
     positions, velocity = curves
-    metric = learn_metric(fixed_match(some_times(5)), positions, velocity)
+    metric, _ = learn_metric(fixed_match(some_times(5)), positions, velocity)
     shares = metric.shares(velocity, positions)
     assert shares.sum() == pytest.approx(1)
     first = metric.velocity * [[1], [0], [0]], 0 * metric.posture
@@ -165,9 +168,9 @@ def test_loud_noise_is_left_out(curves):
     positions, velocity = curves
     rng, times = np.random.default_rng(0), some_times(5)
     noise = 100 * rng.standard_normal((2, 5, P, 4))
-    alone = learn_metric(fixed_match(times), positions, velocity)
+    alone, _ = learn_metric(fixed_match(times), positions, velocity)
     loud, fast = (np.concatenate(x, axis=2) for x in zip(noise, (positions, velocity), strict=True))
-    found = learn_metric(fixed_match(times), loud, fast)
+    found, _ = learn_metric(fixed_match(times), loud, fast)
     np.testing.assert_array_equal(found.features, alone.features + 4)
     np.testing.assert_allclose(found(fast, loud), alone(velocity, positions), atol=1e-9)
     np.testing.assert_array_equal(found.shares(fast, loud)[:4], 0)
@@ -186,5 +189,46 @@ def test_feature_that_agrees_once_matched_is_used():
     times = 59 * np.array([[np.interp(p, q, t) for q in phases] for p in phases])
     velocity = np.gradient(x, axis=1)
     even = np.broadcast_to(np.arange(60.0), times.shape)
-    assert learn_metric(fixed_match(even), x, velocity).features.tolist() == [0]
-    assert learn_metric(fixed_match(times), x, velocity).features.tolist() == [0, 1]
+    assert learn_metric(fixed_match(even), x, velocity)[0].features.tolist() == [0]
+    assert learn_metric(fixed_match(times), x, velocity)[0].features.tolist() == [0, 1]
+
+
+def inconsistency(times):
+    return Evidence.of(times, 0.5).inconsistency
+
+
+def test_warps_by_one_clock_are_consistent():
+    t = np.linspace(0, 1, 41)
+    clocks = [t**rate for rate in (0.6, 0.8, 1, 1.3, 1.7)]
+    times = 40 * np.array([[np.interp(a, b, t) for b in clocks] for a in clocks])
+    # The rest is that between frames.
+    assert inconsistency(times) < 0.05
+
+
+def test_inconsistency_equals_loops():
+    times = some_times(4)
+    frames = range(0, P, 4)
+    gaps, offsets = [], []
+    for n in range(4):
+        for m in range(4):
+            here = np.arange(P) if n == m else times[n, m]
+            if n != m:
+                offsets += [abs(here[p] - p) for p in frames]
+            for k in range(4):
+                to_k = np.arange(P) if n == k else times[n, k]
+                onwards = np.arange(P) if k == m else times[k, m]
+                gaps += [abs(np.interp(to_k[p], range(P), onwards) - here[p]) for p in frames]
+    assert inconsistency(times) == pytest.approx(np.mean(gaps) / np.mean(offsets))
+
+
+def test_inconsistency_of_chance_is_about_one():
+    rng = np.random.default_rng(0)
+    walks = np.cumsum(rng.exponential(size=(12, 12, 101)), axis=2)
+    times = 100 * (walks - walks[:, :, :1]) / (walks[:, :, -1:] - walks[:, :, :1])
+    assert 0.9 < inconsistency(times) < 1.6
+
+
+def test_inconsistency_of_nothing_is_unknown():
+    still = np.broadcast_to(np.arange(50.0), (4, 4, 50))
+    assert np.isnan(Evidence.of(still, 1.0)).all()
+    assert np.isnan(Evidence.of(some_times(2), 1.0)).all()

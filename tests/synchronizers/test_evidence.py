@@ -1,0 +1,117 @@
+"""Warps that trials do not support: warned of, and left out where they contradict each other."""
+
+import warnings
+
+import numpy as np
+import pytest
+from sklearn_motionsync import (
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    SynchronizationWarning,
+)
+from sklearn_motionsync.datasets import load_performances
+
+P = 60
+
+
+def one_movement(n, noise=0.02):
+    """Warped copies of two curves, with noise."""
+    rng, t = np.random.default_rng(0), np.linspace(0, 1, P)
+    phases = [t + b * np.sin(np.pi * t) for b in rng.uniform(-0.15, 0.15, n)]
+    curves = [np.column_stack([np.sin(7 * p), np.cos(5 * p)]) for p in phases]
+    return [x + noise * rng.standard_normal(x.shape) for x in curves]
+
+
+def chance(n):
+    return list(np.random.default_rng(0).standard_normal((n, P, 3)))
+
+
+def test_noise_is_not_warped():
+    sync = DenseSynchronizer(P)
+    X = chance(12)
+    with pytest.warns(SynchronizationWarning, match="contradict each other, too: .* 1.[0-9]+ time"):
+        sync.fit(X)
+    assert sync.evidence_.harmful
+    assert sync.evidence_.inconsistency > 0.7
+    assert sync.evidence_.remaining > 0.7
+    np.testing.assert_array_equal(sync.match(X).offsets, 0)
+    np.testing.assert_array_equal(sync.transform(X), LinearSynchronizer(P).fit_transform(X))
+    assert not sync.refines_
+    # The distance to the pattern is that of the best path nevertheless.
+    warped = DenseSynchronizer(P, unsupported="warp").fit(X)
+    np.testing.assert_array_equal(sync.match(X).distances, warped.match(X).distances)
+
+
+def test_who_knows_better_is_not_warned():
+    X = chance(12)
+    sync = DenseSynchronizer(P, unsupported="warp").fit(X)
+    assert sync.evidence_.harmful
+    assert np.abs(sync.match(X).offsets).max() > 3
+
+
+@pytest.mark.parametrize("X", [one_movement(12), chance(9)], ids=["one movement", "too few"])
+def test_others_are_warped_without_a_warning(X):
+    sync = DenseSynchronizer(P).fit(X)
+    assert not sync.evidence_.harmful
+    assert np.abs(sync.match(X).offsets).max() > 3
+
+
+def test_one_movement_is_consistent():
+    evidence = DenseSynchronizer(P).fit(one_movement(12)).evidence_
+    assert evidence.inconsistency < 0.3
+    assert evidence.remaining < 0.3
+
+
+@pytest.mark.parametrize("params", [{"metric": None}, {"consensus": 0}, {"cost": "posture"}])
+def test_nothing_is_known_without_a_metric(params):
+    evidence = DenseSynchronizer(P, **params).fit(chance(12)).evidence_
+    assert np.isnan([evidence.inconsistency, evidence.remaining]).all()
+    assert not evidence.harmful
+
+
+def test_aligned_trials_are_no_evidence():
+    rng, t = np.random.default_rng(0), np.linspace(0, 1, P)
+    curves = np.column_stack([np.sin(7 * t), np.cos(5 * t)])
+    X = curves + 0.001 * rng.standard_normal((12, P, 2))
+    assert np.isnan(DenseSynchronizer(P).fit(X).evidence_.remaining)
+
+
+# Clips of a Kinect: actions that are warned of, and that are not warped.
+KINECT = {"pickUp": "warned", "sitDown": "warned", "throw": "warned", "walk": "warned"}
+KINECT |= {"carry": "linear", "standUp": "", "push": "", "pull": ""}
+
+
+@pytest.mark.parametrize("action", KINECT)
+def test_people_seen_by_a_kinect(action, real_data):
+    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
+    X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == action and len(x) >= 8]
+    points = ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(X))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        sync = DenseSynchronizer(P).fit(points)
+    assert [w.category for w in said] == [SynchronizationWarning] * bool(KINECT[action])
+    assert sync.evidence_.harmful == (KINECT[action] == "linear")
+
+
+def test_every_action_of_optical_recordings_is_supported(real_data):
+    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    for action in sorted(set(bunch.target)):
+        X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == action]
+        points = ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(X))
+        evidence = DenseSynchronizer(P).fit(points).evidence_
+        assert evidence.inconsistency < 0.5, action
+        assert evidence.remaining < 0.7, action
+
+
+def test_mixed_actions_contradict_each_other(real_data):
+    """A third of the clips walk, a third waves and a third throws."""
+    bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
+    X = []
+    for action in ("walk", "waveHands", "throw"):
+        clips = [x for x, t in zip(bunch.data, bunch.target, strict=True) if t == action]
+        X += [x for x in clips if len(x) >= 8][:6]
+    postures = DirectionCosines(bunch.skeleton).fit_transform(X)
+    with pytest.warns(SynchronizationWarning):
+        DenseSynchronizer(P).fit(ASpace().fit_transform(postures))
