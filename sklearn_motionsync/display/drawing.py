@@ -165,7 +165,9 @@ def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
     height = axis.figure.bbox.y1 - (extents[0].y0 + extents[0].y1) / 2
     for size in _SIZES:
         legend, box = _legend(axis, handles, labels, title, n_cols, room, size)
-        if box.height <= height:
+        # With its distance from the panel.
+        needed = box.y1 - extents[0].y1
+        if needed <= height:
             break
     in_row = [a for a in top if abs(a.get_window_extent().y1 - extents[0].y1) < 1]
     if any(a.get_title() for a in in_row) or box.width > extents[0].width:
@@ -176,7 +178,7 @@ def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
             a.set_title(a.get_title() or " ", fontsize=a.title.get_fontsize(), pad=pad)
     if axis.figure.get_layout_engine() is None:
         for a in in_row:
-            _lower(a, box.height)
+            _lower(a, needed)
     return legend
 
 

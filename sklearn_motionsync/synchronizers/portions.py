@@ -153,11 +153,24 @@ def warp_in_portions(warper, arrays, *along, n_jobs, progress, name):
     return distances, times
 
 
-class _Arrays(list):
-    """Arrays that are sent to another process as one, made when they are sent."""
+class _Arrays:
+    """Arrays that are sent to another process as one, made when they are sent.
+
+    No list: most versions of Dask send the items of a list to different workers.
+    """
+
+    def __init__(self, arrays):
+        self._arrays = arrays
+
+    def __iter__(self):
+        return iter(self._arrays)
+
+    def __sizeof__(self):
+        # By which joblib tells what Dask sends to a worker ahead of the call.
+        return sum(x.nbytes for x in self)
 
     def __reduce__(self):
-        return _split, (np.concatenate(self), [len(x) for x in self])
+        return _split, (np.concatenate(self._arrays), [len(x) for x in self])
 
 
 def _split(frames, lengths):

@@ -7,6 +7,7 @@ import re
 import signal
 import sys
 import time
+import warnings
 from pathlib import Path
 
 import dask.array
@@ -170,6 +171,18 @@ def test_warping_sends_every_performance_to_one_worker(client):
     # joblib chooses the worker of a portion; if that one is busy, Dask moves it.
     assert (received(client) - moved(client) - before).sum() <= 1.1 * many.nbytes
     assert warped.tobytes() == expected.tobytes()
+
+
+def test_large_portions_of_warping_are_sent_ahead_of_their_tasks(client):
+    X = walks(30, 60, 150)
+    many = np.concatenate([X] * 20)
+    sync = DenseSynchronizer(n_frames=40).fit(X)
+    with warnings.catch_warnings(record=True) as caught, joblib.parallel_config(backend="dask"):
+        warnings.simplefilter("always")
+        warped = sync.transform(many)
+    # Dask warns of tasks of more than 10 MB, which pass through its scheduler.
+    assert [str(each.message) for each in caught if "graph" in str(each.message)] == []
+    assert warped.tobytes() == sync.transform(many).tobytes()
 
 
 def test_new_worker_fetches_a_scattered_value_once(client):
