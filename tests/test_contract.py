@@ -71,12 +71,20 @@ def test_every_public_estimator_is_in_the_contract():
     assert not missing, f"give each an instance in INSTANCES of tests/estimators.py: {missing}"
 
 
+# Their rows are noise.
+NO_SUPPORT = pytest.mark.filterwarnings(
+    "ignore:Matching leaves:sklearn_motionsync.SynchronizationWarning"
+)
+
+
+@NO_SUPPORT
 @parametrize_with_checks(ROW_ESTIMATORS)
 def test_scikit_learn_checks(estimator, check):
     check(estimator)
 
 
 # The output checks give arrays to estimators fitted on frames on purpose.
+@NO_SUPPORT
 @pytest.mark.filterwarnings("ignore:X does not have valid feature names:UserWarning")
 @pytest.mark.filterwarnings("ignore:X has feature names, but:UserWarning")
 @pytest.mark.parametrize(

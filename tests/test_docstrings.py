@@ -21,6 +21,8 @@ INHERITED = re.compile("_|set_|get_params$|get_metadata_routing$")
 def callables():
     """Public functions, classes and methods of our own, by their dotted names."""
     for name, each in OBJECTS.items():
+        if inspect.isclass(each) and issubclass(each, Warning):
+            continue
         yield name, each
         if inspect.isclass(each):
             for method in dir(each):

@@ -16,6 +16,20 @@ class SynchronizationWarning(UserWarning):
     """The trials do not support their warps: these explain little, or contradict each other, too.
 
     See ``evidence_`` of `DenseSynchronizer`.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import numpy as np
+    >>> from sklearn_motionsync import DenseSynchronizer, SynchronizationWarning
+    >>> noise = np.random.default_rng(0).standard_normal((20, 60, 3))
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always", SynchronizationWarning)
+    ...     sync = DenseSynchronizer().fit(noise)
+    >>> print(str(caught[0].message).split(":")[0])
+    Matching leaves 79% of the differences between these performances (evidence_.remaining
+    >>> sync.evidence_.harmful
+    True
     """
 
 
@@ -62,4 +76,4 @@ def weigh_evidence(found, n, unsupported):
         )
     if message and unsupported == "linear":
         warnings.warn(message, SynchronizationWarning, stacklevel=2)
-    return Bunch(**found._asdict(), harmful=harmful)
+    return Bunch(remaining=found.remaining, inconsistency=found.inconsistency, harmful=harmful)

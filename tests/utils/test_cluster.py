@@ -119,6 +119,7 @@ FITS = {
 @pytest.mark.parametrize("name", FITS)
 def test_fit_sends_performances_to_every_worker_once(client, name, monkeypatch):
     shape, settings = FITS[name]
+    settings = {**settings, "unsupported": "warp"}
     if "consensus" in settings:
         monkeypatch.setattr(portions, "PORTION_CELLS", 300_000)
     X = walks(*shape)
@@ -176,7 +177,7 @@ def test_warping_sends_every_performance_to_one_worker(client):
 def test_large_portions_of_warping_are_sent_ahead_of_their_tasks(client):
     X = walks(30, 60, 150)
     many = np.concatenate([X] * 20)
-    sync = DenseSynchronizer(n_frames=40).fit(X)
+    sync = DenseSynchronizer(n_frames=40, unsupported="warp").fit(X)
     with warnings.catch_warnings(record=True) as caught, joblib.parallel_config(backend="dask"):
         warnings.simplefilter("always")
         warped = sync.transform(many)
