@@ -7,7 +7,7 @@ clips are warped to one template, and compared on its time line. Errors are in f
 """
 
 import numpy as np
-from events import EVENTS, P, read_actions
+from events import EVENTS, Action, P, read_actions
 from sklearn.model_selection import GroupKFold
 from sklearn_motionsync import ASpace, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.matching.warps import sample
@@ -116,14 +116,15 @@ def fewer_clips(folder, events, n_clips):
     """One action with only some of its clips, taken evenly from their list."""
     (action,) = read_actions(folder, events)
     kept = np.unique(np.linspace(0, len(action.data) - 1, n_clips).astype(int))
-    return People(
-        action._replace(
-            name=f"{action.name}, {n_clips} clips",
-            data=[action.data[i] for i in kept],
-            actors=action.actors[kept],
-            moments={name: at[kept] for name, at in action.moments.items()},
-        )
+    few = Action(
+        archive=action.archive,
+        name=f"{action.name}, {n_clips} clips",
+        data=[action.data[i] for i in kept],
+        actors=action.actors[kept],
+        skeleton=action.skeleton,
+        moments={name: at[kept] for name, at in action.moments.items()},
     )
+    return People(few)
 
 
 def figures(errors):
