@@ -1,13 +1,16 @@
 """How accurate: known warps and real people, against other packages.
 
     pip install . dtaidistance tslearn gdtw fdasrsf aeon
-    python benchmarks/accuracy.py DATA_FOLDER
+    python benchmarks/accuracy.py DATA_FOLDER [TABLES ...]
 
+TABLES are some of refining, bends, known-warps, time-line and people; without them all are printed.
+Tables that are named are without peers, unless peers is named as well.
 DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect and cmu07_walk of the same form; without
-it only known warps are run. Every peer is fed postures and velocities (smoothed over 3 % of the
-clip) and is reported at the best of its settings, for each number of each cell by itself; ours
-have one setting for all. Peers that are not installed are left out; of people, events.py has what
-the best of them reached. Prints Markdown.
+it only known warps and made-up bends are run. Every peer is fed postures and velocities (smoothed
+over 3 % of the clip). Aligned pairs are reported at the best of a peer's settings, for each number
+of each cell by itself; of common time lines, every setting is shown. Ours have one setting for all.
+Peers that are not installed are left out; of people, events.py has what the best of them reached.
+Prints Markdown.
 """
 
 import importlib.metadata
@@ -19,9 +22,9 @@ from pathlib import Path
 
 import numpy as np
 import peers
-from events import EVENTS, P
+from events import EVENTS, THROW, P
 from joblib import Parallel, delayed
-from people import figures, geometric_means, ratio, read_people
+from people import fewer_clips, figures, geometric_means, ratio, read_people
 from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
@@ -38,6 +41,7 @@ from sklearn_motionsync.metrics import group_timing_error, keyframe_error, timin
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
 WITH_PEER = "moments with a peer"
 LINEAR, PLAIN, DEFAULTS = "linear normalisation", "`metric=None`", "`DenseSynchronizer()`"
+TIME_LINE, SPREAD = "one common time line", "spread there"
 OURS = {
     LINEAR: lambda **kw: LinearSynchronizer(P, **kw),
     "the paper's method": lambda **kw: DenseSynchronizer(P, **PAPER, **kw),
@@ -49,6 +53,7 @@ OURS = {
     "`refine=True` (single source)": lambda **kw: DenseSynchronizer(P, refine=True, **kw),
     "`warp_smoothing=0`": lambda **kw: DenseSynchronizer(P, warp_smoothing=0, **kw),
 }
+MAIN = [LINEAR, "the paper's method", PLAIN, DEFAULTS]
 UNREFINED = {"`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw)}
 
 # -- known warps ------------------------------------------------------------------------
@@ -120,15 +125,28 @@ def known_table():
 
 
 def people_tables(folder):
-    """People held out, all ordered pairs, and the other settings."""
+    """People held out, all ordered pairs, one common time line, and the other settings."""
     people = read_people(folder)
     work = [delayed(judge)(one, make) for make in OURS.values() for one in people]
     done = Parallel(n_jobs=-1)(work)
-    held_out, pairs, health = {}, {}, {}
+    held_out, pairs, lines, health = {}, {}, {}, {}
     for i, name in enumerate(OURS):
         parts = zip(*done[i * len(people) : (i + 1) * len(people)], strict=True)
-        of_others, of_all, health[name] = parts
-        held_out[name], pairs[name] = merged(of_others), merged(of_all)
+        of_others, of_all, of_lines, health[name] = parts
+        held_out[name], pairs[name], lines[name] = map(merged, (of_others, of_all, of_lines))
+    scores = {
+        name: [
+            *(show_pair(geometric_means(figures(of[name]))) for of in (held_out, pairs)),
+            *on_line(lines[name]),
+        ]
+        for name in OURS
+    }
+    head = ["people held out", "all ordered pairs", TIME_LINE, SPREAD]
+    print_head("31 moments", head)
+    for name in MAIN:
+        print_row(name, scores[name])
+    for name, line in best_time_lines(people).items():
+        print_row(name, ["-", "-", *on_line(line)])
     of_peers = best_peer(people)
     event_table("people held out", held_out)
     event_table("all ordered pairs", pairs, {"best peer": of_peers})
@@ -136,19 +154,17 @@ def people_tables(folder):
     for label, errors in (("people held out", held_out), ("all ordered pairs", pairs)):
         for keys, which in ((list(errors[LINEAR]), "all moments"), (with_peer(), WITH_PEER)):
             print_row(f"{label}, {which}", compared(errors, PLAIN, keys))
-    header = ["people held out", "all ordered pairs", "stand still", "hurry", "spread of velocity"]
-    print_head("geometric mean", header)
+    print_head("geometric mean", [*head, "stand still", "hurry", "spread of velocity"])
     for name in OURS:
         still, hurry, spread = np.mean(health[name], axis=0)
-        cells = [show_pair(geometric_means(figures(of[name]))) for of in (held_out, pairs)]
-        cells += [f"{still:.0%}", f"{hurry:.0%}", f"{spread:.2f}"]
-        print_row(name, cells)
+        print_row(name, [*scores[name], f"{still:.0%}", f"{hurry:.0%}", f"{spread:.2f}"])
 
 
 def judge(one, make):
-    """Errors of an action with actors held out, and of all its pairs; the health of these."""
+    """Errors of an action: actors held out, all pairs, one time line; the health of all pairs."""
     pairs = one.to_patterns(partial(ours_to, make))
-    return one.to_strangers(make).errors(), pairs.errors(), pairs.health()
+    line = one.to_time_line(lambda X: ours_to(make, X, "median"))
+    return one.to_strangers(make).errors(), pairs.errors(), line, pairs.health()
 
 
 def merged(of_actions):
@@ -202,6 +218,112 @@ def best_peer(people):
         print_head("the best single setting of a peer", [f"geometric mean, {WITH_PEER}"])
         print_row(label, [show_pair(single[label])])
     return best or {(event.action, event.name): event.peers for event in EVENTS if event.peers}
+
+
+# -- one common time line ---------------------------------------------------------------
+
+
+def on_line(of_events):
+    """Cells of a table: geometric means of the errors, and of the spread, on the time line."""
+    errors = geometric_means(figures({key: one for key, (one, _) in of_events.items()}))
+    spread, _ = geometric_means({key: (sd, sd) for key, (_, sd) in of_events.items()})
+    return [show_pair(errors), f"{spread:.2f}"]
+
+
+def time_line_tables(folder):
+    """Each moment on one common time line, sets that are harmed, and what the median is worth."""
+    people = read_people(folder)
+    few = fewer_clips(folder, [event for event in EVENTS if event[:2] == THROW], 12)
+    lines = {
+        name: merged(
+            one.to_time_line(lambda X, make=OURS[name]: ours_to(make, X, "median"))
+            for one in (*people, few)
+        )
+        for name in MAIN
+    }
+    whole = [(event.action, event.name) for event in EVENTS]
+    parts = (("all moments", whole), (WITH_PEER, with_peer()))
+    linear, ours = lines[LINEAR], lines[DEFAULTS]
+    header = [*MAIN, "spread, linear", "spread, defaults", "harmed"]
+    print_head(TIME_LINE, header)
+    harmed = {}
+    for key in linear:
+        (before, sd_before), (after, sd_after) = linear[key], ours[key]
+        told = harm(linear[key], ours[key])
+        cells = [show_pair(figures({0: line[key][0]})[0]) for line in lines.values()]
+        spreads = [f"{sd_before:.2f}", f"{sd_after:.2f}"]
+        print_row(f"`{key[0]}`, {key[1]}", [*cells, *spreads, told])
+        if told:
+            means = [f"{before.mean():.2f}", f"{after.mean():.2f}"]
+            harmed[f"`{key[0]}`, {key[1]}"] = [*means, *spreads]
+    for label, keys in parts:
+        means = {name: on_line({key: lines[name][key] for key in keys}) for name in lines}
+        spreads = [means[LINEAR][1], means[DEFAULTS][1]]
+        print_row(f"geometric mean, {label}", [*(m for m, _ in means.values()), *spreads, ""])
+    print_head("harmed", ["error, linear", "error, defaults", "spread, linear", "spread, defaults"])
+    for name, cells in harmed.items():
+        print_row(name, cells)
+    print_head("template of the defaults", [TIME_LINE, SPREAD])
+    print_row("the median", on_line({key: ours[key] for key in whole}))
+    print_row("each trial in turn, mean", on_line(merged(map(of_each_template, people))))
+    print_time_lines_of_peers(people)
+
+
+def harm(before, after):
+    """What of a moment, (errors, spread) each, is larger after than before, as text."""
+    larger = {"error": after[0].mean() > before[0].mean(), "spread": after[1] > before[1]}
+    return ", ".join(name for name, is_larger in larger.items() if is_larger)
+
+
+def of_each_template(one):
+    """The errors with each clip as the template, and the mean of the spreads."""
+    every = [
+        one.to_time_line(lambda X, n=n: ours_to(OURS[DEFAULTS], X, n)) for n in range(len(one.X))
+    ]
+    return {
+        key: (np.concatenate([e[key][0] for e in every]), np.mean([e[key][1] for e in every]))
+        for key in every[0]
+    }
+
+
+def print_time_lines_of_peers(people):
+    """Every setting of the installed packages that put a set on one time line."""
+    found = time_lines_of_peers(people)
+    if found:
+        print_head("other packages", [TIME_LINE, f"{TIME_LINE}, {WITH_PEER}", SPREAD])
+    for label, of_settings in found.items():
+        for text, line in of_settings.items():
+            errors, spread = on_line(line)
+            some, _ = on_line({key: line[key] for key in with_peer()})
+            print_row(f"{label}, {text}", [errors, some, spread])
+
+
+def time_lines_of_peers(people):
+    """{label: {setting: {(action, event): (errors, spread)}}} of the installed packages."""
+
+    def row(align, kind):
+        return merged(one.to_time_line(lambda X: align(peer_features(X, kind))) for one in people)
+
+    return {
+        label: {text: line for (text, *_), line in zip(peers.settings(label), lines, strict=True)}
+        for label, lines in of_peers(row, peers.TIME_LINES).items()
+    }
+
+
+def best_time_lines(people):
+    """Of each installed package, the setting with the smallest mean error."""
+    best = {}
+    for label, of_settings in time_lines_of_peers(people).items():
+        means = {
+            text: geometric_means(figures({key: one for key, (one, _) in line.items()}))[0]
+            for text, line in of_settings.items()
+        }
+        text = min(means, key=means.get)
+        best[f"{label}, {text}"] = of_settings[text]
+    return best
+
+
+# -- refining, key-frames ---------------------------------------------------------------
 
 
 def refinement_table(folder):
@@ -295,6 +417,8 @@ def peer_features(X, kind):
     on_clock = on_clock - on_clock.mean(axis=(0, 1))
     if kind == "velocity":
         return cost_features(on_clock, "velocity")
+    if kind == "speed":
+        return np.linalg.norm(cost_features(on_clock, "velocity"), axis=2, keepdims=True)
     return smooth(on_clock, SMOOTHING * (P - 1)) if kind == "smoothed" else on_clock
 
 
@@ -306,8 +430,14 @@ def peer_to(align, kind, X, n):
 
 def best_of_peers(row):
     """Rows of the installed peers: every cell holds one result a setting."""
+    found = of_peers(row, peers.PEERS)
+    return {label: list(zip(*cells, strict=True)) for label, cells in found.items()}
+
+
+def of_peers(row, labels):
+    """What ``row(align, kind)`` finds for each setting of the installed peers, by label."""
     rows = {}
-    for label in peers.PEERS:
+    for label in labels:
         if peers.installed(label) is None:
             print(f"{label} is not installed", file=sys.stderr)
             continue
@@ -319,7 +449,7 @@ def best_of_peers(row):
                 found.append(row(align, kind))
             seconds = time.perf_counter() - start
             print(f"{label}, {text}: {seconds:.0f} s", file=sys.stderr, flush=True)
-        rows[label] = list(zip(*found, strict=True))
+        rows[label] = found
     return rows
 
 
@@ -350,17 +480,26 @@ def print_table(corner, header, rows, show):
 def main():
     """Print the tables."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+    tables = {
+        "refining": partial(refinement_table, folder),
+        "bends": bending_table,
+        "known-warps": known_table,
+    }
+    if folder is not None:
+        tables["time-line"] = partial(time_line_tables, folder)
+        tables["people"] = partial(people_tables, folder)
+    named = sys.argv[2:]
+    if named and "peers" not in named:
+        peers.leave_out()
+    chosen = [tables[name] for name in named if name != "peers"] or tables.values()
     versions = {"sklearn_motionsync": __version__}
-    for label in peers.PEERS:
-        versions[peers.PEERS[label][0]] = peers.installed(label)
+    for label, (name, *_) in (peers.PEERS | peers.TIME_LINES).items():
+        versions[name] = peers.installed(label)
     for name in ("numpy", "scipy", "scikit-learn"):
         versions[name] = importlib.metadata.version(name)
     print(", ".join(f"{name} {version}" for name, version in versions.items() if version))
-    refinement_table(folder)
-    bending_table()
-    known_table()
-    if folder is not None:
-        people_tables(folder)
+    for print_tables in chosen:
+        print_tables()
 
 
 if __name__ == "__main__":

@@ -2,8 +2,9 @@
 
     python benchmarks/choices.py DATA_FOLDER
 
-The 16 events of events.py that peers were measured on, all ordered pairs with six patterns an
-action: geometric means over the events of the mean and of the median error, in frames of 100.
+The 16 events of events.py that peers were measured on: geometric means over the events of the mean
+and of the median error, in frames of 100. Of all ordered pairs with six patterns an action, and of
+all pairs on the one common time line that a fit gives, as a set is used.
 Health of the warps, in the mean over actions: share of frames that stand still (rate below 0.1)
 and that hurry (above 2), and the spread of velocities after synchronising over that after linear
 normalisation. Then the constants that are no parameters, other ways to do a step, and the events at
@@ -86,9 +87,14 @@ def row(label, people, times_to=matched, **params):
     """One line of the table."""
     judged = [one.to_patterns(lambda X, n: times_to(X, n, **params)) for one in people]
     errors = ChainMap(*(one.errors() for one in judged))
-    mean, median = geometric_means(figures(errors))
+    lines = ChainMap(
+        *(one.to_time_line(lambda X: times_to(X, "median", **params)) for one in people)
+    )
+    on_lines = figures({event: errors for event, (errors, _) in lines.items()})
+    pairs = (geometric_means(of) for of in (figures(errors), on_lines))
     still, hurry, spread = np.mean([one.health() for one in judged], axis=0)
-    found = f"{mean:.2f} / {median:.2f} | {still:.0%} | {hurry:.0%} | {spread:.2f}"
+    errors = " | ".join(f"{mean:.2f} / {median:.2f}" for mean, median in pairs)
+    found = f"{errors} | {still:.0%} | {hurry:.0%} | {spread:.2f}"
     print(f"| {label} | {found} |", flush=True)
     return found
 
@@ -138,7 +144,8 @@ def main():
     """Print the tables."""
     folder = Path(sys.argv[1])
     people = read_people(folder, [event for event in EVENTS if event.peers], PATTERNS)
-    print("| setting | error | stand still | hurry | spread of velocity |\n" + "|---" * 5 + "|")
+    header = "all ordered pairs | one common time line | stand still | hurry | spread of velocity"
+    print(f"| setting | {header} |\n" + "|---" * 6 + "|")
     of_defaults = row("defaults", people)
     for name, values in CHOICES.items():
         for value in values:

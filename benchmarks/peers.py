@@ -1,11 +1,15 @@
-"""Other packages' pairwise alignments, as times tau(p) of one sequence on the clock of another.
+"""Other packages' alignments: of one sequence to another, and of a set to one time line.
 
 Each function takes a base and a moving sequence, ``(P, n_features)`` both, and gives ``tau`` of
 shape ``(P,)`` in frames. Alignments that are lists of index pairs are averaged over each
 frame of the base. ``PEERS`` maps a label to a function and the features it is to be fed.
+Functions of ``TIME_LINES`` take a set, ``(n, P, n_features)``, and give the warps of all to the
+mean that they find themselves, ``(n, P)``.
 """
 
+import contextlib
 import importlib.metadata
+import os
 
 import numpy as np
 
@@ -86,6 +90,78 @@ def aeon_path(name, **options):
     return align
 
 
+# -- sets ---------------------------------------------------------------------------------
+
+
+def tslearn_barycenter(radius=None):
+    from tslearn.barycenters import dtw_barycenter_averaging
+
+    constraint = {} if radius is None else {"sakoe_chiba_radius": radius}
+    to_mean = tslearn_dtw(radius)
+
+    def align(X):
+        mean = dtw_barycenter_averaging(X, metric_params=constraint)
+        return np.array([to_mean(mean, x) for x in X])
+
+    return align
+
+
+def tslearn_soft_barycenter(gamma):
+    from tslearn.barycenters import softdtw_barycenter
+
+    to_mean = tslearn_soft_dtw(gamma)
+
+    def align(X):
+        mean = softdtw_barycenter(X, gamma=gamma * np.square(X).sum(axis=2).mean())
+        return np.array([to_mean(mean, x) for x in X])
+
+    return align
+
+
+def affinewarp_pieces(n_knots):
+    from affinewarp import PiecewiseWarping
+
+    def align(X):
+        # The search is random, and its seed cannot be set.
+        model = PiecewiseWarping(n_knots)
+        model.fit(X / X.std(), verbose=False)
+        last = X.shape[1] - 1
+        frames, knots = np.arange(last + 1), zip(model.y_knots, model.x_knots, strict=True)
+        return np.array([np.interp(frames, last * mean, last * one) for mean, one in knots])
+
+    return align
+
+
+def fdasrsf_mean(lam=0.0):
+    from fdasrsf.curve_stats import fdacurve
+
+    def align(X):
+        n_frames = X.shape[1]
+        curves = fdacurve(np.ascontiguousarray(X.transpose(2, 1, 0)), N=n_frames)
+        with open(os.devnull, "w") as unread, contextlib.redirect_stdout(unread):
+            curves.karcher_mean(rotation=False, lam=lam, cores=1)
+            curves.srvf_align(rotation=False, lam=lam)
+        return curves.gams.T * (n_frames - 1)
+
+    return align
+
+
+def skfda_elastic(penalty):
+    from skfda import FDataGrid
+    from skfda.preprocessing.registration import FisherRaoElasticRegistration
+
+    # One curve only: the first of the features.
+    def align(X):
+        n_frames = X.shape[1]
+        frames = np.arange(n_frames, dtype=float)
+        register = FisherRaoElasticRegistration(penalty=penalty)
+        register.fit_transform(FDataGrid(X[:, :, 0], frames / frames[-1]))
+        warps = register.warping_(frames / frames[-1])
+        return warps[:, :, 0] * frames[-1]
+
+    return align
+
+
 # label: (distribution, maker, list of settings, kinds of features)
 BOTH = ("posture", "velocity")
 PEERS = {
@@ -123,18 +199,47 @@ PEERS = {
     "aeon shape-DTW": ("aeon", aeon_path, [{"name": "shape_dtw", "reach": 5}], BOTH),
 }
 
+TIME_LINES = {
+    "tslearn DBA": ("tslearn", tslearn_barycenter, [{}, {"radius": 25}], BOTH),
+    "tslearn soft-DTW barycentre": (
+        "tslearn",
+        tslearn_soft_barycenter,
+        [{"gamma": g} for g in (0.01, 0.1, 1.0)],
+        BOTH,
+    ),
+    "affinewarp": (
+        "affinewarp",
+        affinewarp_pieces,
+        [{"n_knots": k} for k in (0, 1, 3)],
+        BOTH,
+    ),
+    "fdasrsf Karcher mean": ("fdasrsf", fdasrsf_mean, [{}], ("posture", "smoothed")),
+    "scikit-fda elastic": (
+        "scikit-fda",
+        skfda_elastic,
+        [{"penalty": p} for p in (0.0, 0.1, 1.0)],
+        ("speed", "smoothed"),
+    ),
+}
+
+
+def leave_out():
+    """Have no peer run, whatever is installed."""
+    PEERS.clear()
+    TIME_LINES.clear()
+
 
 def installed(label):
     """The version of a peer, or None."""
     try:
-        return importlib.metadata.version(PEERS[label][0])
+        return importlib.metadata.version((PEERS | TIME_LINES)[label][0])
     except importlib.metadata.PackageNotFoundError:
         return None
 
 
 def settings(label):
     """Every (description, kind of features, function) of a peer."""
-    _, make, options, kinds = PEERS[label]
+    _, make, options, kinds = (PEERS | TIME_LINES)[label]
     for option in options:
         for kind in kinds:
             text = ", ".join([kind, *(f"{k}={v}" for k, v in option.items())])

@@ -2,11 +2,12 @@
 
 Every action of events.py is matched to at most a dozen of its clips, one after the other: by
 synchronizers that have learnt from all clips (`to_patterns`), and by such that know nothing of
-the people whose clips they match (`to_strangers`). Errors are in frames of 100.
+the people whose clips they match (`to_strangers`). `on_time_line` judges what a user does: all
+clips are warped to one template, and compared on its time line. Errors are in frames of 100.
 """
 
 import numpy as np
-from events import EVENTS, P, read_actions
+from events import EVENTS, Action, P, read_actions
 from sklearn.model_selection import GroupKFold
 from sklearn_motionsync import ASpace, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.matching.warps import sample
@@ -50,6 +51,14 @@ class People:
                     times[row, test] = sync.match(others).times
         return Judged(self, times)
 
+    def to_time_line(self, times_of):
+        """Each moment on the common time line of one fit, of warps ``times_of(X)``.
+
+        Returns {(action, event): (errors, standard deviation)} as `on_time_line` gives them.
+        """
+        times = times_of(self.X)
+        return {(self.name, event): on_time_line(times, at) for event, at in self.moments.items()}
+
 
 class Judged:
     """Warps ``times`` (n_patterns, n_clips, P) of an action; NaN where a pair is not judged."""
@@ -82,9 +91,40 @@ class Judged:
         return np.array([(rates < 0.1).mean(), (rates > 2).mean(), np.mean(spread)])
 
 
+def on_time_line(times, moments):
+    """How far a moment of one clip lands from that of another by way of a common time line.
+
+    ``times`` (n_clips, P) are the warps of all clips to one template, ``moments`` (n_clips,) the
+    frames of a moment, NaN where a clip does not show it. The moment of each clip is taken to the
+    time line of the template, and from there to each other clip. Returns the errors of all ordered
+    pairs, and the standard deviation of the moment on the time line, both in frames.
+    """
+    seen, frames = np.flatnonzero(np.isfinite(moments)), np.arange(P)
+    # Frames of a warp that stands still are told apart by a slope too small to count.
+    there = np.array([np.interp(moments[i], times[i] + 1e-7 * frames, frames) for i in seen])
+    landed = np.array([np.interp(there, frames, times[i]) for i in seen])
+    errors = np.abs(landed - moments[seen, np.newaxis])
+    return errors[~np.eye(len(seen), dtype=bool)], there.std(ddof=1)
+
+
 def read_people(folder, events=EVENTS, patterns=PATTERNS):
     """The actions of some events."""
     return [People(action, patterns) for action in read_actions(folder, events)]
+
+
+def fewer_clips(folder, events, n_clips):
+    """One action with only some of its clips, taken evenly from their list."""
+    (action,) = read_actions(folder, events)
+    kept = np.unique(np.linspace(0, len(action.data) - 1, n_clips).astype(int))
+    few = Action(
+        archive=action.archive,
+        name=f"{action.name}, {n_clips} clips",
+        data=[action.data[i] for i in kept],
+        actors=action.actors[kept],
+        skeleton=action.skeleton,
+        moments={name: at[kept] for name, at in action.moments.items()},
+    )
+    return People(few)
 
 
 def figures(errors):
