@@ -72,9 +72,7 @@ def test_every_public_estimator_is_in_the_contract():
 
 
 # Their rows are noise.
-NO_SUPPORT = pytest.mark.filterwarnings(
-    "ignore:Matching leaves:sklearn_motionsync.SynchronizationWarning"
-)
+NO_SUPPORT = pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 
 
 @NO_SUPPORT

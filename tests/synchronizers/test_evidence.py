@@ -31,11 +31,12 @@ def chance(n):
 def test_noise_is_not_warped():
     sync = DenseSynchronizer(P)
     X = chance(12)
-    with pytest.warns(SynchronizationWarning, match="contradict each other, too: .* 1.[0-9]+ time"):
+    with pytest.warns(
+        SynchronizationWarning, match="contradict each other, too: .* 1.[0-9]+ times"
+    ):
         sync.fit(X)
     assert sync.evidence_.harmful
     assert sync.evidence_.inconsistency > 0.7
-    assert sync.evidence_.remaining > 0.7
     np.testing.assert_array_equal(sync.match(X).offsets, 0)
     np.testing.assert_array_equal(sync.transform(X), LinearSynchronizer(P).fit_transform(X))
     assert not sync.refines_
