@@ -103,7 +103,7 @@ def _as_written(params):
 METHODS = {
     "linear time normalisation": {"": linear},
     "the paper's method": {"": dense(cost="posture", metric=None, consensus=0, max_rate=2)},
-    "`DenseSynchronizer()`": {"": dense()},
+    "`DenseSynchronizer()`": {"": dense(), "`sharpen=False`": dense(sharpen=False)},
     "`DenseSynchronizer`, for single curves": {
         '`cost="elastic"`': dense(cost="elastic"),
         "`subframes=4`": dense(subframes=4),

@@ -502,12 +502,12 @@ class SharpenedWarper(Warper):
         matcher, postures = warper.matcher, exemplars[:, :: warper.matcher.features.subframes]
         times = smooth_warps(warper.to_exemplars, matcher.trellis.reach, warper.warp_smoothing)
         metric = matcher.features.metric
-        sharpener = Sharpener.learn(metric, warper.pattern, postures, times, width)
+        smoothing = warper.warp_smoothing
+        sharpener = Sharpener.learn(metric, warper.pattern, postures, times, smoothing, width)
         return None if sharpener is None else cls(**vars(warper), sharpener=sharpener)
 
     def warps(self, positions):
         """Warps as of `Warper`, sharpened."""
         distances, times = super().warps(positions)
         postures = positions[:, :: self.matcher.features.subframes]
-        reach = self.matcher.trellis.reach
-        return distances, self.sharpener(postures, times, reach, self.warp_smoothing)
+        return distances, self.sharpener(postures, times, self.matcher.trellis.reach)

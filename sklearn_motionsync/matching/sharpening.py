@@ -1,16 +1,18 @@
 """Sharpening: a last local match places the moments of voted warps where velocities agree.
 
 Velocities are smoothed, and warps after the vote once more, so that matching goes the right way.
-Both blur the moments themselves. Here every warp is matched once more, near where it is, in third
+Both blur the moments themselves. Here every warp is matched once more, near where it is, between
 frames and by velocities as sharp as their noise allows. What is compared are signed roots of
 velocities: steep where a movement turns, and, under the elastic cost, independent of pace. Each
-counts by how well trials agree in it, so that nothing must be told of the data.
+counts by how well trials agree in it. A warp follows the local match where the roots change
+clearly, and stays as it was where they tell little.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from .consensus import smooth_warps
 from .filters import LEAST_SIGMA, choose_smoothing, smooth
@@ -28,14 +30,15 @@ _SLOW = 0.05
 # The local trellis: its most frames, positions a frame, largest offset as a share of the clip,
 # largest rate, and weight of changes of pace.
 _FRAMES, _SUBFRAMES, _REACH, _MAX_RATE, _SMOOTHNESS = 201, 3, 0.06, 2, 0.05
-# Smoothing of sharpened warps, in units of that of the vote.
-_FINER = 0.25
+# Smoothing of what sharpening changes, in units of that of the vote.
+_FINER = 0.5
 # Share of the mean energy of a component that is added to all before anything is divided.
 _RIDGE = 0.03
 # Weights of components are their evidence to this power: docs/design.md.
 _POWER = 0.75
-# How far warps go is the mean agreement to this power: docs/design.md.
-_TRUST = 1.5
+# How far warps may go is the mean agreement to this power. They go half of it where the precision
+# of the local match, in one over squared per cent of the clip, is this: docs/design.md.
+_TRUST, _HALF = 1.5, 0.02
 # Numbers that are sampled at a time: bounds the memory.
 _BATCH_SIZE = 1 << 22
 
@@ -94,8 +97,12 @@ class Sharpener(NamedTuple):
         Weighted signed roots of the pattern.
     agreement : ndarray, shape (n_used,)
         How well trials agree with the pattern in every feature, at matched moments: a correlation.
-    trust : float
-        From 0 to 1: how far warps go to where the local match places them.
+    precision : ndarray, shape (P,)
+        Of the local match, frame by frame: squared slopes of the roots over the disagreement.
+    gain : ndarray, shape (P,)
+        Factor of the smoothed product of precision and change.
+    smoothing : float
+        That of the vote, as a share of the clip.
     """
 
     features: np.ndarray
@@ -104,10 +111,12 @@ class Sharpener(NamedTuple):
     weights: np.ndarray
     bases: Bases
     agreement: np.ndarray
-    trust: float
+    precision: np.ndarray
+    gain: np.ndarray
+    smoothing: float
 
     @classmethod
-    def learn(cls, metric, pattern, positions, times, width=None):
+    def learn(cls, metric, pattern, positions, times, smoothing, width=None):
         """The sharpener of some performances, given their warps; None if it has no evidence.
 
         Parameters
@@ -118,7 +127,9 @@ class Sharpener(NamedTuple):
         positions : ndarray, shape (n_sequences, P, n_features)
             At least one other performance, in the unit.
         times : ndarray, shape (n_sequences, P)
-            Their warps after the vote.
+            Their warps.
+        smoothing : float
+            That of the vote, as a share of the clip.
         width : float, default=None
             Smoothing of velocities; by default as their noise asks for.
         """
@@ -139,23 +150,35 @@ class Sharpener(NamedTuple):
         disagreement = np.square(moving - base).mean(axis=(0, 1))
         energy = np.square(roots).mean(axis=(0, 1))
         ridge = _RIDGE * energy.mean()
-        if math.floor(_REACH * count) < 1 or not ridge > 0:
+        agreement = 1 - disagreement / np.where(energy > 0, 2 * energy, 1)
+        if math.floor(_REACH * count) < 1 or not ridge > 0 or not agreement.mean() > 0:
             return None
         # The rule of the metric, one component at a time.
         evidence = 1 / (disagreement + ridge) - 1 / (2 * energy + ridge)
         weights = np.maximum(evidence, 0) ** _POWER
-        agreement = 1 - disagreement / np.where(energy > 0, 2 * energy, 1)
-        trust = float(np.clip(agreement.mean(), 0, 1)) ** _TRUST
-        if not weights.any() or not trust:
+        if not weights.any():
             return None
+        slopes = np.gradient(np.concatenate([base[np.newaxis], moving]) * weights, axis=1)
+        # Squared slopes without noise: those of the mean, less the share that differences explain.
+        clear = np.square(slopes.mean(axis=0)) - slopes.var(axis=0, ddof=1) / len(slopes)
+        noise = (np.square(weights) * disagreement).sum() or ridge
+        precision = np.maximum(clear.sum(axis=1), 0) / noise * (n_frames / 100) ** 2
+        trust = float(agreement.mean()) ** _TRUST
+        gain = trust / (_smooth_along(precision, smoothing) + _HALF)
         base = _at_pace(base[np.newaxis], np.arange(n_frames)[np.newaxis], _grid(n_frames, 1))
         base *= weights
         mu = _SMOOTHNESS * float(np.square(base).sum(axis=2).mean())
         local = {"max_offset": _REACH, "max_rate": _MAX_RATE, "subframes": _SUBFRAMES}
         bases = Bases(Trellis.on_clock("elastic", count, mu, **local), base)
-        return cls(used, width, maps, weights, bases, agreement[: len(used)], trust)
+        own = agreement[: len(used)]
+        return cls(used, width, maps, weights, bases, own, precision, gain, smoothing)
 
-    def __call__(self, positions, times, reach, smoothing):
+    @property
+    def trust(self):
+        """How far warps go to where the local match places them, frame by frame: (P,)."""
+        return self.gain * _smooth_along(self.precision, self.smoothing)
+
+    def __call__(self, positions, times, reach):
         """Sharpened warps (n_sequences, P).
 
         Parameters
@@ -166,12 +189,10 @@ class Sharpener(NamedTuple):
             Their warps after the vote.
         reach : int
             Largest offset, in frames.
-        smoothing : float
-            That of the vote, as a share of the clip.
         """
         n_frames = times.shape[1]
         frames, at = np.arange(n_frames), _grid(n_frames, _SUBFRAMES)
-        voted, times = times, smooth_warps(times, reach, smoothing)
+        voted, times = times, smooth_warps(times, reach, self.smoothing)
         out = np.empty_like(times)
         for rows in even_slices(len(times), max(1, _BATCH_SIZE // (len(at) * len(self.weights)))):
             curves = positions[rows][:, :, self.features]
@@ -181,7 +202,9 @@ class Sharpener(NamedTuple):
             local = disparities + _SUBFRAMES * np.arange(disparities.shape[1])
             for row, tau, steps in zip(out[rows], times[rows], at[local], strict=True):
                 row[:] = np.interp(frames, at[::_SUBFRAMES], np.interp(steps, frames, tau))
-        return voted + self.trust * (smooth_warps(out, reach, _FINER * smoothing) - voted)
+        changes = self.gain * _smooth_along(self.precision * (out - voted), self.smoothing)
+        changes[:, [0, -1]] = 0
+        return smooth_warps(voted + changes, reach, 0)
 
 
 def _grid(n_frames, subframes):
@@ -202,3 +225,9 @@ def _at_pace(roots, times, at):
     tau = evaluate_warps(times, at[np.newaxis])
     rates = np.maximum(np.gradient(tau, at, axis=1), 0)
     return sample(roots, tau, roots.shape[1]) * np.sqrt(rates)[:, :, np.newaxis]
+
+
+def _smooth_along(values, smoothing):
+    """Values (..., P) under a Gaussian, half as wide as that of the vote; 0 beyond the ends."""
+    sigma = _FINER * smoothing * (values.shape[-1] - 1)
+    return gaussian_filter1d(values, sigma, axis=-1, mode="constant") if sigma > 0.1 else values

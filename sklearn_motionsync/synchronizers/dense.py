@@ -115,8 +115,8 @@ class DenseSynchronizer(Synchronizer):
         without. Velocities that sharpen warps then have 0.01 to 0.04, as their noise asks for.
     sharpen : bool, default=True
         Whether a last local match places the moments of every warp, by velocities as sharp as their
-        noise allows. It counts as much as trials agree (see ``sharpening_``). It needs a learnt
-        metric, and leaves warps alone that are refined.
+        noise allows. It counts as far as trials agree (see ``sharpening_``). It needs a learnt
+        metric, and leaves refined warps alone.
     metric : "learned" or None, default="learned"
         How signals are weighted by the velocity cost. ``"learned"``: compressed velocities, and
         poses less their own mean, count by how well trials agree at the same moment. ``fit`` learns
@@ -127,7 +127,7 @@ class DenseSynchronizer(Synchronizer):
         which is not smoothed, and refined only by ``refine=True``.
     warp_smoothing : float, default=0.02
         Standard deviation of the Gaussian that smooths time shifts after the vote, as a share of
-        the trial, and with a quarter of it those of sharpened warps. More gives smoother movements,
+        the trial. What sharpening changes is smoothed half as much. More gives smoother movements,
         and less accurate key moments.
     cost : {"velocity", "elastic", "posture"}, default="velocity"
         What is compared. ``"velocity"``: velocities; at the local rate rho, ``v_n`` with ``(0.8 +
@@ -215,8 +215,9 @@ class DenseSynchronizer(Synchronizer):
     sharpening_ : Bunch or None
         What sharpens warps; None if nothing does. ``width``: smoothing of velocities, as a share of
         the trial. ``agreement``: how well the trials that vote agree with the template in the
-        velocity of every signal, a correlation; NaN for noise. ``trust``: from 0 to 1, how far
-        warps go to where the local match places them; it follows from the agreement.
+        velocity of every signal, a correlation; NaN for noise. ``trust``, shape (P,): from 0 to 1,
+        how far warps go to where the last match places them. It follows from the agreement, and
+        from how clearly velocities change there.
     lengths_ : ndarray of int, shape (n_samples_fit,)
         Numbers of frames of the training trials.
     examples_ : ndarray, shape (min(n_samples_fit, 64), P, n_features)

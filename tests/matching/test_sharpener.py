@@ -35,7 +35,7 @@ def plain_metric(n_features=2):
 
 
 def learnt(positions, times, **settings):
-    return Sharpener.learn(plain_metric(), movement(FRAMES), positions, times, **settings)
+    return Sharpener.learn(plain_metric(), movement(FRAMES), positions, times, 0.02, **settings)
 
 
 def noise_share(width, noise, curve):
@@ -76,7 +76,7 @@ def test_a_blurred_warp_becomes_sharp():
     rough = tau + np.sin(np.pi * FRAMES / (P - 1)) * np.sin(FRAMES / 4) * 1.5
     rough = np.maximum.accumulate(np.clip(rough, 0, P - 1), axis=1)
     sharpener = learnt(trials(tau), rough)
-    found = sharpener(trials(tau), rough, reach=25, smoothing=0.02)
+    found = sharpener(trials(tau), rough, reach=25)
     before, after = (np.abs(times - tau).mean() for times in (rough, found))
     assert before > 0.5
     assert after < 0.2
@@ -85,8 +85,9 @@ def test_a_blurred_warp_becomes_sharp():
 def test_right_warps_stay():
     tau = warps(8)
     sharpener = learnt(trials(tau), tau)
-    assert sharpener.trust > 0.95
-    found = sharpener(trials(tau), tau, reach=25, smoothing=0.02)
+    assert sharpener.trust.shape == (P,)
+    assert sharpener.trust.mean() > 0.8
+    found = sharpener(trials(tau), tau, reach=25)
     assert np.abs(found - tau).max() < 0.5
     np.testing.assert_array_equal(found[:, [0, -1]], [[0, P - 1]] * 8)
 
@@ -95,7 +96,7 @@ def test_a_warp_to_itself_is_exact():
     tau = warps(8)
     sharpener = learnt(trials(tau), tau)
     own = FRAMES[np.newaxis].astype(float)
-    found = sharpener(movement(FRAMES)[np.newaxis], own, reach=25, smoothing=0.02)
+    found = sharpener(movement(FRAMES)[np.newaxis], own, reach=25)
     np.testing.assert_allclose(found, own, atol=1e-9)
 
 
@@ -108,7 +109,7 @@ def test_the_weight_of_a_feature_is_that_of_its_agreement():
     assert sharpener.agreement[0] > 0.95
     assert sharpener.agreement[1] < 0.5
     assert sharpener.weights[0] > 5 * sharpener.weights[1]
-    assert 0.3 < sharpener.trust < learnt(trials(tau), tau).trust
+    assert (sharpener.trust <= learnt(trials(tau), tau).trust + 0.05).all()
 
 
 def test_without_agreement_nothing_is_sharpened():
@@ -116,7 +117,7 @@ def test_without_agreement_nothing_is_sharpened():
     tau = np.tile(FRAMES.astype(float), (5, 1))
     assert learnt(-trials(tau), tau) is None
     still = np.zeros((5, P, 2))
-    assert Sharpener.learn(plain_metric(), still[0], still, tau) is None
+    assert Sharpener.learn(plain_metric(), still[0], still, tau, 0.02) is None
 
 
 @pytest.mark.parametrize(("n_frames", "enough"), [(16, False), (17, True)])
@@ -124,7 +125,7 @@ def test_a_local_match_needs_frames(n_frames, enough):
     few = np.arange(n_frames)
     curve = np.sin(few / 3.0)[:, np.newaxis]
     tau = np.tile(few.astype(float), (3, 1))
-    found = Sharpener.learn(plain_metric(1), curve, np.stack([curve] * 3), tau)
+    found = Sharpener.learn(plain_metric(1), curve, np.stack([curve] * 3), tau, 0.02)
     assert (found is not None) == enough
 
 
@@ -142,8 +143,24 @@ def test_long_trials_are_matched_at_fewer_frames():
     long = np.array([movement(np.interp(times, row, times)) for row in fine])
     rough = fine + np.sin(np.pi * times / (P - 1))
     rough = np.maximum.accumulate(np.clip(rough, 0, P - 1), axis=1)
-    sharpener = Sharpener.learn(plain_metric(), movement(times), long, 5 * rough)
+    sharpener = Sharpener.learn(plain_metric(), movement(times), long, 5 * rough, 0.02)
     assert sharpener.bases.sequences.shape[1] < len(times)
-    found = sharpener(long, 5 * rough, reach=125, smoothing=0.02) / 5
+    found = sharpener(long, 5 * rough, reach=125) / 5
     assert np.abs(rough - fine).mean() > 0.5
     assert np.abs(found - fine).mean() < 0.2
+
+
+def test_where_nothing_changes_warps_stay():
+    """In the middle both signals go on evenly, with noise: there no moment can be told."""
+    rng, still = np.random.default_rng(0), slice(42, 59)
+
+    def curve(times):
+        ends = np.minimum(times, 30) + np.maximum(times - 70, 0)
+        return np.stack([np.sin(ends / 5) + times / 40, np.cos(ends / 5) - times / 50], axis=-1)
+
+    tau = np.tile(FRAMES.astype(float), (8, 1))
+    positions = curve(tau) + 0.02 * rng.standard_normal((8, P, 2))
+    sharpener = Sharpener.learn(plain_metric(), curve(FRAMES), positions, tau, 0.02)
+    assert sharpener.trust[still].mean() < 0.5 * sharpener.trust[10:25].mean()
+    found = sharpener(positions, tau, reach=25)
+    assert np.abs(found - tau)[:, still].mean() < 0.3
