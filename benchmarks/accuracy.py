@@ -49,7 +49,12 @@ OURS = {
     "`refine=True` (single source)": lambda **kw: DenseSynchronizer(P, refine=True, **kw),
     "`warp_smoothing=0`": lambda **kw: DenseSynchronizer(P, warp_smoothing=0, **kw),
 }
-UNREFINED = {"`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw)}
+UNREFINED = {
+    "`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw),
+    "`refine=False, sharpen=False`": lambda **kw: DenseSynchronizer(
+        P, refine=False, sharpen=False, **kw
+    ),
+}
 
 # -- known warps ------------------------------------------------------------------------
 
