@@ -165,7 +165,8 @@ class Sharpener(NamedTuple):
         precision = np.maximum(clear.sum(axis=1), 0) / noise * (n_frames / 100) ** 2
         trust = float(agreement.mean()) ** _TRUST
         gain = trust / (_smooth_along(precision, smoothing) + _HALF)
-        base = _at_pace(base[np.newaxis], np.arange(n_frames)[np.newaxis], _grid(n_frames, 1))
+        own_pace = np.arange(n_frames, dtype=np.float64)[np.newaxis]
+        base = _at_pace(base[np.newaxis], own_pace, _grid(n_frames, 1))
         base *= weights
         mu = _SMOOTHNESS * float(np.square(base).sum(axis=2).mean())
         local = {"max_offset": _REACH, "max_rate": _MAX_RATE, "subframes": _SUBFRAMES}

@@ -137,17 +137,27 @@ def test_a_given_width_wins():
 
 def test_long_trials_are_matched_at_fewer_frames():
     """At five times the frames the same warp is found, in frames of the shorter clock."""
-    times = np.linspace(0, P - 1, 5 * (P - 1) + 1)
+    times = np.linspace(0, P - 1, 5 * (P - 1) + 4)
     tau = warps(8)
     fine = np.array([np.interp(times, FRAMES, row) for row in tau])
+    scale = (len(times) - 1) / (P - 1)
     long = np.array([movement(np.interp(times, row, times)) for row in fine])
     rough = fine + np.sin(np.pi * times / (P - 1))
     rough = np.maximum.accumulate(np.clip(rough, 0, P - 1), axis=1)
-    sharpener = Sharpener.learn(plain_metric(), movement(times), long, 5 * rough, 0.02)
+    sharpener = Sharpener.learn(plain_metric(), movement(times), long, scale * rough, 0.02)
     assert sharpener.bases.sequences.shape[1] < len(times)
-    found = sharpener(long, 5 * rough, reach=125) / 5
+    found = sharpener(long, scale * rough, reach=125) / scale
     assert np.abs(rough - fine).mean() > 0.5
     assert np.abs(found - fine).mean() < 0.2
+
+
+def test_a_long_warp_to_itself_is_exact():
+    """Rough curves: a template that is sampled elsewhere than the trial would not fit."""
+    times = np.linspace(0, P - 1, 375)
+    rough = movement(times) + 0.05 * np.random.default_rng(0).standard_normal((375, 2))
+    own = np.arange(375.0)[np.newaxis]
+    sharpener = Sharpener.learn(plain_metric(), rough, rough[np.newaxis], own, 0.02)
+    np.testing.assert_allclose(sharpener(rough[np.newaxis], own, reach=125), own, atol=1e-9)
 
 
 def test_where_nothing_changes_warps_stay():
