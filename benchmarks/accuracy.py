@@ -54,7 +54,12 @@ OURS = {
     "`warp_smoothing=0`": lambda **kw: DenseSynchronizer(P, warp_smoothing=0, **kw),
 }
 MAIN = [LINEAR, "the paper's method", PLAIN, DEFAULTS]
-UNREFINED = {"`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw)}
+UNREFINED = {
+    "`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw),
+    "`refine=False, sharpen=False`": lambda **kw: DenseSynchronizer(
+        P, refine=False, sharpen=False, **kw
+    ),
+}
 
 # -- known warps ------------------------------------------------------------------------
 

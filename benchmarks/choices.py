@@ -27,6 +27,7 @@ from sklearn_motionsync.matching import metric as learning
 from sklearn_motionsync.synchronizers import dense
 
 CHOICES = {
+    "sharpen": [False],
     "metric": [None],
     "velocity_smoothing": [0.01, 0.02, 0.03, 0.06, 0.1],
     "max_offset": [0.25, 0.33, 0.4, 0.5],

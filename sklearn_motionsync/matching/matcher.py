@@ -2,7 +2,8 @@
 
 What becomes known while a synchronizer is fitted is one object after the other: `Features`, before
 anything was matched; `Matcher`, which matches any two; `Warper`, which knows the pattern;
-`RefinedWarper`, which also knows the noise, or `LinearWarper`, if warps would harm.
+`RefinedWarper`, which also knows the noise, `SharpenedWarper`, which knows what trials agree in, or
+`LinearWarper`, if warps would harm.
 """
 
 import math
@@ -16,11 +17,12 @@ from .costs import COSTS
 from .filters import SMOOTHING, smooth
 from .metric import Metric, energy_shares, learn_metric
 from .refinement import refine_warps
+from .sharpening import Sharpener
 from .trellis import Bases, Trellis
 from .units import Unit
 from .warps import evaluate_warps, normalise
 
-__all__ = ["Features", "Matcher", "RefinedWarper", "Warper", "cost_features"]
+__all__ = ["Features", "Matcher", "RefinedWarper", "SharpenedWarper", "Warper", "cost_features"]
 
 # The metric is learnt from at most so many frames of a clip.
 LEARNING_FRAMES = 100
@@ -476,3 +478,41 @@ class RefinedWarper(Warper):
             return self.pattern, postures
         curves = smooth(np.concatenate([self.pattern[np.newaxis], postures]), self.noise_width)
         return curves[0], curves[1:]
+
+
+@dataclass(frozen=True, eq=False)
+class SharpenedWarper(Warper):
+    """A warper whose warps a last local match sharpens.
+
+    Attributes
+    ----------
+    sharpener : Sharpener
+    """
+
+    sharpener: Sharpener
+
+    @classmethod
+    def of(cls, warper, exemplars, width=None):
+        """The same warper that sharpens, or None if exemplars do not agree with the pattern.
+
+        Parameters
+        ----------
+        warper : Warper
+            With a metric.
+        exemplars : ndarray, shape (n_exemplars, Q, n_features)
+            At all positions, in the unit and in double precision.
+        width : float, default=None
+            Smoothing of velocities; by default as their noise asks for.
+        """
+        matcher, postures = warper.matcher, exemplars[:, :: warper.matcher.features.subframes]
+        times = smooth_warps(warper.to_exemplars, matcher.trellis.reach, warper.warp_smoothing)
+        metric = matcher.features.metric
+        smoothing = warper.warp_smoothing
+        sharpener = Sharpener.learn(metric, warper.pattern, postures, times, smoothing, width)
+        return None if sharpener is None else cls(**vars(warper), sharpener=sharpener)
+
+    def warps(self, positions):
+        """Warps as of `Warper`, sharpened."""
+        distances, times = super().warps(positions)
+        postures = positions[:, :: self.matcher.features.subframes]
+        return distances, self.sharpener(postures, times, self.matcher.trellis.reach)

@@ -14,7 +14,14 @@ from ..inputs.types import Cost, PerformanceLike, PerformancesLike, RandomState
 from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
 from ..matching.filters import SMOOTHING, choose_smoothing
-from ..matching.matcher import Features, LinearWarper, Matcher, RefinedWarper, Warper
+from ..matching.matcher import (
+    Features,
+    LinearWarper,
+    Matcher,
+    RefinedWarper,
+    SharpenedWarper,
+    Warper,
+)
 from ..matching.median import (
     Median,
     estimate_distances,
@@ -113,7 +120,11 @@ class DenseSynchronizer(Synchronizer):
         Standard deviation of the Gaussian that smooths velocities, as a share of the trial. So it
         does not depend on the frame rate. Beyond its ends a trial is continued by its point
         reflection. ``"auto"`` is 0.02 with a learnt metric, which gives noise less weight, and 0.03
-        without.
+        without. Velocities that sharpen warps then have 0.01 to 0.04, as their noise asks for.
+    sharpen : bool, default=True
+        Whether a last local match places the moments of every warp, by velocities as sharp as their
+        noise allows. It counts as far as trials agree (see ``sharpening_``). It needs a learnt
+        metric, and leaves refined warps alone.
     metric : "learned" or None, default="learned"
         How signals are weighted by the velocity cost. ``"learned"``: compressed velocities, and
         poses less their own mean, count by how well trials agree at the same moment. ``fit`` learns
@@ -124,7 +135,8 @@ class DenseSynchronizer(Synchronizer):
         which is not smoothed, and refined only by ``refine=True``.
     warp_smoothing : float, default=0.02
         Standard deviation of the Gaussian that smooths time shifts after the vote, as a share of
-        the trial. More gives smoother movements, and less accurate key moments.
+        the trial. What sharpening changes is smoothed half as much. More gives smoother movements,
+        and less accurate key moments.
     cost : {"velocity", "elastic", "posture"}, default="velocity"
         What is compared. ``"velocity"``: velocities; at the local rate rho, ``v_n`` with ``(0.8 +
         0.2 rho) v_m``. ``"elastic"``: velocities divided by the square root of the speed. Its
@@ -134,7 +146,7 @@ class DenseSynchronizer(Synchronizer):
         Weight of changes of pace, a pure number. ``mu`` is ``smoothness`` times the mean squared
         norm of what is compared.
     max_rate : float, default=4
-        Largest local rate of a path; 2 in Eq. 13. The vote and the refinement may exceed it.
+        Largest local rate of a path; 2 in Eq. 13. What follows the match may exceed it.
     subframes : int, default=1
         Positions a frame at which a path may stand. More than 1 serves direct paths
         (``consensus=0``); vote, smoothing and refinement are finer anyway.
@@ -218,6 +230,12 @@ class DenseSynchronizer(Synchronizer):
         there is no test.
     refines_ : bool
         Whether warps are refined.
+    sharpening_ : Bunch or None
+        What sharpens warps; None if nothing does. ``width``: smoothing of velocities, as a share of
+        the trial. ``agreement``: how well the trials that vote agree with the template in the
+        velocity of every signal, a correlation; NaN for noise. ``trust``, shape (P,): from 0 to 1,
+        how far warps go to where the last match places them. It follows from the agreement, and
+        from how clearly velocities change there.
     lengths_ : ndarray of int, shape (n_samples_fit,)
         Numbers of frames of the training trials.
     examples_ : ndarray, shape (min(n_samples_fit, 64), P, n_features)
@@ -255,7 +273,8 @@ class DenseSynchronizer(Synchronizer):
     5. Some typical trials, the exemplars, vote. The template is matched to a trial directly, and by
        way of each exemplar. The weighted median of these paths outvotes a path that went astray. It
        is then smoothed.
-    6. If that helps, Gauss-Newton steps refine the warps.
+    6. Trials are matched once more, near their warps and by sharper velocities. If refining helps,
+       Gauss-Newton steps on the poses take the place of that.
 
     ``transform`` samples a trial at ``tau(p) = p + Delta(p)`` (Eq. 18).
 
@@ -287,6 +306,7 @@ class DenseSynchronizer(Synchronizer):
         "velocity_smoothing": [StrOptions({"auto"}), Interval(Real, 0, 1, closed="both")],
         "refine": [StrOptions({"auto"}), "boolean"],
         "max_offset": [StrOptions({"auto"}), Interval(Real, 0, 1, closed="both")],
+        "sharpen": ["boolean"],
         "metric": [StrOptions({"learned"}), None],
         "consensus": [Interval(Integral, 0, None, closed="left")],
         "warp_smoothing": [Interval(Real, 0, 1, closed="both")],
@@ -314,6 +334,7 @@ class DenseSynchronizer(Synchronizer):
         velocity_smoothing: float | Literal["auto"] = "auto",
         refine: bool | Literal["auto"] = "auto",
         max_offset: float | Literal["auto"] = "auto",
+        sharpen: bool = True,
         metric: Literal["learned"] | None = "learned",
         consensus: int = 8,
         warp_smoothing: float = 0.02,
@@ -333,6 +354,7 @@ class DenseSynchronizer(Synchronizer):
         self.velocity_smoothing = velocity_smoothing
         self.refine = refine
         self.max_offset = max_offset
+        self.sharpen = sharpen
         self.metric = metric
         self.consensus = consensus
         self.warp_smoothing = warp_smoothing
@@ -484,7 +506,8 @@ class DenseSynchronizer(Synchronizer):
         # Sums over fewer frames, scaled to all.
         self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
         warper = self._choose_exemplars(training, matcher, source, median.estimates)
-        self._warper = self._decide_on_refinement(training, warper, source, progress, shared)
+        warper = self._decide_on_refinement(training, warper, source, progress, shared)
+        self._warper = self._learn_to_sharpen(positions, warper)
 
     def _settings(self, learnt=None):
         """The settings of `Matcher.learn`, for a learnt metric or none; by default as fitted."""
@@ -604,6 +627,23 @@ class DenseSynchronizer(Synchronizer):
         if not self.refines_:
             return warper
         return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.scaled))
+
+    def _learn_to_sharpen(self, positions, warper):
+        """The warper that also sharpens warps, with a metric, unless it refines them or none is."""
+        self.sharpening_ = None
+        is_final = self.refines_ or isinstance(warper, LinearWarper)
+        if not self.sharpen or self.metric_ is None or is_final:
+            return warper
+        exemplars = positions[self.exemplars_].astype(np.float64, copy=False)
+        width = None if self.velocity_smoothing == "auto" else self.velocity_smoothing
+        sharpened = on_one_thread(SharpenedWarper.of, warper, exemplars, width)
+        if sharpened is None:
+            return warper
+        sharpener, agreement = sharpened.sharpener, np.full(positions.shape[2], np.nan)
+        agreement[sharpener.features] = sharpener.agreement
+        found = {"width": sharpener.width, "trust": sharpener.trust}
+        self.sharpening_ = Bunch(agreement=agreement, **found)
+        return sharpened
 
     def _test_refinement(self, scaled, warper, source, some, progress, portions):
         """The verdict on refining some performances, by their indices; without any figure if there

@@ -1,0 +1,234 @@
+"""Sharpening: a last local match places the moments of voted warps where velocities agree.
+
+Velocities are smoothed, and warps after the vote once more, so that matching goes the right way.
+Both blur the moments themselves. Here every warp is matched once more, near where it is, between
+frames and by velocities as sharp as their noise allows. What is compared are signed roots of
+velocities: steep where a movement turns, and, under the elastic cost, independent of pace. Each
+counts by how well trials agree in it. A warp follows the local match where the roots change
+clearly, and stays as it was where they tell little.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from .consensus import smooth_warps
+from .filters import LEAST_SIGMA, choose_smoothing, smooth
+from .trellis import Bases, Trellis
+from .warps import evaluate_warps, even_slices, sample
+
+__all__ = ["Sharpener", "choose_width"]
+
+# Widths of the smoothing of velocities, as shares of the clip, and the largest share of noise in
+# their energy. The first width that keeps to it is chosen.
+_WIDTHS = (0.01, 0.014, 0.02, 0.028, 0.04)
+_NOISE = 0.05
+# Speed, in units of the typical one, below which a root is linear.
+_SLOW = 0.05
+# The local trellis: its most frames, positions a frame, largest offset as a share of the clip,
+# largest rate, and weight of changes of pace.
+_FRAMES, _SUBFRAMES, _REACH, _MAX_RATE, _SMOOTHNESS = 201, 3, 0.06, 2, 0.05
+# Smoothing of what sharpening changes, in units of that of the vote.
+_FINER = 0.5
+# Share of the mean energy of a component that is added to all before anything is divided.
+_RIDGE = 0.03
+# Weights of components are their evidence to this power: docs/design.md.
+_POWER = 0.75
+# How far warps may go is the mean agreement to this power. They go half of it where the precision
+# of the local match, in one over squared per cent of the clip, is this: docs/design.md.
+_TRUST, _HALF = 1.5, 0.02
+# Numbers that are sampled at a time: bounds the memory.
+_BATCH_SIZE = 1 << 22
+
+
+def choose_width(positions):
+    """The smoothing of velocities that suits their noise, as a share of the clip.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (n_sequences, P, n_features)
+
+    Returns
+    -------
+    float
+        The smallest width at which noise has a share of at most 5 % in the energy of velocities,
+        in the mean over features.
+    """
+    last = positions.shape[1] - 1
+    energy = np.square(smooth(positions, _WIDTHS[-1] * last, order=1)).mean(axis=(0, 1))
+    moves = energy > 0
+    if not moves.any():
+        return _WIDTHS[-1]
+    # Features of equal energy of velocity.
+    scaled = positions[:, :, moves] / np.sqrt(energy[moves])
+    sigma = max(choose_smoothing(scaled), LEAST_SIGMA)
+    residuals = np.square(scaled - smooth(scaled, sigma)).mean(axis=(0, 1))
+    grid = np.arange(-math.ceil(4 * sigma), math.ceil(4 * sigma) + 1)
+    weights = np.exp(-0.5 * (grid / sigma) ** 2)
+    weights /= weights.sum()
+    # Of white noise the residuals keep this share.
+    noise = residuals / (1 - 2 * weights.max() + np.square(weights).sum())
+    for width in _WIDTHS:
+        sigma = max(width * last, LEAST_SIGMA)
+        velocity = np.square(smooth(scaled, sigma, order=1)).mean(axis=(0, 1))
+        # The variance of the derivative of white noise under a Gaussian.
+        share = noise / (4 * math.sqrt(math.pi) * sigma**3) / np.where(velocity > 0, velocity, 1)
+        if share.mean() <= _NOISE:
+            break
+    return width
+
+
+class Sharpener(NamedTuple):
+    """Sharpens warps to a pattern.
+
+    Attributes
+    ----------
+    features : ndarray of int, shape (n_used,)
+        Features that are compared.
+    width : float
+        Smoothing of velocities, as a share of the clip.
+    maps : ndarray, shape (n_used, n_components)
+        From velocities to components in units of their typical speed: every feature, and the axes
+        of the metric.
+    weights : ndarray, shape (n_components,)
+    bases : Bases
+        Weighted signed roots of the pattern.
+    agreement : ndarray, shape (n_used,)
+        How well trials agree with the pattern in every feature, at matched moments: a correlation.
+    precision : ndarray, shape (P,)
+        Of the local match, frame by frame: squared slopes of the roots over the disagreement.
+    gain : ndarray, shape (P,)
+        Factor of the smoothed product of precision and change.
+    smoothing : float
+        That of the vote, as a share of the clip.
+    """
+
+    features: np.ndarray
+    width: float
+    maps: np.ndarray
+    weights: np.ndarray
+    bases: Bases
+    agreement: np.ndarray
+    precision: np.ndarray
+    gain: np.ndarray
+    smoothing: float
+
+    @classmethod
+    def learn(cls, metric, pattern, positions, times, smoothing, width=None):
+        """The sharpener of some performances, given their warps; None if it has no evidence.
+
+        Parameters
+        ----------
+        metric : Metric
+        pattern : ndarray, shape (P, n_features)
+            In the unit.
+        positions : ndarray, shape (n_sequences, P, n_features)
+            At least one other performance, in the unit.
+        times : ndarray, shape (n_sequences, P)
+            Their warps.
+        smoothing : float
+            That of the vote, as a share of the clip.
+        width : float, default=None
+            Smoothing of velocities; by default as their noise asks for.
+        """
+        n_frames = len(pattern)
+        count = min(n_frames, _FRAMES)
+        used = metric.features
+        if width is None:
+            width = choose_width(positions[:, :, used])
+        curves = np.concatenate([pattern[np.newaxis], positions])[:, :, used]
+        velocity = smooth(curves, width * (n_frames - 1), order=1)
+        speed = np.sqrt(np.square(velocity).mean(axis=(0, 1)))
+        axes = metric.velocity.astype(np.float64)
+        typical = np.sqrt(np.square(velocity @ axes).mean())
+        parts = np.diag(1 / np.where(speed > 0, speed, np.inf)), axes / (typical or np.inf)
+        maps = np.concatenate(parts, axis=1)
+        roots = _roots(velocity @ maps)
+        base, moving = roots[0], _at_pace(roots[1:], times, np.arange(n_frames))
+        disagreement = np.square(moving - base).mean(axis=(0, 1))
+        energy = np.square(roots).mean(axis=(0, 1))
+        ridge = _RIDGE * energy.mean()
+        agreement = 1 - disagreement / np.where(energy > 0, 2 * energy, 1)
+        if math.floor(_REACH * count) < 1 or not ridge > 0 or not agreement.mean() > 0:
+            return None
+        # The rule of the metric, one component at a time.
+        evidence = 1 / (disagreement + ridge) - 1 / (2 * energy + ridge)
+        weights = np.maximum(evidence, 0) ** _POWER
+        if not weights.any():
+            return None
+        slopes = np.gradient(np.concatenate([base[np.newaxis], moving]) * weights, axis=1)
+        # Squared slopes without noise: those of the mean, less the share that differences explain.
+        clear = np.square(slopes.mean(axis=0)) - slopes.var(axis=0, ddof=1) / len(slopes)
+        noise = (np.square(weights) * disagreement).sum() or ridge
+        precision = np.maximum(clear.sum(axis=1), 0) / noise * (n_frames / 100) ** 2
+        trust = float(agreement.mean()) ** _TRUST
+        gain = trust / (_smooth_along(precision, smoothing) + _HALF)
+        own_pace = np.arange(n_frames, dtype=np.float64)[np.newaxis]
+        base = _at_pace(base[np.newaxis], own_pace, _grid(n_frames, 1))
+        base *= weights
+        mu = _SMOOTHNESS * float(np.square(base).sum(axis=2).mean())
+        local = {"max_offset": _REACH, "max_rate": _MAX_RATE, "subframes": _SUBFRAMES}
+        bases = Bases(Trellis.on_clock("elastic", count, mu, **local), base)
+        own = agreement[: len(used)]
+        return cls(used, width, maps, weights, bases, own, precision, gain, smoothing)
+
+    @property
+    def trust(self):
+        """How far warps go to where the local match places them, frame by frame: (P,)."""
+        return self.gain * _smooth_along(self.precision, self.smoothing)
+
+    def __call__(self, positions, times, reach):
+        """Sharpened warps (n_sequences, P).
+
+        Parameters
+        ----------
+        positions : ndarray, shape (n_sequences, P, n_features)
+            Performances in the unit.
+        times : ndarray, shape (n_sequences, P)
+            Their warps after the vote.
+        reach : int
+            Largest offset, in frames.
+        """
+        n_frames = times.shape[1]
+        frames, at = np.arange(n_frames), _grid(n_frames, _SUBFRAMES)
+        voted, times = times, smooth_warps(times, reach, self.smoothing)
+        out = np.empty_like(times)
+        for rows in even_slices(len(times), max(1, _BATCH_SIZE // (len(at) * len(self.weights)))):
+            curves = positions[rows][:, :, self.features]
+            velocity = smooth(curves, self.width * (n_frames - 1), order=1)
+            moving = _at_pace(_roots(velocity @ self.maps) * self.weights, times[rows], at)
+            disparities = self.bases.trellis.paths(self.bases, moving)[0]
+            local = disparities + _SUBFRAMES * np.arange(disparities.shape[1])
+            for row, tau, steps in zip(out[rows], times[rows], at[local], strict=True):
+                row[:] = np.interp(frames, at[::_SUBFRAMES], np.interp(steps, frames, tau))
+        changes = self.gain * _smooth_along(self.precision * (out - voted), self.smoothing)
+        changes[:, [0, -1]] = 0
+        return smooth_warps(voted + changes, reach, 0)
+
+
+def _grid(n_frames, subframes):
+    """Times of the local clock, in frames, with so many positions a frame of it."""
+    return np.linspace(0, n_frames - 1, (min(n_frames, _FRAMES) - 1) * subframes + 1)
+
+
+def _roots(velocity):
+    """Signed roots of velocities in units of their typical speed; linear about 0."""
+    return velocity / (np.square(velocity) + _SLOW**2) ** 0.25
+
+
+def _at_pace(roots, times, at):
+    """Roots (n_sequences, P, n_components) along warps, at some times, times the root of the rate.
+
+    So warped, the roots are those of the warped velocities.
+    """
+    tau = evaluate_warps(times, at[np.newaxis])
+    rates = np.maximum(np.gradient(tau, at, axis=1), 0)
+    return sample(roots, tau, roots.shape[1]) * np.sqrt(rates)[:, :, np.newaxis]
+
+
+def _smooth_along(values, smoothing):
+    """Values (..., P) under a Gaussian, half as wide as that of the vote; 0 beyond the ends."""
+    sigma = _FINER * smoothing * (values.shape[-1] - 1)
+    return gaussian_filter1d(values, sigma, axis=-1, mode="constant") if sigma > 0.1 else values

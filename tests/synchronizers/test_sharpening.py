@@ -1,0 +1,141 @@
+"""What sharpening brings: single curves, several signals, noise; and whose settings win."""
+
+import numpy as np
+import pytest
+from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
+from sklearn_motionsync.datasets import make_gait
+
+P = 101
+
+
+@pytest.fixture(scope="module")
+def known_warps(benchmark):
+    """Copies of a random movement with known warps, of rates from 0.5 to 2."""
+
+    def make(seed, noise, n_features):
+        return benchmark("accuracy").known_warps(seed, 0.5, 2.0, noise, n_features=n_features)
+
+    return make
+
+
+def error(X, truth, **params):
+    sync = DenseSynchronizer(100, pattern=0, **params).fit(X)
+    return np.abs(sync.match(X).times - truth)[1:].mean()
+
+
+def vertices(curves, first, last):
+    """Frames of the maxima between two frames, by a parabola."""
+    found = []
+    for curve in curves:
+        top = first + int(np.argmax(curve[first:last]))
+        before, here, after = curve[top - 1 : top + 2]
+        found.append(top + (before - after) / (2 * (before - 2 * here + after)))
+    return np.array(found)
+
+
+def spread(times, moments):
+    """Standard deviation of moments of trials on the clock of the pattern."""
+    frames = np.arange(times.shape[1])
+    tilted = times + 1e-9 * frames
+    return np.std([np.interp(m, t, frames) for m, t in zip(moments, tilted, strict=True)], ddof=1)
+
+
+@pytest.mark.parametrize(("noise", "share"), [(0.005, 0.6), (0.05, 1.05), (0.2, 1.05)])
+def test_known_warps_of_a_single_curve(noise, share, known_warps):
+    """Clean curves gain much; noise is not followed."""
+    cases = [known_warps(seed, noise, n_features=1) for seed in range(4)]
+    with_it, without = (
+        np.mean([error(X, truth, sharpen=sharpen) for X, truth in cases])
+        for sharpen in (True, False)
+    )
+    assert with_it < share * without
+
+
+def test_moments_of_several_signals_come_closer():
+    gait = make_gait(timing=6, random_state=0)
+    moments = gait.keyframes * (P - 1) / (np.array([len(x) for x in gait.data])[:, np.newaxis] - 1)
+    spreads = []
+    for sharpen in (True, False):
+        times = DenseSynchronizer(P, sharpen=sharpen).fit(gait.data).match(gait.data).times
+        spreads.append([spread(times, of_one) for of_one in moments.T])
+    with_it, without = np.array(spreads)
+    assert (with_it < without).all()
+    assert with_it.mean() < 0.6 * without.mean()
+
+
+@pytest.mark.parametrize(
+    ("file", "first", "last", "most"),
+    [("Besier2009-vastus", 8, 45, 0.6), ("Pataky2014-mediolateral", 35, 80, 0.4)],
+)
+def test_peaks_of_single_curves_of_people(file, first, last, most, real_data):
+    """In per cent; without sharpening 1.7 and 0.7, with time normalisation alone 4.7 and 7.1."""
+    curves = np.loadtxt(real_data / "nlreg1d" / f"{file}.csv", delimiter=",")[:, 1:]
+    X = LinearSynchronizer(P).fit_transform(curves[:, :, np.newaxis])
+    moments = vertices(X[:, :, 0], first, last)
+    with_it, without = (
+        DenseSynchronizer(P, sharpen=sharpen).fit(list(X)).match(list(X)).times
+        for sharpen in (True, False)
+    )
+    assert spread(with_it, moments) < most
+    still, before = (np.mean(np.diff(times, axis=1) < 0.1) for times in (with_it, without))
+    assert still <= before
+
+
+def test_what_sharpens_is_told(known_warps):
+    X, _ = known_warps(0, 0.005, n_features=2)
+    noise = np.random.default_rng(0).standard_normal((len(X), 100, 1))
+    X = [np.concatenate([x, 0.3 * own], axis=1) for x, own in zip(X, noise, strict=True)]
+    sync = DenseSynchronizer(refine=False).fit(X)
+    found = sync.sharpening_
+    assert found.width == 0.01
+    assert (found.agreement[:2] > 0.9).all()
+    assert np.isnan(found.agreement[2])
+    assert found.trust.shape == (100,)
+    assert ((found.trust >= 0) & (found.trust <= 1)).all()
+    assert found.trust.mean() > 0.5
+
+
+@pytest.mark.parametrize(
+    "params",
+    [
+        {"sharpen": False},
+        {"metric": None},
+        {"consensus": 0},
+        {"refine": True},
+        {"cost": "elastic"},
+        {"cost": "posture", "max_rate": 2, "consensus": 0},
+    ],
+    ids=str,
+)
+def test_other_settings_are_as_they_were(params, known_warps):
+    X, _ = known_warps(0, 0.005, n_features=1)
+    sync = DenseSynchronizer(**params).fit(X)
+    assert sync.sharpening_ is None
+    same = DenseSynchronizer(**{**params, "sharpen": False}).fit(X)
+    np.testing.assert_array_equal(sync.match(X).times, same.match(X).times)
+
+
+def test_given_smoothing_wins(known_warps):
+    X, _ = known_warps(0, 0.005, n_features=1)
+    assert DenseSynchronizer(velocity_smoothing=0.03).fit(X).sharpening_.width == 0.03
+    rough = [
+        np.abs(np.diff(DenseSynchronizer(warp_smoothing=width).fit(X).match(X).times, n=2)).mean()
+        for width in (0.0, 0.02, 0.1)
+    ]
+    assert rough[0] > rough[1] > rough[2]
+
+
+def test_sharpened_warps_stay_in_the_band(known_warps):
+    X, _ = known_warps(0, 0.05, n_features=2)
+    sync = DenseSynchronizer(100, max_offset=0.03, refine=False).fit(X)
+    assert sync.sharpening_ is not None
+    times = sync.match(X).times
+    assert np.abs(times - np.arange(100)).max() <= 3
+    assert (np.diff(times, axis=1) >= 0).all()
+
+
+def test_distances_are_those_of_the_direct_paths(known_warps):
+    X, _ = known_warps(0, 0.005, n_features=1)
+    with_it, without = (DenseSynchronizer(sharpen=sharpen).fit(X) for sharpen in (True, False))
+    np.testing.assert_array_equal(with_it.match(X).distances, without.match(X).distances)
+    np.testing.assert_array_equal(with_it.global_distances_, without.global_distances_)
