@@ -162,14 +162,16 @@ class Features(NamedTuple):
         # Where all frames lie among the few.
         within = np.interp(np.arange(len(some)), few, np.arange(len(few)))
 
-        def match(compared):
+        def match(compared, others):
             compared = compared[:, few]
             matcher = Matcher.of(self.at_pace(1), compared, **settings)
-            times = matcher.match_all(compared, consensus, warp_smoothing)
+            times = matcher.match_others(compared, others, consensus, warp_smoothing)
             times = np.interp(times, np.arange(len(few)), few)
             return evaluate_warps(times, within[np.newaxis, np.newaxis])
 
-        positions, velocity = positions[:, some], velocity[:, some]
+        # Which one of a pair is the base does not depend on the order of performances.
+        order = np.argsort(np.einsum("npk,npk->n", velocity, velocity), kind="stable")
+        positions, velocity = (x[np.ix_(order, some)] for x in (positions, velocity))
         learnt = learn_metric(match, positions, velocity)
         if learnt is None:
             return None
@@ -263,25 +265,30 @@ class Matcher(NamedTuple):
         frames = np.arange(disparities.shape[-1])
         return frames + disparities / self.trellis.table.subframes
 
-    def match_all(self, sequences, n_exemplars, warp_smoothing):
-        """Warps after the vote of all ordered pairs: (n_sequences, n_sequences, P).
+    def match_others(self, sequences, others, n_exemplars, warp_smoothing):
+        """Warps after the vote of every sequence to others of its own.
 
         Parameters
         ----------
         sequences : ndarray, shape (n_sequences, P, n_compared)
+        others : ndarray of int, shape (n_sequences, n_others)
         n_exemplars : int
         warp_smoothing : float
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, n_others, P)
         """
         disparities, costs = self.trellis.paths_and_costs(sequences, sequences)
         times = self.times(disparities).astype(costs.dtype)
         typical = costs.sum(axis=1, dtype=np.float64)
-        exemplars = choose_exemplars(typical, n_exemplars, range(len(typical)))
-        out = np.empty_like(times)
-        for n, k in enumerate(exemplars.T):
-            lengths = np.concatenate([costs[n, np.newaxis], costs[n, k][:, np.newaxis] + costs[k]])
-            voted = vote(times[n], times[n, k][:, np.newaxis], times[k], lengths)
-            out[n] = smooth_warps(voted, self.trellis.reach, warp_smoothing)
-        return out
+        chosen = choose_exemplars(typical, n_exemplars, range(len(typical)))
+        # The base, the other and, (n_exemplars, n_pairs), the exemplars of every pair.
+        n, m = np.repeat(np.arange(len(others)), others.shape[1]), others.ravel()
+        k = chosen[:, n]
+        lengths = np.concatenate([costs[n, m][np.newaxis], costs[n, k] + costs[k, m]])
+        out = vote(times[n, m], times[n, k], times[k, m], lengths)
+        return smooth_warps(out, self.trellis.reach, warp_smoothing).reshape(*others.shape, -1)
 
 
 @dataclass(frozen=True, eq=False)

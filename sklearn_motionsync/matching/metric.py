@@ -136,23 +136,21 @@ class Evidence(NamedTuple):
 
     @classmethod
     def of(cls, times, remaining):
-        """The evidence of the warps (n_sequences, n_sequences, P) of all ordered pairs."""
-        n, _, n_frames = times.shape
-        times = times.astype(np.float64)
-        times[np.arange(n), np.arange(n)] = np.arange(n_frames)
+        """The evidence of warps (n_sequences, n_others, P) to the next ones in a circle."""
+        n_others, n_frames = times.shape[1:]
         # Warps are smooth: a quarter of the frames tells as much.
         frames = np.arange(0, n_frames, 4)
         some = times[:, :, frames]
-        offset = np.abs(some - frames).sum() / (n * (n - 1) * len(frames))
-        if n < 3 or offset < _LEAST_OFFSET * n_frames:
+        offset = np.abs(some - frames).mean(dtype=np.float64)
+        if n_others < 2 or offset < _LEAST_OFFSET * n_frames:
             return cls(np.nan, np.nan)
-        # From every base by way of one in the middle to all others; on average over all three.
-        total = 0.0
-        for middle in range(n):
-            at = np.broadcast_to(some[:, middle, np.newaxis], some.shape)
-            onwards = np.broadcast_to(times[middle], times.shape)
-            total += np.abs(evaluate_warps(onwards, at) - some).sum()
-        return cls(float(total / (n**3 * len(frames)) / offset), remaining)
+        # From every base by way of the i-th after it to the j-th after that one.
+        distances = [
+            np.abs(evaluate_warps(np.roll(times[:, j], -i - 1, axis=0), some[:, i]) - direct).mean()
+            for i in range(n_others)
+            for j, direct in enumerate(some[:, i + 1 :].swapaxes(0, 1))
+        ]
+        return cls(float(np.mean(distances) / offset), remaining)
 
 
 # Standard errors of the agreement between performances from which on a feature is reliable.
@@ -178,7 +176,8 @@ def learn_metric(match, positions, velocity):
     Parameters
     ----------
     match : callable
-        ``match(features)``: voted times (n_sequences, n_sequences, P) of all ordered pairs.
+        ``match(features, others)``: voted times (n_sequences, n_others, P) of all sequences as
+        bases, each with others of its own, by their indices (n_sequences, n_others).
     positions, velocity : ndarray, shape (n_sequences, P, n_features)
         Postures on the clock and their velocities, in the unit.
 
@@ -198,13 +197,14 @@ def learn_metric(match, positions, velocity):
     n, n_features = len(positions), len(moves)
     fast = compressed(velocity[:, :, used], _mean_square_speed(velocity[:, :, used]))
     first = _square_root(metric_matrix(fast, _unmatched_covariance(fast))).astype(fast.dtype)
-    times = match(fast @ first if first.any() else fast)
-    others = np.array([np.delete(np.arange(n), base) for base in range(n)])
-    to_others = np.stack([times[base, some] for base, some in enumerate(others)])
+    # Of any two sequences one is the base, both of those that are opposite in the circle: the two
+    # directions carry nearly the same information.
+    others = (np.arange(n)[:, np.newaxis] + np.arange(1, n // 2 + 1)) % n
+    times = match(fast @ first if first.any() else fast, others)
     # For every sequence its others at its times: (n_sequences, n_others, P, n_features).
     n_frames = times.shape[-1]
-    matched = sample(both[others.ravel()], to_others.reshape(-1, n_frames), n_frames)
-    matched = matched.reshape(*to_others.shape, 2 * n_features)
+    matched = sample(both[others.ravel()], times.reshape(-1, n_frames), n_frames)
+    matched = matched.reshape(*times.shape, 2 * n_features)
     if not used[moves].all():
         used |= moves & _are_reliable(_agreement(both, matched), errors)
     energy = _mean_square_speed(velocity[:, :, used])
@@ -212,7 +212,7 @@ def learn_metric(match, positions, velocity):
     parts = matched[..., :n_features], matched[..., n_features:]
     parts = parts if used.all() else [x[..., used] for x in parts]
     of_postures, posture_length = _differences(postures, parts[0])
-    of_fast, fast_length = _differences(fast, _at_rates(parts[1], energy, to_others))
+    of_fast, fast_length = _differences(fast, _at_rates(parts[1], energy, times))
     by_fast = _square_root(metric_matrix(fast, of_fast))
     # Differences of a longer correlation length are fewer independent observations.
     weight = np.sqrt(fast_length / posture_length)

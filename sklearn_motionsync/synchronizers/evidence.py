@@ -9,7 +9,7 @@ __all__ = ["SynchronizationWarning", "no_evidence", "weigh_evidence"]
 
 # Matching that leaves more of the differences explains little; if the inconsistency is larger, too,
 # warps did no good. So many performances are enough to tell. Measured in docs/design.md.
-_REMAINING, _INCONSISTENT, _ENOUGH = 0.7, 0.7, 10
+_REMAINING, _INCONSISTENT, _ENOUGH = 0.7, 0.8, 10
 
 
 class SynchronizationWarning(UserWarning):

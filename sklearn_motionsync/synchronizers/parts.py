@@ -145,7 +145,7 @@ class PartSynchronizer(Synchronizer):
     >>> lags = sync.lags([X[5], last], unit="percent")
     >>> change = lags.values[1] - lags.values[0]
     >>> dict(zip(lags.parts, change.max(axis=1).round(1).tolist()))
-    {'left arm': 0.0, 'right arm': 5.1, 'left leg': 0.2, 'right leg': 0.6, 'trunk': 0.2}
+    {'left arm': 0.0, 'right arm': 5.1, 'left leg': 0.2, 'right leg': 0.8, 'trunk': 0.2}
     """
 
     _parameter_constraints: dict = {
