@@ -6,7 +6,14 @@ import pickle
 import numpy as np
 import pytest
 from sklearn.metrics import silhouette_samples
-from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer, Match
+from sklearn_motionsync import (
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    Match,
+)
+from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.matching.modes import DistanceTable, Modes, cut_in_two, least_silhouette
 
 P = 60
@@ -233,3 +240,32 @@ def test_modes_of_collections_that_are_read_in_parts():
     X, _ = made(strokes)
     sync = DenseSynchronizer(P).fit(X)
     np.testing.assert_array_equal(sync.match(Source(X)).mode, sync.modes_.labels)
+
+
+@pytest.fixture(scope="module")
+def hdm05(real_data):
+    """Points of clips of HDM05, in an aSpace of the chosen clips."""
+    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+
+    def points(*chosen):
+        clips = [bunch.data[i] for i in np.concatenate(chosen)]
+        return ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(clips))
+
+    names = {name: np.flatnonzero(bunch.target == name) for name in np.unique(bunch.target)}
+    return names, points
+
+
+def test_people_doing_one_thing_are_one_mode(hdm05):
+    names, points = hdm05
+    assert len(names) == 6
+    for clips in names.values():
+        assert not DenseSynchronizer(P, refine=False).fit(points(clips)).modes_.labels.any()
+
+
+def test_people_doing_two_things_are_two_modes(hdm05):
+    names, points = hdm05
+    jog, knee = names["jogLeftCircle4StepsRstart"], names["elbowToKnee1RepsLelbowStart"]
+    for few, many in ((jog[:4], knee[:12]), (knee[:12:3], jog[:12])):
+        sync = DenseSynchronizer(P, refine=False).fit(points(few, many))
+        expected = [1] * len(few) + [0] * len(many)
+        np.testing.assert_array_equal(sync.modes_.labels, expected)
