@@ -22,7 +22,7 @@ import numpy as np
 from events import EVENTS, P
 from people import figures, geometric_means, read_people
 from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
-from sklearn_motionsync.matching import consensus, costs
+from sklearn_motionsync.matching import consensus, costs, modes
 from sklearn_motionsync.matching import metric as learning
 from sklearn_motionsync.synchronizers import dense
 
@@ -66,7 +66,7 @@ CONSTANTS = [
     ("largest offset while learning", "_LEARNING_OFFSET", (dense,), [0.12, 0.25]),
     ("performances the metric is learnt from", "_MOST", (dense,), [12, 16]),
     ("decay of a route's say", "_DECAY", (consensus,), [0.0, 3.0]),
-    ("exemplars", "choose_exemplars", (dense,), [most_typical, at_random]),
+    ("exemplars", "choose_exemplars", (modes,), [most_typical, at_random]),
 ]
 
 

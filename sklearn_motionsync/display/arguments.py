@@ -33,6 +33,7 @@ __all__ = [
     "as_names",
     "as_performances",
     "labels_as_text",
+    "named_groups",
     "one_each",
     "times_from_zero",
 ]
@@ -190,3 +191,15 @@ def _as_list(values):
     if isinstance(values, (str, bytes, Set, Mapping)) or not isinstance(values, Iterable):
         return None
     return None if getattr(values, "ndim", 1) != 1 else list(values)
+
+
+def named_groups(groups, match):
+    """Groups as given; for ``"mode"`` the mode of each performance, by a function for their match.
+
+    Returns
+    -------
+    sequence of length n_sequences, or None
+    """
+    if isinstance(groups, str) and groups == "mode":
+        return [f"mode {mode}" for mode in match().mode]
+    return groups

@@ -13,9 +13,9 @@ from ..inputs.features import choose_features
 from ..inputs.types import Features, Labels, PerformanceLike, PerformancesLike, Unit, ValuesLike
 from ..inputs.wording import counted
 from ..model.views import view_of
-from ..synchronizers.match import rates_of
+from ..synchronizers.match import Match, rates_of
 from ..utils.groups import names_of_groups
-from .arguments import AxesLike
+from .arguments import AxesLike, named_groups
 from .drawing import (
     COLORS,
     WIDTH,
@@ -146,7 +146,7 @@ class ActionModelDisplay:
         features: Features | None = None,
         band: Literal["points", "performances", "mean"] | None = None,
         departures: bool = True,
-        groups: Labels | None = None,
+        groups: Labels | Literal["mode"] | None = None,
         people: Labels | None = None,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
@@ -182,10 +182,12 @@ class ActionModelDisplay:
         departures : bool, default=True
             Whether the parts of performances outside the band are violet; they never are with the
             band of the mean.
-        groups : sequence of length n_sequences, default=None
+        groups : sequence of length n_sequences or "mode", default=None
             The group of each performance of X. Mean and band are then those of a model of each
             group, fitted to its performances; all are on the clock of the same pattern. A group of
             one performance has no band, nor has a group of one subject, except ``"points"``.
+            ``"mode"`` takes ``Match.mode``, by the synchronizer of the pipeline: then no mean lies
+            between two ways of doing it.
         people : sequence of length n_sequences, default=None
             The subject of each performance of X, as in ``ActionModel.fit(groups=...)``: bands of
             performances and of means then estimate the differences between subjects. By default
@@ -232,6 +234,7 @@ class ActionModelDisplay:
                 f"{caller} takes people along with groups only: a fitted model has learnt its "
                 "people by fit(X, groups=people)."
             )
+        groups = named_groups(groups, lambda: Match.from_estimator(estimator, X, **params))
         view = view_of(estimator, X, params, caller, features=features)
         chosen = choose_features(features, view.names)
         shown = view.whole if band == "performances" else view.synchronised

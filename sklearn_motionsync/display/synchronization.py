@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
@@ -24,7 +24,7 @@ from ..inputs.wording import counted
 from ..synchronizers.match import match_of_times, rates_of
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
-from .arguments import AxesLike, as_names
+from .arguments import AxesLike, as_names, named_groups
 from .drawing import (
     COLORS,
     WIDTH,
@@ -135,7 +135,7 @@ class SynchronizationDisplay:
         X: PerformancesLike,
         *,
         features: Features | None = None,
-        groups: Labels | None = None,
+        groups: Labels | Literal["mode"] | None = None,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
         warps: bool = True,
@@ -153,9 +153,10 @@ class SynchronizationDisplay:
         features : int, str or list of them, default=None
             Features by index or name, as they reach the synchronizer, such as dimensions of the
             aSpace. By default the first four.
-        groups : sequence of length n_sequences, default=None
+        groups : sequence of length n_sequences or "mode", default=None
             The group of each performance, such as ``bunch.actor``. Groups have different colours,
-            and their means are drawn; all are on the clock of the same pattern.
+            and their means are drawn; all are on the clock of the same pattern. ``"mode"`` takes
+            ``Match.mode``.
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time: frames; per cent of a performance, and of the pattern; or seconds of
             the performances as recorded, and of the median performance on the clock.
@@ -178,8 +179,9 @@ class SynchronizationDisplay:
         before, synchronizer, performances = reached[:3]
         names = names_of_features(before, synchronizer, performances[0].shape[1])
         chosen = choose_features(features, names)
-        groups = None if groups is None else names_of_groups(groups, len(performances))
         match, shown = reached.match(), [x[:, chosen] for x in performances]
+        groups = named_groups(groups, lambda: match)
+        groups = None if groups is None else names_of_groups(groups, len(performances))
         display = cls(
             shown,
             match.warp(shown),

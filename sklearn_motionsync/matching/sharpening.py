@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
+from sklearn.utils import Bunch
 
 from .consensus import smooth_warps
 from .filters import LEAST_SIGMA, choose_smoothing, smooth
@@ -178,6 +179,12 @@ class Sharpener(NamedTuple):
     def trust(self):
         """How far warps go to where the local match places them, frame by frame: (P,)."""
         return self.gain * _smooth_along(self.precision, self.smoothing)
+
+    def found(self, n_features):
+        """What `DenseSynchronizer` tells of it, given the number of all features."""
+        agreement = np.full(n_features, np.nan)
+        agreement[self.features] = self.agreement
+        return Bunch(agreement=agreement, width=self.width, trust=self.trust)
 
     def __call__(self, positions, times, reach):
         """Sharpened warps (n_sequences, P).

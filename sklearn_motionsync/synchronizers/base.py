@@ -322,8 +322,8 @@ class Synchronizer(
         if read is None:
             return self._match(self.check_performances(X))
         matches = [self._match(part) for part in read[1]]
-        times = np.concatenate([match.times for match in matches])
-        return Match(times, np.concatenate([match.distances for match in matches]))
+        names = "times", "distances", "mode"
+        return Match(*(np.concatenate([getattr(x, name) for x in matches]) for name in names))
 
     # -- steps of a fit ---------------------------------------------------------------------
 

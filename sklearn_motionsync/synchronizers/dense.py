@@ -11,7 +11,6 @@ from sklearn.utils import Bunch, check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
 
 from ..inputs.types import Cost, PerformanceLike, PerformancesLike, RandomState
-from ..matching.consensus import choose_exemplars
 from ..matching.costs import COSTS
 from ..matching.filters import SMOOTHING, choose_smoothing
 from ..matching.matcher import (
@@ -29,6 +28,7 @@ from ..matching.median import (
     rounding_bound,
     sampled_median,
 )
+from ..matching.modes import DistanceTable, ModalWarper, Modes
 from ..matching.refinement_test import RefinementTest, Verdict, split_features
 from ..matching.trellis import Trellis
 from ..matching.warps import normalise, sample
@@ -219,7 +219,12 @@ class DenseSynchronizer(Synchronizer):
     mu_ : float
         Absolute weight of the changes of pace, by the frames that the search compares.
     exemplars_ : ndarray of int
-        Indices of the trials that vote.
+        Indices of the trials that vote: up to ``consensus``, and so many of each of several modes.
+    modes_ : Bunch
+        The ways of doing the movement that the training set holds, such as one stroke or two.
+        ``labels``: the mode of each training trial, 0 being the most frequent; -1 if ``max_fit``
+        left it out. ``shares``: the share of each mode, ``[1.]`` if there is a single one. At least
+        6 trials and a learnt metric are needed to find several, and 3 trials of each.
     misfit_ : float
         Median share of the variance of the template in the smoothed residuals of matched poses;
         NaN unless ``refine="auto"`` finds that refining may help.
@@ -273,7 +278,9 @@ class DenseSynchronizer(Synchronizer):
        "median".
     5. Some typical trials, the exemplars, vote. The template is matched to a trial directly, and by
        way of each exemplar. The weighted median of these paths outvotes a path that went astray. It
-       is then smoothed.
+       is then smoothed. If the distances fall into several modes, exemplars vote within their mode
+       only. A trial of another mode than the template is warped to the most typical one of its
+       mode, and one warp joins that to the template.
     6. Trials are matched once more, near their warps and by sharper velocities. If refining helps,
        Gauss-Newton steps on the poses take the place of that.
 
@@ -409,13 +416,17 @@ class DenseSynchronizer(Synchronizer):
         Match
             ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
             the pattern, after vote, smoothing and refinement; ``distances``, shape
-            (n_sequences,), of the direct paths: ``D_{n,m}`` of Eq. 12.
+            (n_sequences,), of the direct paths: ``D_{n,m}`` of Eq. 12; ``mode``, the mode of
+            ``modes_`` that each performance is nearest to.
         """
         return self._match_in_parts(X)
 
     def _match(self, performances):
         distances, times = self._distances_and_times(performances)
-        return Match(times, self._warper.matcher.features.back(distances))
+        distances, mode = self._warper.matcher.features.back(distances), None
+        if len(self.modes_.shares) > 1:
+            mode = on_one_thread(self._warper.modes_of, performances)
+        return Match(times, distances, mode)
 
     def _warp_part(self, performances):
         times = np.maximum.accumulate(self._distances_and_times(performances)[1], axis=1)
@@ -478,6 +489,9 @@ class DenseSynchronizer(Synchronizer):
         sample, distances = self.sample_, np.full(self._population, np.nan)
         distances[sample] = self.global_distances_
         self.global_distances_, self.exemplars_ = distances, sample[self.exemplars_]
+        labels = np.full(self._population, -1)
+        labels[sample] = self.modes_.labels
+        self.modes_.labels = labels
         if self.pattern_index_ is not None:
             self.pattern_index_ = int(sample[self.pattern_index_])
         if self.metric_ is not None:
@@ -494,7 +508,7 @@ class DenseSynchronizer(Synchronizer):
         searched = features.for_search(self.n_frames_, settings["max_offset"])
         store = FeatureStore(searched, positions)
         warn_of_one_feature(self, performances, store)
-        searcher, shared, median = self._search(searched, store, positions, progress)
+        searcher, shared, median, modes = self._search(searched, store, positions, progress)
         matcher = searcher
         if searched is not features:
             reach = {name: settings[name] for name in ("max_offset", "max_rate")}
@@ -506,9 +520,22 @@ class DenseSynchronizer(Synchronizer):
         source = self._set_pattern(training, median, features.degree)
         # Sums over fewer frames, scaled to all.
         self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
-        warper = self._choose_exemplars(training, matcher, source, median.estimates)
-        warper = self._decide_on_refinement(training, warper, source, progress, shared)
-        self._warper = self._learn_to_sharpen(positions, warper)
+        chosen = self._choose_exemplars(median.estimates, modes)
+        warpers = [self._warper_by(x, training, matcher, source) for x in chosen]
+        home = modes.home(self.pattern_index_, warpers)
+        warper = self._decide_on_refinement(training, warpers[home], source, progress, shared)
+        self.sharpening_ = None
+        if modes.are_several and not isinstance(warper, LinearWarper):
+            warpers[home], arrays = warper, list(training.performances)
+            finish = partial(self._sharpened, positions)
+            settings = warpers, home, arrays, chosen, modes.signs(), finish
+            warper = on_one_thread(ModalWarper.of, *settings)
+            final = warper.warpers[home]
+        else:
+            warper = final = on_one_thread(self._sharpened, positions, warper, chosen[home])
+        if isinstance(final, SharpenedWarper):
+            self.sharpening_ = final.sharpener.found(positions.shape[2])
+        self._warper = warper
 
     def _settings(self, learnt=None):
         """The settings of `Matcher.learn`, for a learnt metric or none; by default as fitted."""
@@ -559,20 +586,28 @@ class DenseSynchronizer(Synchronizer):
             )
 
     def _search(self, features, store, positions, progress):
-        """The matcher that searches, the portions of the training set, and the median (Eq. 19)."""
+        """The matcher that searches, the portions of the training set, the median, and modes."""
         energy = store.energy()
         shape = len(positions), *store.template.shape[1:]
         matcher = Matcher.of_energy(features, shape, energy, **self._settings())
         portions = TrainingPortions(matcher, positions, store)
         rounding = rounding_bound(store.template.dtype, energy)
-        compare = partial(portions.compare, n_jobs=self.n_jobs, progress=progress)
-        median = self._choose_median(compare, len(positions), rounding)
+        table = DistanceTable(partial(portions.compare, n_jobs=self.n_jobs, progress=progress))
+        median = self._choose_median(table, len(positions), rounding)
         is_rounded = features.single and positions.dtype != store.template.dtype
         if not is_rounded or not median.is_blurred(rounding):
-            return matcher, portions, median
+            return matcher, portions, median, self._find_modes(table, store, len(positions))
         # Nearly equal trials: single precision does not tell them apart.
         features = features.replace(single=False)
         return self._search(features, FeatureStore(features, positions), positions, progress)
+
+    def _find_modes(self, table, store, n):
+        """The modes of n performances; without a learnt metric too many sets seem to have some."""
+        modes = Modes.single(n)
+        if self.metric_ is not None:
+            modes = table.modes(n, store)
+        self.modes_ = Bunch(labels=modes.labels, shares=modes.shares)
+        return modes
 
     def _choose_median(self, compare, n, rounding):
         """The median (Eq. 19), by all matches or some; or only what chooses the exemplars."""
@@ -594,14 +629,18 @@ class DenseSynchronizer(Synchronizer):
         self.typical_share_ = typical_share(known.in_doubt, n, population) if wanted else np.nan
         return median
 
-    def _choose_exemplars(self, training, matcher, source, estimates):
-        """Choose the exemplars; the warper to the pattern by way of them."""
-        self.exemplars_ = np.empty(0, dtype=np.intp)
+    def _choose_exemplars(self, estimates, modes):
+        """Choose the exemplars: those of every mode, a list."""
+        chosen = [np.empty(0, dtype=np.intp)] * len(modes.shares)
         if self.consensus > 0:
-            patterns = [self.pattern_index_]
-            self.exemplars_ = choose_exemplars(estimates, self.consensus, patterns)[:, 0]
+            chosen = modes.exemplars(estimates, self.consensus, self.pattern_index_)
+        self.exemplars_ = np.concatenate(chosen)
+        return chosen
+
+    def _warper_by(self, exemplars, training, matcher, source):
+        """The warper to the pattern by way of exemplars."""
         arrays = list(training.performances)
-        chosen = [source, *(arrays[k] for k in self.exemplars_.tolist())]
+        chosen = [source, *(arrays[k] for k in exemplars.tolist())]
         # In double precision, as all performances that are warped.
         chosen = [x.astype(np.float64, copy=False) for x in chosen]
         positions = matcher.features.positions(chosen, self.n_frames_)
@@ -629,22 +668,14 @@ class DenseSynchronizer(Synchronizer):
             return warper
         return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.scaled))
 
-    def _learn_to_sharpen(self, positions, warper):
-        """The warper that also sharpens warps, with a metric, unless it refines them or none is."""
-        self.sharpening_ = None
-        is_final = self.refines_ or isinstance(warper, LinearWarper)
+    def _sharpened(self, positions, warper, exemplars):
+        """The warper that also sharpens, with a metric; the same if it refines or does not warp."""
+        is_final = isinstance(warper, (LinearWarper, RefinedWarper))
         if not self.sharpen or self.metric_ is None or is_final:
             return warper
-        exemplars = positions[self.exemplars_].astype(np.float64, copy=False)
         width = None if self.velocity_smoothing == "auto" else self.velocity_smoothing
-        sharpened = on_one_thread(SharpenedWarper.of, warper, exemplars, width)
-        if sharpened is None:
-            return warper
-        sharpener, agreement = sharpened.sharpener, np.full(positions.shape[2], np.nan)
-        agreement[sharpener.features] = sharpener.agreement
-        found = {"width": sharpener.width, "trust": sharpener.trust}
-        self.sharpening_ = Bunch(agreement=agreement, **found)
-        return sharpened
+        chosen = positions[exemplars].astype(np.float64, copy=False)
+        return SharpenedWarper.of(warper, chosen, width) or warper
 
     def _test_refinement(self, scaled, warper, source, some, progress, portions):
         """The verdict on refining some performances, by their indices; without any figure if there

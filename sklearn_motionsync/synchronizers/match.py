@@ -58,6 +58,8 @@ class Match:
         performances that are linearly normalised to its length.
     distances : array-like, shape (n_sequences,), default=None
         Distance of each performance from the pattern; NaN by default.
+    mode : array-like of int, shape (n_sequences,), default=None
+        The mode of each performance; 0 by default.
 
     Attributes
     ----------
@@ -67,12 +69,16 @@ class Match:
     distances : ndarray, shape (n_sequences,)
         From a `DenseSynchronizer` the synchronisation distance ``D_{n,m}`` of Eq. 12, of the path
         straight to the base; from others the squared distance to the pattern.
+    mode : ndarray of int, shape (n_sequences,)
+        Which of several ways of doing the movement each performance shows: a label of
+        ``DenseSynchronizer.modes_``. 0 everywhere if there is a single one, and from other
+        synchronizers.
 
     Raises
     ------
     ValueError
         If times are not of shape (n_sequences, P) with at least two frames, decrease, or are not
-        within the clock; or if there is not one distance a performance.
+        within the clock; or if there is not one distance and one mode a performance.
 
     Notes
     -----
@@ -103,9 +109,14 @@ class Match:
     [[2.0, 1.5, 0.75, 0.5, 0.5]]
     """
 
-    __slots__ = ("distances", "times")
+    __slots__ = ("distances", "mode", "times")
 
-    def __init__(self, times: NumbersLike, distances: ValuesLike | None = None) -> None:
+    def __init__(
+        self,
+        times: NumbersLike,
+        distances: ValuesLike | None = None,
+        mode: ValuesLike | None = None,
+    ) -> None:
         times = np.array(as_numbers(times, "times", dtype=np.float64))
         if times.ndim != 2 or times.shape[1] < 2:
             raise ValueError(
@@ -136,7 +147,15 @@ class Match:
                 f"distances must be one for each of the {counted(n_sequences, 'performance')}, got "
                 f"shape {distances.shape}."
             )
-        self.times, self.distances = times, distances
+        if mode is None:
+            mode = np.zeros(n_sequences)
+        mode = np.array(as_numbers(mode, "mode"))
+        if mode.shape != (n_sequences,) or not (mode == np.floor(mode)).all():
+            raise ValueError(
+                f"mode must be one whole number for each of the "
+                f"{counted(n_sequences, 'performance')}, got shape {mode.shape}."
+            )
+        self.times, self.distances, self.mode = times, distances, mode.astype(np.intp)
 
     @property
     def offsets(self) -> np.ndarray:
@@ -218,7 +237,7 @@ class Match:
         DataFrame
             Indexed by the label of the performance and the frame of the pattern. Columns:
             ``time``, tau(p) in the unit, from the beginning of each performance; ``offset``;
-            ``rate``.
+            ``rate``; and ``mode``, if there are several.
 
         Raises
         ------
@@ -243,7 +262,10 @@ class Match:
         if labels is not None:
             self._check_count(labels, "label")
         columns = {"time": times, "offset": offsets, "rate": self.rates}
-        return timing_table(columns, X, labels)
+        table = timing_table(columns, X, labels)
+        if self.mode.any():
+            table["mode"] = np.repeat(self.mode, times.shape[1])
+        return table
 
     @classmethod
     def from_estimator(cls, estimator: BaseEstimator, X: PerformancesLike, **params: Any) -> Self:
@@ -401,7 +423,12 @@ class Match:
 
     def __repr__(self):
         n_sequences, n_frames = self.times.shape
-        return f"Match({counted(n_sequences, 'performance')} on {n_frames} frames)"
+        modes = ""
+        if self.mode.any():
+            counts = np.unique(self.mode, return_counts=True)
+            parts = [f"{count} in mode {mode}" for mode, count in zip(*counts, strict=True)]
+            modes = f", several ways of doing it: {', '.join(parts)}"
+        return f"Match({counted(n_sequences, 'performance')} on {n_frames} frames{modes})"
 
     def _check_count(self, given, noun):
         if len(given) != len(self.times):

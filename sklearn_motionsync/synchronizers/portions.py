@@ -286,6 +286,11 @@ class FeatureStore:
         """Slices of n performances whose features take half a dozen copies in the making."""
         return even_slices(n, max(1, CACHE_BYTES // (16 * self._positions[0].nbytes)))
 
+    @property
+    def positions_a_frame(self):
+        """Positions of the features a frame that is compared."""
+        return self._features.subframes if self._features.frames is None else 1
+
     def energy(self):
         """The sum of the squares of all features."""
         parts = [np.einsum("npk,npk->", x, x, dtype=np.float64) for x in self.portions()]
