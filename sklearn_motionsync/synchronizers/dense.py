@@ -214,7 +214,7 @@ class DenseSynchronizer(Synchronizer):
         share of their differences that matching leaves. ``inconsistency``: how far, on average, the
         warp by way of a third trial is from the warp itself, over the mean time shift. It is small
         for one movement, and about 1 for noise. ``harmful``: whether there are ten trials, and both
-        exceed their limits, 0.7 and 0.8. NaN without a metric, and for time shifts below 1 % of a
+        exceed their limits, 0.7 and 1. NaN without a metric, and for time shifts below 1 % of a
         trial.
     mu_ : float
         Absolute weight of the changes of pace, by the frames that the search compares.

@@ -7,9 +7,10 @@ from sklearn.utils import Bunch
 
 __all__ = ["SynchronizationWarning", "no_evidence", "weigh_evidence"]
 
-# Matching that leaves more of the differences explains little; if the inconsistency is larger, too,
-# warps did no good. So many performances are enough to tell. Measured in docs/design.md.
-_REMAINING, _INCONSISTENT, _ENOUGH = 0.7, 0.8, 10
+# Matching that leaves more of the differences explains little. If the inconsistency is larger, too,
+# warps are like those of noise. So many performances are enough to tell. Measured in
+# docs/design.md.
+_REMAINING, _INCONSISTENT, _ENOUGH = 0.7, 1.0, 10
 
 
 class SynchronizationWarning(UserWarning):
