@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
-from sklearn.utils import Bunch
 
 from .consensus import smooth_warps
 from .filters import LEAST_SIGMA, choose_smoothing, smooth
@@ -184,7 +183,7 @@ class Sharpener(NamedTuple):
         """What `DenseSynchronizer` tells of it, given the number of all features."""
         agreement = np.full(n_features, np.nan)
         agreement[self.features] = self.agreement
-        return Bunch(agreement=agreement, width=self.width, trust=self.trust)
+        return {"agreement": agreement, "width": self.width, "trust": self.trust}
 
     def __call__(self, positions, times, reach):
         """Sharpened warps (n_sequences, P).

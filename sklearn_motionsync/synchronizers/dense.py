@@ -534,7 +534,7 @@ class DenseSynchronizer(Synchronizer):
         else:
             warper = final = on_one_thread(self._sharpened, positions, warper, chosen[home])
         if isinstance(final, SharpenedWarper):
-            self.sharpening_ = final.sharpener.found(positions.shape[2])
+            self.sharpening_ = Bunch(**final.sharpener.found(positions.shape[2]))
         self._warper = warper
 
     def _settings(self, learnt=None):
