@@ -213,9 +213,9 @@ class DenseSynchronizer(Synchronizer):
         Whether the trials that the metric is learnt from support their warps. ``remaining``: the
         share of their differences that matching leaves. ``inconsistency``: how far, on average, the
         warp by way of a third trial is from the warp itself, over the mean time shift. It is small
-        for one movement, and about 1 for noise. ``harmful``: whether there are ten trials, and both
-        exceed their limits, 0.7 and 1. NaN without a metric, and for time shifts below 1 % of a
-        trial.
+        for one movement, and about 1 for noise. Ten or more trials with more than 0.7 and 0.45 are
+        warned of. ``harmful``: whether the inconsistency is above 1, too. NaN without a metric, and
+        for time shifts below 1 % of a trial.
     mu_ : float
         Absolute weight of the changes of pace, by the frames that the search compares.
     exemplars_ : ndarray of int

@@ -7,14 +7,14 @@ from sklearn.utils import Bunch
 
 __all__ = ["SynchronizationWarning", "no_evidence", "weigh_evidence"]
 
-# Matching that leaves more of the differences explains little. If the inconsistency is larger, too,
-# warps are like those of noise. So many performances are enough to tell. Measured in
-# docs/design.md.
-_REMAINING, _INCONSISTENT, _ENOUGH = 0.7, 1.0, 10
+# Warps explain little if matching leaves more of the differences, and the inconsistency is larger,
+# too; beyond the third number they are like those of noise. So many performances are enough to
+# tell. Measured in docs/design.md.
+_REMAINING, _INCONSISTENT, _NOISE, _ENOUGH = 0.7, 0.45, 1.0, 10
 
 
 class SynchronizationWarning(UserWarning):
-    """The trials do not support their warps: these explain little, or contradict each other, too.
+    """The trials do not support their warps: these explain little, and contradict each other.
 
     See ``evidence_`` of `DenseSynchronizer`.
 
@@ -57,23 +57,21 @@ def weigh_evidence(found, n, unsupported):
         ``remaining``, ``inconsistency``, ``harmful``.
     """
     remaining, inconsistency = found.remaining, found.inconsistency
-    little = n >= _ENOUGH and remaining > _REMAINING
-    harmful = bool(little and inconsistency > _INCONSISTENT)
-    if little and unsupported == "linear":
+    doubtful = n >= _ENOUGH and remaining > _REMAINING and inconsistency > _INCONSISTENT
+    harmful = bool(doubtful and inconsistency > _NOISE)
+    if doubtful and unsupported == "linear":
         consequence = (
-            "They contradict each other, too: by way of a third performance a moment lands "
-            f"{inconsistency:.2f} times a typical offset away (evidence_.inconsistency; "
-            f"{_INCONSISTENT} is the limit). So performances are linearly normalised, without "
-            "warps. Check that all show one movement, cut at the same moments; if so, set "
-            "unsupported='warp'."
+            "That is as in noise, so they are linearly normalised, without warps. Check that all "
+            "show one movement, cut at the same moments; if so, set unsupported='warp'."
             if harmful
             else "Compare them with LinearSynchronizer. Less noise helps, and so do features that "
             "show the movement; unsupported='warp' silences this."
         )
         warnings.warn(
-            f"Matching leaves {remaining:.0%} of the differences between these performances "
-            f"(evidence_.remaining; {_REMAINING:.0%} is the limit): the warps explain little. "
-            + consequence,
+            f"Matching leaves {remaining:.0%} of the differences between these performances, and "
+            "by way of a third performance a moment lands "
+            f"{inconsistency:.2f} times a typical offset away (evidence_; {_REMAINING:.0%} and "
+            f"{_INCONSISTENT} are the limits): the warps explain little. {consequence}",
             SynchronizationWarning,
             stacklevel=2,
         )
