@@ -144,13 +144,15 @@ class Evidence(NamedTuple):
         offset = np.abs(some - frames).mean(dtype=np.float64)
         if n_others < 2 or offset < _LEAST_OFFSET * n_frames:
             return cls(np.nan, np.nan)
-        # From every base by way of the i-th after it to the j-th after that one.
-        distances = [
-            np.abs(evaluate_warps(np.roll(times[:, j], -i - 1, axis=0), some[:, i]) - direct).mean()
-            for i in range(n_others)
-            for j, direct in enumerate(some[:, i + 1 :].swapaxes(0, 1))
-        ]
-        return cls(float(np.mean(distances) / offset), remaining)
+        distance, count = 0.0, 0
+        # From every base by way of the i-th after it to all after that one.
+        for i in range(n_others - 1):
+            onwards = np.roll(times, -i - 1, axis=0)[:, : n_others - i - 1]
+            direct = some[:, i + 1 :]
+            by_way = evaluate_warps(onwards, some[:, i : i + 1])
+            distance += np.abs(by_way - direct).sum(dtype=np.float64)
+            count += direct.size
+        return cls(float(distance / count / offset), remaining)
 
 
 # Standard errors of the agreement between performances from which on a feature is reliable.
