@@ -45,7 +45,7 @@ def test_noise_is_not_warped():
     np.testing.assert_array_equal(sync.match(X).distances, warped.match(X).distances)
 
 
-def test_who_knows_better_is_not_warned():
+def test_unsupported_warps_are_kept_on_request():
     X = chance(12)
     sync = DenseSynchronizer(P, unsupported="warp").fit(X)
     assert sync.evidence_.harmful
