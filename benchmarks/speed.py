@@ -32,7 +32,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, LinearSynchronizer
 from sklearn_motionsync.datasets import load_performances, make_bending
 from sklearn_motionsync.matching.costs import step_table
-from sklearn_motionsync.matching.trellis import Bases, Trellis
+from sklearn_motionsync.matching.factors import Bases
+from sklearn_motionsync.matching.trellis import Trellis
 
 HERE = Path(__file__).resolve().parent
 PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}

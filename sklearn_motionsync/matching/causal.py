@@ -8,7 +8,8 @@ delay.
 import numpy as np
 from scipy.signal import lfilter
 
-from .trellis import TIE, Bases, Tile, right_factor
+from .factors import Bases, right_factor
+from .trellis import TIE, Tile
 
 __all__ = ["CausalDerivative", "CausalTrellis", "causal_costs", "causal_velocity"]
 

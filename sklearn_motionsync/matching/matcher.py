@@ -14,11 +14,12 @@ import numpy as np
 
 from .consensus import choose_exemplars, smooth_warps, vote
 from .costs import COSTS
+from .factors import Bases
 from .filters import SMOOTHING, smooth
 from .metric import Metric, energy_shares, learn_metric
 from .refinement import refine_warps
 from .sharpening import Sharpener
-from .trellis import Bases, Trellis
+from .trellis import Trellis
 from .units import Unit
 from .warps import evaluate_warps, normalise
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .consensus import choose_exemplars
+from .factors import Bases
 from .matcher import Warper
-from .trellis import Bases
 from .warps import evaluate_warps, even_slices
 
 __all__ = ["DistanceTable", "ModalWarper", "Modes", "cut_in_two", "least_silhouette"]

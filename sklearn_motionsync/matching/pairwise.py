@@ -9,8 +9,9 @@ import itertools
 
 import numpy as np
 
+from .factors import Bases, right_factor
 from .matcher import cost_features
-from .trellis import PRODUCT_ROWS, Bases, Tile, Trellis, right_factor
+from .trellis import PRODUCT_ROWS, Tile, Trellis
 from .warps import even_slices
 
 __all__ = ["BLOCK", "PairwiseDistance", "blocks_of_pairs"]

@@ -15,8 +15,9 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from .consensus import smooth_warps
+from .factors import Bases
 from .filters import LEAST_SIGMA, choose_smoothing, smooth
-from .trellis import Bases, Trellis
+from .trellis import Trellis
 from .warps import evaluate_warps, even_slices, sample
 
 __all__ = ["Sharpener", "choose_width"]
