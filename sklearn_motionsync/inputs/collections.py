@@ -96,6 +96,13 @@ class Performances(tuple):
         """The name of one of them in messages."""
         return name_performance(self.numbers[i], self.labels[i])
 
+    def replace(self, arrays):
+        """Other arrays of the same performances."""
+        same = self.labels, self.frames, self.names, self.levels, self.numbers
+        out = Performances(arrays, self.kind, *same)
+        out.facts = self.facts
+        return out
+
     def take(self, indices):
         """Some of them, by a slice or a sequence of indices: rows, or a list."""
         if isinstance(indices, slice):

@@ -35,6 +35,7 @@ from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
+from .gaps import fill_performances, has_gaps, learn_filler
 from .match import Match, check_match
 
 __all__ = ["Synchronizer", "TrainingSet"]
@@ -261,6 +262,7 @@ class Synchronizer(
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.three_d_array = True
+        tags.input_tags.allow_nan = self._finite == "allow-nan"
         tags.transformer_tags.preserves_dtype = ["float64", "float32"]
         return tags
 
@@ -325,7 +327,20 @@ class Synchronizer(
         names = "times", "distances", "mode"
         return Match(*(np.concatenate([getattr(x, name) for x in matches]) for name in names))
 
+    def _without_gaps(self, performances):
+        """Checked performances, filled where they are NaN."""
+        if not has_gaps(performances):
+            return performances
+        filler = self._filler or learn_filler(self.examples_)
+        return fill_performances(filler, performances)
+
     # -- steps of a fit ---------------------------------------------------------------------
+
+    def _check_training_set(self, X, numbers=None):
+        performances, self._filler = super()._check_training_set(X, numbers), None
+        if has_gaps(performances):
+            self._filler = learn_filler(performances, names_of_input(self))
+        return self._without_gaps(performances)
 
     def _number_as_given(self):
         """Number performances as given, if the fit is to a sample."""

@@ -84,13 +84,20 @@ class DenseSynchronizer(Synchronizer):
     >>> sync.match(trials).offsets[:, 50].round().tolist()  # how late they were, in frames
     [-10.0, 0.0, 12.0]
 
-    A trial with a gap is refused:
+    NaN is what was not seen. It is matched by what was, and stays NaN:
 
-    >>> trials[2][7] = np.nan
+    >>> trials[2][20:30] = np.nan
+    >>> aligned = sync.transform(trials)
+    >>> aligned.shape, int(np.isnan(aligned[2]).sum())
+    ((3, 101, 1), 8)
+
+    A trial of which nothing was seen is refused:
+
+    >>> trials[2][:] = np.nan
     >>> sync.transform(trials)
     Traceback (most recent call last):
         ...
-    ValueError: Performance 2, frame 7, feature 0 is NaN; the input must be finite. ...
+    ValueError: Performance 2 is NaN in every frame and feature: nothing of it was seen, ...
 
     The defaults suit most data. Four parameters depend on the data or on the question. The others
     were set by measurements, or are for many trials and long jobs.
@@ -332,6 +339,7 @@ class DenseSynchronizer(Synchronizer):
 
     metric_: Any
 
+    _finite = "allow-nan"
     _SMALLER = "fewer frames, subframes or performances. Or learn from some: max_fit=1000"
 
     def __init__(
@@ -422,6 +430,7 @@ class DenseSynchronizer(Synchronizer):
         return self._match_in_parts(X)
 
     def _match(self, performances):
+        performances = self._without_gaps(performances)
         distances, times = self._distances_and_times(performances)
         distances, mode = self._warper.matcher.features.back(distances), None
         if len(self.modes_.shares) > 1:
@@ -435,7 +444,7 @@ class DenseSynchronizer(Synchronizer):
     def _distances_and_times(self, performances):
         with self._progress(fits=False) as progress:
             portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "warping"}
-            return warp_in_portions(self._warper, performances, **portions)
+            return warp_in_portions(self._warper, self._without_gaps(performances), **portions)
 
     @snapshot
     def disparity_space(self, X: PerformancesLike, performance: int = 0) -> Bunch:
@@ -469,7 +478,8 @@ class DenseSynchronizer(Synchronizer):
                 f"performances, 0 to {len(performances) - 1}."
             )
         warper = self._warper
-        positions = warper.positions([performances[performance]])
+        chosen = self._without_gaps(performances.take([performance]))
+        positions = warper.positions(chosen)
         frames, offsets, costs, path = warper.disparity_space(positions)
         costs = warper.matcher.features.back(costs)
         return Bunch(frames=frames, offsets=offsets, costs=costs, path=path)

@@ -49,6 +49,7 @@ _SHARED = (
     "_names_in",
     "_facts_in",
     "_fitted_on_rows",
+    "_filler",
 )
 
 
@@ -153,6 +154,8 @@ class PartSynchronizer(Synchronizer):
         "coupling": [Interval(Real, 0, None, closed="both")],
         "synchronizer": [DenseSynchronizer, None],
     }
+
+    _finite = "allow-nan"
 
     def __init__(
         self,
@@ -305,6 +308,7 @@ class PartSynchronizer(Synchronizer):
         What does not move has the warp of the body.
         """
         found, sync = {}, self.synchronizer_
+        performances = self._without_gaps(performances)
         with Progress(self, sync.verbose) as progress:
             for name in self.parts_:
                 warper = self._warpers[what].get(name)

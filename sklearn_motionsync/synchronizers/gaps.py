@@ -1,0 +1,66 @@
+"""Gaps of performances: filled before they are matched (`matching.gaps`)."""
+
+import numpy as np
+
+from ..inputs.wording import counted
+from ..matching.gaps import Filler
+
+__all__ = ["fill_performances", "has_gaps", "learn_filler"]
+
+
+def has_gaps(performances):
+    """Whether anything of performances is NaN; they hold no infinity."""
+    return any(np.isnan(x.sum()) for x in performances)
+
+
+def learn_filler(performances, names=None):
+    """The filler of a training set.
+
+    Parameters
+    ----------
+    performances : sequence of ndarray (n_frames_i, n_features)
+    names : sequence, default=None
+        Of the features.
+
+    Raises
+    ------
+    ValueError
+        If a feature is NaN in all of them.
+    """
+    never = np.logical_and.reduce([np.isnan(x).all(axis=0) for x in performances])
+    if never.any():
+        k = int(never.argmax())
+        name = k if names is None else f"{k} ({names[k]!r})"
+        raise ValueError(
+            f"Feature {name} is NaN in every frame of every performance: "
+            f"{counted(int(never.sum()), 'feature')} of {len(never)} were never seen. Leave them "
+            "out, or add a performance that shows them."
+        )
+    return Filler.learn(performances)
+
+
+def fill_performances(filler, performances):
+    """Performances without gaps.
+
+    Parameters
+    ----------
+    filler : Filler
+    performances : Performances
+
+    Raises
+    ------
+    ValueError
+        If all of a performance is NaN.
+    """
+    arrays = []
+    for i, x in enumerate(performances):
+        if not np.isnan(x.sum()):
+            arrays.append(x)
+            continue
+        if np.isnan(x).all():
+            raise ValueError(
+                f"{performances.called(i)} is NaN in every frame and feature: nothing of it was "
+                "seen, so it has no timing. Leave it out."
+            )
+        arrays.append(filler(x)[0])
+    return performances.replace(arrays)
