@@ -35,7 +35,7 @@ from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
-from .gaps import fill_performances, has_gaps, learn_filler
+from .gaps import check_fill, fill_performances, fill_warped, has_gaps, learn_filler
 from .match import Match, check_match
 
 __all__ = ["Synchronizer", "TrainingSet"]
@@ -186,7 +186,7 @@ class Synchronizer(
 
     fit_transform: ClassVar[FitTransform] = whole_fit_transform
 
-    def transform(self, X: PerformancesLike) -> Transformed:
+    def transform(self, X: PerformancesLike, fill: Literal["model"] | None = None) -> Transformed:
         """Warp performances onto the clock of the pattern (Eq. 18).
 
         Parameters
@@ -194,14 +194,24 @@ class Synchronizer(
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Performances. Memory maps, and collections that give performances by index, are read in
             parts, once each; rows of a matrix are loaded into memory.
+        fill : {None, "model"}, default=None
+            What becomes of NaN, which is what was hidden. None: it stays NaN, feature by feature.
+            "model": it is filled from the mean of the warped training set (``examples_``) at the
+            same moment, moved by how far the performance is from the mean around the gap, and in
+            the features that are seen.
 
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features)
             ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
             ``set_output(transform="pandas")``.
+
+        Raises
+        ------
+        ValueError
+            If the input breaks the contract, or there is no such ``fill``.
         """
-        return self._warp(X)
+        return self._warp(X, fill)
 
     def match(self, X: PerformancesLike) -> Match:
         """Match performances to the pattern.
@@ -278,7 +288,8 @@ class Synchronizer(
         self._set_pattern(training, self._plain_median(training.scaled))
 
     @snapshot
-    def _warp(self, X, **params):
+    def _warp(self, X, fill=None, **params):
+        check_fill(fill)
         # Further parameters are given for all performances at once.
         read = None if params else self._read_in_parts(X)
         if read is None:
@@ -286,9 +297,15 @@ class Synchronizer(
             out = self._warp_part(performances, **params)
         else:
             performances, out = self._warp_parts(*read)
+        if fill == "model" and np.isnan(out.sum()):
+            fill_warped(out, self._warp_part(self._checked_examples()))
         if performances.kind == "rows":
             return out[:, :, 0]
         return restore(self, performances, out, frames=range(out.shape[1]))
+
+    def _checked_examples(self):
+        """The examples as performances."""
+        return Performances(list(self.examples_), "list", list(range(len(self.examples_))))
 
     def _warp_part(self, performances, **params):
         return self._match(performances, **params).warp(performances)

@@ -5,7 +5,7 @@ import numpy as np
 from ..inputs.wording import counted
 from ..matching.gaps import Filler
 
-__all__ = ["fill_performances", "has_gaps", "learn_filler"]
+__all__ = ["check_fill", "fill_performances", "fill_warped", "has_gaps", "learn_filler"]
 
 
 def has_gaps(performances):
@@ -64,3 +64,30 @@ def fill_performances(filler, performances):
             )
         arrays.append(filler(x)[0])
     return performances.replace(arrays)
+
+
+def check_fill(fill):
+    """Refuse a ``fill`` that there is not."""
+    if fill is not None and not (isinstance(fill, str) and fill == "model"):
+        raise ValueError(
+            f"fill={fill!r} is unknown: use None to keep what was hidden as NaN, or 'model' to "
+            "fill it from the mean of the warped training set."
+        )
+
+
+def fill_warped(warped, examples):
+    """Fill warped performances from the mean of others at every moment, in place.
+
+    A performance deviates from the mean. Its deviations are filled as gaps are before a match.
+
+    Parameters
+    ----------
+    warped : ndarray, shape (n_sequences, P, n_features)
+    examples : ndarray, shape (n_examples, P, n_features)
+        Warped, without gaps.
+    """
+    mean = examples.mean(axis=0)
+    filler = Filler.learn(list(examples - mean))
+    for x in warped:
+        if np.isnan(x.sum()):
+            np.copyto(x, filler(x - mean)[0] + mean, where=np.isnan(x))

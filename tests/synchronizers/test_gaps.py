@@ -230,3 +230,49 @@ def test_infinity_and_gaps_of_a_pattern_are_refused():
         clone(DENSE).fit(X)
     with pytest.raises(ValueError, match=r"The pattern, frame \d+, feature \d is NaN"):
         DenseSynchronizer(P, pattern=GAPPY[0][:, :]).fit(GAPPY)
+
+
+# -- fill="model" ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["dense", "paper", "parts", "linear"])
+def test_filling_by_the_model_is_better_than_the_mean(name):
+    sync = clone(SYNCHRONIZERS[name]).fit(WHOLE)
+    out, filled = sync.transform(GAPPY), sync.transform(GAPPY, fill="model")
+    hidden = np.isnan(out)
+    np.testing.assert_array_equal(filled[~hidden], out[~hidden])
+    assert np.isfinite(filled).all()
+    # The same moments of the whole performances.
+    truth = sync.match(GAPPY).warp(WHOLE) if name != "parts" else sync.transform(WHOLE)
+    mean = np.broadcast_to(sync.transform(WHOLE).mean(axis=0), out.shape)
+    errors = [np.abs(guess - truth)[hidden].mean() for guess in (filled, mean)]
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_a_gap_at_which_all_deviate_alike_is_filled_exactly():
+    # Each performance is the mean plus a constant of its own in every feature.
+    t = np.linspace(0, 1, P)[:, np.newaxis]
+    mean = np.concatenate([np.sin(6 * t), np.cos(5 * t)], axis=1)
+    X = [mean + shift for shift in (-0.2, -0.1, 0.0, 0.1, 0.2)]
+    gappy = [x.copy() for x in X]
+    gappy[3][10:20] = np.nan
+    sync = LinearSynchronizer(P).fit(X)
+    assert np.isnan(sync.transform(gappy)[3, 10:20]).all()
+    np.testing.assert_allclose(sync.transform(gappy, fill="model")[3], X[3], atol=1e-12)
+
+
+def test_filling_keeps_pandas_and_single_precision_and_rows():
+    single = [x.astype(np.float32) for x in GAPPY]
+    sync = clone(DENSE).fit(single)
+    assert sync.transform(single, fill="model").dtype == np.float32
+    table = clone(DENSE).set_output(transform="pandas").fit(GAPPY).transform(GAPPY, fill="model")
+    expected = clone(DENSE).fit(GAPPY).transform(GAPPY, fill="model")
+    np.testing.assert_array_equal(table.to_numpy().reshape(expected.shape), expected)
+    rows = np.stack([np.resize(x[:, 3], 50) for x in GAPPY])
+    assert np.isfinite(clone(DENSE).fit(rows).transform(rows, fill="model")).all()
+
+
+@pytest.mark.parametrize("fill", ["mean", 0, True])
+def test_an_unknown_fill_is_refused(fill):
+    with pytest.raises(ValueError, match=r"fill=.* is unknown: use None .* or 'model'"):
+        clone(DENSE).fit(WHOLE).transform(GAPPY, fill=fill)
