@@ -22,6 +22,7 @@ __all__ = [
     "difference",
     "is_integer",
     "listed",
+    "nanmean",
     "refuse_non_numeric",
 ]
 
@@ -313,3 +314,11 @@ def is_integer(value):
     if isinstance(value, bool) or not isinstance(value, Real):
         return False
     return isinstance(value, Integral) or float(value).is_integer()
+
+
+def nanmean(values, axis):
+    """The mean of the values that are not NaN; NaN, without a warning, if all are."""
+    seen = np.isfinite(values)
+    count = seen.sum(axis=axis)
+    total = np.where(seen, values, 0).sum(axis=axis)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

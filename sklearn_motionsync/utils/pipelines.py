@@ -4,6 +4,7 @@ import inspect
 from contextlib import contextmanager
 from typing import NamedTuple
 
+import numpy as np
 from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils.validation import check_is_fitted
 
@@ -263,8 +264,10 @@ def index_of_pattern(synchronizer, performances):
     index = synchronizer.pattern_index_
     if index is None or index >= len(performances):
         return None
-    same = synchronizer.normalize(performances.take([index]))[0]
-    return index if (same == synchronizer.pattern_).all() else None
+    own = synchronizer.normalize(performances.take([index]))[0]
+    # The gaps of the pattern are filled.
+    same = (own == synchronizer.pattern_) | np.isnan(own)
+    return index if same.all() else None
 
 
 def _named_steps(pipeline):
