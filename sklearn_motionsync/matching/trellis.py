@@ -105,11 +105,13 @@ class Trellis:
     running : bool, default=False
         Whether bases may stop at any sample and end at any position of the moving sequence, which
         has ``max_disparity * subframes + 1`` of them.
+    anchors : Anchors, default=None
+        The cost of key-frames. They are the last columns of sequences.
     """
 
-    def __init__(self, table, mu, max_disparity, free=False, running=False):
+    def __init__(self, table, mu, max_disparity, free=False, running=False, anchors=None):
         self.table, self.mu, self.free, self.running = table, mu, free, running
-        self.reach = max_disparity
+        self.reach, self.anchors = max_disparity, anchors
         self.width = max_disparity * table.subframes
         # The position that sample 0 of the base meets at disparity 0, the positions from sample to
         # sample, and the disparities at which paths may end.
@@ -133,14 +135,20 @@ class Trellis:
         self.unit_group = self.group_of_step[table.steps == table.subframes][0]
         self._windows = {}
 
+    def features(self, sequences):
+        """Sequences (..., n_columns) without columns of key-frames."""
+        return sequences if self.anchors is None else self.anchors.columns.features(sequences)
+
     @classmethod
-    def on_clock(cls, cost, n_frames, mu, *, max_offset, max_rate, subframes=1, free=False):
+    def on_clock(
+        cls, cost, n_frames, mu, *, max_offset, max_rate, subframes=1, free=False, anchors=None
+    ):
         """The trellis of a cost; the largest offset is a share of the clock."""
         # Whole frames; 0.29 * 100 must not lose one to rounding.
         reach = int(np.floor(max_offset * n_frames * (1 + 1e-12)))
         # No step is longer than the clip.
         table = step_table(cost, min(max_rate, n_frames - 1), subframes)
-        return cls(table, mu, min(reach, n_frames - 1), free)
+        return cls(table, mu, min(reach, n_frames - 1), free, anchors=anchors)
 
     def distances(self, bases, moving):
         """Cost of the best path for every ordered pair.
@@ -222,6 +230,7 @@ class Trellis:
         -------
         ndarray, shape (n_moving,)
         """
+        base, moving = self.features(base), self.features(moving)
         out = np.empty(len(moving), dtype=moving.dtype)
         n_positions, n_features = moving.shape[1:]
         diagonal = self.lead + self.stride * np.arange(len(base))
@@ -271,7 +280,7 @@ class Trellis:
             drawn = None
             if coupling is not None:
                 drawn = Coupling(coupling.weight, coupling.offsets[rows, columns])
-            yield rows, columns, Tile(part, right_factor(moving[columns]), drawn)
+            yield rows, columns, Tile(part, right_factor(moving[columns], self.anchors), drawn)
 
     def windows(self, n_frames):
         """Lowest and highest disparity, at every sample, of a path in the band."""
@@ -555,7 +564,7 @@ class Tile:
         penalties, weight, inner = trellis.of_step.astype(states.dtype)[:, :, np.newaxis]
         charges = penalties + self.tie_breakers
         n_moving, n_factors = self.right.shape[1:]
-        positions = self.right.reshape(-1, n_factors)
+        positions, features = self.right.reshape(-1, n_factors), self.bases.features
         start = min(last, self.n_frames - 1)
         here = at[start]
         for p in range(start, first, -1):
@@ -565,8 +574,8 @@ class Tile:
                 q = trellis.lead + p * trellis.stride - trellis.centre
                 y = positions.take(here // self.n_bases + q * n_moving, axis=0)
                 value += weight * y[:, -2]
-                y = y.reshape(-1, self.n_bases, n_factors)[..., :-2]
-                products = np.einsum("mnk,nk->mn", y, self.bases.sequences[:, p])
+                y = y.reshape(-1, self.n_bases, n_factors)[..., : features.shape[2]]
+                products = np.einsum("mnk,nk->mn", y, features[:, p])
                 value -= inner * products.ravel()
             here = here - shift.take(value.argmin(axis=0))
             at[p - 1] = here
