@@ -16,16 +16,17 @@ from scipy.ndimage import gaussian_filter1d
 
 from .consensus import smooth_warps
 from .factors import Bases
-from .filters import LEAST_SIGMA, choose_smoothing, smooth
+from .filters import LEAST_SIGMA, smooth
 from .trellis import Trellis
 from .warps import evaluate_warps, even_slices, sample
 
 __all__ = ["Sharpener", "choose_width"]
 
-# Widths of the smoothing of velocities, as shares of the clip, and the largest share of noise in
-# their energy. The first width that keeps to it is chosen.
+# Widths of the smoothing of velocities, as shares of the clip. The first is chosen whose share of
+# noise in their energy is at most this, times the root of the number of features: noise averages
+# out. Noise is what is left of differences of this order: docs/design.md.
 _WIDTHS = (0.01, 0.014, 0.02, 0.028, 0.04)
-_NOISE = 0.05
+_NOISE, _ORDER = 0.01, 6
 # Speed, in units of the typical one, below which a root is linear.
 _SLOW = 0.05
 # The local trellis: its most frames, positions a frame, largest offset as a share of the clip,
@@ -54,29 +55,19 @@ def choose_width(positions):
     Returns
     -------
     float
-        The smallest width at which noise has a share of at most 5 % in the energy of velocities,
-        in the mean over features.
+        The smallest width at which white noise has a small share in the energy of velocities, in
+        the mean over features: at most 1 % of one feature, and 4 % of sixteen.
     """
     last = positions.shape[1] - 1
-    energy = np.square(smooth(positions, _WIDTHS[-1] * last, order=1)).mean(axis=(0, 1))
-    moves = energy > 0
-    if not moves.any():
-        return _WIDTHS[-1]
-    # Features of equal energy of velocity.
-    scaled = positions[:, :, moves] / np.sqrt(energy[moves])
-    sigma = max(choose_smoothing(scaled), LEAST_SIGMA)
-    residuals = np.square(scaled - smooth(scaled, sigma)).mean(axis=(0, 1))
-    grid = np.arange(-math.ceil(4 * sigma), math.ceil(4 * sigma) + 1)
-    weights = np.exp(-0.5 * (grid / sigma) ** 2)
-    weights /= weights.sum()
-    # Of white noise the residuals keep this share.
-    noise = residuals / (1 - 2 * weights.max() + np.square(weights).sum())
+    differences = np.diff(positions, _ORDER, axis=1)
+    noise = np.square(differences).mean(axis=(0, 1)) / math.comb(2 * _ORDER, _ORDER)
     for width in _WIDTHS:
         sigma = max(width * last, LEAST_SIGMA)
-        velocity = np.square(smooth(scaled, sigma, order=1)).mean(axis=(0, 1))
+        energy = np.square(smooth(positions, sigma, order=1)).mean(axis=(0, 1))
+        moves = energy > 0
         # The variance of the derivative of white noise under a Gaussian.
-        share = noise / (4 * math.sqrt(math.pi) * sigma**3) / np.where(velocity > 0, velocity, 1)
-        if share.mean() <= _NOISE:
+        share = noise[moves] / (4 * math.sqrt(math.pi) * sigma**3 * energy[moves])
+        if len(share) and share.mean() <= _NOISE * math.sqrt(len(share)):
             break
     return width
 
@@ -136,6 +127,8 @@ class Sharpener(NamedTuple):
         """
         n_frames = len(pattern)
         count = min(n_frames, _FRAMES)
+        if math.floor(_REACH * count) < 1:
+            return None
         used = metric.features
         if width is None:
             width = choose_width(positions[:, :, used])
@@ -152,7 +145,7 @@ class Sharpener(NamedTuple):
         energy = np.square(roots).mean(axis=(0, 1))
         ridge = _RIDGE * energy.mean()
         agreement = 1 - disagreement / np.where(energy > 0, 2 * energy, 1)
-        if math.floor(_REACH * count) < 1 or not ridge > 0 or not agreement.mean() > 0:
+        if not ridge > 0 or not agreement.mean() > 0:
             return None
         # The rule of the metric, one component at a time.
         evidence = 1 / (disagreement + ridge) - 1 / (2 * energy + ridge)
