@@ -8,6 +8,7 @@ counts by how well trials agree in it. A warp follows the local match where the 
 clearly, and stays as it was where they tell little.
 """
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -18,7 +19,7 @@ from .consensus import smooth_warps
 from .factors import Bases
 from .filters import LEAST_SIGMA, smooth
 from .trellis import Trellis
-from .warps import evaluate_warps, even_slices, sample
+from .warps import even_slices
 
 __all__ = ["Sharpener", "choose_width"]
 
@@ -208,9 +209,12 @@ class Sharpener(NamedTuple):
         return smooth_warps(voted + changes, reach, 0)
 
 
+@functools.lru_cache(maxsize=8)
 def _grid(n_frames, subframes):
     """Times of the local clock, in frames, with so many positions a frame of it."""
-    return np.linspace(0, n_frames - 1, (min(n_frames, _FRAMES) - 1) * subframes + 1)
+    grid = np.linspace(0, n_frames - 1, (min(n_frames, _FRAMES) - 1) * subframes + 1)
+    grid.flags.writeable = False
+    return grid
 
 
 def _roots(velocity):
@@ -223,9 +227,22 @@ def _at_pace(roots, times, at):
 
     So warped, the roots are those of the warped velocities.
     """
-    tau = evaluate_warps(times, at[np.newaxis])
-    rates = np.maximum(np.gradient(tau, at, axis=1), 0)
-    return sample(roots, tau, roots.shape[1]) * np.sqrt(rates)[:, :, np.newaxis]
+    n_frames = roots.shape[1]
+    frames, step = np.arange(n_frames), at[-1] / (len(at) - 1)
+    out = np.empty((len(roots), len(at), roots.shape[2]))
+    for one, warp, warped in zip(roots, times, out, strict=True):
+        tau = np.interp(at, frames, warp)
+        # Central differences, one-sided at the ends.
+        edges = np.concatenate([tau[:1], tau, tau[-1:]])
+        rates = (edges[2:] - edges[:-2]) / (2 * step)
+        rates[[0, -1]] *= 2
+        left = np.minimum(tau.astype(np.intp), n_frames - 2)
+        scale = np.sqrt(np.maximum(rates, 0))
+        following = (tau - left) * scale
+        np.multiply(one.take(left, axis=0), (scale - following)[:, np.newaxis], out=warped)
+        left += 1
+        warped += one.take(left, axis=0) * following[:, np.newaxis]
+    return out
 
 
 def _smooth_along(values, smoothing):
