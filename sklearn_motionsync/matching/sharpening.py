@@ -42,6 +42,8 @@ _POWER = 0.75
 # How far warps may go is the mean agreement to this power. They go half of it where the precision
 # of the local match, in one over squared per cent of the clip, is this: docs/design.md.
 _TRUST, _HALF = 1.5, 0.02
+# Decimals of a frame to which changes are rounded.
+_DECIMALS = 7
 # Numbers that are sampled at a time: bounds the memory.
 _BATCH_SIZE = 1 << 22
 
@@ -205,6 +207,8 @@ class Sharpener(NamedTuple):
             for row, tau, steps in zip(out[rows], times[rows], at[local], strict=True):
                 row[:] = np.interp(frames, at[::_SUBFRAMES], np.interp(steps, frames, tau))
         changes = self.gain * _smooth_along(self.precision * (out - voted), self.smoothing)
+        # The last bits of a metric depend on the unit of the data; warps must not.
+        changes = np.round(changes, _DECIMALS)
         changes[:, [0, -1]] = 0
         return smooth_warps(voted + changes, reach, 0)
 
