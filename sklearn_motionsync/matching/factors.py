@@ -40,9 +40,13 @@ class Bases:
 
     @functools.cached_property
     def by_step(self):
-        """The left factor of every step, in order of steps, for small tiles."""
+        """The left factor of every step, in order of steps, for small tiles.
+
+        (P, n_steps * n_bases, n_features + 2): one product a sample.
+        """
         penalty, moving, inner = self.trellis.of_step[:, self.trellis.entry_of_step]
-        return self._left_factor(moving, inner, penalty)
+        left = self._left_factor(moving, inner, penalty).swapaxes(2, 3)
+        return np.ascontiguousarray(left).reshape(len(left), -1, left.shape[3])
 
     def _left_factor(self, moving, inner, penalty):
         """(P, n_groups, n_columns + 2, n_bases): times the right factor, the local costs.

@@ -270,6 +270,8 @@ class FeatureStore:
 
     def select(self, indices):
         """Features of some performances, (n_indices, Q, n_compared)."""
+        if self.is_cached:
+            return self.cached[indices]
         out = np.empty((len(indices), *self.template.shape[1:]), self.template.dtype)
         for rows in self._slices(len(indices)):
             out[rows] = self._features(self._positions[indices[rows]])
