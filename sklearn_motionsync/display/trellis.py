@@ -105,7 +105,7 @@ class TrellisDisplay:
         colorbar : bool, default=True
             Whether to draw a scale of the costs.
         **params : dict
-            Further arguments of the steps before the synchronizer, such as ``keyframes``.
+            Further arguments of the synchronizer and of steps before, such as ``keyframes``.
 
         Returns
         -------
@@ -114,9 +114,12 @@ class TrellisDisplay:
         """
         caller = f"{cls.__name__}.from_estimator"
         reached = route_to_synchronizer(estimator, X, params, caller, kind=DenseSynchronizer)
-        _, synchronizer, performances = reached[:3]
-        space = synchronizer.disparity_space(performances, performance)
-        warp = synchronizer.match(performances.take([performance])).offsets[0]
+        _, synchronizer, performances, given = reached[:4]
+        space = synchronizer.disparity_space(performances, performance, **given)
+        if given:
+            warp = reached.match().offsets[performance]
+        else:
+            warp = synchronizer.match(performances.take([performance])).offsets[0]
         index = index_of_pattern(synchronizer, performances)
         names = ("template" if index is None else f"template {index}", f"trial {performance}")
         return cls(**space, warp=warp, names=names).plot(ax, colorbar=colorbar)

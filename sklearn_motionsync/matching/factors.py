@@ -26,7 +26,13 @@ class Bases:
     @functools.cached_property
     def energy(self):
         """``sum_p |x_n(p)|^2``: (n_bases,)."""
-        return np.einsum("npk,npk->n", self.sequences, self.sequences)
+        features = self.features
+        return np.einsum("npk,npk->n", features, features)
+
+    @property
+    def features(self):
+        """The sequences without columns of key-frames."""
+        return self.trellis.features(self.sequences)
 
     def by_group(self):
         """The left factor of every group of steps. It is large for long takes: not cached."""
@@ -34,32 +40,44 @@ class Bases:
 
     @functools.cached_property
     def by_step(self):
-        """The left factor of every step, in order of steps, for small tiles."""
+        """The left factor of every step, in order of steps, for small tiles.
+
+        (P, n_steps * n_bases, n_features + 2): one product a sample.
+        """
         penalty, moving, inner = self.trellis.of_step[:, self.trellis.entry_of_step]
-        return self._left_factor(moving, inner, penalty)
+        left = self._left_factor(moving, inner, penalty).swapaxes(2, 3)
+        return np.ascontiguousarray(left).reshape(len(left), -1, left.shape[3])
 
     def _left_factor(self, moving, inner, penalty):
-        """(P, n_groups, n_features + 2, n_bases): times the right factor, the local costs.
+        """(P, n_groups, n_columns + 2, n_bases): times the right factor, the local costs.
 
         Given the weights of |x_m|^2 and of the inner product, and the penalty, of every group.
         """
-        n_bases, n_frames, n_features = self.sequences.shape
-        shape = n_frames, len(moving), n_features + 2, n_bases
-        left = np.empty(shape, dtype=self.sequences.dtype)
-        energy = np.einsum("npk,npk->pn", self.sequences, self.sequences)
+        n_bases, n_frames, n_columns = self.sequences.shape
+        features, anchors = self.features, self.trellis.anchors
+        n_features = features.shape[2]
+        left = np.empty((n_frames, len(moving), n_columns + 2, n_bases), dtype=features.dtype)
+        energy = np.einsum("npk,npk->pn", features, features)
         moving, inner, penalty = np.asarray([moving, inner, penalty], dtype=left.dtype)
-        frames = self.sequences.transpose(1, 2, 0)[:, np.newaxis]
-        np.multiply(frames, -inner[:, np.newaxis, np.newaxis], out=left[:, :, :-2])
+        frames = features.transpose(1, 2, 0)[:, np.newaxis]
+        np.multiply(frames, -inner[:, np.newaxis, np.newaxis], out=left[:, :, :n_features])
+        if anchors is not None:
+            shares = anchors.left(self.sequences).transpose(1, 2, 0)
+            left[:, :, n_features:-2] = shares[:, np.newaxis]
         left[:, :, -2] = moving[:, np.newaxis]
         np.add(energy[:, np.newaxis], penalty[:, np.newaxis], out=left[:, :, -1])
         return left
 
 
-def right_factor(moving):
-    """(Q, n_moving, n_features + 2): x_m(q), |x_m(q)|^2 and 1."""
-    n_moving, n_positions, n_features = moving.shape
-    right = np.empty((n_positions, n_moving, n_features + 2), dtype=moving.dtype)
-    right[..., :-2] = moving.transpose(1, 0, 2)
-    right[..., -2] = np.einsum("mqk,mqk->mq", moving, moving).T
+def right_factor(moving, anchors=None):
+    """(Q, n_moving, n_columns + 2): x_m(q), costs of anchors, |x_m(q)|^2 and 1."""
+    n_moving, n_positions, n_columns = moving.shape
+    features = moving if anchors is None else anchors.columns.features(moving)
+    n_features = features.shape[2]
+    right = np.empty((n_positions, n_moving, n_columns + 2), dtype=moving.dtype)
+    right[..., :n_features] = features.transpose(1, 0, 2)
+    if anchors is not None:
+        right[..., n_features:-2] = anchors.right(moving).transpose(1, 0, 2)
+    right[..., -2] = np.einsum("mqk,mqk->mq", features, features).T
     right[..., -1] = 1
     return right

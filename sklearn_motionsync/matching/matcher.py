@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .anchors import KeyframeColumns
 from .consensus import choose_exemplars, smooth_warps, vote
 from .costs import COSTS
 from .factors import Bases
@@ -84,6 +85,8 @@ class Features(NamedTuple):
         Only so many frames are compared, evenly spaced.
     single : bool, default=False
         Whether features are in single precision, whatever that of the postures.
+    anchors : KeyframeColumns, default=None
+        Columns of positions and features behind their own.
     """
 
     cost: str
@@ -93,17 +96,28 @@ class Features(NamedTuple):
     metric: Metric | None = None
     frames: int | None = None
     single: bool = False
+    anchors: KeyframeColumns | None = None
 
     def __call__(self, positions):
-        """Features, at every position, of postures in the unit: (n_sequences, Q, n_compared)."""
+        """Features, at every position, of postures in the unit: (n_sequences, Q, n_compared).
+
+        Columns of key-frames follow them.
+        """
         if self.single:
             positions = positions.astype(np.float32, copy=False)
-        features = cost_features(positions, self.cost, self.subframes, self.velocity_smoothing)
+        postures = self.plain(positions)
+        features = cost_features(postures, self.cost, self.subframes, self.velocity_smoothing)
         if self.metric is not None:
-            features = self.metric(features, positions)
+            features = self.metric(features, postures)
+        if postures is not positions:
+            features = np.concatenate([features, self.anchors.ramps(positions)], axis=2)
         if self.frames is not None:
             features = features[:, _spread(features.shape[1], self.frames)]
         return features
+
+    def plain(self, columns):
+        """Positions or features (..., n_columns) without columns of key-frames."""
+        return columns if self.anchors is None else self.anchors.features(columns)
 
     def replace(self, **changes):
         """The same features but for these attributes."""
@@ -155,6 +169,7 @@ class Features(NamedTuple):
         """
         # Rounding changes a metric much less than noise.
         positions = positions.astype(np.float32, copy=False)
+        positions, ramps = self.plain(positions), positions[..., len(self.unit.centre) :]
         velocity = cost_features(positions, self.cost, self.subframes, self.velocity_smoothing)
         n_frames = (positions.shape[1] - 1) // self.subframes + 1
         some = _spread(positions.shape[1], min(n_frames, LEARNING_FRAMES))
@@ -164,7 +179,7 @@ class Features(NamedTuple):
         within = np.interp(np.arange(len(some)), few, np.arange(len(few)))
 
         def match(compared, others):
-            compared = compared[:, few]
+            compared = np.concatenate([compared, ramps], axis=2)[:, few]
             matcher = Matcher.of(self.at_pace(1), compared, **settings)
             times = matcher.match_others(compared, others, consensus, warp_smoothing)
             times = np.interp(times, np.arange(len(few)), few)
@@ -172,7 +187,8 @@ class Features(NamedTuple):
 
         # Which one of a pair is the base does not depend on the order of performances.
         order = np.argsort(np.einsum("npk,npk->n", velocity, velocity), kind="stable")
-        positions, velocity = (x[np.ix_(order, some)] for x in (positions, velocity))
+        parts = positions, velocity, ramps
+        positions, velocity, ramps = (x[np.ix_(order, some)] for x in parts)
         learnt = learn_metric(match, positions, velocity)
         if learnt is None:
             return None
@@ -230,7 +246,8 @@ class Matcher(NamedTuple):
     @classmethod
     def of(cls, features, compared, **settings):
         """The matcher of a training set with these features, an array."""
-        energy = np.einsum("npk,npk->", compared, compared, dtype=np.float64)
+        plain = features.plain(compared)
+        energy = np.einsum("npk,npk->", plain, plain, dtype=np.float64)
         return cls.of_energy(features, compared.shape, energy, **settings)
 
     @classmethod
@@ -245,7 +262,18 @@ class Matcher(NamedTuple):
         subframes = features.subframes if features.frames is None else 1
         n_frames = (n_positions - 1) // subframes + 1
         reach = {"max_offset": max_offset, "max_rate": max_rate, "subframes": subframes}
+        if features.anchors is not None:
+            mean = float(energy / (n_sequences * n_positions))
+            reach["anchors"] = features.anchors.on_clock(n_frames, mean)
         return cls(features, Trellis.on_clock(features.cost, n_frames, mu, **reach))
+
+    def on_clock(self, features, n_frames, *, max_offset, max_rate):
+        """The matcher that is this one but for its features and the frames of its clock."""
+        reach = {"max_offset": max_offset, "max_rate": max_rate, "subframes": features.subframes}
+        if self.trellis.anchors is not None:
+            reach["anchors"] = self.trellis.anchors.at(n_frames)
+        trellis = Trellis.on_clock(features.cost, n_frames, self.trellis.mu, **reach)
+        return Matcher(features, trellis)
 
     def distances(self, features, bases, moving, tiles):
         """Synchronisation distances ``D_{n,m}`` of the tiles of the pairs of two index arrays."""
@@ -405,7 +433,7 @@ class Warper:
             # A strong coupling leaves nothing, also where the given warp is steeper than a path.
             times += share**2 * (others + np.arange(times.shape[1]) - times)
         # A path without any distance is right: the pattern keeps its own pace.
-        rounding = 64 * np.finfo(positions.dtype).eps * np.square(base).sum()
+        rounding = 64 * np.finfo(positions.dtype).eps * bases.energy[0]
         return distances, np.where((distances <= rounding)[:, np.newaxis], routes[0], times)
 
     def disparity_space(self, positions):
@@ -429,7 +457,7 @@ class Warper:
         for row, p in zip(costs, frames, strict=True):
             inside = (lows[p] <= disparities) & (disparities <= highs[p])
             window = moving[0, p * sub + disparities[inside]]
-            row[inside] = np.square(base[p] - window).sum(axis=1)
+            row[inside] = np.square(trellis.features(base[p] - window)).sum(axis=1)
         path = trellis.paths(base[np.newaxis], moving)[0, 0] / sub
         return frames, disparities / sub, costs, path
 
@@ -481,7 +509,8 @@ class RefinedWarper(Warper):
 
     def postures(self, positions):
         """Postures of the pattern and of performances, smoothed by the width of the noise."""
-        postures = positions[:, :: self.matcher.features.subframes]
+        features = self.matcher.features
+        postures = features.plain(positions)[:, :: features.subframes]
         if self.noise_width <= 0:
             return self.pattern, postures
         curves = smooth(np.concatenate([self.pattern[np.newaxis], postures]), self.noise_width)
@@ -512,7 +541,8 @@ class SharpenedWarper(Warper):
         width : float, default=None
             Smoothing of velocities; by default as their noise asks for.
         """
-        matcher, postures = warper.matcher, exemplars[:, :: warper.matcher.features.subframes]
+        matcher, features = warper.matcher, warper.matcher.features
+        postures = features.plain(exemplars)[:, :: features.subframes]
         times = smooth_warps(warper.to_exemplars, matcher.trellis.reach, warper.warp_smoothing)
         metric = matcher.features.metric
         smoothing = warper.warp_smoothing
@@ -522,5 +552,6 @@ class SharpenedWarper(Warper):
     def warps(self, positions):
         """Warps as of `Warper`, sharpened."""
         distances, times = super().warps(positions)
-        postures = positions[:, :: self.matcher.features.subframes]
+        features = self.matcher.features
+        postures = features.plain(positions)[:, :: features.subframes]
         return distances, self.sharpener(postures, times, self.matcher.trellis.reach)

@@ -28,6 +28,8 @@ _COORDINATES = 2
 _LANDMARKS = 100
 # Most typical performances that stand for a mode.
 _SIGNS = 3
+# Fewest performances with key-frames that are enough exemplars.
+_LEAST_KNOWN = 2
 # Performances at a time whose modes are found.
 _ROWS = 256
 
@@ -60,17 +62,26 @@ class Modes(NamedTuple):
     def are_several(self):
         return bool(self.labels.max(initial=0) > 0)
 
-    def exemplars(self, typical, n_exemplars, pattern):
+    def exemplars(self, typical, n_exemplars, pattern, known=None):
         """Indices of exemplars of every mode, a list of arrays.
 
-        ``typical`` are the global distances of all: they choose the exemplars of a single mode.
+        Parameters
+        ----------
+        typical : ndarray, shape (n_sequences,)
+            The global distances of all: they choose the exemplars of a single mode.
+        n_exemplars : int
+        pattern : int or None
+        known : ndarray of bool, shape (n_sequences,), default=None
+            Which performances have key-frames. If a mode has some, they are its exemplars.
         """
-        if not self.are_several:
+        if not self.are_several and known is None:
             return [choose_exemplars(typical, n_exemplars, [pattern])[:, 0]]
-        chosen = []
+        typical, chosen = self.typical if self.are_several else typical, []
         for mode in range(len(self.shares)):
             own = np.flatnonzero((self.labels == mode) & (np.arange(len(self.labels)) != pattern))
-            chosen.append(own[choose_exemplars(self.typical[own], n_exemplars, [None])[:, 0]])
+            if known is not None and known[own].sum() >= _LEAST_KNOWN:
+                own = own[known[own]]
+            chosen.append(own[choose_exemplars(typical[own], n_exemplars, [None])[:, 0]])
         return chosen
 
     def home(self, pattern, warpers):
@@ -126,14 +137,15 @@ class DistanceTable:
         if table is None or len(table) < n or len(marks) < 2 * _FEWEST:
             return single
         subframes = store.positions_a_frame
-        own = _energies(store.select(marks), subframes)
+        own = _energies(store.plain(store.select(marks)), subframes)
         among = _shares(table[marks], own, own)
         among = (among + among.T) / 2
         np.fill_diagonal(among, 0)
         heaps = _heaps(among, np.arange(len(marks)))
         if len(heaps) == 1:
             return single
-        energies = np.concatenate([_energies(x, subframes) for x in store.portions()])
+        energies = [_energies(store.plain(x), subframes) for x in store.portions()]
+        energies = np.concatenate(energies)
         shares, distances = _shares(table, energies, own), np.empty((len(heaps), n))
         shares[marks] = among
         for mode, heap in enumerate(heaps):
@@ -271,7 +283,8 @@ class ModalWarper(Warper):
             positions = own.positions([performances[k] for k in chosen])
             across[mode] = warper.warps(positions[:1])[1][0]
             settings = positions, True, own.warp_smoothing
-            found = Warper.to_pattern(matcher, positions[0, ::subframes], *settings)
+            pattern = matcher.features.plain(positions)[0, ::subframes]
+            found = Warper.to_pattern(matcher, pattern, *settings)
             to_own.append(finish(type(own)(**vars(own) | vars(found)), chosen[1:]))
         features = matcher.features(own.positions([performances[k] for k in signs.ravel()]))
         return cls(
@@ -305,8 +318,9 @@ class ModalWarper(Warper):
         if moving.dtype != signs.sequences.dtype:
             signs = Bases(signs.trellis, signs.sequences.astype(moving.dtype))
         distances = signs.trellis.paths_and_costs(signs, moving)[1]
-        own = _energies(moving, self.matcher.features.subframes)
-        shares = _shares(distances, _energies(signs.sequences), own)
+        features = self.matcher.features
+        own = _energies(features.plain(moving), features.subframes)
+        shares = _shares(distances, _energies(signs.features), own)
         return shares.reshape(len(self.warpers), -1, len(moving)).mean(axis=1).argmin(axis=0)
 
     def modes_of(self, arrays):

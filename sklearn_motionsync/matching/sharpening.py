@@ -8,6 +8,7 @@ counts by how well trials agree in it. A warp follows the local match where the 
 clearly, and stays as it was where they tell little.
 """
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -16,16 +17,17 @@ from scipy.ndimage import gaussian_filter1d
 
 from .consensus import smooth_warps
 from .factors import Bases
-from .filters import LEAST_SIGMA, choose_smoothing, smooth
+from .filters import LEAST_SIGMA, smooth
 from .trellis import Trellis
-from .warps import evaluate_warps, even_slices, sample
+from .warps import even_slices
 
 __all__ = ["Sharpener", "choose_width"]
 
-# Widths of the smoothing of velocities, as shares of the clip, and the largest share of noise in
-# their energy. The first width that keeps to it is chosen.
+# Widths of the smoothing of velocities, as shares of the clip. The first is chosen whose share of
+# noise in their energy is at most this, times the root of the number of features: noise averages
+# out. Noise is what is left of differences of this order: docs/design.md.
 _WIDTHS = (0.01, 0.014, 0.02, 0.028, 0.04)
-_NOISE = 0.05
+_NOISE, _ORDER = 0.01, 6
 # Speed, in units of the typical one, below which a root is linear.
 _SLOW = 0.05
 # The local trellis: its most frames, positions a frame, largest offset as a share of the clip,
@@ -40,6 +42,8 @@ _POWER = 0.75
 # How far warps may go is the mean agreement to this power. They go half of it where the precision
 # of the local match, in one over squared per cent of the clip, is this: docs/design.md.
 _TRUST, _HALF = 1.5, 0.02
+# Decimals of a frame to which changes are rounded.
+_DECIMALS = 7
 # Numbers that are sampled at a time: bounds the memory.
 _BATCH_SIZE = 1 << 22
 
@@ -54,29 +58,19 @@ def choose_width(positions):
     Returns
     -------
     float
-        The smallest width at which noise has a share of at most 5 % in the energy of velocities,
-        in the mean over features.
+        The smallest width at which white noise has a small share in the energy of velocities, in
+        the mean over features: at most 1 % of one feature, and 4 % of sixteen.
     """
     last = positions.shape[1] - 1
-    energy = np.square(smooth(positions, _WIDTHS[-1] * last, order=1)).mean(axis=(0, 1))
-    moves = energy > 0
-    if not moves.any():
-        return _WIDTHS[-1]
-    # Features of equal energy of velocity.
-    scaled = positions[:, :, moves] / np.sqrt(energy[moves])
-    sigma = max(choose_smoothing(scaled), LEAST_SIGMA)
-    residuals = np.square(scaled - smooth(scaled, sigma)).mean(axis=(0, 1))
-    grid = np.arange(-math.ceil(4 * sigma), math.ceil(4 * sigma) + 1)
-    weights = np.exp(-0.5 * (grid / sigma) ** 2)
-    weights /= weights.sum()
-    # Of white noise the residuals keep this share.
-    noise = residuals / (1 - 2 * weights.max() + np.square(weights).sum())
+    differences = np.diff(positions, _ORDER, axis=1)
+    noise = np.square(differences).mean(axis=(0, 1)) / math.comb(2 * _ORDER, _ORDER)
     for width in _WIDTHS:
         sigma = max(width * last, LEAST_SIGMA)
-        velocity = np.square(smooth(scaled, sigma, order=1)).mean(axis=(0, 1))
+        energy = np.square(smooth(positions, sigma, order=1)).mean(axis=(0, 1))
+        moves = energy > 0
         # The variance of the derivative of white noise under a Gaussian.
-        share = noise / (4 * math.sqrt(math.pi) * sigma**3) / np.where(velocity > 0, velocity, 1)
-        if share.mean() <= _NOISE:
+        share = noise[moves] / (4 * math.sqrt(math.pi) * sigma**3 * energy[moves])
+        if len(share) and share.mean() <= _NOISE * math.sqrt(len(share)):
             break
     return width
 
@@ -136,6 +130,8 @@ class Sharpener(NamedTuple):
         """
         n_frames = len(pattern)
         count = min(n_frames, _FRAMES)
+        if math.floor(_REACH * count) < 1:
+            return None
         used = metric.features
         if width is None:
             width = choose_width(positions[:, :, used])
@@ -152,7 +148,7 @@ class Sharpener(NamedTuple):
         energy = np.square(roots).mean(axis=(0, 1))
         ridge = _RIDGE * energy.mean()
         agreement = 1 - disagreement / np.where(energy > 0, 2 * energy, 1)
-        if math.floor(_REACH * count) < 1 or not ridge > 0 or not agreement.mean() > 0:
+        if not ridge > 0 or not agreement.mean() > 0:
             return None
         # The rule of the metric, one component at a time.
         evidence = 1 / (disagreement + ridge) - 1 / (2 * energy + ridge)
@@ -211,13 +207,18 @@ class Sharpener(NamedTuple):
             for row, tau, steps in zip(out[rows], times[rows], at[local], strict=True):
                 row[:] = np.interp(frames, at[::_SUBFRAMES], np.interp(steps, frames, tau))
         changes = self.gain * _smooth_along(self.precision * (out - voted), self.smoothing)
+        # The last bits of a metric depend on the unit of the data; warps must not.
+        changes = np.round(changes, _DECIMALS)
         changes[:, [0, -1]] = 0
         return smooth_warps(voted + changes, reach, 0)
 
 
+@functools.lru_cache(maxsize=8)
 def _grid(n_frames, subframes):
     """Times of the local clock, in frames, with so many positions a frame of it."""
-    return np.linspace(0, n_frames - 1, (min(n_frames, _FRAMES) - 1) * subframes + 1)
+    grid = np.linspace(0, n_frames - 1, (min(n_frames, _FRAMES) - 1) * subframes + 1)
+    grid.flags.writeable = False
+    return grid
 
 
 def _roots(velocity):
@@ -230,9 +231,22 @@ def _at_pace(roots, times, at):
 
     So warped, the roots are those of the warped velocities.
     """
-    tau = evaluate_warps(times, at[np.newaxis])
-    rates = np.maximum(np.gradient(tau, at, axis=1), 0)
-    return sample(roots, tau, roots.shape[1]) * np.sqrt(rates)[:, :, np.newaxis]
+    n_frames = roots.shape[1]
+    frames, step = np.arange(n_frames), at[-1] / (len(at) - 1)
+    out = np.empty((len(roots), len(at), roots.shape[2]))
+    for one, warp, warped in zip(roots, times, out, strict=True):
+        tau = np.interp(at, frames, warp)
+        # Central differences, one-sided at the ends.
+        edges = np.concatenate([tau[:1], tau, tau[-1:]])
+        rates = (edges[2:] - edges[:-2]) / (2 * step)
+        rates[[0, -1]] *= 2
+        left = np.minimum(tau.astype(np.intp), n_frames - 2)
+        scale = np.sqrt(np.maximum(rates, 0))
+        following = (tau - left) * scale
+        np.multiply(one.take(left, axis=0), (scale - following)[:, np.newaxis], out=warped)
+        left += 1
+        warped += one.take(left, axis=0) * following[:, np.newaxis]
+    return out
 
 
 def _smooth_along(values, smoothing):

@@ -105,11 +105,13 @@ class Trellis:
     running : bool, default=False
         Whether bases may stop at any sample and end at any position of the moving sequence, which
         has ``max_disparity * subframes + 1`` of them.
+    anchors : Anchors, default=None
+        The cost of key-frames. They are the last columns of sequences.
     """
 
-    def __init__(self, table, mu, max_disparity, free=False, running=False):
+    def __init__(self, table, mu, max_disparity, free=False, running=False, anchors=None):
         self.table, self.mu, self.free, self.running = table, mu, free, running
-        self.reach = max_disparity
+        self.reach, self.anchors = max_disparity, anchors
         self.width = max_disparity * table.subframes
         # The position that sample 0 of the base meets at disparity 0, the positions from sample to
         # sample, and the disparities at which paths may end.
@@ -133,14 +135,20 @@ class Trellis:
         self.unit_group = self.group_of_step[table.steps == table.subframes][0]
         self._windows = {}
 
+    def features(self, sequences):
+        """Sequences (..., n_columns) without columns of key-frames."""
+        return sequences if self.anchors is None else self.anchors.columns.features(sequences)
+
     @classmethod
-    def on_clock(cls, cost, n_frames, mu, *, max_offset, max_rate, subframes=1, free=False):
+    def on_clock(
+        cls, cost, n_frames, mu, *, max_offset, max_rate, subframes=1, free=False, anchors=None
+    ):
         """The trellis of a cost; the largest offset is a share of the clock."""
         # Whole frames; 0.29 * 100 must not lose one to rounding.
         reach = int(np.floor(max_offset * n_frames * (1 + 1e-12)))
         # No step is longer than the clip.
         table = step_table(cost, min(max_rate, n_frames - 1), subframes)
-        return cls(table, mu, min(reach, n_frames - 1), free)
+        return cls(table, mu, min(reach, n_frames - 1), free, anchors=anchors)
 
     def distances(self, bases, moving):
         """Cost of the best path for every ordered pair.
@@ -222,6 +230,7 @@ class Trellis:
         -------
         ndarray, shape (n_moving,)
         """
+        base, moving = self.features(base), self.features(moving)
         out = np.empty(len(moving), dtype=moving.dtype)
         n_positions, n_features = moving.shape[1:]
         diagonal = self.lead + self.stride * np.arange(len(base))
@@ -271,7 +280,7 @@ class Trellis:
             drawn = None
             if coupling is not None:
                 drawn = Coupling(coupling.weight, coupling.offsets[rows, columns])
-            yield rows, columns, Tile(part, right_factor(moving[columns]), drawn)
+            yield rows, columns, Tile(part, right_factor(moving[columns], self.anchors), drawn)
 
     def windows(self, n_frames):
         """Lowest and highest disparity, at every sample, of a path in the band."""
@@ -555,7 +564,7 @@ class Tile:
         penalties, weight, inner = trellis.of_step.astype(states.dtype)[:, :, np.newaxis]
         charges = penalties + self.tie_breakers
         n_moving, n_factors = self.right.shape[1:]
-        positions = self.right.reshape(-1, n_factors)
+        positions, features = self.right.reshape(-1, n_factors), self.bases.features
         start = min(last, self.n_frames - 1)
         here = at[start]
         for p in range(start, first, -1):
@@ -565,8 +574,8 @@ class Tile:
                 q = trellis.lead + p * trellis.stride - trellis.centre
                 y = positions.take(here // self.n_bases + q * n_moving, axis=0)
                 value += weight * y[:, -2]
-                y = y.reshape(-1, self.n_bases, n_factors)[..., :-2]
-                products = np.einsum("mnk,nk->mn", y, self.bases.sequences[:, p])
+                y = y.reshape(-1, self.n_bases, n_factors)[..., : features.shape[2]]
+                products = np.einsum("mnk,nk->mn", y, features[:, p])
                 value -= inner * products.ravel()
             here = here - shift.take(value.argmin(axis=0))
             at[p - 1] = here
@@ -596,44 +605,51 @@ class Tile:
 
     def small_paths(self):
         """The same as `paths`, for a small tile: every row by all of its steps at once."""
-        trellis, right, pairs = self.trellis, self.right, self.pairs
+        trellis, right, n_bases = self.trellis, self.right, self.n_bases
         sub, width, n_frames = trellis.table.subframes, trellis.width, self.n_frames
-        # Local costs, with the penalty, of every step to every cell: (P, n_steps, cells).
+        n_moving, n_cells = right.shape[1], (2 * width + 1) * right.shape[1]
+        # Local costs, with the penalty, of every step to every cell, base by base: (P, n_steps,
+        # n_bases, cells).
         padded = np.zeros((len(right) + 2 * width, *right.shape[1:]), self.dtype)
         padded[width : width + len(right)] = right
+        stride, *strides = padded.strides
         windows = as_strided(
             padded,
-            shape=(n_frames, 1, (2 * width + 1) * right.shape[1], right.shape[2]),
-            strides=(sub * padded.strides[0], 0, *padded.strides[1:]),
+            shape=(n_frames, right.shape[2], n_cells),
+            strides=(sub * stride, *strides[::-1]),
             writeable=False,
         )
-        costs = np.matmul(windows, self.bases.by_step)
-        costs = costs.reshape(n_frames, len(trellis.slopes), -1)
+        costs = np.matmul(self.bases.by_step, windows).reshape(n_frames, -1, n_bases, n_cells)
         # The first sample is reached by no step, so it pays no penalty.
-        costs[0] -= trellis.of_step[0, trellis.entry_of_step, np.newaxis]
+        costs[0] -= trellis.of_step[0, trellis.entry_of_step, np.newaxis, np.newaxis]
         if self.coupling is not None:
             for p, row in enumerate(costs):
-                row += self._coupling_costs(p, -width, width)
-        states = self.states(n_frames)
-        edge, item = trellis.pad * pairs, states.itemsize
+                extra = self._coupling_costs(p, -width, width)
+                row += extra.reshape(n_cells, n_bases).T
+        edge = trellis.pad * n_moving
+        states = np.full((n_frames, n_bases, n_cells + 2 * edge), np.inf, dtype=self.dtype)
         # S(p - 1, d - k) of every cell, step by step.
         before = as_strided(
-            states[:, edge + sub * pairs :],
+            states[..., edge + sub * n_moving :],
             shape=costs.shape,
-            strides=(states.strides[0], -pairs * item, item),
+            strides=(states.strides[0], -n_moving * states.itemsize, *states.strides[1:]),
             writeable=False,
         )
-        rows = states[:, edge : states.shape[1] - edge]
-        middle = slice(width * pairs, (width + 1) * pairs)
-        rows[0, middle] = costs[0, sub, middle]
+        rows = states[..., edge : edge + n_cells]
+        middle = slice(width * n_moving, (width + 1) * n_moving)
+        rows[0, :, middle] = costs[0, sub, :, middle]
         add, smallest = np.add, np.minimum.reduce
         for own, last, row in zip(costs[1:], before[:-1], rows[1:], strict=True):
             smallest(add(own, last, own), 0, None, row)
-        lengths = np.maximum(rows[-1, middle], 0).reshape(-1, self.n_bases).T
-        walk = _backtrack_each if pairs <= _FEW_PAIRS else _backtrack_all
-        here = width * pairs + np.arange(pairs)
-        at = walk(costs, here, trellis.table.steps, trellis.slopes * pairs, self.tie_breakers)
-        return self._by_pair(at // pairs - width), lengths
+        lengths = np.maximum(rows[-1, :, middle], 0)
+        walk = _backtrack_each if self.pairs <= _FEW_PAIRS else _backtrack_all
+        here = n_cells * np.arange(n_bases)[:, np.newaxis] + np.arange(middle.start, middle.stop)
+        ties = self.tie_breakers.reshape(-1, n_moving, n_bases).swapaxes(1, 2)
+        totals = costs.reshape(n_frames, len(trellis.slopes), -1)
+        shift = trellis.slopes * n_moving
+        at = walk(totals, here.ravel(), trellis.table.steps, shift, ties.reshape(len(shift), -1))
+        disparities = at % n_cells // n_moving - width
+        return disparities.T.reshape(n_bases, n_moving, n_frames), lengths
 
 
 def _best_step(old, start, stop, levels, out, scratch):
@@ -680,9 +696,11 @@ def _backtrack_all(totals, last_cells, steps, shift, tie_breakers):
     # The cell of every entry of the step table; that of the first tells where the path is.
     cells = np.empty((n_frames, len(steps), len(last_cells)), dtype=np.intp)
     cells[-1] = last_cells + (steps * n_cells)[:, np.newaxis]
-    rows, subtract = totals.reshape(n_frames, -1), np.subtract
+    rows, value = totals.reshape(n_frames, -1), np.empty(cells.shape[1:], totals.dtype)
+    add, subtract = np.add, np.subtract
     for row, here, before in zip(rows[:0:-1], cells[:0:-1], cells[-2::-1], strict=True):
-        value = row[here]
-        value += tie_breakers
-        subtract(here, shift[value.argmin(axis=0)], before)
+        # Indices are valid; mode="clip" only spares NumPy a copy of the result.
+        row.take(here, out=value, mode="clip")
+        add(value, tie_breakers, value)
+        subtract(here, shift.take(value.argmin(axis=0)), before)
     return cells[:, 0] - steps[0] * n_cells

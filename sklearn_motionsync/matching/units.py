@@ -61,7 +61,15 @@ class Unit(NamedTuple):
         return cls(centre * inverse, size, np.where(varies, 0, rounding * inverse), copies)
 
     def __call__(self, postures, out=None):
-        """Centred postures (..., n_features) in this unit; constant features are exactly 0."""
+        """Centred postures (..., n_features) in this unit; constant features are exactly 0.
+
+        Further columns stay as they are.
+        """
+        n_features = len(self.centre)
+        if postures.shape[-1] > n_features:
+            out = postures.copy() if out is None else out
+            self(postures[..., :n_features], out[..., :n_features])
+            return out
         out = np.multiply(postures, postures.dtype.type(1 / self.size), out=out)
         out -= self.centre
         constant = np.flatnonzero(self.rounding)

@@ -14,7 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.facts import TIMELESS
 from ..inputs.numbers import check_magnitude
-from ..inputs.types import Indexed, NumbersLike, PerformancesLike, ValuesLike
+from ..inputs.types import Indexed, NumbersLike, PerformancesLike, SupportsArray, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
 from ..inputs.wording import counted
 from ..matching.causal import causal_costs, causal_velocity
@@ -165,7 +165,12 @@ class OnlineSynchronizer(
 
     @atomic_fit
     @validated_with_nested
-    def fit(self, X: PerformancesLike, y: object = None) -> Self:
+    def fit(
+        self,
+        X: PerformancesLike,
+        y: object = None,
+        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
+    ) -> Self:
         """Learn the mean performance, its duration, and the scale of path costs.
 
         Parameters
@@ -174,6 +179,8 @@ class OnlineSynchronizer(
             Performances; the rows of a 2-D array are univariate ones.
         y : ignored
             Passed to the synchronizer.
+        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
+            Key-frames of each performance, passed to the synchronizer, which has to take them.
 
         Returns
         -------
@@ -187,10 +194,11 @@ class OnlineSynchronizer(
         """
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
         performances = self._check_training_set(X)
+        given = {} if keyframes is None else {"keyframes": keyframes}
         with self._progress(fits=True) as progress:
             with progress.fitting(sync, "synchronizing"):
-                self.synchronizer_ = sync.fit(X, y)
-            match = sync.match(X)
+                self.synchronizer_ = sync.fit(X, y, **given)
+            match = sync.match(X, **given)
             warped = match.warp(performances)
             self.n_frames_ = sync.n_frames_
             self.mean_ = warped.mean(axis=0)

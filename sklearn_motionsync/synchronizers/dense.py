@@ -10,7 +10,16 @@ import numpy as np
 from sklearn.utils import Bunch, check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
 
-from ..inputs.types import Cost, PerformanceLike, PerformancesLike, RandomState
+from ..inputs.types import (
+    Cost,
+    Indexed,
+    PerformanceLike,
+    PerformancesLike,
+    RandomState,
+    SupportsArray,
+    ValuesLike,
+)
+from ..matching.anchors import KeyframeColumns, add_ramps, first_meeting, pin
 from ..matching.costs import COSTS
 from ..matching.filters import SMOOTHING, choose_smoothing
 from ..matching.matcher import (
@@ -29,16 +38,16 @@ from ..matching.median import (
     sampled_median,
 )
 from ..matching.modes import DistanceTable, ModalWarper, Modes
-from ..matching.refinement_test import RefinementTest, Verdict, split_features
-from ..matching.trellis import Trellis
+from ..matching.refinement_test import Verdict
 from ..matching.warps import normalise, sample
 from ..utils.atomic import snapshot
 from ..utils.threads import on_one_thread
+from .anchored import AnchoredSynchronizer
 from .balance import warn_of_one_feature
-from .base import Synchronizer
 from .evidence import no_evidence, weigh_evidence
 from .match import Match
-from .portions import FeatureStore, TrainingPortions, measure_in_portions, warp_in_portions
+from .portions import FeatureStore, TrainingPortions, warp_in_portions
+from .refinement import try_refinement
 from .subsamples import subsample, typical_share
 
 __all__ = ["DenseSynchronizer"]
@@ -57,12 +66,11 @@ _MOST_STEPS = 1e9
 _FEWEST, _MOST = 3, 20
 # Most performances for an exhaustive search: see docs/scaling.md.
 _EXHAUSTIVE = 100
-# Most performances for the refinement test; fewer than the second number have no first pass, and
-# with twice as many it takes every second one.
-_TESTED, _SEVERAL = 12, 3
+# Most performances for the refinement test.
+_TESTED = 12
 
 
-class DenseSynchronizer(Synchronizer):
+class DenseSynchronizer(AnchoredSynchronizer):
     """Align trials in time: warp all of them to the most typical one.
 
     That trial is the template, here the *pattern*. Every trial is matched to it by all of its
@@ -161,6 +169,10 @@ class DenseSynchronizer(Synchronizer):
         What becomes of ten or more trials that do not support their warps. ``"linear"``: there is a
         warning, and if ``evidence_.harmful``, they are linearly normalised. ``"warp"``: they are
         warped, without a warning. Set it if you know that they show one movement in loud noise.
+    keyframe_std : float, default=0
+        Standard deviation of key-frames that are given, in frames of the clock. 0: they are exact,
+        and warps go through them. Above: they draw softly, as labels have errors, and a label that
+        contradicts the movement by far counts little. See Notes.
     search : {"auto", "exhaustive", "sampled"}, default="auto"
         The search for the most typical trial: by all matches, or by a sequential test on matches
         with random references (see ``search_``). ``"auto"``: by all, for up to 100 trials.
@@ -227,6 +239,10 @@ class DenseSynchronizer(Synchronizer):
         Absolute weight of the changes of pace, by the frames that the search compares.
     exemplars_ : ndarray of int
         Indices of the trials that vote: up to ``consensus``, and so many of each of several modes.
+        If only some trials have key-frames, they are the exemplars.
+    keyframes_ : ndarray, shape (n_keyframes,), or None
+        Key-frames of the template, in frames of the clock: its own, or learnt from the trials that
+        have them. None if none were given.
     modes_ : Bunch
         The ways of doing the movement that the training set holds, such as one stroke or two.
         ``labels``: the mode of each training trial, 0 being the most frequent; -1 if ``max_fit``
@@ -317,7 +333,7 @@ class DenseSynchronizer(Synchronizer):
     """
 
     _parameter_constraints: dict = {
-        **Synchronizer._parameter_constraints,
+        **AnchoredSynchronizer._parameter_constraints,
         "velocity_smoothing": [StrOptions({"auto"}), Interval(Real, 0, 1, closed="both")],
         "refine": [StrOptions({"auto"}), "boolean"],
         "max_offset": [StrOptions({"auto"}), Interval(Real, 0, 1, closed="both")],
@@ -330,6 +346,7 @@ class DenseSynchronizer(Synchronizer):
         "max_rate": [Interval(Real, 1, None, closed="left")],
         "subframes": [Interval(Integral, 1, None, closed="left")],
         "unsupported": [StrOptions({"linear", "warp"})],
+        "keyframe_std": [Interval(Real, 0, None, closed="left")],
         "search": [StrOptions({"auto", "exhaustive", "sampled"})],
         "max_fit": [Interval(Integral, 2, None, closed="left"), None],
         "random_state": ["random_state"],
@@ -359,6 +376,7 @@ class DenseSynchronizer(Synchronizer):
         max_rate: float = 4,
         subframes: int = 1,
         unsupported: Literal["linear", "warp"] = "linear",
+        keyframe_std: float = 0,
         search: Literal["auto", "exhaustive", "sampled"] = "auto",
         max_fit: int | None = None,
         random_state: RandomState = 0,
@@ -379,6 +397,7 @@ class DenseSynchronizer(Synchronizer):
         self.max_rate = max_rate
         self.subframes = subframes
         self.unsupported = unsupported
+        self.keyframe_std = keyframe_std
         self.search = search
         self.max_fit = max_fit
         self.random_state = random_state
@@ -409,45 +428,47 @@ class DenseSynchronizer(Synchronizer):
         """
         return cls(**{"cost": "posture", "max_rate": 2, "consensus": 0} | params)
 
-    @snapshot
-    def match(self, X: PerformancesLike) -> Match:
-        """Match performances to the pattern: the warps of ``transform`` (Eqs. 12-17).
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
-            Read in parts as by ``transform``.
-
-        Returns
-        -------
-        Match
-            ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
-            the pattern, after vote, smoothing and refinement; ``distances``, shape
-            (n_sequences,), of the direct paths: ``D_{n,m}`` of Eq. 12; ``mode``, the mode of
-            ``modes_`` that each performance is nearest to.
-        """
-        return self._match_in_parts(X)
-
-    def _match(self, performances):
-        performances = self._without_gaps(performances)
-        distances, times = self._distances_and_times(performances)
+    def _match(self, performances, keyframes=None, frame_rate=None):
+        arrays, shares = self._with_keyframes(performances, keyframes, frame_rate)
+        distances, times = self._distances_and_times(arrays, shares)
         distances, mode = self._warper.matcher.features.back(distances), None
         if len(self.modes_.shares) > 1:
-            mode = on_one_thread(self._warper.modes_of, performances)
+            mode = on_one_thread(self._warper.modes_of, arrays)
         return Match(times, distances, mode)
 
-    def _warp_part(self, performances):
-        times = np.maximum.accumulate(self._distances_and_times(performances)[1], axis=1)
+    def _warp_part(self, performances, keyframes=None, frame_rate=None):
+        given = self._with_keyframes(performances, keyframes, frame_rate)
+        times = np.maximum.accumulate(self._distances_and_times(*given)[1], axis=1)
         return sample(performances, times, self.n_frames_)
 
-    def _distances_and_times(self, performances):
+    def _with_keyframes(self, performances, keyframes=None, frame_rate=None):
+        """Performances as the warper takes them, and their key-frames as shares, or None."""
+        shares = self._shares(performances, keyframes, frame_rate)
+        performances = self._without_gaps(performances)
+        if self.keyframes_ is None:
+            return performances, None
+        if shares is None:
+            shares = np.full((len(performances), len(self.keyframes_)), np.nan)
+        return add_ramps(performances, shares), shares
+
+    def _distances_and_times(self, arrays, shares):
         with self._progress(fits=False) as progress:
             portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "warping"}
-            return warp_in_portions(self._warper, self._without_gaps(performances), **portions)
+            distances, times = warp_in_portions(self._warper, arrays, **portions)
+        if shares is None or self.keyframe_std > 0:
+            return distances, times
+        # Linear warps go straight from one key-frame to the next.
+        reach = {"reach": np.inf} if isinstance(self._warper, LinearWarper) else {}
+        return distances, pin(times, self.keyframes_, shares * (self.n_frames_ - 1), **reach)
 
     @snapshot
-    def disparity_space(self, X: PerformancesLike, performance: int = 0) -> Bunch:
+    def disparity_space(
+        self,
+        X: PerformancesLike,
+        performance: int = 0,
+        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
+        frame_rate: float | ValuesLike | None = None,
+    ) -> Bunch:
         """The disparity space of the pattern and one performance, and the path through it (Fig. 2).
 
         Parameters
@@ -456,6 +477,8 @@ class DenseSynchronizer(Synchronizer):
             Performances; the rows of a 2-D array are univariate ones.
         performance : int, default=0
             The index of one of them.
+        keyframes, frame_rate : as for ``match``, default=None
+            Key-frames draw the path. They are no part of the costs.
 
         Returns
         -------
@@ -478,8 +501,8 @@ class DenseSynchronizer(Synchronizer):
                 f"performances, 0 to {len(performances) - 1}."
             )
         warper = self._warper
-        chosen = self._without_gaps(performances.take([performance]))
-        positions = warper.positions(chosen)
+        arrays, _ = self._with_keyframes(performances, keyframes, frame_rate)
+        positions = warper.positions([arrays[performance]])
         frames, offsets, costs, path = warper.disparity_space(positions)
         costs = warper.matcher.features.back(costs)
         return Bunch(frames=frames, offsets=offsets, costs=costs, path=path)
@@ -507,13 +530,20 @@ class DenseSynchronizer(Synchronizer):
         if self.metric_ is not None:
             self.metric_.performances = sample[self.metric_.performances]
 
-    def _learn(self, performances, progress):
+    def _n_given(self, performances):
+        return self._population
+
+    def _learn(self, performances, progress, keyframes):
         training = self._set_clock(performances, self.subframes)
-        positions = training.scaled
-        if self.subframes > 1:
-            positions = normalise(performances, self.n_frames_, self.subframes)
+        positions, arrays, columns = training.scaled, list(performances), None
+        if keyframes is not None:
+            arrays = add_ramps(performances, keyframes)
+            std = self.keyframe_std / (self.n_frames_ - 1)
+            columns = KeyframeColumns(keyframes.shape[1], std)
+        if self.subframes > 1 or columns is not None:
+            positions = normalise(arrays, self.n_frames_, self.subframes)
             training.unit(positions, out=positions)
-        features = self._learn_metric(training.unit, positions)
+        features = self._learn_metric(training.unit, positions, columns)
         settings = self._settings()
         searched = features.for_search(self.n_frames_, settings["max_offset"])
         store = FeatureStore(searched, positions)
@@ -522,21 +552,20 @@ class DenseSynchronizer(Synchronizer):
         matcher = searcher
         if searched is not features:
             reach = {name: settings[name] for name in ("max_offset", "max_rate")}
-            sizes = self.n_frames_, searcher.trellis.mu
-            trellis = Trellis.on_clock(self.cost, *sizes, subframes=self.subframes, **reach)
-            matcher = Matcher(features, trellis)
-        self.features_ = features
+            matcher = searcher.on_clock(features, self.n_frames_, **reach)
+        self.features_ = features.replace(anchors=None)
         self.mu_ = float(features.back(matcher.trellis.mu))
         source = self._set_pattern(training, median, features.degree)
         # Sums over fewer frames, scaled to all.
         self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
-        chosen = self._choose_exemplars(median.estimates, modes)
-        warpers = [self._warper_by(x, training, matcher, source) for x in chosen]
+        chosen = self._choose_exemplars(median.estimates, modes, keyframes)
+        source = self._set_keyframes(keyframes, source, arrays, matcher, chosen[0])
+        warpers = [self._warper_by(x, arrays, matcher, source) for x in chosen]
         home = modes.home(self.pattern_index_, warpers)
         warper = self._decide_on_refinement(training, warpers[home], source, progress, shared)
         self.sharpening_ = None
         if modes.are_several and not isinstance(warper, LinearWarper):
-            warpers[home], arrays = warper, list(training.performances)
+            warpers[home] = warper
             finish = partial(self._sharpened, positions)
             settings = warpers, home, arrays, chosen, modes.signs(), finish
             warper = on_one_thread(ModalWarper.of, *settings)
@@ -556,7 +585,7 @@ class DenseSynchronizer(Synchronizer):
         settings = {"smoothness": self.smoothness, "max_rate": self.max_rate}
         return {**settings, "max_offset": max_offset}
 
-    def _learn_metric(self, unit, positions):
+    def _learn_metric(self, unit, positions, columns):
         """The features with the learnt metric, from evenly spaced performances if there are many.
 
         Sets ``metric_`` and ``evidence_``.
@@ -566,7 +595,8 @@ class DenseSynchronizer(Synchronizer):
         smoothing, self.metric_ = self.velocity_smoothing, None
         self.evidence_ = no_evidence()
         sharp, smooth = (_SHARP, _SMOOTH) if smoothing == "auto" else (smoothing, smoothing)
-        plain, n = Features(self.cost, self.subframes, smooth, unit), len(positions)
+        plain = Features(self.cost, self.subframes, smooth, unit, anchors=columns)
+        n = len(positions)
         if not learns or n < _FEWEST:
             return plain
         some = np.unique(np.round(np.linspace(0, n - 1, min(n, _MOST))).astype(np.intp))
@@ -639,22 +669,47 @@ class DenseSynchronizer(Synchronizer):
         self.typical_share_ = typical_share(known.in_doubt, n, population) if wanted else np.nan
         return median
 
-    def _choose_exemplars(self, estimates, modes):
-        """Choose the exemplars: those of every mode, a list."""
+    def _choose_exemplars(self, estimates, modes, keyframes):
+        """Choose the exemplars: those of every mode, a list.
+
+        If some performances have key-frames and others none, those that have.
+        """
         chosen = [np.empty(0, dtype=np.intp)] * len(modes.shares)
         if self.consensus > 0:
-            chosen = modes.exemplars(estimates, self.consensus, self.pattern_index_)
+            known = None if keyframes is None else np.isfinite(keyframes).any(axis=1)
+            chosen = modes.exemplars(estimates, self.consensus, self.pattern_index_, known)
         self.exemplars_ = np.concatenate(chosen)
         return chosen
 
-    def _warper_by(self, exemplars, training, matcher, source):
+    def _set_keyframes(self, keyframes, source, arrays, matcher, exemplars):
+        """Set the key-frames of the pattern, which may have to be learnt; the pattern with them."""
+        self.keyframes_ = None
+        if keyframes is None:
+            return source
+        own = np.full(keyframes.shape[1], np.nan)
+        if self.pattern_index_ is not None:
+            own = keyframes[self.pattern_index_]
+        last, unknown = self.n_frames_ - 1, np.isnan(own)
+        if unknown.any():
+            some = np.flatnonzero(np.isfinite(keyframes[:, unknown]).any(axis=1))[:_MOST]
+            (pattern,) = add_ramps([source], own[np.newaxis])
+            warper = self._warper_by(exemplars, arrays, matcher, pattern)
+            positions = warper.positions([arrays[k] for k in some])
+            _, times = on_one_thread(warper.warps, positions)
+            met = first_meeting(times, keyframes[some] * last) / last
+            own = np.maximum.accumulate(np.where(unknown, np.nanmedian(met, axis=0), own))
+        self.keyframes_ = own * last
+        (pattern,) = add_ramps([source], own[np.newaxis])
+        return pattern
+
+    def _warper_by(self, exemplars, arrays, matcher, source):
         """The warper to the pattern by way of exemplars."""
-        arrays = list(training.performances)
         chosen = [source, *(arrays[k] for k in exemplars.tolist())]
         # In double precision, as all performances that are warped.
         chosen = [x.astype(np.float64, copy=False) for x in chosen]
         positions = matcher.features.positions(chosen, self.n_frames_)
-        pattern, votes = positions[0, :: self.subframes], self.consensus > 0
+        pattern = matcher.features.plain(positions)[0, :: self.subframes]
+        votes = self.consensus > 0
         settings = pattern, positions, votes, self.warp_smoothing
         linear = self.evidence_.harmful and self.unsupported == "linear"
         made = LinearWarper if linear else Warper
@@ -666,9 +721,9 @@ class DenseSynchronizer(Synchronizer):
         if self.refine == "auto" and self.consensus > 0 and not linear:
             others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
             some = others[:: -(-len(others) // _TESTED) or 1]
-            verdict = self._test_refinement(
-                training.scaled, warper, source, some, progress, portions
-            )
+            how = {"n_jobs": self.n_jobs, "progress": progress}
+            given = training.scaled, warper, source, some, portions
+            verdict = try_refinement(*given, self._settings(learnt=False), **how)
         names = "ratio", "p_value", "ratio_to_all"
         self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
         self.misfit_ = verdict.misfit
@@ -686,38 +741,3 @@ class DenseSynchronizer(Synchronizer):
         width = None if self.velocity_smoothing == "auto" else self.velocity_smoothing
         chosen = positions[exemplars].astype(np.float64, copy=False)
         return SharpenedWarper.of(warper, chosen, width) or warper
-
-    def _test_refinement(self, scaled, warper, source, some, progress, portions):
-        """The verdict on refining some performances, by their indices; without any figure if there
-        are no two folds of features.
-        """
-        folds = split_features(scaled[some]) if len(some) else []
-        if not folds:
-            return Verdict()
-        positions = portions.positions[some].astype(np.float64, copy=False)
-        every = 1 if len(some) < 2 * _SEVERAL else 2
-        width = choose_smoothing(scaled[some[::every]])
-        test = on_one_thread(
-            partial(RefinementTest.of, **self._settings(learnt=False)),
-            *(warper, warper.positions([source]), positions, folds, width),
-        )
-        energy = np.square(test.pattern - test.pattern.mean(axis=0)).sum() or 1.0
-        how = {"n_jobs": self.n_jobs, "progress": progress}
-
-        def misfits(method, name, every=1):
-            given = test, method, positions[::every], (portions, some[::every])
-            return np.concatenate(measure_in_portions(*given, name=name, **how), axis=1)
-
-        def verdict_of(by_fold, by_all=None):
-            by_all = np.full_like(by_fold[:1], np.nan) if by_all is None else by_all
-            return Verdict.of(np.concatenate([by_all, by_fold]), energy)
-
-        if len(some) >= _SEVERAL:
-            first = verdict_of(misfits("first_misfits", "first pass of the refinement test", every))
-            if first.is_hopeless:
-                return first
-        by_fold = misfits("misfits", "refinement test")
-        verdict = verdict_of(by_fold)
-        if not verdict.may_help:
-            return verdict
-        return verdict_of(by_fold, misfits("misfits_by_all", "refinement test, unrefined"))

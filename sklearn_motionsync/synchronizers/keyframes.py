@@ -3,30 +3,19 @@
 from __future__ import annotations
 
 from numbers import Integral
-from typing import Literal, Self
+from typing import Literal
 
 import numpy as np
-import pandas as pd
 from sklearn.utils._param_validation import Interval
 
-from ..inputs.numbers import as_numbers
-from ..inputs.recorded import refuse_moved_events, refuse_seconds
 from ..inputs.types import (
-    Indexed,
     PerformanceLike,
-    PerformancesLike,
-    SupportsArray,
-    Transformed,
-    ValuesLike,
 )
-from ..inputs.wording import counted
 from ..matching.filters import SMOOTHING, smooth
 from ..matching.units import Unit
 from ..matching.warps import even_slices, sample
-from ..utils.atomic import atomic_fit, snapshot
-from ..utils.parameters import validated
 from ..utils.pipelines import MissingMetadata
-from .base import Synchronizer
+from .anchored import AnchoredSynchronizer
 from .match import Match
 
 __all__ = ["KeyframeSynchronizer"]
@@ -37,7 +26,7 @@ _BATCH = 256
 _TIE = 1e-9
 
 
-class KeyframeSynchronizer(Synchronizer):
+class KeyframeSynchronizer(AnchoredSynchronizer):
     """Synchronise performances by key-frames, piecewise linearly between them.
 
     1. The pattern is the performance with the smallest sum of squared distances to all others:
@@ -102,9 +91,11 @@ class KeyframeSynchronizer(Synchronizer):
     """
 
     _parameter_constraints: dict = {
-        **Synchronizer._parameter_constraints,
+        **AnchoredSynchronizer._parameter_constraints,
         "n_keyframes": [Interval(Integral, 1, None, closed="left")],
     }
+
+    _needs_all = True
 
     def __init__(
         self,
@@ -116,131 +107,21 @@ class KeyframeSynchronizer(Synchronizer):
         self.pattern = pattern
         self.n_keyframes = n_keyframes
 
-    @atomic_fit
-    @validated
-    def fit(
-        self,
-        X: PerformancesLike,
-        y: object = None,
-        keyframes: Indexed[ValuesLike] | SupportsArray | None = None,
-    ) -> Self:
-        """Choose the pattern and its key-frames.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
-        y : ignored
-            Present for API consistency.
-        keyframes : list of arrays (n_keyframes,), default=None
-            Key-frames of each performance, in its own frames, counted from its first row
-            (fractions allowed), increasing; found by curvature if None.
-
-        Returns
-        -------
-        self : KeyframeSynchronizer
-            The fitted synchronizer.
-
-        Raises
-        ------
-        ValueError
-            If the input breaks the contract, the pattern does not exist or fit, or key-frames are
-            not increasing, inside their performance and equally many in all; if they look like
-            seconds, all below 1 or in the first fiftieth of a performance and not whole; or if
-            performances have events whose frames are not their rows.
-        """
-        if keyframes is not None:
-            refuse_moved_events(X)
-        with self._progress(fits=True) as progress:
-            self._learn(self._check_training_set(X), progress, keyframes)
-        return self
-
-    @atomic_fit
-    def fit_transform(
-        self,
-        X: PerformancesLike,
-        y: object = None,
-        keyframes: Indexed[ValuesLike] | SupportsArray | None = None,
-    ) -> Transformed:
-        """Fit, and warp the same performances.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
-        y : ignored
-            Present for API consistency.
-        keyframes : list of arrays (n_keyframes,), default=None
-            Key-frames of each performance, as for ``fit``.
-
-        Returns
-        -------
-        ndarray, shape (n_sequences, P, n_features)
-            As from ``transform``.
-        """
-        return self.fit(X, y, keyframes=keyframes).transform(X, keyframes=keyframes)
-
-    def transform(
-        self,
-        X: PerformancesLike,
-        keyframes: Indexed[ValuesLike] | SupportsArray | None = None,
-    ) -> Transformed:
-        """Warp performances so that their key-frames coincide with those of the pattern.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
-        keyframes : list of arrays (n_keyframes,), default=None
-            Required if ``fit`` was given key-frames.
-
-        Returns
-        -------
-        ndarray, shape (n_sequences, P, n_features)
-            ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
-            ``set_output(transform="pandas")``.
-        """
-        if keyframes is not None:
-            refuse_moved_events(X)
-        return self._warp(X, keyframes=keyframes)
-
-    @snapshot
-    def match(
-        self,
-        X: PerformancesLike,
-        keyframes: Indexed[ValuesLike] | SupportsArray | None = None,
-    ) -> Match:
-        """Match performances to the pattern.
-
-        Parameters
-        ----------
-        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances; the rows of a 2-D array are univariate ones.
-        keyframes : list of arrays (n_keyframes,), default=None
-            Required if ``fit`` was given key-frames.
-
-        Returns
-        -------
-        Match
-            As from ``DenseSynchronizer.match``; distances are squared ones to the pattern.
-        """
-        performances = self.check_performances(X)
-        if self._given and keyframes is None:
+    def _match(self, performances, keyframes=None, frame_rate=None):
+        if self._needs_keyframes and keyframes is None:
             raise MissingMetadata(
                 "The synchronizer was fitted with key-frames: give those of these performances too",
                 "keyframes",
             )
-        if keyframes is not None:
-            refuse_moved_events(X)
-            knots = self._check_keyframes(performances, keyframes, len(self.keyframes_))
+        shares = self._shares(performances, keyframes, frame_rate)
         distances, times = np.empty(len(performances)), []
         for rows in even_slices(len(performances), _BATCH):
             some = performances.take(rows)
-            if keyframes is None:
+            if shares is None:
                 on_clock = self.normalize(some)
                 own = [match_keyframes(self.pattern_, self.keyframes_, x) for x in on_clock]
             else:
-                own = knots[rows]
+                own = shares[rows] * (self.n_frames_ - 1)
             times.append(self._interpolate(self.keyframes_, own))
             synchronised = sample(some, times[-1], self.n_frames_)
             differences = np.square(synchronised - self.pattern_)
@@ -248,50 +129,25 @@ class KeyframeSynchronizer(Synchronizer):
         return Match(np.concatenate(times), distances)
 
     def _learn(self, performances, progress, keyframes):
-        self._given = keyframes is not None
+        self._needs_keyframes = keyframes is not None
         training = self._set_clock(performances)
         comparable = training.scaled
-        if self._given:
-            knots = self._check_keyframes(performances, keyframes)
+        if self._needs_keyframes:
+            knots = keyframes * (self.n_frames_ - 1)
             # On the mean key-frames all performances are comparable, as on one clock.
             times = self._interpolate(knots.mean(axis=0), knots)
             comparable = training.unit(sample(performances, times, self.n_frames_))
         self._set_pattern(training, self._plain_median(comparable))
-        if self._given and self.pattern_index_ is not None:
+        if self._needs_keyframes and self.pattern_index_ is not None:
             self.keyframes_ = knots[self.pattern_index_]
         else:
-            count = knots.shape[1] if self._given else self.n_keyframes
+            count = knots.shape[1] if self._needs_keyframes else self.n_keyframes
             self.keyframes_ = curvature_keyframes(self.pattern_, count)
 
     def _interpolate(self, knots, others):
         """tau(p): piecewise linear through the ends and the key-frames."""
         p, last = np.arange(self.n_frames_), self.n_frames_ - 1
         return np.stack([np.interp(p, [0, *knots, last], [0, *other, last]) for other in others])
-
-    def _check_keyframes(self, arrays, keyframes, count=None):
-        """Given key-frames, checked, in frames of the common clock: (n_sequences, n_keyframes)."""
-        if isinstance(keyframes, (pd.DataFrame, pd.Series)):
-            # One row a performance; iterating would give columns.
-            keyframes = keyframes.to_numpy()
-        if not hasattr(keyframes, "__len__") or len(keyframes) != len(arrays):
-            raise ValueError(
-                f"keyframes must be a list of {len(arrays)} arrays (n_keyframes,), one a "
-                f"performance; got {keyframes!r:.200}."
-            )
-        checked = []
-        for i, (given, x) in enumerate(zip(keyframes, arrays, strict=True)):
-            frames = as_numbers(given, f"Performance {i}: keyframes", dtype=np.float64)
-            count = frames.size if count is None else count
-            refuse_seconds(frames.ravel(), len(x), f"Performance {i}")
-            path = np.concatenate([[0], frames.ravel(), [len(x) - 1]])
-            if frames.shape != (count,) or count == 0 or not (np.diff(path) > 0).all():
-                raise ValueError(
-                    f"Performance {i}: key-frames must be "
-                    f"{counted(count, 'increasing frame') if count else 'some increasing frames'} "
-                    f"between 0 and {len(x) - 1}, both excluded, got {given}."
-                )
-            checked.append(frames * (self.n_frames_ - 1) / (len(x) - 1))
-        return np.stack(checked)
 
 
 # -- automatic key-frames: frames of large curvature (Figs. 1c and 3c) ---------------------

@@ -16,8 +16,17 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..body.limbs import parts_of_names, parts_of_postures
 from ..inputs.features import choose_features
-from ..inputs.types import Features, Labels, PerformancesLike, Unit, ValuesLike
+from ..inputs.types import (
+    Features,
+    Indexed,
+    Labels,
+    PerformancesLike,
+    SupportsArray,
+    Unit,
+    ValuesLike,
+)
 from ..inputs.validation import names_of_input
+from ..matching.anchors import add_ramps
 from ..matching.matcher import Matcher, Warper
 from ..matching.trellis import Coupling
 from ..matching.warps import evaluate_warps, normalise
@@ -25,7 +34,7 @@ from ..utils.atomic import atomic_fit, snapshot
 from ..utils.groups import encode_groups
 from ..utils.parallel import Progress, run
 from ..utils.parameters import validated, validated_with_nested
-from .base import Synchronizer
+from .anchored import AnchoredSynchronizer
 from .dense import DenseSynchronizer
 from .lags import Lags
 from .match import Match, rates_of
@@ -44,6 +53,7 @@ _SHARED = (
     "lengths_",
     "examples_",
     "features_",
+    "keyframes_",
     "n_features_in_",
     "feature_names_in_",
     "_names_in",
@@ -53,7 +63,7 @@ _SHARED = (
 )
 
 
-class PartSynchronizer(Synchronizer):
+class PartSynchronizer(AnchoredSynchronizer):
     """Synchronise parts of the body, each by a warp of its own, coupled to the body's warp.
 
     A single warp for the whole body cannot show that an arm is late while the legs are not: the
@@ -102,7 +112,7 @@ class PartSynchronizer(Synchronizer):
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
         Global distances of the whole body, as of `DenseSynchronizer`.
-    lengths_, examples_, features_
+    lengths_, examples_, features_, keyframes_
         Those of ``synchronizer_``.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
@@ -169,7 +179,13 @@ class PartSynchronizer(Synchronizer):
 
     @atomic_fit
     @validated_with_nested
-    def fit(self, X: PerformancesLike, y: object = None) -> Self:
+    def fit(
+        self,
+        X: PerformancesLike,
+        y: object = None,
+        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
+        frame_rate: float | ValuesLike | None = None,
+    ) -> Self:
         """Learn the whole body, then every part.
 
         Parameters
@@ -178,6 +194,11 @@ class PartSynchronizer(Synchronizer):
             Performances; the rows of a 2-D array are univariate ones.
         y : ignored
             Present for API consistency.
+        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
+            Key-frames of the whole body, as `DenseSynchronizer` takes them. Parts are coupled to
+            its warp, and may be early or late.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            Frames per second of X. With it key-frames are seconds.
 
         Returns
         -------
@@ -195,7 +216,8 @@ class PartSynchronizer(Synchronizer):
             self._progress(fits=True) as progress,
             progress.fitting(body, "learning the body and its parts"),
         ):
-            self.parts_, self._warpers = fit_body_and_parts(body, X, self.parts, self.coupling)
+            given = self.parts, self.coupling, keyframes, frame_rate
+            self.parts_, self._warpers = fit_body_and_parts(body, X, *given)
         self.synchronizer_ = body
         for name in _SHARED:
             if hasattr(body, name):
@@ -203,13 +225,22 @@ class PartSynchronizer(Synchronizer):
         return self
 
     @snapshot
-    def match(self, X: PerformancesLike) -> Match:
+    def match(
+        self,
+        X: PerformancesLike,
+        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
+        frame_rate: float | ValuesLike | None = None,
+    ) -> Match:
         """Match the whole body of performances to the pattern.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Performances; the rows of a 2-D array are univariate ones.
+        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
+            Key-frames of each performance, as for ``fit``.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            As for ``fit``.
 
         Returns
         -------
@@ -217,16 +248,25 @@ class PartSynchronizer(Synchronizer):
             As from ``DenseSynchronizer.match``.
         """
         check_is_fitted(self)
-        return self.synchronizer_.match(X)
+        return self.synchronizer_.match(X, keyframes, frame_rate)
 
     @snapshot
-    def match_parts(self, X: PerformancesLike) -> dict[str, Match]:
+    def match_parts(
+        self,
+        X: PerformancesLike,
+        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
+        frame_rate: float | ValuesLike | None = None,
+    ) -> dict[str, Match]:
         """Match every part of performances to that of the pattern.
 
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Performances; the rows of a 2-D array are univariate ones.
+        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
+            Key-frames of each performance, as for ``fit``.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            As for ``fit``.
 
         Returns
         -------
@@ -235,7 +275,8 @@ class PartSynchronizer(Synchronizer):
             for parts that only follow the body.
         """
         performances = self.check_performances(X)
-        return self._match_parts(performances, self.match(performances), "part")
+        body = self.match(performances, **self._given(X, keyframes, frame_rate))
+        return self._match_parts(performances, body, "part")
 
     @snapshot
     def lags(
@@ -246,6 +287,7 @@ class PartSynchronizer(Synchronizer):
         against: str = "rest",
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
+        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
     ) -> Lags:
         """How much later than the rest of the body each part is, at every frame of the pattern.
 
@@ -265,6 +307,8 @@ class PartSynchronizer(Synchronizer):
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames per second of X, for seconds; by default what tables tell, as in
             `Match.to_frame`.
+        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
+            Key-frames of the whole body, as for ``fit`` and in frames.
 
         Returns
         -------
@@ -281,7 +325,7 @@ class PartSynchronizer(Synchronizer):
         people = None
         if groups is not None:
             groups, people = encode_groups(groups, len(performances))
-        body = self.match(performances)
+        body = self.match(performances, **self._given(X, keyframes, None))
         parts = self._match_parts(performances, body, "part")
         references = dict.fromkeys(parts, parts.get(against, body))
         if against == "rest":
@@ -294,8 +338,8 @@ class PartSynchronizer(Synchronizer):
         values = np.stack(values, axis=1)
         return Lags(values, names, against, unit, groups, people, performances.labels)
 
-    def _warp_part(self, performances):
-        body = self.match(performances)
+    def _warp_part(self, performances, keyframes=None, frame_rate=None):
+        body = self.match(performances, keyframes, frame_rate)
         out = body.warp(performances)
         for name, match in self._match_parts(performances, body, "part").items():
             columns = self.parts_[name]
@@ -335,7 +379,7 @@ class PartSynchronizer(Synchronizer):
 
 @atomic_fit
 @validated
-def fit_body_and_parts(self, X, parts, coupling):
+def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None):
     """A ``fit`` of the synchronizer of the whole body, which also learns the parts.
 
     Parameters
@@ -344,6 +388,7 @@ def fit_body_and_parts(self, X, parts, coupling):
         Of the whole body.
     X : as for ``PartSynchronizer.fit``
     parts, coupling : parameters of `PartSynchronizer`
+    keyframes, frame_rate : as for ``PartSynchronizer.fit``
 
     Returns
     -------
@@ -356,7 +401,8 @@ def fit_body_and_parts(self, X, parts, coupling):
     performances = self._check_training_set(X)
     parts = choose_parts(parts, performances, names_of_input(self))
     with self._progress(fits=True) as progress:
-        self._learn(performances, progress)
+        known = self._known(performances, X, keyframes, frame_rate)
+        self._learn(performances, progress, known)
         warpers = {"part": {}, "rest": {}}
         if coupling < math.inf:
             source = self._given_pattern(performances)
@@ -365,8 +411,13 @@ def fit_body_and_parts(self, X, parts, coupling):
             chosen = [source, *(performances[k] for k in self.exemplars_)]
             # In double precision, as all that is warped.
             chosen = [x.astype(np.float64, copy=False) for x in chosen]
-            chosen = normalise(chosen, self.n_frames_, self.subframes)
-            (times,) = run(_warp_pattern_and_exemplars, [(self._warper, chosen)])
+            sizes = self.n_frames_, self.subframes
+            given = chosen
+            if known is not None:
+                own = self.keyframes_ / (self.n_frames_ - 1)
+                given = add_ramps(chosen, [own, *known[self.exemplars_]])
+            given, chosen = (normalise(x, *sizes) for x in (given, chosen))
+            (times,) = run(_warp_pattern_and_exemplars, [(self._warper, given)])
             training = normalise(performances, self.n_frames_, self.subframes)
             common = self._warper, times, training, chosen, coupling, self._settings()
             everything = np.arange(performances[0].shape[1])

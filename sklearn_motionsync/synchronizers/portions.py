@@ -252,6 +252,7 @@ class FeatureStore:
         self._features, self._positions = features, positions
         self.is_cached = positions.nbytes <= CACHE_BYTES
         self._cached, self._lock = None, threading.Lock()
+        self.plain = features.plain
 
     @functools.cached_property
     def template(self):
@@ -269,6 +270,8 @@ class FeatureStore:
 
     def select(self, indices):
         """Features of some performances, (n_indices, Q, n_compared)."""
+        if self.is_cached:
+            return self.cached[indices]
         out = np.empty((len(indices), *self.template.shape[1:]), self.template.dtype)
         for rows in self._slices(len(indices)):
             out[rows] = self._features(self._positions[indices[rows]])
@@ -293,7 +296,8 @@ class FeatureStore:
 
     def energy(self):
         """The sum of the squares of all features."""
-        parts = [np.einsum("npk,npk->", x, x, dtype=np.float64) for x in self.portions()]
+        parts = map(self.plain, self.portions())
+        parts = [np.einsum("npk,npk->", x, x, dtype=np.float64) for x in parts]
         return parts[0] if len(parts) == 1 else float(np.sum(parts))
 
 

@@ -25,6 +25,10 @@ __all__ = [
 ]
 
 
+# Parameters of synchronizers that take key-frames.
+_OF_KEYFRAMES = ("keyframes", "frame_rate")
+
+
 class MissingMetadata(ValueError):
     """A synchronizer needs more than performances, such as key-frames.
 
@@ -168,9 +172,14 @@ def transform_through(before, X, params, caller, *, hint="", also=()):
 
 
 def accepted_params(method, params):
-    """Those params that a method accepts by name, without None."""
+    """Those params that a method accepts by name, without None.
+
+    A synchronizer that was fitted without key-frames accepts none.
+    """
     given = {name: value for name, value in params.items() if value is not None}
     owner = getattr(method, "__self__", None)
+    if getattr(_unwrapped(owner), "keyframes_", owner) is None:
+        given = {name: value for name, value in given.items() if name not in _OF_KEYFRAMES}
     if isinstance(owner, FeatureUnion):
         # By its signature it accepts any, and passes on those that its transformers accept.
         parts = [accepted_params(part.transform, given) for part in union_transformers(owner)]

@@ -53,10 +53,26 @@ def test_the_width_is_the_smallest_that_keeps_noise_low(noise):
     width = choose_width(trials(tau, noise)[:, :, :1])
     assert width in (0.01, 0.014, 0.02, 0.028, 0.04)
     curve = movement(FRAMES)[:, 0]
-    assert noise_share(width, noise, curve) < 0.075
+    assert noise_share(width, noise, curve) < 0.015
     if width > 0.01:
         smaller = {0.014: 0.01, 0.02: 0.014, 0.028: 0.02, 0.04: 0.028}[width]
-        assert noise_share(smaller, noise, curve) > 0.03
+        assert noise_share(smaller, noise, curve) > 0.007
+
+
+def test_noise_averages_out_over_features():
+    tau = warps(12)
+    one, sixteen = (
+        choose_width(np.concatenate([trials(tau, 0.05, seed) for seed in seeds], axis=2))
+        for seeds in (range(1), range(8))
+    )
+    assert sixteen < one
+
+
+def test_a_sharp_peak_is_no_noise():
+    """One frame wide: a Gaussian takes much of it for noise, differences of a high order little."""
+    middles = np.linspace(40, 60, 12)[:, np.newaxis]
+    peaks = np.exp(-0.5 * np.square(FRAMES - middles))[:, :, np.newaxis]
+    assert choose_width(peaks) == 0.01
 
 
 def test_more_noise_asks_for_more_smoothing():

@@ -73,6 +73,14 @@ def test_warps_do_not_depend_on_the_unit(estimator, X, exponent, binary):
     assert_close(times(estimator, [10.0**exponent * x for x in X]), expected)
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_the_last_bits_of_a_metric_do_not_show_in_sharpened_warps(seed):
+    rng = np.random.default_rng(seed)
+    X = [np.cumsum(rng.standard_normal((n, 2)), axis=0) for n in (15, 22, 28, 33, 39)]
+    expected = times(DenseSynchronizer(), X)
+    assert_close(times(DenseSynchronizer(), [32 * x for x in X]), expected, 0)
+
+
 @every_synchronizer
 @few
 @given(performances(), st.floats(-5, 5))

@@ -1,0 +1,114 @@
+"""Key-frames that are given: one row a performance, in frames or seconds, NaN for not known."""
+
+import numpy as np
+import pandas as pd
+
+from .numbers import as_numbers
+from .recorded import refuse_seconds
+from .resampling import as_frame_rates
+from .wording import counted
+
+__all__ = ["Keyframes"]
+
+
+class Keyframes:
+    """The key-frames of a set of performances.
+
+    Parameters
+    ----------
+    given : list of arrays (n_keyframes,), 2-D array or DataFrame
+        One row a performance; None for one of which nothing is known.
+    n_sequences : int
+        Performances in the set.
+    frame_rate : float, or array-like of shape (n_sequences,), default=None
+        Frames per second: key-frames are seconds.
+    """
+
+    def __init__(self, given, n_sequences, frame_rate=None):
+        self._labels = None
+        if isinstance(given, (pd.DataFrame, pd.Series)):
+            # One row a performance; iterating would give columns.
+            if not isinstance(given.index, pd.RangeIndex):
+                self._labels = given.index.to_list()
+            given = given.to_numpy()
+        if not hasattr(given, "__len__") or len(given) != n_sequences:
+            raise ValueError(
+                f"keyframes must be a list of {n_sequences} arrays (n_keyframes,), one a "
+                f"performance; got {given!r:.200}."
+            )
+        self._rows, self._rates = list(given), None
+        if frame_rate is not None:
+            rates = as_frame_rates(frame_rate, n_sequences)
+            self._rates = np.broadcast_to(rates, (n_sequences, 1))[:, 0]
+
+    def shares(self, performances, count=None, *, complete=False):
+        """Key-frames (n_sequences, n_keyframes) as shares of the performances, NaN for not known.
+
+        Parameters
+        ----------
+        performances : Performances
+            All or, by their ``numbers``, some of the set.
+        count : int, default=None
+            Key-frames of each; by default as many as the first has.
+        complete : bool, default=False
+            Whether all have to be known.
+        """
+        own = range(len(self._rows))
+        if len(performances) < len(self._rows):
+            own = performances.numbers
+        self._check_labels([performances.labels[i] for i in range(len(performances))], own)
+        if count is None:
+            counts = [np.size(row) for row in self._rows if row is not None]
+            count = counts[0] if counts else 0
+        out = np.full((len(performances), count), np.nan)
+        for row, i, x in zip(out, own, performances, strict=True):
+            if self._rows[i] is not None:
+                row[:] = self._checked(i, len(x), count, complete)
+            elif complete:
+                raise ValueError(f"Performance {i}: key-frames must be given, got None.")
+        return out
+
+    def known(self, performances, *, complete=False):
+        """Key-frames of a training set as from `shares`, each of them known in some performance."""
+        out = self.shares(performances, complete=complete)
+        missing = np.flatnonzero(np.isnan(out).all(axis=0))
+        if len(missing) or not out.shape[1]:
+            which = f"key-frame {missing[0]}" if len(missing) else "a key-frame"
+            raise ValueError(
+                f"keyframes: {which} is known in no performance. Leave it out, or give its frame "
+                "in at least one."
+            )
+        return out
+
+    def _checked(self, i, n_frames, count, complete):
+        """The key-frames of one performance, as shares."""
+        given = self._rows[i]
+        frames = as_numbers(given, f"Performance {i}: keyframes", dtype=np.float64)
+        known = frames[~np.isnan(frames)] if frames.shape == (count,) else frames.ravel()
+        if self._rates is not None:
+            frames, known = frames * self._rates[i], known * self._rates[i]
+        else:
+            refuse_seconds(known, n_frames, f"Performance {i}")
+        path = np.concatenate([[0], known, [n_frames - 1]])
+        is_whole = count > 0 and (len(known) == count or not complete)
+        if frames.shape != (count,) or not is_whole or not (np.diff(path) > 0).all():
+            unit = "" if self._rates is None else f" times {self._rates[i]:g} frames per second"
+            unknown = "" if complete else ", NaN where one is not known"
+            raise ValueError(
+                f"Performance {i}: key-frames must be "
+                f"{counted(count, 'increasing frame') if count else 'some increasing frames'} "
+                f"between 0 and {n_frames - 1}, both excluded{unknown}, got {given}{unit}."
+            )
+        return frames / (n_frames - 1)
+
+    def _check_labels(self, labels, own):
+        """Refuse rows of a table that are labelled otherwise than the performances."""
+        if self._labels is None or labels == list(range(len(labels))):
+            return
+        for place, (label, i) in enumerate(zip(labels, own, strict=True)):
+            if self._labels[i] != label:
+                raise ValueError(
+                    f"Performance {place} is labelled {label!r}, and its row of keyframes "
+                    f"{self._labels[i]!r}. Give rows in the order of the performances: "
+                    "keyframes.loc[labels]."
+                )

@@ -1,0 +1,203 @@
+"""AnchoredSynchronizer: the base of synchronizers that take key-frames."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+import numpy as np
+
+from ..inputs.keyframes import Keyframes
+from ..inputs.recorded import refuse_moved_events
+from ..inputs.types import (
+    Indexed,
+    PerformancesLike,
+    SupportsArray,
+    Transformed,
+    ValuesLike,
+)
+from ..utils.atomic import atomic_fit, snapshot
+from ..utils.parameters import validated
+from .base import Synchronizer
+from .match import Match
+
+__all__ = ["AnchoredSynchronizer"]
+
+
+class AnchoredSynchronizer(Synchronizer):
+    """Base class of synchronizers whose methods take key-frames.
+
+    A subclass defines ``_learn(performances, progress, keyframes)``, with key-frames as shares of
+    the performances, (n_sequences, n_keyframes), or None; and ``_match(performances, keyframes,
+    frame_rate)``, which calls ``_shares`` for the same.
+    """
+
+    keyframes_: np.ndarray | None
+
+    # Whether every key-frame of every performance has to be known.
+    _needs_all = False
+
+    @atomic_fit
+    @validated
+    def fit(
+        self,
+        X: PerformancesLike,
+        y: object = None,
+        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
+        frame_rate: float | ValuesLike | None = None,
+    ) -> Self:
+        """Learn from performances, of which key-frames may be known.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+        y : ignored
+            Present for API consistency.
+        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
+            One row a performance, in its own frames, counted from its first row (fractions
+            allowed), increasing. NaN, or None for a whole row, where one is not known;
+            `KeyframeSynchronizer` needs all of them.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            Frames per second of X. With it key-frames are seconds.
+
+        Returns
+        -------
+        self : Synchronizer
+            The fitted synchronizer.
+
+        Raises
+        ------
+        ValueError
+            If the input breaks the contract, or the pattern does not exist or fit. If key-frames
+            are not increasing, inside their performance and equally many in all; if they look like
+            seconds, all below 1 or in the first fiftieth of a performance and not whole; if no
+            performance has one of them; or if performances have events whose frames are not their
+            rows.
+        """
+        with self._progress(fits=True) as progress:
+            performances = self._check_training_set(X)
+            known = self._known(performances, X, keyframes, frame_rate)
+            self._learn(performances, progress, known)
+            self._number_as_given()
+        return self
+
+    @atomic_fit
+    def fit_transform(
+        self,
+        X: PerformancesLike,
+        y: object = None,
+        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
+        frame_rate: float | ValuesLike | None = None,
+    ) -> Transformed:
+        """Fit, and warp the same performances.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+        y : ignored
+            Present for API consistency.
+        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
+            Key-frames of each performance, as for ``fit``.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            As for ``fit``.
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P, n_features)
+            As from ``transform``.
+        """
+        given = {"keyframes": keyframes, "frame_rate": frame_rate}
+        return self.fit(X, y, **given).transform(X, **given)
+
+    def transform(
+        self,
+        X: PerformancesLike,
+        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
+        frame_rate: float | ValuesLike | None = None,
+        fill: Literal["model"] | None = None,
+    ) -> Transformed:
+        """Warp performances onto the clock of the pattern (Eq. 18).
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances. Memory maps, and collections that give performances by index, are read in
+            parts, once each, if no key-frames are given; rows of a matrix are loaded into memory.
+        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
+            Key-frames of each performance, as for ``fit``.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            As for ``fit``.
+        fill : {None, "model"}, default=None
+            What becomes of NaN, which is what was hidden. None: it stays NaN, feature by feature.
+            "model": it is filled from the mean of the warped training set (``examples_``) at the
+            same moment, moved by how far the performance is from the mean around the gap, and in
+            the features that are seen.
+
+        Returns
+        -------
+        ndarray, shape (n_sequences, P, n_features)
+            ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
+            ``set_output(transform="pandas")``.
+        """
+        return self._warp(X, fill, **self._given(X, keyframes, frame_rate))
+
+    @snapshot
+    def match(
+        self,
+        X: PerformancesLike,
+        keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
+        frame_rate: float | ValuesLike | None = None,
+    ) -> Match:
+        """Match performances to the pattern: the warps of ``transform``.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances; the rows of a 2-D array are univariate ones.
+            Read in parts as by ``transform``.
+        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
+            Key-frames of each performance, as for ``fit``.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            As for ``fit``.
+
+        Returns
+        -------
+        Match
+            ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
+            the pattern; ``distances``, shape (n_sequences,).
+        """
+        given = self._given(X, keyframes, frame_rate)
+        if not given:
+            return self._match_in_parts(X)
+        return self._match(self.check_performances(X), **given)
+
+    def _given(self, X, keyframes, frame_rate) -> dict[str, Any]:
+        """Key-frames as arguments of ``_match`` and ``_warp_part``; none if none are given."""
+        if keyframes is None:
+            return {}
+        refuse_moved_events(X)
+        return {"keyframes": keyframes, "frame_rate": frame_rate}
+
+    def _known(self, performances, X, keyframes, frame_rate):
+        """Key-frames of a training set as shares of the performances; None if none are given."""
+        if not self._given(X, keyframes, frame_rate):
+            return None
+        given = Keyframes(keyframes, self._n_given(performances), frame_rate)
+        return given.known(performances, complete=self._needs_all)
+
+    def _n_given(self, performances):
+        """How many performances were given to ``fit``, of which these may be a sample."""
+        return len(performances)
+
+    def _shares(self, performances, keyframes, frame_rate):
+        """Key-frames of performances as shares of them, by those of the fit; None if none are."""
+        if keyframes is None:
+            return None
+        if self.keyframes_ is None:
+            raise ValueError(
+                f"Key-frames are given, and this {type(self).__name__} was fitted without any, so "
+                "it does not know where they are in the pattern. Fit it with keyframes=[...], too."
+            )
+        given = Keyframes(keyframes, len(performances), frame_rate)
+        return given.shares(performances, len(self.keyframes_), complete=self._needs_all)

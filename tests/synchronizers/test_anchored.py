@@ -1,0 +1,237 @@
+"""Key-frames that are given to dense matching: exact, soft, of a few trials, and wrong."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn_motionsync import (
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    KeyframeSynchronizer,
+    LinearSynchronizer,
+    OnlineSynchronizer,
+    PartSynchronizer,
+)
+from sklearn_motionsync.datasets import make_bending
+
+P = 60
+
+
+@pytest.fixture(scope="module")
+def bunch():
+    bunch = make_bending(9, random_state=0)
+    postures = DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+    bunch.data = ASpace(3).fit_transform(postures)
+    return bunch
+
+
+def shares(bunch, keyframes):
+    return np.array(keyframes) / (np.array([len(x) for x in bunch.data])[:, np.newaxis] - 1)
+
+
+def at_keyframes(sync, match):
+    """The times, as shares, at which performances meet the key-frames of the pattern."""
+    frames = np.arange(match.times.shape[1])
+    return np.array([np.interp(sync.keyframes_, frames, t) for t in match.times]) / frames[-1]
+
+
+@pytest.mark.parametrize("params", [{}, {"refine": True}, {"metric": None}, {"subframes": 2}])
+def test_exact_keyframes_are_met(bunch, params):
+    K = bunch.keyframes[:, [1, 3]]
+    sync = DenseSynchronizer(P, **params).fit(bunch.data, keyframes=K)
+    match = sync.match(bunch.data, keyframes=K)
+    np.testing.assert_allclose(at_keyframes(sync, match), shares(bunch, K), atol=1e-9)
+    assert (np.diff(match.times) >= 0).all()
+    own = shares(bunch, K)[sync.pattern_index_] * (P - 1)
+    np.testing.assert_allclose(sync.keyframes_, own)
+    warped = sync.transform(bunch.data, keyframes=K)
+    np.testing.assert_array_equal(warped, match.warp(bunch.data))
+    again = DenseSynchronizer(P, **params).fit_transform(bunch.data, keyframes=K)
+    np.testing.assert_array_equal(again, warped)
+
+
+def test_nothing_given_and_nothing_known_give_the_same(bunch):
+    # Without a metric, which is learnt in single precision.
+    plain = DenseSynchronizer(P, pattern=2, metric=None).fit(bunch.data)
+    assert plain.keyframes_ is None
+    K = np.full((9, 1), np.nan)
+    K[2] = bunch.keyframes[2, 2]
+    sync = clone(plain).fit(bunch.data, keyframes=K)
+    # Only the pattern has one, which anchors no pair.
+    np.testing.assert_allclose(sync.match(bunch.data).times, plain.match(bunch.data).times)
+    np.testing.assert_allclose(sync.transform(bunch.data), plain.transform(bunch.data))
+
+
+def test_a_row_that_is_not_known_may_be_none(bunch):
+    K = [list(row) for row in bunch.keyframes[:, :2]]
+    K[3], K[5][1] = None, np.nan
+    sync = DenseSynchronizer(P).fit(bunch.data, keyframes=K)
+    met = at_keyframes(sync, sync.match(bunch.data, keyframes=K))
+    wanted = shares(bunch, bunch.keyframes[:, :2])
+    known = np.ones_like(wanted, dtype=bool)
+    known[3], known[5, 1] = False, False
+    np.testing.assert_allclose(met[known], wanted[known], atol=1e-9)
+    assert np.abs(met - wanted)[~known].max() < 0.05
+
+
+@pytest.mark.parametrize("pattern", [4, "array"])
+def test_keyframes_of_a_pattern_without_any_are_learnt(bunch, pattern):
+    K, truth = bunch.keyframes[:, 1:4].copy(), shares(bunch, bunch.keyframes[:, 1:4])[4]
+    K[4] = np.nan
+    if pattern == "array":
+        pattern = np.asarray(bunch.data[4])
+    sync = DenseSynchronizer(P, pattern=pattern).fit(bunch.data, keyframes=K)
+    np.testing.assert_allclose(sync.keyframes_ / (P - 1), truth, atol=0.015)
+    known = np.arange(9) != 4
+    met = at_keyframes(sync, sync.match(bunch.data, keyframes=K))
+    np.testing.assert_allclose(met[known], shares(bunch, K)[known], atol=1e-9)
+
+
+def test_soft_keyframes_draw_where_nothing_else_tells():
+    t = np.linspace(0, 1, 80)
+
+    def steps(first, second):
+        """Two quick steps and, between them, rest."""
+        return 1 / (1 + np.exp(-(t[:, np.newaxis] - [first, second]) / 0.02))
+
+    X = [steps(0.15 + 0.01 * i, 0.85 - 0.01 * i) for i in range(6)]
+    # Labels of the rest, of which the last is 4.74 frames late.
+    K = [[79 * 0.5]] * 5 + [[79 * 0.56]]
+    for std in (1, 3):
+        sync = DenseSynchronizer(80, pattern=0, keyframe_std=std).fit(X, keyframes=K)
+        *others, moved = 79 * at_keyframes(sync, sync.match(X, keyframes=K))[:, 0]
+        np.testing.assert_allclose(others, 39.5, atol=0.1)
+        assert 39.5 + 3 < moved < 39.5 + 4.74
+    # In the first step a label is wrong that says anything else.
+    K = [[79 * (0.15 + 0.01 * i)] for i in range(5)] + [[79 * 0.3]]
+    sync = DenseSynchronizer(80, pattern=0, keyframe_std=1).fit(X, keyframes=K)
+    met = at_keyframes(sync, sync.match(X, keyframes=K))[:, 0]
+    np.testing.assert_allclose(met, 0.15 + 0.01 * np.arange(6), atol=0.005)
+
+
+def test_known_moments_right_a_movement_that_misleads():
+    """Two equal strokes: the middle says which one is meant, and nothing else does."""
+    t = np.linspace(0, 1, 101)
+
+    def strokes(first, second):
+        bumps = [np.exp(-0.5 * ((t - at) / 0.03) ** 2) for at in (first, second)]
+        return np.stack([sum(bumps), np.gradient(sum(bumps))], axis=1)
+
+    X = [strokes(0.25 + 0.01 * i, 0.7 - 0.005 * i) for i in range(5)]
+    X.append(np.stack([np.exp(-0.5 * ((t - 0.5) / 0.03) ** 2)] * 2, axis=1))
+    X[-1][:, 1] = np.gradient(X[-1][:, 0])
+    for stroke, at in enumerate((0.25, 0.7)):
+        K = [[100 * (0.25 + 0.01 * i, 0.7 - 0.005 * i)[stroke]] for i in range(5)] + [[50.0]]
+        sync = DenseSynchronizer(101, pattern=0).fit(X, keyframes=K)
+        times = sync.match(X, keyframes=K).times[-1]
+        np.testing.assert_allclose(np.interp(100 * at, np.arange(101), times), 50, atol=1e-9)
+
+
+def test_the_disparity_space_shows_the_anchored_path(bunch):
+    K = bunch.keyframes[:, [2]].copy()
+    K[8] += 9
+    plain = DenseSynchronizer(P, pattern=0).fit(bunch.data, keyframes=K)
+    space = plain.disparity_space(bunch.data, 8, keyframes=K)
+    free = plain.disparity_space(bunch.data, 8)
+    np.testing.assert_array_equal(space.costs, free.costs)
+    moment = round(plain.keyframes_[0])
+    wanted = shares(bunch, K)[8, 0] * (P - 1)
+    assert abs(moment + space.path[moment] - wanted) <= 1
+    assert abs(moment + free.path[moment] - wanted) > 1
+
+
+def test_results_do_not_depend_on_order_jobs_or_company(bunch):
+    K = bunch.keyframes[:, [1, 3]].copy()
+    K[6] = np.nan
+    sync = DenseSynchronizer(P, pattern=0).fit(bunch.data, keyframes=K)
+    times = sync.match(bunch.data, keyframes=K).times
+    jobs = clone(sync).set_params(n_jobs=2).fit(bunch.data, keyframes=K)
+    np.testing.assert_array_equal(jobs.match(bunch.data, keyframes=K).times, times)
+    alone = sync.match(bunch.data[5:6], keyframes=K[5:6]).times[0]
+    np.testing.assert_array_equal(alone, times[5])
+
+
+def test_a_sample_takes_its_own_keyframes(bunch):
+    K = bunch.keyframes[:, [2]]
+    sync = DenseSynchronizer(P, max_fit=5).fit(bunch.data, keyframes=K)
+    own = shares(bunch, K)[sync.pattern_index_] * (P - 1)
+    np.testing.assert_allclose(sync.keyframes_, own)
+    with pytest.raises(ValueError, match="list of 9 arrays"):
+        DenseSynchronizer(P, max_fit=5).fit(bunch.data, keyframes=K[:5])
+
+
+def test_seconds_and_frames_are_the_same(bunch):
+    K, rates = bunch.keyframes[:, [1, 3]], np.linspace(50, 120, 9)
+    for rate in (100.0, rates):
+        seconds = K / np.broadcast_to(rate, 9)[:, np.newaxis]
+        given = {"keyframes": seconds, "frame_rate": rate}
+        for sync in (DenseSynchronizer(P), KeyframeSynchronizer(P)):
+            expected = clone(sync).fit(bunch.data, keyframes=K).match(bunch.data, keyframes=K)
+            found = sync.fit(bunch.data, **given).match(bunch.data, **given)
+            np.testing.assert_allclose(found.times, expected.times, atol=1e-9)
+            np.testing.assert_array_equal(
+                sync.transform(bunch.data, **given), found.warp(bunch.data)
+            )
+
+
+def test_parts_follow_a_body_that_is_anchored(bunch):
+    K = bunch.keyframes[:, [2]]
+    sync = PartSynchronizer({"a": [0, 1, 2]}, synchronizer=DenseSynchronizer(P))
+    sync.fit(bunch.data, keyframes=K)
+    body = DenseSynchronizer(P).fit(bunch.data, keyframes=K).match(bunch.data, keyframes=K)
+    np.testing.assert_array_equal(sync.match(bunch.data, keyframes=K).times, body.times)
+    parts = sync.match_parts(bunch.data, keyframes=K)
+    warped = sync.transform(bunch.data, keyframes=K)
+    np.testing.assert_array_equal(warped[..., 3:], body.warp(bunch.data)[..., 3:])
+    assert np.isfinite(sync.lags(bunch.data, keyframes=K).values).all()
+    strong = clone(sync).set_params(coupling=np.inf).fit(bunch.data, keyframes=K)
+    np.testing.assert_array_equal(strong.match_parts(bunch.data, K)["a"].times, body.times)
+    # A weak coupling lets the part be early or late.
+    assert np.abs(parts["a"].times - body.times).max() > 0.1
+
+
+def test_the_live_synchronizer_learns_from_keyframes(bunch):
+    K = bunch.keyframes[:, [2]]
+    live = OnlineSynchronizer(DenseSynchronizer(P)).fit(bunch.data, keyframes=K)
+    warped = DenseSynchronizer(P).fit_transform(bunch.data, keyframes=K)
+    np.testing.assert_allclose(live.mean_, warped.mean(axis=0))
+    assert live.track(bunch.data[:1])[0].phase[-1] > 0.8 * (P - 1)
+
+
+def test_rows_of_a_table_are_those_of_the_performances(bunch):
+    names = [f"trial {i}" for i in range(9)]
+    X = pd.concat([pd.DataFrame(x) for x in bunch.data], keys=names)
+    K = pd.DataFrame(bunch.keyframes[:, [2]], index=names)
+    sync = DenseSynchronizer(P).fit(X, keyframes=K)
+    expected = DenseSynchronizer(P).fit(bunch.data, keyframes=bunch.keyframes[:, [2]])
+    np.testing.assert_array_equal(sync.pattern_, expected.pattern_)
+    with pytest.raises(ValueError, match="labelled 'trial 0', and its row of keyframes 'trial 8'"):
+        sync.match(X, keyframes=K[::-1])
+
+
+BAD = {
+    "too few rows": (lambda K: K[:4], "list of 9 arrays"),
+    "another count": (lambda K: [*K[:3], [5.0], *K[4:]], "Performance 3: .* 2 increasing"),
+    "falling": (lambda K: [*K[:2], K[2][::-1], *K[3:]], "Performance 2: .* increasing"),
+    "outside": (lambda K: [*K[:8], [10.0, 1e4]], "Performance 8: .* between 0 and"),
+    "in seconds": (lambda K: K / 1000, "Performance 0: .* look like seconds"),
+    "none known": (lambda K: K * [1, np.nan], "key-frame 1 is known in no performance"),
+    "no column": (lambda K: K[:, :0], "must be some increasing frames"),
+    "no row": (lambda K: [None] * 9, "a key-frame is known in no performance"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_keyframes_are_refused(name, bunch):
+    make, message = BAD[name]
+    with pytest.raises(ValueError, match=message):
+        DenseSynchronizer(P).fit(bunch.data, keyframes=make(bunch.keyframes[:, [1, 3]]))
+
+
+def test_keyframes_need_a_fit_with_some(bunch):
+    sync = DenseSynchronizer(P).fit(bunch.data)
+    with pytest.raises(ValueError, match="fitted without any"):
+        sync.match(bunch.data, keyframes=bunch.keyframes)
+    with pytest.raises(TypeError, match="keyframes"):
+        LinearSynchronizer(P).fit(bunch.data, keyframes=bunch.keyframes)
