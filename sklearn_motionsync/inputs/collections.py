@@ -81,9 +81,12 @@ class Performances(tuple):
         The index of each in all that was given.
     facts : list of dict
         What the tables say of each, from `facts_of`; empty without tables.
+    weights : list of ndarray (n_frames_i,), or None
+        Of the frames of each, if gaps were filled.
     """
 
     facts = ()
+    weights = None
 
     def __new__(cls, arrays, kind, labels, frames=(), names=None, levels=INDEX_NAMES, numbers=None):
         self = super().__new__(cls, arrays)

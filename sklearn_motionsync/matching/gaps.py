@@ -15,7 +15,11 @@ from scipy.interpolate import Akima1DInterpolator
 from .filters import smooth
 from .warps import normalise
 
-__all__ = ["Filler"]
+__all__ = ["UNSEEN", "Filler", "add_weights"]
+
+# Cost of a frame of which nothing was seen, in mean squared features: about that of two matched
+# ones. Without it a path would stay where nothing was seen. docs/design.md.
+UNSEEN = 0.3
 
 # Frames of the clock on which covariances are learnt.
 _FRAMES = 101
@@ -58,7 +62,7 @@ class Filler(NamedTuple):
         on_clock = normalise([_without_gaps(x, mean) for x in arrays], _FRAMES)
         velocity = smooth(on_clock, _SMOOTHING * (_FRAMES - 1), order=1)
         factors, ridge, reach = {}, {}, 0
-        while reach <= _FRAMES // 4:
+        while 2 * reach < _FRAMES - 1:
             part = velocity
             if reach:
                 ahead, behind = on_clock[:, 2 * reach :], on_clock[:, : -2 * reach]
@@ -90,7 +94,7 @@ class Filler(NamedTuple):
             others, kept = seen[rows], before[rows] - base
             for mask in np.unique(others, axis=0):
                 own = (others == mask).all(axis=1)
-                slopes, left = self._regression(reach, mask, columns)
+                slopes, left = self.regression(reach, mask, columns)
                 at = np.ix_(first + np.flatnonzero(own), columns)
                 filled[at] = base[np.ix_(own, columns)] + kept[np.ix_(own, mask)] @ slopes
                 unknown[at] = left
@@ -111,7 +115,7 @@ class Filler(NamedTuple):
         nearest = 2 ** int(np.clip(np.round(np.log2(reach)), 0, np.log2(max(self.factors))))
         return _along(beside, curves[beside], rows), nearest
 
-    def _regression(self, reach, seen, hidden):
+    def regression(self, reach, seen, hidden):
         """Slopes (n_seen, n_hidden) of hidden on seen features, and the variances that remain."""
         factor, ridge = self.factors[reach], self.ridge[reach]
         known, wanted = factor[seen], factor[hidden]
@@ -140,6 +144,25 @@ def _runs(mask):
     """First and last index of every run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
     return edges[::2], edges[1::2] - 1
+
+
+def add_weights(arrays, weights):
+    """Performances with a column of weights behind their features.
+
+    Parameters
+    ----------
+    arrays : sequence of ndarray (n_frames_i, n_features)
+    weights : sequence of ndarray (n_frames_i,), or None
+        None: all have the weight 1.
+
+    Returns
+    -------
+    list of ndarray (n_frames_i, n_features + 1)
+    """
+    if weights is None:
+        weights = [np.ones(len(x)) for x in arrays]
+    columns = (w[:, np.newaxis].astype(x.dtype) for x, w in zip(arrays, weights, strict=True))
+    return [np.concatenate([x, w], axis=1) for x, w in zip(arrays, columns, strict=True)]
 
 
 def _along(frames, values, at):

@@ -22,6 +22,7 @@ from ..inputs.types import (
 from ..matching.anchors import KeyframeColumns, add_ramps, first_meeting, pin
 from ..matching.costs import COSTS
 from ..matching.filters import SMOOTHING, choose_smoothing
+from ..matching.gaps import add_weights
 from ..matching.matcher import (
     Features,
     LinearWarper,
@@ -92,14 +93,13 @@ class DenseSynchronizer(AnchoredSynchronizer):
     >>> sync.match(trials).offsets[:, 50].round().tolist()  # how late they were, in frames
     [-10.0, 0.0, 12.0]
 
-    NaN is what was not seen. It is matched by what was, and stays NaN:
+    NaN is what was not seen. A trial is matched by what was, and stays NaN elsewhere:
 
     >>> trials[2][20:30] = np.nan
-    >>> aligned = sync.transform(trials)
-    >>> aligned.shape, int(np.isnan(aligned[2]).sum())
-    ((3, 101, 1), 8)
+    >>> int(np.isnan(sync.transform(trials)[2]).sum())
+    8
 
-    A trial of which nothing was seen is refused:
+    One of which nothing was seen is refused:
 
     >>> trials[2][:] = np.nan
     >>> sync.transform(trials)
@@ -445,11 +445,14 @@ class DenseSynchronizer(AnchoredSynchronizer):
         """Performances as the warper takes them, and their key-frames as shares, or None."""
         shares = self._shares(performances, keyframes, frame_rate)
         performances = self._without_gaps(performances)
+        arrays = performances
+        if self._warper.matcher.features.weighs:
+            arrays = add_weights(performances, performances.weights)
         if self.keyframes_ is None:
-            return performances, None
+            return arrays, None
         if shares is None:
             shares = np.full((len(performances), len(self.keyframes_)), np.nan)
-        return add_ramps(performances, shares), shares
+        return add_ramps(arrays, shares), shares
 
     def _distances_and_times(self, arrays, shares):
         with self._progress(fits=False) as progress:
@@ -536,14 +539,17 @@ class DenseSynchronizer(AnchoredSynchronizer):
     def _learn(self, performances, progress, keyframes):
         training = self._set_clock(performances, self.subframes)
         positions, arrays, columns = training.scaled, list(performances), None
+        n_features, weights = positions.shape[2], performances.weights
+        if weights is not None:
+            arrays = add_weights(arrays, weights)
         if keyframes is not None:
-            arrays = add_ramps(performances, keyframes)
+            arrays = add_ramps(arrays, keyframes)
             std = self.keyframe_std / (self.n_frames_ - 1)
             columns = KeyframeColumns(keyframes.shape[1], std)
-        if self.subframes > 1 or columns is not None:
+        if self.subframes > 1 or arrays[0].shape[1] > n_features:
             positions = normalise(arrays, self.n_frames_, self.subframes)
             training.unit(positions, out=positions)
-        features = self._learn_metric(training.unit, positions, columns)
+        features = self._learn_metric(training.unit, positions, columns, weights is not None)
         settings = self._settings()
         searched = features.for_search(self.n_frames_, settings["max_offset"])
         store = FeatureStore(searched, positions)
@@ -553,9 +559,12 @@ class DenseSynchronizer(AnchoredSynchronizer):
         if searched is not features:
             reach = {name: settings[name] for name in ("max_offset", "max_rate")}
             matcher = searcher.on_clock(features, self.n_frames_, **reach)
-        self.features_ = features.replace(anchors=None)
+        self.features_ = features.replace(anchors=None, weighs=False)
         self.mu_ = float(features.back(matcher.trellis.mu))
         source = self._set_pattern(training, median, features.degree)
+        if weights is not None:
+            own = self.pattern_index_
+            (source,) = add_weights([source], None if own is None else [weights[own]])
         # Sums over fewer frames, scaled to all.
         self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
         chosen = self._choose_exemplars(median.estimates, modes, keyframes)
@@ -573,7 +582,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
         else:
             warper = final = on_one_thread(self._sharpened, positions, warper, chosen[home])
         if isinstance(final, SharpenedWarper):
-            self.sharpening_ = Bunch(**final.sharpener.found(positions.shape[2]))
+            self.sharpening_ = Bunch(**final.sharpener.found(n_features))
         self._warper = warper
 
     def _settings(self, learnt=None):
@@ -585,7 +594,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
         settings = {"smoothness": self.smoothness, "max_rate": self.max_rate}
         return {**settings, "max_offset": max_offset}
 
-    def _learn_metric(self, unit, positions, columns):
+    def _learn_metric(self, unit, positions, columns, weighs):
         """The features with the learnt metric, from evenly spaced performances if there are many.
 
         Sets ``metric_`` and ``evidence_``.
@@ -595,8 +604,8 @@ class DenseSynchronizer(AnchoredSynchronizer):
         smoothing, self.metric_ = self.velocity_smoothing, None
         self.evidence_ = no_evidence()
         sharp, smooth = (_SHARP, _SMOOTH) if smoothing == "auto" else (smoothing, smoothing)
-        plain = Features(self.cost, self.subframes, smooth, unit, anchors=columns)
-        n = len(positions)
+        plain, n = Features(self.cost, self.subframes, smooth, unit), len(positions)
+        plain = plain.replace(anchors=columns, weighs=weighs)
         if not learns or n < _FEWEST:
             return plain
         some = np.unique(np.round(np.linspace(0, n - 1, min(n, _MOST))).astype(np.intp))
@@ -704,16 +713,15 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     def _warper_by(self, exemplars, arrays, matcher, source):
         """The warper to the pattern by way of exemplars."""
-        chosen = [source, *(arrays[k] for k in exemplars.tolist())]
         # In double precision, as all performances that are warped.
-        chosen = [x.astype(np.float64, copy=False) for x in chosen]
-        positions = matcher.features.positions(chosen, self.n_frames_)
+        both = source, *(arrays[k] for k in exemplars.tolist())
+        chosen = [x.astype(np.float64, copy=False) for x in both]
+        positions, votes = matcher.features.positions(chosen, self.n_frames_), self.consensus > 0
         pattern = matcher.features.plain(positions)[0, :: self.subframes]
-        votes = self.consensus > 0
-        settings = pattern, positions, votes, self.warp_smoothing
         linear = self.evidence_.harmful and self.unsupported == "linear"
         made = LinearWarper if linear else Warper
-        return on_one_thread(made.to_pattern, matcher, *settings)
+        settings = matcher, pattern, positions, votes, self.warp_smoothing
+        return on_one_thread(made.to_pattern, *settings)
 
     def _decide_on_refinement(self, training, warper, source, progress, portions):
         """Decide whether warps are refined by postures; the warper that does so or not."""
@@ -721,9 +729,8 @@ class DenseSynchronizer(AnchoredSynchronizer):
         if self.refine == "auto" and self.consensus > 0 and not linear:
             others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
             some = others[:: -(-len(others) // _TESTED) or 1]
-            how = {"n_jobs": self.n_jobs, "progress": progress}
-            given = training.scaled, warper, source, some, portions
-            verdict = try_refinement(*given, self._settings(learnt=False), **how)
+            given = training.scaled, warper, source, some, portions, self._settings(learnt=False)
+            verdict = try_refinement(*given, n_jobs=self.n_jobs, progress=progress)
         names = "ratio", "p_value", "ratio_to_all"
         self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
         self.misfit_ = verdict.misfit

@@ -40,7 +40,7 @@ def learn_filler(performances, names=None):
 
 
 def fill_performances(filler, performances):
-    """Performances without gaps.
+    """Performances without gaps, and with the weights of their frames.
 
     Parameters
     ----------
@@ -52,18 +52,21 @@ def fill_performances(filler, performances):
     ValueError
         If all of a performance is NaN.
     """
-    arrays = []
+    filled = []
     for i, x in enumerate(performances):
         if not np.isnan(x.sum()):
-            arrays.append(x)
+            filled.append((x, np.ones(len(x))))
             continue
         if np.isnan(x).all():
             raise ValueError(
                 f"{performances.called(i)} is NaN in every frame and feature: nothing of it was "
                 "seen, so it has no timing. Leave it out."
             )
-        arrays.append(filler(x)[0])
-    return performances.replace(arrays)
+        filled.append(filler(x))
+    arrays, weights = zip(*filled, strict=True)
+    out = performances.replace(arrays)
+    out.weights = list(weights)
+    return out
 
 
 def check_fill(fill):

@@ -27,6 +27,7 @@ from ..inputs.types import (
 )
 from ..inputs.validation import names_of_input
 from ..matching.anchors import add_ramps
+from ..matching.gaps import add_weights
 from ..matching.matcher import Matcher, Warper
 from ..matching.trellis import Coupling
 from ..matching.warps import evaluate_warps, normalise
@@ -413,9 +414,14 @@ def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None
             chosen = [x.astype(np.float64, copy=False) for x in chosen]
             sizes = self.n_frames_, self.subframes
             given = chosen
+            if performances.weights is not None:
+                weights = [performances.weights[k] for k in self.exemplars_]
+                index = self.pattern_index_
+                own = np.ones(len(source)) if index is None else performances.weights[index]
+                given = add_weights(given, [own, *weights])
             if known is not None:
                 own = self.keyframes_ / (self.n_frames_ - 1)
-                given = add_ramps(chosen, [own, *known[self.exemplars_]])
+                given = add_ramps(given, [own, *known[self.exemplars_]])
             given, chosen = (normalise(x, *sizes) for x in (given, chosen))
             (times,) = run(_warp_pattern_and_exemplars, [(self._warper, given)])
             training = normalise(performances, self.n_frames_, self.subframes)
