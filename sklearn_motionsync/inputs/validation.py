@@ -61,6 +61,9 @@ _EXCHANGED = (
 class SequenceLevelMixin:
     """Input checks of estimators whose samples are whole performances."""
 
+    # How `check_performances` treats NaN; "allow-nan" admits gaps.
+    _finite = True
+
     def check_performances(self, X: PerformancesLike) -> Performances:
         """Check performances against the input contract, and against those of ``fit``.
 
@@ -86,7 +89,8 @@ class SequenceLevelMixin:
             same = X.names is getattr(self, "feature_names_in_", None)
             if same and X[0].shape[not on_rows] == self.n_features_in_:
                 return X
-        return check_performances(self, X, reset=False, level="sequence", on_rows=on_rows)
+        how = {"level": "sequence", "on_rows": on_rows, "finite": self._finite}
+        return check_performances(self, X, reset=False, **how)
 
     def _read_rows_in_fit(self):
         """Whether it was fitted on 2-D input; an error if it was not fitted."""
@@ -97,7 +101,8 @@ class SequenceLevelMixin:
 
     def _check_training_set(self, X, numbers=None):
         """Check the input of ``fit``: all performances, or some with their numbers."""
-        performances = check_performances(self, X, reset=True, level="sequence", numbers=numbers)
+        how = {"level": "sequence", "numbers": numbers, "finite": self._finite}
+        performances = check_performances(self, X, reset=True, **how)
         self._fitted_on_rows = performances.kind == "rows"
         if not self._fitted_on_rows:
             warn_of_clocks(performances, names_of_input(self))
