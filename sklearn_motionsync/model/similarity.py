@@ -233,6 +233,7 @@ def movement_energies(on_clock, floor=None):
     Parameters
     ----------
     on_clock : ndarray (n_sequences, P, n_features)
+        NaN in gaps: the mean is that of what was seen, feature by feature.
     floor : float, default=None
         The energy of standing still; by default a billionth of the variance of all postures.
 
@@ -244,13 +245,35 @@ def movement_energies(on_clock, floor=None):
         Above 0.
     """
     on_clock = np.asarray(on_clock, dtype=np.float64)
-    squares = np.square(on_clock - on_clock.mean(axis=1, keepdims=True))
-    energy = squares.reshape(len(on_clock), -1).sum(axis=1) / on_clock.shape[1]
-    if floor is None:
+    if has_gaps(on_clock):
+        energy, variance = _energies_of_seen(on_clock)
+    else:
+        squares = np.square(on_clock - on_clock.mean(axis=1, keepdims=True))
+        energy = squares.reshape(len(on_clock), -1).sum(axis=1) / on_clock.shape[1]
         variance = np.square(on_clock - on_clock.mean(axis=(0, 1))).sum(axis=2).mean()
-        rounding = np.square(64 * np.finfo(float).eps * np.abs(on_clock).max())
+    if floor is None:
+        rounding = np.square(64 * np.finfo(float).eps * np.nanmax(np.abs(on_clock)))
         floor = max(_LEAST * variance, rounding * on_clock.shape[2], np.finfo(float).tiny)
     return np.maximum(energy, floor), float(floor)
+
+
+def _energies_of_seen(on_clock):
+    """Energies (n,) of performances with gaps, and the variance of all postures.
+
+    A feature that a performance never shows has the share of the energy that it has in the others.
+    """
+    seen = ~np.isnan(on_clock)
+    values, counts = np.where(seen, on_clock, 0), seen.sum(axis=1)
+    means = values.sum(axis=1) / np.maximum(counts, 1)
+    squares = np.where(seen, np.square(values - means[:, np.newaxis]), 0).sum(axis=1)
+    shown = counts > 0
+    own = np.where(shown, squares / np.maximum(counts, 1), 0)
+    usual = own.sum(axis=0) / np.maximum(shown.sum(axis=0), 1)
+    share = np.where(shown, usual, 0).sum(axis=1) / (usual.sum() or 1.0)
+    centre = values.sum(axis=(0, 1)) / np.maximum(counts.sum(axis=0), 1)
+    apart = np.where(seen, np.square(values - centre), 0).sum(axis=(0, 1))
+    variance = (apart / np.maximum(counts.sum(axis=0), 1)).sum()
+    return own.sum(axis=1) / np.where(share > 0, share, 1), variance
 
 
 # -- logarithms of positive measures, taken for normal ------------------------------------

@@ -280,16 +280,17 @@ class ASpace(
             k = int(seen.argmin())
             times = "never seen" if seen[k] == 0 else "seen in one posture only"
             raise ValueError(
-                f"Feature {called[k]} was {times}: {counted((seen < 2).sum(), 'feature')} of "
-                f"{n_features} are NaN in all postures but one, or in all. Leave them out, or fit "
-                "on performances that show them."
+                f"Feature {called[k]} was {times}. Of {counted(n_features, 'feature')} "
+                f"{(seen < 2).sum()} was seen in fewer than 2 postures: leave such out, or fit on "
+                "performances that show them."
             )
         if seen.min() < n_features:
             k = int(seen.argmin())
             warnings.warn(
-                f"Feature {called[k]} was seen in {seen[k]} of {len(hidden)} postures, fewer than "
-                f"there are features, {n_features}: what it is where it is hidden is hardly known. "
-                "Leave it out, or fit on performances that show it.",
+                f"Feature {called[k]} was seen in {counted(int(seen[k]), 'posture')} of "
+                f"{len(hidden)}, and a posture has {counted(n_features, 'feature')}: fewer "
+                "postures than features hardly tell what it is where it is hidden. Leave it out, "
+                "or fit on performances that show it.",
                 UserWarning,
                 stacklevel=2,
             )
