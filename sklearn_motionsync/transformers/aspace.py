@@ -99,7 +99,8 @@ class ASpace(
     deviations. ``transform`` projects the conditional expectation of a pose given all that was seen
     of its trial. There poses are normal, and frames t apart are correlated by
     ``exp(-t / correlation_time_)``. So a hidden arm follows the other limbs, and joins the frames
-    before and after the gap. The covariance is shrunk a little (3 %) towards its diagonal for that.
+    before and after the gap. Features that predict others are taken to have noise, a tenth of their
+    variance, as few people show them together.
     Rows of a 2-D array are poses without order, each expected by itself. A pose of which nothing
     was seen becomes NaN: its neighbours in time know more of it than the mean pose.
 

@@ -12,10 +12,10 @@ from sklearn.utils.extmath import svd_flip
 
 __all__ = ["HiddenNormal", "components_of_seen", "estimate_moments"]
 
-# Added to the variances, as a share, wherever a feature is predicted by others: few people have
-# shown the features together. Of 0.001 to 0.1 it is near the best in seven sets of people.
-SHRINKAGE = 0.03
-# A fit ends when what was hidden changes by less, in standard deviations of its features (RMS).
+# Noise of the features by which others are predicted, as a share of their variance: few people have
+# shown them together. It is near the best in seven sets of people (benchmarks/expectation.py).
+SHRINKAGE = 0.1
+# A fit ends when hidden values (RMS) and variances change by less, in standard units.
 TOLERANCE, MAX_ROUNDS = 1e-4, 500
 # A feature is constant if it varies by less than a share of the most varying one.
 _CONSTANT = 1e-15
@@ -36,7 +36,7 @@ class HiddenNormal(NamedTuple):
     mean, scale : ndarray, shape (n_features,)
         Postures less the mean, divided by the scale, are in standard units.
     precision : ndarray, shape (n_features, n_features)
-        The inverse of their covariance in these units, shrunk a little towards its diagonal.
+        The inverse of their covariance in these units, with the variance of a noise.
     tau : float
         In frames; 0 if frames have no order.
     """
@@ -59,7 +59,8 @@ class HiddenNormal(NamedTuple):
         """
         mean, covariance = (np.asarray(a, dtype=np.float64) for a in (mean, covariance))
         scale = _scale(np.diag(covariance))
-        precision = _shrunk_inverse(covariance / np.outer(scale, scale))
+        covariance = covariance / np.outer(scale, scale)
+        precision = np.linalg.inv(covariance + np.diag(_noise(covariance)))
         return cls(mean, scale, precision, _correlation_time(arrays, mean, scale))
 
     def fill(self, x, timed):
@@ -117,17 +118,20 @@ def estimate_moments(postures):
     whole, gappy, hidden = z[~has_gaps], z[has_gaps], hidden[has_gaps]
     sums, squares = whole.sum(axis=0), whole.T @ whole
     patterns, n = Patterns(hidden), len(z)
-    mean, covariance = np.zeros(len(center)), np.diag(np.square(z).sum(axis=0) / n)
+    variance = np.square(z).sum(axis=0) / (~np.isnan(postures)).sum(axis=0)
+    mean, covariance = np.zeros(len(center)), np.diag(variance)
     for round_ in range(MAX_ROUNDS):
-        before = gappy[hidden]
-        precision = _shrunk_inverse(covariance)
+        before, known = gappy[hidden], np.diag(covariance)
+        noise = _noise(covariance)
+        precision = np.linalg.inv(covariance + np.diag(noise))
         gappy = patterns.expect(np.where(hidden, 0, gappy - mean), precision) + mean
         mean = (sums + gappy.sum(axis=0)) / n
-        covariance = (squares + gappy.T @ gappy + patterns.left_unknown(precision)) / n
-        covariance -= np.outer(mean, mean)
-        # In the first round all features are independent, and hidden ones have their mean.
-        change = np.square(gappy[hidden] - before).sum() / max(len(before), 1)
-        if round_ and np.sqrt(change) < TOLERANCE:
+        unknown = patterns.left_unknown(precision) - np.diag(hidden.sum(axis=0) * noise)
+        covariance = (squares + gappy.T @ gappy + unknown) / n - np.outer(mean, mean)
+        change = np.sqrt(np.square(gappy[hidden] - before).sum() / max(len(before), 1))
+        change = max(change, np.abs(np.diag(covariance) - known).max())
+        # In the first round all features are independent.
+        if round_ and change < TOLERANCE:
             break
     else:
         warnings.warn(
@@ -213,7 +217,10 @@ class Patterns:
         return out
 
     def left_unknown(self, precision):
-        """The sum over all rows of the covariances of what is hidden, given what is seen."""
+        """The sum over all rows of the covariances of what is hidden, given what is seen.
+
+        Of hidden features with their noise.
+        """
         n = self._shape[1]
         total = np.zeros(n * n)
         for _, _, features, counts in self._batches:
@@ -232,11 +239,11 @@ def _scale(variance):
     return np.sqrt(np.where(variance > _CONSTANT * variance.max(), variance, 1))
 
 
-def _shrunk_inverse(covariance):
+def _noise(covariance):
+    """The variance of the noise of each feature, by a covariance in standard units."""
     variance = np.diag(covariance)
     # Constant features have no unit, and predict nothing.
-    constant = variance <= _CONSTANT * max(1, variance.max())
-    return np.linalg.inv(covariance + np.diag(np.where(constant, 1, SHRINKAGE * variance)))
+    return np.where(variance > _CONSTANT * max(1, variance.max()), SHRINKAGE * variance, 1)
 
 
 def _correlation_time(arrays, mean, scale):

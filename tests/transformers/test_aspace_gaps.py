@@ -67,8 +67,11 @@ def maximise_slowly(Z, n_rounds=100):
     for _ in range(n_rounds):
         found = [conditional(z, mean, shrunk(covariance)) for z in Z]
         whole = np.array([x for x, _ in found])
+        left = sum(left for _, left in found)
+        # What is unknown of a hidden feature is unknown of it without noise.
+        left -= SHRINKAGE * np.diag(np.isnan(Z).sum(axis=0) * np.diag(covariance))
         mean = whole.mean(axis=0)
-        covariance = np.cov(whole.T, bias=True) + sum(left for _, left in found) / len(Z)
+        covariance = np.cov(whole.T, bias=True) + left / len(Z)
     return mean, covariance
 
 
@@ -274,6 +277,15 @@ def test_an_estimate_that_does_not_settle_is_warned_of(monkeypatch):
     monkeypatch.setattr(expectation, "MAX_ROUNDS", 2)
     with pytest.warns(ConvergenceWarning, match="still changes after 2 rounds: 28% of all"):
         ASpace().fit(hide(low_rank(3), 0.3))
+
+
+def test_variances_of_what_is_hidden_at_random_are_not_biased():
+    """Of independent features nothing is learnt about hidden values: they change no variance."""
+    rng = np.random.default_rng(0)
+    Z = rng.standard_normal((4000, 3)) * [1, 2, 3]
+    Z[rng.random(Z.shape) < [0, 0.5, 0.95]] = np.nan
+    _, covariance = estimate_moments(Z)
+    np.testing.assert_allclose(np.diag(covariance), np.nanvar(Z, axis=0), rtol=0.02)
 
 
 def test_infinity_is_refused():
