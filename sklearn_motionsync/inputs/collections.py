@@ -127,6 +127,7 @@ def check_members(
     dtype=None,
     names=None,
     timed=False,
+    advice=None,
 ):
     """Check the performances of a collection in one pass.
 
@@ -146,6 +147,8 @@ def check_members(
         that has them in another order is brought into this one.
     timed : bool, default=False
         Whether the times of frames are given, so that the index need not tell them.
+    advice : str, default=None
+        What to do about NaN, as for `check_finite`.
 
     Returns
     -------
@@ -211,7 +214,8 @@ def check_members(
         peak = high if high > low else low
         if not peak <= LARGEST:
             own = frames[i] if tables else None
-            check_finite(array, f"{what(i)}, frame", names, own, allow_nan=finite == "allow-nan")
+            how = {"allow_nan": finite == "allow-nan"} | ({"advice": advice} if advice else {})
+            check_finite(array, f"{what(i)}, frame", names, own, **how)
             peak = np.fmax.reduce(np.abs(array), axis=None, initial=0)
         if peak > largest:
             largest, holder = peak, i

@@ -128,7 +128,8 @@ def check_performances(
     Parameters
     ----------
     estimator : estimator
-        Gets ``n_features_in_`` (features of a frame) and ``feature_names_in_``.
+        Gets ``n_features_in_`` (features of a frame) and ``feature_names_in_``. Its ``_on_gaps``,
+        if it has one, is what to do about NaN that it refuses.
     X : the input, of any kind the contract names
     reset : bool
         True in ``fit``.
@@ -163,7 +164,8 @@ def check_performances(
             f"{estimator.n_features_in_}) and got a collection of performances. Give it 2-D "
             "input, or fit it on a collection."
         )
-    how = {"numbers": numbers, "dtype": dtype, "timed": timed}
+    advice = getattr(estimator, "_on_gaps", None)
+    how = {"numbers": numbers, "dtype": dtype, "timed": timed, "advice": advice}
     how |= {} if reset else {"names": names_of_input(estimator)}
     out = check_members(sequences, finite=finite, training=reset, **how)
     width = out[0].shape[1]
@@ -294,7 +296,9 @@ def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
     _check_names(estimator, X, reset)
     names = getattr(estimator, "feature_names_in_", None)
     labels = index if index is not None else numbers
-    check_finite(out, "Row", names, labels, allow_nan=finite == "allow-nan")
+    advice = getattr(estimator, "_on_gaps", None)
+    how = {"allow_nan": finite == "allow-nan"} | ({"advice": advice} if advice else {})
+    check_finite(out, "Row", names, labels, **how)
     ends = (np.fmax.reduce(out, axis=1, initial=0), -np.fmin.reduce(out, axis=1, initial=0))
     size = np.maximum(*ends)
     row = int(size.argmax())

@@ -35,7 +35,7 @@ from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
-from .gaps import check_fill, fill_performances, fill_warped, has_gaps, learn_filler
+from .gaps import check_fill, fill_performances, fill_warped, hold_gaps, learn_filler
 from .match import Match, check_match
 
 __all__ = ["Synchronizer", "TrainingSet"]
@@ -346,7 +346,7 @@ class Synchronizer(
 
     def _without_gaps(self, performances):
         """Checked performances, filled where they are NaN."""
-        if not has_gaps(performances):
+        if not hold_gaps(performances):
             return performances
         filler = self._filler or learn_filler(self.examples_)
         return fill_performances(filler, performances)
@@ -355,7 +355,7 @@ class Synchronizer(
 
     def _check_training_set(self, X, numbers=None):
         performances, self._filler = super()._check_training_set(X, numbers), None
-        if has_gaps(performances):
+        if hold_gaps(performances):
             self._filler = learn_filler(performances, names_of_input(self))
         return self._without_gaps(performances)
 

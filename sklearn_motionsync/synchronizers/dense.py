@@ -46,6 +46,7 @@ from ..utils.threads import on_one_thread
 from .anchored import AnchoredSynchronizer
 from .balance import warn_of_one_feature
 from .evidence import no_evidence, weigh_evidence
+from .gaps import known_whole
 from .match import Match
 from .portions import FeatureStore, TrainingPortions, warp_in_portions
 from .refinement import try_refinement
@@ -355,7 +356,6 @@ class DenseSynchronizer(AnchoredSynchronizer):
     }
 
     metric_: Any
-
     _finite = "allow-nan"
     _SMALLER = "fewer frames, subframes or performances. Or learn from some: max_fit=1000"
 
@@ -540,7 +540,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
         training = self._set_clock(performances, self.subframes)
         positions, arrays, columns = training.scaled, list(performances), None
         n_features, weights = positions.shape[2], performances.weights
-        if weights is not None:
+        if weights:
             arrays = add_weights(arrays, weights)
         if keyframes is not None:
             arrays = add_ramps(arrays, keyframes)
@@ -716,18 +716,18 @@ class DenseSynchronizer(AnchoredSynchronizer):
         # In double precision, as all performances that are warped.
         both = source, *(arrays[k] for k in exemplars.tolist())
         chosen = [x.astype(np.float64, copy=False) for x in both]
-        positions, votes = matcher.features.positions(chosen, self.n_frames_), self.consensus > 0
+        positions = matcher.features.positions(chosen, self.n_frames_)
         pattern = matcher.features.plain(positions)[0, :: self.subframes]
         linear = self.evidence_.harmful and self.unsupported == "linear"
         made = LinearWarper if linear else Warper
-        settings = matcher, pattern, positions, votes, self.warp_smoothing
-        return on_one_thread(made.to_pattern, *settings)
+        given = pattern, positions, self.consensus > 0, self.warp_smoothing
+        return on_one_thread(made.to_pattern, matcher, *given)
 
     def _decide_on_refinement(self, training, warper, source, progress, portions):
         """Decide whether warps are refined by postures; the warper that does so or not."""
         verdict, linear = Verdict(), isinstance(warper, LinearWarper)
         if self.refine == "auto" and self.consensus > 0 and not linear:
-            others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
+            others = known_whole(training.performances, self.pattern_index_)
             some = others[:: -(-len(others) // _TESTED) or 1]
             given = training.scaled, warper, source, some, portions, self._settings(learnt=False)
             verdict = try_refinement(*given, n_jobs=self.n_jobs, progress=progress)

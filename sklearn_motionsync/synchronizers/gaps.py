@@ -5,10 +5,17 @@ import numpy as np
 from ..inputs.wording import counted
 from ..matching.gaps import Filler
 
-__all__ = ["check_fill", "fill_performances", "fill_warped", "has_gaps", "learn_filler"]
+__all__ = [
+    "check_fill",
+    "fill_performances",
+    "fill_warped",
+    "hold_gaps",
+    "known_whole",
+    "learn_filler",
+]
 
 
-def has_gaps(performances):
+def hold_gaps(performances):
     """Whether anything of performances is NaN; they hold no infinity."""
     return any(np.isnan(x.sum()) for x in performances)
 
@@ -67,6 +74,12 @@ def fill_performances(filler, performances):
     out = performances.replace(arrays)
     out.weights = list(weights)
     return out
+
+
+def known_whole(performances, but):
+    """Indices of filled performances that had no gaps, but for one."""
+    weights = performances.weights or [np.ones(1)] * len(performances)
+    return np.array([i for i, w in enumerate(weights) if i != but and w.min() == 1], np.intp)
 
 
 def check_fill(fill):
