@@ -21,7 +21,7 @@ DENSE = DenseSynchronizer(P)
 SYNCHRONIZERS = {
     "dense": DENSE,
     "paper": DenseSynchronizer.paper(n_frames=P),
-    "elastic": DenseSynchronizer(P, cost="elastic"),
+    "elastic": DenseSynchronizer(P, cost="elastic", refine=False),
     "subframes": DenseSynchronizer(P, subframes=2),
     "refined": DenseSynchronizer(P, refine=True),
     "parts": PartSynchronizer({"one": [0, 1, 2], "two": [5, 6]}, synchronizer=DENSE),
