@@ -83,10 +83,12 @@ class Performances(tuple):
         What the tables say of each, from `facts_of`; empty without tables.
     weights : list of ndarray (n_frames_i,), or None
         Of the frames of each, if gaps were filled.
+    confidence : list of ndarray (n_frames_i, n_features), or None
+        How sure it is what was seen, if that is given.
     """
 
     facts = ()
-    weights = None
+    weights = confidence = None
 
     def __new__(cls, arrays, kind, labels, frames=(), names=None, levels=INDEX_NAMES, numbers=None):
         self = super().__new__(cls, arrays)

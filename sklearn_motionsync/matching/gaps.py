@@ -71,13 +71,15 @@ class Filler(NamedTuple):
             reach = 2 * reach or 1
         return cls(mean, np.square(velocity).mean(axis=(0, 1)), factors, ridge)
 
-    def __call__(self, array):
+    def __call__(self, array, confidence=1.0):
         """A performance without gaps, and the weight of each of its frames.
 
         Parameters
         ----------
         array : ndarray, shape (n_frames, n_features)
             NaN where a feature is hidden.
+        confidence : ndarray, shape (n_frames, n_features), default=1.0
+            Weights of what is seen.
 
         Returns
         -------
@@ -87,7 +89,7 @@ class Filler(NamedTuple):
         """
         seen = np.isfinite(array)
         before = _without_gaps(array.astype(np.float64), self.mean)
-        filled, unknown = before.copy(), np.zeros(array.shape)
+        filled, unknown = before.copy(), np.where(seen, 1 - confidence, 0) * self.energy
         for (first, last), hidden in _gaps_of(~seen).items():
             base, reach = self._base(before, first, last)
             rows, columns = slice(first, last + 1), np.array(hidden)

@@ -35,7 +35,14 @@ from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
-from .gaps import check_fill, fill_performances, fill_warped, hold_gaps, learn_filler
+from .gaps import (
+    check_fill,
+    fill_performances,
+    fill_warped,
+    hold_gaps,
+    learn_filler,
+    with_confidence,
+)
 from .match import Match, check_match
 
 __all__ = ["Synchronizer", "TrainingSet"]
@@ -353,8 +360,9 @@ class Synchronizer(
 
     # -- steps of a fit ---------------------------------------------------------------------
 
-    def _check_training_set(self, X, numbers=None):
+    def _check_training_set(self, X, numbers=None, confidence=None):
         performances, self._filler = super()._check_training_set(X, numbers), None
+        performances = with_confidence(performances, confidence)
         if hold_gaps(performances):
             self._filler = learn_filler(performances, names_of_input(self))
         return self._without_gaps(performances)

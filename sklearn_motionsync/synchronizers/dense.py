@@ -46,9 +46,9 @@ from ..utils.threads import on_one_thread
 from .anchored import AnchoredSynchronizer
 from .balance import warn_of_one_feature
 from .evidence import no_evidence, weigh_evidence
-from .gaps import known_whole
+from .gaps import known_whole, with_confidence
 from .match import Match
-from .portions import FeatureStore, TrainingPortions, warp_in_portions
+from .portions import FeatureStore, TrainingPortions, refuse_long_paths, warp_in_portions
 from .refinement import try_refinement
 from .subsamples import subsample, typical_share
 
@@ -61,8 +61,6 @@ _NARROW, _WIDE = 0.25, 0.4
 _LEARNING_OFFSET = 0.2
 # velocity_smoothing="auto": a metric weights noise down; without one it is smoothed away.
 _SMOOTH, _SHARP = SMOOTHING, 0.02
-# Most steps of a path at a frame, all offsets together.
-_MOST_STEPS = 1e9
 # Numbers of performances a metric is learnt from. Two have no route but the
 # direct one: their differences cannot be told from a wrong path.
 _FEWEST, _MOST = 3, 20
@@ -428,7 +426,8 @@ class DenseSynchronizer(AnchoredSynchronizer):
         """
         return cls(**{"cost": "posture", "max_rate": 2, "consensus": 0} | params)
 
-    def _match(self, performances, keyframes=None, frame_rate=None):
+    def _match(self, performances, keyframes=None, frame_rate=None, confidence=None):
+        performances = with_confidence(performances, confidence)
         arrays, shares = self._with_keyframes(performances, keyframes, frame_rate)
         distances, times = self._distances_and_times(arrays, shares)
         distances, mode = self._warper.matcher.features.back(distances), None
@@ -436,7 +435,8 @@ class DenseSynchronizer(AnchoredSynchronizer):
             mode = on_one_thread(self._warper.modes_of, arrays)
         return Match(times, distances, mode)
 
-    def _warp_part(self, performances, keyframes=None, frame_rate=None):
+    def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
+        performances = with_confidence(performances, confidence)
         given = self._with_keyframes(performances, keyframes, frame_rate)
         times = np.maximum.accumulate(self._distances_and_times(*given)[1], axis=1)
         return sample(performances, times, self.n_frames_)
@@ -512,10 +512,10 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     # -- steps of a fit ---------------------------------------------------------------------
 
-    def _check_training_set(self, X):
+    def _check_training_set(self, X, confidence=None):
         some, sample, population = subsample(X, self.max_fit, self.pattern, self.random_state)
         numbers = None if sample is None else sample.tolist()
-        performances = super()._check_training_set(some, numbers)
+        performances = super()._check_training_set(some, numbers, confidence)
         n = len(performances)
         self.sample_ = np.arange(n) if sample is None else sample
         self._population = n if sample is None else population
@@ -600,7 +600,8 @@ class DenseSynchronizer(AnchoredSynchronizer):
         Sets ``metric_`` and ``evidence_``.
         """
         learns = self.metric == "learned" and self.cost == "velocity" and self.consensus > 0
-        self._check_paths(self._settings(learns)["max_offset"])
+        given = self.subframes, self.max_rate, self._settings(learns)["max_offset"]
+        refuse_long_paths(*given, self.n_frames_)
         smoothing, self.metric_ = self.velocity_smoothing, None
         self.evidence_ = no_evidence()
         sharp, smooth = (_SHARP, _SMOOTH) if smoothing == "auto" else (smoothing, smoothing)
@@ -620,19 +621,6 @@ class DenseSynchronizer(AnchoredSynchronizer):
         self.evidence_ = weigh_evidence(evidence, len(some), self.unsupported)
         self.metric_ = Bunch(share=share, energy=energy, performances=some)
         return features
-
-    def _check_paths(self, max_offset):
-        """Refuse a trellis that takes too long."""
-        subframes, n_frames = self.subframes, self.n_frames_
-        steps = min(self.max_rate, n_frames - 1) * subframes + 1
-        steps *= 2 * max_offset * n_frames * subframes + 1
-        if steps > _MOST_STEPS:
-            raise ValueError(
-                f"subframes = {subframes}, max_rate = {self.max_rate} and max_offset = "
-                f"{max_offset} on {n_frames} frames ask for {steps:.0e} steps of a path "
-                f"at every frame of every pair; {_MOST_STEPS:.0e} is the limit. Use fewer "
-                "subframes, a smaller rate or offset."
-            )
 
     def _search(self, features, store, positions, progress):
         """The matcher that searches, the portions of the training set, the median, and modes."""

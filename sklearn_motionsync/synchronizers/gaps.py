@@ -2,8 +2,12 @@
 
 import numpy as np
 
+from ..inputs.numbers import as_numbers
 from ..inputs.wording import counted
 from ..matching.gaps import Filler
+
+# What is less sure is as not seen.
+_SURE = 0.5
 
 __all__ = [
     "check_fill",
@@ -16,8 +20,52 @@ __all__ = [
 
 
 def hold_gaps(performances):
-    """Whether anything of performances is NaN; they hold no infinity."""
-    return any(np.isnan(x.sum()) for x in performances)
+    """Whether anything of performances is NaN, or not sure; they hold no infinity."""
+    return performances.confidence is not None or any(np.isnan(x.sum()) for x in performances)
+
+
+def with_confidence(performances, confidence):
+    """Performances of which what is less sure than not is hidden.
+
+    Parameters
+    ----------
+    performances : Performances
+    confidence : list of array-like (n_frames_i,) or (n_frames_i, n_features), or None
+        From 0 to 1, one for each of all that were given.
+
+    Raises
+    ------
+    ValueError
+        If there is not one for each, of these shapes and in this range.
+    """
+    if confidence is None:
+        return performances
+    n = len(performances)
+    if not hasattr(confidence, "__len__") or len(confidence) <= max(performances.numbers):
+        raise ValueError(
+            f"confidence must be a list of {n} arrays, (n_frames,) or (n_frames, n_features), one "
+            f"a performance; got {confidence!r:.200}."
+        )
+    arrays, kept = [], []
+    for i, x in zip(performances.numbers, performances, strict=True):
+        sure = as_numbers(confidence[i], f"Performance {i}: confidence", dtype=np.float64)
+        if sure.shape not in (x.shape, x.shape[:1]):
+            raise ValueError(
+                f"Performance {i}: confidence has shape {sure.shape}, expected one number a frame, "
+                f"{x.shape[:1]}, or one for each feature, {x.shape}."
+            )
+        sure = np.broadcast_to(sure.reshape(len(x), -1), x.shape)
+        # Not a number fails the comparison, too.
+        if not (sure.min() >= 0 and sure.max() <= 1):
+            raise ValueError(
+                f"Performance {i}: confidence must be from 0, not seen, to 1, got "
+                f"{sure.min():g} to {sure.max():g}. Divide it by its largest value."
+            )
+        arrays.append(np.where(sure < _SURE, x.dtype.type(np.nan), x))
+        kept.append(sure)
+    out = performances.replace(arrays)
+    out.confidence = kept
+    return out
 
 
 def learn_filler(performances, names=None):
@@ -61,7 +109,8 @@ def fill_performances(filler, performances):
     """
     filled = []
     for i, x in enumerate(performances):
-        if not np.isnan(x.sum()):
+        sure = 1.0 if performances.confidence is None else performances.confidence[i]
+        if not np.isnan(x.sum()) and np.all(sure == 1):
             filled.append((x, np.ones(len(x))))
             continue
         if np.isnan(x).all():
@@ -69,7 +118,7 @@ def fill_performances(filler, performances):
                 f"{performances.called(i)} is NaN in every frame and feature: nothing of it was "
                 "seen, so it has no timing. Leave it out."
             )
-        filled.append(filler(x))
+        filled.append(filler(x, sure))
     arrays, weights = zip(*filled, strict=True)
     out = performances.replace(arrays)
     out.weights = list(weights)

@@ -20,6 +20,7 @@ from ..inputs.types import (
     Features,
     Indexed,
     Labels,
+    NumbersLike,
     PerformancesLike,
     SupportsArray,
     Unit,
@@ -37,6 +38,7 @@ from ..utils.parallel import Progress, run
 from ..utils.parameters import validated, validated_with_nested
 from .anchored import AnchoredSynchronizer
 from .dense import DenseSynchronizer
+from .gaps import with_confidence
 from .lags import Lags
 from .match import Match, rates_of
 from .portions import warp_in_portions
@@ -186,6 +188,7 @@ class PartSynchronizer(AnchoredSynchronizer):
         y: object = None,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
+        confidence: Indexed[NumbersLike] | None = None,
     ) -> Self:
         """Learn the whole body, then every part.
 
@@ -200,6 +203,9 @@ class PartSynchronizer(AnchoredSynchronizer):
             its warp, and may be early or late.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames per second of X. With it key-frames are seconds.
+        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
+            How sure it is what was seen, as `DenseSynchronizer` takes it. It weighs the frames of
+            the whole body.
 
         Returns
         -------
@@ -217,7 +223,7 @@ class PartSynchronizer(AnchoredSynchronizer):
             self._progress(fits=True) as progress,
             progress.fitting(body, "learning the body and its parts"),
         ):
-            given = self.parts, self.coupling, keyframes, frame_rate
+            given = self.parts, self.coupling, keyframes, frame_rate, confidence
             self.parts_, self._warpers = fit_body_and_parts(body, X, *given)
         self.synchronizer_ = body
         for name in _SHARED:
@@ -231,6 +237,7 @@ class PartSynchronizer(AnchoredSynchronizer):
         X: PerformancesLike,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
+        confidence: Indexed[NumbersLike] | None = None,
     ) -> Match:
         """Match the whole body of performances to the pattern.
 
@@ -242,6 +249,8 @@ class PartSynchronizer(AnchoredSynchronizer):
             Key-frames of each performance, as for ``fit``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             As for ``fit``.
+        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
+            As for ``fit``.
 
         Returns
         -------
@@ -249,7 +258,7 @@ class PartSynchronizer(AnchoredSynchronizer):
             As from ``DenseSynchronizer.match``.
         """
         check_is_fitted(self)
-        return self.synchronizer_.match(X, keyframes, frame_rate)
+        return self.synchronizer_.match(X, keyframes, frame_rate, confidence)
 
     @snapshot
     def match_parts(
@@ -339,7 +348,8 @@ class PartSynchronizer(AnchoredSynchronizer):
         values = np.stack(values, axis=1)
         return Lags(values, names, against, unit, groups, people, performances.labels)
 
-    def _warp_part(self, performances, keyframes=None, frame_rate=None):
+    def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
+        performances = with_confidence(performances, confidence)
         body = self.match(performances, keyframes, frame_rate)
         out = body.warp(performances)
         for name, match in self._match_parts(performances, body, "part").items():
@@ -380,7 +390,7 @@ class PartSynchronizer(AnchoredSynchronizer):
 
 @atomic_fit
 @validated
-def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None):
+def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None, confidence=None):
     """A ``fit`` of the synchronizer of the whole body, which also learns the parts.
 
     Parameters
@@ -389,7 +399,7 @@ def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None
         Of the whole body.
     X : as for ``PartSynchronizer.fit``
     parts, coupling : parameters of `PartSynchronizer`
-    keyframes, frame_rate : as for ``PartSynchronizer.fit``
+    keyframes, frame_rate, confidence : as for ``PartSynchronizer.fit``
 
     Returns
     -------
@@ -399,7 +409,7 @@ def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None
         ``"part"``: of every part by name; ``"rest"``: of the body without it. None if nothing of it
         moves. No warpers for an infinite coupling.
     """
-    performances = self._check_training_set(X)
+    performances = self._check_training_set(X, confidence)
     parts = choose_parts(parts, performances, names_of_input(self))
     with self._progress(fits=True) as progress:
         known = self._known(performances, X, keyframes, frame_rate)

@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn import clone
-from sklearn.model_selection import GridSearchCV, cross_val_score
+from sklearn import clone, config_context
+from sklearn.model_selection import GridSearchCV, cross_val_score, cross_validate
 from sklearn.pipeline import make_pipeline
 from sklearn.utils import get_tags
 from sklearn_motionsync import (
@@ -15,6 +15,7 @@ from sklearn_motionsync import (
     TimingChannel,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.metrics import SpreadScorer
 
 P = 40
 DENSE = DenseSynchronizer(P)
@@ -279,3 +280,93 @@ def test_filling_keeps_pandas_and_single_precision_and_rows():
 def test_an_unknown_fill_is_refused(fill):
     with pytest.raises(ValueError, match=r"fill=.* is unknown: use None .* or 'model'"):
         clone(DENSE).fit(WHOLE).transform(GAPPY, fill=fill)
+
+
+# -- confidence= ----------------------------------------------------------------------------
+
+
+def confidences(performances):
+    """1 where something was seen, else 0."""
+    return [np.isfinite(x).astype(float) for x in performances]
+
+
+@pytest.mark.parametrize("name", ["dense", "paper", "parts"])
+def test_no_confidence_is_as_nan(name):
+    sync, given = clone(SYNCHRONIZERS[name]), {"confidence": confidences(GAPPY)}
+    expected = clone(sync).fit(GAPPY)
+    wrong = [np.where(np.isnan(x), 100.0, x) for x in GAPPY]
+    fitted = clone(sync).fit(wrong, **given)
+    np.testing.assert_array_equal(fitted.pattern_, expected.pattern_)
+    found = fitted.match(wrong, **given)
+    np.testing.assert_array_equal(found.times, expected.match(GAPPY).times)
+    np.testing.assert_array_equal(found.distances, expected.match(GAPPY).distances)
+    np.testing.assert_array_equal(fitted.transform(wrong, **given), expected.transform(GAPPY))
+    np.testing.assert_array_equal(sync.fit_transform(wrong, **given), expected.transform(GAPPY))
+
+
+def test_what_is_less_sure_counts_less():
+    rng = np.random.default_rng(0)
+    noisy, sure = [], []
+    for x in WHOLE:
+        confidence = np.ones(len(x))
+        confidence[len(x) // 3 : len(x) // 2] = 0.5
+        noise = rng.standard_normal(x.shape).cumsum(axis=0) * 0.02
+        noisy.append(x + noise * (confidence < 1)[:, np.newaxis])
+        sure.append(confidence)
+    expected = DenseSynchronizer(P, pattern=0).fit(WHOLE).match(WHOLE).times
+    sync = DenseSynchronizer(P, pattern=0)
+    plain = mean_error(sync.fit(noisy).match(noisy).times, expected)
+    weighed = sync.fit(noisy, confidence=sure).match(noisy, confidence=sure).times
+    assert mean_error(weighed, expected) < plain
+    # Of a frame or of each of its features.
+    by_feature = [np.repeat(w[:, None], 12, axis=1) for w in sure]
+    again = sync.fit(noisy, confidence=by_feature).match(noisy, confidence=by_feature).times
+    np.testing.assert_array_equal(again, weighed)
+
+
+def test_confidence_goes_through_pipelines_and_searches():
+    sure = confidences(GAPPY)
+    wrong = [np.where(np.isnan(x), 9.0, x) for x in GAPPY]
+    with config_context(enable_metadata_routing=True):
+        dense = clone(DENSE).set_fit_request(confidence=True)
+        dense.set_transform_request(confidence=True)
+        pipe = make_pipeline(dense)
+        expected = clone(DENSE).fit_transform(wrong, confidence=sure)
+        np.testing.assert_array_equal(pipe.fit_transform(wrong, confidence=sure), expected)
+        scorer = SpreadScorer().set_score_request(confidence=True)
+        given = {"confidence": sure}
+        found = cross_validate(dense, wrong, cv=2, scoring=scorer, params=given)
+    plain = cross_validate(DENSE, GAPPY, cv=2, scoring=SpreadScorer())
+    assert np.isfinite(found["test_score"]).all()
+    assert np.abs(found["test_score"] - plain["test_score"]).max() < 0.2
+
+
+def test_confidence_of_a_sample_and_of_timing():
+    sure = confidences(GAPPY)
+    sync = DenseSynchronizer(P, max_fit=5).fit(GAPPY, confidence=sure)
+    expected = DenseSynchronizer(P, max_fit=5).fit(GAPPY)
+    np.testing.assert_array_equal(sync.pattern_, expected.pattern_)
+    timing = TimingChannel(DENSE).fit(GAPPY, confidence=sure)
+    found = timing.transform(GAPPY, confidence=sure)
+    np.testing.assert_array_equal(found, TimingChannel(DENSE).fit(GAPPY).transform(GAPPY))
+
+
+WRONG = {
+    "one for all": (np.ones(3), "list of 8 arrays"),
+    "a number": (0.5, "list of 8 arrays"),
+    "length": ([np.ones(3)] * 8, r"Performance 0: confidence has shape \(3,\), expected"),
+    "range": ([2.0 * np.ones(len(x)) for x in WHOLE], "Performance 0: .*from 0.*to 1, got 2 to 2"),
+    "NaN": ([np.full(len(x), np.nan) for x in WHOLE], "Performance 0: confidence must be from 0"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_confidence_is_refused(case):
+    given, message = WRONG[case]
+    with pytest.raises(ValueError, match=message):
+        clone(DENSE).fit(WHOLE, confidence=given)
+
+
+def test_synchronizers_that_take_no_gaps_take_no_confidence():
+    with pytest.raises(ValueError, match=r"KeyframeSynchronizer takes no gaps.*DenseSynchronizer"):
+        KeyframeSynchronizer().fit(WHOLE, confidence=confidences(WHOLE))
