@@ -117,6 +117,7 @@ def by_mean(cosines, action, positions):
     return [np.where(np.isnan(x), mean, x) for x in cosines]
 
 
+SPACES = "cosines", "aSpace"
 WAYS = {
     "as they are": as_they_are,
     "fill_gaps": by_fill_gaps,
@@ -145,40 +146,41 @@ def dtw_arow(X, patterns):
     """
     curves = normalise(X, P)
     base, moving = curves[patterns], curves
-    cost = np.full((P, P, len(base), len(moving)), 0.0)
+    cost = np.empty((P, P, len(base), len(moving)))
     for p in range(P):
         differences = base[:, p, np.newaxis] - moving.swapaxes(0, 1)[:, np.newaxis]
         seen = np.isfinite(differences)
         share = seen.mean(axis=3)
         squares = np.where(seen, np.square(differences), 0).sum(axis=3)
         cost[p] = np.where(share > 0, squares / np.where(share > 0, share, 1), np.nan)
-    blocked, total = np.isnan(cost), np.full_like(cost, np.inf)
-    came = np.zeros(cost.shape, dtype=np.int8)
-    for p in range(P):
-        for q in range(P):
-            ways = [total[p - 1, q - 1] if p and q else None]
-            ways += [total[p - 1, q] if p else None, total[p, q - 1] if q else None]
-            ways = [np.full(cost.shape[2:], np.inf) if w is None else w for w in ways]
-            for i, (a, b) in enumerate(((p - 1, q), (p, q - 1)), 1):
-                stuck = blocked[p, q] | (blocked[a, b] if a >= 0 and b >= 0 else False)
-                ways[i] = np.where(stuck, np.inf, ways[i])
-            best = np.min(ways, axis=0) if p or q else np.zeros(cost.shape[2:])
-            came[p, q] = np.argmin(ways, axis=0)
-            total[p, q] = best + np.nan_to_num(cost[p, q])
-    times = np.empty((len(base), len(moving), P))
-    for b, m in np.ndindex(*times.shape[:2]):
-        p = q = P - 1
-        met = [[] for _ in range(P)]
-        while True:
-            met[p].append(q)
-            if p == q == 0 or not np.isfinite(total[p, q, b, m]):
-                break
-            step = came[p, q, b, m]
-            p, q = p - (step != 2), q - (step != 1)
-        found = np.array([np.mean(x) if x else np.nan for x in met])
-        known = np.flatnonzero(np.isfinite(found))
-        times[b, m] = np.interp(np.arange(P), known, found[known])
-    return times
+    return paths_of(cost.reshape(P, P, -1)).reshape(len(base), len(moving), P)
+
+
+def paths_of(cost):
+    """Mean positions (n_pairs, P) that best paths meet, of costs (P, P, n_pairs); NaN is hidden."""
+    pad = ((1, 0), (1, 0), (0, 0))
+    blocked = np.pad(np.isnan(cost), pad)
+    cost, pairs = np.nan_to_num(cost), np.arange(cost.shape[2])
+    total = np.full((P + 1, P + 1, len(pairs)), np.inf)
+    total[0, 0] = 0
+    came = np.zeros(total.shape, dtype=np.int8)
+    for diagonal in range(2, 2 * P + 1):
+        p = np.arange(max(1, diagonal - P), min(P, diagonal - 1) + 1)
+        q, here = diagonal - p, blocked[p, diagonal - p]
+        ways = [total[p - 1, q - 1]]
+        for before in ((p - 1, q), (p, q - 1)):
+            ways.append(np.where(here | blocked[before], np.inf, total[before]))
+        total[p, q] = cost[p - 1, q - 1] + np.min(ways, axis=0)
+        came[p, q] = np.argmin(ways, axis=0)
+    p, q = np.full((2, len(pairs)), P)
+    met, count = np.zeros((2, len(pairs), P))
+    for _ in range(2 * P):
+        met[pairs, p - 1] += np.where(q > 0, q - 1, 0)
+        count[pairs, p - 1] += 1
+        step = np.where(p == 1, 2, np.where(q == 1, 1, came[p, q, pairs]))
+        done = (p == 1) & (q == 1)
+        p, q = np.where(done | (step == 2), p, p - 1), np.where(done | (step == 1), q, q - 1)
+    return met / count
 
 
 # -- the table --------------------------------------------------------------------------------
@@ -189,7 +191,7 @@ def errors_of(people, X, warps=dense):
     return figures(Judged(people, warps(X, people.patterns)).errors())
 
 
-def compare(people, actions, kind, seed, ways=WAYS, spaces=("cosines", "aSpace")):
+def compare(people, actions, kind, seed, ways=WAYS, spaces=SPACES, peer=True):
     """{(way, space): geometric means} of all actions, with gaps of a kind."""
     found: dict = {}
     for i, (one, action) in enumerate(zip(people, actions, strict=True)):
@@ -200,7 +202,7 @@ def compare(people, actions, kind, seed, ways=WAYS, spaces=("cosines", "aSpace")
             for space in spaces:
                 given = ASpace().fit_transform(X) if space == "aSpace" else X
                 found.setdefault((name, space), {}).update(errors_of(one, given))
-        if "DTW-AROW" in spaces:
+        if peer:
             arow = errors_of(one, cosines, dtw_arow)
             found.setdefault(("DTW-AROW", "cosines"), {}).update(arow)
     return {key: geometric_means(of_events) for key, of_events in found.items()}
@@ -210,14 +212,13 @@ def main(folder, draws=2):
     warnings.simplefilter("ignore")
     actions = read_actions(folder, JUDGED)
     people = [People(action) for action in actions]
-    spaces = "cosines", "aSpace", "DTW-AROW"
-    whole = compare(people, actions, None, 0, {"as they are": as_they_are}, spaces)
+    whole = compare(people, actions, None, 0, {"as they are": as_they_are})
     print("without gaps: mean and median error, in frames of 100")
     for (name, space), pair in whole.items():
         print(f"  {name:12s} {space:8s} {pair[0]:6.2f} {pair[1]:6.2f}", flush=True)
     print(f"with gaps, over those without: mean, median (spread of {draws} draws)")
     for kind in KINDS:
-        runs_of = [compare(people, actions, kind, seed, spaces=spaces) for seed in range(draws)]
+        runs_of = [compare(people, actions, kind, seed) for seed in range(draws)]
         for name, space in runs_of[0]:
             base = whole["DTW-AROW" if name == "DTW-AROW" else "as they are", space]
             ratios = np.array([found[name, space] / base for found in runs_of])
