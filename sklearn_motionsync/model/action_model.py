@@ -23,7 +23,7 @@ from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
-from .hidden import fill_with_mean, group_counts, has_gaps
+from .hidden import fill_with_mean, group_counts, is_gappy
 from .sampling import sample_performances, sample_postures
 from .similarity import Neighbours, PerformanceStream, log_moments
 from .variation import mean_band, predictive_variance, simultaneous_factor
@@ -649,7 +649,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     def _check_seen(self, performances):
         """Refuse performances that show nothing."""
         for i, x in enumerate(performances):
-            if has_gaps(x) and np.isnan(x).all():
+            if is_gappy(x) and np.isnan(x).all():
                 raise ValueError(
                     f"{performances.called(i)} is NaN in every frame and feature: nothing of it "
                     "was seen. Drop the performance."

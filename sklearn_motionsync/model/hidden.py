@@ -2,10 +2,10 @@
 
 import numpy as np
 
-__all__ = ["fill_with_mean", "group_counts", "has_gaps", "mean_of_other_groups"]
+__all__ = ["fill_with_mean", "group_counts", "is_gappy", "mean_of_other_groups"]
 
 
-def has_gaps(performances):
+def is_gappy(performances):
     """Whether anything in an array is NaN."""
     # A sum is NaN if a term is; no mask is made of what is whole.
     return bool(np.isnan(performances.sum()))
@@ -28,7 +28,7 @@ def fill_with_mean(performances, mean):
     ndarray, shape (n, P, n_features)
         The same array if there is no gap.
     """
-    if not has_gaps(performances):
+    if not is_gappy(performances):
         return performances
     hidden, filled = np.isnan(performances), performances.copy()
     frames = np.arange(len(mean))

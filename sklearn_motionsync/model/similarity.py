@@ -10,7 +10,7 @@ from ..matching.filters import smooth
 from ..matching.warps import even_slices
 from ..utils.groups import encode_groups
 from ..utils.threads import on_one_thread
-from .hidden import fill_with_mean, has_gaps
+from .hidden import fill_with_mean, is_gappy
 
 __all__ = [
     "DIFFERENCES",
@@ -113,7 +113,7 @@ class Neighbours:
     def __init__(self, performances, groups, features=_velocities, kernel=PRODUCTS, mean=None):
         self._groups, self._features, self._kernel = groups, features, kernel
         self._mean, self._seen = mean, None
-        if mean is not None and has_gaps(performances):
+        if mean is not None and is_gappy(performances):
             self._seen = ~np.isnan(performances)
             performances = fill_with_mean(performances, mean)
         self._center = performances.mean(axis=(0, 1))
@@ -245,7 +245,7 @@ def movement_energies(on_clock, floor=None):
         Above 0.
     """
     on_clock = np.asarray(on_clock, dtype=np.float64)
-    if has_gaps(on_clock):
+    if is_gappy(on_clock):
         energy, variance = _energies_of_seen(on_clock)
     else:
         squares = np.square(on_clock - on_clock.mean(axis=1, keepdims=True))
@@ -389,7 +389,7 @@ class PerformanceStream:
     def starting_at(cls, first):
         """An empty stream with a performance (P, n_features) as its origin."""
         zeros, origin = np.zeros(first.shape), first.astype(np.float64)
-        if has_gaps(origin):
+        if is_gappy(origin):
             seen = ~np.isnan(origin)
             means = np.nansum(origin, axis=0) / np.maximum(seen.sum(axis=0), 1)
             origin = np.where(seen, origin, means)
@@ -476,7 +476,7 @@ class PerformanceStream:
         counts = self.counts
         for x in performances:
             offset = x - self.origin
-            if has_gaps(offset):
+            if is_gappy(offset):
                 seen = ~np.isnan(offset)
                 counts = np.full(x.shape, n) + seen if counts is None else counts + seen
                 # A step of 0 changes neither.

@@ -8,7 +8,7 @@ import numpy as np
 from sklearn.utils import check_random_state
 
 from ..utils.groups import mean_of_others, sums_of_groups
-from .hidden import group_counts, has_gaps, mean_of_other_groups
+from .hidden import group_counts, is_gappy, mean_of_other_groups
 from .similarity import t_prediction_limit
 
 __all__ = ["mean_band", "predictive_variance", "simultaneous_factor"]
@@ -48,7 +48,7 @@ def predictive_variance(performances, groups):
         Positive, also where performances do not differ.
     """
     n, codes = len(performances), _at_least_two(groups)
-    if has_gaps(performances):
+    if is_gappy(performances):
         squares = np.square(performances - mean_of_other_groups(performances, codes))
         n = (~np.isnan(squares)).sum(axis=0)
         squares = np.nansum(squares, axis=0) / np.maximum(n, 1)
@@ -82,7 +82,7 @@ def simultaneous_factor(performances, groups, coverage):
     float
     """
     codes, prior = _at_least_two(groups), _PRIOR_VARIANCE
-    gaps = has_gaps(performances)
+    gaps = is_gappy(performances)
     mean = (mean_of_other_groups if gaps else mean_of_others)(performances, codes)
     largest = np.empty(len(performances))
     for group in range(codes.max() + 1):
@@ -131,7 +131,7 @@ def mean_band(performances, groups, coverage, random_state=None):
     sums, counts = sums_of_groups(np.nan_to_num(performances), codes)
     n_groups, n, shape = len(sums), len(performances), performances.shape[1:]
     weights, n_seen = counts[:, 0, 0] / n, n_groups
-    if has_gaps(performances):
+    if is_gappy(performances):
         # Each value has weights of its own: a group that does not show it has none.
         counts = group_counts(performances, codes)
         weights = (counts / counts.sum(axis=0)).reshape(n_groups, -1)
@@ -188,7 +188,7 @@ def _shrink(squares, n):
 
 
 def _floor(performances):
-    var = np.nanvar if has_gaps(performances) else np.var
+    var = np.nanvar if is_gappy(performances) else np.var
     spread = var(performances, axis=(0, 1))
     largest = spread.max() if spread.max() > 0 else 1.0
     return _FLOOR * np.where(spread > _CONSTANT * largest, spread, largest)
