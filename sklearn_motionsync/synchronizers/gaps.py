@@ -105,9 +105,11 @@ def fill_performances(filler, performances):
     Raises
     ------
     ValueError
-        If all of a performance is NaN.
+        If all of a performance is NaN, or the end of one in an array of equal lengths.
     """
     filled = []
+    if performances.kind == "array":
+        _refuse_padding(performances)
     for i, x in enumerate(performances):
         sure = 1.0 if performances.confidence is None else performances.confidence[i]
         if not np.isnan(x.sum()) and np.all(sure == 1):
@@ -123,6 +125,18 @@ def fill_performances(filler, performances):
     out = performances.replace(arrays)
     out.weights = list(weights)
     return out
+
+
+def _refuse_padding(performances):
+    """Refuse frames of NaN that only bring performances to the length of the longest."""
+    for i, x in enumerate(performances):
+        if not np.isnan(x).all() and np.isnan(x[-1]).all():
+            n = len(x) - int(np.argmin(np.isnan(x[::-1]).all(axis=1)))
+            raise ValueError(
+                f"{performances.called(i)} is NaN from frame {n} to its end, frame {len(x) - 1}: "
+                "in an array of equal lengths such frames only fill up. Give a list without them, "
+                f"such as [X[0], X[1][:{n}], ...]; if the end was not seen, give list(X)."
+            )
 
 
 def known_whole(performances, but):
