@@ -56,8 +56,7 @@ def cut_at_events(
 
         events : list of dict
             The events within the performance, with ``frame`` counted from its first frame. The
-            events at its two ends are left out, so that the others are key-frames for
-            `KeyframeSynchronizer`.
+            events at its two ends are left out, so that the others are key-frames.
         rows : list of int
             Its first and last frame, as events count them in the recording.
         frame_rate : float
@@ -85,7 +84,7 @@ def cut_at_events(
     See Also
     --------
     read_motion : Reads events of C3D files.
-    sklearn_motionsync.KeyframeSynchronizer : Aligns the other events.
+    keyframes_from_events : Makes key-frames of the other events.
 
     Examples
     --------
