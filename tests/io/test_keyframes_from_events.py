@@ -113,6 +113,15 @@ def test_an_order_that_mean_times_contradict():
     assert found.columns.tolist() == ["a", "b", "c"]
 
 
+def test_events_that_never_meet_are_in_order_of_their_share_of_the_trial():
+    X = [np.zeros((1001, 1)), np.zeros((101, 1)), np.zeros((101, 1))]
+    events = pd.DataFrame({"trial": [1, 0, 2], "event": ["late", "early", "mid"], "frame": 60})
+    events.loc[1, "frame"], events.loc[2, "frame"] = 100, 40
+    for rows in (events, events[::-1]):
+        found = keyframes_from_events(X, rows)
+        assert found.columns.tolist() == ["early", "mid", "late"]
+
+
 def test_the_ends_are_left_out():
     ends = pd.DataFrame({"subject": "ann", "trial": 1, "event": "strike", "frame": [0.0, 100.3]})
     check(keyframes_from_events(trials(), pd.concat([table(), ends])))
