@@ -21,7 +21,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.datasets import make_gait
 from sklearn_motionsync.display import ActionModelDisplay
-from sklearn_motionsync.io import cut_at_events
+from sklearn_motionsync.io import cut_at_events, keyframes_from_events
 
 gait = make_gait(12, n_cycles=4, takes=True, random_state=0)
 
@@ -72,9 +72,9 @@ _ = figure.legend(
 
 cycles = [cycle for take in takes for cycle in cut_at_events(take, "Foot Strike")]
 person = [cycle.attrs["performance"][0] for cycle in cycles]
-toe_off = [[event["frame"] for event in cycle.attrs["events"]] for cycle in cycles]
+toe_off = keyframes_from_events(cycles)
 print(len(cycles), "cycles of", [len(cycle) for cycle in cycles[:6]], "... frames")
-print("toe-off at frame", np.round(np.ravel(toe_off[:6]), 1), "...")
+print("toe-off at frame", toe_off.iloc[:6, 0].round(1).tolist(), "...")
 
 # %%
 # Align them
@@ -111,7 +111,8 @@ pd.DataFrame(spreads, index=names).round(2)
 
 # %%
 # Linear normalisation keeps all differences of pace. The key-frame removes those at toe-off and
-# nearby. Dense matching reduces all five, but is less exact at toe-off itself.
+# nearby. Dense matching reduces all five, but is less exact at toe-off itself. It takes key-frames,
+# too: :doc:`plot_keyframes`.
 #
 # What is outside the band
 # ------------------------

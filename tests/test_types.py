@@ -118,7 +118,7 @@ import pandas as pd
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import *
 from sklearn_motionsync.datasets import make_bending, make_gait
-from sklearn_motionsync.io import read_motion
+from sklearn_motionsync.io import keyframes_from_events, read_motion
 from sklearn_motionsync.metrics import SpreadScorer, least_squares, timing_error
 X = list(np.random.RandomState(0).standard_normal((3, 20, 2)).cumsum(axis=1))
 tables = [pd.DataFrame(x) for x in X]
@@ -145,6 +145,10 @@ offsets, times, distances = sync.match(X)
 sync.match(X).offsets_in("seconds", X, frame_rate=50)[0].tolist()
 Match.from_estimator(make_pipeline(sync), X).warp(X).shape
 KeyframeSynchronizer().fit(X, keyframes=[[5, 9], [6, 8], np.array([4, 9])])
+DenseSynchronizer(keyframe_std=2.5).fit(X, keyframes=[[5.5], None, np.array([np.nan])])
+DenseSynchronizer().fit_transform(X, keyframes=pd.DataFrame({"a": [0.5, 0.6, 0.7]}), frame_rate=10)
+DenseSynchronizer().fit(X, keyframes=np.array([[5.0], [6], [7]])).match(X, [[5], None, [7]])
+keyframes_from_events(X, pd.DataFrame({"trial": [0], "event": "a", "frame": 5}), ["a"]).loc[0, "a"]
 TimingChannel(LinearSynchronizer(), "log_rate").fit_transform(X).shape
 ActionModel(coverage=0.9).fit(X, groups=["ann", "ann", "bob"]).envelope()[0].shape
 ActionModel().fit(X, groups=pd.Series([0, 1, 2])).sample(2, random_state=0).tolist()
@@ -171,6 +175,10 @@ DenseSynchronizer(30, "median", "auto").fit(X)
 DenseSynchronizer(pattern="mean").fit(X)
 DenseSynchronizer(random_state="0").fit(X)
 DenseSynchronizer(frames=30).fit(X)
+DenseSynchronizer(keyframe_std="soft").fit(X)
+DenseSynchronizer().fit(X, keyframes=5)
+DenseSynchronizer().fit(X, keyframes=[["5"], ["6"], ["7"]])
+keyframes_from_events(X, by=3)
 DenseSynchronizer().fit("trials.csv")
 DenseSynchronizer().fit(5)
 DenseSynchronizer().fit({"ann": X[0], "bob": X[1]})

@@ -26,6 +26,7 @@ from .drawing import (
     panels,
     parts_outside,
 )
+from .keyframes import check_pattern_keyframes, draw_keyframes, keyframes_of_estimator
 from .time_axis import TimeAxis
 
 __all__ = ["ActionModelDisplay"]
@@ -77,6 +78,8 @@ class ActionModelDisplay:
         The unit of time.
     frame_rate : float, default=None
         Frames of the clock a second, for seconds.
+    pattern_keyframes : array-like of shape (n_keyframes,) or Series, default=None
+        Key-frames on the clock: lines. The index of a Series holds their names.
 
     Attributes
     ----------
@@ -92,6 +95,8 @@ class ActionModelDisplay:
         The performances, in the order of ``mean_``; empty without performances.
     departures_ : list of LineCollection
         The parts of performances outside the band; empty if they are not drawn.
+    keyframes_ : list of list of Line2D
+        The key-frames, for each panel; empty without any.
 
     Examples
     --------
@@ -123,6 +128,7 @@ class ActionModelDisplay:
         people: Labels | None = None,
         unit: Unit = "frames",
         frame_rate: float | None = None,
+        pattern_keyframes: ValuesLike | None = None,
     ) -> None:
         self.mean, self.lower, self.upper = np.asarray(mean), np.asarray(lower), np.asarray(upper)
         self.feature_names, self.n_std = feature_names, n_std
@@ -133,6 +139,7 @@ class ActionModelDisplay:
         )
         self.unit, self.frame_rate = unit, frame_rate
         self._axis = TimeAxis(unit, self.mean.shape[-2], None, frame_rate)
+        self.pattern_keyframes = check_pattern_keyframes(pattern_keyframes, self.mean.shape[-2])
 
     def __repr__(self):
         return f"ActionModelDisplay({self.feature_names})"
@@ -150,6 +157,7 @@ class ActionModelDisplay:
         people: Labels | None = None,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
+        keyframe_lines: bool = True,
         ax: AxesLike | None = None,
         **params: Any,
     ) -> Self:
@@ -198,10 +206,13 @@ class ActionModelDisplay:
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames a second of X as recorded, for seconds, by default what tables tell, as in
             `Match.to_frame`; without X those of the clock.
+        keyframe_lines : bool, default=True
+            Whether to draw the key-frames of the synchronizer, if it has some.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
-            Further arguments of the synchronizer, such as ``keyframes``.
+            Further arguments of the synchronizer, such as ``keyframes``, in frames. The columns of
+            a table of key-frames are their names.
 
         Returns
         -------
@@ -262,10 +273,13 @@ class ActionModelDisplay:
             people=people,
             unit=unit,
             frame_rate=frame_rate,
+            pattern_keyframes=keyframes_of_estimator(
+                estimator, mean.shape[-2], params.get("keyframes")
+            ),
         )
-        return display.plot(ax)
+        return display.plot(ax, keyframe_lines=keyframe_lines)
 
-    def plot(self, ax: AxesLike | None = None) -> Self:
+    def plot(self, ax: AxesLike | None = None, *, keyframe_lines: bool = True) -> Self:
         """Draw.
 
         Parameters
@@ -273,6 +287,8 @@ class ActionModelDisplay:
         ax : Axes or array-like of Axes, default=None
             One of a figure's subplots is divided into the panels; or one axes a feature. None
             makes a figure.
+        keyframe_lines : bool, default=True
+            Whether to draw key-frames, if there are some.
 
         Returns
         -------
@@ -292,6 +308,12 @@ class ActionModelDisplay:
             axis.set_ylabel(name)
             if i + n_cols >= count:
                 axis.set_xlabel(self._axis.label)
+        self.keyframes_ = []
+        if keyframe_lines and self.pattern_keyframes is not None:
+            times = self._axis.convert(self.pattern_keyframes.to_numpy())
+            for axis in self.axes_:
+                names = self.pattern_keyframes.index if axis is self.axes_[0] else ()
+                self.keyframes_.append(draw_keyframes(axis, times, names))
         self._draw_legend(parts, n_cols)
         return self
 

@@ -34,6 +34,14 @@ from .drawing import (
     legend_above,
     panels,
 )
+from .keyframes import (
+    check_own_keyframes,
+    check_pattern_keyframes,
+    draw_keyframes,
+    draw_own_keyframes,
+    named_keyframes,
+    own_keyframes,
+)
 from .time_axis import TimeAxis
 
 __all__ = ["SynchronizationDisplay"]
@@ -71,6 +79,10 @@ class SynchronizationDisplay:
         The unit of time.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames a second of the performances, for seconds.
+    keyframes : array-like, shape (n_sequences, n_keyframes), default=None
+        Key-frames of the performances in their frames, NaN where one is not known: ticks.
+    pattern_keyframes : array-like of shape (n_keyframes,) or Series, default=None
+        Key-frames on the clock: lines. The index of a Series holds their names.
 
     Attributes
     ----------
@@ -86,6 +98,10 @@ class SynchronizationDisplay:
         For each feature the mean of each group; empty without groups.
     warps_ : LineCollection or None
         The warps.
+    keyframes_ : list of list of Line2D
+        The key-frames, for each panel on the clock; empty without any.
+    own_keyframes_ : list of LineCollection
+        Those of the performances, one collection a feature; empty without any.
 
     Examples
     --------
@@ -113,6 +129,8 @@ class SynchronizationDisplay:
         groups: Labels | None = None,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
+        keyframes: NumbersLike | None = None,
+        pattern_keyframes: ValuesLike | None = None,
     ) -> None:
         self.before = [np.asarray(x) for x in before]
         self.after, self.times = np.asarray(after), np.asarray(times)
@@ -122,6 +140,8 @@ class SynchronizationDisplay:
         self.groups = None if groups is None else list(map(str, groups))
         lengths = [len(x) for x in self.before]
         self._axis = TimeAxis(unit, self.times.shape[1], lengths, frame_rate)
+        self.keyframes = None if keyframes is None else np.asarray(keyframes, dtype=np.float64)
+        self.pattern_keyframes = check_pattern_keyframes(pattern_keyframes, self.times.shape[1])
 
     def __repr__(self):
         count = counted(len(self.before), "performance")
@@ -138,6 +158,7 @@ class SynchronizationDisplay:
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
         warps: bool = True,
+        keyframe_lines: bool = True,
         ax: AxesLike | None = None,
         **params: Any,
     ) -> Self:
@@ -164,10 +185,14 @@ class SynchronizationDisplay:
             `Match.to_frame`.
         warps : bool, default=True
             Whether to draw tau(p) against the diagonal.
+        keyframe_lines : bool, default=True
+            Whether to draw the key-frames of the synchronizer, if it has some, as lines; and those
+            of X that are given, as ticks.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
-            Further arguments of the ``match`` of the synchronizer, such as ``keyframes``.
+            Further arguments of the ``match`` of the synchronizer, such as ``keyframes``, in
+            frames. The columns of a table of key-frames are their names.
 
         Returns
         -------
@@ -191,8 +216,10 @@ class SynchronizationDisplay:
             groups=groups,
             unit=unit,
             frame_rate=rates_of(X, frame_rate, unit),
+            keyframes=own_keyframes(synchronizer, performances, params),
+            pattern_keyframes=named_keyframes(synchronizer, params.get("keyframes")),
         )
-        return display.plot(ax, warps=warps)
+        return display.plot(ax, warps=warps, keyframe_lines=keyframe_lines)
 
     @classmethod
     def from_predictions(
@@ -207,6 +234,8 @@ class SynchronizationDisplay:
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
         warps: bool = True,
+        keyframes: NumbersLike | None = None,
+        pattern_keyframes: ValuesLike | None = None,
         ax: AxesLike | None = None,
     ) -> Self:
         """Draw performances and warps that are known already.
@@ -233,6 +262,11 @@ class SynchronizationDisplay:
             `Match.to_frame`.
         warps : bool, default=True
             Whether to draw tau(p) against the diagonal.
+        keyframes : array-like, shape (n_sequences, n_keyframes), default=None
+            Key-frames of the performances in their frames, NaN where one is not known: ticks.
+        pattern_keyframes : array-like of shape (n_keyframes,) or Series, default=None
+            Key-frames on the clock, such as ``synchronizer.keyframes_``: lines. The index of a
+            Series holds their names.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
 
@@ -244,11 +278,13 @@ class SynchronizationDisplay:
         Raises
         ------
         ValueError
-            If there is not one row of times a performance, the pattern has another shape, the
-            number of names differs, there is no such feature, or a value is infinite.
+            If there is not one row of times or key-frames a performance, the pattern has another
+            shape, the number of names differs, there is no such feature, a value is infinite, or
+            a key-frame is not on the clock.
         """
         arrays, names = read_collection(X)
         match, width = match_of_times(times, len(arrays)), arrays[0].shape[1]
+        keyframes = check_own_keyframes(keyframes, len(arrays))
         if feature_names is None:
             feature_names = names or [f"x{i}" for i in range(width)]
         feature_names = as_names(feature_names, width, "feature_names", "features")
@@ -271,10 +307,18 @@ class SynchronizationDisplay:
             groups=groups,
             unit=unit,
             frame_rate=rates_of(X, frame_rate, unit),
+            keyframes=keyframes,
+            pattern_keyframes=pattern_keyframes,
         )
         return display.plot(ax, warps=warps)
 
-    def plot(self, ax: AxesLike | None = None, *, warps: bool = True) -> Self:
+    def plot(
+        self,
+        ax: AxesLike | None = None,
+        *,
+        warps: bool = True,
+        keyframe_lines: bool = True,
+    ) -> Self:
         """Draw.
 
         Parameters
@@ -284,6 +328,8 @@ class SynchronizationDisplay:
             feature before and after, then the warps. None makes a figure.
         warps : bool, default=True
             Whether to draw tau(p) against the diagonal.
+        keyframe_lines : bool, default=True
+            Whether to draw key-frames, if there are some.
 
         Returns
         -------
@@ -320,12 +366,30 @@ class SynchronizationDisplay:
         left.set_xlabel(self._axis.performance_label)
         right.set_xlabel(self._axis.label)
         self.warps_ = self._draw_warps(self.axes_[-1], clock, style) if warps else None
+        self.keyframes_, self.own_keyframes_ = [], []
+        if keyframe_lines:
+            self._draw_keyframes(colors)
         for axis in self.axes_:
             axis.set_title(axis.get_title(), fontsize="medium")
         if styles:
             handles, labels = self.group_means_[0], list(styles)
             legend_above(self.axes_, handles, labels, below=self.axes_[:2])
         return self
+
+    def _draw_keyframes(self, colors):
+        """Draw key-frames: lines on the clock, with names once, and ticks of the performances."""
+        if self.pattern_keyframes is not None:
+            times = self._axis.convert(self.pattern_keyframes.to_numpy())
+            aligned = self.axes_[1 : 2 * len(self.feature_names) : 2]
+            named = aligned if self.warps_ is None else [*aligned, self.axes_[-1]]
+            for axis in named:
+                names = self.pattern_keyframes.index if axis is named[-1] else ()
+                style = {"by_diagonal": axis not in aligned}
+                self.keyframes_.append(draw_keyframes(axis, times, names, **style))
+        if self.keyframes is not None:
+            own = self._axis.own(self.keyframes)
+            for axis in self.axes_[: 2 * len(self.feature_names) : 2]:
+                self.own_keyframes_.append(draw_own_keyframes(axis, own, colors))
 
     def _describe_pattern(self):
         if self.pattern is None:

@@ -58,12 +58,15 @@ class TimeAxis:
 
     def performances(self):
         """The times of the frames of each performance: list of ndarray (n_frames_i,)."""
-        frames = [np.arange(n) for n in self._lengths]
+        return self.own([np.arange(n) for n in self._lengths])
+
+    def own(self, frames):
+        """Frames of each performance, whole or not, in the unit: list of ndarray."""
         if self.unit == "percent":
-            return [100 * f / f[-1] for f in frames]
+            return [100 * f / (n - 1) for f, n in zip(frames, self._lengths, strict=True)]
         if self.unit == "seconds":
             return [f / rate for f, rate in zip(frames, self._rates, strict=True)]
-        return frames
+        return list(frames)
 
     def convert(self, frames):
         """Frames of the clock, whole or not, in the unit."""

@@ -7,11 +7,12 @@ from typing import Any, Self
 import numpy as np
 from sklearn.base import BaseEstimator
 
-from ..inputs.types import PerformanceLike, PerformancesLike, ValuesLike
+from ..inputs.types import NumbersLike, PerformanceLike, PerformancesLike, ValuesLike
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .arguments import AxesLike
 from .drawing import COLORS, WIDTH, legend_above, panels
+from .keyframes import own_keyframes
 
 __all__ = ["TrellisDisplay"]
 
@@ -36,6 +37,9 @@ class TrellisDisplay:
         The final offsets Delta(p), after consensus, smoothing and refinement.
     names : (str, str), default=("template", "trial")
         Names of the pattern and of the performance.
+    keyframes : array-like, shape (n_keyframes, 2), default=None
+        The frame of each key-frame in the pattern, and the offset of the performance there; NaN
+        where one is not known.
 
     Attributes
     ----------
@@ -47,6 +51,8 @@ class TrellisDisplay:
         The costs.
     path_, warp_ : Line2D
         The best path, and the final warp.
+    keyframes_ : Line2D or None
+        The key-frames, as points.
     colorbar_ : Colorbar or None
         The scale of the costs.
 
@@ -71,10 +77,12 @@ class TrellisDisplay:
         warp: ValuesLike,
         *,
         names: tuple[str, str] = ("template", "trial"),
+        keyframes: NumbersLike | None = None,
     ) -> None:
         self.frames, self.offsets = np.asarray(frames, dtype=np.float64), np.asarray(offsets)
         self.costs, self.path, self.warp = np.asarray(costs), np.asarray(path), np.asarray(warp)
         self.names = names
+        self.keyframes = None if keyframes is None else np.asarray(keyframes, dtype=np.float64)
 
     def __repr__(self):
         return f"TrellisDisplay({self.names[1]} matched to {self.names[0]})"
@@ -88,6 +96,7 @@ class TrellisDisplay:
         performance: int = 0,
         ax: AxesLike | None = None,
         colorbar: bool = True,
+        keyframe_points: bool = True,
         **params: Any,
     ) -> Self:
         """Draw the disparity space of the pattern and one performance.
@@ -104,6 +113,8 @@ class TrellisDisplay:
             Axes to draw on. None makes a figure.
         colorbar : bool, default=True
             Whether to draw a scale of the costs.
+        keyframe_points : bool, default=True
+            Whether to draw the key-frames that are given for the performance.
         **params : dict
             Further arguments of the synchronizer and of steps before, such as ``keyframes``.
 
@@ -122,9 +133,21 @@ class TrellisDisplay:
             warp = synchronizer.match(performances.take([performance])).offsets[0]
         index = index_of_pattern(synchronizer, performances)
         names = ("template" if index is None else f"template {index}", f"trial {performance}")
-        return cls(**space, warp=warp, names=names).plot(ax, colorbar=colorbar)
+        own = own_keyframes(synchronizer, performances, given)
+        if own is not None:
+            last = (synchronizer.n_frames_ - 1) / (len(performances[performance]) - 1)
+            at = synchronizer.keyframes_
+            own = np.column_stack([at, own[performance] * last - at])
+        display = cls(**space, warp=warp, names=names, keyframes=own)
+        return display.plot(ax, colorbar=colorbar, keyframe_points=keyframe_points)
 
-    def plot(self, ax: AxesLike | None = None, *, colorbar: bool = True) -> Self:
+    def plot(
+        self,
+        ax: AxesLike | None = None,
+        *,
+        colorbar: bool = True,
+        keyframe_points: bool = True,
+    ) -> Self:
         """Draw.
 
         Parameters
@@ -133,6 +156,8 @@ class TrellisDisplay:
             Axes to draw on. None makes a figure.
         colorbar : bool, default=True
             Whether to draw a scale of the costs.
+        keyframe_points : bool, default=True
+            Whether to draw key-frames, if there are some.
 
         Returns
         -------
@@ -173,7 +198,14 @@ class TrellisDisplay:
         self.ax_.set_xlabel(f"frame p of {self.names[0]}")
         self.ax_.set_ylabel(f"offset d of {self.names[1]} (frames)")
         outside = Patch(facecolor="0.85", edgecolor="0.6", label="no path can pass")
-        handles = [self.path_, self.warp_, outside]
+        handles, self.keyframes_ = [self.path_, self.warp_, outside], None
+        known = self.keyframes is not None and np.isfinite(self.keyframes).all(axis=1).any()
+        if keyframe_points and known:
+            style = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}
+            (self.keyframes_,) = self.ax_.plot(
+                *self.keyframes.T, "o", markersize=7, zorder=5, label="key-frame", **style
+            )
+            handles.append(self.keyframes_)
         legend_above([self.ax_], handles, [handle.get_label() for handle in handles])
         self.ax_.grid(False)
         self.colorbar_ = None

@@ -22,9 +22,11 @@ __all__ = [
     "Recorded",
     "frame_rate_of_rows",
     "is_thinned",
+    "names_seconds",
     "recorded_frames",
     "refuse_moved_events",
     "refuse_seconds",
+    "start_of_rows",
     "timeless",
     "warn_of_rows",
 ]
@@ -108,6 +110,32 @@ def frame_rate_of_rows(x):
     if len(steps) and (steps[0] == 0 or (steps != steps[0]).any()):
         return None
     return float(rate / steps[0]) if len(steps) else float(rate)
+
+
+def start_of_rows(x):
+    """The time of the first row of a table in seconds, by its index or ``attrs``; 0 if unknown.
+
+    Parameters
+    ----------
+    x : DataFrame, or anything
+        One performance.
+
+    Returns
+    -------
+    float
+    """
+    if not isinstance(x, pd.DataFrame) or not len(x):
+        return 0.0
+    if _rate_of_seconds(_frame_level(x)) is not None:
+        return float(times_as_numbers(_frame_level(x), "The index")[0])
+    start, rate, frames = x.attrs.get("first_time"), x.attrs.get("frame_rate"), recorded_frames(x)
+    start = float(start) if isinstance(start, Real) else 0.0
+    return start if frames is None or not _is_rate(rate) else start + float(frames[0] / rate)
+
+
+def names_seconds(name):
+    """Whether a column or level of this name may be in seconds."""
+    return bool(name) and bool(_SECONDS.fullmatch(str(name).strip()))
 
 
 def refuse_seconds(frames, n_frames, name):
@@ -349,7 +377,7 @@ def _is_rate(rate):
 
 
 def _may_be_seconds(index):
-    return bool(index.name) and bool(_SECONDS.fullmatch(str(index.name).strip()))
+    return names_seconds(index.name)
 
 
 def _smallest_step(values):

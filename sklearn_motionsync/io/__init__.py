@@ -2,7 +2,15 @@
 
 from .events import cut_at_events
 from .gaps import fill_gaps, find_gaps
+from .keyframes import keyframes_from_events
 from .motion import read_motion
 from .poses import from_poses
 
-__all__ = ["cut_at_events", "fill_gaps", "find_gaps", "from_poses", "read_motion"]
+__all__ = [
+    "cut_at_events",
+    "fill_gaps",
+    "find_gaps",
+    "from_poses",
+    "keyframes_from_events",
+    "read_motion",
+]

@@ -56,8 +56,7 @@ def cut_at_events(
 
         events : list of dict
             The events within the performance, with ``frame`` counted from its first frame. The
-            events at its two ends are left out, so that the others are key-frames for
-            `KeyframeSynchronizer`.
+            events at its two ends are left out, so that the others are key-frames.
         rows : list of int
             Its first and last frame, as events count them in the recording.
         frame_rate : float
@@ -85,7 +84,7 @@ def cut_at_events(
     See Also
     --------
     read_motion : Reads events of C3D files.
-    sklearn_motionsync.KeyframeSynchronizer : Aligns the other events.
+    keyframes_from_events : Makes key-frames of the other events.
 
     Examples
     --------
@@ -113,7 +112,7 @@ def cut_at_events(
             f"{name} has no events, so no performance is cut out of it.", UserWarning, stacklevel=2
         )
         return []
-    events = _read_events(df, name)
+    events = read_events(df, name)
     starts = _select(events, start, "start", name)
     stops = starts if stop is None else _select(events, stop, "stop", name)
     recording = _Frames(df, name)
@@ -137,7 +136,7 @@ def name_recording(df):
     return "The recording" if label is None else f"The recording {str(label)[:60]!r}"
 
 
-def _read_events(df, name):
+def read_events(df, name):
     """The events that have a frame, by time."""
     events = df.attrs.get("events")
     if not isinstance(events, (list, tuple)):
@@ -164,7 +163,7 @@ def _select(events, what, name, recording):
             f"{name} must be the label of an event, or a pair of label and context, got {what!r}."
         )
     wanted = [word.strip().casefold() for word in wanted]
-    found = [event for event in events if _words(event)[: len(wanted)] == wanted]
+    found = [event for event in events if words_of(event)[: len(wanted)] == wanted]
     if not found:
         kinds = Counter((event["label"], event.get("context")) for event in events)
         listed = ", ".join(
@@ -175,7 +174,8 @@ def _select(events, what, name, recording):
     return found
 
 
-def _words(event):
+def words_of(event):
+    """Label and context of an event in lower case, to be compared."""
     return [str(event.get(key) or "").strip().casefold() for key in ("label", "context")]
 
 

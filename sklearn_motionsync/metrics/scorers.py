@@ -12,6 +12,7 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
 from sklearn.utils.metadata_routing import MetadataRequest
 
+from ..inputs.keyframes import Keyframes
 from ..inputs.types import PerformancesLike, RandomState
 from ..matching.warps import normalise
 from ..utils.pipelines import accepted_params, route_to_synchronizer
@@ -204,7 +205,8 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
 
     Features are divided into ``n_folds`` folds. For each fold a clone is fitted without it, to a
     median pattern. Its warps are scored by the spread of the fold alone, which over-warping does
-    not reduce. The clones are given the key-frames of the performances that are scored.
+    not reduce. The clones are given the key-frames of the performances that are scored, but for
+    those that none of these has.
 
     Parameters
     ----------
@@ -288,7 +290,10 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
         if reached.takes_params:
             # Metadata that the estimator needs are missing for its clones, too.
             reached.match()
-        fit_params = accepted_params(synchronizer.fit, params)
+        params = known_keyframes(performances, params)
+        fit_params, match_params = (
+            accepted_params(method, params) for method in (synchronizer.fit, synchronizer.match)
+        )
         order = check_random_state(self.random_state).permutation(n_features)
         scores = []
         for held_out in np.array_split(order, self.n_folds):
@@ -297,7 +302,24 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
                 n_frames=synchronizer.n_frames_, pattern="median"
             )
             seen, hidden = ([x[:, part] for x in performances] for part in (others, held_out))
-            match = refitted.fit(seen, **fit_params).match(seen, **reached.params)
+            match = refitted.fit(seen, **fit_params).match(seen, **match_params)
             before = normalise(hidden, synchronizer.n_frames_)
             scores.append(self._score(before, match.warp(hidden)))
         return float(np.mean(scores))
+
+
+def known_keyframes(performances, params):
+    """Metadata without the key-frames that are known in none of these performances.
+
+    Where labels are few, a fold may have none.
+    """
+    if params.get("keyframes") is None:
+        return params
+    given = Keyframes(params["keyframes"], len(performances), params.get("frame_rate"))
+    shares = given.shares(performances)
+    known = np.isfinite(shares).any(axis=0)
+    if known.all():
+        return params
+    others = {name: params[name] for name in params if name not in ("keyframes", "frame_rate")}
+    last = np.array([[len(x) - 1] for x in performances])
+    return others | ({"keyframes": (shares * last)[:, known]} if known.any() else {})

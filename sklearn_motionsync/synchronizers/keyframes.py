@@ -68,7 +68,8 @@ class KeyframeSynchronizer(AnchoredSynchronizer):
 
     See Also
     --------
-    DenseSynchronizer : Needs no key-frames.
+    DenseSynchronizer : Needs no key-frames, and takes those that are known.
+    io.keyframes_from_events : Makes key-frames of a table of events.
 
     Notes
     -----

@@ -1,0 +1,131 @@
+"""Key-frames in figures: where they are drawn, and by what name."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import ActionModel, DenseSynchronizer, KeyframeSynchronizer
+from sklearn_motionsync.datasets import make_gait
+from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay, TrellisDisplay
+
+GAIT = make_gait(3, 2, random_state=0)
+X = [x / x.std(axis=0) for x in GAIT.data]
+LENGTHS = np.array([len(x) for x in X])
+NAMES = ["force peak", ("Foot Off", "Right")]
+K = pd.DataFrame(GAIT.keyframes[:, [0, 3]], columns=pd.Index(NAMES, tupleize_cols=False))
+K.iloc[1] = np.nan
+
+
+@pytest.fixture(scope="module")
+def sync():
+    return DenseSynchronizer(61).fit(X, keyframes=K)
+
+
+def places(lines):
+    return [line.get_xdata()[0] for line in lines]
+
+
+def texts(axis):
+    return [text.get_text() for text in axis.texts if "template" not in text.get_text()]
+
+
+@pytest.mark.parametrize(
+    ("unit", "scale"), [("frames", 1), ("percent", 100 / 60), ("seconds", None)]
+)
+def test_lines_on_the_clock_and_ticks_of_trials(sync, unit, scale):
+    given = {"features": [0, 1], "unit": unit, "frame_rate": 100}
+    display = SynchronizationDisplay.from_estimator(sync, X, keyframes=K, **given)
+    scale = np.median(LENGTHS - 1) / 100 / 60 if scale is None else scale
+    # Two panels of features and that of the warps.
+    assert len(display.keyframes_) == 3
+    for lines in display.keyframes_:
+        np.testing.assert_allclose(places(lines), sync.keyframes_ * scale)
+    assert [line.axes for lines in display.keyframes_ for line in lines[:1]] == [
+        display.axes_[i] for i in (1, 3, 4)
+    ]
+    assert texts(display.axes_[4]) == ["force peak", "Foot Off, Right"]
+    assert texts(display.axes_[1]) == []
+    of_unit = {"frames": 1, "percent": 100 / (LENGTHS - 1), "seconds": 1 / 100}[unit]
+    own = (K.to_numpy().T * of_unit).T
+    ticks = [segment[0, 0] for segment in display.own_keyframes_[0].get_segments()]
+    np.testing.assert_allclose(ticks, own[np.isfinite(own)])
+    plt.close("all")
+
+
+def test_ticks_have_the_colours_of_groups(sync):
+    given = {"features": 0, "groups": GAIT.group, "warps": False}
+    display = SynchronizationDisplay.from_estimator(sync, X, keyframes=K, **given)
+    curves = display.before_[0].get_colors()[:, :3]
+    (ticks,) = display.own_keyframes_
+    np.testing.assert_array_equal(ticks.get_colors()[:, :3], curves[[0, 0, 2, 2, 3, 3, 4, 4, 5, 5]])
+    assert texts(display.axes_[1]) == ["force peak", "Foot Off, Right"]
+    plt.close("all")
+
+
+def test_key_frames_that_trials_lack_are_lines_without_names(sync):
+    display = SynchronizationDisplay.from_estimator(sync, X, features=0)
+    np.testing.assert_allclose(places(display.keyframes_[0]), sync.keyframes_)
+    assert display.own_keyframes_ == []
+    assert texts(display.axes_[-1]) == []
+    display.plot(keyframe_lines=False)
+    assert display.keyframes_ == []
+    none = SynchronizationDisplay.from_estimator(sync, X, keyframes=K, keyframe_lines=False)
+    assert none.keyframes_ == none.own_keyframes_ == []
+    plain = DenseSynchronizer(61).fit(X)
+    assert SynchronizationDisplay.from_estimator(plain, X, features=0).keyframes_ == []
+    found = KeyframeSynchronizer(61).fit(X)
+    display = SynchronizationDisplay.from_estimator(found, X, features=0)
+    np.testing.assert_allclose(places(display.keyframes_[0]), found.keyframes_)
+    plt.close("all")
+
+
+def test_key_frames_of_warps_that_are_known_already(sync):
+    times = sync.match(X, keyframes=K).times
+    given = {"keyframes": K, "pattern_keyframes": pd.Series(sync.keyframes_, index=["a$", "b"])}
+    display = SynchronizationDisplay.from_predictions(X, times, features=0, **given)
+    expected = SynchronizationDisplay.from_estimator(sync, X, keyframes=K, features=0)
+    for lines, others in zip(display.keyframes_, expected.keyframes_, strict=True):
+        assert places(lines) == places(others)
+    (ticks,), (others,) = display.own_keyframes_, expected.own_keyframes_
+    np.testing.assert_allclose(ticks.get_segments(), others.get_segments())
+    assert texts(display.axes_[-1]) == [r"a\$", "b"]
+    display = SynchronizationDisplay.from_predictions(X, times, pattern_keyframes=[5, np.nan])
+    assert places(display.keyframes_[0]) == [5]
+    with pytest.raises(ValueError, match=r"pattern_keyframes must be .* from 0 to 60; got 61"):
+        SynchronizationDisplay.from_predictions(X, times, pattern_keyframes=[5, 61])
+    with pytest.raises(ValueError, match="6 performances, and 5 rows of keyframes"):
+        SynchronizationDisplay.from_predictions(X, times, keyframes=K[:5])
+    plt.close("all")
+
+
+def test_the_model_of_a_pipeline_shows_them(sync):
+    pipe = make_pipeline(DenseSynchronizer(61), ActionModel())
+    pipe.fit(X, densesynchronizer__keyframes=K)
+    given = {"features": [0, 1], "unit": "percent"}
+    display = ActionModelDisplay.from_estimator(pipe, X, keyframes=K, **given)
+    for lines in display.keyframes_:
+        np.testing.assert_allclose(places(lines), pipe[0].keyframes_ * 100 / 60)
+    assert texts(display.axes_[0]) == ["force peak", "Foot Off, Right"]
+    assert texts(display.axes_[1]) == []
+    without = ActionModelDisplay.from_estimator(pipe, **given)
+    assert [places(lines) for lines in without.keyframes_] == [
+        places(lines) for lines in display.keyframes_
+    ]
+    assert ActionModelDisplay.from_estimator(pipe, keyframe_lines=False).keyframes_ == []
+    assert ActionModelDisplay.from_estimator(pipe[1]).keyframes_ == []
+    plt.close("all")
+
+
+def test_the_trellis_shows_those_of_its_trial(sync):
+    display = TrellisDisplay.from_estimator(sync, X, performance=2, keyframes=K)
+    at = K.iloc[2] * 60 / (LENGTHS[2] - 1) - sync.keyframes_
+    expected = np.column_stack([sync.keyframes_, at])
+    np.testing.assert_allclose(display.keyframes_.get_xydata(), expected)
+    # The warp goes through them.
+    met = np.interp(at + sync.keyframes_, np.arange(61) + display.warp, np.arange(61))
+    np.testing.assert_allclose(met, sync.keyframes_, atol=1e-6)
+    assert display.plot(keyframe_points=False).keyframes_ is None
+    assert TrellisDisplay.from_estimator(sync, X, performance=1, keyframes=K).keyframes_ is None
+    assert TrellisDisplay.from_estimator(sync, X, performance=2).keyframes_ is None
+    plt.close("all")

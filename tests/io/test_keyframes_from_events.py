@@ -1,0 +1,254 @@
+"""Events in tables and in attrs become key-frames."""
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+from sklearn_motionsync import DenseSynchronizer, to_frame, to_sequences
+from sklearn_motionsync.datasets import make_gait
+from sklearn_motionsync.io import cut_at_events, keyframes_from_events, read_motion
+
+LENGTHS = [101, 121, 91]
+# Of (subject, trial): toe-off and knee flexed, in frames.
+TRUTH = {("ann", 1): (62.0, 73.5), ("ann", 2): (75.25, np.nan), ("bob", 1): (np.nan, 66.0)}
+NAMES = ["toe-off", "knee flexed"]
+
+
+def trials(levels=("subject", "trial", "frame"), start=0, **attrs):
+    out = []
+    for label, n in zip(TRUTH, LENGTHS, strict=True):
+        out.append(pd.DataFrame({"knee": np.zeros(n)}, index=pd.RangeIndex(start, start + n)))
+        out[-1].attrs = {"performance": label, "levels": levels, **attrs}
+    return out
+
+
+def table(time="frame", scale=1.0, start=0, ids=int, event="event"):
+    rows = [
+        {"subject": who, "trial": ids(trial), event: name, time: (frame + start) * scale}
+        for (who, trial), frames in TRUTH.items()
+        for name, frame in zip(NAMES, frames, strict=True)
+    ]
+    return pd.DataFrame(rows).sample(frac=1, random_state=0)
+
+
+def check(found, index=None):
+    np.testing.assert_allclose(found.to_numpy(), list(TRUTH.values()), rtol=0, atol=1e-9)
+    assert found.columns.tolist() == NAMES
+    assert found.index.to_list() == (list(TRUTH) if index is None else index)
+
+
+@pytest.mark.parametrize("time", ["frame", "Frame", " FRAMES "])
+@pytest.mark.parametrize("ids", [int, str, float, np.int8])
+def test_rows_of_any_order_and_ids_of_any_type(time, ids):
+    check(keyframes_from_events(trials(), table(time, ids=ids)))
+    renamed = table(time, ids=ids, event="Label").rename(columns={"subject": "Subject"})
+    check(keyframes_from_events(trials(), renamed))
+    check(keyframes_from_events(trials(), renamed.set_index(["Subject", "trial"])))
+    check(keyframes_from_events(trials(), pl.DataFrame(renamed.to_dict("list"))))
+    check(keyframes_from_events(to_frame(trials()), renamed))
+
+
+@pytest.mark.parametrize("time", ["seconds", "time", "Time (s)", "t"])
+def test_seconds(time):
+    X, events = trials(), table(time, 1 / 200)
+    check(keyframes_from_events(X, events, frame_rate=200))
+    check(keyframes_from_events(X, events, frame_rate=[200] * 3))
+    check(keyframes_from_events(trials(frame_rate=200.0), events))
+    with pytest.raises(ValueError, match=r"frame rate of performance 0 \('ann', 1\)|frame rate of"):
+        keyframes_from_events(X, events)
+    # As events of one recording are, of which the trials are parts.
+    late = trials(frame_rate=200.0, first_time=3.0)
+    check(keyframes_from_events(late, table(time, 1 / 200, start=600)))
+
+
+def test_times_and_frames_are_those_of_the_index():
+    late = trials(start=40)
+    check(keyframes_from_events(late, table(start=40)))
+    for x in late:
+        x.index = pd.Index(x.index / 50, name="time")
+    check(keyframes_from_events(late, table("seconds", 1 / 50, start=40)))
+    # Made by the package, of a table of times.
+    long = to_frame(late).reset_index()
+    X = to_sequences(long, by=["subject", "trial"], time="time")
+    check(keyframes_from_events(X, table("seconds", 1 / 50, start=40)))
+
+
+def test_frames_count_where_both_are_given():
+    check(keyframes_from_events(trials(), table().assign(time=1e6)))
+
+
+@pytest.mark.parametrize("make", [list, np.stack, lambda X: np.stack(X)[:, :, 0]])
+def test_arrays_are_numbered(make):
+    X = make([np.zeros((100, 1))] * 3)
+    for column in ("trial", "performance"):
+        events = pd.DataFrame({column: [2, 0], "event": "apex", "frame": [40, 30.5]})
+        found = keyframes_from_events(X, events)
+        np.testing.assert_array_equal(found["apex"], [30.5, np.nan, 40])
+        assert found.index.to_list() == [0, 1, 2]
+    mine = events.rename(columns={"performance": "rep"})
+    pd.testing.assert_frame_equal(keyframes_from_events(X, mine, by="rep"), found)
+    contexts = events.assign(context=["Left", None])
+    assert set(keyframes_from_events(X, contexts).columns) == {("apex", "Left"), "apex"}
+
+
+def test_names_choose_and_order():
+    events = pd.concat([table(), table(event="event").assign(event="other", frame=np.arange(6))])
+    found = keyframes_from_events(trials(), events, ["Toe-Off", "knee flexed"])
+    check(found.set_axis(NAMES, axis=1))
+    (only,) = keyframes_from_events(trials(), table(), ["knee flexed"]).columns
+    assert only == "knee flexed"
+    with pytest.raises(
+        ValueError, match=r"\('ann', 1\): event 'toe-off' in row 62 is not after 'kn"
+    ):
+        keyframes_from_events(trials(), table(), NAMES[::-1])
+
+
+def test_an_order_that_mean_times_contradict():
+    """b comes first on average, and a comes before it in each trial that has both."""
+    frames = {"a": [50, 40, np.nan], "b": [60, 45, 5], "c": [np.nan, 70, np.nan]}
+    wide = pd.DataFrame(frames).rename_axis("trial").reset_index()
+    events = wide.melt("trial", var_name="event", value_name="frame").iloc[::-1]
+    found = keyframes_from_events([np.zeros((100, 1))] * 3, events)
+    np.testing.assert_array_equal(found, np.array(list(frames.values())).T)
+    assert found.columns.tolist() == ["a", "b", "c"]
+
+
+def test_events_that_never_meet_are_in_order_of_their_share_of_the_trial():
+    X = [np.zeros((1001, 1)), np.zeros((101, 1)), np.zeros((101, 1))]
+    events = pd.DataFrame({"trial": [1, 0, 2], "event": ["late", "early", "mid"], "frame": 60})
+    events.loc[1, "frame"], events.loc[2, "frame"] = 100, 40
+    for rows in (events, events[::-1]):
+        found = keyframes_from_events(X, rows)
+        assert found.columns.tolist() == ["early", "mid", "late"]
+
+
+def test_the_ends_are_left_out():
+    ends = pd.DataFrame({"subject": "ann", "trial": 1, "event": "strike", "frame": [0.0, 100.3]})
+    check(keyframes_from_events(trials(), pd.concat([table(), ends])))
+    with pytest.raises(ValueError, match="No trial has the event 'strike' inside, after its first"):
+        keyframes_from_events(trials(), pd.concat([table(), ends]), ["strike"])
+
+
+def changed(**columns):
+    """The table with one row changed: the toe-off of the first trial."""
+    events = table().sort_index().reset_index(drop=True)
+    for column, value in columns.items():
+        events[column] = events[column].astype(object)
+        events.loc[0, column] = value
+    return events
+
+
+MORE = pd.DataFrame([("ann", 2, NAMES[1], 90.0)], columns=table().columns)
+BAD = {
+    "twice": (
+        pd.concat([table(), changed(frame=64.0)[:1]]),
+        r"^Performance 0 \('ann', 1\): event 'toe-off' comes twice, in rows 6.* and 6",
+    ),
+    "outside": (changed(frame=101), "^Performance 0 .*'toe-off' at 101 is outside.* 100"),
+    "before": (changed(frame=-1), "'toe-off' at -1 is outside of it, from 0 to 100"),
+    "unknown": (changed(trial=7), r"trial \('ann', 7\) of event 'toe-off' is not in X"),
+    "none known": (table().assign(subject="eve"), r"trial \('eve', .* is not in X, whose trials"),
+    "order": (
+        pd.concat([changed(frame=80.0), MORE]),
+        r"different orders: .*'ann', [12]\), and .*'ann', [12]\)\. Key-frames have one order",
+    ),
+    "at once": (changed(frame=73.5), "not after .* in row 73.5. Key-frames have one order, and"),
+    "no event": (table().drop(columns="event"), r"no column event; there are .*events.melt\(\['su"),
+    "no time": (table().drop(columns="frame"), "no column frame or seconds"),
+    "no level": (table().drop(columns="trial"), "no column 'trial', a level of the labels of X"),
+    "text": (changed(frame="soon"), "events: column 'frame'"),
+    "nothing": (table().assign(frame=np.nan), "No trial has an event"),
+    "a list": ([{"event": "x"}], "must be a DataFrame of pandas or polars, got list"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_tables_are_refused(name):
+    events, message = BAD[name]
+    with pytest.raises(ValueError, match=message):
+        keyframes_from_events(trials(), events)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"by": "subject"}, "must name 2 columns of events, for the levels"),
+        ({"by": ["subject", "rep"]}, "must name 2 columns"),
+        ({"names": ["apex"]}, r"No trial has the event 'apex' .*; there are \['"),
+        ({"names": [3]}, r"labels of events, or pairs of label and context; got \(3,\)"),
+        ({"names": [("a", "b", "c")]}, "labels of events, or pairs"),
+    ],
+)
+def test_bad_arguments_are_refused(given, message):
+    with pytest.raises(ValueError, match=message):
+        keyframes_from_events(trials(), table(), **given)
+
+
+def test_trials_without_events_have_none():
+    with pytest.raises(ValueError, match="No trial has an event: give a table"):
+        keyframes_from_events(trials())
+
+
+# -- events of recordings -------------------------------------------------------------------
+
+
+def gait_cycles():
+    gait = make_gait(4, 3, takes=True, random_state=0)
+    takes = [pd.DataFrame(x, columns=gait.feature_names) for x in gait.data]
+    for take, events, person in zip(takes, gait.events, gait.person, strict=True):
+        take.attrs = {"events": events, "frame_rate": gait.frame_rate, "performance": person}
+    return gait, takes, [x for take in takes for x in cut_at_events(take, "Foot Strike")]
+
+
+def test_events_of_cut_cycles():
+    gait, takes, cycles = gait_cycles()
+    found = keyframes_from_events(cycles)
+    assert found.columns.tolist() == [("Foot Off", "Right")]
+    # The true toe-offs, by the key-frames of the takes.
+    is_toe_off = [name.startswith("toe-off") for name in gait.keyframe_names]
+    truth = gait.keyframes[:, is_toe_off].ravel() - [x.attrs["rows"][0] for x in cycles]
+    np.testing.assert_allclose(found.to_numpy()[:, 0], truth, atol=1e-4)
+    assert found.index.to_list() == [x.attrs["performance"] for x in cycles]
+    pd.testing.assert_series_equal(
+        keyframes_from_events(cycles, names=["foot off"])["foot off"],
+        found[("Foot Off", "Right")].rename("foot off"),
+    )
+    with pytest.raises(ValueError, match=r"'Right'\) comes twice, in rows .* by cut_at_events"):
+        keyframes_from_events(takes)
+    sync = DenseSynchronizer(60).fit(cycles, keyframes=found)
+    own = truth * 59 / (np.array([len(x) for x in cycles]) - 1)
+    times = sync.match(cycles, keyframes=found).times
+    met = [np.interp(sync.keyframes_[0], np.arange(60), tau) for tau in times]
+    np.testing.assert_allclose(met, own, atol=1e-3)
+
+
+def test_a_table_of_the_same_events_says_the_same():
+    _, _, cycles = gait_cycles()
+    rows = [
+        dict(zip(("recording", "part"), x.attrs["performance"], strict=True)) | event
+        for x in cycles
+        for event in x.attrs["events"]
+    ]
+    events = pd.DataFrame(rows).drop(columns="time")
+    found = keyframes_from_events(cycles, events)
+    pd.testing.assert_frame_equal(found, keyframes_from_events(cycles))
+
+
+def test_rows_that_events_do_not_count_are_refused():
+    _, _, cycles = gait_cycles()
+    with pytest.raises(ValueError, match="Performance 0: by its index row 0 is frame 5 of the rec"):
+        keyframes_from_events([cycles[0].iloc[5:]])
+
+
+@pytest.mark.filterwarnings("ignore:.*missing:UserWarning")
+def test_events_of_real_files(real_data):
+    files = sorted((real_data / "original_files" / "c3d").glob("*.c3d"))
+    trials = [read_motion(path) for path in files]
+    found = keyframes_from_events(trials)
+    assert found.columns.tolist() == ["RIC", "RHS", "RTO"]
+    # As the files have them, at 50 frames a second.
+    np.testing.assert_allclose(found, [[136, 270, 366]] * len(trials), atol=1e-3)
+    seconds = pd.DataFrame([e | {"trial": "Eb015pi"} for e in trials[0].attrs["events"]])
+    again = keyframes_from_events(trials[:1], seconds.drop(columns="frame"))
+    np.testing.assert_allclose(again, [[136, 270, 366]], atol=1e-3)
+    assert keyframes_from_events(trials, names=["rto"]).shape == (len(trials), 1)
