@@ -25,9 +25,11 @@ from .limbs import (
     LIMBS,
     body_size,
     landmark_positions,
+    limb_indices,
     limb_vectors,
     lowest_height,
     median_lengths,
+    scale_missing_lengths,
 )
 from .skeleton import check_columns
 from .upright import check_upright
@@ -215,13 +217,13 @@ class Body:
 class PositionsTransformer(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator):
     """Base of the transformers that compute features of joint positions, body by body.
 
-    A subclass has a ``skeleton``, a ``fit`` that calls ``_check(X, reset=True)``, a
-    ``get_feature_names_out``, and a ``_features(portion, body)`` that returns the features of a
-    `Portion` of a `Body`.
+    A subclass has a ``skeleton``; ``hidden``, which is "raise" or "nan"; a ``fit`` that calls
+    ``_measure(X)``; a ``get_feature_names_out``; and a ``_features(portion, body)`` that returns
+    the features of a `Portion` of a `Body`.
     """
 
-    # How `check_performances` treats NaN; "allow-nan" admits hidden joints.
-    _finite = True
+    # What an error about NaN advises.
+    _on_gaps = "Set hidden='nan', which takes hidden joints, interpolate the gap"
     # Lengths count in those of the body, so units do not matter.
     _facts = "frame_rate", "up"
 
@@ -261,6 +263,42 @@ class PositionsTransformer(DocumentedMixin, LongWorkMixin, TransformerMixin, Bas
         tags.input_tags.allow_nan = self._finite == "allow-nan"
         tags.transformer_tags.preserves_dtype = ["float64", "float32"]
         return tags
+
+    @property
+    def _finite(self):
+        """How `check_performances` treats NaN."""
+        return "allow-nan" if self.hidden == "nan" else True
+
+    def _measure(self, X):
+        """Check performances of a fit, and return the median length of each of their limbs."""
+        performances = self._check(X, reset=True)
+        limbs = self.skeleton.limbs
+        with self._progress(fits=True) as progress:
+            step, lengths = progress.stage("measuring limbs", len(performances)), []
+            for i in range(len(performances)):
+                lengths.append(self._body(performances, i).lengths)
+                step()
+        lengths = np.concatenate(lengths) if len(lengths) > 1 else lengths[0]
+        found = median_lengths(lengths)[limb_indices(limbs)]
+        if np.isnan(found).any():
+            never = [name for name, length in zip(limbs, found, strict=True) if np.isnan(length)]
+            raise ValueError(
+                f"The limbs {never} are hidden in every frame of every performance, so that their "
+                "lengths cannot be learnt. Fit on performances that show them, or leave their "
+                "landmarks out of the skeleton: Skeleton(..., landmarks={'left_wrist': None, ...})."
+            )
+        return found
+
+    def _lengths_of(self, body):
+        """Lengths (12,) of the limbs of a body; hidden ones are those of ``fit``, scaled to it."""
+        learnt = self._all_lengths(self.limb_lengths_)
+        return scale_missing_lengths(body.median_lengths, learnt)
+
+    def _all_lengths(self, lengths):
+        """Lengths (12,) of all limbs, 0 of those that the skeleton lacks."""
+        found = np.zeros(len(LIMB_NAMES), dtype=lengths.dtype)
+        found[limb_indices(self.skeleton.limbs)] = lengths
+        return found
 
     def _check(self, X, *, reset):
         finite = self._finite

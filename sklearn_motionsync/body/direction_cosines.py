@@ -25,8 +25,6 @@ from .limbs import (
     leg_length,
     limb_indices,
     lowest_height,
-    median_lengths,
-    scale_missing_lengths,
     unit_vectors,
 )
 from .skeleton import Skeleton
@@ -168,23 +166,7 @@ class DirectionCosines(PositionsTransformer):
         ValueError
             As from ``transform``, or if a limb is hidden throughout.
         """
-        performances = self._check(X, reset=True)
-        limbs = self.skeleton.limbs
-        with self._progress(fits=True) as progress:
-            step, lengths = progress.stage("measuring limbs", len(performances)), []
-            for i in range(len(performances)):
-                lengths.append(self._body(performances, i).lengths)
-                step()
-        lengths = np.concatenate(lengths) if len(lengths) > 1 else lengths[0]
-        found = median_lengths(lengths)[limb_indices(limbs)]
-        if np.isnan(found).any():
-            never = [name for name, length in zip(limbs, found, strict=True) if np.isnan(length)]
-            raise ValueError(
-                f"The limbs {never} are hidden in every frame of every performance, so that their "
-                "lengths cannot be learnt. Fit on performances that show them, or leave their "
-                "landmarks out of the skeleton: Skeleton(..., landmarks={'left_wrist': None, ...})."
-            )
-        self.limb_lengths_ = found
+        self.limb_lengths_ = self._measure(X)
         return self
 
     @snapshot
@@ -326,11 +308,9 @@ class DirectionCosines(PositionsTransformer):
         cosines = cosines[:, limb_indices(limbs)].reshape(len(cosines), -1)
         if not self.skeleton.has_height:
             return cosines
-        lengths = body.median_lengths
-        leg = leg_length(lengths, limbs)
+        leg = leg_length(body.median_lengths, limbs)
         if np.isnan(leg):
-            lengths = scale_missing_lengths(lengths, self._all_lengths(self.limb_lengths_))
-            leg = leg_length(lengths, limbs)
+            leg = leg_length(self._lengths_of(body), limbs)
         heights = (portion.position_of("pelvis")[:, 1] - body.floor) / leg
         return np.column_stack([heights, cosines])
 
@@ -354,16 +334,6 @@ class DirectionCosines(PositionsTransformer):
                 f"limb_lengths must be numbers above 0, got {lengths[limb]:g} for {limbs[limb]!r}."
             )
         return lengths
-
-    def _all_lengths(self, lengths):
-        """Lengths (12,) of all limbs, 0 of those that the skeleton lacks."""
-        found = np.zeros(len(LIMB_NAMES), dtype=lengths.dtype)
-        found[limb_indices(self.skeleton.limbs)] = lengths
-        return found
-
-    @property
-    def _finite(self):
-        return "allow-nan" if self.hidden == "nan" else True
 
     def _positions(self, performances, i, lengths):
         postures, limbs = performances[i], self.skeleton.limbs

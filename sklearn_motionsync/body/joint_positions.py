@@ -14,6 +14,7 @@ from ..utils.parameters import validated
 from .axes import project_on_axes
 from .base import PositionsTransformer
 from .formats import AXES, LANDMARKS, SIDES
+from .limbs import body_size
 from .skeleton import Skeleton
 
 __all__ = ["JointPositions"]
@@ -38,9 +39,16 @@ class JointPositions(PositionsTransformer):
         The axes. ``"heading"``: those of the body at each frame, x to the left along the hips,
         y up, z forward, as in `DirectionCosines`. ``"world"``: those of the recording, turned so
         that y is vertical. In the plane both are the picture's, x across and y up.
+    hidden : {"raise", "nan"}, default="raise"
+        How NaN, the positions of hidden joints, are treated. ``"raise"``: they are an error.
+        ``"nan"``: a joint is hidden in a frame if any of its coordinates is NaN, and its features
+        are NaN in that frame. Where the origin is hidden, the pelvis, all are.
 
     Attributes
     ----------
+    limb_lengths_ : ndarray, shape (n_limbs,)
+        Median length of each of ``skeleton.limbs`` over the frames of ``fit`` that show it, in
+        the unit of the positions.
     n_features_in_ : int
         The number of joints times that of their axes.
     feature_names_in_ : ndarray of str
@@ -56,6 +64,9 @@ class JointPositions(PositionsTransformer):
     the median over the performance; of a body without a complete leg, the sum of its limbs.
     Without a pelvis, positions are relative to the first of these that is there: the middle of the
     hips, the neck, the middle of the shoulders, the first landmark. A 2-D input is one performance.
+
+    Hidden hips, and lengths of limbs that a performance never shows, are treated as in
+    `DirectionCosines`.
 
     `DirectionCosines` weighs all limbs alike; positions weigh long limbs more.
     scikit-learn's ``make_union`` joins the features of both, frame by frame. It needs pandas output
@@ -90,18 +101,23 @@ class JointPositions(PositionsTransformer):
     _parameter_constraints: dict = {
         "skeleton": [Skeleton],
         "reference": [StrOptions({"heading", "world"})],
+        "hidden": [StrOptions({"raise", "nan"})],
     }
 
     def __init__(
-        self, skeleton: Skeleton, reference: Literal["heading", "world"] = "heading"
+        self,
+        skeleton: Skeleton,
+        reference: Literal["heading", "world"] = "heading",
+        hidden: Literal["raise", "nan"] = "raise",
     ) -> None:
         self.skeleton = skeleton
         self.reference = reference
+        self.hidden = hidden
 
     @atomic_fit
     @validated
     def fit(self, X: PerformancesLike, y: object = None) -> Self:
-        """Check the performances, and store the number and the names of the columns.
+        """Check the performances, and learn the limb lengths.
 
         Parameters
         ----------
@@ -118,14 +134,9 @@ class JointPositions(PositionsTransformer):
         Raises
         ------
         ValueError
-            As from ``transform``.
+            As from ``transform``, or if a limb is hidden throughout.
         """
-        performances = self._check(X, reset=True)
-        with self._progress(fits=True) as progress:
-            step = progress.stage("checking bodies", len(performances))
-            for i in range(len(performances)):
-                self._body(performances, i)
-                step()
+        self.limb_lengths_ = self._measure(X)
         return self
 
     def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
@@ -154,8 +165,11 @@ class JointPositions(PositionsTransformer):
 
     def _features(self, portion, body):
         origin = [portion.position_of(name) for name in _origin_of(self.skeleton)]
+        size = body.size
+        if np.isnan(size):
+            size = body_size(self._lengths_of(body), self.skeleton.limbs)
         # The pelvis is the first landmark, and the origin if it is there.
-        places = (portion.points[:, 1:] - (sum(origin) / len(origin))[:, np.newaxis]) / body.size
+        places = (portion.points[:, 1:] - (sum(origin) / len(origin))[:, np.newaxis]) / size
         axes = portion.axes if self.reference == "heading" else None
         if axes is not None:
             places = project_on_axes(places, axes)

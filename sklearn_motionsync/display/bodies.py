@@ -8,8 +8,7 @@ from ..body.axes import heading_axes, to_y_up
 from ..body.direction_cosines import DirectionCosines
 from ..body.limbs import unit_vectors
 from ..body.skeleton import Skeleton, check_columns, loose_joints
-from ..inputs.numbers import as_numbers, check_finite, column_names
-from .drawing import nanmean
+from ..inputs.numbers import as_numbers, check_finite, column_names, nanmean
 
 __all__ = [
     "bones_by_side",

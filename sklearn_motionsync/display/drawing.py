@@ -13,7 +13,6 @@ __all__ = [
     "front_line",
     "group_styles",
     "legend_above",
-    "nanmean",
     "panels",
     "parts_outside",
     "pyplot",
@@ -246,14 +245,6 @@ def parts_outside(ys, lower, upper):
         start, step = ys[curve, p], ys[curve, p + 1] - ys[curve, p]
         pieces.append((p[:, np.newaxis] + ends, start[:, np.newaxis] + ends * step[:, np.newaxis]))
     return tuple(np.concatenate(of_both) for of_both in zip(*pieces, strict=True))
-
-
-def nanmean(values, axis):
-    """The mean of the values that are not NaN; NaN, without a warning, if all are."""
-    seen = np.isfinite(values)
-    count = seen.sum(axis=axis)
-    total = np.where(seen, values, 0).sum(axis=axis)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def group_styles(groups):

@@ -9,7 +9,7 @@ import numpy as np
 from sklearn.base import BaseEstimator
 
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.numbers import as_numbers, check_finite, check_names
+from ..inputs.numbers import as_numbers, check_finite, check_names, nanmean
 from ..inputs.types import (
     Features,
     Labels,
@@ -32,7 +32,6 @@ from .drawing import (
     front_line,
     group_styles,
     legend_above,
-    nanmean,
     panels,
 )
 from .keyframes import (

@@ -81,9 +81,14 @@ class Performances(tuple):
         The index of each in all that was given.
     facts : list of dict
         What the tables say of each, from `facts_of`; empty without tables.
+    weights : list of ndarray (n_frames_i,), or None
+        Of the frames of each, if gaps were filled.
+    confidence : list of ndarray (n_frames_i, n_features), or None
+        How sure it is what was seen, if that is given.
     """
 
     facts = ()
+    weights = confidence = None
 
     def __new__(cls, arrays, kind, labels, frames=(), names=None, levels=INDEX_NAMES, numbers=None):
         self = super().__new__(cls, arrays)
@@ -95,6 +100,13 @@ class Performances(tuple):
     def called(self, i):
         """The name of one of them in messages."""
         return name_performance(self.numbers[i], self.labels[i])
+
+    def replace(self, arrays):
+        """Other arrays of the same performances."""
+        same = self.labels, self.frames, self.names, self.levels, self.numbers
+        out = Performances(arrays, self.kind, *same)
+        out.facts = self.facts
+        return out
 
     def take(self, indices):
         """Some of them, by a slice or a sequence of indices: rows, or a list."""
@@ -117,6 +129,7 @@ def check_members(
     dtype=None,
     names=None,
     timed=False,
+    advice=None,
 ):
     """Check the performances of a collection in one pass.
 
@@ -136,6 +149,8 @@ def check_members(
         that has them in another order is brought into this one.
     timed : bool, default=False
         Whether the times of frames are given, so that the index need not tell them.
+    advice : str, default=None
+        What to do about NaN, as for `check_finite`.
 
     Returns
     -------
@@ -201,7 +216,8 @@ def check_members(
         peak = high if high > low else low
         if not peak <= LARGEST:
             own = frames[i] if tables else None
-            check_finite(array, f"{what(i)}, frame", names, own, allow_nan=finite == "allow-nan")
+            how = {"allow_nan": finite == "allow-nan"} | ({"advice": advice} if advice else {})
+            check_finite(array, f"{what(i)}, frame", names, own, **how)
             peak = np.fmax.reduce(np.abs(array), axis=None, initial=0)
         if peak > largest:
             largest, holder = peak, i

@@ -22,6 +22,7 @@ __all__ = [
     "difference",
     "is_integer",
     "listed",
+    "nanmean",
     "refuse_non_numeric",
 ]
 
@@ -45,6 +46,7 @@ _LABEL = (
     "It looks like a label, such as the trial's name: name it in by=, or drop it. "
     "to_sequences(df, by=..., time=...) takes it"
 )
+_ADVICE = "Interpolate the gap, as by sklearn_motionsync.io.fill_gaps(x, max_gap=10)"
 # The name of a file, by its ending, which begins with a letter.
 _FILE = re.compile(r".*\.[a-z]\w{1,4}", re.IGNORECASE | re.DOTALL)
 
@@ -207,7 +209,7 @@ def _not_numeric(values, what, reason):
     return f"{what} is not a numeric array: got {type(values).__name__}, {reason}."
 
 
-def check_finite(array, where, names=None, frames=None, *, allow_nan=False):
+def check_finite(array, where, names=None, frames=None, *, allow_nan=False, advice=_ADVICE):
     """Refuse NaN and infinity in (n_frames, n_features), naming the first one.
 
     Parameters
@@ -219,6 +221,8 @@ def check_finite(array, where, names=None, frames=None, *, allow_nan=False):
         Names of the features, and labels of the frames.
     allow_nan : bool, default=False
         Refuse infinity only.
+    advice : str
+        What to do about NaN, instead of dropping the performance.
     """
     # A sum is not finite if a term is not; no mask is made of a sound array.
     with np.errstate(over="ignore", invalid="ignore"):
@@ -231,7 +235,7 @@ def check_finite(array, where, names=None, frames=None, *, allow_nan=False):
     kind = "NaN" if np.isnan(array[frame, feature]) else "infinity"
     label = "" if frames is None or frames[frame] == frame else f" ({frames[frame]})"
     name = "" if names is None else f" ({names[feature]!r})"
-    advice = "Give NaN where nothing is known" if allow_nan else "Interpolate the gap"
+    advice = "Give NaN where nothing is known" if allow_nan else advice
     raise ValueError(
         f"{where} {frame}{label}, feature {feature}{name} is {kind}; the input must be finite. "
         f"{advice}, or drop the performance. (Input X contains NaN or infinity.)"
@@ -313,3 +317,11 @@ def is_integer(value):
     if isinstance(value, bool) or not isinstance(value, Real):
         return False
     return isinstance(value, Integral) or float(value).is_integer()
+
+
+def nanmean(values, axis):
+    """The mean of the values that are not NaN; NaN, without a warning, if all are."""
+    seen = np.isfinite(values)
+    count = seen.sum(axis=axis)
+    total = np.where(seen, values, 0).sum(axis=axis)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -8,6 +8,7 @@ import warnings
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator
+from sklearn.utils import get_tags
 from sklearn.utils._set_output import _get_output_config
 from sklearn.utils.validation import check_is_fitted, validate_data
 
@@ -61,6 +62,9 @@ _EXCHANGED = (
 class SequenceLevelMixin:
     """Input checks of estimators whose samples are whole performances."""
 
+    # How `check_performances` treats NaN; "allow-nan" admits gaps.
+    _finite = True
+
     def check_performances(self, X: PerformancesLike) -> Performances:
         """Check performances against the input contract, and against those of ``fit``.
 
@@ -86,7 +90,8 @@ class SequenceLevelMixin:
             same = X.names is getattr(self, "feature_names_in_", None)
             if same and X[0].shape[not on_rows] == self.n_features_in_:
                 return X
-        return check_performances(self, X, reset=False, level="sequence", on_rows=on_rows)
+        how = {"on_rows": on_rows, "finite": self._finite}
+        return check_performances(self, X, reset=False, level="sequence", **how)
 
     def _read_rows_in_fit(self):
         """Whether it was fitted on 2-D input; an error if it was not fitted."""
@@ -97,7 +102,8 @@ class SequenceLevelMixin:
 
     def _check_training_set(self, X, numbers=None):
         """Check the input of ``fit``: all performances, or some with their numbers."""
-        performances = check_performances(self, X, reset=True, level="sequence", numbers=numbers)
+        how = {"numbers": numbers, "finite": self._finite}
+        performances = check_performances(self, X, reset=True, level="sequence", **how)
         self._fitted_on_rows = performances.kind == "rows"
         if not self._fitted_on_rows:
             warn_of_clocks(performances, names_of_input(self))
@@ -122,7 +128,8 @@ def check_performances(
     Parameters
     ----------
     estimator : estimator
-        Gets ``n_features_in_`` (features of a frame) and ``feature_names_in_``.
+        Gets ``n_features_in_`` (features of a frame) and ``feature_names_in_``. Its ``_on_gaps``,
+        if it has one, is what to do about NaN that it refuses.
     X : the input, of any kind the contract names
     reset : bool
         True in ``fit``.
@@ -157,7 +164,8 @@ def check_performances(
             f"{estimator.n_features_in_}) and got a collection of performances. Give it 2-D "
             "input, or fit it on a collection."
         )
-    how = {"numbers": numbers, "dtype": dtype, "timed": timed}
+    advice = getattr(estimator, "_on_gaps", None)
+    how = {"numbers": numbers, "dtype": dtype, "timed": timed, "advice": advice}
     how |= {} if reset else {"names": names_of_input(estimator)}
     out = check_members(sequences, finite=finite, training=reset, **how)
     width = out[0].shape[1]
@@ -288,7 +296,9 @@ def _check_rows(estimator, X, *, reset, level, on_rows, finite, numbers):
     _check_names(estimator, X, reset)
     names = getattr(estimator, "feature_names_in_", None)
     labels = index if index is not None else numbers
-    check_finite(out, "Row", names, labels, allow_nan=finite == "allow-nan")
+    advice = getattr(estimator, "_on_gaps", None)
+    how = {"allow_nan": finite == "allow-nan"} | ({"advice": advice} if advice else {})
+    check_finite(out, "Row", names, labels, **how)
     ends = (np.fmax.reduce(out, axis=1, initial=0), -np.fmin.reduce(out, axis=1, initial=0))
     size = np.maximum(*ends)
     row = int(size.argmax())
@@ -419,6 +429,7 @@ def read_source(estimator, source, on_rows):
         if dtype is None:
             dtype = as_numbers(part[0], "Performance 0").dtype
         how = {"on_rows": on_rows, "numbers": range(start, i + 1), "dtype": dtype}
+        how["finite"] = "allow-nan" if get_tags(estimator).input_tags.allow_nan else True
         yield check_performances(estimator, part, reset=False, level="sequence", **how)
         start, part, size = i + 1, [], 0
 

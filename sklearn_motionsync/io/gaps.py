@@ -50,7 +50,7 @@ def find_gaps(df: pd.DataFrame) -> pd.DataFrame:
 
     See Also
     --------
-    fill_gaps : Interpolates short gaps.
+    fill_gaps : Interpolates short gaps; its notes say what takes long ones.
 
     Examples
     --------
@@ -130,6 +130,10 @@ def fill_gaps(
     The cubic spline is best on HDM05's joints, which were smoothed before; Akima is best on
     markers as they were recorded, where gaps occur. From 20 frames on the error of each is
     centimetres.
+
+    Leave longer gaps NaN. `DirectionCosines` with ``hidden="nan"`` and then `ASpace` take them:
+    what was hidden is expected from the other limbs, and from the frames before and after. A
+    `MotionTracker` fills in limbs of a movement that it knows.
 
     Examples
     --------

@@ -139,7 +139,7 @@ class CausalTrellis:
     def __init__(self, trellis, moving, n_streams=1):
         self.trellis, self.n_samples = trellis, 0
         empty = np.empty((n_streams, 0, moving.shape[1]), dtype=moving.dtype)
-        self._tile = Tile(Bases(trellis, empty), right_factor(moving[np.newaxis]))
+        self._tile = Tile(Bases(trellis, empty), right_factor(moving[np.newaxis], trellis))
         self._states = self._tile.states(2)
         self._energy = np.full(n_streams, self._tile.right[:, 0, -2].sum())
         self._rank = TIE[moving.dtype] * np.arange(trellis.width + 1.0)[:, np.newaxis]
@@ -204,7 +204,7 @@ class CausalTrellis:
             shape = len(penalties), high + 1, n_streams
             return np.broadcast_to(penalties[:, np.newaxis, np.newaxis], shape)
         samples, moving = parts
-        right = right_factor(moving[np.newaxis])[: high + 1, 0]
+        right = right_factor(moving[np.newaxis], self.trellis)[: high + 1, 0]
         return right @ self._left(samples)
 
 
@@ -218,7 +218,7 @@ def causal_costs(trellis, moving, base):
     moving : ndarray, shape (Q, n_features)
     base : ndarray, shape (n_samples, n_features)
     """
-    tile = Tile(Bases(trellis, base[np.newaxis]), right_factor(moving[np.newaxis]))
+    tile = Tile(Bases(trellis, base[np.newaxis]), right_factor(moving[np.newaxis], trellis))
     states = tile.states(2)
     for p in tile.advance(states):
         row = states[p % 2, trellis.centre : trellis.centre + trellis.width + 1]

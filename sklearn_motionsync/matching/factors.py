@@ -31,7 +31,7 @@ class Bases:
 
     @property
     def features(self):
-        """The sequences without columns of key-frames."""
+        """The sequences without columns of weights and key-frames."""
         return self.trellis.features(self.sequences)
 
     def by_group(self):
@@ -63,21 +63,37 @@ class Bases:
         np.multiply(frames, -inner[:, np.newaxis, np.newaxis], out=left[:, :, :n_features])
         if anchors is not None:
             shares = anchors.left(self.sequences).transpose(1, 2, 0)
-            left[:, :, n_features:-2] = shares[:, np.newaxis]
+            left[:, :, -2 - shares.shape[1] : -2] = shares[:, np.newaxis]
         left[:, :, -2] = moving[:, np.newaxis]
-        np.add(energy[:, np.newaxis], penalty[:, np.newaxis], out=left[:, :, -1])
+        unseen, weights = self.trellis.unseen, self.trellis.weights(self.sequences)
+        if weights is None:
+            np.add(energy[:, np.newaxis], penalty[:, np.newaxis], out=left[:, :, -1])
+            return left
+        weights = weights.T[:, np.newaxis]
+        left[:, :, :n_features] *= weights[:, :, np.newaxis]
+        left[:, :, n_features] = weights * (energy[:, np.newaxis] - unseen)
+        left[:, :, -2] *= weights
+        left[:, :, -1] = penalty[:, np.newaxis] + left.dtype.type(unseen)
         return left
 
 
-def right_factor(moving, anchors=None):
-    """(Q, n_moving, n_columns + 2): x_m(q), costs of anchors, |x_m(q)|^2 and 1."""
+def right_factor(moving, trellis):
+    """(Q, n_moving, n_columns + 2): x_m(q), weight, costs of anchors, |x_m(q)|^2 and 1.
+
+    With weights the first and the last but one are multiplied by them.
+    """
     n_moving, n_positions, n_columns = moving.shape
-    features = moving if anchors is None else anchors.columns.features(moving)
+    features, weights, anchors = trellis.features(moving), trellis.weights(moving), trellis.anchors
     n_features = features.shape[2]
     right = np.empty((n_positions, n_moving, n_columns + 2), dtype=moving.dtype)
     right[..., :n_features] = features.transpose(1, 0, 2)
     if anchors is not None:
-        right[..., n_features:-2] = anchors.right(moving).transpose(1, 0, 2)
+        costs = anchors.right(moving).transpose(1, 0, 2)
+        right[..., -2 - costs.shape[2] : -2] = costs
     right[..., -2] = np.einsum("mqk,mqk->mq", features, features).T
+    if weights is not None:
+        right[..., n_features] = 1
+        right[..., : n_features + 1] *= weights.T[:, :, np.newaxis]
+        right[..., -2] *= weights.T
     right[..., -1] = 1
     return right

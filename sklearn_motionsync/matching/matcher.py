@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from .anchors import KeyframeColumns
 from .consensus import choose_exemplars, smooth_warps, vote
 from .costs import COSTS
 from .factors import Bases
 from .filters import SMOOTHING, smooth
+from .gaps import UNSEEN
 from .metric import Metric, energy_shares, learn_metric
 from .refinement import refine_warps
 from .sharpening import Sharpener
@@ -87,6 +89,8 @@ class Features(NamedTuple):
         Whether features are in single precision, whatever that of the postures.
     anchors : KeyframeColumns, default=None
         Columns of positions and features behind their own.
+    weighs : bool, default=False
+        Whether a column of weights follows those of the unit: see `gaps`.
     """
 
     cost: str
@@ -97,11 +101,12 @@ class Features(NamedTuple):
     frames: int | None = None
     single: bool = False
     anchors: KeyframeColumns | None = None
+    weighs: bool = False
 
     def __call__(self, positions):
         """Features, at every position, of postures in the unit: (n_sequences, Q, n_compared).
 
-        Columns of key-frames follow them.
+        Columns of weights and key-frames follow them.
         """
         if self.single:
             positions = positions.astype(np.float32, copy=False)
@@ -110,14 +115,24 @@ class Features(NamedTuple):
         if self.metric is not None:
             features = self.metric(features, postures)
         if postures is not positions:
-            features = np.concatenate([features, self.anchors.ramps(positions)], axis=2)
+            features = np.concatenate([features, self.beside(positions)], axis=2)
         if self.frames is not None:
             features = features[:, _spread(features.shape[1], self.frames)]
         return features
 
     def plain(self, columns):
-        """Positions or features (..., n_columns) without columns of key-frames."""
-        return columns if self.anchors is None else self.anchors.features(columns)
+        """Positions or features (..., n_columns) without columns of weights and key-frames."""
+        columns = columns if self.anchors is None else self.anchors.features(columns)
+        return columns[..., :-1] if self.weighs else columns
+
+    def beside(self, positions):
+        """The columns of weights, smoothed as velocities are, and of key-frames."""
+        columns = positions[..., len(self.unit.centre) :]
+        if not self.weighs:
+            return columns
+        sigma = self.velocity_smoothing * (positions.shape[1] - 1)
+        weights = gaussian_filter1d(columns[..., :1], sigma, axis=1, mode="nearest")
+        return np.concatenate([weights, columns[..., 1:]], axis=2)
 
     def replace(self, **changes):
         """The same features but for these attributes."""
@@ -169,7 +184,7 @@ class Features(NamedTuple):
         """
         # Rounding changes a metric much less than noise.
         positions = positions.astype(np.float32, copy=False)
-        positions, ramps = self.plain(positions), positions[..., len(self.unit.centre) :]
+        positions, beside = self.plain(positions), self.beside(positions)
         velocity = cost_features(positions, self.cost, self.subframes, self.velocity_smoothing)
         n_frames = (positions.shape[1] - 1) // self.subframes + 1
         some = _spread(positions.shape[1], min(n_frames, LEARNING_FRAMES))
@@ -179,7 +194,7 @@ class Features(NamedTuple):
         within = np.interp(np.arange(len(some)), few, np.arange(len(few)))
 
         def match(compared, others):
-            compared = np.concatenate([compared, ramps], axis=2)[:, few]
+            compared = np.concatenate([compared, beside], axis=2)[:, few]
             matcher = Matcher.of(self.at_pace(1), compared, **settings)
             times = matcher.match_others(compared, others, consensus, warp_smoothing)
             times = np.interp(times, np.arange(len(few)), few)
@@ -187,8 +202,8 @@ class Features(NamedTuple):
 
         # Which one of a pair is the base does not depend on the order of performances.
         order = np.argsort(np.einsum("npk,npk->n", velocity, velocity), kind="stable")
-        parts = positions, velocity, ramps
-        positions, velocity, ramps = (x[np.ix_(order, some)] for x in parts)
+        parts = positions, velocity, beside
+        positions, velocity, beside = (x[np.ix_(order, some)] for x in parts)
         learnt = learn_metric(match, positions, velocity)
         if learnt is None:
             return None
@@ -259,17 +274,20 @@ class Matcher(NamedTuple):
         """
         n_sequences, n_positions, _ = shape
         mu = float(smoothness * energy / (n_sequences * n_positions))
+        mean = float(energy / (n_sequences * n_positions))
         subframes = features.subframes if features.frames is None else 1
         n_frames = (n_positions - 1) // subframes + 1
         reach = {"max_offset": max_offset, "max_rate": max_rate, "subframes": subframes}
+        if features.weighs:
+            reach["unseen"] = UNSEEN * mean
         if features.anchors is not None:
-            mean = float(energy / (n_sequences * n_positions))
             reach["anchors"] = features.anchors.on_clock(n_frames, mean)
         return cls(features, Trellis.on_clock(features.cost, n_frames, mu, **reach))
 
     def on_clock(self, features, n_frames, *, max_offset, max_rate):
         """The matcher that is this one but for its features and the frames of its clock."""
         reach = {"max_offset": max_offset, "max_rate": max_rate, "subframes": features.subframes}
+        reach["unseen"] = self.trellis.unseen
         if self.trellis.anchors is not None:
             reach["anchors"] = self.trellis.anchors.at(n_frames)
         trellis = Trellis.on_clock(features.cost, n_frames, self.trellis.mu, **reach)
@@ -434,6 +452,9 @@ class Warper:
             times += share**2 * (others + np.arange(times.shape[1]) - times)
         # A path without any distance is right: the pattern keeps its own pace.
         rounding = 64 * np.finfo(positions.dtype).eps * bases.energy[0]
+        if trellis.unseen is not None:
+            seen = trellis.costs(base, moving, disparities[0], unseen=0.0)
+            return distances, np.where((seen <= rounding)[:, np.newaxis], routes[0], times)
         return distances, np.where((distances <= rounding)[:, np.newaxis], routes[0], times)
 
     def disparity_space(self, positions):
@@ -457,7 +478,8 @@ class Warper:
         for row, p in zip(costs, frames, strict=True):
             inside = (lows[p] <= disparities) & (disparities <= highs[p])
             window = moving[0, p * sub + disparities[inside]]
-            row[inside] = np.square(trellis.features(base[p] - window)).sum(axis=1)
+            squares = np.square(trellis.features(base[p] - window)).sum(axis=1)
+            row[inside] = trellis.weighed(squares, base[p], window)
         path = trellis.paths(base[np.newaxis], moving)[0, 0] / sub
         return frames, disparities / sub, costs, path
 

@@ -116,7 +116,7 @@ class PairTile(Tile):
     """
 
     def __init__(self, trellis, bases, moving):
-        super().__init__(Bases(trellis, bases), right_factor(moving))
+        super().__init__(Bases(trellis, bases), right_factor(moving, trellis))
         self.moving = moving
 
     def costs_of_samples(self, first, last, lows, highs):

@@ -160,7 +160,7 @@ class RefinementTest(RefinedWarper):
         """
         fold_warpers = []
         # Without a metric, which has been learnt from the test features, too.
-        features = warper.matcher.features.replace(metric=None, anchors=None)
+        features = warper.matcher.features.replace(metric=None, anchors=None, weighs=False)
         for fold in folds[::-1]:
             matcher, _ = Matcher.learn(features, positions[:, :, fold], **settings)
             chosen, pattern = source[:, :, fold], warper.pattern[:, fold]

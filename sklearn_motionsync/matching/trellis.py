@@ -107,10 +107,17 @@ class Trellis:
         has ``max_disparity * subframes + 1`` of them.
     anchors : Anchors, default=None
         The cost of key-frames. They are the last columns of sequences.
+    unseen : float, default=None
+        The cost of a frame that was not seen. With it a column of weights, from 0 to 1, follows the
+        features of sequences, and a cell costs ``w |x_n(p) - x_m(q)|^2 + (1 - w) unseen``, with
+        the product w of both weights.
     """
 
-    def __init__(self, table, mu, max_disparity, free=False, running=False, anchors=None):
+    def __init__(
+        self, table, mu, max_disparity, free=False, running=False, anchors=None, unseen=None
+    ):
         self.table, self.mu, self.free, self.running = table, mu, free, running
+        self.unseen = unseen
         self.reach, self.anchors = max_disparity, anchors
         self.width = max_disparity * table.subframes
         # The position that sample 0 of the base meets at disparity 0, the positions from sample to
@@ -136,19 +143,34 @@ class Trellis:
         self._windows = {}
 
     def features(self, sequences):
-        """Sequences (..., n_columns) without columns of key-frames."""
-        return sequences if self.anchors is None else self.anchors.columns.features(sequences)
+        """Sequences (..., n_columns) without columns of weights and key-frames."""
+        columns = sequences
+        if self.anchors is not None:
+            columns = self.anchors.columns.features(columns)
+        return columns if self.unseen is None else columns[..., :-1]
+
+    def weights(self, sequences):
+        """The column of weights (...), or None."""
+        if self.unseen is None:
+            return None
+        columns = sequences if self.anchors is None else self.anchors.columns.features(sequences)
+        return columns[..., -1]
+
+    def weighed(self, squares, base, moving, unseen=None):
+        """Squared distances of samples as they count, given the samples with all columns."""
+        if self.unseen is None:
+            return squares
+        both = self.weights(base) * self.weights(moving)
+        return both * squares + (1 - both) * (self.unseen if unseen is None else unseen)
 
     @classmethod
-    def on_clock(
-        cls, cost, n_frames, mu, *, max_offset, max_rate, subframes=1, free=False, anchors=None
-    ):
+    def on_clock(cls, cost, n_frames, mu, *, max_offset, max_rate, subframes=1, **others):
         """The trellis of a cost; the largest offset is a share of the clock."""
         # Whole frames; 0.29 * 100 must not lose one to rounding.
         reach = int(np.floor(max_offset * n_frames * (1 + 1e-12)))
         # No step is longer than the clip.
         table = step_table(cost, min(max_rate, n_frames - 1), subframes)
-        return cls(table, mu, min(reach, n_frames - 1), free, anchors=anchors)
+        return cls(table, mu, min(reach, n_frames - 1), **others)
 
     def distances(self, bases, moving):
         """Cost of the best path for every ordered pair.
@@ -217,7 +239,7 @@ class Trellis:
             disparities[rows, columns], costs[rows, columns] = found
         return disparities, costs
 
-    def costs(self, base, moving, disparities):
+    def costs(self, base, moving, disparities, unseen=None):
         """Cost of given paths from one base (Eq. 12), added up frame by frame, pair by pair.
 
         Parameters
@@ -225,11 +247,14 @@ class Trellis:
         base : ndarray, shape (P, n_features)
         moving : ndarray, shape (n_moving, Q, n_features)
         disparities : ndarray of int, shape (n_moving, P)
+        unseen : float, default=None
+            In place of that of the trellis.
 
         Returns
         -------
         ndarray, shape (n_moving,)
         """
+        whole, all_columns = base, moving
         base, moving = self.features(base), self.features(moving)
         out = np.empty(len(moving), dtype=moving.dtype)
         n_positions, n_features = moving.shape[1:]
@@ -244,8 +269,14 @@ class Trellis:
             if self.scales:
                 differences *= self.scale_by_step.take(steps)[:, :, np.newaxis]
             differences -= base
-            differences = differences.reshape(len(q), -1)
             penalties = self.penalty_by_step.take(steps[:, 1:]).sum(axis=1)
+            if self.unseen is not None:
+                met = all_columns[rows].reshape(-1, all_columns.shape[2]).take(q, axis=0)
+                squares = np.vecdot(differences, differences)
+                costs = self.weighed(squares, whole, met, unseen).sum(axis=1)
+                out[rows] = costs + penalties
+                continue
+            differences = differences.reshape(len(q), -1)
             out[rows] = np.vecdot(differences, differences) + penalties.astype(out.dtype)
         return out
 
@@ -280,7 +311,7 @@ class Trellis:
             drawn = None
             if coupling is not None:
                 drawn = Coupling(coupling.weight, coupling.offsets[rows, columns])
-            yield rows, columns, Tile(part, right_factor(moving[columns], self.anchors), drawn)
+            yield rows, columns, Tile(part, right_factor(moving[columns], self), drawn)
 
     def windows(self, n_frames):
         """Lowest and highest disparity, at every sample, of a path in the band."""
@@ -565,6 +596,10 @@ class Tile:
         charges = penalties + self.tie_breakers
         n_moving, n_factors = self.right.shape[1:]
         positions, features = self.right.reshape(-1, n_factors), self.bases.features
+        weights = trellis.weights(self.bases.sequences)
+        if weights is not None:
+            features = features * weights[:, :, np.newaxis]
+            weights = np.tile(weights.T, n_moving)
         start = min(last, self.n_frames - 1)
         here = at[start]
         for p in range(start, first, -1):
@@ -573,7 +608,8 @@ class Tile:
             if len(trellis.groups) > 1:
                 q = trellis.lead + p * trellis.stride - trellis.centre
                 y = positions.take(here // self.n_bases + q * n_moving, axis=0)
-                value += weight * y[:, -2]
+                energy = y[:, -2] if weights is None else weights[p] * y[:, -2]
+                value += weight * energy
                 y = y.reshape(-1, self.n_bases, n_factors)[..., : features.shape[2]]
                 products = np.einsum("mnk,nk->mn", y, features[:, p])
                 value -= inner * products.ravel()

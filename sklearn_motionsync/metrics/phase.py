@@ -105,7 +105,7 @@ def amplitude_phase_variance(before: PerformancesLike, after: PerformancesLike) 
     >>> round(amplitude_phase_variance(higher, higher).phase_share, 3)
     0.0
     """
-    (x, tolerance), (y, _) = check_pair(before, after)
+    (x, tolerance), (y, _) = check_pair(before, after, allow_nan=False)
     total, energy = _variance(x), _energy(x)
     left, energy_left = _variance(y), _energy(y)
     if energy == 0 < energy_left or energy_left == 0 < energy:

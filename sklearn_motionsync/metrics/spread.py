@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from ..inputs.collections import as_collection
-from ..inputs.numbers import as_numbers, check_finite
+from ..inputs.numbers import as_numbers, check_finite, nanmean
 from ..inputs.types import PerformancesLike
 
 __all__ = [
@@ -30,7 +30,8 @@ def least_squares(before: PerformancesLike, after: PerformancesLike) -> float:
     Parameters
     ----------
     before, after : array-like, shape (n_sequences, P, n_features)
-        On one clock, linearly normalised and synchronised, in one unit.
+        On one clock, linearly normalised and synchronised, in one unit. NaN is what was hidden:
+        it is left out.
 
     Returns
     -------
@@ -41,8 +42,8 @@ def least_squares(before: PerformancesLike, after: PerformancesLike) -> float:
     Raises
     ------
     ValueError
-        If they are not of one shape and finite; or performances that were identical before are not
-        after.
+        If they are not of one shape, infinite, or all NaN; or performances that were identical
+        before are not after.
 
     Notes
     -----
@@ -77,7 +78,8 @@ def sobolev_least_squares(before: PerformancesLike, after: PerformancesLike) -> 
     Parameters
     ----------
     before, after : array-like, shape (n_sequences, P, n_features)
-        On one clock, linearly normalised and synchronised, in one unit.
+        On one clock, linearly normalised and synchronised, in one unit. NaN is what was hidden:
+        it is left out.
 
     Returns
     -------
@@ -88,8 +90,8 @@ def sobolev_least_squares(before: PerformancesLike, after: PerformancesLike) -> 
     Raises
     ------
     ValueError
-        If they are not of one shape and finite; or velocities that were identical before are not
-        after.
+        If they are not of one shape, infinite, or all NaN; or velocities that were identical
+        before are not after.
 
     Examples
     --------
@@ -116,7 +118,8 @@ def pairwise_correlation(before: PerformancesLike, after: PerformancesLike) -> f
     Parameters
     ----------
     before, after : array-like, shape (n_sequences, P, n_features)
-        On one clock, linearly normalised and synchronised.
+        On one clock, linearly normalised and synchronised. NaN is what was hidden: it counts as
+        the mean of its feature over time.
 
     Returns
     -------
@@ -127,7 +130,7 @@ def pairwise_correlation(before: PerformancesLike, after: PerformancesLike) -> f
     Raises
     ------
     ValueError
-        If they are not of one shape and finite; or the sum is 0 before and not after.
+        If they are not of one shape, infinite, or all NaN; or the sum is 0 before and not after.
 
     Examples
     --------
@@ -148,8 +151,10 @@ def pairwise_correlation(before: PerformancesLike, after: PerformancesLike) -> f
 # -- checks and sums ----------------------------------------------------------------------
 
 
-def check_pair(before, after):
+def check_pair(before, after, *, allow_nan=True):
     """The same performances before and after, each with the size of its rounding errors.
+
+    With ``allow_nan`` NaN is what was hidden.
 
     Returns
     -------
@@ -166,9 +171,13 @@ def check_pair(before, after):
         )
     for z, what in zip(pair, ("before", "after"), strict=True):
         for i, x in enumerate(z):
-            check_finite(x, f"{what}, performance {i}, frame")
+            check_finite(x, f"{what}, performance {i}, frame", allow_nan=allow_nan)
+            if np.isnan(x).all():
+                raise ValueError(f"{what}, performance {i}: all is NaN. Leave it out.")
     eps = [np.finfo(z.dtype).eps + len(z) * np.finfo(np.float64).eps for z in pair]
-    return [(z.astype(np.float64), 4 * e * np.abs(z).max()) for z, e in zip(pair, eps, strict=True)]
+    return [
+        (z.astype(np.float64), 4 * e * np.nanmax(np.abs(z))) for z, e in zip(pair, eps, strict=True)
+    ]
 
 
 def _on_clock(values, what):
@@ -194,10 +203,19 @@ def _squared_norms(z):
 
 
 def _from_others(z):
-    """Differences of every sequence from the mean of the others."""
-    # Relative to the first one, so that identical sequences differ by exactly 0.
-    z = z - z[0]
-    return (z - z.mean(axis=0)) * len(z) / (len(z) - 1)
+    """Differences of every sequence from the mean of the others.
+
+    What is hidden differs by 0, and the rest by as much more as gives the mean square of the seen.
+    """
+    hidden = np.isnan(z)
+    if not hidden.any():
+        # Relative to the first one, so that identical sequences differ by exactly 0.
+        z = z - z[0]
+        return (z - z.mean(axis=0)) * len(z) / (len(z) - 1)
+    others = (~hidden).sum(axis=0) - 1
+    differences = np.where(hidden, 0, z - nanmean(z, axis=0)) * (others + 1) / np.maximum(others, 1)
+    compared = (~hidden & (others > 0)).mean(axis=(1, 2), keepdims=True)
+    return differences / np.sqrt(np.where(compared > 0, compared, 1))
 
 
 def _without_spread_before(none_after, what):
@@ -212,6 +230,8 @@ def _without_spread_before(none_after, what):
 
 def _mean_correlation(z, tolerance):
     # Relative to the first frame, so that constant sequences are exactly 0.
+    if np.isnan(z).any():
+        z = np.nan_to_num(z - nanmean(z, axis=1)[:, np.newaxis])
     z = z - z[:, :1]
     centred = (z - z.mean(axis=1, keepdims=True)).reshape(len(z), -1)
     norms = np.linalg.norm(centred, axis=1)

@@ -17,11 +17,13 @@ from ..inputs.collections import Performances
 from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.types import Labels, PerformanceLike, PerformancesLike, RandomState, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, names_of_input
+from ..inputs.wording import counted
 from ..utils.atomic import atomic_fit, atomic_partial_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
+from .hidden import fill_with_mean, group_counts, is_gappy
 from .sampling import sample_performances, sample_postures
 from .similarity import Neighbours, PerformanceStream, log_moments
 from .variation import mean_band, predictive_variance, simultaneous_factor
@@ -64,9 +66,12 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     predictive_variance_ : ndarray, shape (P, n_features)
         The variance to be expected of a new person about the mean: estimated by leaving groups
         out, shrunk a little towards its mean over the frames, never 0.
+    missing_ : ndarray, shape (P, n_features)
+        The share of the performances of which a value was missing (NaN).
     deviations_ : ndarray, shape (n_kept, P, n_features)
         Training performances less the mean: those that others are compared with and drawn from.
-        At most 64, one of every group and the rest evenly spread.
+        At most 64, one of every group and the rest evenly spread. In a gap they go on in a straight
+        line from one end to the other.
     groups_ : ndarray of int, shape (n_kept,)
         The groups of these, counted from 0 in the order of their first appearance.
     dissimilarities_ : ndarray, shape (n_sequences,)
@@ -104,6 +109,12 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
        new person stays below it with probability ``coverage``. Standing still is always above,
        unless no training trial moves.
 
+    **Gaps.** NaN is what was not seen, in training and after it. Mean and variances are those of
+    what was seen at each frame, feature by feature; every value must have been seen in two groups.
+    A density is that of what was seen (`score_samples`). A dissimilarity compares what was seen of
+    both trials: it is a ratio, so trials with and without gaps have one threshold. Bands hold what
+    is seen of a trial. Samples have no gaps.
+
     Give ``groups``, such as subjects, whenever people come more than once. Without them the
     threshold rests on how people repeat themselves, and new people are rejected too often:
     docs/accuracy.md. In a pipeline they are given as ``pipe.fit(X, actionmodel__groups=groups)``,
@@ -115,6 +126,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         "n_std": [Interval(Real, 0, None, closed="neither")],
         "coverage": [Interval(Real, 0, 1, closed="neither")],
     }
+    _finite = "allow-nan"
 
     def __init__(self, n_std: float = 3.0, coverage: float = 0.95) -> None:
         self.n_std = n_std
@@ -130,7 +142,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
-            Synchronised performances. The rows of a 2-D array are univariate ones.
+            Synchronised performances; NaN where something was not seen. The rows of a 2-D array
+            are univariate ones.
         y : ignored
             Present for API consistency.
         groups : array-like, shape (n_sequences,), default=None
@@ -146,9 +159,10 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         ------
         ValueError
             If the performances have different lengths, or there is only one, or all are of one
-            group, or there is not a group for each.
+            group, or there is not a group for each; if nothing of a performance was seen, or a
+            value was seen in fewer than two groups.
         """
-        performances = _check_lengths(self._check_training_set(X))
+        performances = self._check_seen(_check_lengths(self._check_training_set(X)))
         if len(performances) < 2:
             raise ValueError(
                 "A model of how performances vary needs at least 2 performances, got n_samples = 1."
@@ -156,6 +170,11 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         encode_groups(groups, len(performances), at_least=2)
         with self._progress(fits=True):
             self._update(PerformanceStream.starting_at(performances[0]), performances, groups)
+        if self._unseen:
+            raise ValueError(
+                f"{self._unseen}. Give more performances, leave out the feature, or fill gaps "
+                "before, as by fill_gaps of sklearn_motionsync.io."
+            )
         return self
 
     @atomic_partial_fit
@@ -186,8 +205,9 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         Returns
         -------
         self : ActionModel
-            The updated model. As long as all performances are of one group, only ``mean_`` and
-            ``variance_`` are known, and other methods raise `NotFittedError`.
+            The updated model. As long as all performances are of one group, or a value was seen in
+            one group only, only ``mean_`` and ``variance_`` are known, and other methods raise
+            `NotFittedError`.
 
         Raises
         ------
@@ -217,7 +237,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         if hasattr(self, "_stream"):
             performances, stream = self._check_clock(X), self._stream
         else:
-            performances = _check_lengths(self._check_training_set(X))
+            performances = self._check_seen(_check_lengths(self._check_training_set(X)))
             stream = PerformanceStream.starting_at(performances[0])
         self._update(stream, performances, groups)
         return self
@@ -227,7 +247,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     def deviations_(self) -> np.ndarray:
         """Training performances that are kept, less the mean: (n_kept, P, n_features)."""
         check_is_fitted(self)
-        return self._stream.kept - self.mean_
+        return fill_with_mean(self._stream.kept, self.mean_) - self.mean_
 
     def check_performances(self, X: PerformancesLike) -> Performances:
         """Check that performances are synchronised, and to the clock of the model.
@@ -262,6 +282,10 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         It is a sum over all frames and features, in the unit of the data. Compare it only between
         models of equal ``P``, features and scaling. See `score` for what to use instead.
 
+        With gaps (NaN) it is the density of what was seen, the marginal one: a sum over fewer
+        values. It compares models of one performance as it does without gaps. Two performances with
+        different gaps have sums of different length: compare their `dissimilarity`.
+
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
@@ -275,8 +299,15 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         performances = self.check_performances(X)
         std = np.sqrt(np.maximum(self.variance_, self._variance_floor))
         squares = np.array([np.square((x - self.mean_) / std).sum() for x in performances])
-        log_std = np.log(std).sum(dtype=np.float64)
-        return -0.5 * squares - log_std - 0.5 * self.mean_.size * np.log(2 * np.pi)
+        log_std, size = np.log(std).sum(dtype=np.float64), self.mean_.size
+        gaps = np.flatnonzero(np.isnan(squares))
+        if len(gaps):
+            log_std, size = np.full(len(squares), log_std), np.full(len(squares), size)
+        for i in gaps:
+            seen = ~np.isnan(performances[i])
+            squares[i] = np.nansum(np.square((performances[i] - self.mean_) / std))
+            log_std[i], size[i] = np.log(std[seen]).sum(dtype=np.float64), seen.sum()
+        return -0.5 * squares - log_std - 0.5 * size * np.log(2 * np.pi)
 
     @snapshot
     def score(
@@ -316,6 +347,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     @snapshot
     def dissimilarity(self, X: PerformancesLike) -> np.ndarray:
         """Mean dissimilarity of performances to the two most similar training performances.
+
+        What was not seen of both performances of a pair counts in no sum of theirs.
 
         Parameters
         ----------
@@ -399,7 +432,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features)
-            ``(X - mean_) / sqrt(predictive_variance_)``.
+            ``(X - mean_) / sqrt(predictive_variance_)``; NaN where nothing was seen.
 
         See Also
         --------
@@ -420,7 +453,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         Parameters
         ----------
         postures : array-like, shape (n_postures, n_features)
-            Postures, in the features of the model.
+            Postures, in the features of the model. One that was not seen (NaN) rejects nothing.
         frame : int
             Frame of the model, 0 to P - 1.
 
@@ -440,9 +473,10 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
                 f"postures must have shape (n_postures, {width}), got {postures.shape}. Give one "
                 "posture as [posture]."
             )
-        check_finite(postures, "postures, row", names)
+        check_finite(postures, "postures, row", names, allow_nan=True)
         mean, half_width = self.mean_[frame], self.n_std * np.sqrt(self.variance_[frame])
-        return ((postures >= mean - half_width) & (postures <= mean + half_width)).all(axis=1)
+        outside = (postures < mean - half_width) | (postures > mean + half_width)
+        return ~outside.any(axis=1)
 
     @snapshot
     def envelope(self, simultaneous: bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -563,6 +597,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.three_d_array = True
+        tags.input_tags.allow_nan = True
         return tags
 
     def _update(self, before, performances, groups):
@@ -575,13 +610,14 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         spread = float(spread.astype(dtype))
         self._variance_floor = _VARIANCE_FLOOR * (spread if spread > 0 else 1.0)
         self.groups_, self._stream = stream.groups, stream
-        if stream.n_groups < 2:
+        self.missing_, self._unseen = stream.missing, self._describe_unseen(stream)
+        if stream.n_groups < 2 or self._unseen:
             return
         if stream.kept is not before.kept:
             kept = stream.kept.astype(np.float64)
             variance = predictive_variance(kept, stream.groups)
             self.predictive_variance_ = variance.astype(dtype)
-            self._neighbours = Neighbours(kept, stream.groups)
+            self._neighbours = Neighbours(kept, stream.groups, mean=stream.mean)
             known = self._neighbours.dissimilarity(before.kept, before.groups)
         else:
             known = self._kept_dissimilarities
@@ -593,6 +629,33 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         self._stream = replace(stream, dropped=dropped)
         self.threshold_ = self._neighbours.limit(self._log_moments, self.coverage)
 
+    def _describe_unseen(self, stream):
+        """A text about a value that the performances of fewer than two groups show; or none."""
+        if stream.counts is None or stream.n_groups < 2:
+            return ""
+        n_groups = (group_counts(stream.kept, stream.groups) > 0).sum(axis=0)
+        if n_groups.min() > 1:
+            return ""
+        frame, feature = np.argwhere(n_groups < 2)[0]
+        names = names_of_input(self)
+        name = "" if names is None else f" ({names[feature]!r})"
+        groups = "performance" if stream.n_groups == stream.n else "group"
+        return (
+            f"Frame {frame}, feature {feature}{name} was seen in "
+            f"{counted(int(n_groups[frame, feature]), groups)}, and at least 2 tell how it varies: "
+            f"{counted(int((n_groups < 2).sum()), 'value')} of {n_groups.size} are so"
+        )
+
+    def _check_seen(self, performances):
+        """Refuse performances that show nothing."""
+        for i, x in enumerate(performances):
+            if is_gappy(x) and np.isnan(x).all():
+                raise ValueError(
+                    f"{performances.called(i)} is NaN in every frame and feature: nothing of it "
+                    "was seen. Drop the performance."
+                )
+        return performances
+
     def _check_frame(self, frame):
         if not isinstance(frame, Integral) or not 0 <= frame < self.n_frames_:
             raise ValueError(
@@ -601,7 +664,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         return int(frame)
 
     def _check_clock(self, X):
-        performances = _check_lengths(super().check_performances(X))
+        performances = self._check_seen(_check_lengths(super().check_performances(X)))
         if len(performances[0]) != self.n_frames_:
             raise ValueError(
                 f"The performances have {len(performances[0])} frames, the model "
@@ -612,6 +675,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
 
     def _check_groups_seen(self):
         check_is_fitted(self)
+        if self._unseen:
+            raise NotFittedError(f"{self._unseen}. Give others to partial_fit.")
         if not hasattr(self, "threshold_"):
             raise NotFittedError(
                 "A model of how performances vary needs at least 2 performances, of different "

@@ -29,6 +29,7 @@ from ..utils.pipelines import (
     flat_steps,
     route_to_synchronizer,
     steps_to_fit,
+    takes_gaps,
 )
 from .action_model import ActionModel
 from .similarity import movement_energies, t_prediction_limit
@@ -109,6 +110,9 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
     Give ``groups``, such as subjects, whenever people come more than once: acceptance regions
     are then those of differences between people. Variation between people is accepted: copies
     at half or double speed are rejected only where people agree on the duration of the action.
+
+    Gaps (NaN) are accepted if the pipeline accepts them. Movement, course and energy are those of
+    what was seen.
 
     The detector has no ``score``, as one kind of trial alone cannot tell whether it is right. A
     search needs a scorer, and trials that are to be refused. This one is the balanced accuracy. It
@@ -289,6 +293,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         tags = super().__sklearn_tags__()
         tags.estimator_type = "outlier_detector"
         tags.input_tags.three_d_array = True
+        tags.input_tags.allow_nan = takes_gaps(self.estimator)
         return tags
 
     def _check_steps(self):

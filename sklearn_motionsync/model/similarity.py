@@ -10,6 +10,7 @@ from ..matching.filters import smooth
 from ..matching.warps import even_slices
 from ..utils.groups import encode_groups
 from ..utils.threads import on_one_thread
+from .hidden import fill_with_mean, is_gappy
 
 __all__ = [
     "DIFFERENCES",
@@ -99,6 +100,9 @@ class Neighbours:
     features : callable, default=velocities
         Makes features (n, P, n_compared) of performances (n, P, n_features).
     kernel : Kernel, default=PRODUCTS
+    mean : ndarray (P, n_features), default=None
+        The mean performance, by which gaps (NaN) of performances are filled for their velocities
+        and means. What was not seen of both performances of a pair counts in no sum of theirs.
 
     Attributes
     ----------
@@ -106,8 +110,12 @@ class Neighbours:
         Whether no training performance moves: then only postures are compared.
     """
 
-    def __init__(self, performances, groups, features=_velocities, kernel=PRODUCTS):
+    def __init__(self, performances, groups, features=_velocities, kernel=PRODUCTS, mean=None):
         self._groups, self._features, self._kernel = groups, features, kernel
+        self._mean, self._seen = mean, None
+        if mean is not None and is_gappy(performances):
+            self._seen = ~np.isnan(performances)
+            performances = fill_with_mean(performances, mean)
         self._center = performances.mean(axis=(0, 1))
         self._known = self._parts(performances)
         energy, floor = movement_energies(performances)
@@ -129,7 +137,18 @@ class Neighbours:
         """
         found = np.empty(len(performances))
         for rows in even_slices(len(performances), _BATCH):
-            ratios = self._ratios(np.asarray(performances[rows], dtype=np.float64))
+            some = np.asarray(performances[rows], dtype=np.float64)
+            # The path of a performance depends on no other one.
+            gaps = np.full(len(some), self._seen is not None)
+            if self._mean is not None:
+                gaps |= np.isnan(some.sum(axis=(1, 2)))
+            if gaps.any():
+                ratios = np.empty((len(some), len(self._groups)))
+                if not gaps.all():
+                    ratios[~gaps] = self._ratios(some[~gaps])
+                ratios[gaps] = list(map(self._ratios_of_seen, some[gaps]))
+            else:
+                ratios = self._ratios(some)
             if groups is not None:
                 ratios[groups[rows, np.newaxis] == self._groups] = np.inf
             nearest = np.sort(ratios, axis=1)[:, :_N_NEAREST]
@@ -167,6 +186,30 @@ class Neighbours:
         ratios += self._kernel.distances(features, known_features) / sums
         return ratios / 2
 
+    def _ratios_of_seen(self, performance):
+        """The same of one performance, (n_kept,), in sums over what was seen of both of a pair."""
+        seen = ~np.isnan(performance)
+        filled = fill_with_mean(performance[np.newaxis], self._mean)
+        postures, _, features, _ = self._parts(filled)
+        known_postures, _, known_features, _ = self._known
+        n_kept, width = len(known_postures), performance.shape[1]
+        both = np.broadcast_to(
+            seen if self._seen is None else seen & self._seen, (n_kept, *seen.shape)
+        )
+        weights = both.reshape(n_kept, -1)
+        moved, energy = _sums_over(weights, postures[:, :-width], known_postures[:, :-width])
+        changed, power = _sums_over(weights, features, known_features)
+        # Mean postures count by the share of the frames that are compared.
+        shares = both.mean(axis=1)
+        offsets = postures[:, -width:] - known_postures[:, -width:]
+        moved += (shares * np.square(offsets)).sum(axis=1)
+        if self.stand_still:
+            ratios = 2 * moved * _LEAST / self._floor
+        else:
+            ratios = moved / np.maximum(energy, self._floor)
+            ratios += changed / np.maximum(power, np.finfo(float).tiny)
+        return np.where(shares.any(axis=1), ratios / 2, np.inf)
+
     def _parts(self, performances):
         """Centred postures beside their weighted mean, features, and the squared norms of both."""
         n, n_frames, _ = performances.shape
@@ -178,12 +221,19 @@ class Neighbours:
         return np.hstack([moved, offset]), norms(moved), features, norms(features)
 
 
+def _sums_over(weights, a, b):
+    """Squared distances of a row (1, m) and rows (n, m), and the sums of their squared norms."""
+    distances = np.vecdot(weights, np.square(a - b))
+    return distances, np.vecdot(weights, np.square(a) + np.square(b))
+
+
 def movement_energies(on_clock, floor=None):
     """Mean squared distance of a performance's postures from their own mean posture.
 
     Parameters
     ----------
     on_clock : ndarray (n_sequences, P, n_features)
+        NaN in gaps: the mean is that of what was seen, feature by feature.
     floor : float, default=None
         The energy of standing still; by default a billionth of the variance of all postures.
 
@@ -195,13 +245,35 @@ def movement_energies(on_clock, floor=None):
         Above 0.
     """
     on_clock = np.asarray(on_clock, dtype=np.float64)
-    squares = np.square(on_clock - on_clock.mean(axis=1, keepdims=True))
-    energy = squares.reshape(len(on_clock), -1).sum(axis=1) / on_clock.shape[1]
-    if floor is None:
+    if is_gappy(on_clock):
+        energy, variance = _energies_of_seen(on_clock)
+    else:
+        squares = np.square(on_clock - on_clock.mean(axis=1, keepdims=True))
+        energy = squares.reshape(len(on_clock), -1).sum(axis=1) / on_clock.shape[1]
         variance = np.square(on_clock - on_clock.mean(axis=(0, 1))).sum(axis=2).mean()
-        rounding = np.square(64 * np.finfo(float).eps * np.abs(on_clock).max())
+    if floor is None:
+        rounding = np.square(64 * np.finfo(float).eps * np.nanmax(np.abs(on_clock)))
         floor = max(_LEAST * variance, rounding * on_clock.shape[2], np.finfo(float).tiny)
     return np.maximum(energy, floor), float(floor)
+
+
+def _energies_of_seen(on_clock):
+    """Energies (n,) of performances with gaps, and the variance of all postures.
+
+    A feature that a performance never shows has the share of the energy that it has in the others.
+    """
+    seen = ~np.isnan(on_clock)
+    values, counts = np.where(seen, on_clock, 0), seen.sum(axis=1)
+    means = values.sum(axis=1) / np.maximum(counts, 1)
+    squares = np.where(seen, np.square(values - means[:, np.newaxis]), 0).sum(axis=1)
+    shown = counts > 0
+    own = np.where(shown, squares / np.maximum(counts, 1), 0)
+    usual = own.sum(axis=0) / np.maximum(shown.sum(axis=0), 1)
+    share = np.where(shown, usual, 0).sum(axis=1) / (usual.sum() or 1.0)
+    centre = values.sum(axis=(0, 1)) / np.maximum(counts.sum(axis=0), 1)
+    apart = np.where(seen, np.square(values - centre), 0).sum(axis=(0, 1))
+    variance = (apart / np.maximum(counts.sum(axis=0), 1)).sum()
+    return own.sum(axis=1) / np.where(share > 0, share, 1), variance
 
 
 # -- logarithms of positive measures, taken for normal ------------------------------------
@@ -289,6 +361,8 @@ class PerformanceStream:
         One of every group, then evenly spread; in order.
     n, n_groups : int
         Number of performances, and of their groups.
+    counts : ndarray, shape (P, n_features), or None
+        How many of them show each value; None as long as all show all.
     labels : tuple of pairs
         Labels of groups, and their numbers from 0 in the order of first appearance.
     groups : ndarray of int, shape (n_kept,)
@@ -309,22 +383,36 @@ class PerformanceStream:
     groups: np.ndarray = field(default_factory=lambda: np.array([], dtype=np.intp))
     priorities: np.ndarray = field(default_factory=lambda: np.array([], dtype=np.uint64))
     dropped: LogMoments = field(default_factory=LogMoments)
+    counts: np.ndarray | None = None
 
     @classmethod
     def starting_at(cls, first):
         """An empty stream with a performance (P, n_features) as its origin."""
-        zeros = np.zeros(first.shape)
-        return cls(first.astype(np.float64), zeros, zeros, np.empty((0, *first.shape), first.dtype))
+        zeros, origin = np.zeros(first.shape), first.astype(np.float64)
+        if is_gappy(origin):
+            seen = ~np.isnan(origin)
+            means = np.nansum(origin, axis=0) / np.maximum(seen.sum(axis=0), 1)
+            origin = np.where(seen, origin, means)
+        return cls(origin, zeros, zeros, np.empty((0, *first.shape), first.dtype))
 
     @property
     def mean(self):
-        """Of all performances, (P, n_features)."""
-        return self.origin + self.mean_offset
+        """Of all performances, (P, n_features); NaN where none shows anything."""
+        mean = self.origin + self.mean_offset
+        return mean if self.counts is None else np.where(self.counts > 0, mean, np.nan)
 
     @property
     def variance(self):
         """Of all performances at every posture, (P, n_features), divided by their number."""
-        return self.squares / self.n
+        if self.counts is None:
+            return self.squares / self.n
+        return np.where(self.counts > 0, self.squares / np.maximum(self.counts, 1), np.nan)
+
+    @property
+    def missing(self):
+        """The share (P, n_features) of the performances that do not show a value."""
+        counts = self.n if self.counts is None else self.counts
+        return (self.n - np.broadcast_to(counts, self.origin.shape)) / self.n
 
     def extend(self, performances, groups=None):
         """The stream after more performances.
@@ -385,10 +473,18 @@ class PerformanceStream:
     def _add(self, performances):
         """Number, mean and squares with more performances, by Welford's recurrence."""
         n, mean, squares = self.n, self.mean_offset.copy(), self.squares.copy()
+        counts = self.counts
         for x in performances:
-            n += 1
             offset = x - self.origin
+            if is_gappy(offset):
+                seen = ~np.isnan(offset)
+                counts = np.full(x.shape, n) + seen if counts is None else counts + seen
+                # A step of 0 changes neither.
+                offset = np.where(seen, offset, mean)
+            elif counts is not None:
+                counts = counts + 1
+            n += 1
             step = offset - mean
-            mean += step / n
+            mean += step / (n if counts is None else np.maximum(counts, 1))
             squares += step * (offset - mean)
-        return {"n": n, "mean_offset": mean, "squares": squares}
+        return {"n": n, "mean_offset": mean, "squares": squares, "counts": counts}

@@ -8,6 +8,7 @@ import numpy as np
 from sklearn.utils import check_random_state
 
 from ..utils.groups import mean_of_others, sums_of_groups
+from .hidden import group_counts, is_gappy, mean_of_other_groups
 from .similarity import t_prediction_limit
 
 __all__ = ["mean_band", "predictive_variance", "simultaneous_factor"]
@@ -37,7 +38,7 @@ def predictive_variance(performances, groups):
     Parameters
     ----------
     performances : ndarray, shape (n, P, n_features)
-        At least 2.
+        At least 2. NaN in gaps: then n is the number of deviations that are known of a value.
     groups : ndarray of int, shape (n,)
         If all are of one group, each performance counts as a group of its own.
 
@@ -47,7 +48,13 @@ def predictive_variance(performances, groups):
         Positive, also where performances do not differ.
     """
     n, codes = len(performances), _at_least_two(groups)
-    squares = np.square(performances - mean_of_others(performances, codes)).mean(axis=0)
+    if is_gappy(performances):
+        squares = np.square(performances - mean_of_other_groups(performances, codes))
+        n = (~np.isnan(squares)).sum(axis=0)
+        squares = np.nansum(squares, axis=0) / np.maximum(n, 1)
+        n, squares = np.maximum(n, 1), np.where(n > 0, squares, np.nan)
+    else:
+        squares = np.square(performances - mean_of_others(performances, codes)).mean(axis=0)
     return np.maximum(_shrink(squares, n) * (1 + 1 / n), _floor(performances))
 
 
@@ -75,7 +82,9 @@ def simultaneous_factor(performances, groups, coverage):
     float
     """
     codes, prior = _at_least_two(groups), _PRIOR_VARIANCE
-    largest, mean = np.empty(len(performances)), mean_of_others(performances, codes)
+    gaps = is_gappy(performances)
+    mean = (mean_of_other_groups if gaps else mean_of_others)(performances, codes)
+    largest = np.empty(len(performances))
     for group in range(codes.max() + 1):
         out = codes == group
         others = performances[~out], codes[~out]
@@ -83,7 +92,8 @@ def simultaneous_factor(performances, groups, coverage):
             # A single performance has no variance: that of both takes its place.
             others, prior = (performances, codes), _VAGUE_VARIANCE
         z = (performances[out] - mean[out]) / np.sqrt(predictive_variance(*others))
-        largest[out] = np.abs(z).max(axis=(1, 2))
+        # Of what was seen.
+        largest[out] = np.fmax.reduce(np.abs(z), axis=(1, 2), initial=0)
     logs = np.log(np.maximum(largest, _LEAST))
     logs = np.maximum(logs, np.median(logs) - _BELOW_MEDIAN)
     squares = np.square(logs - logs.mean()).sum()
@@ -117,20 +127,31 @@ def mean_band(performances, groups, coverage, random_state=None):
     ndarray, shape (P, n_features)
     """
     random_state = check_random_state(random_state)
-    sums, counts = sums_of_groups(performances, _at_least_two(groups))
+    codes = _at_least_two(groups)
+    sums, counts = sums_of_groups(np.nan_to_num(performances), codes)
     n_groups, n, shape = len(sums), len(performances), performances.shape[1:]
-    weights = counts[:, 0, 0] / n
+    weights, n_seen = counts[:, 0, 0] / n, n_groups
+    if is_gappy(performances):
+        # Each value has weights of its own: a group that does not show it has none.
+        counts = group_counts(performances, codes)
+        weights = (counts / counts.sum(axis=0)).reshape(n_groups, -1)
+        n_seen = (counts > 0).sum(axis=0)
     # Without group g the mean changes by w_g / (1 - w_g) (mean - mean_g).
-    jackknife = (1 - 1 / n_groups) * np.square(weights / (1 - weights))
+    jackknife = (1 - 1 / np.ravel(n_seen)) * np.square(weights / (1 - weights))
     floor = _floor(performances) / n
 
     def estimate(means):
-        mean = weights @ means
-        squares = (jackknife @ np.square(means - mean)).reshape(shape)
-        return mean, np.sqrt(np.maximum(_shrink(squares, n_groups), floor)).ravel()
+        mean = _weigh(weights, means)
+        squares = _weigh(jackknife, np.square(means - mean)).reshape(shape)
+        return mean, np.sqrt(np.maximum(_shrink(squares, n_seen), floor)).ravel()
 
-    means = (sums / counts).reshape(n_groups, -1)
-    scatter = (means - means.mean(axis=0)) / np.sqrt(n_groups - 1)
+    means = (sums / np.maximum(counts, 1)).reshape(n_groups, -1)
+    if n_seen is n_groups:
+        scatter = (means - means.mean(axis=0)) / np.sqrt(n_groups - 1)
+    else:
+        shown = counts.reshape(n_groups, -1) > 0
+        deviations = np.where(shown, means - means.sum(axis=0) / np.ravel(n_seen), 0)
+        scatter = deviations / np.sqrt(np.ravel(n_seen) - 1)
     # Drawn means about their average are independent of that average: each draw of the former,
     # which takes longer, is combined with several of the latter. Few groups vary most.
     n_draws = max(_N_DRAWS // n_groups, _MIN_DRAWS)
@@ -143,6 +164,11 @@ def mean_band(performances, groups, coverage, random_state=None):
     return np.quantile(largest, coverage) * estimate(means)[1].reshape(shape)
 
 
+def _weigh(weights, values):
+    """The weighted sum of values (n, m): one weight a row, or weights (n, m)."""
+    return weights @ values if weights.ndim == 1 else (weights * values).sum(axis=0)
+
+
 def _at_least_two(groups):
     """Codes of the groups; of a single group, every performance is one of its own."""
     codes = np.unique(groups, return_inverse=True)[1].ravel()
@@ -150,11 +176,19 @@ def _at_least_two(groups):
 
 
 def _shrink(squares, n):
-    """Variances (P, n_features) shrunk towards their mean over the frames."""
-    return ((n - 1) * squares + _SHRINKAGE * squares.mean(axis=0)) / (n - 1 + _SHRINKAGE)
+    """Variances (P, n_features) shrunk towards their mean over the frames.
+
+    Where one is not known (NaN) it is that mean.
+    """
+    known = ~np.isnan(squares)
+    if known.all():
+        return ((n - 1) * squares + _SHRINKAGE * squares.mean(axis=0)) / (n - 1 + _SHRINKAGE)
+    mean = np.nansum(squares, axis=0) / np.maximum(known.sum(axis=0), 1)
+    return np.where(known, ((n - 1) * squares + _SHRINKAGE * mean) / (n - 1 + _SHRINKAGE), mean)
 
 
 def _floor(performances):
-    spread = performances.var(axis=(0, 1))
+    var = np.nanvar if is_gappy(performances) else np.var
+    spread = var(performances, axis=(0, 1))
     largest = spread.max() if spread.max() > 0 else 1.0
     return _FLOOR * np.where(spread > _CONSTANT * largest, spread, largest)

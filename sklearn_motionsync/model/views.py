@@ -147,7 +147,8 @@ class _Inverse(NamedTuple):
         """The performances that reach the model, and their postures on the same clock."""
         takers = [method for step in self.after for method in (step.match, step.transform)]
         postures = transform_through(self.before, X, params, caller, also=takers)
-        whole = check_performances(self.aspace, postures, reset=False, level="posture")
+        how = {"level": "posture", "finite": "allow-nan"}
+        whole = check_performances(self.aspace, postures, reset=False, **how)
         points = self.aspace.transform(postures)
         with explain_missing(caller):
             for step in self.after:

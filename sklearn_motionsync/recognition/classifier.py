@@ -140,6 +140,8 @@ class ActionClassifier(
     classes. Trials are not warped to the template of a class: that makes unknown movements resemble
     it.
 
+    Gaps (NaN) are refused. An `ASpace` before it takes them: ``ASpace(1.0)`` keeps all features.
+
     Give ``groups``, such as subjects, whenever people come more than once: probabilities
     and thresholds are then those of new people. Under metadata routing
     ``set_fit_request(groups=True)``; otherwise a pipeline takes ``actionclassifier__groups``.
@@ -158,6 +160,10 @@ class ActionClassifier(
         "reject_below": [Interval(Real, None, None, closed="neither"), StrOptions({"auto"}), None],
         "unknown_label": [str, Integral, Real, None],
     }
+    _on_gaps = (
+        "Put ASpace(1.0) before it, which expects what was hidden, or interpolate the gap, as by "
+        "sklearn_motionsync.io.fill_gaps(x, max_gap=10)"
+    )
 
     def __init__(
         self,

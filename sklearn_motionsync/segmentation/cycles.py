@@ -135,6 +135,8 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
 
     Notes
     -----
+    Gaps (NaN) are refused: fill them before, as by `io.fill_gaps`.
+
     A cycle lasts at least half the mean period of its take. The pace may change slowly, by a fifth
     and more. Fit takes of different movements separately, as they have no common template. Scale
     features of different units before, with ``FrameWise(StandardScaler())``.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from ..inputs.keyframes import Keyframes
 from ..inputs.recorded import refuse_moved_events
 from ..inputs.types import (
     Indexed,
+    NumbersLike,
     PerformancesLike,
     SupportsArray,
     Transformed,
@@ -44,6 +45,7 @@ class AnchoredSynchronizer(Synchronizer):
         y: object = None,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
+        confidence: Indexed[NumbersLike] | None = None,
     ) -> Self:
         """Learn from performances, of which key-frames may be known.
 
@@ -59,6 +61,9 @@ class AnchoredSynchronizer(Synchronizer):
             `KeyframeSynchronizer` needs all of them.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames per second of X. With it key-frames are seconds.
+        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
+            How sure it is what was seen, from 0 to 1, such as of a markerless system. Below 0.5 is
+            as NaN: not seen. Above, it is the weight of what was seen.
 
         Returns
         -------
@@ -75,7 +80,8 @@ class AnchoredSynchronizer(Synchronizer):
             rows.
         """
         with self._progress(fits=True) as progress:
-            performances = self._check_training_set(X)
+            given = {} if confidence is None else self._given(X, None, None, confidence)
+            performances = self._check_training_set(X, **given)
             known = self._known(performances, X, keyframes, frame_rate)
             self._learn(performances, progress, known)
             self._number_as_given()
@@ -88,6 +94,7 @@ class AnchoredSynchronizer(Synchronizer):
         y: object = None,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
+        confidence: Indexed[NumbersLike] | None = None,
     ) -> Transformed:
         """Fit, and warp the same performances.
 
@@ -101,13 +108,15 @@ class AnchoredSynchronizer(Synchronizer):
             Key-frames of each performance, as for ``fit``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             As for ``fit``.
+        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
+            As for ``fit``.
 
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features)
             As from ``transform``.
         """
-        given = {"keyframes": keyframes, "frame_rate": frame_rate}
+        given = {"keyframes": keyframes, "frame_rate": frame_rate, "confidence": confidence}
         return self.fit(X, y, **given).transform(X, **given)
 
     def transform(
@@ -115,6 +124,8 @@ class AnchoredSynchronizer(Synchronizer):
         X: PerformancesLike,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
+        confidence: Indexed[NumbersLike] | None = None,
+        fill: Literal["model"] | None = None,
     ) -> Transformed:
         """Warp performances onto the clock of the pattern (Eq. 18).
 
@@ -127,6 +138,13 @@ class AnchoredSynchronizer(Synchronizer):
             Key-frames of each performance, as for ``fit``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             As for ``fit``.
+        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
+            As for ``fit``.
+        fill : {None, "model"}, default=None
+            What becomes of NaN, which is what was hidden. None: it stays NaN, feature by feature.
+            "model": it is filled from the mean of the warped training set (``examples_``) at the
+            same moment, moved by how far the performance is from the mean around the gap, and in
+            the features that are seen.
 
         Returns
         -------
@@ -134,7 +152,7 @@ class AnchoredSynchronizer(Synchronizer):
             ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
             ``set_output(transform="pandas")``.
         """
-        return self._warp(X, **self._given(X, keyframes, frame_rate))
+        return self._warp(X, fill, **self._given(X, keyframes, frame_rate, confidence))
 
     @snapshot
     def match(
@@ -142,6 +160,7 @@ class AnchoredSynchronizer(Synchronizer):
         X: PerformancesLike,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
+        confidence: Indexed[NumbersLike] | None = None,
     ) -> Match:
         """Match performances to the pattern: the warps of ``transform``.
 
@@ -154,6 +173,8 @@ class AnchoredSynchronizer(Synchronizer):
             Key-frames of each performance, as for ``fit``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             As for ``fit``.
+        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
+            As for ``fit``.
 
         Returns
         -------
@@ -161,17 +182,26 @@ class AnchoredSynchronizer(Synchronizer):
             ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
             the pattern; ``distances``, shape (n_sequences,).
         """
-        given = self._given(X, keyframes, frame_rate)
+        given = self._given(X, keyframes, frame_rate, confidence)
         if not given:
             return self._match_in_parts(X)
         return self._match(self.check_performances(X), **given)
 
-    def _given(self, X, keyframes, frame_rate) -> dict[str, Any]:
-        """Key-frames as arguments of ``_match`` and ``_warp_part``; none if none are given."""
-        if keyframes is None:
-            return {}
-        refuse_moved_events(X)
-        return {"keyframes": keyframes, "frame_rate": frame_rate}
+    def _given(self, X, keyframes, frame_rate, confidence=None) -> dict[str, Any]:
+        """What is given, as arguments of ``_match`` and ``_warp_part``."""
+        given: dict[str, Any] = {}
+        if keyframes is not None:
+            refuse_moved_events(X)
+            given |= {"keyframes": keyframes, "frame_rate": frame_rate}
+        if confidence is not None:
+            if self._finite is True:
+                name = type(self).__name__
+                raise ValueError(
+                    f"{name} takes no gaps, and so no confidence=: use DenseSynchronizer, or give "
+                    f"{name} what DenseSynchronizer(...).transform(X, fill='model') returns."
+                )
+            given["confidence"] = confidence
+        return given
 
     def _known(self, performances, X, keyframes, frame_rate):
         """Key-frames of a training set as shares of the performances; None if none are given."""

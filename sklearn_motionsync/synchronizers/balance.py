@@ -52,7 +52,7 @@ def warn_of_one_feature(synchronizer, performances, store):
 def _shares(store, cost):
     """The share of every feature in the energy that is compared without a metric."""
     total, energy, count = 0, 0, 0
-    for features in store.portions():
+    for features in map(store.plain, store.portions()):
         total += features.sum(axis=(0, 1), dtype=np.float64)
         energy += np.einsum("npk,npk->k", features, features, dtype=np.float64)
         count += features[:, :, 0].size

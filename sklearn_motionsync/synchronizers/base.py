@@ -35,6 +35,14 @@ from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
+from .gaps import (
+    check_fill,
+    fill_performances,
+    fill_warped,
+    hold_gaps,
+    learn_filler,
+    with_confidence,
+)
 from .match import Match, check_match
 
 __all__ = ["Synchronizer", "TrainingSet"]
@@ -185,7 +193,7 @@ class Synchronizer(
 
     fit_transform: ClassVar[FitTransform] = whole_fit_transform
 
-    def transform(self, X: PerformancesLike) -> Transformed:
+    def transform(self, X: PerformancesLike, fill: Literal["model"] | None = None) -> Transformed:
         """Warp performances onto the clock of the pattern (Eq. 18).
 
         Parameters
@@ -193,14 +201,24 @@ class Synchronizer(
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
             Performances. Memory maps, and collections that give performances by index, are read in
             parts, once each; rows of a matrix are loaded into memory.
+        fill : {None, "model"}, default=None
+            What becomes of NaN, which is what was hidden. None: it stays NaN, feature by feature.
+            "model": it is filled from the mean of the warped training set (``examples_``) at the
+            same moment, moved by how far the performance is from the mean around the gap, and in
+            the features that are seen.
 
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features)
             ``(n_sequences, P)`` for 2-D input; a ``(performance, frame)`` frame under
             ``set_output(transform="pandas")``.
+
+        Raises
+        ------
+        ValueError
+            If the input breaks the contract, or there is no such ``fill``.
         """
-        return self._warp(X)
+        return self._warp(X, fill)
 
     def match(self, X: PerformancesLike) -> Match:
         """Match performances to the pattern.
@@ -261,6 +279,7 @@ class Synchronizer(
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.three_d_array = True
+        tags.input_tags.allow_nan = self._finite == "allow-nan"
         tags.transformer_tags.preserves_dtype = ["float64", "float32"]
         return tags
 
@@ -276,7 +295,8 @@ class Synchronizer(
         self._set_pattern(training, self._plain_median(training.scaled))
 
     @snapshot
-    def _warp(self, X, **params):
+    def _warp(self, X, fill=None, **params):
+        check_fill(fill)
         # Further parameters are given for all performances at once.
         read = None if params else self._read_in_parts(X)
         if read is None:
@@ -284,9 +304,15 @@ class Synchronizer(
             out = self._warp_part(performances, **params)
         else:
             performances, out = self._warp_parts(*read)
+        if fill == "model" and np.isnan(out.sum()):
+            fill_warped(out, self._warp_part(self._checked_examples()))
         if performances.kind == "rows":
             return out[:, :, 0]
         return restore(self, performances, out, frames=range(out.shape[1]))
+
+    def _checked_examples(self):
+        """The examples as performances."""
+        return Performances(list(self.examples_), "list", list(range(len(self.examples_))))
 
     def _warp_part(self, performances, **params):
         return self._match(performances, **params).warp(performances)
@@ -325,7 +351,21 @@ class Synchronizer(
         names = "times", "distances", "mode"
         return Match(*(np.concatenate([getattr(x, name) for x in matches]) for name in names))
 
+    def _without_gaps(self, performances):
+        """Checked performances, filled where they are NaN."""
+        if not hold_gaps(performances):
+            return performances
+        filler = self._filler or learn_filler(self.examples_)
+        return fill_performances(filler, performances)
+
     # -- steps of a fit ---------------------------------------------------------------------
+
+    def _check_training_set(self, X, numbers=None, confidence=None):
+        performances, self._filler = super()._check_training_set(X, numbers), None
+        performances = with_confidence(performances, confidence)
+        if hold_gaps(performances):
+            self._filler = learn_filler(performances, names_of_input(self))
+        return self._without_gaps(performances)
 
     def _number_as_given(self):
         """Number performances as given, if the fit is to a sample."""

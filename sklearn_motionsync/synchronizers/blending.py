@@ -68,8 +68,8 @@ def blend_performances(
         Fitted; or the match of X, ``Match.from_estimator(pipe, X)``, for several blends or for
         sequences recorded with the performances.
     X : list of arrays (n_frames_i, n_features), 3-D array, or (performance, frame) frame
-        Performances as the estimator takes them; with a `Match` any sequences recorded with them.
-        All have one frame rate.
+        Performances as the estimator takes them, without gaps; with a `Match` any sequences
+        recorded with them. All have one frame rate.
     weights : array-like of shape (n_sequences,) or (n_rows, n_sequences), or dict
         Weight of each performance; their sum is 1. Weights below 0 or above 1 extrapolate:
         1.5 and -0.5 exaggerate the differences of the first from the second. Several rows change

@@ -22,6 +22,7 @@ from ..inputs.types import (
 from ..matching.anchors import KeyframeColumns, add_ramps, first_meeting, pin
 from ..matching.costs import COSTS
 from ..matching.filters import SMOOTHING, choose_smoothing
+from ..matching.gaps import add_weights
 from ..matching.matcher import (
     Features,
     LinearWarper,
@@ -45,8 +46,9 @@ from ..utils.threads import on_one_thread
 from .anchored import AnchoredSynchronizer
 from .balance import warn_of_one_feature
 from .evidence import no_evidence, weigh_evidence
+from .gaps import known_whole, with_confidence
 from .match import Match
-from .portions import FeatureStore, TrainingPortions, warp_in_portions
+from .portions import FeatureStore, TrainingPortions, refuse_long_paths, warp_in_portions
 from .refinement import try_refinement
 from .subsamples import subsample, typical_share
 
@@ -59,8 +61,6 @@ _NARROW, _WIDE = 0.25, 0.4
 _LEARNING_OFFSET = 0.2
 # velocity_smoothing="auto": a metric weights noise down; without one it is smoothed away.
 _SMOOTH, _SHARP = SMOOTHING, 0.02
-# Most steps of a path at a frame, all offsets together.
-_MOST_STEPS = 1e9
 # Numbers of performances a metric is learnt from. Two have no route but the
 # direct one: their differences cannot be told from a wrong path.
 _FEWEST, _MOST = 3, 20
@@ -92,13 +92,19 @@ class DenseSynchronizer(AnchoredSynchronizer):
     >>> sync.match(trials).offsets[:, 50].round().tolist()  # how late they were, in frames
     [-10.0, 0.0, 12.0]
 
-    A trial with a gap is refused:
+    NaN is what was not seen. A trial is matched by what was, and stays NaN elsewhere:
 
-    >>> trials[2][7] = np.nan
+    >>> trials[2][20:30] = np.nan
+    >>> int(np.isnan(sync.transform(trials)[2]).sum())
+    8
+
+    One of which nothing was seen is refused:
+
+    >>> trials[2][:] = np.nan
     >>> sync.transform(trials)
     Traceback (most recent call last):
         ...
-    ValueError: Performance 2, frame 7, feature 0 is NaN; the input must be finite. ...
+    ValueError: Performance 2 is NaN in every frame and feature: nothing of it was seen, ...
 
     The defaults suit most data. Four parameters depend on the data or on the question. The others
     were set by measurements, or are for many trials and long jobs.
@@ -348,7 +354,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
     }
 
     metric_: Any
-
+    _finite = "allow-nan"
     _SMALLER = "fewer frames, subframes or performances. Or learn from some: max_fit=1000"
 
     def __init__(
@@ -420,7 +426,8 @@ class DenseSynchronizer(AnchoredSynchronizer):
         """
         return cls(**{"cost": "posture", "max_rate": 2, "consensus": 0} | params)
 
-    def _match(self, performances, keyframes=None, frame_rate=None):
+    def _match(self, performances, keyframes=None, frame_rate=None, confidence=None):
+        performances = with_confidence(performances, confidence)
         arrays, shares = self._with_keyframes(performances, keyframes, frame_rate)
         distances, times = self._distances_and_times(arrays, shares)
         distances, mode = self._warper.matcher.features.back(distances), None
@@ -428,7 +435,8 @@ class DenseSynchronizer(AnchoredSynchronizer):
             mode = on_one_thread(self._warper.modes_of, arrays)
         return Match(times, distances, mode)
 
-    def _warp_part(self, performances, keyframes=None, frame_rate=None):
+    def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
+        performances = with_confidence(performances, confidence)
         given = self._with_keyframes(performances, keyframes, frame_rate)
         times = np.maximum.accumulate(self._distances_and_times(*given)[1], axis=1)
         return sample(performances, times, self.n_frames_)
@@ -436,11 +444,15 @@ class DenseSynchronizer(AnchoredSynchronizer):
     def _with_keyframes(self, performances, keyframes=None, frame_rate=None):
         """Performances as the warper takes them, and their key-frames as shares, or None."""
         shares = self._shares(performances, keyframes, frame_rate)
+        performances = self._without_gaps(performances)
+        arrays = performances
+        if self._warper.matcher.features.weighs:
+            arrays = add_weights(performances, performances.weights)
         if self.keyframes_ is None:
-            return performances, None
+            return arrays, None
         if shares is None:
             shares = np.full((len(performances), len(self.keyframes_)), np.nan)
-        return add_ramps(performances, shares), shares
+        return add_ramps(arrays, shares), shares
 
     def _distances_and_times(self, arrays, shares):
         with self._progress(fits=False) as progress:
@@ -500,10 +512,10 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     # -- steps of a fit ---------------------------------------------------------------------
 
-    def _check_training_set(self, X):
+    def _check_training_set(self, X, confidence=None):
         some, sample, population = subsample(X, self.max_fit, self.pattern, self.random_state)
         numbers = None if sample is None else sample.tolist()
-        performances = super()._check_training_set(some, numbers)
+        performances = super()._check_training_set(some, numbers, confidence)
         n = len(performances)
         self.sample_ = np.arange(n) if sample is None else sample
         self._population = n if sample is None else population
@@ -527,14 +539,17 @@ class DenseSynchronizer(AnchoredSynchronizer):
     def _learn(self, performances, progress, keyframes):
         training = self._set_clock(performances, self.subframes)
         positions, arrays, columns = training.scaled, list(performances), None
+        n_features, weights = positions.shape[2], performances.weights
+        if weights:
+            arrays = add_weights(arrays, weights)
         if keyframes is not None:
-            arrays = add_ramps(performances, keyframes)
+            arrays = add_ramps(arrays, keyframes)
             std = self.keyframe_std / (self.n_frames_ - 1)
             columns = KeyframeColumns(keyframes.shape[1], std)
-        if self.subframes > 1 or columns is not None:
+        if self.subframes > 1 or arrays[0].shape[1] > n_features:
             positions = normalise(arrays, self.n_frames_, self.subframes)
             training.unit(positions, out=positions)
-        features = self._learn_metric(training.unit, positions, columns)
+        features = self._learn_metric(training.unit, positions, columns, weights is not None)
         settings = self._settings()
         searched = features.for_search(self.n_frames_, settings["max_offset"])
         store = FeatureStore(searched, positions)
@@ -544,9 +559,12 @@ class DenseSynchronizer(AnchoredSynchronizer):
         if searched is not features:
             reach = {name: settings[name] for name in ("max_offset", "max_rate")}
             matcher = searcher.on_clock(features, self.n_frames_, **reach)
-        self.features_ = features.replace(anchors=None)
+        self.features_ = features.replace(anchors=None, weighs=False)
         self.mu_ = float(features.back(matcher.trellis.mu))
         source = self._set_pattern(training, median, features.degree)
+        if weights is not None:
+            own = self.pattern_index_
+            (source,) = add_weights([source], None if own is None else [weights[own]])
         # Sums over fewer frames, scaled to all.
         self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
         chosen = self._choose_exemplars(median.estimates, modes, keyframes)
@@ -564,7 +582,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
         else:
             warper = final = on_one_thread(self._sharpened, positions, warper, chosen[home])
         if isinstance(final, SharpenedWarper):
-            self.sharpening_ = Bunch(**final.sharpener.found(positions.shape[2]))
+            self.sharpening_ = Bunch(**final.sharpener.found(n_features))
         self._warper = warper
 
     def _settings(self, learnt=None):
@@ -576,18 +594,19 @@ class DenseSynchronizer(AnchoredSynchronizer):
         settings = {"smoothness": self.smoothness, "max_rate": self.max_rate}
         return {**settings, "max_offset": max_offset}
 
-    def _learn_metric(self, unit, positions, columns):
+    def _learn_metric(self, unit, positions, columns, weighs):
         """The features with the learnt metric, from evenly spaced performances if there are many.
 
         Sets ``metric_`` and ``evidence_``.
         """
         learns = self.metric == "learned" and self.cost == "velocity" and self.consensus > 0
-        self._check_paths(self._settings(learns)["max_offset"])
+        given = self.subframes, self.max_rate, self._settings(learns)["max_offset"]
+        refuse_long_paths(*given, self.n_frames_)
         smoothing, self.metric_ = self.velocity_smoothing, None
         self.evidence_ = no_evidence()
         sharp, smooth = (_SHARP, _SMOOTH) if smoothing == "auto" else (smoothing, smoothing)
-        plain = Features(self.cost, self.subframes, smooth, unit, anchors=columns)
-        n = len(positions)
+        plain, n = Features(self.cost, self.subframes, smooth, unit), len(positions)
+        plain = plain.replace(anchors=columns, weighs=weighs)
         if not learns or n < _FEWEST:
             return plain
         some = np.unique(np.round(np.linspace(0, n - 1, min(n, _MOST))).astype(np.intp))
@@ -602,19 +621,6 @@ class DenseSynchronizer(AnchoredSynchronizer):
         self.evidence_ = weigh_evidence(evidence, len(some), self.unsupported)
         self.metric_ = Bunch(share=share, energy=energy, performances=some)
         return features
-
-    def _check_paths(self, max_offset):
-        """Refuse a trellis that takes too long."""
-        subframes, n_frames = self.subframes, self.n_frames_
-        steps = min(self.max_rate, n_frames - 1) * subframes + 1
-        steps *= 2 * max_offset * n_frames * subframes + 1
-        if steps > _MOST_STEPS:
-            raise ValueError(
-                f"subframes = {subframes}, max_rate = {self.max_rate} and max_offset = "
-                f"{max_offset} on {n_frames} frames ask for {steps:.0e} steps of a path "
-                f"at every frame of every pair; {_MOST_STEPS:.0e} is the limit. Use fewer "
-                "subframes, a smaller rate or offset."
-            )
 
     def _search(self, features, store, positions, progress):
         """The matcher that searches, the portions of the training set, the median, and modes."""
@@ -695,26 +701,24 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     def _warper_by(self, exemplars, arrays, matcher, source):
         """The warper to the pattern by way of exemplars."""
-        chosen = [source, *(arrays[k] for k in exemplars.tolist())]
         # In double precision, as all performances that are warped.
-        chosen = [x.astype(np.float64, copy=False) for x in chosen]
+        both = source, *(arrays[k] for k in exemplars.tolist())
+        chosen = [x.astype(np.float64, copy=False) for x in both]
         positions = matcher.features.positions(chosen, self.n_frames_)
         pattern = matcher.features.plain(positions)[0, :: self.subframes]
-        votes = self.consensus > 0
-        settings = pattern, positions, votes, self.warp_smoothing
         linear = self.evidence_.harmful and self.unsupported == "linear"
         made = LinearWarper if linear else Warper
-        return on_one_thread(made.to_pattern, matcher, *settings)
+        given = pattern, positions, self.consensus > 0, self.warp_smoothing
+        return on_one_thread(made.to_pattern, matcher, *given)
 
     def _decide_on_refinement(self, training, warper, source, progress, portions):
         """Decide whether warps are refined by postures; the warper that does so or not."""
         verdict, linear = Verdict(), isinstance(warper, LinearWarper)
         if self.refine == "auto" and self.consensus > 0 and not linear:
-            others = np.flatnonzero(np.arange(len(training.performances)) != self.pattern_index_)
+            others = known_whole(training.performances, self.pattern_index_)
             some = others[:: -(-len(others) // _TESTED) or 1]
-            how = {"n_jobs": self.n_jobs, "progress": progress}
-            given = training.scaled, warper, source, some, portions
-            verdict = try_refinement(*given, self._settings(learnt=False), **how)
+            given = training.scaled, warper, source, some, portions, self._settings(learnt=False)
+            verdict = try_refinement(*given, n_jobs=self.n_jobs, progress=progress)
         names = "ratio", "p_value", "ratio_to_all"
         self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
         self.misfit_ = verdict.misfit

@@ -65,6 +65,8 @@ class LinearSynchronizer(Synchronizer):
     [0.0, 1.0, 2.0, 3.0, 4.0]
     """
 
+    _finite = "allow-nan"
+
     @snapshot
     def match(self, X: PerformancesLike) -> Match:
         """Match performances to the pattern without any warp.
@@ -82,7 +84,7 @@ class LinearSynchronizer(Synchronizer):
         return self._match_in_parts(X)
 
     def _match(self, performances):
-        arrays, distances = list(performances), np.empty(len(performances))
+        arrays, distances = list(self._without_gaps(performances)), np.empty(len(performances))
         for start in range(0, len(arrays), _BATCH):
             rows = slice(start, start + _BATCH)
             differences = normalise(arrays[rows], self.n_frames_) - self.pattern_

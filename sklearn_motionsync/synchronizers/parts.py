@@ -20,6 +20,7 @@ from ..inputs.types import (
     Features,
     Indexed,
     Labels,
+    NumbersLike,
     PerformancesLike,
     SupportsArray,
     Unit,
@@ -27,6 +28,7 @@ from ..inputs.types import (
 )
 from ..inputs.validation import names_of_input
 from ..matching.anchors import add_ramps
+from ..matching.gaps import add_weights
 from ..matching.matcher import Matcher, Warper
 from ..matching.trellis import Coupling
 from ..matching.warps import evaluate_warps, normalise
@@ -36,6 +38,7 @@ from ..utils.parallel import Progress, run
 from ..utils.parameters import validated, validated_with_nested
 from .anchored import AnchoredSynchronizer
 from .dense import DenseSynchronizer
+from .gaps import with_confidence
 from .lags import Lags
 from .match import Match, rates_of
 from .portions import warp_in_portions
@@ -59,6 +62,7 @@ _SHARED = (
     "_names_in",
     "_facts_in",
     "_fitted_on_rows",
+    "_filler",
 )
 
 
@@ -164,6 +168,8 @@ class PartSynchronizer(AnchoredSynchronizer):
         "synchronizer": [DenseSynchronizer, None],
     }
 
+    _finite = "allow-nan"
+
     def __init__(
         self,
         parts: Mapping[str, Features] | None = None,
@@ -182,6 +188,7 @@ class PartSynchronizer(AnchoredSynchronizer):
         y: object = None,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
+        confidence: Indexed[NumbersLike] | None = None,
     ) -> Self:
         """Learn the whole body, then every part.
 
@@ -196,6 +203,9 @@ class PartSynchronizer(AnchoredSynchronizer):
             its warp, and may be early or late.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             Frames per second of X. With it key-frames are seconds.
+        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
+            How sure it is what was seen, as `DenseSynchronizer` takes it. It weighs the frames of
+            the whole body.
 
         Returns
         -------
@@ -213,7 +223,7 @@ class PartSynchronizer(AnchoredSynchronizer):
             self._progress(fits=True) as progress,
             progress.fitting(body, "learning the body and its parts"),
         ):
-            given = self.parts, self.coupling, keyframes, frame_rate
+            given = self.parts, self.coupling, keyframes, frame_rate, confidence
             self.parts_, self._warpers = fit_body_and_parts(body, X, *given)
         self.synchronizer_ = body
         for name in _SHARED:
@@ -227,6 +237,7 @@ class PartSynchronizer(AnchoredSynchronizer):
         X: PerformancesLike,
         keyframes: Indexed[ValuesLike | None] | SupportsArray | None = None,
         frame_rate: float | ValuesLike | None = None,
+        confidence: Indexed[NumbersLike] | None = None,
     ) -> Match:
         """Match the whole body of performances to the pattern.
 
@@ -238,6 +249,8 @@ class PartSynchronizer(AnchoredSynchronizer):
             Key-frames of each performance, as for ``fit``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
             As for ``fit``.
+        confidence : list of arrays (n_frames_i,) or (n_frames_i, n_features), default=None
+            As for ``fit``.
 
         Returns
         -------
@@ -245,7 +258,7 @@ class PartSynchronizer(AnchoredSynchronizer):
             As from ``DenseSynchronizer.match``.
         """
         check_is_fitted(self)
-        return self.synchronizer_.match(X, keyframes, frame_rate)
+        return self.synchronizer_.match(X, keyframes, frame_rate, confidence)
 
     @snapshot
     def match_parts(
@@ -335,7 +348,8 @@ class PartSynchronizer(AnchoredSynchronizer):
         values = np.stack(values, axis=1)
         return Lags(values, names, against, unit, groups, people, performances.labels)
 
-    def _warp_part(self, performances, keyframes=None, frame_rate=None):
+    def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
+        performances = with_confidence(performances, confidence)
         body = self.match(performances, keyframes, frame_rate)
         out = body.warp(performances)
         for name, match in self._match_parts(performances, body, "part").items():
@@ -349,6 +363,7 @@ class PartSynchronizer(AnchoredSynchronizer):
         What does not move has the warp of the body.
         """
         found, sync = {}, self.synchronizer_
+        performances = self._without_gaps(performances)
         with Progress(self, sync.verbose) as progress:
             for name in self.parts_:
                 warper = self._warpers[what].get(name)
@@ -375,7 +390,7 @@ class PartSynchronizer(AnchoredSynchronizer):
 
 @atomic_fit
 @validated
-def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None):
+def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None, confidence=None):
     """A ``fit`` of the synchronizer of the whole body, which also learns the parts.
 
     Parameters
@@ -384,7 +399,7 @@ def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None
         Of the whole body.
     X : as for ``PartSynchronizer.fit``
     parts, coupling : parameters of `PartSynchronizer`
-    keyframes, frame_rate : as for ``PartSynchronizer.fit``
+    keyframes, frame_rate, confidence : as for ``PartSynchronizer.fit``
 
     Returns
     -------
@@ -394,7 +409,7 @@ def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None
         ``"part"``: of every part by name; ``"rest"``: of the body without it. None if nothing of it
         moves. No warpers for an infinite coupling.
     """
-    performances = self._check_training_set(X)
+    performances = self._check_training_set(X, confidence)
     parts = choose_parts(parts, performances, names_of_input(self))
     with self._progress(fits=True) as progress:
         known = self._known(performances, X, keyframes, frame_rate)
@@ -409,9 +424,14 @@ def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None
             chosen = [x.astype(np.float64, copy=False) for x in chosen]
             sizes = self.n_frames_, self.subframes
             given = chosen
+            if performances.weights is not None:
+                weights = [performances.weights[k] for k in self.exemplars_]
+                index = self.pattern_index_
+                own = np.ones(len(source)) if index is None else performances.weights[index]
+                given = add_weights(given, [own, *weights])
             if known is not None:
                 own = self.keyframes_ / (self.n_frames_ - 1)
-                given = add_ramps(chosen, [own, *known[self.exemplars_]])
+                given = add_ramps(given, [own, *known[self.exemplars_]])
             given, chosen = (normalise(x, *sizes) for x in (given, chosen))
             (times,) = run(_warp_pattern_and_exemplars, [(self._warper, given)])
             training = normalise(performances, self.n_frames_, self.subframes)

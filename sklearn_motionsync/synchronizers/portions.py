@@ -11,11 +11,19 @@ from ..matching.warps import even_slices
 from ..utils.parallel import SharedArgument, on_cluster, run
 from ..utils.threads import on_one_thread
 
-__all__ = ["FeatureStore", "TrainingPortions", "measure_in_portions", "warp_in_portions"]
+__all__ = [
+    "FeatureStore",
+    "TrainingPortions",
+    "measure_in_portions",
+    "refuse_long_paths",
+    "warp_in_portions",
+]
 
 # Sizes of a portion of warping: worth sending to another process, and small enough to share out.
 PORTION_CELLS = 50_000_000
 _PORTION_SEQUENCES = 256
+# Most steps of a path at a frame, all offsets together.
+_MOST_STEPS = 1e9
 # How many times longer a portion may be that reuses features.
 _LONGEST = 4
 # Up to this share of a training set the pattern and the exemplars are worth sending after it.
@@ -23,6 +31,19 @@ _LARGEST_SHARE = 0.4
 # Most bytes of features that are cached; beyond, computing them again takes a few per cent of the
 # time of comparing them, and caching them one more copy of all performances.
 CACHE_BYTES = 1 << 25
+
+
+def refuse_long_paths(subframes, max_rate, max_offset, n_frames):
+    """Refuse a trellis that takes too long."""
+    steps = min(max_rate, n_frames - 1) * subframes + 1
+    steps *= 2 * max_offset * n_frames * subframes + 1
+    if steps > _MOST_STEPS:
+        raise ValueError(
+            f"subframes = {subframes}, max_rate = {max_rate} and max_offset = "
+            f"{max_offset} on {n_frames} frames ask for {steps:.0e} steps of a path "
+            f"at every frame of every pair; {_MOST_STEPS:.0e} is the limit. Use fewer "
+            "subframes, a smaller rate or offset."
+        )
 
 
 # -- pairs of a training set ------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from numbers import Integral
 from typing import ClassVar, Self
 
@@ -23,6 +24,7 @@ from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
+from .expectation import HiddenNormal, components_of_seen
 
 __all__ = ["ASpace"]
 
@@ -70,6 +72,11 @@ class ASpace(
         ``eps_b`` of Eq. 4: the variance left out, the sum of the other eigenvalues.
     left_out_variance_ : ndarray, shape (n_features,)
         The variance left out of each feature; the sum is ``eps_b``.
+    missing_ : ndarray, shape (n_features,)
+        The share of the training poses in which a feature was missing (NaN).
+    correlation_time_ : float
+        Frames after which the correlation of poses with later ones has fallen to 1/e. 0 after a fit
+        on rows, which have no order.
     n_features_in_ : int
         Features of a posture.
     feature_names_in_ : ndarray of str
@@ -85,6 +92,36 @@ class ASpace(
     The poses of all trials are pooled, and their covariance is diagonalised (Eq. 3). The first
     ``b`` eigenvectors are kept, the fewest that reach the share of the variance (Eq. 4). Poses are
     projected onto them (Eq. 5).
+
+    **Gaps.** NaN is what was not seen. ``fit`` estimates mean and covariance from what was seen, by
+    expectation and maximisation: hidden features are expected given the seen ones of the same pose,
+    and the moments are estimated again, until hidden values change by less than 0.0001 standard
+    deviations. ``transform`` projects the conditional expectation of a pose given all that was seen
+    of its trial. There poses are normal, and frames t apart are correlated by
+    ``exp(-t / correlation_time_)``. So a hidden arm follows the other limbs, and joins the frames
+    before and after the gap. Features that predict others are taken to have noise, a tenth of their
+    variance, as few people show them together.
+    Rows of a 2-D array are poses without order, each expected by itself. A pose of which nothing
+    was seen becomes NaN: its neighbours in time know more of it than the mean pose.
+
+    Without any gap nothing of this is computed, but for ``correlation_time_``.
+
+    An elbow is hidden for a while:
+
+    >>> from sklearn_motionsync import DirectionCosines
+    >>> from sklearn_motionsync.datasets import make_bending
+    >>> bunch = make_bending(6, random_state=0)
+    >>> elbow = 3 * bunch.skeleton.index_of("left_elbow")
+    >>> gappy = [x.copy() for x in bunch.data]
+    >>> gappy[0][30:60, elbow : elbow + 3] = np.nan
+    >>> cosines = DirectionCosines(bunch.skeleton, hidden="nan").fit(gappy)
+    >>> postures = cosines.transform(gappy)
+    >>> aspace = ASpace().fit(postures)
+    >>> names = cosines.get_feature_names_out()
+    >>> names[aspace.missing_ > 0].tolist()[:3], round(float(aspace.missing_.max()), 3)
+    (['left_arm_x', 'left_arm_y', 'left_arm_z'], 0.049)
+    >>> bool(np.isnan(aspace.transform(postures)[0]).any())
+    False
     """
 
     _parameter_constraints: dict = {
@@ -105,7 +142,7 @@ class ASpace(
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances, or postures in rows.
+            Performances, or postures in rows; NaN where something was not seen.
         y : ignored
             Present for API consistency.
 
@@ -118,12 +155,22 @@ class ASpace(
         ------
         ValueError
             If there are fewer than two postures, or fewer than ``n_components`` postures or
-            features.
+            features; if a feature was seen in fewer than two postures.
+
+        Warns
+        -----
+        UserWarning
+            If a feature was seen in fewer postures than there are features: too few to learn how it
+            depends on the others.
         """
-        arrays = check_performances(self, X, reset=True, level="posture")
+        arrays = check_performances(self, X, reset=True, level="posture", finite="allow-nan")
         postures = np.concatenate(arrays)
+        has_gaps = bool(np.isnan(postures.sum()))
         if len(postures) < 2:
             raise ValueError("ASpace needs at least 2 postures, got n_samples=1.")
+        self.missing_ = np.zeros(postures.shape[1])
+        if has_gaps:
+            postures = postures[self._check_seen(postures)]
         most = min(postures.shape)
         if isinstance(self.n_components, Integral) and self.n_components > most:
             raise ValueError(
@@ -131,18 +178,20 @@ class ASpace(
                 f"{counted(len(postures), 'posture')} of {counted(postures.shape[1], 'feature')} "
                 f"can span; use at most {most}, or a share of the variance such as 0.95."
             )
-        # Of postures that are all equal PCA divides 0 by 0.
-        with self._progress(fits=True), np.errstate(invalid="ignore"):
-            pca = PCA().set_output(transform="default").fit(postures)
-        variance = pca.explained_variance_
+        with self._progress(fits=True):
+            estimate = components_of_seen if has_gaps else _components
+            mean, components, variance, covariance = estimate(postures)
         b = self._count(variance)
-        self.components_ = np.ascontiguousarray(pca.components_[:b])
-        self.mean_ = pca.mean_
+        self.components_ = np.ascontiguousarray(components[:b])
+        self.mean_ = mean
         self.explained_variance_ = variance[:b]
         self.explained_variance_ratio_ = variance[:b] / (variance.sum() or 1.0)
         self.residual_variance_ = float(variance[b:].sum())
-        self.left_out_variance_ = variance[b:] @ np.square(pca.components_[b:])
+        self.left_out_variance_ = variance[b:] @ np.square(components[b:])
         self.n_components_ = b
+        timed = [] if arrays.kind == "rows" else arrays
+        self._expected = HiddenNormal.of(mean, covariance, timed)
+        self.correlation_time_ = self._expected.tau
         return self
 
     fit_transform: ClassVar[FitTransform] = whole_fit_transform
@@ -154,18 +203,21 @@ class ASpace(
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
-            Performances, or postures in rows.
+            Performances, or postures in rows; NaN where something was not seen.
 
         Returns
         -------
         list of ndarray (n_frames_i, b), or ndarray
             Points of the aSpace, of the same kind as ``X``; a ``(performance, frame)`` frame under
-            ``set_output(transform="pandas")``.
+            ``set_output(transform="pandas")``. NaN where nothing of a posture was seen.
         """
         check_is_fitted(self)
-        performances = check_performances(self, X, reset=False, level="posture")
-        components = self.components_.T
-        arrays = [((a - self.mean_) @ components).astype(a.dtype, copy=False) for a in performances]
+        performances = check_performances(self, X, reset=False, level="posture", finite="allow-nan")
+        components, timed = self.components_.T, performances.kind != "rows"
+        arrays = []
+        for a in performances:
+            whole = self._expected.fill(a, timed) if np.isnan(a.sum()) else a
+            arrays.append(((whole - self.mean_) @ components).astype(a.dtype, copy=False))
         return restore(self, performances, arrays)
 
     @snapshot
@@ -180,10 +232,11 @@ class ASpace(
         Returns
         -------
         list of ndarray (n_frames_i, n_features), or ndarray
-            Postures, of the same kind as ``X``.
+            Postures, of the same kind as ``X``; NaN where a coordinate is NaN.
         """
         check_is_fitted(self)
-        performances = check_transformed(self, X, self.get_feature_names_out())
+        names = self.get_feature_names_out()
+        performances = check_transformed(self, X, names, finite="allow-nan")
         arrays = [
             (a @ self.components_ + self.mean_).astype(a.dtype, copy=False) for a in performances
         ]
@@ -209,12 +262,40 @@ class ASpace(
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.three_d_array = True
+        tags.input_tags.allow_nan = True
         tags.transformer_tags.preserves_dtype = ["float64", "float32"]
         return tags
 
     @property
     def _n_features_out(self):
         return self.n_components_
+
+    def _check_seen(self, postures):
+        """Which postures (n_postures,) show anything; an error if a feature was never seen."""
+        hidden = np.isnan(postures)
+        self.missing_ = hidden.mean(axis=0)
+        seen, n_features = len(hidden) - hidden.sum(axis=0), hidden.shape[1]
+        names = getattr(self, "feature_names_in_", None)
+        called = [f"{k}" if names is None else f"{k} ({names[k]!r})" for k in range(n_features)]
+        if seen.min() < 2:
+            k = int(seen.argmin())
+            times = "never seen" if seen[k] == 0 else "seen in one posture only"
+            raise ValueError(
+                f"Feature {called[k]} was {times}. Of {counted(n_features, 'feature')} "
+                f"{(seen < 2).sum()} was seen in fewer than 2 postures: leave such out, or fit on "
+                "performances that show them."
+            )
+        if seen.min() < n_features:
+            k = int(seen.argmin())
+            warnings.warn(
+                f"Feature {called[k]} was seen in {counted(int(seen[k]), 'posture')} of "
+                f"{len(hidden)}, and a posture has {counted(n_features, 'feature')}: fewer "
+                "postures than features hardly tell what it is where it is hidden. Leave it out, "
+                "or fit on performances that show it.",
+                UserWarning,
+                stacklevel=2,
+            )
+        return ~hidden.all(axis=1)
 
     def _count(self, variance):
         """The smallest number of eigenvalues that reach the share to be kept (Eq. 4)."""
@@ -223,3 +304,12 @@ class ASpace(
         share = np.cumsum(variance)
         reached = share >= self.n_components * share[-1]
         return int(np.argmax(reached)) + 1
+
+
+def _components(postures):
+    """Mean, eigenvectors and eigenvalues of the covariance of postures, and that itself."""
+    # Of postures that are all equal PCA divides 0 by 0.
+    with np.errstate(invalid="ignore"):
+        pca = PCA().set_output(transform="default").fit(postures)
+    variance, components = pca.explained_variance_, pca.components_
+    return pca.mean_, components, variance, (components.T * variance) @ components

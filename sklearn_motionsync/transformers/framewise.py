@@ -8,8 +8,6 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
 from sklearn.base import BaseEstimator, TransformerMixin, clone
-from sklearn.compose import ColumnTransformer
-from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 from sklearn.utils._param_validation import HasMethods
 from sklearn.utils.metaestimators import available_if
@@ -23,6 +21,7 @@ from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
+from ..utils.pipelines import takes_gaps
 
 __all__ = ["FrameWise"]
 
@@ -222,7 +221,7 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator)
 
     def _finite(self):
         """What the input must be: NaN is allowed if the transformer accepts it."""
-        return "allow-nan" if _takes_gaps(self.transformer) else True
+        return "allow-nan" if takes_gaps(self.transformer) else True
 
     def _named(self, frames):
         """A copy of frames with their names: a transformer may write to it."""
@@ -247,21 +246,6 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator)
                 "frames is applied before, [change(x) for x in X]."
             )
         return np.ascontiguousarray(rows)
-
-
-def _takes_gaps(transformer):
-    """Whether a transformer accepts NaN, or passes its input on without a check."""
-    if isinstance(transformer, Pipeline):
-        steps = [step for _, step in transformer.steps if step not in (None, "passthrough")]
-        return bool(steps) and _takes_gaps(steps[0])
-    if isinstance(transformer, FeatureUnion):
-        parts = [part for _, part in transformer.transformer_list if part != "drop"]
-        return all(part == "passthrough" or _takes_gaps(part) for part in parts)
-    if not hasattr(transformer, "__sklearn_tags__"):
-        return False
-    tags = get_tags(transformer)
-    unchecked = tags.no_validation or isinstance(transformer, ColumnTransformer)
-    return tags.input_tags.allow_nan or unchecked
 
 
 def _inverts(transformer, rows):

@@ -4,7 +4,10 @@ import inspect
 from contextlib import contextmanager
 from typing import NamedTuple
 
+import numpy as np
+from sklearn.compose import ColumnTransformer
 from sklearn.pipeline import FeatureUnion, Pipeline
+from sklearn.utils import get_tags
 from sklearn.utils.validation import check_is_fitted
 
 __all__ = [
@@ -19,6 +22,7 @@ __all__ = [
     "index_of_pattern",
     "route_to_synchronizer",
     "steps_to_fit",
+    "takes_gaps",
     "transform_through",
     "union_transformers",
 ]
@@ -272,8 +276,10 @@ def index_of_pattern(synchronizer, performances):
     index = synchronizer.pattern_index_
     if index is None or index >= len(performances):
         return None
-    same = synchronizer.normalize(performances.take([index]))[0]
-    return index if (same == synchronizer.pattern_).all() else None
+    own = synchronizer.normalize(performances.take([index]))[0]
+    # The gaps of the pattern are filled.
+    same = (own == synchronizer.pattern_) | np.isnan(own)
+    return index if same.all() else None
 
 
 def _named_steps(pipeline):
@@ -317,3 +323,18 @@ def _search(estimator, fits):
             before = estimator.steps[:i] + ([] if inner is None else [(name, inner)])
             return (Pipeline(before) if before else None), fitting
     return None
+
+
+def takes_gaps(transformer):
+    """Whether a transformer accepts NaN, or passes its input on without a check."""
+    if isinstance(transformer, Pipeline):
+        steps = [step for _, step in transformer.steps if step not in (None, "passthrough")]
+        return bool(steps) and takes_gaps(steps[0])
+    if isinstance(transformer, FeatureUnion):
+        parts = [part for _, part in transformer.transformer_list if part != "drop"]
+        return all(part == "passthrough" or takes_gaps(part) for part in parts)
+    if not hasattr(transformer, "__sklearn_tags__"):
+        return False
+    tags = get_tags(transformer)
+    unchecked = tags.no_validation or isinstance(transformer, ColumnTransformer)
+    return tags.input_tags.allow_nan or unchecked

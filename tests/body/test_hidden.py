@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from sklearn.utils import get_tags
-from sklearn_motionsync import ASpace, DirectionCosines, Skeleton, to_frame
+from sklearn_motionsync import ASpace, DirectionCosines, JointPositions, Skeleton, to_frame
 from sklearn_motionsync.body.axes import fill_heading, heading_axes
 from sklearn_motionsync.datasets import load_performances, make_bending
 
@@ -270,13 +270,46 @@ def test_hidden_joints_are_refused_unless_allowed(recordings, fitted):
         plain.transform([x])
     with pytest.raises(ValueError, match="is NaN"):
         plain.inverse_transform(fitted().transform([x]))
-    with pytest.raises(ValueError, match=r"Performance 0, frame 3, .* is NaN.*Interpolate"):
-        ASpace().fit(plain.transform(recordings)).transform(fitted().transform([x]))
-    for hidden, allowed in (("nan", True), ("raise", False)):
-        tags = get_tags(DirectionCosines(PAPER, hidden=hidden))
-        assert tags.input_tags.allow_nan is allowed
-    with pytest.raises(ValueError, match="The 'hidden' parameter"):
-        DirectionCosines(PAPER, hidden="drop").fit(recordings)
+    with pytest.raises(ValueError, match=r"Performance 0, frame 3, .* is NaN.*Set hidden='nan'"):
+        JointPositions(PAPER).fit(recordings).transform([x])
+    points = ASpace().fit(plain.transform(recordings)).transform(fitted().transform([x]))
+    assert np.isfinite(points[0]).all()
+    for kind in (DirectionCosines, JointPositions):
+        for hidden, allowed in (("nan", True), ("raise", False)):
+            tags = get_tags(kind(PAPER, hidden=hidden))
+            assert tags.input_tags.allow_nan is allowed
+        with pytest.raises(ValueError, match="The 'hidden' parameter"):
+            kind(PAPER, hidden="drop").fit(recordings)
+
+
+@pytest.mark.parametrize("reference", ["heading", "world"])
+def test_positions_of_hidden_joints_are_nan_and_others_unchanged(reference, recordings):
+    x = recordings[0]
+    positions = JointPositions(PAPER, reference, "nan").fit(recordings)
+    (whole,) = positions.transform([x])
+    np.testing.assert_array_equal(whole, JointPositions(PAPER, reference).fit_transform([x])[0])
+    hidden = np.random.default_rng(0).random((len(x), 15)) < 0.2
+    for joint in ("left_hip", "right_hip"):
+        hidden[:, JOINTS.index(joint)] = False
+    (found,) = positions.transform([without(x, hidden)])
+    names = positions.get_feature_names_out()
+    lost = hidden[:, [JOINTS.index(name[:-2]) for name in names]] | hidden[:, :1]
+    np.testing.assert_array_equal(np.isnan(found), lost)
+    # The unit is the median length of the leg, of fewer frames.
+    np.testing.assert_allclose(found[~lost], whole[~lost], rtol=2e-3, atol=1e-9)
+
+
+def test_positions_of_a_body_whose_legs_are_never_seen_have_the_unit_of_fit(recordings):
+    positions = JointPositions(PAPER, hidden="nan").fit(recordings)
+    x = 2 * recordings[0]
+    frames = np.arange(len(x))
+    (found,) = positions.transform([hide(x, frames, "left_knee", "right_knee")])
+    (whole,) = positions.transform([x])
+    seen = ~np.isnan(found)
+    assert seen.any(axis=0).sum() == 36
+    np.testing.assert_allclose(found[seen], whole[seen], rtol=0.05, atol=1e-9)
+    with pytest.raises(ValueError, match=r"\['left_thigh', 'left_leg'\] are hidden in every frame"):
+        JointPositions(PAPER, hidden="nan").fit([hide(x, frames, "left_knee")])
 
 
 def test_visible_limbs_are_checked(recordings, fitted):

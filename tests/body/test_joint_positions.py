@@ -80,9 +80,10 @@ def test_features_are_invariant_to_place_and_heading_of_each_frame(bending):
     np.testing.assert_allclose(astray, straight, atol=1e-9)
 
 
-def test_fit_stores_the_number_of_columns_only(bending):
+def test_transform_needs_nothing_of_fit_without_gaps(bending):
     fitted = JointPositions(bending.skeleton).fit(bending.data[:2])
-    assert {name for name in vars(fitted) if name.endswith("_")} == {"n_features_in_"}
+    stored = {name for name in vars(fitted) if name.endswith("_")}
+    assert stored == {"n_features_in_", "limb_lengths_"}
     other = clone(fitted).fit([3 * x for x in bending.data[2:]])
     for x, y in zip(fitted.transform(bending.data), other.transform(bending.data), strict=True):
         np.testing.assert_array_equal(x, y)

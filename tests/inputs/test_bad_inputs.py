@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from scipy.sparse import csr_array
 from sklearn.base import clone
+from sklearn.utils import get_tags
 from sklearn_motionsync import (
     ActionModel,
     ASpace,
@@ -26,6 +27,8 @@ SYNCHRONIZERS = [
 ]
 SEQUENCES = [*SYNCHRONIZERS, TimingChannel(LinearSynchronizer()), ActionModel()]
 ALL = [ASpace(), *SEQUENCES]
+# Those that take no gaps.
+WHOLE = [e for e in ALL if not get_tags(e).input_tags.allow_nan]
 
 NAMES = ["hip", "knee", "ankle"]
 RNG = np.random.default_rng(0)
@@ -112,7 +115,7 @@ PERFORMANCES = [
     (one(lambda x: csr_array(x)), ALL, ["Performance 2", "sparse", "toarray"]),
     (one(lambda x: x.astype(np.longdouble) * np.longdouble("1e400")), ALL, ["2", "infinity"]),
     (one(lambda x: [[10**400, 1, 2]] * 20), ALL, ["Performance 2", "too large"]),
-    (one(put(np.nan)), ALL, ["Performance 2, frame 4, feature 1 is NaN", "nterpolate"]),
+    (one(put(np.nan)), WHOLE, ["Performance 2, frame 4, feature 1 is NaN", "nterpolate"]),
     (one(put(-np.inf)), ALL, ["Performance 2, frame 4, feature 1 is infinity"]),
     (one(put(-2e9)), ALL, ["Performance 2", "2e+09", "between 1e-09 and 1e+09", "unit"]),
     (one(lambda x: (1e30 * x).astype("f4")), ALL, ["Performance 2", "e+3", "another unit"]),
@@ -126,7 +129,7 @@ PERFORMANCES = [
         ALL,
         ["Performance 2", "not a numeric array", "parts differ in length", "times of spikes"],
     ),
-    (LABELLED.mask(LABELLED["knee"] == X[1][4, 1]), ALL, ["'bob'", "frame 4", "'hip'", "NaN"]),
+    (LABELLED.mask(LABELLED["knee"] == X[1][4, 1]), WHOLE, ["'bob'", "frame 4", "'hip'", "NaN"]),
     ([*FRAMES[:2], FRAMES[2][NAMES[:2]]], ALL, ["Performance 2", "it lacks ['ankle']", "common"]),
     ([*FRAMES[:2], MORE[2]], ALL, ["Performance 2", "has besides ['toe']", "columns='common'"]),
     ([*FRAMES[:2], X[2]], ALL, ["Performance 2 has the columns None", "['hip',"]),
@@ -303,8 +306,8 @@ CALLS = [
     (lambda: MODEL.accepts(masked(X[0]), 0), ["postures", "masked"]),
     (lambda: MODEL.accepts(X[0] + 0j, 0), ["postures", "complex"]),
     (lambda: MODEL.accepts(X[0].astype("m8[s]"), 0), ["postures", "durations"]),
-    (lambda: MODEL.accepts(put(np.nan, X[0]), 0), ["postures, row 4, feature 1 is NaN"]),
-    (lambda: FRAMED.accepts(put(np.nan, X[0]), 0), ["feature 1 ('knee') is NaN"]),
+    (lambda: MODEL.accepts(put(np.inf, X[0]), 0), ["postures, row 4, feature 1 is infinity"]),
+    (lambda: FRAMED.accepts(put(np.inf, X[0]), 0), ["feature 1 ('knee') is infinity"]),
     (lambda: FRAMED.accepts(TURNED[0], 0), ["postures", "same order"]),
     (lambda: MODEL.accepts(X[0][0], 0), ["shape (n_postures, 3)", "[posture]"]),
     (lambda: MODEL.accepts(X[0], 20), ["frame", "0 to 19"]),

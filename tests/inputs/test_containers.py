@@ -234,8 +234,15 @@ def test_frames_that_only_fill_up_a_labelled_array(trials):
     array = to_frame(trials, columns=NAMES).to_xarray().to_dataarray("angle")
     array = array.transpose("performance", "frame", "angle")
     assert array.shape == (12, 35, 3)
-    with pytest.raises(ValueError, match=r"frame 24, feature 0 \('hip'\) is NaN"):
+    with pytest.raises(ValueError, match="is NaN from frame 24 to its end, frame 34"):
         sync().fit(array)
+    padded = np.full((2, 35, 3), np.nan)
+    padded[0], padded[1, :20] = trials[0][:1], trials[1][:20]
+    padded[0] += np.sin(np.arange(35))[:, np.newaxis]
+    with pytest.raises(ValueError, match=r"Performance 1 is NaN from frame 20 .* list\(X\)"):
+        sync().fit(padded)
+    # An end that was not seen.
+    assert np.isnan(sync().fit_transform(list(padded))[1, -5:]).all()
     same_bits(to_sequences(to_frame(array).dropna(how="all")), trials)
 
 

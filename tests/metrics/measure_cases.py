@@ -195,7 +195,7 @@ def with_gap(value):
 
 
 WRONG_CURVES = [
-    (with_gap(NAN), "before, performance 2, frame 7, feature 1 is NaN"),
+    (np.full((4, 20, 3), NAN), "all is NaN|is NaN"),
     (with_gap(INF), "is infinity"),
     (np.ma.masked_invalid(with_gap(NAN)), "masked"),
     (CURVES[0] + 1j, "complex"),
@@ -259,5 +259,12 @@ CASES = {
     "least_squares": Case(CURVES, spread_ratio, CURVE_REFUSALS),
     "sobolev_least_squares": Case(CURVES, velocity_ratio, CURVE_REFUSALS),
     "pairwise_correlation": Case(CURVES, correlation_ratio, CURVE_REFUSALS),
-    "amplitude_phase_variance": Case(CURVES, decomposition, CURVE_REFUSALS),
+    "amplitude_phase_variance": Case(
+        CURVES,
+        decomposition,
+        [
+            *CURVE_REFUSALS,
+            ((with_gap(NAN), CURVES[1]), {}, "before, performance 2, frame 7, feature 1 is NaN"),
+        ],
+    ),
 }

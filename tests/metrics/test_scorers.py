@@ -23,7 +23,13 @@ from sklearn_motionsync import (
     LinearSynchronizer,
 )
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.metrics import FeatureHoldoutScorer, SpreadScorer, least_squares
+from sklearn_motionsync.metrics import (
+    FeatureHoldoutScorer,
+    SpreadScorer,
+    least_squares,
+    pairwise_correlation,
+    sobolev_least_squares,
+)
 
 from shift_synchronizer import ShiftSynchronizer
 
@@ -377,3 +383,43 @@ def test_score_of_constant_features_is_1(spread, points):
     sync = DenseSynchronizer(40).fit(X)
     sign = 1 if spread == "correlation" else -1
     assert SpreadScorer(spread)(sync, X) == FeatureHoldoutScorer(spread, 2)(sync, X) == sign
+
+
+# -- gaps -----------------------------------------------------------------------------------
+
+
+def spread_of_seen(z):
+    """The squared differences of every sequence from the mean of the others, where it is seen."""
+    out = []
+    for i, x in enumerate(z):
+        others = np.nanmean(np.delete(z, i, axis=0), axis=0)
+        out.append(np.nanmean(np.square(x - others)) * x[0].size)
+    return np.array(out)
+
+
+def test_hidden_values_do_not_count_in_the_spread():
+    rng = np.random.default_rng(0)
+    before = rng.standard_normal((6, 201, 3))
+    after = 0.5 * before + rng.standard_normal((201, 3))
+    before[1, 20:50], after[2, 30:60, 1] = np.nan, np.nan
+    found = least_squares(before, after)
+    expected = np.mean(spread_of_seen(after) / spread_of_seen(before))
+    assert abs(found - expected) < 0.02 * expected
+    # As without gaps, nearly.
+    assert abs(found - 0.25) < 0.02
+    assert abs(sobolev_least_squares(before, after) - 0.25) < 0.02
+    curves = np.sin(np.linspace(0, 6, 201))[:, np.newaxis] + 0.3 * before
+    whole = np.nan_to_num(curves - np.nanmean(curves)) + 0
+    assert abs(pairwise_correlation(curves, curves) - 1) < 1e-12
+    assert np.isfinite(pairwise_correlation(whole, curves))
+
+
+@pytest.mark.parametrize("scorer", [SpreadScorer(), FeatureHoldoutScorer()])
+def test_scores_of_performances_with_gaps(scorer):
+    X = [x[:, 6:18] for x in make_bending(8, random_state=0).data]
+    gappy = [x.copy() for x in X]
+    for i, x in enumerate(gappy):
+        x[len(x) // 3 : len(x) // 2, (i % 3) : (i % 3) + 3] = np.nan
+    sync = DenseSynchronizer(40)
+    expected, found = (cross_val_score(sync, given, cv=2, scoring=scorer) for given in (X, gappy))
+    assert np.abs(found - expected).max() < 0.25 * np.abs(expected).max()

@@ -151,7 +151,7 @@ def test_accepts_and_sample_refuse_frames_outside(model, frame):
             ask()
 
 
-@pytest.mark.parametrize("postures", [[0.0, 0, 0], [[0.0, 0]], [[np.nan, 0, 0]]])
+@pytest.mark.parametrize("postures", [[0.0, 0, 0], [[0.0, 0]], [[np.inf, 0, 0]]])
 def test_accepts_refuses_invalid_postures(model, postures):
     with pytest.raises(ValueError, match="postures"):
         model.accepts(postures, 0)

@@ -206,7 +206,7 @@ def test_many_of_one_group_before_another():
     [
         (curves(3, n_frames=11), None, "have 11 frames, the model 10"),
         ([np.zeros((10, 2)), np.zeros((9, 2))], None, "Performance 1 has 9 frames"),
-        (np.full((3, 10, 2), np.nan), None, "Performance 0, frame 0, feature 0 is NaN"),
+        (np.full((3, 10, 2), np.nan), None, "Performance 0 is NaN in every frame and feature"),
         (np.zeros((3, 10, 3)), None, "3 features a frame, but ActionModel is expecting 2"),
         (curves(3, n_frames=10), ["a", None, "b"], r"groups\[1\] is missing, None"),
         (

@@ -169,7 +169,7 @@ def test_tables_by_index_equal_a_list():
 
 
 BAD = {
-    "gap": (np.where(np.arange(20)[:, None] == 5, np.nan, X[11]), "frame 5, feature 0 is NaN"),
+    "infinity": (np.where(np.arange(20)[:, None] == 5, np.inf, X[11]), "frame 5, feature 0 is inf"),
     "width": (X[11][:, :2], "has 2 features a frame"),
     "unit": (1e40 * X[11], "e\\+40.*give the data in another unit"),
     "text": ([["a"] * 3] * 9, "is not a numeric array"),
@@ -281,7 +281,7 @@ def test_only_the_sample_is_checked():
     spoilt = X.copy()
     spoilt[np.delete(np.arange(16), sample)] = np.nan
     DenseSynchronizer(max_fit=9).fit(spoilt)
-    spoilt[sample[7], 3, 1] = np.nan
+    spoilt[sample[7], 3, 1] = np.inf
     with pytest.raises(ValueError, match=f"Performance {sample[7]}, frame 3, feature 1"):
         DenseSynchronizer(max_fit=9).fit(spoilt)
 

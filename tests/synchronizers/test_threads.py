@@ -125,7 +125,7 @@ def test_failed_fit_leaves_nothing_fitted(estimator, sets):
     fitted = clone(estimator).fit(sets[0])
     parameters = fitted.get_params()
     with pytest.raises(ValueError, match="Performance 1"):
-        fitted.fit([sets[1][0], sets[1][1] * np.nan])
+        fitted.fit([sets[1][0], sets[1][1] * np.inf])
     with pytest.raises(NotFittedError):
         check_is_fitted(fitted)
     assert fitted.get_params() == parameters

@@ -21,6 +21,7 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 from sklearn_motionsync import (
     ActionModel,
     ASpace,
+    CycleSegmenter,
     DenseSynchronizer,
     DirectionCosines,
     FrameWise,
@@ -170,7 +171,7 @@ def test_gaps_pass_to_transformers_that_accept_them(transformer, X):
     [
         FrameWise(PCA(2)),
         FrameWise(make_union(StandardScaler(), PCA(2))),
-        make_pipeline(FrameWise(StandardScaler()), ASpace()),
+        make_pipeline(FrameWise(StandardScaler()), CycleSegmenter()),
     ],
     ids=str,
 )

@@ -1,0 +1,228 @@
+"""Gaps in the trellis against all admissible paths, and what fills them against slow versions."""
+
+import numpy as np
+import pytest
+from sklearn_motionsync.matching import trellis as module
+from sklearn_motionsync.matching.anchors import KeyframeColumns, add_ramps
+from sklearn_motionsync.matching.costs import COSTS, step_table
+from sklearn_motionsync.matching.gaps import Filler, add_weights
+from sklearn_motionsync.matching.trellis import Trellis
+
+from oracle import known_paths, step_costs
+
+KEPT = {"rows": (0, 10**9), "choices": (0, 0), "small": (10**6, 0)}
+
+
+@pytest.fixture(params=KEPT)
+def kept(request, monkeypatch):
+    """What is kept of a tile."""
+    small_bytes, row_bytes = KEPT[request.param]
+    monkeypatch.setattr(module, "SMALL_BYTES", [small_bytes] * 2)
+    monkeypatch.setattr(module, "ROW_BYTES", row_bytes)
+
+
+def brute_force(x, y, weights, others, costs, mu, subframes, reach, unseen):
+    """The smallest cost of all paths, each added up frame by frame, and the paths that have it."""
+    totals, paths = [], known_paths(len(x), tuple(sorted(costs)), subframes, reach)
+    for path in paths:
+        total = 0.0
+        for p, q in enumerate(path):
+            step = subframes if p == 0 else q - path[p - 1]
+            b, g, phi = costs[step]
+            square = x[p] @ x[p] + b * (y[q] @ y[q]) - g * (x[p] @ y[q])
+            w = weights[p] * others[q]
+            total += w * square + (1 - w) * unseen + (p > 0) * mu * phi
+        totals.append(total)
+    best = min(totals)
+    near = np.array(totals) <= best + 1e-9 * max(1.0, best)
+    return best, [tuple(path) for path, is_near in zip(paths, near, strict=True) if is_near]
+
+
+def draw(seed, n_frames, subframes, exact):
+    """Bases and moving sequences with a column of weights.
+
+    Exact ones are multiples of powers of two, so that no sum is rounded.
+    """
+    rng, out = np.random.default_rng(seed), []
+    for n, length in ((3, n_frames), (4, (n_frames - 1) * subframes + 1)):
+        if exact:
+            x, w = rng.integers(-3, 4, (n, length, 2)) / 2, rng.integers(0, 3, (n, length)) / 2
+        else:
+            x, w = rng.standard_normal((n, length, 2)), rng.random((n, length))
+            # Whole frames that were not seen, and such that were.
+            w[rng.random(w.shape) < 0.3], w[rng.random(w.shape) < 0.3] = 0, 1
+        out.append(np.concatenate([x, w[:, :, np.newaxis]], axis=2))
+    return out
+
+
+CASES = [(6, 2, 1, 2, 0.5, 0.25), (7, 3, 1, 3, 0.75, 0.5), (5, 2, 2, 2, 0.5, 1.0)]
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("cost", [*COSTS, "exact"])
+def test_best_path_with_gaps_equals_all_admissible_paths(case, cost, kept):
+    n_frames, max_rate, subframes, reach, mu, unseen = case
+    exact, cost = cost == "exact", "posture" if cost == "exact" else cost
+    bases, moving = draw(n_frames, n_frames, subframes, exact)
+    costs = step_costs(cost, max_rate, subframes)
+    trellis = Trellis(step_table(cost, max_rate, subframes), mu, reach, unseen=unseen)
+    distances, (disparities, lengths) = (
+        trellis.distances(bases, moving),
+        trellis.paths_and_costs(bases, moving),
+    )
+    for n, base in enumerate(bases):
+        given = trellis.costs(base, moving, disparities[n])
+        for m, other in enumerate(moving):
+            sequences = base[:, :2], other[:, :2], base[:, 2], other[:, 2]
+            best, paths = brute_force(*sequences, costs, mu, subframes, reach, unseen)
+            path = disparities[n, m] + subframes * np.arange(n_frames)
+            assert tuple(path) in paths
+            if exact:
+                # To the last bit.
+                assert distances[n, m] == lengths[n, m] == given[m] == best
+            found = [distances[n, m], lengths[n, m], given[m]]
+            np.testing.assert_allclose(found, best, rtol=1e-12, atol=1e-12)
+
+
+def test_ties_take_the_same_step_in_every_way_of_back_tracking(monkeypatch):
+    bases, moving = draw(3, 7, 1, exact=True)
+    trellis = Trellis(step_table("posture", 2, 1), 0.25, 3, unseen=0.5)
+    found = []
+    for small_bytes, row_bytes in KEPT.values():
+        monkeypatch.setattr(module, "SMALL_BYTES", [small_bytes] * 2)
+        monkeypatch.setattr(module, "ROW_BYTES", row_bytes)
+        found.append(trellis.paths(bases, moving))
+    np.testing.assert_array_equal(found[0], found[1])
+    np.testing.assert_array_equal(found[0], found[2])
+
+
+def test_weights_of_one_are_as_without_weights():
+    bases, moving = draw(0, 9, 1, exact=False)
+    bases[..., 2], moving[..., 2] = 1, 1
+    table = step_table("velocity", 3, 1)
+    plain, weighed = Trellis(table, 0.3, 4), Trellis(table, 0.3, 4, unseen=0.7)
+    expected = plain.distances(bases[..., :2], moving[..., :2])
+    np.testing.assert_allclose(weighed.distances(bases, moving), expected, rtol=1e-12)
+    paths = plain.paths(bases[..., :2].copy(), moving[..., :2].copy())
+    np.testing.assert_array_equal(weighed.paths(bases, moving), paths)
+
+
+def test_what_was_not_seen_does_not_matter():
+    bases, moving = draw(1, 9, 1, exact=False)
+    trellis = Trellis(step_table("velocity", 3, 1), 0.3, 4, unseen=0.7)
+    expected = trellis.paths(bases, moving), trellis.distances(bases, moving)
+    for sequences in (bases, moving):
+        hidden = sequences[..., 2] == 0
+        assert hidden.any()
+        sequences[hidden, :2] = np.random.default_rng(2).standard_normal((hidden.sum(), 2))
+    np.testing.assert_array_equal(trellis.paths(bases, moving), expected[0])
+    np.testing.assert_allclose(trellis.distances(bases, moving), expected[1], rtol=1e-12)
+
+
+def test_gaps_and_keyframes_together_equal_all_admissible_paths():
+    bases, moving = draw(5, 6, 1, exact=False)
+    keyframes = np.array([[0.4], [0.2], [np.nan]]), np.array([[0.6], [np.nan], [0.2], [0.8]])
+    bases, moving = (
+        np.array(add_ramps(list(x), k)) for x, k in zip((bases, moving), keyframes, strict=True)
+    )
+    mu, unseen, costs = 0.3, 0.6, step_costs("velocity", 2, 1)
+    anchors = KeyframeColumns(1, 0.0).on_clock(6, 0.1)
+    trellis = Trellis(step_table("velocity", 2, 1), mu, 3, anchors=anchors, unseen=unseen)
+    shares, penalties = anchors.left(bases)[..., 0], anchors.right(moving)[..., 0]
+    distances = trellis.distances(bases, moving)
+    for n, base in enumerate(bases):
+        for m, other in enumerate(moving):
+            totals = []
+            for path in known_paths(6, tuple(sorted(costs)), 1, 3):
+                only = brute_force_of(path, base, other, costs, mu, unseen)
+                totals.append(only + shares[n] @ penalties[m, path])
+            np.testing.assert_allclose(distances[n, m], min(totals), rtol=1e-12)
+
+
+def brute_force_of(path, base, other, costs, mu, unseen):
+    """The cost of one path with gaps."""
+    total = 0.0
+    for p, q in enumerate(path):
+        b, g, phi = costs[1 if p == 0 else q - path[p - 1]]
+        x, y, w = base[p, :2], other[q, :2], base[p, 2] * other[q, 2]
+        total += w * (x @ x + b * (y @ y) - g * (x @ y)) + (1 - w) * unseen + (p > 0) * mu * phi
+    return total
+
+
+# -- what fills gaps ------------------------------------------------------------------------
+
+
+def curves(n=6, n_frames=80, seed=0):
+    """Performances of five features: three that move by two hidden ones, and these."""
+    rng, t = np.random.default_rng(seed), np.linspace(0, 1, n_frames)
+    out = []
+    for _ in range(n):
+        a = np.sin(2 * np.pi * (1.5 * t + 0.1 * rng.random()))
+        b = np.cos(2 * np.pi * (2.5 * t + 0.1 * rng.random()))
+        out.append(np.column_stack([a, b, a + b, a - 2 * b, 3 * b + 0.5]))
+    return out
+
+
+def test_a_feature_that_the_others_determine_is_recovered():
+    X = curves()
+    filler = Filler.learn(X)
+    gappy = X[2].copy()
+    gappy[20:60, 3] = np.nan
+    filled, weights = filler(gappy)
+    line = np.interp(np.arange(20, 60), [19, 60], X[2][[19, 60], 3])
+    wrong = np.abs(line - X[2][20:60, 3]).max()
+    # All but what the ridge shrinks.
+    assert np.abs(filled[20:60, 3] - X[2][20:60, 3]).max() < wrong / 3
+    seen = np.isfinite(gappy)
+    np.testing.assert_array_equal(filled[seen], gappy[seen])
+    assert (weights[:20] == 1).all()
+    assert (weights[60:] == 1).all()
+    # Of what is known the rest is small.
+    assert weights[20:60].min() > 0.9
+
+
+def test_weights_fall_with_the_length_of_a_gap():
+    X, found = curves(), []
+    filler = Filler.learn(X)
+    for length in (4, 8, 16, 40):
+        gone = X[1].copy()
+        gone[20 : 20 + length] = np.nan
+        filled, weights = filler(gone)
+        assert np.isfinite(filled).all()
+        found.append(weights[20 : 20 + length].min())
+        assert (weights[:20] == 1).all()
+    assert found == sorted(found, reverse=True)
+    assert found[0] > 0.9
+    assert found[-1] < 0.2
+
+
+def test_regression_equals_the_inverse_of_the_covariance():
+    X = [np.cumsum(np.random.default_rng(i).standard_normal((90, 5)), axis=0) for i in range(8)]
+    filler = Filler.learn(X)
+    seen, hidden = np.array([True, False, True, True, False]), [1, 4]
+    for reach, factor in filler.factors.items():
+        covariance, ridge = factor @ factor.T, filler.ridge[reach]
+        inner = covariance[np.ix_(seen, seen)] + ridge * np.eye(3)
+        across = covariance[np.ix_(seen, hidden)]
+        slopes = np.linalg.inv(inner) @ across
+        left = np.diag(covariance[np.ix_(hidden, hidden)] - across.T @ slopes)
+        found = filler.regression(reach, seen, hidden)
+        np.testing.assert_allclose(found[0], slopes, atol=1e-10)
+        np.testing.assert_allclose(found[1], left, atol=1e-10 * covariance.max())
+
+
+def test_ends_are_held_and_a_feature_never_seen_has_its_mean():
+    flat = [np.full((30, 2), 3.0) + np.arange(2) for _ in range(4)]
+    filler = Filler.learn(flat)
+    gappy = flat[0].copy()
+    gappy[:8, 0], gappy[:, 1] = np.nan, np.nan
+    filled, _ = filler(gappy)
+    np.testing.assert_allclose(filled, flat[0])
+
+
+def test_weights_are_a_column():
+    X = curves(2)
+    a, b = add_weights(X, [np.arange(80.0), np.ones(80)])
+    np.testing.assert_array_equal(a[:, :5], X[0])
+    np.testing.assert_array_equal(a[:, 5], np.arange(80))
+    np.testing.assert_array_equal(add_weights(X, None)[1], b)

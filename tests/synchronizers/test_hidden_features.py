@@ -1,0 +1,372 @@
+"""Performances with gaps: what is matched, kept as NaN, and refused."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn import clone, config_context
+from sklearn.model_selection import GridSearchCV, cross_val_score, cross_validate
+from sklearn.pipeline import make_pipeline
+from sklearn.utils import get_tags
+from sklearn_motionsync import (
+    DenseSynchronizer,
+    KeyframeSynchronizer,
+    LinearSynchronizer,
+    PartSynchronizer,
+    TimingChannel,
+)
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.metrics import SpreadScorer
+
+P = 40
+DENSE = DenseSynchronizer(P)
+SYNCHRONIZERS = {
+    "dense": DENSE,
+    "paper": DenseSynchronizer.paper(n_frames=P),
+    "elastic": DenseSynchronizer(P, cost="elastic", refine=False),
+    "subframes": DenseSynchronizer(P, subframes=2),
+    "refined": DenseSynchronizer(P, refine=True),
+    "parts": PartSynchronizer({"one": [0, 1, 2], "two": [5, 6]}, synchronizer=DENSE),
+    "timing": TimingChannel(DENSE),
+    "linear": LinearSynchronizer(P),
+}
+WHOLE = [x[:, 6:18] for x in make_bending(8, random_state=0).data]
+
+
+def with_gaps(performances, seed=0):
+    """A limb hidden for a third, some frames gone, and a feature that flickers."""
+    rng = np.random.default_rng(seed)
+    out = [x.copy() for x in performances]
+    for i, x in enumerate(out):
+        n = len(x)
+        if i % 3 == 0:
+            x[n // 3 : 2 * n // 3, 3:6] = np.nan
+        elif i % 3 == 1:
+            x[n // 2 : n // 2 + n // 10] = np.nan
+        x[rng.random(n) < 0.1, 7] = np.nan
+    return out
+
+
+GAPPY = with_gaps(WHOLE)
+
+
+def mean_error(times, expected):
+    return np.abs(times - expected).mean()
+
+
+@pytest.mark.parametrize("name", [name for name in SYNCHRONIZERS if name != "linear"])
+def test_warps_are_those_without_gaps_nearly(name):
+    sync = clone(SYNCHRONIZERS[name])
+    expected = sync.fit(WHOLE).match(WHOLE)
+    # Learnt from whole performances, and from those with gaps.
+    after = sync.match(GAPPY)
+    # To the same pattern.
+    inner = sync.synchronizer_ if name in ("parts", "timing") else sync
+    given = "synchronizer__pattern" if inner is not sync else "pattern"
+    both = clone(sync).set_params(**{given: inner.pattern_index_}).fit(GAPPY).match(GAPPY)
+    moved = np.abs(expected.offsets).mean()
+    assert mean_error(after.times, expected.times) < 0.1 * moved
+    assert mean_error(both.times, expected.times) < 0.5 * moved
+
+
+@pytest.mark.parametrize("name", SYNCHRONIZERS)
+def test_performances_without_gaps_keep_every_bit(name):
+    sync = clone(SYNCHRONIZERS[name]).fit(WHOLE)
+    whole = [5, 6]
+    some = [GAPPY[0], WHOLE[5], GAPPY[1], WHOLE[6]]
+    expected, found = sync.match([WHOLE[i] for i in whole]), sync.match(some)
+    np.testing.assert_array_equal(found.times[[1, 3]], expected.times)
+    np.testing.assert_array_equal(found.distances[[1, 3]], expected.distances)
+    np.testing.assert_array_equal(
+        sync.transform(some)[[1, 3]], sync.transform([WHOLE[i] for i in whole])
+    )
+
+
+@pytest.mark.parametrize("name", SYNCHRONIZERS)
+def test_what_was_hidden_stays_nan(name):
+    sync = clone(SYNCHRONIZERS[name]).fit(GAPPY)
+    out = sync.transform(GAPPY)[:, :, : GAPPY[0].shape[1]]
+    # Everything else is there, at the same moments.
+    if name != "parts":
+        expected = sync.match(GAPPY).warp(GAPPY)
+        np.testing.assert_array_equal(out, expected)
+    hidden = np.isnan(out)
+    assert hidden[0, :, 3:6].any()
+    assert not hidden[:, :, [0, 1, 2, 6, 8]][[0, 2, 3]].any()
+    assert hidden[1].all(axis=1).any()
+    assert np.isfinite(sync.match(GAPPY).times).all()
+    assert np.isfinite(sync.match(GAPPY).distances).all()
+
+
+@pytest.mark.parametrize("name", ["dense", "parts", "linear"])
+def test_attributes_have_no_gaps(name):
+    sync = clone(SYNCHRONIZERS[name]).fit(GAPPY)
+    for attribute in ("pattern_", "examples_", "global_distances_"):
+        assert np.isfinite(getattr(sync, attribute)).all()
+
+
+def test_frames_of_which_nothing_is_seen_take_their_time_from_their_neighbours():
+    sync = DenseSynchronizer(P).fit(WHOLE)
+    expected = sync.match(WHOLE).times
+    for i, x in enumerate(WHOLE):
+        gone = x.copy()
+        gone[len(x) // 2 : len(x) // 2 + len(x) // 8] = np.nan
+        times = sync.match([gone]).times[0]
+        assert (np.diff(times) >= 0).all()
+        assert np.abs(times - expected[i]).max() < 3
+
+
+def test_a_feature_that_one_performance_never_shows():
+    sync = DenseSynchronizer(P)
+    X = [x.copy() for x in WHOLE]
+    X[2][:, 4] = np.nan
+    expected = DenseSynchronizer(P).fit(WHOLE).match(WHOLE)
+    found = sync.fit(X).match(X)
+    assert mean_error(found.times, expected.times) < 0.5 * np.abs(expected.offsets).mean()
+    out = sync.transform(X)
+    assert np.isnan(out[2, :, 4]).all()
+    assert np.isnan(out).sum() == P
+
+
+KINDS = {
+    "list": list,
+    "object array": lambda X: pd.Series(list(X)).to_numpy(),
+    "tables": lambda X: [pd.DataFrame(x) for x in X],
+    "frame": lambda X: pd.concat(
+        [pd.DataFrame(x, index=range(len(x))) for x in X],
+        keys=range(len(X)),
+        names=["performance", "frame"],
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_collection(kind):
+    given = KINDS[kind](GAPPY)
+    expected = DENSE.fit(GAPPY).transform(GAPPY)
+    np.testing.assert_array_equal(clone(DENSE).fit(given).transform(given), expected)
+
+
+def test_arrays_of_three_and_two_dimensions_and_memory_maps(tmp_path):
+    X = np.stack([np.resize(x, (50, x.shape[1])) for x in GAPPY])
+    expected = clone(DENSE).fit(list(X)).transform(list(X))
+    np.save(tmp_path / "X.npy", X)
+    maps = np.load(tmp_path / "X.npy", mmap_mode="r")
+    for given in (X, maps):
+        np.testing.assert_array_equal(clone(DENSE).fit(given).transform(given), expected)
+    rows = X[:, :, 3]
+    assert np.isnan(rows).any()
+    out = clone(DENSE).fit(rows).transform(rows)
+    alone = clone(DENSE).fit(list(rows[:, :, None])).transform(list(rows[:, :, None]))
+    np.testing.assert_array_equal(out, alone[:, :, 0])
+
+
+def test_single_precision_stays():
+    single = [x.astype(np.float32) for x in GAPPY]
+    sync = clone(DENSE).fit(single)
+    assert sync.transform(single).dtype == np.float32
+    expected = clone(DENSE).fit(GAPPY).match(GAPPY).times
+    assert mean_error(sync.match(single).times, expected) < 0.1
+
+
+def test_results_do_not_depend_on_the_number_of_jobs():
+    expected = clone(DENSE).fit(GAPPY)
+    parallel = clone(DENSE).set_params(n_jobs=2).fit(GAPPY)
+    np.testing.assert_array_equal(parallel.transform(GAPPY), expected.transform(GAPPY))
+    np.testing.assert_array_equal(parallel.match(GAPPY).distances, expected.match(GAPPY).distances)
+
+
+def test_a_warp_depends_on_its_performance_alone():
+    sync = clone(DENSE).fit(GAPPY)
+    together = sync.match(GAPPY)
+    for i, x in enumerate(GAPPY):
+        np.testing.assert_array_equal(sync.match([x]).times[0], together.times[i])
+
+
+def test_searches_and_pipelines():
+    pipe = make_pipeline(clone(DENSE), LinearSynchronizer(20))
+
+    def score(estimator, X, y=None):
+        return -float(np.nanmean(np.square(estimator.transform(X))))
+
+    scores = cross_val_score(pipe, GAPPY, cv=2, scoring=score)
+    assert np.isfinite(scores).all()
+    grid = {"densesynchronizer__max_offset": [0.1, 0.3]}
+    search = GridSearchCV(pipe, grid, cv=2, scoring=score, n_jobs=2).fit(GAPPY)
+    assert np.isfinite(search.cv_results_["mean_test_score"]).all()
+
+
+def test_tags_say_who_takes_gaps():
+    takes = {name: get_tags(sync).input_tags.allow_nan for name, sync in SYNCHRONIZERS.items()}
+    assert set(takes.values()) == {True}
+    assert not get_tags(KeyframeSynchronizer()).input_tags.allow_nan
+
+
+# -- what is refused ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", SYNCHRONIZERS)
+def test_a_performance_that_shows_nothing_is_refused_by_its_index(name):
+    empty = [*GAPPY[:3], np.full((30, 12), np.nan)]
+    sync = clone(SYNCHRONIZERS[name])
+    with pytest.raises(ValueError, match=r"Performance 3 is NaN in every frame and feature.*Leave"):
+        sync.fit(empty)
+    with pytest.raises(ValueError, match=r"Performance 3 is NaN in every frame and feature.*Leave"):
+        sync.fit(WHOLE).match(empty)
+
+
+def test_a_feature_that_is_never_seen_is_refused_by_its_name():
+    X = [x.copy() for x in WHOLE]
+    for x in X:
+        x[:, [2, 5]] = np.nan
+    with pytest.raises(ValueError, match=r"Feature 2 is NaN in every frame.*2 features of 12"):
+        clone(DENSE).fit(X)
+    names = [f"f{i}" for i in range(12)]
+    with pytest.raises(ValueError, match=r"Feature 2 \('f2'\) is NaN"):
+        clone(DENSE).fit([pd.DataFrame(x, columns=names) for x in X])
+    # After a fit that has seen it, it is filled.
+    assert np.isfinite(clone(DENSE).fit(WHOLE).match(X).times).all()
+
+
+def test_infinity_and_gaps_of_a_pattern_are_refused():
+    X = [x.copy() for x in GAPPY]
+    X[4][3, 2] = np.inf
+    with pytest.raises(ValueError, match="Performance 4, frame 3, feature 2 is infinity"):
+        clone(DENSE).fit(X)
+    with pytest.raises(ValueError, match=r"The pattern, frame \d+, feature \d is NaN"):
+        DenseSynchronizer(P, pattern=GAPPY[0][:, :]).fit(GAPPY)
+
+
+# -- fill="model" ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["dense", "paper", "parts", "linear"])
+def test_filling_by_the_model_is_better_than_the_mean(name):
+    sync = clone(SYNCHRONIZERS[name]).fit(WHOLE)
+    out, filled = sync.transform(GAPPY), sync.transform(GAPPY, fill="model")
+    hidden = np.isnan(out)
+    np.testing.assert_array_equal(filled[~hidden], out[~hidden])
+    assert np.isfinite(filled).all()
+    # The same moments of the whole performances.
+    truth = sync.match(GAPPY).warp(WHOLE) if name != "parts" else sync.transform(WHOLE)
+    mean = np.broadcast_to(sync.transform(WHOLE).mean(axis=0), out.shape)
+    errors = [np.abs(guess - truth)[hidden].mean() for guess in (filled, mean)]
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_a_gap_at_which_all_deviate_alike_is_filled_exactly():
+    # Each performance is the mean plus a constant of its own in every feature.
+    t = np.linspace(0, 1, P)[:, np.newaxis]
+    mean = np.concatenate([np.sin(6 * t), np.cos(5 * t)], axis=1)
+    X = [mean + shift for shift in (-0.2, -0.1, 0.0, 0.1, 0.2)]
+    gappy = [x.copy() for x in X]
+    gappy[3][10:20] = np.nan
+    sync = LinearSynchronizer(P).fit(X)
+    assert np.isnan(sync.transform(gappy)[3, 10:20]).all()
+    np.testing.assert_allclose(sync.transform(gappy, fill="model")[3], X[3], atol=1e-12)
+
+
+def test_filling_keeps_pandas_and_single_precision_and_rows():
+    single = [x.astype(np.float32) for x in GAPPY]
+    sync = clone(DENSE).fit(single)
+    assert sync.transform(single, fill="model").dtype == np.float32
+    table = clone(DENSE).set_output(transform="pandas").fit(GAPPY).transform(GAPPY, fill="model")
+    expected = clone(DENSE).fit(GAPPY).transform(GAPPY, fill="model")
+    np.testing.assert_array_equal(table.to_numpy().reshape(expected.shape), expected)
+    rows = np.stack([np.resize(x[:, 3], 50) for x in GAPPY])
+    assert np.isfinite(clone(DENSE).fit(rows).transform(rows, fill="model")).all()
+
+
+@pytest.mark.parametrize("fill", ["mean", 0, True])
+def test_an_unknown_fill_is_refused(fill):
+    with pytest.raises(ValueError, match=r"fill=.* is unknown: use None .* or 'model'"):
+        clone(DENSE).fit(WHOLE).transform(GAPPY, fill=fill)
+
+
+# -- confidence= ----------------------------------------------------------------------------
+
+
+def confidences(performances):
+    """1 where something was seen, else 0."""
+    return [np.isfinite(x).astype(float) for x in performances]
+
+
+@pytest.mark.parametrize("name", ["dense", "paper", "parts"])
+def test_no_confidence_is_as_nan(name):
+    sync, given = clone(SYNCHRONIZERS[name]), {"confidence": confidences(GAPPY)}
+    expected = clone(sync).fit(GAPPY)
+    wrong = [np.where(np.isnan(x), 100.0, x) for x in GAPPY]
+    fitted = clone(sync).fit(wrong, **given)
+    np.testing.assert_array_equal(fitted.pattern_, expected.pattern_)
+    found = fitted.match(wrong, **given)
+    np.testing.assert_array_equal(found.times, expected.match(GAPPY).times)
+    np.testing.assert_array_equal(found.distances, expected.match(GAPPY).distances)
+    np.testing.assert_array_equal(fitted.transform(wrong, **given), expected.transform(GAPPY))
+    np.testing.assert_array_equal(sync.fit_transform(wrong, **given), expected.transform(GAPPY))
+
+
+def test_what_is_less_sure_counts_less():
+    rng = np.random.default_rng(0)
+    noisy, sure = [], []
+    for x in WHOLE:
+        confidence = np.ones(len(x))
+        confidence[len(x) // 3 : len(x) // 2] = 0.5
+        noise = rng.standard_normal(x.shape).cumsum(axis=0) * 0.02
+        noisy.append(x + noise * (confidence < 1)[:, np.newaxis])
+        sure.append(confidence)
+    expected = DenseSynchronizer(P, pattern=0).fit(WHOLE).match(WHOLE).times
+    sync = DenseSynchronizer(P, pattern=0)
+    plain = mean_error(sync.fit(noisy).match(noisy).times, expected)
+    weighed = sync.fit(noisy, confidence=sure).match(noisy, confidence=sure).times
+    assert mean_error(weighed, expected) < plain
+    # Of a frame or of each of its features.
+    by_feature = [np.repeat(w[:, None], 12, axis=1) for w in sure]
+    again = sync.fit(noisy, confidence=by_feature).match(noisy, confidence=by_feature).times
+    np.testing.assert_array_equal(again, weighed)
+
+
+def test_confidence_goes_through_pipelines_and_searches():
+    sure = confidences(GAPPY)
+    wrong = [np.where(np.isnan(x), 9.0, x) for x in GAPPY]
+    with config_context(enable_metadata_routing=True):
+        dense = clone(DENSE).set_fit_request(confidence=True)
+        dense.set_transform_request(confidence=True)
+        pipe = make_pipeline(dense)
+        expected = clone(DENSE).fit_transform(wrong, confidence=sure)
+        np.testing.assert_array_equal(pipe.fit_transform(wrong, confidence=sure), expected)
+        scorer = SpreadScorer().set_score_request(confidence=True)
+        given = {"confidence": sure}
+        found = cross_validate(dense, wrong, cv=2, scoring=scorer, params=given)
+    plain = cross_validate(DENSE, GAPPY, cv=2, scoring=SpreadScorer())
+    assert np.isfinite(found["test_score"]).all()
+    assert np.abs(found["test_score"] - plain["test_score"]).max() < 0.2
+
+
+def test_confidence_of_a_sample_and_of_timing():
+    sure = confidences(GAPPY)
+    sync = DenseSynchronizer(P, max_fit=5).fit(GAPPY, confidence=sure)
+    expected = DenseSynchronizer(P, max_fit=5).fit(GAPPY)
+    np.testing.assert_array_equal(sync.pattern_, expected.pattern_)
+    timing = TimingChannel(DENSE).fit(GAPPY, confidence=sure)
+    found = timing.transform(GAPPY, confidence=sure)
+    np.testing.assert_array_equal(found, TimingChannel(DENSE).fit(GAPPY).transform(GAPPY))
+
+
+WRONG = {
+    "one for all": (np.ones(3), "list of 8 arrays"),
+    "a number": (0.5, "list of 8 arrays"),
+    "length": ([np.ones(3)] * 8, r"Performance 0: confidence has shape \(3,\), expected"),
+    "range": ([2.0 * np.ones(len(x)) for x in WHOLE], "Performance 0: .*from 0.*to 1, got 2 to 2"),
+    "NaN": ([np.full(len(x), np.nan) for x in WHOLE], "Performance 0: confidence must be from 0"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_confidence_is_refused(case):
+    given, message = WRONG[case]
+    with pytest.raises(ValueError, match=message):
+        clone(DENSE).fit(WHOLE, confidence=given)
+
+
+def test_synchronizers_that_take_no_gaps_take_no_confidence():
+    with pytest.raises(ValueError, match=r"KeyframeSynchronizer takes no gaps.*DenseSynchronizer"):
+        KeyframeSynchronizer().fit(WHOLE, confidence=confidences(WHOLE))

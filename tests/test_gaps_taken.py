@@ -1,0 +1,135 @@
+"""Gaps (NaN): every estimator takes them, or refuses them with the call that cures it."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.decomposition import PCA
+from sklearn.impute import KNNImputer
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.utils import get_tags
+from sklearn_motionsync import (
+    ActionClassifier,
+    ActionDetector,
+    ActionModel,
+    ASpace,
+    CycleSegmenter,
+    DirectionCosines,
+    FrameWise,
+    JointPositions,
+    LinearSynchronizer,
+    Match,
+    blend_performances,
+)
+from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.io import fill_gaps
+from sklearn_motionsync.model.similarity import movement_energies
+
+
+@pytest.fixture(scope="module")
+def bunch():
+    return make_bending(12, n_actors=4, n_frames=40, random_state=0)
+
+
+@pytest.fixture(scope="module")
+def gaps(bunch):
+    """A wrist is hidden for a while, in every third bend."""
+    X, wrist = [x.copy() for x in bunch.data], 3 * bunch.skeleton.index_of("left_wrist")
+    for x in X[1::3]:
+        x[10:20, wrist : wrist + 3] = np.nan
+    return X
+
+
+def filled(X, skeleton):
+    columns = skeleton.column_names
+    return [fill_gaps(pd.DataFrame(x, columns=columns), max_gap=10).to_numpy() for x in X]
+
+
+@pytest.mark.parametrize("kind", [DirectionCosines, JointPositions])
+def test_bodies_name_the_parameter_that_takes_gaps(kind, bunch, gaps):
+    message = r"Performance 1, frame 10, feature \d+ is NaN.*Set hidden='nan'"
+    with pytest.raises(ValueError, match=message):
+        kind(bunch.skeleton).fit(gaps)
+    kind(bunch.skeleton).fit(filled(gaps, bunch.skeleton))
+    postures = kind(bunch.skeleton, hidden="nan").fit_transform(gaps)
+    assert [bool(np.isnan(x).any()) for x in postures] == [i % 3 == 1 for i in range(12)]
+
+
+def test_a_classifier_names_the_step_that_takes_gaps(bunch, gaps):
+    X = gaps + [x[: len(x) // 2] for x in gaps]
+    y = np.repeat(["bend", "half"], 12)
+    cosines, classifier = (
+        DirectionCosines(bunch.skeleton, hidden="nan"),
+        ActionClassifier(n_frames=20),
+    )
+    message = r"Performance 1, frame 10, .* is NaN.*Put ASpace\(1\.0\) before it"
+    with pytest.raises(ValueError, match=message):
+        make_pipeline(cosines, classifier).fit(X, y)
+    pipe = make_pipeline(cosines, ASpace(1.0), classifier).fit(X, y)
+    assert pipe.score(X, y) == 1
+
+
+def test_a_segmenter_names_the_call_that_fills_gaps():
+    takes = make_gait(2, n_cycles=5, takes=True, random_state=0).data
+    takes[1][100:104, 2] = np.nan
+    with pytest.raises(
+        ValueError, match=r"Performance 1, frame 100, .* NaN.*fill_gaps\(x, max_gap"
+    ):
+        CycleSegmenter(start=0).fit(takes)
+    takes = ASpace(1.0).fit_transform(takes)
+    assert len(CycleSegmenter().fit(takes).segment(takes)[0]) == 10
+
+
+def test_blends_name_the_call_that_fills_gaps(bunch, gaps):
+    whole = filled(gaps, bunch.skeleton)
+    pipe = make_pipeline(DirectionCosines(bunch.skeleton), LinearSynchronizer(50)).fit(whole)
+    weights = {0: 0.5, 1: 0.5}
+    for estimator in (pipe, Match.from_estimator(pipe, whole)):
+        with pytest.raises(
+            ValueError, match=r"Performance 1, frame 10, .* NaN.*fill_gaps\(x, max_g"
+        ):
+            blend_performances(estimator, gaps, weights, skeleton=bunch.skeleton)
+    assert np.isfinite(blend_performances(pipe, whole, weights)).all()
+
+
+@pytest.mark.parametrize("hidden", ["raise", "nan"])
+def test_a_detector_takes_what_its_pipeline_takes(hidden, bunch, gaps):
+    cosines = DirectionCosines(bunch.skeleton, hidden=hidden)
+    pipe = make_pipeline(cosines, ASpace(0.95), LinearSynchronizer(30), ActionModel())
+    detector = ActionDetector(pipe)
+    assert get_tags(detector).input_tags.allow_nan is (hidden == "nan")
+    if hidden == "raise":
+        with pytest.raises(ValueError, match=r"Performance 1, frame 10, .* is NaN"):
+            detector.fit(gaps)
+        return
+    detector.fit(gaps, groups=bunch.actor)
+    assert (detector.predict(gaps) == 1).mean() > 0.8
+    still = [x[:1].repeat(len(x), axis=0) for x in gaps]
+    assert (detector.predict(still) == -1).all()
+
+
+def test_tags_of_frame_wise_are_those_of_its_transformer():
+    for transformer, takes in (
+        (KNNImputer(), True),
+        (StandardScaler(), True),
+        (PCA(2), False),
+        (make_pipeline(KNNImputer(), PCA(2)), True),
+    ):
+        assert get_tags(FrameWise(transformer)).input_tags.allow_nan is takes
+
+
+def test_energies_of_movements_are_those_of_what_was_seen():
+    rng = np.random.default_rng(0)
+    X = np.cumsum(rng.standard_normal((5, 400, 3)), axis=1) * [1, 2, 3]
+    whole, _ = movement_energies(X)
+    gaps = np.where(rng.random(X.shape) < 0.2, np.nan, X)
+    gaps[1, :, 2] = np.nan
+    found, floor = movement_energies(gaps)
+    np.testing.assert_allclose(np.delete(found, 1), np.delete(whole, 1), rtol=0.1)
+    np.testing.assert_allclose(floor, 1e-9 * np.nanvar(gaps, axis=(0, 1)).sum(), rtol=1e-9)
+    # By hand: feature by feature about its own mean, and the third has its usual share.
+    own = np.nanvar(gaps[:, :, :2], axis=1)
+    third = np.nanvar(np.delete(gaps[:, :, 2], 1, axis=0), axis=1).mean()
+    shares = own.mean(axis=0)
+    np.testing.assert_allclose(found[1], own[1].sum() * (1 + third / shares.sum()), rtol=1e-9)
+    assert movement_energies(np.where(np.isnan(gaps), np.nan, 7.0), floor)[0].max() == floor

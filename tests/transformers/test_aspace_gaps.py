@@ -1,0 +1,363 @@
+"""Postures with gaps in the aSpace, against conditional normal distributions written out."""
+
+from contextlib import nullcontext
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.decomposition import PCA
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.model_selection import GridSearchCV, GroupKFold
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import ASpace, DirectionCosines, LinearSynchronizer, to_frame
+from sklearn_motionsync.transformers import expectation
+from sklearn_motionsync.transformers.expectation import (
+    SHRINKAGE,
+    HiddenNormal,
+    components_of_seen,
+    estimate_moments,
+)
+
+
+def low_rank(n_performances, n_frames=60, rank=2, n_features=6, noise=0.01, seed=0):
+    """Smooth performances of few dimensions, and a little noise."""
+    rng = np.random.default_rng(seed)
+    mixing = np.random.default_rng(99).standard_normal((rank, n_features))
+    t = np.linspace(0, 1, n_frames)[:, np.newaxis]
+    X = []
+    for _ in range(n_performances):
+        phase, pace = rng.uniform(0, 6, rank), rng.uniform(3, 9, rank)
+        x = np.sin(pace * t + phase) @ mixing + 5
+        X.append(x + noise * rng.standard_normal(x.shape))
+    return X
+
+
+def hide(X, share, seed=0, run=1):
+    """Copies with runs of single features hidden."""
+    rng = np.random.default_rng(seed)
+    out = []
+    for x in X:
+        starts = rng.random(x.shape) < share / run
+        hidden = np.zeros(x.shape, dtype=bool)
+        for k in range(run):
+            hidden[k:] |= starts[: len(x) - k]
+        out.append(np.where(hidden, np.nan, x))
+    return out
+
+
+def shrunk(covariance):
+    return covariance + SHRINKAGE * np.diag(np.diag(covariance))
+
+
+def conditional(x, mean, covariance):
+    """Expectation and covariance of one vector given its values that are not NaN."""
+    hidden, x, left = np.isnan(x), x.copy(), np.zeros_like(covariance)
+    seen = ~hidden
+    weights = covariance[np.ix_(hidden, seen)] @ np.linalg.pinv(covariance[np.ix_(seen, seen)])
+    x[hidden] = mean[hidden] + weights @ (x[seen] - mean[seen])
+    left[np.ix_(hidden, hidden)] = (
+        covariance[np.ix_(hidden, hidden)] - weights @ covariance[np.ix_(seen, hidden)]
+    )
+    return x, left
+
+
+def maximise_slowly(Z, n_rounds=100):
+    """Mean and covariance by expectation and maximisation, row by row."""
+    mean, covariance = np.nanmean(Z, axis=0), np.diag(np.nanvar(Z, axis=0))
+    for _ in range(n_rounds):
+        found = [conditional(z, mean, shrunk(covariance)) for z in Z]
+        whole = np.array([x for x, _ in found])
+        left = sum(left for _, left in found)
+        # What is unknown of a hidden feature is unknown of it without noise.
+        left -= SHRINKAGE * np.diag(np.isnan(Z).sum(axis=0) * np.diag(covariance))
+        mean = whole.mean(axis=0)
+        covariance = np.cov(whole.T, bias=True) + left / len(Z)
+    return mean, covariance
+
+
+# -- the moments --------------------------------------------------------------------------
+
+
+def test_moments_are_those_of_slow_expectation_and_maximisation(monkeypatch):
+    monkeypatch.setattr(expectation, "TOLERANCE", 1e-12)
+    Z = np.concatenate(hide(low_rank(3, n_frames=40, n_features=5), 0.2))
+    Z = Z[~np.isnan(Z).all(axis=1)]
+    mean, covariance = estimate_moments(Z)
+    slow_mean, slow_covariance = maximise_slowly(Z)
+    np.testing.assert_allclose(mean, slow_mean, rtol=1e-8)
+    np.testing.assert_allclose(covariance, slow_covariance, rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("batch", [1, 50])
+def test_moments_and_expectations_do_not_depend_on_batches(batch, monkeypatch):
+    X = hide(low_rank(3), 0.3)
+    whole = ASpace(2).fit(X)
+    monkeypatch.setattr(expectation, "BATCH", batch)
+    parts = ASpace(2).fit(X)
+    np.testing.assert_allclose(parts.components_, whole.components_, rtol=1e-10)
+    np.testing.assert_allclose(parts.transform(X[0]), whole.transform(X[0]), rtol=1e-9, atol=1e-9)
+
+
+def test_with_nothing_missing_both_ways_agree():
+    """The estimate from what was seen is that of scikit-learn's PCA."""
+    postures = np.concatenate(low_rank(3, noise=0.3))
+    mean, components, variance, covariance = components_of_seen(postures)
+    pca = PCA().fit(postures)
+    np.testing.assert_allclose(mean, pca.mean_, rtol=1e-12)
+    np.testing.assert_allclose(components, pca.components_, atol=1e-9)
+    np.testing.assert_allclose(variance, pca.explained_variance_, rtol=1e-9)
+    np.testing.assert_allclose(covariance, np.cov(postures.T), rtol=1e-9)
+    single = components_of_seen(postures.astype("f4"))
+    assert [x.dtype for x in single[:3]] == ["f4"] * 3
+
+
+def test_without_gaps_nothing_is_estimated_otherwise(monkeypatch):
+    monkeypatch.delattr("sklearn_motionsync.transformers.aspace.components_of_seen")
+    monkeypatch.delattr(HiddenNormal, "fill")
+    X = low_rank(3)
+    aspace, pca = ASpace(3).fit(X), PCA(svd_solver="auto").fit(np.concatenate(X))
+    np.testing.assert_array_equal(aspace.components_, pca.components_[:3])
+    np.testing.assert_array_equal(aspace.mean_, pca.mean_)
+    np.testing.assert_array_equal(aspace.missing_, np.zeros(6))
+    for x, points in zip(X, aspace.transform(X), strict=True):
+        np.testing.assert_array_equal(points, (x - pca.mean_) @ aspace.components_.T)
+
+
+# -- hidden values ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fitted_on", ["whole", "gaps"])
+def test_rows_are_the_conditional_expectation_of_each_posture(fitted_on):
+    X = low_rank(4)
+    gaps = hide(X, 0.3)
+    rows = np.concatenate(X if fitted_on == "whole" else gaps)
+    aspace = ASpace(1.0).fit(rows)
+    covariance = (aspace.components_.T * aspace.explained_variance_) @ aspace.components_
+    new = np.concatenate(hide(low_rank(2, seed=5), 0.5, seed=1))
+    points = aspace.transform(new)
+    for x, point in zip(new, points, strict=True):
+        if np.isnan(x).all():
+            assert np.isnan(point).all()
+            continue
+        whole, _ = conditional(x, aspace.mean_, shrunk(covariance))
+        np.testing.assert_allclose(point, aspace.components_ @ (whole - aspace.mean_), atol=1e-9)
+
+
+@pytest.mark.parametrize("run", [1, 8])
+def test_performances_are_the_conditional_expectation_of_all_their_values(run):
+    """Against one covariance of all values of a performance: frames times features."""
+    X = low_rank(4, n_frames=30, n_features=4)
+    aspace = ASpace(1.0).fit(hide(X, 0.1))
+    covariance = (aspace.components_.T * aspace.explained_variance_) @ aspace.components_
+    (x,) = hide(low_rank(1, n_frames=30, n_features=4, seed=7), 0.5, seed=2, run=run)
+    x[11] = np.nan
+    nothing = np.isnan(x).all(axis=1)
+    t = np.arange(len(x))
+    in_time = np.exp(-np.abs(t - t[:, np.newaxis]) / aspace.correlation_time_)
+    of_all = np.kron(in_time, shrunk(covariance))
+    whole, _ = conditional(x.ravel(), np.tile(aspace.mean_, len(x)), of_all)
+    expected = (whole.reshape(x.shape) - aspace.mean_) @ aspace.components_.T
+    (points,) = aspace.transform([x])
+    assert nothing.sum() >= 1
+    assert np.isnan(points[nothing]).all()
+    np.testing.assert_allclose(points[~nothing], expected[~nothing], atol=1e-8)
+
+
+def test_correlation_time_is_where_the_autocorrelation_falls_to_one_over_e():
+    rng = np.random.default_rng(0)
+    decay = np.exp(-1 / 12)
+    X = []
+    for _ in range(60):
+        x = [rng.standard_normal(3)]
+        for _ in range(300):
+            x.append(decay * x[-1] + np.sqrt(1 - decay**2) * rng.standard_normal(3))
+        X.append(np.array(x))
+    assert 10 < ASpace(1.0).fit(X).correlation_time_ < 14
+    assert 10 < ASpace(1.0).fit(hide(X, 0.2)).correlation_time_ < 14
+    assert ASpace(1.0).fit([rng.standard_normal((99, 3))]).correlation_time_ < 1
+    assert ASpace(1.0).fit(X[0]).correlation_time_ == 0
+
+
+def test_hidden_values_of_a_known_process_are_found():
+    """Below the mean, below straight lines in time, and as good as what the noise allows."""
+    X = low_rank(12, noise=0.01)
+    # Two features of six, or less, tell two dimensions.
+    gaps = [
+        np.column_stack([a[:, :4], x[:, 4:]]) for a, x in zip(hide(X, 0.25, run=25), X, strict=True)
+    ]
+    aspace = ASpace(1.0).fit(gaps)
+    hidden, truth = np.isnan(np.stack(gaps)), np.stack(X)
+
+    def error(filled):
+        return np.sqrt(np.square(np.stack(filled) - truth)[hidden].mean())
+
+    lines = [pd.DataFrame(x).interpolate(limit_direction="both").to_numpy() for x in gaps]
+    means = np.where(hidden, np.nanmean(np.stack(gaps), axis=(0, 1)), np.stack(gaps))
+    found = error(aspace.inverse_transform(aspace.transform(gaps)))
+    assert found < 0.25 * error(lines)
+    assert found < 0.15 * error(means)
+
+
+def test_results_of_a_performance_depend_on_no_other():
+    X = hide(low_rank(5), 0.2, run=4)
+    aspace = ASpace(2).fit(X)
+    together = aspace.transform(X)
+    for x, points in zip(X, together, strict=True):
+        np.testing.assert_array_equal(aspace.transform([x])[0], points)
+
+
+# -- people -------------------------------------------------------------------------------
+
+
+def test_a_limb_of_people_that_is_hidden_for_a_second(bends):
+    """An arm of eight of 24 bends: nearer than the mean, straight lines and no order in time."""
+    joints = [3 * bends.skeleton.index_of(f"left_{name}") for name in ("elbow", "wrist")]
+    gaps = [x.copy() for x in bends.data]
+    for i in range(0, 24, 3):
+        for k in joints:
+            gaps[i][100:220, k : k + 3] = np.nan
+    cosines = DirectionCosines(bends.skeleton, hidden="nan").fit(gaps)
+    truth, postures = cosines.transform(bends.data), cosines.transform(gaps)
+    hidden = np.isnan(np.concatenate(postures))
+
+    def error(filled):
+        return np.sqrt(np.square(np.concatenate(filled) - np.concatenate(truth))[hidden].mean())
+
+    aspace = ASpace(1.0).fit(postures)
+    found = error(aspace.inverse_transform(aspace.transform(postures)))
+    rows = [aspace.transform(x) for x in postures]
+    lines = [pd.DataFrame(x).interpolate().to_numpy() for x in postures]
+    means = [np.where(np.isnan(x), aspace.mean_, x) for x in postures]
+    assert found < 0.9 * error(lines)
+    assert found < 0.6 * error(means)
+    assert found < 0.8 * error(aspace.inverse_transform(rows))
+
+
+# -- what is missing, and what is refused -------------------------------------------------
+
+
+def test_missing_is_the_share_of_the_postures():
+    X = [x.copy() for x in low_rank(2, n_frames=50)]
+    X[0][:20, 3] = np.nan
+    X[1][7] = np.nan
+    np.testing.assert_allclose(ASpace().fit(X).missing_, [0.01, 0.01, 0.01, 0.21, 0.01, 0.01])
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_a_feature_that_was_never_seen_is_refused_by_its_name(named):
+    X = low_rank(3)
+    for x in X:
+        x[:, 4] = np.nan
+    if named:
+        X = [pd.DataFrame(x, columns=list("abcdef")) for x in X]
+    where = r"Feature 4 \('e'\)" if named else "Feature 4"
+    with pytest.raises(
+        ValueError, match=f"{where} was never seen\\. Of 6 features 1 was seen in fewer"
+    ):
+        ASpace().fit(X)
+    X = [np.array(x) for x in X]
+    X[1][9, 4] = 5
+    with pytest.raises(ValueError, match="Feature 4 was seen in one posture only"):
+        ASpace().fit(X)
+
+
+def test_a_feature_that_was_hardly_ever_seen_is_warned_of():
+    whole = low_rank(2, n_frames=9, noise=0.3)
+    X = [x.copy() for x in whole]
+    for x in X[1:]:
+        x[:, 4] = np.nan
+    X[0][5:, 4] = np.nan
+    with pytest.warns(UserWarning, match="Feature 4 was seen in 5 postures of 18, and a"):
+        ASpace().fit(X)
+    X[0][5, 4] = whole[0][5, 4]
+    ASpace().fit(X)
+
+
+def test_an_estimate_that_does_not_settle_is_warned_of(monkeypatch):
+    monkeypatch.setattr(expectation, "MAX_ROUNDS", 2)
+    with pytest.warns(ConvergenceWarning, match="still changes after 2 rounds: 28% of all"):
+        ASpace().fit(hide(low_rank(3), 0.3))
+
+
+def test_variances_of_what_is_hidden_at_random_are_not_biased():
+    """Of independent features nothing is learnt about hidden values: they change no variance."""
+    rng = np.random.default_rng(0)
+    Z = rng.standard_normal((4000, 3)) * [1, 2, 3]
+    Z[rng.random(Z.shape) < [0, 0.5, 0.95]] = np.nan
+    _, covariance = estimate_moments(Z)
+    np.testing.assert_allclose(np.diag(covariance), np.nanvar(Z, axis=0), rtol=0.02)
+
+
+def test_infinity_is_refused():
+    X = low_rank(3)
+    X[1][4, 2] = np.inf
+    with pytest.raises(ValueError, match="Performance 1, frame 4, feature 2 is infinity"):
+        ASpace().fit(X)
+
+
+@pytest.mark.parametrize("n", [2, 5])
+def test_constant_features_and_few_postures(n):
+    X = [np.column_stack([x[:n], np.full(n, 3.0)]) for x in low_rank(2, noise=0.3)]
+    gaps = [x.copy() for x in X]
+    gaps[0][0, 6] = gaps[0][0, 1] = gaps[1][1, 2] = np.nan
+    with (
+        pytest.warns(UserWarning, match="fewer postures than features") if n == 2 else nullcontext()
+    ):
+        aspace = ASpace(1.0).fit(gaps)
+    back = aspace.inverse_transform(aspace.transform(gaps))
+    np.testing.assert_allclose(back[0][:, 6], 3, atol=1e-9)
+    assert all(np.isfinite(x).all() for x in back)
+    still = ASpace().fit([np.array([[1.0, np.nan], [1, 2], [1, 2]])])
+    np.testing.assert_allclose(still.transform([np.array([[np.nan, 2.0], [1, 2]])])[0], 0)
+
+
+# -- input and output ---------------------------------------------------------------------
+
+
+def test_every_kind_of_collection_with_gaps_gives_equal_results():
+    X = hide(low_rank(4), 0.2, run=5)
+    fitted = ASpace(2).fit(X)
+    expected = np.stack(fitted.transform(X))
+    objects = np.empty(4, dtype=object)
+    objects[:] = X
+    for given in (np.stack(X), tuple(X), objects, [x.tolist() for x in X]):
+        again = ASpace(2).fit(given)
+        np.testing.assert_array_equal(np.stack(list(again.transform(given))), expected)
+    table = to_frame(X, columns=list("abcdef"))
+    pandas = ASpace(2).set_output(transform="pandas").fit_transform(table)
+    np.testing.assert_array_equal(pandas.to_numpy(), np.concatenate(expected))
+    single = ASpace(2).fit([x.astype("f4") for x in X])
+    points = single.transform([x.astype("f4") for x in X])
+    assert points[0].dtype == single.components_.dtype == single.mean_.dtype == "f4"
+    np.testing.assert_allclose(np.stack(points), expected, rtol=2e-3, atol=2e-3)
+
+
+def test_the_input_is_not_written_to():
+    X = hide(low_rank(3), 0.2)
+    before = [x.copy() for x in X]
+    ASpace(2).fit(X).transform(X)
+    np.testing.assert_array_equal(X, before)
+
+
+def test_nan_points_become_nan_postures():
+    aspace = ASpace(2).fit(low_rank(3))
+    points = aspace.transform(low_rank(1))
+    points[0][3, 1] = np.nan
+    (back,) = aspace.inverse_transform(points)
+    assert np.isnan(back[3]).all()
+    assert np.isfinite(np.delete(back, 3, axis=0)).all()
+
+
+def test_gaps_in_a_pipeline_and_a_search():
+    X = hide(low_rank(8), 0.1, run=6)
+    pipe = make_pipeline(ASpace(2), LinearSynchronizer(20))
+    assert np.isfinite(pipe.fit_transform(X)).all()
+
+    def explained(pipe, X, y=None):
+        return pipe[0].explained_variance_ratio_.sum()
+
+    search = GridSearchCV(
+        pipe, {"aspace__n_components": [1, 2]}, cv=GroupKFold(2), scoring=explained
+    )
+    search.fit(X, groups=np.arange(8) // 2)
+    assert search.best_params_ == {"aspace__n_components": 2}
