@@ -197,8 +197,8 @@ class AnchoredSynchronizer(Synchronizer):
             if self._finite is True:
                 name = type(self).__name__
                 raise ValueError(
-                    f"{name} takes no gaps, and so no confidence=: use DenseSynchronizer, or give "
-                    f"{name} what DenseSynchronizer(...).transform(X, fill='model') returns."
+                    f"{name} takes no gaps, and so no confidence=. DenseSynchronizer takes both, "
+                    "and key-frames."
                 )
             given["confidence"] = confidence
         return given

@@ -15,6 +15,7 @@ from sklearn_motionsync import (
     TimingChannel,
 )
 from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.display import MetricDisplay, SynchronizationDisplay, TrellisDisplay
 from sklearn_motionsync.metrics import SpreadScorer
 
 P = 40
@@ -370,3 +371,37 @@ def test_wrong_confidence_is_refused(case):
 def test_synchronizers_that_take_no_gaps_take_no_confidence():
     with pytest.raises(ValueError, match=r"KeyframeSynchronizer takes no gaps.*DenseSynchronizer"):
         KeyframeSynchronizer().fit(WHOLE, confidence=confidences(WHOLE))
+
+
+# -- displays, lags and tables --------------------------------------------------------------
+
+
+def test_displays_of_performances_with_gaps():
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    sync = clone(DENSE).fit(GAPPY)
+    shown = SynchronizationDisplay.from_estimator(sync, GAPPY, features=[3, 4])
+    assert shown.pattern_index == sync.pattern_index_
+    # Drawn as a gap: matplotlib leaves the hidden points out.
+    hidden = np.isnan(shown.after[0, :, 0])
+    assert hidden.any()
+    paths = shown.after_[0].get_paths()[0].vertices
+    np.testing.assert_array_equal(np.isnan(paths[:, 1]), hidden)
+    assert np.isfinite(shown.pattern_[0].get_ydata()).all()
+    TrellisDisplay.from_estimator(sync, GAPPY, performance=1)
+    MetricDisplay.from_estimator(sync)
+    pyplot.close("all")
+
+
+def test_lags_and_tables_of_performances_with_gaps():
+    parts = clone(SYNCHRONIZERS["parts"]).fit(GAPPY)
+    assert np.isfinite(parts.lags(GAPPY).values).all()
+    table = parts.match(GAPPY).to_frame("percent", GAPPY)
+    assert np.isfinite(table.to_numpy()).all()
+
+
+def test_the_trellis_that_is_drawn_is_that_of_the_match():
+    sync = DenseSynchronizer.paper(n_frames=P).fit(GAPPY)
+    space = sync.disparity_space(GAPPY, 1)
+    np.testing.assert_array_equal(space.path, sync.match(GAPPY[1:2]).offsets[0])
+    costs = space.costs[np.isfinite(space.costs)]
+    assert (costs >= 0).all()
