@@ -80,6 +80,7 @@ _ = figure.suptitle("Heel strikes bring back the walk that went astray")
 
 # %%
 # Nothing given, one walk is half a stride off: its toe-offs are on the bump after the others.
+#
 # Displays draw what was given: lines on the time axis of the template, ticks below the trials.
 
 sync = DenseSynchronizer(151).fit(trials, keyframes=keyframes)
@@ -92,8 +93,8 @@ _ = display.figure_.suptitle("Lines and ticks are the heel strikes that were giv
 # Eight sets
 # ----------
 # One set says little. Here are eight, with other people each. Heel strikes are given to all trials,
-# exact or soft, or to every fourth trial. The dots are toe-offs and the largest knee flexion, which
-# were never given.
+# exact or soft, or to every fourth trial. The table judges by toe-offs and by the largest knee
+# flexion, which were never given.
 
 
 def every_fourth(labels):

@@ -5,7 +5,6 @@ import pandas as pd
 
 from ..inputs.keyframes import Keyframes
 from ..inputs.numbers import as_numbers
-from ..inputs.wording import counted
 from ..utils.pipelines import find_synchronizer
 
 __all__ = [
@@ -70,9 +69,8 @@ def check_own_keyframes(keyframes, n_sequences):
     keyframes = as_numbers(keyframes, "keyframes", dtype=np.float64)
     if keyframes.ndim != 2 or len(keyframes) != n_sequences:
         raise ValueError(
-            f"There are {counted(n_sequences, 'performance')}, and {len(keyframes)} rows of "
-            "keyframes: give one row each, (n_sequences, n_keyframes), with NaN where one is not "
-            "known."
+            f"keyframes must have shape ({n_sequences}, n_keyframes), one row a performance, with "
+            f"NaN where one is not known; got {keyframes.shape}."
         )
     return keyframes
 
