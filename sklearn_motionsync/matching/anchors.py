@@ -27,6 +27,8 @@ _OF_PAIR = math.sqrt(2)
 _NEXT = 0.5
 # Reach of the last correction to an exact key-frame, as a share of the clip: docs/design.md.
 _REACH = 0.1
+# Distance of a key-frame from a whole frame that is rounding.
+_WHOLE = 1e-12
 # Steepest change of that correction, in frames a frame, before it reaches farther.
 _STEEPEST = 0.5
 
@@ -176,6 +178,8 @@ def pin(times, keyframes, own, reach=_REACH):
 
 def _meet(tau, at, wanted):
     """Move the frames beside every key-frame, so that the line between them goes through it."""
+    # But for rounding, a whole frame is one.
+    at = np.where(np.abs(at - np.round(at)) < _WHOLE, np.round(at), at)
     lowest, frames, above = 0.0, at.astype(np.intp), [*wanted[1:], len(tau) - 1.0]
     for k, first, moment, highest in zip(at, frames, wanted, above, strict=True):
         share = k - first
@@ -183,9 +187,11 @@ def _meet(tau, at, wanted):
             tau[first] = lowest = moment
         else:
             miss = moment - ((1 - share) * tau[first] + share * tau[first + 1])
-            left, right = max(tau[first] + miss, lowest), tau[first + 1] + miss
-            right = min((moment - (1 - share) * left) / share, highest)
-            tau[first] = (moment - share * right) / (1 - share)
-            tau[first + 1] = lowest = right
+            left = max(tau[first] + miss, lowest)
+            right = (moment - (1 - share) * left) / share
+            if right > highest:
+                left, right = (moment - share * highest) / (1 - share), highest
+            tau[first], tau[first + 1] = left, right
+            lowest = right
         np.minimum(tau[:first], tau[first], out=tau[:first])
         np.maximum(tau[first + 1 :], lowest, out=tau[first + 1 :])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from sklearn_motionsync.matching import trellis as module
 from sklearn_motionsync.matching.anchors import (
@@ -103,7 +103,11 @@ def warps_and_keyframes(draw):
     return tau, np.array(at), np.array(moments) * (n_frames - 1)
 
 
+JUMP = np.array([0.0] * 7 + [18.0] * 12), np.array([np.nextafter(9, 0)]), np.array([2.390625])
+
+
 @settings(max_examples=200, deadline=None)
+@example(JUMP, 0.1)
 @given(warps_and_keyframes(), st.sampled_from([0.1, np.inf]))
 def test_pinned_warps_meet_keyframes_and_stay_warps(case, reach):
     tau, at, moments = case
