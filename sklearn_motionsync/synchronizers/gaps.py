@@ -41,7 +41,10 @@ def with_confidence(performances, confidence):
     if confidence is None:
         return performances
     n = len(performances)
-    if not hasattr(confidence, "__len__") or len(confidence) <= max(performances.numbers):
+    # Some of all that were given have the confidence of their number.
+    is_whole = list(performances.numbers) == list(range(n))
+    count = len(confidence) if hasattr(confidence, "__len__") else -1
+    if count <= max(performances.numbers) or (is_whole and count != n):
         raise ValueError(
             f"confidence must be a list of {n} arrays, (n_frames,) or (n_frames, n_features), one "
             f"a performance; got {confidence!r:.200}."

@@ -355,6 +355,7 @@ def test_confidence_of_a_sample_and_of_timing():
 WRONG = {
     "one for all": (np.ones(3), "list of 8 arrays"),
     "a number": (0.5, "list of 8 arrays"),
+    "too many": ([np.ones(len(x)) for x in [*WHOLE, WHOLE[0]]], "a list of 8 arrays"),
     "length": ([np.ones(3)] * 8, r"Performance 0: confidence has shape \(3,\), expected"),
     "range": ([2.0 * np.ones(len(x)) for x in WHOLE], "Performance 0: .*from 0.*to 1, got 2 to 2"),
     "NaN": ([np.full(len(x), np.nan) for x in WHOLE], "Performance 0: confidence must be from 0"),
