@@ -90,9 +90,9 @@ def learn_filler(performances, names=None):
         k = int(never.argmax())
         name = k if names is None else f"{k} ({names[k]!r})"
         raise ValueError(
-            f"Feature {name} is NaN in every frame of every performance: "
-            f"{counted(int(never.sum()), 'feature')} of {len(never)} were never seen. Leave them "
-            "out, or add a performance that shows them."
+            f"Feature {name} is NaN in every frame of every performance; never seen: "
+            f"{never.sum()} of {counted(len(never), 'feature')}. Leave such out, or add a "
+            "performance that shows them."
         )
     return Filler.learn(performances)
 

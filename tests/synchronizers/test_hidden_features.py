@@ -219,7 +219,7 @@ def test_a_feature_that_is_never_seen_is_refused_by_its_name():
     X = [x.copy() for x in WHOLE]
     for x in X:
         x[:, [2, 5]] = np.nan
-    with pytest.raises(ValueError, match=r"Feature 2 is NaN in every frame.*2 features of 12"):
+    with pytest.raises(ValueError, match=r"Feature 2 is NaN.*never seen: 2 of 12 features"):
         clone(DENSE).fit(X)
     names = [f"f{i}" for i in range(12)]
     with pytest.raises(ValueError, match=r"Feature 2 \('f2'\) is NaN"):
