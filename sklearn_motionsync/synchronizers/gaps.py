@@ -21,7 +21,8 @@ __all__ = [
 
 def hold_gaps(performances):
     """Whether anything of performances is NaN, or not sure; they hold no infinity."""
-    return performances.confidence is not None or any(np.isnan(x.sum()) for x in performances)
+    sums = [x.sum() for x in performances]
+    return performances.confidence is not None or bool(np.isnan(sums).any())
 
 
 def with_confidence(performances, confidence):
