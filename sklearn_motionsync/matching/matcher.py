@@ -20,9 +20,10 @@ from .factors import Bases
 from .filters import SMOOTHING, smooth
 from .gaps import UNSEEN
 from .metric import Metric, energy_shares, learn_metric
-from .refinement import refine_warps
+from .refinement import refine_warps, standard_errors
 from .sharpening import Sharpener
 from .trellis import Trellis
+from .uncertainty import refined_uncertainty, uncertainty_of_paths
 from .units import Unit
 from .warps import evaluate_warps, normalise
 
@@ -457,6 +458,19 @@ class Warper:
             return distances, np.where((seen <= rounding)[:, np.newaxis], routes[0], times)
         return distances, np.where((distances <= rounding)[:, np.newaxis], routes[0], times)
 
+    def uncertainty(self, positions, times):
+        """The `Uncertainty` of the warps of performances.
+
+        Parameters
+        ----------
+        positions : ndarray, shape (n_sequences, Q, n_features)
+            Performances at all positions, in the unit.
+        times : ndarray, shape (n_sequences, P)
+            Their warps.
+        """
+        base, moving = self.bases.sequences[:1], self.matcher.features(positions)
+        return uncertainty_of_paths(self.matcher, base, moving, times)
+
     def disparity_space(self, positions):
         """E(p, d) of the pattern and one performance at the pattern's rate (Eq. 12), and the path.
 
@@ -528,6 +542,11 @@ class RefinedWarper(Warper):
         base, moving = self.postures(positions)
         reach = self.matcher.trellis.reach
         return distances, refine_warps(base, moving, times, reach, self.noise_width)
+
+    def uncertainty(self, positions, times):
+        """The uncertainty as of `Warper`, but for half-widths: by the noise of the postures."""
+        errors = standard_errors(*self.postures(positions), times, self.noise_width)
+        return refined_uncertainty(super().uncertainty(positions, times), errors)
 
     def postures(self, positions):
         """Postures of the pattern and of performances, smoothed by the width of the noise."""

@@ -9,6 +9,8 @@ Averages over features are weighted by their variance, and copies are discounted
 constant features nor copies change a result.
 """
 
+import math
+
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
@@ -21,6 +23,7 @@ __all__ = [
     "curvature",
     "refine_warps",
     "slow_energy",
+    "standard_errors",
     "typical_energy",
 ]
 
@@ -30,6 +33,10 @@ _RATE_CHANGE = 2.0
 MAX_STEPS = 20
 _LONGEST_STEP = 1.5
 _SHORTEST_STEP = 0.01
+# Lags, as a share of the clip, up to which residuals are counted as dependent.
+_DEPENDENT = 0.2
+# Least share of the squared slopes that counts as movement, and least rate, in standard errors.
+_LEAST_SIGNAL, _SLOWEST = 0.05, 0.1
 # Gains are shrunk towards 1 by this share of the energy of a typical feature.
 _RIDGE = 0.003
 
@@ -119,6 +126,62 @@ def refine_warps(base, moving, times, reach, noise_width=0.0, steps=MAX_STEPS):
         refined[active] = np.maximum.accumulate(np.clip(tau, low, high), axis=1)
         active = active[np.abs(step).max(axis=1) >= _SHORTEST_STEP]
     return refined
+
+
+def standard_errors(base, moving, times, noise_width=0.0):
+    """Standard errors of refined warps, in frames: (n_sequences, P).
+
+    The warp solves linear equations, with matrix A and right side y. Its covariance is
+    ``A^-1 Cov(y) A^-1``. The squared slopes in y hold noise. The matrix has the inner products of
+    the slopes of base and moving sequence instead, whose noise is independent. Noise that is the
+    same for several frames counts by how many: the sum of its autocorrelation.
+
+    Parameters
+    ----------
+    base : ndarray, shape (P, n_features)
+    moving : ndarray, shape (n_sequences, P, n_features)
+    times : ndarray, shape (n_sequences, P)
+        Refined warps.
+    noise_width : float, default=0.0
+        Width of the smoothing of the postures, in frames.
+    """
+    n_frames, errors = times.shape[1], np.zeros(times.shape)
+    if n_frames < 5:
+        return errors
+    frames, (band, _) = np.arange(n_frames), curvature(n_frames)
+    independent = n_frames / max(1, np.sqrt(2 * np.pi) * noise_width)
+    lags = np.arange(1, math.ceil(_DEPENDENT * n_frames))
+    share = 1 - lags / (_DEPENDENT * n_frames)
+    own = CubicSpline(frames, base)(frames, 1)
+    width = max(SMOOTHING * (n_frames - 1), LEAST_SIGMA)
+    for x, tau, row in zip(moving, times, errors, strict=True):
+        spline = CubicSpline(frames, x)
+        fitted, gain = _fit_gain(base[np.newaxis], spline(tau)[np.newaxis])
+        residual, slope = base - fitted[0], gain[0] * spline(tau, 1)
+        noise = typical_energy(residual[np.newaxis], independent)[0] / n_frames
+        pull = np.vecdot(slope, slope)
+        if not (noise > 0 and pull[1:-1].any()):
+            continue
+        stiffness = max(noise * (n_frames / _RATE_CHANGE) ** 2, 1e-9 * pull[1:-1].mean())
+        rates = np.maximum(np.gradient(tau), _SLOWEST)
+        both = np.stack([pull, np.vecdot(slope, own) / rates])[..., np.newaxis]
+        total, common = smooth(both, width)[:, 1:-1, 0]
+        pull = pull[1:-1]
+        clean = pull * np.clip(common / total, _LEAST_SIGNAL, 1)
+        system = band * stiffness
+        system[-1] += clean
+        inverse = solveh_banded(system, np.eye(n_frames - 2))
+        variance = np.diagonal(inverse) + np.square(inverse) @ (pull - clean)
+        spectrum = np.square(np.abs(np.fft.rfft(residual, 2 * n_frames, axis=0))).sum(axis=1)
+        related = np.fft.irfft(spectrum)
+        dependent = 1 + 2 * (share @ related[lags]) / (related[0] or 1)
+        dependent = max(dependent, 1, 2 * math.sqrt(math.pi) * noise_width)
+        # What the warp, gains and offsets have taken away from the residuals.
+        features = np.square(residual).sum() / (n_frames * noise)
+        taken = np.diagonal(inverse) @ clean + 2 * features
+        left = 1 - taken * dependent / (features * n_frames)
+        row[1:-1] = np.sqrt(noise / max(left, 0.5) * dependent * variance)
+    return errors
 
 
 def _evaluate(splines, active, times):

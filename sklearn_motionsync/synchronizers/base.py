@@ -43,6 +43,7 @@ from .gaps import (
     learn_filler,
     with_confidence,
 )
+from .intervals import Intervals, joined
 from .match import Match, check_match
 
 __all__ = ["Synchronizer", "TrainingSet"]
@@ -347,9 +348,19 @@ class Synchronizer(
         read = self._read_in_parts(X)
         if read is None:
             return self._match(self.check_performances(X))
-        matches = [self._match(part) for part in read[1]]
-        names = "times", "distances", "mode"
-        return Match(*(np.concatenate([getattr(x, name) for x in matches]) for name in names))
+        parts, tells = [], False
+        for part in read[1]:
+            match = self._match(part)
+            tells = match.intervals is not None
+            parts.append((match.times, match.distances, match.mode))
+        match = Match(*map(np.concatenate, zip(*parts, strict=True)))
+        if tells:
+            match.intervals = Intervals(match.times, lambda: self._measured_in_parts(X))
+        return match
+
+    def _measured_in_parts(self, X):
+        """What the intervals of performances need, which are read and matched once more."""
+        return joined(self._match(part).intervals.measured() for part in self._read_in_parts(X)[1])
 
     def _without_gaps(self, performances):
         """Checked performances, filled where they are NaN."""

@@ -9,7 +9,9 @@ from typing import Any, Literal, Self
 import numpy as np
 from sklearn.utils import Bunch, check_random_state
 from sklearn.utils._param_validation import Interval, StrOptions
+from sklearn.utils.validation import check_is_fitted
 
+from ..inputs.keyframes import Keyframes
 from ..inputs.types import (
     Cost,
     Indexed,
@@ -21,10 +23,8 @@ from ..inputs.types import (
 )
 from ..matching.anchors import KeyframeColumns, add_ramps, first_meeting, pin
 from ..matching.costs import COSTS
-from ..matching.filters import SMOOTHING, choose_smoothing
 from ..matching.gaps import add_weights
 from ..matching.matcher import (
-    Features,
     LinearWarper,
     Matcher,
     RefinedWarper,
@@ -39,17 +39,17 @@ from ..matching.median import (
     sampled_median,
 )
 from ..matching.modes import DistanceTable, ModalWarper, Modes
-from ..matching.refinement_test import Verdict
 from ..matching.warps import normalise, sample
-from ..utils.atomic import snapshot
+from ..utils.atomic import atomic_partial_fit, snapshot
 from ..utils.threads import on_one_thread
 from .anchored import AnchoredSynchronizer
 from .balance import warn_of_one_feature
-from .evidence import no_evidence, weigh_evidence
-from .gaps import known_whole, with_confidence
+from .evidence import MOST_LEARNT, learn_features
+from .gaps import with_confidence
+from .intervals import calibrated_factor, intervals_of
 from .match import Match
-from .portions import FeatureStore, TrainingPortions, refuse_long_paths, warp_in_portions
-from .refinement import try_refinement
+from .portions import FeatureStore, TrainingPortions, warp_in_portions
+from .refinement import decide_on_refinement
 from .subsamples import subsample, typical_share
 
 __all__ = ["DenseSynchronizer"]
@@ -57,17 +57,8 @@ __all__ = ["DenseSynchronizer"]
 # max_offset="auto". A wide band leads paths astray without a learnt metric; with one, gestures
 # need it: docs/design.md.
 _NARROW, _WIDE = 0.25, 0.4
-# The largest offset while the metric is learnt: docs/design.md.
-_LEARNING_OFFSET = 0.2
-# velocity_smoothing="auto": a metric weights noise down; without one it is smoothed away.
-_SMOOTH, _SHARP = SMOOTHING, 0.02
-# Numbers of performances a metric is learnt from. Two have no route but the
-# direct one: their differences cannot be told from a wrong path.
-_FEWEST, _MOST = 3, 20
 # Most performances for an exhaustive search: see docs/scaling.md.
 _EXHAUSTIVE = 100
-# Most performances for the refinement test.
-_TESTED = 12
 
 
 class DenseSynchronizer(AnchoredSynchronizer):
@@ -264,6 +255,9 @@ class DenseSynchronizer(AnchoredSynchronizer):
         velocity of every signal, a correlation; NaN for noise. ``trust``, shape (P,): from 0 to 1,
         how far warps go to where the last match places them. It follows from the agreement, and
         from how clearly velocities change there.
+    interval_factor_ : float
+        By which the intervals of `Match.interval` are wider than those of the package; 1 before
+        ``calibrate``.
     lengths_ : ndarray of int, shape (n_samples_fit,)
         Numbers of frames of the training trials.
     examples_ : ndarray, shape (min(n_samples_fit, 64), P, n_features)
@@ -433,7 +427,50 @@ class DenseSynchronizer(AnchoredSynchronizer):
         distances, mode = self._warper.matcher.features.back(distances), None
         if len(self.modes_.shares) > 1:
             mode = on_one_thread(self._warper.modes_of, arrays)
-        return Match(times, distances, mode)
+        match = Match(times, distances, mode)
+        match.intervals = intervals_of(self, self._warper, arrays, match.times, shares)
+        return match
+
+    @atomic_partial_fit
+    def calibrate(
+        self,
+        X: PerformancesLike,
+        keyframes: Indexed[ValuesLike | None] | SupportsArray,
+        frame_rate: float | ValuesLike | None = None,
+    ) -> Self:
+        """Fit the intervals of `Match.interval` to key-frames of your own.
+
+        They are multiplied by one number, so that intervals of 90 % hold 90 % of the key-frames.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
+            Performances, best of subjects that ``fit`` has not seen. They are matched without
+            their key-frames.
+        keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame
+            Moments of each, as for ``fit``: at least 9, better some dozens. Those of the template
+            are ``keyframes_``, or else the median of the frames that these moments meet.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            As for ``fit``.
+
+        Returns
+        -------
+        self : DenseSynchronizer
+            With ``interval_factor_``.
+
+        Raises
+        ------
+        ValueError
+            If there are too few key-frames; and as from ``fit``.
+        """
+        check_is_fitted(self)
+        performances = self.check_performances(X)
+        given = Keyframes(keyframes, len(performances), frame_rate)
+        count = None if self.keyframes_ is None else len(self.keyframes_)
+        known = given.shares(performances, count) * (self.n_frames_ - 1)
+        match = self._match(performances)
+        self.interval_factor_ *= calibrated_factor(match, self.keyframes_, known)
+        return self
 
     def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
         performances = with_confidence(performances, confidence)
@@ -549,7 +586,8 @@ class DenseSynchronizer(AnchoredSynchronizer):
         if self.subframes > 1 or arrays[0].shape[1] > n_features:
             positions = normalise(arrays, self.n_frames_, self.subframes)
             training.unit(positions, out=positions)
-        features = self._learn_metric(training.unit, positions, columns, weights is not None)
+        beside = {"anchors": columns, "weighs": weights is not None}
+        features = learn_features(self, training.unit, positions, beside, self._settings)
         settings = self._settings()
         searched = features.for_search(self.n_frames_, settings["max_offset"])
         store = FeatureStore(searched, positions)
@@ -571,8 +609,9 @@ class DenseSynchronizer(AnchoredSynchronizer):
         source = self._set_keyframes(keyframes, source, arrays, matcher, chosen[0])
         warpers = [self._warper_by(x, arrays, matcher, source) for x in chosen]
         home = modes.home(self.pattern_index_, warpers)
-        warper = self._decide_on_refinement(training, warpers[home], source, progress, shared)
-        self.sharpening_ = None
+        tested = warpers[home], source, shared, self._settings(learnt=False), progress
+        warper = decide_on_refinement(self, training, *tested)
+        self.sharpening_, self.interval_factor_ = None, 1.0
         if modes.are_several and not isinstance(warper, LinearWarper):
             warpers[home] = warper
             finish = partial(self._sharpened, positions)
@@ -593,34 +632,6 @@ class DenseSynchronizer(AnchoredSynchronizer):
             max_offset = _WIDE if learnt else _NARROW
         settings = {"smoothness": self.smoothness, "max_rate": self.max_rate}
         return {**settings, "max_offset": max_offset}
-
-    def _learn_metric(self, unit, positions, columns, weighs):
-        """The features with the learnt metric, from evenly spaced performances if there are many.
-
-        Sets ``metric_`` and ``evidence_``.
-        """
-        learns = self.metric == "learned" and self.cost == "velocity" and self.consensus > 0
-        given = self.subframes, self.max_rate, self._settings(learns)["max_offset"]
-        refuse_long_paths(*given, self.n_frames_)
-        smoothing, self.metric_ = self.velocity_smoothing, None
-        self.evidence_ = no_evidence()
-        sharp, smooth = (_SHARP, _SMOOTH) if smoothing == "auto" else (smoothing, smoothing)
-        plain, n = Features(self.cost, self.subframes, smooth, unit), len(positions)
-        plain = plain.replace(anchors=columns, weighs=weighs)
-        if not learns or n < _FEWEST:
-            return plain
-        some = np.unique(np.round(np.linspace(0, n - 1, min(n, _MOST))).astype(np.intp))
-        settings = self._settings(learnt=False)
-        settings["max_offset"] = min(settings["max_offset"], _LEARNING_OFFSET)
-        settings |= {"consensus": self.consensus, "warp_smoothing": self.warp_smoothing}
-        features = plain.replace(velocity_smoothing=sharp)
-        learnt = on_one_thread(partial(features.learn, **settings), positions[some])
-        if learnt is None:
-            return plain
-        features, share, energy, evidence = learnt
-        self.evidence_ = weigh_evidence(evidence, len(some), self.unsupported)
-        self.metric_ = Bunch(share=share, energy=energy, performances=some)
-        return features
 
     def _search(self, features, store, positions, progress):
         """The matcher that searches, the portions of the training set, the median, and modes."""
@@ -688,7 +699,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
             own = keyframes[self.pattern_index_]
         last, unknown = self.n_frames_ - 1, np.isnan(own)
         if unknown.any():
-            some = np.flatnonzero(np.isfinite(keyframes[:, unknown]).any(axis=1))[:_MOST]
+            some = np.flatnonzero(np.isfinite(keyframes[:, unknown]).any(axis=1))[:MOST_LEARNT]
             (pattern,) = add_ramps([source], own[np.newaxis])
             warper = self._warper_by(exemplars, arrays, matcher, pattern)
             positions = warper.positions([arrays[k] for k in some])
@@ -710,23 +721,6 @@ class DenseSynchronizer(AnchoredSynchronizer):
         made = LinearWarper if linear else Warper
         given = pattern, positions, self.consensus > 0, self.warp_smoothing
         return on_one_thread(made.to_pattern, matcher, *given)
-
-    def _decide_on_refinement(self, training, warper, source, progress, portions):
-        """Decide whether warps are refined by postures; the warper that does so or not."""
-        verdict, linear = Verdict(), isinstance(warper, LinearWarper)
-        if self.refine == "auto" and self.consensus > 0 and not linear:
-            others = known_whole(training.performances, self.pattern_index_)
-            some = others[:: -(-len(others) // _TESTED) or 1]
-            given = training.scaled, warper, source, some, portions, self._settings(learnt=False)
-            verdict = try_refinement(*given, n_jobs=self.n_jobs, progress=progress)
-        names = "ratio", "p_value", "ratio_to_all"
-        self.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
-        self.misfit_ = verdict.misfit
-        helps = verdict.helps if self.refine == "auto" else self.refine
-        self.refines_ = bool(helps and not linear)
-        if not self.refines_:
-            return warper
-        return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.scaled))
 
     def _sharpened(self, positions, warper, exemplars):
         """The warper that also sharpens, with a metric; the same if it refines or does not warp."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Iterator, Mapping
+from numbers import Real
 from typing import Any, Self
 
 import numpy as np
@@ -27,6 +28,7 @@ from ..inputs.validation import read_collection
 from ..inputs.wording import counted
 from ..matching.warps import sample
 from ..utils.pipelines import route_to_synchronizer
+from .intervals import Intervals
 
 __all__ = [
     "UNITS",
@@ -60,6 +62,8 @@ class Match:
         Distance of each performance from the pattern; NaN by default.
     mode : array-like of int, shape (n_sequences,), default=None
         The mode of each performance; 0 by default.
+    intervals : Intervals, default=None
+        What `DenseSynchronizer` gives for ``interval`` and ``doubtful``.
 
     Attributes
     ----------
@@ -73,6 +77,8 @@ class Match:
         Which of several ways of doing the movement each performance shows: a label of
         ``DenseSynchronizer.modes_``. 0 everywhere if there is a single one, and from other
         synchronizers.
+    intervals : Intervals or None
+        As given; ``interval`` asks it.
 
     Raises
     ------
@@ -109,13 +115,14 @@ class Match:
     [[2.0, 1.5, 0.75, 0.5, 0.5]]
     """
 
-    __slots__ = ("distances", "mode", "times")
+    __slots__ = ("distances", "intervals", "mode", "times")
 
     def __init__(
         self,
         times: NumbersLike,
         distances: ValuesLike | None = None,
         mode: ValuesLike | None = None,
+        intervals: Intervals | None = None,
     ) -> None:
         times = np.array(as_numbers(times, "times", dtype=np.float64))
         if times.ndim != 2 or times.shape[1] < 2:
@@ -156,6 +163,7 @@ class Match:
                 f"{counted(n_sequences, 'performance')}, got shape {mode.shape}."
             )
         self.times, self.distances, self.mode = times, distances, mode.astype(np.intp)
+        self.intervals = intervals
 
     @property
     def offsets(self) -> np.ndarray:
@@ -174,6 +182,88 @@ class Match:
         slower and its offset grows, negative where it is faster.
         """
         return np.maximum(np.gradient(self.times, axis=1), _SLOWEST)
+
+    def interval(
+        self,
+        coverage: float = 0.9,
+        unit: Unit = "frames",
+        X: PerformancesLike | ValuesLike | None = None,
+        frame_rate: float | ValuesLike | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """How sure ``times`` are: where a performance shows the moments of the pattern.
+
+        For a key moment of the pattern, the interval holds the time of the same moment of a
+        performance with this probability. It is pointwise: of many moments a share of
+        ``1 - coverage`` is outside. Its width follows from the paths of the trellis that cost
+        hardly more than the best one, and from the share of the movement that no warp explains.
+        Constants turn them into per cent. They were fitted to key moments of people, or
+        ``DenseSynchronizer.calibrate`` fits them to yours. Of warps that are refined the width
+        follows from the noise.
+
+        Parameters
+        ----------
+        coverage : float, default=0.9
+            Probability, above 0 and below 1.
+        unit : {"frames", "percent", "seconds"}, default="frames"
+            Of the bounds, from the beginning of each performance, as in ``offsets_in``.
+        X : performances, or array-like of numbers, shape (n_sequences,), default=None
+            For seconds: the performances, or how many frames each has.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            For seconds: frames per second of X, as in ``offsets_in``.
+
+        Returns
+        -------
+        lower, upper : ndarray, shape (n_sequences, P)
+            Non-decreasing, inside the performance, and on both sides of ``times``. They meet at
+            both ends, and at exact key-frames, which pin a warp.
+
+        Raises
+        ------
+        ValueError
+            If the match does not tell, because it is not from a `DenseSynchronizer`; if there is no
+            such coverage; and as from ``offsets_in``.
+
+        Notes
+        -----
+        It is computed when it, or ``doubtful``, is first asked for, in less time than the match
+        took. Until then the performances must not be changed in place.
+
+        Examples
+        --------
+        >>> from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
+        >>> from sklearn_motionsync.datasets import make_bending
+        >>> bunch = make_bending(12, random_state=0)
+        >>> X = ASpace().fit_transform(DirectionCosines(bunch.skeleton).fit_transform(bunch.data))
+        >>> match = DenseSynchronizer(n_frames=101).fit(X).match(X)
+        >>> lower, upper = match.interval(0.9, "percent")
+        >>> float((upper - lower).mean().round(1)) < 5
+        True
+        >>> bool((lower <= match.times).all() and (match.times <= upper).all())
+        True
+        """
+        is_number = isinstance(coverage, Real) and not isinstance(coverage, bool)
+        if not (is_number and 0 < coverage < 1):
+            raise ValueError(
+                f"coverage must be a probability above 0 and below 1, such as 0.9; got "
+                f"{reprlib.repr(coverage)}."
+            )
+        lower, upper = self._known_intervals().bounds(float(coverage))
+        return self._in_unit(lower, unit, X, frame_rate), self._in_unit(upper, unit, X, frame_rate)
+
+    @property
+    def doubtful(self) -> np.ndarray:
+        """Which performances to look at before their warps are used, bool: (n_sequences,).
+
+        Those that are nearly as far from the pattern as standing still, those whose intervals of
+        90 % hold much of the clip, and all of a fit whose training set did not support its warps.
+        ``reasons`` says which. Raises as ``interval``.
+        """
+        return np.array([reason is not None for reason in self.reasons], dtype=bool)
+
+    @property
+    def reasons(self) -> list[str | None]:
+        """Why each performance is doubtful, in words; None if it is not."""
+        return list(self._known_intervals().measured().reasons)
 
     def offsets_in(
         self,
@@ -208,7 +298,7 @@ class Match:
             If there is no such unit, or X or the frame rate is missing for seconds; and as from
             ``seconds``.
         """
-        return self._in_unit(unit, X, frame_rate)[1]
+        return self._in_unit(self.offsets, unit, X, frame_rate)
 
     def to_frame(
         self,
@@ -216,6 +306,8 @@ class Match:
         X: PerformancesLike | ValuesLike | None = None,
         frame_rate: float | ValuesLike | None = None,
         labels: Labels | None = None,
+        *,
+        coverage: float | None = None,
     ) -> pd.DataFrame:
         """The timing of all performances as a table, such as for a CSV file.
 
@@ -231,18 +323,22 @@ class Match:
         labels : sequence of length n_sequences, or Index, default=None
             Labels of the performances; by default those of X, or 0, 1, ... A MultiIndex makes
             several levels.
+        coverage : float, default=None
+            Probability of the intervals of ``interval``, such as 0.9. None for none.
 
         Returns
         -------
         DataFrame
             Indexed by the label of the performance and the frame of the pattern. Columns:
             ``time``, tau(p) in the unit, from the beginning of each performance; ``offset``;
-            ``rate``; and ``mode``, if there are several.
+            ``rate``; ``mode``, if there are several; and with a coverage ``lower`` and ``upper``,
+            between which the time lies, and ``doubtful``.
 
         Raises
         ------
         ValueError
-            As from ``offsets_in``; or if there is not one label a performance.
+            As from ``offsets_in``, and with a coverage as from ``interval``; or if there is not one
+            label a performance.
 
         Examples
         --------
@@ -258,13 +354,19 @@ class Match:
         4      100.0     0.0   0.5
         >>> csv = match.to_frame("percent", labels=["ann"]).to_csv()
         """
-        times, offsets = self._in_unit(unit, X, frame_rate)
+        clock = unit, X, frame_rate
+        columns = {"time": self._in_unit(self.times, *clock), "offset": self.offsets_in(*clock)}
+        columns["rate"] = self.rates
         if labels is not None:
             self._check_count(labels, "label")
-        columns = {"time": times, "offset": offsets, "rate": self.rates}
+        if coverage is not None:
+            columns["lower"], columns["upper"] = self.interval(coverage, *clock)
         table = timing_table(columns, X, labels)
+        n_frames = self.times.shape[1]
         if self.mode.any():
-            table["mode"] = np.repeat(self.mode, times.shape[1])
+            table["mode"] = np.repeat(self.mode, n_frames)
+        if coverage is not None:
+            table["doubtful"] = np.repeat(self.doubtful, n_frames)
         return table
 
     @classmethod
@@ -381,19 +483,26 @@ class Match:
         """
         return self._in_seconds(self.times, X, frame_rate)
 
-    def _in_unit(self, unit, X, frame_rate):
-        """``times`` and ``offsets`` in a unit of time."""
+    def _known_intervals(self):
+        if self.intervals is None:
+            raise ValueError(
+                "This match does not tell how sure it is: only DenseSynchronizer.match does, and "
+                "Match.from_estimator of a pipeline with one."
+            )
+        return self.intervals
+
+    def _in_unit(self, frames, unit, X, frame_rate):
+        """Times or offsets in frames of the pattern, in a unit of time."""
         if check_unit(unit) == "seconds":
             if X is None:
                 raise ValueError(
                     "unit='seconds' needs X, the performances or how many frames each has, and "
                     "frame_rate."
                 )
-            return tuple(self._in_seconds(t, X, frame_rate) for t in (self.times, self.offsets))
+            return self._in_seconds(frames, X, frame_rate)
         if X is not None:
             self._check_count(_lengths(X), "length")
-        scale = 100 / (self.times.shape[1] - 1) if unit == "percent" else 1
-        return self.times * scale, self.offsets * scale
+        return frames * (100 / (self.times.shape[1] - 1) if unit == "percent" else 1)
 
     def _stretched(self, times, X):
         """Frames of the pattern in frames of each performance."""

@@ -3,16 +3,50 @@
 from functools import partial
 
 import numpy as np
+from sklearn.utils import Bunch
 
 from ..matching.filters import choose_smoothing
+from ..matching.matcher import LinearWarper, RefinedWarper
 from ..matching.refinement_test import RefinementTest, Verdict, split_features
 from ..utils.threads import on_one_thread
+from .gaps import known_whole
 from .portions import measure_in_portions
 
-__all__ = ["try_refinement"]
+__all__ = ["decide_on_refinement", "try_refinement"]
+
+# Most performances for the refinement test.
+_TESTED = 12
 
 # Fewer performances have no first pass, and with twice as many it takes every second one.
 _SEVERAL = 3
+
+
+def decide_on_refinement(sync, training, warper, source, portions, settings, progress):
+    """Decide whether warps are refined by postures; the warper that does so or not.
+
+    Sets ``refinement_``, ``misfit_`` and ``refines_`` of the synchronizer.
+
+    Parameters
+    ----------
+    sync : DenseSynchronizer
+    training : TrainingSet
+    warper : Warper
+    source, portions, settings, progress : as for `try_refinement`
+    """
+    verdict, linear = Verdict(), isinstance(warper, LinearWarper)
+    if sync.refine == "auto" and sync.consensus > 0 and not linear:
+        others = known_whole(training.performances, sync.pattern_index_)
+        some = others[:: -(-len(others) // _TESTED) or 1]
+        given = training.scaled, warper, source, some, portions, settings
+        verdict = try_refinement(*given, n_jobs=sync.n_jobs, progress=progress)
+    names = "ratio", "p_value", "ratio_to_all"
+    sync.refinement_ = Bunch(**{name: getattr(verdict, name) for name in names})
+    sync.misfit_ = verdict.misfit
+    helps = verdict.helps if sync.refine == "auto" else sync.refine
+    sync.refines_ = bool(helps and not linear)
+    if not sync.refines_:
+        return warper
+    return RefinedWarper(**vars(warper), noise_width=choose_smoothing(training.scaled))
 
 
 def try_refinement(scaled, warper, source, some, portions, settings, *, n_jobs, progress):

@@ -1,0 +1,157 @@
+"""How far the times of warps may be off, by what was matched.
+
+Paths that cost hardly more than the best one tell how far a warp may move. Their mean distance
+from it gives the half-width of an interval, by constants that were fitted to key moments of people:
+see docs/accuracy.md.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .factors import Bases, right_factor
+from .trellis import Tile, Trellis
+from .warps import even_slices
+
+__all__ = ["Uncertainty", "refined_uncertainty", "tail_factor", "uncertainty_of_paths"]
+
+# Half-widths of 90 %, in mean distances of the paths: docs/design.md.
+_SCALE = 2.2
+# Half-widths grow with the coverage c as ln(1 / (1 - c)) to this power: for warps of people, and
+# for a normal distribution.
+_HEAVY, _NORMAL = 1.2, 0.7
+# Half-width of 90 % of a normal distribution, in standard errors.
+_STANDARD = 1.645
+# Most frames of the clock on which paths are compared.
+_FRAMES = 81
+# A path counts by exp(-1) where it costs this share more than the best one.
+_TEMPERATURE = 0.1
+# Share of the energy by which rounding may change a cost.
+_ROUNDING = 2.0**-40
+# Cells of the rows that are kept at once.
+_BATCH_CELLS = 1 << 20
+
+
+class Uncertainty(NamedTuple):
+    """How far the times of warps may be off.
+
+    Attributes
+    ----------
+    half_widths : ndarray, shape (n_sequences, P)
+        Of intervals that hold 90 %, in frames, where nothing pins a warp.
+    tails : ndarray, shape (n_sequences,)
+        Power by which half-widths grow with the coverage: see `tail_factor`.
+    shares : ndarray, shape (n_sequences,)
+        Distances of the direct paths as shares of the energy of both sequences: 1 is as far as
+        standing still.
+    widest : ndarray, shape (n_sequences,)
+        The widest interval of 90 %, by the paths, as a share of the clip.
+    """
+
+    half_widths: np.ndarray
+    tails: np.ndarray
+    shares: np.ndarray
+    widest: np.ndarray
+
+
+def tail_factor(coverage, tails):
+    """Half-widths of a coverage, in those of 90 %."""
+    return (np.log1p(-coverage) / np.log(0.1)) ** tails
+
+
+def uncertainty_of_paths(matcher, base, moving, times):
+    """The uncertainty of warps, by the trellis of their direct paths.
+
+    Parameters
+    ----------
+    matcher : Matcher
+    base : ndarray, shape (1, P, n_features)
+        Features of the pattern.
+    moving : ndarray, shape (n_sequences, Q, n_features)
+        Features of the performances.
+    times : ndarray, shape (n_sequences, P)
+        Their warps.
+
+    Returns
+    -------
+    Uncertainty
+    """
+    n_frames, trellis = times.shape[1], matcher.trellis
+    some = np.unique(np.round(np.linspace(0, n_frames - 1, _FRAMES)).astype(np.intp))
+    base, moving = base[:, some], moving[:, some * trellis.table.subframes]
+    trellis = _coarse(matcher, n_frames, len(some))
+    per_frame = (n_frames - 1) / (len(some) - 1)
+    spread, shares = _spread_of_paths(trellis, base, moving, times[:, some] / per_frame)
+    frames, scale = np.arange(n_frames), _SCALE * per_frame
+    widths = np.array([np.interp(frames, some, scale * row) for row in spread])
+    widest = np.minimum(2 * widths.max(axis=1) / (n_frames - 1), 1)
+    return Uncertainty(widths, np.full(len(times), _HEAVY), shares, widest)
+
+
+def refined_uncertainty(by_paths, errors):
+    """The uncertainty of refined warps, by their standard errors in frames."""
+    normal = np.full(len(errors), _NORMAL)
+    return Uncertainty(_STANDARD * errors, normal, by_paths.shares, by_paths.widest)
+
+
+def _coarse(matcher, n_frames, count):
+    """The trellis of a matcher on so many of the frames of the clock, one position each."""
+    trellis, table = matcher.trellis, matcher.trellis.table
+    if count == n_frames and table.subframes == 1:
+        return trellis
+    reach = {"max_offset": trellis.reach / n_frames, "unseen": trellis.unseen}
+    reach["max_rate"] = max(1, table.steps.max() / table.subframes)
+    if trellis.anchors is not None:
+        reach["anchors"] = trellis.anchors.at(count)
+    return Trellis.on_clock(matcher.features.cost, count, trellis.mu, **reach)
+
+
+def _spread_of_paths(trellis, base, moving, times):
+    """Mean distance of near-optimal paths from given times, and the costs of the best ones.
+
+    The best path through a cell is one to it, and one from there: a cell of the trellis, and one of
+    that of the reversed sequences. It counts by ``exp(-excess / T)``, where T is a share of the
+    cost of the best path.
+
+    Parameters
+    ----------
+    trellis : Trellis
+        With one position a frame.
+    base : ndarray, shape (1, P, n_features)
+    moving : ndarray, shape (n_moving, P, n_features)
+    times : ndarray, shape (n_moving, P)
+
+    Returns
+    -------
+    spread : ndarray, shape (n_moving, P)
+        In frames.
+    shares : ndarray, shape (n_moving,)
+        Costs of the best paths, as shares of the energy of both sequences.
+    """
+    n_frames, width = base.shape[1], trellis.width
+    energies = np.square(trellis.features(moving)).sum(axis=(1, 2), dtype=np.float64)
+    energies += np.square(trellis.features(base)).sum()
+    energies = np.maximum(energies, np.finfo(np.float64).tiny)
+    spread, shares = np.empty(times.shape), np.empty(len(times))
+    offsets = np.arange(-width, width + 1)[:, np.newaxis]
+    for rows in even_slices(len(times), max(1, _BATCH_CELLS // (n_frames * len(offsets)))):
+        totals = _rows(trellis, base, moving[rows])
+        shares[rows] = np.maximum(totals[-1, width], 0) / energies[rows]
+        totals += _rows(trellis, base[:, ::-1], moving[rows, ::-1])[::-1, ::-1]
+        totals -= totals.min(axis=1, keepdims=True)
+        totals /= -np.maximum(_TEMPERATURE * shares[rows], _ROUNDING) * energies[rows]
+        weights = np.exp(totals, out=totals)
+        sums = weights.sum(axis=1)
+        weights *= np.abs(offsets - (times[rows] - np.arange(n_frames)).T[:, np.newaxis])
+        spread[rows] = (weights.sum(axis=1) / sums).T
+    return spread, shares
+
+
+def _rows(trellis, base, moving):
+    """Costs of the best paths to every cell: (P, 2 * width + 1, n_moving)."""
+    tile = Tile(Bases(trellis, base), right_factor(moving, trellis))
+    states = tile.states(base.shape[1])
+    for _ in tile.advance(states):
+        pass
+    rows = states.reshape(len(states), -1, len(moving))
+    return rows[:, trellis.pad : rows.shape[1] - trellis.pad]

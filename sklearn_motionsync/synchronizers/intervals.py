@@ -1,0 +1,173 @@
+"""How sure a match is: intervals of its times, and which performances are doubtful."""
+
+import math
+import threading
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..inputs.wording import counted
+from ..matching.anchors import first_meeting
+from ..matching.uncertainty import tail_factor
+from ..matching.warps import even_slices
+from ..utils.threads import on_one_thread
+
+__all__ = ["Intervals", "calibrated_factor", "intervals_of", "joined"]
+
+# Performances whose uncertainty is computed at a time.
+_PORTION = 64
+# A performance is doubtful if the share of its movement that no path explains, times the widest
+# interval of 90 %, as a share of the clip, is larger: docs/design.md.
+_DOUBTFUL = 0.2
+
+
+class Measured(NamedTuple):
+    """How far the times of some performances may be off.
+
+    Attributes
+    ----------
+    widths : ndarray, shape (n_sequences, P)
+        Half-widths of 90 %, in frames; 0 where a warp is pinned.
+    tails : ndarray, shape (n_sequences,)
+        As of `Uncertainty`.
+    reasons : list of str or None
+        Why each performance is doubtful.
+    """
+
+    widths: np.ndarray
+    tails: np.ndarray
+    reasons: list[str | None]
+
+
+class Intervals:
+    """Intervals of the times of a match, measured when they are first asked for.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n_sequences, P)
+    measure : callable
+        Gives `Measured`. It is called once.
+    """
+
+    def __init__(self, times: np.ndarray, measure: Callable[[], Measured]) -> None:
+        self.times, self._measure, self._found = times, measure, None
+        self._lock = threading.Lock()
+
+    def __getstate__(self):
+        return self.times, self.measured()
+
+    def __setstate__(self, state):
+        self.times, self._found = state
+        self._lock = threading.Lock()
+
+    def measured(self) -> Measured:
+        """What is known of the performances, which are not needed any more."""
+        with self._lock:
+            if self._found is None:
+                self._found = self._measure()
+                del self._measure
+            return self._found
+
+    def bounds(self, coverage: float) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper times, (n_sequences, P) each, non-decreasing and inside the clip."""
+        widths, tails, _ = self.measured()
+        half, last = widths * tail_factor(coverage, tails)[:, np.newaxis], self.times.shape[1] - 1
+        lower, upper = np.maximum(self.times - half, 0), np.minimum(self.times + half, last)
+        # A warp does not decrease: it is above what it was above before.
+        lower = np.maximum.accumulate(lower, axis=1)
+        return lower, np.minimum.accumulate(upper[:, ::-1], axis=1)[:, ::-1]
+
+
+def joined(parts: Iterable[Measured]) -> Measured:
+    """What was measured of performances that were matched in parts."""
+    *columns, reasons = zip(*parts, strict=True)
+    return Measured(*map(np.concatenate, columns), [why for part in reasons for why in part])
+
+
+def intervals_of(sync, warper, arrays, times, shares=None):
+    """The intervals of the warps of a `DenseSynchronizer`.
+
+    Parameters
+    ----------
+    sync : DenseSynchronizer
+        Fitted.
+    warper : Warper
+        Its own.
+    arrays : list of ndarray (n_frames_i, n_columns)
+        Performances as the warper takes them.
+    times : ndarray, shape (n_sequences, P)
+    shares : ndarray, shape (n_sequences, n_keyframes), default=None
+        Key-frames that were given.
+    """
+    factor, evidence, pinned = sync.interval_factor_, sync.evidence_, sync.keyframes_
+    pins = shares is not None and sync.keyframe_std == 0
+
+    def measure():
+        parts = [
+            on_one_thread(warper.uncertainty, warper.positions(arrays[rows]), times[rows])
+            for rows in even_slices(len(times), _PORTION)
+        ]
+        widths, tails, unlike, widest = map(np.concatenate, zip(*parts, strict=True))
+        widths[:, [0, -1]] = 0
+        if pins:
+            for frames in (np.floor(pinned), np.ceil(pinned)):
+                widths[:, frames.astype(np.intp)] *= np.isnan(shares)
+        return Measured(widths * factor, tails, _reasons(unlike, widest, evidence))
+
+    return Intervals(times, measure)
+
+
+def calibrated_factor(match, pattern, known):
+    """By what the half-widths of a match have to be multiplied, so that they hold key-frames.
+
+    Parameters
+    ----------
+    match : Match
+        Of performances, without their key-frames.
+    pattern : ndarray, shape (n_keyframes,), or None
+        Key-frames of the pattern, in frames; None for the median of what performances meet.
+    known : ndarray, shape (n_sequences, n_keyframes)
+        In frames of the clock; NaN where one is not known.
+
+    Returns
+    -------
+    float
+    """
+    if pattern is None:
+        pattern = np.nanmedian(first_meeting(match.times, known), axis=0)
+    frames, seen = np.arange(match.times.shape[1]), np.isfinite(known)
+
+    def at_keyframes(curves):
+        return np.array([np.interp(pattern, frames, curve) for curve in curves])[seen]
+
+    errors = np.abs(at_keyframes(match.times) - known[seen])
+    widths = np.maximum(at_keyframes(match.intervals.measured().widths), np.finfo(np.float64).tiny)
+    # As many as hold 90 % of new ones, too (split conformal prediction).
+    n = len(errors)
+    rank = math.ceil(0.9 * (n + 1))
+    if rank > n:
+        raise ValueError(
+            f"{counted(n, 'key-frame')} of the performances do not tell 90 %: at least 9 are "
+            "needed, and some dozens tell it well."
+        )
+    return float(np.sort(errors / widths)[rank - 1])
+
+
+def _reasons(shares, widest, evidence):
+    """Why performances are doubtful; None for those that are not."""
+    reasons = []
+    for share, width in zip(shares, widest, strict=True):
+        why = None
+        if share * width > _DOUBTFUL:
+            why = (
+                f"no warp explains {share:.0%} of its movement, and an interval of 90 % holds "
+                f"{width:.0%} of the clip: it may be cut off, repeated or another movement"
+            )
+        elif evidence.weak:
+            why = (
+                f"matching leaves {evidence.remaining:.0%} of the differences in the training set, "
+                "and its warps contradict each other (evidence_)"
+            )
+        reasons.append(why)
+    return reasons

@@ -1,0 +1,103 @@
+"""Near-optimal paths against all admissible paths, and standard errors against repeated noise."""
+
+import numpy as np
+import pytest
+from sklearn_motionsync.matching.costs import COSTS
+from sklearn_motionsync.matching.filters import smooth
+from sklearn_motionsync.matching.matcher import Features, Matcher
+from sklearn_motionsync.matching.refinement import refine_warps, standard_errors
+from sklearn_motionsync.matching.trellis import Trellis
+from sklearn_motionsync.matching.uncertainty import tail_factor, uncertainty_of_paths
+
+from oracle import all_paths, path_cost, step_costs
+
+P, REACH, MU = 7, 3, 0.4
+
+
+def matcher_of(cost):
+    trellis = Trellis.on_clock(cost, P, MU, max_offset=REACH / P, max_rate=2)
+    return Matcher(Features(cost, 1, 0.0, None), trellis)
+
+
+def expected(x, y, cost, times):
+    """Mean distance of paths from times, the best one through each cell, by all of them."""
+    costs, last = step_costs(cost, 2, 1), P - 1
+    forward, backward = {}, {}
+    for path in all_paths(P, range(3), 1, REACH):
+        for p, q in enumerate(path):
+            to = path_cost(x[: p + 1], y, path[: p + 1], costs, MU, 1)
+            # The way from a cell is that of the reversed sequences.
+            back = path_cost(x[::-1][: P - p], y[::-1], last - path[::-1][: P - p], costs, MU, 1)
+            forward[p, q] = min(to, forward.get((p, q), np.inf))
+            backward[p, q] = min(back, backward.get((p, q), np.inf))
+    best = min(path_cost(x, y, path, costs, MU, 1) for path in all_paths(P, range(3), 1, REACH))
+    out = []
+    for p in range(P):
+        cells = {q: forward[p, q] + backward[p, q] for q in range(P) if (p, q) in forward}
+        least = min(cells.values())
+        weights = {q: np.exp(-(c - least) / (0.1 * best)) for q, c in cells.items()}
+        distance = sum(w * abs(q - times[p]) for q, w in weights.items())
+        out.append(distance / sum(weights.values()))
+    return np.array(out), best / (np.square(x).sum() + np.square(y).sum())
+
+
+@pytest.mark.parametrize("cost", COSTS)
+def test_spread_equals_that_of_all_paths(cost):
+    rng = np.random.default_rng(0)
+    base, moving = rng.standard_normal((1, P, 2)), rng.standard_normal((3, P, 2))
+    times = np.sort(rng.uniform(0, P - 1, (3, P)), axis=1)
+    times[:, 0], times[:, -1] = 0, P - 1
+    found = uncertainty_of_paths(matcher_of(cost), base, moving, times)
+    for y, tau, widths, share in zip(moving, times, found.half_widths, found.shares, strict=True):
+        spread, best = expected(base[0], y, cost, tau)
+        np.testing.assert_allclose(widths, 2.2 * spread, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(share, best, rtol=1e-9)
+    widest = np.minimum(2 * found.half_widths.max(axis=1) / (P - 1), 1)
+    np.testing.assert_allclose(found.widest, widest)
+
+
+def test_equal_sequences_are_certain():
+    t = np.linspace(0, 1, 60)[:, np.newaxis]
+    x = np.hstack([np.sin(5 * t), np.cos(7 * t)])[np.newaxis]
+    trellis = Trellis.on_clock("posture", 60, 0.01, max_offset=0.25, max_rate=2)
+    matcher = Matcher(Features("posture", 1, 0.0, None), trellis)
+    found = uncertainty_of_paths(matcher, x, x, np.arange(60.0)[np.newaxis])
+    np.testing.assert_allclose(found.half_widths, 0, atol=1e-6)
+    np.testing.assert_allclose(found.shares, 0, atol=1e-12)
+
+
+def test_half_widths_grow_with_the_coverage():
+    tails = np.array([0.7, 1.2])
+    np.testing.assert_allclose(tail_factor(0.9, tails), 1)
+    normal = tail_factor(0.8, tails)[0], tail_factor(0.95, tails)[0]
+    np.testing.assert_allclose(normal, [1.2816 / 1.6449, 1.96 / 1.6449], rtol=0.02)
+    assert (tail_factor(0.5, tails) < 1).all()
+    assert (tail_factor(0.99, tails) > tail_factor(0.95, tails)).all()
+
+
+@pytest.mark.parametrize(("noise", "width"), [(0.02, 0.0), (0.3, 0.0), (0.3, 1.5)])
+def test_standard_errors_are_those_of_repeated_noise(noise, width):
+    """The root mean square of the errors of a warp whose noise is drawn anew."""
+    n_frames, rng = 80, np.random.default_rng(0)
+    t = np.linspace(0, 1, n_frames)[:, np.newaxis]
+    true = t + 0.05 * np.sin(np.pi * t) * np.sin(2 * np.pi * t)
+    waves, shift = np.arange(1, 9), np.linspace(0, 5, 8)
+
+    def movement(phase):
+        return np.sin(3 * waves * phase + shift)
+
+    draws = noise * rng.standard_normal((2, 150, n_frames, 8))
+    base, moving = movement(true) + draws[0], movement(t) + draws[1]
+    if width:
+        base, moving = smooth(base, width), smooth(moving, width)
+    times = np.tile((n_frames - 1) * true[:, 0], (150, 1))
+    errors, stated = np.empty(times.shape), np.empty(times.shape)
+    for i, (x, y) in enumerate(zip(base, moving, strict=True)):
+        refined = refine_warps(x, y[np.newaxis], times[i : i + 1], 20, width)
+        errors[i] = refined[0] - times[i]
+        stated[i] = standard_errors(x, y[np.newaxis], refined, width)[0]
+    middle = slice(8, -8)
+    found = np.sqrt(np.square(errors).mean(axis=0))[middle].mean()
+    ratio = np.median(stated[:, middle].mean(axis=1)) / found
+    assert 0.8 < ratio < 1.4
+    assert (stated[:, [0, -1]] == 0).all()
