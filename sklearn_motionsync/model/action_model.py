@@ -18,6 +18,7 @@ from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.types import Labels, PerformanceLike, PerformancesLike, RandomState, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..inputs.wording import counted
+from ..synchronizers.match import STANDARD, Match
 from ..utils.atomic import atomic_fit, atomic_partial_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
@@ -26,7 +27,7 @@ from ..utils.parameters import validated
 from .hidden import fill_with_mean, group_counts, is_gappy
 from .sampling import sample_performances, sample_postures
 from .similarity import Neighbours, PerformanceStream, log_moments
-from .variation import mean_band, predictive_variance, simultaneous_factor
+from .variation import clock_error, mean_band, predictive_variance, simultaneous_factor
 
 __all__ = ["ActionModel"]
 
@@ -507,26 +508,46 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         return self.mean_ - half_width, self.mean_ + half_width
 
     @snapshot
-    def mean_envelope(self, random_state: RandomState = 0) -> tuple[np.ndarray, np.ndarray]:
+    def mean_envelope(
+        self, random_state: RandomState = 0, match: Match | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """A confidence band of the population's mean, at all frames and in all features.
 
         It holds that mean with probability ``coverage``, by a bootstrap over groups: the mean to
         be expected if other people had been recorded, as many with as many performances. Of more
         than 64 performances it is the band of those that are kept, which is wider.
 
+        The bootstrap takes the clock for exact. With a match the variance of a wrong clock is
+        added: the squared slope of the mean times the squared standard error of the times.
+
         Parameters
         ----------
         random_state : int, RandomState instance or None, default=0
             Draws the bootstrap samples.
+        match : Match, default=None
+            Of the training performances, by the `DenseSynchronizer` that the model was fitted
+            after.
 
         Returns
         -------
         lower, upper : ndarray, shape (P, n_features)
             The bounds of the band.
+
+        Raises
+        ------
+        ValueError
+            If the match is on another clock, or does not tell how sure it is (`Match.interval`).
         """
         self._check_groups_seen()
         kept = self._stream.kept.astype(np.float64)
         half_width = mean_band(kept, self.groups_, self.coverage, random_state)
+        if match is not None:
+            if match.times.shape[1] != self.n_frames_:
+                raise ValueError(
+                    f"The match has {match.times.shape[1]} frames, the model {self.n_frames_}: "
+                    "give the match of the synchronizer that the model was fitted after."
+                )
+            half_width = np.hypot(half_width, clock_error(self.mean_, *match.interval(STANDARD)))
         half_width = half_width.astype(self.mean_.dtype)
         return self.mean_ - half_width, self.mean_ + half_width
 

@@ -11,6 +11,7 @@ from sklearn.base import BaseEstimator
 
 from ..inputs.features import choose_features
 from ..inputs.types import Features, PerformancesLike
+from ..utils.pipelines import find_synchronizer, route_to_synchronizer
 from .views import models_of_classes, view_of
 
 __all__ = ["find_departures"]
@@ -55,7 +56,9 @@ def find_departures(
         model, counted from 0; ``peak``, the frame of the largest deviation; ``deviation``, in
         standard deviations, negative below the mean; ``rare``, whether it exceeds
         `ActionModel.simultaneous_factor`, which a share of ``coverage`` of the performances of new
-        people does at no frame and in no feature.
+        people does at no frame and in no feature; ``timing``, whether the clock may be the reason:
+        inside the intervals of 90 % of its times (`Match.interval`) the performance has values
+        within the limit. False where no `DenseSynchronizer` tells.
 
     Raises
     ------
@@ -75,8 +78,8 @@ def find_departures(
     >>> new = np.sin(3 * t)
     >>> new[20:25] += 3
     >>> find_departures(model, [np.sin(3 * t), new]).round(0)
-       performance feature  first  last  peak  deviation  rare
-    0            1      x0     20    24    20       19.0  True
+       performance feature  first  last  peak  deviation  rare  timing
+    0            1      x0     20    24    20       19.0  True   False
     """
     is_number = isinstance(limit, Real) and not isinstance(limit, bool)
     if limit is not None and not (is_number and 0 < limit < np.inf):
@@ -100,11 +103,18 @@ def find_departures(
 def _departures(estimator, X, params, caller, features, limit, part=None):
     """The table of one model; of the model of a class with the class, and indices in it."""
     view = view_of(estimator, X, params, caller, features=features, postures=features is None)
-    names, scores = view.names, view.scores
+    names, scores, curves = view.names, view.scores, view.whole
+    mean, std = view.model.mean_, view.predicted
     if features is not None:
         chosen = choose_features(features, names)
-        names, scores = [names[i] for i in chosen], scores[:, :, chosen]
-    found = runs(scores, view.model.n_std if limit is None else limit)
+        names, scores, curves = (
+            [names[i] for i in chosen],
+            scores[:, :, chosen],
+            curves[..., chosen],
+        )
+        mean, std = mean[:, chosen], std[:, chosen]
+    limit = view.model.n_std if limit is None else limit
+    found = runs(scores, limit)
     labels = view.labels if part is None else part.labels
     # A label may be a tuple, which an array would unpack.
     columns = {"performance": pd.Series([labels[i] for i in found.performance], dtype=object)}
@@ -118,10 +128,25 @@ def _departures(estimator, X, params, caller, features, limit, part=None):
         "peak": found.peak,
         "deviation": found.score,
         "rare": np.abs(found.score) > view.model.simultaneous_factor(),
+        "timing": np.zeros(len(found.first), dtype=bool),
     }
+    match = _match_of(estimator, X, params) if len(found.first) else None
+    if match is not None:
+        bounds = mean - limit * std, mean + limit * std
+        columns["timing"] = explained_by_timing(found, curves, *bounds, match)
     table = pd.DataFrame(columns)
     order = np.lexsort((found.first, found.feature, -np.abs(found.score), found.performance))
     return table.iloc[order].reset_index(drop=True).infer_objects()
+
+
+def _match_of(estimator, X, params):
+    """The match of performances, if a synchronizer of the estimator tells how sure it is."""
+    try:
+        find_synchronizer(estimator)
+    except ValueError:
+        return None
+    match = route_to_synchronizer(estimator, X, params, "find_departures").match()
+    return None if match.intervals is None else match
 
 
 class Runs(NamedTuple):
@@ -175,3 +200,32 @@ def runs(scores, limit):
     peak = frames[order]
     score = scores[performance[0], feature[0], peak]
     return Runs(performance[0], feature[0], first, last, peak, score)
+
+
+def explained_by_timing(found, curves, lower, upper, match):
+    """Whether a wrong clock may be the reason of runs, (n_runs,).
+
+    The time of every frame of the run may then be another one inside its interval, where the
+    performance has values between the bounds.
+
+    Parameters
+    ----------
+    found : Runs
+    curves : ndarray, shape (n, P, n_features)
+        Performances on the clock.
+    lower, upper : ndarray, shape (P, n_features)
+        Bounds of what is no departure.
+    match : Match
+        Of the performances.
+    """
+    n_frames, pairs = curves.shape[1], zip(match.times, *match.interval(), strict=True)
+    # The frames of the clock whose times are inside the interval of a frame.
+    spans = np.array([(t.searchsorted(a), t.searchsorted(b, "right")) for t, a, b in pairs])
+    frames, explained = np.arange(n_frames), np.empty(len(found.first), dtype=bool)
+    starts, ends = np.minimum(spans[:, 0], frames), np.maximum(spans[:, 1], frames + 1)
+    for k, (i, feature) in enumerate(zip(found.performance, found.feature, strict=True)):
+        own, run = curves[i, :, feature], frames[found.first[k] : found.last[k] + 1]
+        seen = [own[starts[i, p] : ends[i, p]] for p in run]
+        low, high = (np.array([extreme(x) for x in seen]) for extreme in (np.nanmin, np.nanmax))
+        explained[k] = np.all((low <= upper[run, feature]) & (high >= lower[run, feature]))
+    return explained

@@ -11,7 +11,7 @@ from ..utils.groups import mean_of_others, sums_of_groups
 from .hidden import group_counts, is_gappy, mean_of_other_groups
 from .similarity import t_prediction_limit
 
-__all__ = ["mean_band", "predictive_variance", "simultaneous_factor"]
+__all__ = ["clock_error", "mean_band", "predictive_variance", "simultaneous_factor"]
 
 # A variance is shrunk to its mean over the frames, which weighs as much as so many performances.
 _SHRINKAGE = 5
@@ -162,6 +162,19 @@ def mean_band(performances, groups, coverage, random_state=None):
         drawn = random_state.standard_normal((len(row), n_groups)) / np.sqrt(n_groups)
         row[:] = np.abs((drawn @ scatter + off) / error).max(axis=1)
     return np.quantile(largest, coverage) * estimate(means)[1].reshape(shape)
+
+
+def clock_error(mean, lower, upper):
+    """Standard error of a mean performance by that of the clock: (P, n_features).
+
+    Parameters
+    ----------
+    mean : ndarray, shape (P, n_features)
+    lower, upper : ndarray, shape (n_sequences, P)
+        Intervals of one standard error about the times of performances.
+    """
+    error = (upper - lower).mean(axis=0) / 2
+    return np.abs(np.gradient(mean, axis=0)) * error[:, np.newaxis]
 
 
 def _weigh(weights, values):

@@ -31,6 +31,7 @@ from ..utils.pipelines import route_to_synchronizer
 from .intervals import Intervals
 
 __all__ = [
+    "STANDARD",
     "UNITS",
     "Match",
     "check_match",
@@ -40,6 +41,8 @@ __all__ = [
     "timing_table",
 ]
 
+# Coverage of one standard error to both sides, of a normal distribution.
+STANDARD = 0.6827
 # Units of time of the clock of the pattern.
 UNITS = ("frames", "percent", "seconds")
 # Times may decrease by rounding errors, by this share of the clock.

@@ -1,0 +1,126 @@
+"""What a model makes of intervals of the clock: departures by timing, and the band of the mean."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    Match,
+    find_departures,
+)
+from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.model.departures import explained_by_timing, runs
+from sklearn_motionsync.synchronizers.intervals import Intervals, Measured
+
+P = 60
+
+
+def match_within(half_width, n=1):
+    """A match at an even pace whose intervals of 90 % have one half-width, in frames."""
+    times = np.tile(np.arange(float(P)), (n, 1))
+    match = Match(times)
+    widths = np.full(times.shape, float(half_width))
+    match.intervals = Intervals(times, lambda: Measured(widths, np.ones(n), [None] * n))
+    return match
+
+
+@pytest.mark.parametrize(
+    ("half_width", "explained"), [(0, False), (1.5, False), (3, True), (10, True)]
+)
+def test_a_late_step_is_timing_if_the_interval_reaches_it(half_width, explained):
+    """Two frames late, within bounds of a tenth."""
+    mean = np.where(np.arange(P) < 30, 0.0, 1.0)[:, np.newaxis]
+    late = np.where(np.arange(P) < 33, 0.0, 1.0)[np.newaxis, :, np.newaxis]
+    found = runs((late - mean) / 0.1, 1.0)
+    assert (found.first.tolist(), found.last.tolist()) == ([30], [32])
+    given = found, late, mean - 0.1, mean + 0.1
+    assert explained_by_timing(*given, match_within(half_width)).tolist() == [explained]
+
+
+def test_a_value_that_never_comes_is_not_timing():
+    mean = np.sin(np.linspace(0, 6, P))[:, np.newaxis]
+    high = mean[np.newaxis] + 2.5
+    found = runs((high - mean) / 0.1, 1.0)
+    assert not explained_by_timing(found, high, mean - 0.1, mean + 0.1, match_within(P)).any()
+
+
+def test_a_lifted_forearm_is_no_timing_and_departures_of_people_often_are(bends):
+    """Actors held out: their departures, and those of a forearm that points up for most of it."""
+    skeleton = DirectionCosines(bends.skeleton).fit(bends.data)
+    postures = skeleton.transform(bends.data)
+    known, new = np.flatnonzero(bends.actor != "tr"), np.flatnonzero(bends.actor == "tr")
+    pipe = make_pipeline(ASpace(), DenseSynchronizer(P), ActionModel())
+    pipe.fit([postures[i] for i in known], actionmodel__groups=bends.actor[known])
+    names = list(skeleton.get_feature_names_out())
+    arm = [i for i, name in enumerate(names) if name.startswith("left_forearm")]
+    lifted = [postures[i].copy() for i in new]
+    for x in lifted:
+        x[len(x) // 3 :, arm] = 0, 1, 0
+    of_arm = find_departures(pipe, lifted)
+    of_arm = of_arm[of_arm["feature"].isin([f"x{i}" for i in arm])]
+    assert of_arm["performance"].nunique() == len(new)
+    assert of_arm["timing"].mean() < 0.2
+    untouched = find_departures(pipe, [postures[i] for i in new], limit=2)
+    assert untouched["timing"].mean() > 0.3
+
+
+def test_where_nothing_tells_departures_are_not_timing(bending):
+    points = ASpace(3).fit_transform(bending.data[:12])
+    pipe = make_pipeline(LinearSynchronizer(P), ActionModel()).fit(points)
+    wrong = [2 * x for x in points[:3]]
+    assert not find_departures(pipe, wrong)["timing"].any()
+    model = ActionModel().fit(LinearSynchronizer(P).fit_transform(points))
+    assert not find_departures(model, [2 * model.mean_])["timing"].any()
+
+
+def test_the_band_of_the_mean_with_the_doubt_of_the_clock(bending_aspace):
+    sync = DenseSynchronizer(P).fit(bending_aspace[:12])
+    match = sync.match(bending_aspace[:12])
+    model = ActionModel().fit(match.warp(bending_aspace[:12]))
+    plain, wide = model.mean_envelope(), model.mean_envelope(match=match)
+    lower, upper = match.interval(0.6827)
+    error = (upper - lower).mean(axis=0)[:, np.newaxis] / 2 * np.gradient(model.mean_, axis=0)
+    for own, other, side in zip(plain, wide, (-1, 1), strict=True):
+        half_width = np.hypot(own - model.mean_, error)
+        np.testing.assert_allclose(other, model.mean_ + side * half_width)
+    other = Match(np.tile(np.arange(30.0), (2, 1)))
+    with pytest.raises(ValueError, match="The match has 30 frames, the model 60: give the match"):
+        model.mean_envelope(match=other)
+    with pytest.raises(ValueError, match=r"only DenseSynchronizer\.match does"):
+        model.mean_envelope(match=Match(match.times))
+
+
+def test_the_band_holds_the_mean_as_often_as_with_true_warps():
+    """The mean of 400 bendings on the true clock; fits to 40 of them."""
+    everybody = make_bending(400, random_state=0)
+    postures = DirectionCosines(everybody.skeleton).fit_transform(everybody.data)
+    shares = np.linspace(0, 1, P)
+
+    def on_true_clock(x, phase, at):
+        frames = np.interp(at, phase, np.arange(len(x)))
+        return np.stack([np.interp(frames, np.arange(len(x)), column) for column in x.T], axis=1)
+
+    pairs = list(zip(postures, everybody.times, strict=True))
+    mean = np.mean([on_true_clock(x, phase, shares) for x, phase in pairs], axis=0)
+    held = SimpleNamespace(plain=[], doubt=[], true=[])
+    for seed in range(12):
+        some = [pairs[i] for i in np.random.default_rng(seed).permutation(400)[:40]]
+        points = ASpace().fit_transform([x for x, _ in some])
+        sync = DenseSynchronizer(P).fit(points)
+        match, phase = sync.match(points), some[sync.pattern_index_][1]
+        at = np.interp(shares, np.linspace(0, 1, len(phase)), phase)
+        target = on_true_clock(mean, shares, at)
+        model = ActionModel().fit(match.warp([x for x, _ in some]))
+        true = ActionModel().fit([on_true_clock(*pair, at) for pair in some])
+        bands = model.mean_envelope(), model.mean_envelope(match=match), true.mean_envelope()
+        for found, (lower, upper) in zip(vars(held).values(), bands, strict=True):
+            found.append(((lower <= target) & (target <= upper)).all())
+    plain, doubt, true = (np.mean(found) for found in vars(held).values())
+    assert plain < true - 0.2
+    assert doubt > true - 0.1
