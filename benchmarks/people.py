@@ -35,11 +35,17 @@ class People:
         return Judged(self, np.array([times_to(self.X, int(n)) for n in self.patterns]))
 
     def to_strangers(self, make):
-        """Warps of the clips of actors that had no part in aSpace, metric and exemplars.
+        """Warps of the clips of actors that had no part in aSpace, metric and exemplars."""
+        times = np.full((len(self.patterns), len(self.X), P), np.nan)
+        for row, test, match in self.matches_of_strangers(make):
+            times[row, test] = match.times
+        return Judged(self, times)
+
+    def matches_of_strangers(self, make):
+        """Yield the row of a pattern, the clips of a fold and their match to the pattern.
 
         The actors are dealt into four folds; a pattern serves the folds that it is not in.
         """
-        times = np.full((len(self.patterns), len(self.X), P), np.nan)
         folds = GroupKFold(min(FOLDS, len(set(self.actors))))
         for train, test in folds.split(self.X, groups=self.actors):
             space = ASpace().fit([self.postures[i] for i in train])
@@ -48,8 +54,7 @@ class People:
             for row, n in enumerate(self.patterns):
                 if n in train:
                     sync = make(pattern=int(np.flatnonzero(train == n)[0])).fit(known)
-                    times[row, test] = sync.match(others).times
-        return Judged(self, times)
+                    yield row, test, sync.match(others)
 
     def to_time_line(self, times_of):
         """Each moment on the common time line of one fit, of warps ``times_of(X)``.

@@ -67,7 +67,11 @@ INSTANCES = {
     "DenseSynchronizer": [DenseSynchronizer()],
     "PartSynchronizer": [PartSynchronizer({"first": [0]}, synchronizer=WHOLE)],
     "Synchronizer": [ShiftSynchronizer()],
-    "TimingChannel": [TimingChannel(LinearSynchronizer()), TimingChannel(QUICK, "log_rate")],
+    "TimingChannel": [
+        TimingChannel(LinearSynchronizer()),
+        TimingChannel(QUICK, "log_rate"),
+        TimingChannel(QUICK, errors=True),
+    ],
     "ActionModel": [ActionModel()],
     "ActionDetector": [ActionDetector(make_pipeline(QUICK, ActionModel()))],
     "OnlineSynchronizer": [OnlineSynchronizer(LinearSynchronizer())],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Sequence
 from typing import Any, Literal, Self
 
@@ -16,12 +17,13 @@ from ..inputs.types import (
     NumbersLike,
     PerformanceLike,
     PerformancesLike,
+    SupportsArray,
     Unit,
     ValuesLike,
 )
 from ..inputs.validation import read_collection
 from ..inputs.wording import counted
-from ..synchronizers.match import match_of_times, rates_of
+from ..synchronizers.match import check_coverage, match_of_times, rates_of
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
 from .arguments import AxesLike, as_names, named_groups
@@ -52,6 +54,10 @@ _WARP_LABELS = {
     "percent": "% of the trial",
     "seconds": "time of the trial (s),\nstretched to the template",
 }
+# The dots of doubtful trials, in line widths, and their opacity.
+_DOTTED, _STRONG = (0, (1, 1.4)), 0.9
+# The opacity of a band, at least and at most; and of all bands where they overlap.
+_FAINTEST, _BAND, _BANDS = 0.01, 0.2, 0.4
 
 
 class SynchronizationDisplay:
@@ -83,6 +89,12 @@ class SynchronizationDisplay:
         Key-frames of the performances in their frames, NaN where one is not known: ticks.
     pattern_keyframes : array-like of shape (n_keyframes,) or Series, default=None
         Key-frames on the clock: lines. The index of a Series holds their names.
+    intervals : array-like of shape (2, n_sequences, P), default=None
+        Lower and upper bounds of the times, in frames of the pattern: bands around the warps.
+    doubtful : array-like of bool, shape (n_sequences,), default=None
+        Performances that are dotted in all panels.
+    coverage : float, default=None
+        Probability of the intervals, which a title names.
 
     Attributes
     ----------
@@ -98,6 +110,8 @@ class SynchronizationDisplay:
         For each feature the mean of each group; empty without groups.
     warps_ : LineCollection or None
         The warps.
+    intervals_ : PolyCollection or None
+        The bands around them, one a performance; None without intervals or warps.
     keyframes_ : list of list of Line2D
         The key-frames, for each panel on the clock; empty without any.
     own_keyframes_ : list of LineCollection
@@ -131,6 +145,9 @@ class SynchronizationDisplay:
         frame_rate: float | ValuesLike | None = None,
         keyframes: NumbersLike | None = None,
         pattern_keyframes: ValuesLike | None = None,
+        intervals: Sequence[NumbersLike] | SupportsArray | None = None,
+        doubtful: ValuesLike | None = None,
+        coverage: float | None = None,
     ) -> None:
         self.before = [np.asarray(x) for x in before]
         self.after, self.times = np.asarray(after), np.asarray(times)
@@ -142,6 +159,9 @@ class SynchronizationDisplay:
         self._axis = TimeAxis(unit, self.times.shape[1], lengths, frame_rate)
         self.keyframes = None if keyframes is None else np.asarray(keyframes, dtype=np.float64)
         self.pattern_keyframes = check_pattern_keyframes(pattern_keyframes, self.times.shape[1])
+        self.intervals = None if intervals is None else np.asarray(intervals)
+        self.doubtful = None if doubtful is None else np.asarray(doubtful)
+        self.coverage = coverage
 
     def __repr__(self):
         count = counted(len(self.before), "performance")
@@ -159,6 +179,7 @@ class SynchronizationDisplay:
         frame_rate: float | ValuesLike | None = None,
         warps: bool = True,
         keyframe_lines: bool = True,
+        coverage: float | None = 0.9,
         ax: AxesLike | None = None,
         **params: Any,
     ) -> Self:
@@ -188,6 +209,11 @@ class SynchronizationDisplay:
         keyframe_lines : bool, default=True
             Whether to draw the key-frames of the synchronizer, if it has some, as lines; and those
             of X that are given, as ticks.
+        coverage : float or None, default=0.9
+            Probability of the intervals of `Match.interval`, which are bands around the warps.
+            Performances that are `Match.doubtful` are dotted in all panels. None: neither is
+            drawn. Nor is it if the match does not tell: only those of a `DenseSynchronizer` or
+            `PartSynchronizer` do.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         **params : dict
@@ -199,6 +225,8 @@ class SynchronizationDisplay:
         SynchronizationDisplay
             The display, drawn.
         """
+        if coverage is not None:
+            check_coverage(coverage)
         reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
         before, synchronizer, performances = reached[:3]
         names = names_of_features(before, synchronizer, performances[0].shape[1])
@@ -206,6 +234,7 @@ class SynchronizationDisplay:
         match, shown = reached.match(), [x[:, chosen] for x in performances]
         groups = named_groups(groups, lambda: match)
         groups = None if groups is None else names_of_groups(groups, len(performances))
+        tells = coverage is not None and match.intervals is not None
         display = cls(
             shown,
             match.warp(shown),
@@ -218,6 +247,9 @@ class SynchronizationDisplay:
             frame_rate=rates_of(X, frame_rate, unit),
             keyframes=own_keyframes(synchronizer, performances, params),
             pattern_keyframes=named_keyframes(synchronizer, params.get("keyframes")),
+            intervals=match.interval(coverage) if tells else None,
+            doubtful=match.doubtful if tells else None,
+            coverage=coverage,
         )
         return display.plot(ax, warps=warps, keyframe_lines=keyframe_lines)
 
@@ -236,6 +268,9 @@ class SynchronizationDisplay:
         warps: bool = True,
         keyframes: NumbersLike | None = None,
         pattern_keyframes: ValuesLike | None = None,
+        intervals: Sequence[NumbersLike] | SupportsArray | None = None,
+        doubtful: ValuesLike | None = None,
+        coverage: float | None = None,
         ax: AxesLike | None = None,
     ) -> Self:
         """Draw performances and warps that are known already.
@@ -267,6 +302,13 @@ class SynchronizationDisplay:
         pattern_keyframes : array-like of shape (n_keyframes,) or Series, default=None
             Key-frames on the clock, such as ``synchronizer.keyframes_``: lines. The index of a
             Series holds their names.
+        intervals : array-like of shape (2, n_sequences, P), default=None
+            Lower and upper bounds of the times, in frames of the pattern, such as
+            ``match.interval(0.9)``: bands around the warps.
+        doubtful : array-like of bool, shape (n_sequences,), default=None
+            Performances that are dotted in all panels, such as ``match.doubtful``.
+        coverage : float, default=None
+            Probability of the intervals, such as 0.9, which the title of the warps names.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
 
@@ -280,11 +322,16 @@ class SynchronizationDisplay:
         ValueError
             If there is not one row of times or key-frames a performance, the pattern has another
             shape, the number of names differs, there is no such feature, a value is infinite, or
-            a key-frame is not on the clock.
+            a key-frame or an interval is not on the clock; or if ``doubtful`` is not True or False
+            for each performance.
         """
+        if coverage is not None:
+            check_coverage(coverage)
         arrays, names = read_collection(X)
         match, width = match_of_times(times, len(arrays)), arrays[0].shape[1]
         keyframes = check_own_keyframes(keyframes, len(arrays))
+        intervals = _check_intervals(intervals, match.times.shape)
+        doubtful = _check_doubtful(doubtful, len(arrays))
         if feature_names is None:
             feature_names = names or [f"x{i}" for i in range(width)]
         feature_names = as_names(feature_names, width, "feature_names", "features")
@@ -309,6 +356,9 @@ class SynchronizationDisplay:
             frame_rate=rates_of(X, frame_rate, unit),
             keyframes=keyframes,
             pattern_keyframes=pattern_keyframes,
+            intervals=intervals,
+            doubtful=doubtful,
+            coverage=coverage,
         )
         return display.plot(ax, warps=warps)
 
@@ -347,6 +397,11 @@ class SynchronizationDisplay:
         size = (WIDTH, max(2.6, 1.6 * n_all + 0.8) + bool(warps) + 0.2 * n_lines)
         self.figure_, self.axes_ = panels(ax, cells, n_all, 2, size)
         style = {"colors": colors, "linewidths": 0.9, "alpha": 0.35 if styles else 0.55}
+        if self._n_doubtful():
+            style["colors"] = colors if styles else [colors] * len(self.before)
+            style["linestyles"] = [_DOTTED if one else "-" for one in self.doubtful]
+            style["linewidths"] = np.where(self.doubtful, 1.5, style["linewidths"])
+            style["alpha"] = np.where(self.doubtful, _STRONG, style["alpha"])
         clock, own = self._axis.clock, self._axis.performances()
         self.before_, self.after_, self.pattern_, self.group_means_ = [], [], [], []
         for row, name in enumerate(self.feature_names):
@@ -360,12 +415,16 @@ class SynchronizationDisplay:
             right.sharey(left)
             right.autoscale_view()
             if row == 0:
-                left.set_title(f"as recorded\n{counted(len(self.before), 'trial')}")
+                dotted = "" if warps else self._describe_doubtful(", dotted: ")
+                left.set_title(f"as recorded\n{counted(len(self.before), 'trial')}{dotted}")
                 means = ", thick: group means" if styles else ""
                 right.set_title(f"aligned{means}\n{self._describe_pattern()}")
         left.set_xlabel(self._axis.performance_label)
         right.set_xlabel(self._axis.label)
-        self.warps_ = self._draw_warps(self.axes_[-1], clock, style) if warps else None
+        self.warps_ = self.intervals_ = None
+        if warps:
+            self.intervals_ = self._draw_intervals(self.axes_[-1], clock, colors)
+            self.warps_ = self._draw_warps(self.axes_[-1], clock, style)
         self.keyframes_, self.own_keyframes_ = [], []
         if keyframe_lines:
             self._draw_keyframes(colors)
@@ -418,10 +477,80 @@ class SynchronizationDisplay:
         times = self._axis.convert(self.times)
         lines = curves(axis, [clock] * len(times), times, **style)
         axis.plot(clock, clock, "--", color=COLORS["pattern"], linewidth=1)
-        axis.set_title("warps; dashed: an even pace")
+        bands = "" if self.intervals is None else "shaded: intervals"
+        if bands and self.coverage is not None:
+            bands = f"shaded: {100 * self.coverage:g} % intervals"
+        dotted = self._describe_doubtful("dotted: ")
+        second = "; ".join(words for words in (bands, dotted) if words)
+        axis.set_title("\n".join(filter(None, ("warps; dashed: an even pace", second))))
         axis.set_xlabel(self._axis.label)
         axis.set_ylabel(_WARP_LABELS[self.unit])
         place = {"transform": axis.transAxes, "fontsize": "small", "color": "0.3"}
         axis.text(0.04, 0.96, "later than\nthe template", va="top", **place)
         axis.text(0.96, 0.04, "earlier than\nthe template", ha="right", **place)
         return lines
+
+    def _draw_intervals(self, axis, clock, colors):
+        """Draw bands around the warps, lighter if there are more; None without intervals."""
+        from matplotlib.collections import PolyCollection
+        from matplotlib.colors import to_rgba_array
+
+        if self.intervals is None:
+            return None
+        lower, upper = self._axis.convert(self.intervals)
+        n_sequences, n_doubtful = len(lower), self._n_doubtful()
+        xs = np.concatenate([clock, clock[::-1]])
+        ys = np.concatenate([lower, upper[:, ::-1]], axis=1)
+        faces = np.tile(to_rgba_array(colors), (1 if self.groups else n_sequences, 1))
+        # Those of doubtful performances are wide, few, and stay visible.
+        faces[:, 3] = _opacity(n_sequences - n_doubtful)
+        if n_doubtful:
+            faces[self.doubtful, 3] = _opacity(n_doubtful)
+        style = {"facecolors": faces, "edgecolors": "none", "zorder": 1}
+        return axis.add_collection(PolyCollection([np.column_stack([xs, y]) for y in ys], **style))
+
+    def _n_doubtful(self):
+        return 0 if self.doubtful is None else int(np.count_nonzero(self.doubtful))
+
+    def _describe_doubtful(self, before):
+        """How many performances are doubtful, after other words; nothing if none is."""
+        count = self._n_doubtful()
+        return f"{before}{counted(count, 'doubtful trial')}" if count else ""
+
+
+def _opacity(n_bands):
+    """The opacity of each of so many bands, which overlap."""
+    return float(np.clip(1 - (1 - _BANDS) ** (1 / max(n_bands, 1)), _FAINTEST, _BAND))
+
+
+def _check_intervals(intervals, shape):
+    """Bounds (2, n_sequences, P) of times of a shape (n_sequences, P); None if none are given."""
+    if intervals is None:
+        return None
+    usage = "lower and upper bounds in frames of the pattern, as from match.interval(0.9)"
+    bounds, last = as_numbers(intervals, "intervals", dtype=np.float64), shape[1] - 1
+    if bounds.shape != (2, *shape):
+        raise ValueError(f"intervals must have shape {(2, *shape)}: {usage}; got {bounds.shape}.")
+    lower, upper = bounds
+    # Not a number fails the comparison, too.
+    sound = ((lower >= 0) & (lower <= upper) & (upper <= last)).all(axis=1)
+    if not sound.all():
+        i = int(np.argmin(sound))
+        raise ValueError(
+            f"Performance {i}: intervals must be {usage}, from 0 to {last}, and the lower one must "
+            "not be above the upper one."
+        )
+    return bounds
+
+
+def _check_doubtful(doubtful, n_sequences):
+    """True or False (n_sequences,) for each performance; None if not given."""
+    if doubtful is None:
+        return None
+    found = np.asarray(doubtful)
+    if found.dtype != bool or found.shape != (n_sequences,):
+        raise ValueError(
+            f"doubtful must be True or False for each of the {n_sequences} performances, as "
+            f"match.doubtful is; got {reprlib.repr(doubtful)}."
+        )
+    return found

@@ -247,11 +247,14 @@ class ModalWarper(Warper):
         The times, on the clock of the template of each mode, of the pattern.
     signs : Bases
         Features of performances that stand for the modes, as many of each.
+    home : int
+        The mode of the pattern.
     """
 
     warpers: list
     across: np.ndarray
     signs: Bases
+    home: int
 
     @classmethod
     def of(cls, warpers, home, performances, exemplars, signs, finish):
@@ -292,6 +295,7 @@ class ModalWarper(Warper):
             warpers=to_own,
             across=across,
             signs=Bases(matcher.trellis, features[:, ::subframes].copy()),
+            home=home,
         )
 
     def warps(self, positions):

@@ -428,7 +428,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
         if len(self.modes_.shares) > 1:
             mode = on_one_thread(self._warper.modes_of, arrays)
         match = Match(times, distances, mode)
-        match.intervals = intervals_of(self, self._warper, arrays, match.times, shares)
+        match.intervals = intervals_of(self, self._warper, arrays, match, shares)
         return match
 
     @atomic_partial_fit

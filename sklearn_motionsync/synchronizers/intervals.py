@@ -85,8 +85,8 @@ def joined(parts: Iterable[Measured]) -> Measured:
     return Measured(*map(np.concatenate, columns), [why for part in reasons for why in part])
 
 
-def intervals_of(sync, warper, arrays, times, shares=None):
-    """The intervals of the warps of a `DenseSynchronizer`.
+def intervals_of(sync, warper, arrays, match, shares=None):
+    """The intervals of a match of a `DenseSynchronizer`.
 
     Parameters
     ----------
@@ -96,10 +96,11 @@ def intervals_of(sync, warper, arrays, times, shares=None):
         Its own.
     arrays : list of ndarray (n_frames_i, n_columns)
         Performances as the warper takes them.
-    times : ndarray, shape (n_sequences, P)
+    match : Match
     shares : ndarray, shape (n_sequences, n_keyframes), default=None
         Key-frames that were given.
     """
+    times, mode, home = match.times, match.mode, getattr(warper, "home", 0)
     factor, evidence, pinned = sync.interval_factor_, sync.evidence_, sync.keyframes_
     pins = shares is not None and sync.keyframe_std == 0
 
@@ -113,7 +114,7 @@ def intervals_of(sync, warper, arrays, times, shares=None):
         if pins:
             for frames in (np.floor(pinned), np.ceil(pinned)):
                 widths[:, frames.astype(np.intp)] *= np.isnan(shares)
-        return Measured(widths * factor, tails, _reasons(unlike, widest, evidence))
+        return Measured(widths * factor, tails, _reasons(unlike, widest, mode, home, evidence))
 
     return Intervals(times, measure)
 
@@ -154,16 +155,18 @@ def calibrated_factor(match, pattern, known):
     return float(np.sort(errors / widths)[rank - 1])
 
 
-def _reasons(shares, widest, evidence):
+def _reasons(shares, widest, modes, home, evidence):
     """Why performances are doubtful; None for those that are not."""
     reasons = []
-    for share, width in zip(shares, widest, strict=True):
+    for share, width, mode in zip(shares, widest, modes, strict=True):
         why = None
         if share * width > _DOUBTFUL:
             why = (
                 f"no warp explains {share:.0%} of its movement, and an interval of 90 % holds "
                 f"{width:.0%} of the clip: it may be cut off, repeated or another movement"
             )
+        elif mode != home:
+            why = f"it shows mode {mode} of the movement, and the template mode {home} (modes_)"
         elif evidence.weak:
             why = (
                 f"matching leaves {evidence.remaining:.0%} of the differences in the training set, "

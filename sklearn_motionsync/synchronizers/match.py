@@ -34,6 +34,7 @@ __all__ = [
     "STANDARD",
     "UNITS",
     "Match",
+    "check_coverage",
     "check_match",
     "check_unit",
     "match_of_times",
@@ -244,22 +245,16 @@ class Match:
         >>> bool((lower <= match.times).all() and (match.times <= upper).all())
         True
         """
-        is_number = isinstance(coverage, Real) and not isinstance(coverage, bool)
-        if not (is_number and 0 < coverage < 1):
-            raise ValueError(
-                f"coverage must be a probability above 0 and below 1, such as 0.9; got "
-                f"{reprlib.repr(coverage)}."
-            )
-        lower, upper = self._known_intervals().bounds(float(coverage))
+        lower, upper = self._known_intervals().bounds(check_coverage(coverage))
         return self._in_unit(lower, unit, X, frame_rate), self._in_unit(upper, unit, X, frame_rate)
 
     @property
     def doubtful(self) -> np.ndarray:
         """Which performances to look at before their warps are used, bool: (n_sequences,).
 
-        Those that are nearly as far from the pattern as standing still, those whose intervals of
-        90 % hold much of the clip, and all of a fit whose training set did not support its warps.
-        ``reasons`` says which. Raises as ``interval``.
+        Those with much movement that no warp explains and a wide interval: cut off, repeated, or
+        another movement. Those of another mode than the pattern. And all performances if the
+        training set did not support its warps. ``reasons`` says which. Raises as ``interval``.
         """
         return np.array([reason is not None for reason in self.reasons], dtype=bool)
 
@@ -548,6 +543,17 @@ class Match:
                 f"{counted(len(self.times), 'matched performance')}, but "
                 f"{counted(len(given), noun)}: give one for each, in the same order."
             )
+
+
+def check_coverage(coverage):
+    """The coverage of an interval as a float, if it is a probability."""
+    is_number = isinstance(coverage, Real) and not isinstance(coverage, bool)
+    if not (is_number and 0 < coverage < 1):
+        raise ValueError(
+            f"coverage must be a probability above 0 and below 1, such as 0.9; got "
+            f"{reprlib.repr(coverage)}."
+        )
+    return float(coverage)
 
 
 def match_of_times(times, n_sequences):

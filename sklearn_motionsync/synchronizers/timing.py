@@ -25,9 +25,16 @@ from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
 from .base import Synchronizer
-from .match import UNITS, Match, check_match
+from .dense import DenseSynchronizer
+from .match import STANDARD, UNITS, Match, check_match
+from .parts import PartSynchronizer
 
 __all__ = ["TimingChannel"]
+
+# The feature of the standard errors of the offset.
+_ERROR = "offset_error"
+# Synchronizers whose matches tell how sure they are.
+_TELLING = (DenseSynchronizer, PartSynchronizer)
 
 
 class TimingChannel(
@@ -52,6 +59,11 @@ class TimingChannel(
         performance.
     frame_rate : float, default=None
         Frames per second of the performances, for seconds only.
+    errors : bool, default=False
+        Whether to append, after the channel, the standard error of the offset in its unit: half of
+        the interval that `Match.interval` gives for a coverage of 68.27 %. For
+        ``channel="offset"`` of a `DenseSynchronizer` or `PartSynchronizer` only, whose matches tell
+        how sure they are.
 
     Attributes
     ----------
@@ -66,13 +78,17 @@ class TimingChannel(
 
     See Also
     --------
-    Match : Offsets and rates as arrays, and as a table.
+    Match : Offsets and rates as arrays, and as a table; how sure they are.
     metrics.amplitude_phase_variance : How much of the spread is timing.
 
     Notes
     -----
     The unit of the channel differs from those of the features. Scale them before they are combined,
     as in principal components.
+
+    Errors are 0 at both ends and at exact key-frames, where a warp is pinned, and nearly 0 for the
+    pattern itself. A weight of ``1 / error ** 2`` is then infinite. Add a variance to the square of
+    the error: that of the true offsets of the performances, or that of what is read off a frame.
 
     Metadata of the synchronizer, such as ``keyframes``, are arguments of ``fit`` and ``transform``;
     with scikit-learn's metadata routing they are requested by ``set_fit_request`` and
@@ -92,6 +108,18 @@ class TimingChannel(
     ['x0', 'offset']
     >>> channel.transform(X)[1, 50].round().tolist()  # the peak, and how late it is: 10 in truth
     [1.0, 9.0]
+
+    A mean offset in which performances under noise count less: their offsets are less sure.
+
+    >>> rng = np.random.default_rng(0)
+    >>> noise = np.repeat([0.02, 0.5], 4)[:, np.newaxis, np.newaxis]
+    >>> trials = X[1] + noise * rng.standard_normal((8, 101, 1))
+    >>> channel = TimingChannel(DenseSynchronizer(pattern=0), errors=True)
+    >>> offset, error = channel.fit([X[0], *trials]).transform(trials)[:, 50, 1:].T
+    >>> weights = 1 / (error**2 + 0.5**2)  # times are read to half of a per cent
+    >>> bool(weights[:4].min() > weights[4:].max())
+    True
+    >>> mean = np.average(offset, weights=weights)
     """
 
     _parameter_constraints: dict = {
@@ -99,6 +127,7 @@ class TimingChannel(
         "channel": [StrOptions({"offset", "log_rate"})],
         "unit": [StrOptions(set(UNITS))],
         "frame_rate": [Interval(Real, 0, None, closed="neither"), None],
+        "errors": ["boolean"],
     }
 
     def __init__(
@@ -107,11 +136,13 @@ class TimingChannel(
         channel: Literal["offset", "log_rate"] = "offset",
         unit: Unit = "percent",
         frame_rate: float | None = None,
+        errors: bool = False,
     ) -> None:
         self.synchronizer = synchronizer
         self.channel = channel
         self.unit = unit
         self.frame_rate = frame_rate
+        self.errors = errors
 
     @atomic_fit
     @validated_with_nested
@@ -135,18 +166,30 @@ class TimingChannel(
         Raises
         ------
         ValueError
-            If the frame rate for seconds is missing, or a feature has the name of the channel; and
-            as from the ``fit`` of the synchronizer.
+            If the frame rate for seconds is missing, errors are asked of a log rate or of a
+            synchronizer whose matches do not tell them, or a feature has the name of the channel or
+            of the errors; and as from the ``fit`` of the synchronizer.
         """
         if self.channel == "offset" and self.unit == "seconds" and self.frame_rate is None:
             raise ValueError("unit='seconds' needs frame_rate, frames per second of X.")
+        if self.errors and self.channel != "offset":
+            raise ValueError(
+                f"errors=True needs channel='offset': the error of {self.channel!r} is not known. "
+                "Set channel='offset' or errors=False."
+            )
+        if self.errors and not isinstance(self.synchronizer, _TELLING):
+            raise ValueError(
+                f"errors=True needs {' or '.join(kind.__name__ for kind in _TELLING)}, whose "
+                f"matches tell how sure they are; got {type(self.synchronizer).__name__}. Set "
+                "errors=False."
+            )
         sync, given = clone(self.synchronizer), self._route("fit", params)
         with self._progress(fits=True) as progress, progress.fitting(sync, "synchronizing"):
             sync.fit(X, y, **given)
-        if self.channel in getattr(sync, "feature_names_in_", ()):
-            raise ValueError(
-                f"A feature of X has the name of the channel, {self.channel!r}: rename it."
-            )
+        for name in self._own_names():
+            if name in getattr(sync, "feature_names_in_", ()):
+                what = "channel" if name == self.channel else "errors"
+                raise ValueError(f"A feature of X has the name of the {what}, {name!r}: rename it.")
         self.synchronizer_ = sync
         for name in ("n_frames_", "n_features_in_", "feature_names_in_", "_fitted_on_rows"):
             if hasattr(sync, name):
@@ -169,7 +212,7 @@ class TimingChannel(
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features + 1)
-            As from ``transform``.
+            As from ``transform``; one feature more with errors.
         """
         if not _routes_metadata():
             return self.fit(X, y, **params).transform(X, **params)
@@ -193,9 +236,9 @@ class TimingChannel(
         Returns
         -------
         ndarray, shape (n_sequences, P, n_features + 1)
-            The channel is the last feature. For 2-D input ``(n_sequences, 2 P)``: each row is a
-            curve, then its channel. A ``(performance, frame)`` frame under
-            ``set_output(transform="pandas")``.
+            The channel is the last feature; with errors they follow as one more. For 2-D input
+            ``(n_sequences, 2 P)``: each row is a curve, then its channel, then its errors. A
+            ``(performance, frame)`` frame under ``set_output(transform="pandas")``.
         """
         check_is_fitted(self)
         sync, params = self.synchronizer_, self._route("transform", params)
@@ -204,14 +247,17 @@ class TimingChannel(
         check_match(match, len(performances), self.n_frames_, type(sync).__name__)
         curves = match.warp(performances)
         if self.channel == "log_rate":
-            channel = np.log(match.rates)
+            own = [np.log(match.rates)]
         else:
-            lengths = [len(x) for x in performances]
-            channel = match.offsets_in(self.unit, lengths, self.frame_rate)
-        channel = channel.astype(curves.dtype)
+            clock = self.unit, [len(x) for x in performances], self.frame_rate
+            own = [match.offsets_in(*clock)]
+            if self.errors:
+                lower, upper = match.interval(STANDARD, *clock)
+                own.append((upper - lower) / 2)
+        own = [channel.astype(curves.dtype) for channel in own]
         if performances.kind == "rows":
-            return np.concatenate([curves[:, :, 0], channel], axis=1)
-        out = np.concatenate([curves, channel[:, :, np.newaxis]], axis=2)
+            return np.concatenate([curves[:, :, 0], *own], axis=1)
+        out = np.concatenate([curves, np.stack(own, axis=2)], axis=2)
         return restore(self, performances, out, frames=range(self.n_frames_))
 
     def match(self, X: PerformancesLike, **params: Any) -> Match:
@@ -233,7 +279,9 @@ class TimingChannel(
         return self.synchronizer_.match(X, **params)
 
     def get_feature_names_out(self, input_features: NamesLike | None = None) -> np.ndarray:
-        """Names of the outputs: those of the synchronizer, and ``"offset"`` or ``"log_rate"``.
+        """Names of the outputs: those of the synchronizer, then those of the channel.
+
+        These are ``"offset"`` or ``"log_rate"``, and with errors ``"offset_error"``.
 
         Parameters
         ----------
@@ -243,13 +291,14 @@ class TimingChannel(
         Returns
         -------
         ndarray of str
-            For 2-D input a name for each frame of the curve, then for each of the channel.
+            For 2-D input a name for each frame of the curve, then for each of the channel, and of
+            the errors.
         """
         check_is_fitted(self)
         names = self.synchronizer_.get_feature_names_out(input_features)
-        own = [self.channel]
+        own = self._own_names()
         if self._fitted_on_rows:
-            own = [f"{self.channel}{p}" for p in range(self.n_frames_)]
+            own = [f"{name}{p}" for name in own for p in range(self.n_frames_)]
         return np.concatenate([names, np.asarray(own, dtype=object)])
 
     def get_metadata_routing(self):
@@ -274,6 +323,10 @@ class TimingChannel(
         tags.input_tags.allow_nan = get_tags(self.synchronizer).input_tags.allow_nan
         tags.transformer_tags.preserves_dtype = ["float64", "float32"]
         return tags
+
+    def _own_names(self):
+        """The names of the appended features."""
+        return [self.channel, _ERROR] if self.errors else [self.channel]
 
     def _route(self, method, params):
         """The metadata that a method of the synchronizer is given."""

@@ -93,6 +93,16 @@ def draw_synchronization(**arguments):
         ({"features": []}, "at least one feature"),
         ({"pattern": PATTERN[:9]}, r"must have the shape \(10, 3\), got \(9, 3\)"),
         ({"pattern": masked(PATTERN)}, "The pattern has masked values"),
+        *(({"intervals": bad}, r"intervals must have shape \(2, 4, 10\): lower and upper bounds")
+          for bad in (TIMES, [TIMES], [TIMES[:2], TIMES[:2]], [TIMES, TIMES, TIMES], 0.9)),
+        ({"intervals": [TIMES, 11 * TIMES]}, "Performance 0: intervals must be .*, from 0 to 9"),
+        ({"intervals": [TIMES, BACKWARDS]}, "Performance 3: .* must not be above the upper one"),
+        ({"intervals": [TIMES, with_one(TIMES, np.nan)]}, "Performance 3: intervals must be"),
+        ({"intervals": ["low", "high"]}, "intervals"),
+        *(({"doubtful": bad}, "doubtful must be True or False for each of the 4 performances, .*")
+          for bad in ([2], [0, 0, 1, 0], [True] * 3, True, "none", [[True]] * 4, [True, None] * 2)),
+        *(({"coverage": bad}, "coverage must be a probability above 0 and below 1, .*; got")
+          for bad in (0, 1, 90, "0.9", True, np.nan)),
         ({"ax": []}, r"ax must be Axes of matplotlib, got \[\]"),
         ({"ax": "left"}, "ax must be Axes of matplotlib, got 'left'"),
     ],

@@ -12,7 +12,10 @@ from sklearn.preprocessing import FunctionTransformer
 from sklearn_motionsync import (
     ActionModel,
     DenseSynchronizer,
+    KeyframeSynchronizer,
     LinearSynchronizer,
+    Match,
+    PartSynchronizer,
     to_frame,
 )
 from sklearn_motionsync.display import ActionModelDisplay, SynchronizationDisplay
@@ -185,3 +188,159 @@ def test_tables_tell_their_frame_rate(bunch, pipe):
         pytest_warns = pytest.warns(UserWarning, match="Performance 1 has 27 frames a second")
         with pytest_warns, pytest.raises(ValueError, match="needs frame_rate"):
             display.from_estimator(pipe, [*tables[1:], bunch.data[0]], **given)
+
+
+# -- how sure the warps are ------------------------------------------------------------------
+
+
+def twice(x):
+    """A trial in which the movement is repeated; it is doubtful."""
+    return np.concatenate([x, x])
+
+
+def is_dotted(lines):
+    """Whether each line is dotted."""
+    return [dashes is not None for _, dashes in lines.get_linestyle()]
+
+
+def band(clock, lower, upper):
+    """The corners of a band, closed."""
+    xs, ys = np.concatenate([clock, clock[::-1]]), np.concatenate([lower, upper[::-1]])
+    return np.column_stack([[*xs, xs[0]], [*ys, ys[0]]])
+
+
+def check_bands(display, lower, upper):
+    bands = segments(display.intervals_)
+    assert len(bands) == len(lower)
+    for found, *bounds in zip(bands, lower, upper, strict=True):
+        np.testing.assert_allclose(found, band(display.pattern_[0].get_xdata(), *bounds))
+
+
+def test_bands_are_the_intervals_of_the_match(bunch, pipe):
+    match = Match.from_estimator(pipe, bunch.data)
+    for coverage in (0.9, 0.5, np.float32(0.75)):
+        display = SynchronizationDisplay.from_estimator(pipe, bunch.data, coverage=coverage)
+        check_bands(display, *match.interval(coverage))
+        title = display.axes_[-1].get_title()
+        assert title.endswith(f"shaded: {100 * coverage:g} % intervals")
+        assert display.intervals_.get_zorder() < display.warps_.get_zorder()
+    check_bands(SynchronizationDisplay.from_estimator(pipe, bunch.data), *match.interval(0.9))
+
+
+def test_bands_have_the_unit_of_the_warps(bunch, pipe):
+    match, seconds = Match.from_estimator(pipe, bunch.data), {"unit": "seconds", "frame_rate": 50}
+    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, unit="percent")
+    check_bands(display, *match.interval(0.9, "percent"))
+    # Seconds of the median trial, for all of them.
+    lasts = np.median([len(x) - 1 for x in bunch.data])
+    display = SynchronizationDisplay.from_estimator(pipe, bunch.data, **seconds)
+    check_bands(display, *match.interval(0.9, "seconds", [lasts + 1] * 9, 50))
+
+
+def test_doubtful_trials_are_dotted_in_all_panels(bunch, pipe):
+    X = [*bunch.data[:4], twice(bunch.data[4]), *bunch.data[5:]]
+    doubtful = Match.from_estimator(pipe, X).doubtful
+    assert doubtful.tolist() == [i == 4 for i in range(9)]
+    for groups in (None, GROUPS):
+        display = SynchronizationDisplay.from_estimator(pipe, X, features=[0, 1], groups=groups)
+        for lines in (*display.before_, *display.after_, display.warps_):
+            assert is_dotted(lines) == doubtful.tolist()
+        assert display.axes_[-1].get_title().endswith("; dotted: 1 doubtful trial")
+        assert display.axes_[0].get_title() == "as recorded\n9 trials"
+        colors = display.warps_.get_colors()
+        np.testing.assert_array_equal(display.intervals_.get_facecolor()[:, :3], colors[:, :3])
+        display.figure_.canvas.draw()
+    display = SynchronizationDisplay.from_estimator(pipe, X, warps=False)
+    assert display.intervals_ is None
+    assert display.axes_[0].get_title() == "as recorded\n9 trials, dotted: 1 doubtful trial"
+    assert is_dotted(display.before_[0]) == doubtful.tolist()
+
+
+def test_sure_trials_are_drawn_as_before(bunch, pipe):
+    for coverage in (0.9, None):
+        display = SynchronizationDisplay.from_estimator(pipe, bunch.data, coverage=coverage)
+        for lines in (*display.before_, *display.after_, display.warps_):
+            assert not any(is_dotted(lines))
+        assert "dotted" not in display.axes_[-1].get_title()
+
+
+def test_nothing_is_drawn_of_a_match_that_does_not_tell(bunch, pipe):
+    X = [*bunch.data[:8], twice(bunch.data[8])]
+    linear, marks = LinearSynchronizer(30).fit(X), {"keyframes": bunch.keyframes}
+    by_marks = KeyframeSynchronizer(30).fit(bunch.data, **marks)
+    for display in (
+        SynchronizationDisplay.from_estimator(pipe, X, coverage=None),
+        SynchronizationDisplay.from_estimator(linear, X),
+        SynchronizationDisplay.from_estimator(by_marks, bunch.data, **marks),
+    ):
+        assert display.intervals is display.doubtful is display.intervals_ is None
+        assert display.axes_[-1].get_title() == "warps; dashed: an even pace"
+        assert not any(is_dotted(display.warps_))
+    for coverage in (1.0, 90, "most"):
+        with pytest.raises(ValueError, match="coverage must be a probability above 0"):
+            SynchronizationDisplay.from_estimator(linear, X, coverage=coverage)
+
+
+def test_the_warps_of_whole_trials_of_parts_have_bands(bunch, pipe):
+    points = pipe[:2].transform(bunch.data)
+    sync = PartSynchronizer({"first": [0]}, synchronizer=DenseSynchronizer(30)).fit(points)
+    display = SynchronizationDisplay.from_estimator(sync, points)
+    check_bands(display, *sync.match(points).interval(0.9))
+
+
+def test_intervals_and_doubtful_trials_are_given_by_hand(bunch, pipe):
+    points = pipe[:2].transform([*bunch.data[:8], twice(bunch.data[8])])
+    match = pipe[2].match(points)
+    given = {"intervals": match.interval(0.9), "doubtful": match.doubtful}
+    one = SynchronizationDisplay.from_predictions(points, match.times, **given)
+    other = SynchronizationDisplay.from_estimator(pipe[2], points)
+    for found, expected in zip(segments(one.intervals_), segments(other.intervals_), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    assert is_dotted(one.warps_) == is_dotted(other.warps_) == match.doubtful.tolist()
+    title = "warps; dashed: an even pace\nshaded: {}intervals; dotted: 1 doubtful trial"
+    assert one.axes_[-1].get_title() == title.format("")
+    assert other.axes_[-1].get_title() == title.format("90 % ")
+    named = SynchronizationDisplay.from_predictions(points, match.times, **given, coverage=0.9)
+    assert named.axes_[-1].get_title() == title.format("90 % ")
+    # Each without the other.
+    bands = SynchronizationDisplay.from_predictions(
+        points, match.times, intervals=np.array(given["intervals"])
+    )
+    assert len(segments(bands.intervals_)) == 9
+    assert not any(is_dotted(bands.warps_))
+    dots = SynchronizationDisplay.from_predictions(
+        points, match.times, doubtful=pd.Series(match.doubtful)
+    )
+    assert dots.intervals_ is None
+    assert dots.axes_[-1].get_title() == title.partition("shaded")[0] + "dotted: 1 doubtful trial"
+    assert is_dotted(dots.after_[0]) == match.doubtful.tolist()
+
+
+def test_many_bands_are_lighter_than_few(bunch, pipe):
+    def opacity(n, doubtful=()):
+        X = [bunch.data[0]] * n
+        for i in doubtful:
+            X[i] = twice(X[i])
+        display = SynchronizationDisplay.from_estimator(pipe, X, features=0)
+        plt.close(display.figure_)
+        return display.intervals_.get_facecolor()[:, 3]
+
+    few, many, one = opacity(6), opacity(40), opacity(40, [7])
+    assert len(set(few)) == len(set(many)) == 1
+    assert 0.01 < many[0] < 0.05 < few[0] <= 0.2
+    # All that overlap leave the paper visible.
+    assert 1 - (1 - many[0]) ** 40 < 0.5
+    # The wide band of a single doubtful trial stays visible.
+    assert one[7] > 4 * one[0]
+
+
+def test_gaps_and_keyframes_are_drawn_with_bands(bunch, pipe):
+    points = [x.copy() for x in pipe[:2].transform(bunch.data)]
+    points[3][5:9, 0] = np.nan
+    lows = np.array([[x[:, 0].argmax()] for x in pipe[:2].transform(bunch.data)])
+    sync = DenseSynchronizer(30).fit(points, keyframes=lows)
+    display = SynchronizationDisplay.from_estimator(sync, points, keyframes=lows, features=0)
+    check_bands(display, *sync.match(points, keyframes=lows).interval(0.9))
+    assert len(display.keyframes_) == 2
+    assert np.isnan(segments(display.before_[0])[3]).any()
+    display.figure_.canvas.draw()

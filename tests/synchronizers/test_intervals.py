@@ -256,6 +256,28 @@ def test_performances_that_are_repeated_cut_off_or_still_are_doubtful(fitted, be
         assert "it may be cut off, repeated or another movement" in match.reasons[0]
 
 
+def test_trials_of_another_mode_are_doubtful():
+    """A hammer that falls once or twice; and twice among trials that all fall once."""
+    rng, t = np.random.default_rng(0), np.linspace(0, 1, 101)
+
+    def trial(strokes):
+        moments = np.array([0.5] if strokes == 1 else [0.3, 0.7]) + rng.uniform(-0.08, 0.08)
+        swing = np.column_stack([t, t + 0.03])
+        height = sum(np.exp(-(((swing - moment) / 0.07) ** 2)) for moment in moments)
+        return rng.uniform(0.9, 1.1) * height + 0.02 * rng.standard_normal((101, 2))
+
+    both = [trial(n) for n in [1, 2, 1] * 6]
+    match = DenseSynchronizer().fit(both).match(both)
+    np.testing.assert_array_equal(match.doubtful, match.mode == 1)
+    assert "mode 1 of the movement, and the template mode 0" in " ".join(
+        filter(None, match.reasons)
+    )
+    once = [trial(1) for _ in range(12)]
+    sync = DenseSynchronizer().fit(once)
+    assert not sync.match([trial(1) for _ in range(8)]).doubtful.any()
+    assert sync.match([trial(2) for _ in range(8)]).doubtful.mean() > 0.6
+
+
 def test_the_way_back_of_a_movement_that_is_alike_both_ways_is_not_doubted(bends):
     """A bend backwards is a bend: docs/howto/uncertainty.md names it."""
     X = make_pipeline(DirectionCosines(bends.skeleton), ASpace()).fit_transform(bends.data)

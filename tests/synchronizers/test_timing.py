@@ -4,9 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn import config_context
+from sklearn.base import clone
 from sklearn.decomposition import PCA
 from sklearn.exceptions import NotFittedError
-from sklearn.model_selection import GridSearchCV
+from sklearn.linear_model import Ridge
+from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionDetector,
@@ -17,6 +19,7 @@ from sklearn_motionsync import (
     KeyframeSynchronizer,
     LinearSynchronizer,
     Match,
+    PartSynchronizer,
     TimingChannel,
     find_departures,
 )
@@ -178,6 +181,7 @@ def test_model_displays_show_the_channel_beside_postures(bunch):
         ({"unit": "ms"}, "The 'unit' parameter"),
         ({"unit": "seconds"}, "unit='seconds' needs frame_rate"),
         ({"frame_rate": 0}, "The 'frame_rate' parameter"),
+        ({"errors": "yes"}, "The 'errors' parameter"),
         ({"synchronizer": ASpace()}, "The 'synchronizer' parameter .* 'sklearn_motionsync"),
         ({"synchronizer": TimingChannel(DenseSynchronizer())}, "The 'synchronizer' parameter"),
     ],
@@ -194,3 +198,165 @@ def test_fit_refuses_a_feature_with_the_name_of_the_channel(points):
     channel = TimingChannel(LinearSynchronizer(), channel="log_rate").fit(frames)
     assert list(channel.feature_names_in_) == ["p", "offset", "r"]
     assert list(channel.get_feature_names_out()) == ["p", "offset", "r", "log_rate"]
+
+
+# -- standard errors of the offset -----------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("params", "clock"),
+    [
+        ({}, ("percent",)),
+        ({"unit": "frames"}, ("frames",)),
+        ({"unit": "seconds", "frame_rate": 50}, ("seconds", 50)),
+    ],
+)
+def test_errors_follow_the_channel_in_its_unit(points, params, clock):
+    plain = TimingChannel(DenseSynchronizer(30), **params).fit(points)
+    channel = TimingChannel(DenseSynchronizer(30), errors=True, **params).fit(points)
+    out = channel.transform(points)
+    np.testing.assert_array_equal(out[:, :, :4], plain.transform(points))
+    bounds = channel.match(points).interval(0.6827, clock[0], points, *clock[1:])
+    np.testing.assert_allclose(out[:, :, 4], (bounds[1] - bounds[0]) / 2)
+    assert channel.get_feature_names_out().tolist() == ["x0", "x1", "x2", "offset", "offset_error"]
+    single = TimingChannel(DenseSynchronizer(30), errors=True, **params)
+    out = single.fit_transform([x.astype(np.float32) for x in points])
+    assert (out.dtype, out.shape) == (np.float32, (7, 30, 5))
+
+
+def test_errors_of_rows_follow_their_channel():
+    rows = np.sin(np.linspace(0, 6, 25) + np.linspace(0, 1, 5)[:, np.newaxis])
+    channel = TimingChannel(DenseSynchronizer(20), errors=True).set_output(transform="pandas")
+    out = channel.fit_transform(rows)
+    assert out.shape == (5, 60)
+    assert list(out.columns) == channel.get_feature_names_out().tolist()
+    assert list(out.columns[[20, 39, 40, 59]]) == [
+        "offset0",
+        "offset19",
+        "offset_error0",
+        "offset_error19",
+    ]
+    lower, upper = channel.match(rows).interval(0.6827, "percent")
+    np.testing.assert_allclose(out.iloc[:, 40:], (upper - lower) / 2)
+    assert make_pipeline(channel, PCA(2)).fit_transform(rows).shape == (5, 2)
+    pipe = make_pipeline(clone(channel), Ridge())
+    rows = np.concatenate([rows, rows[::-1] + 0.01])
+    assert np.isfinite(cross_val_score(pipe, rows, np.arange(10), cv=2)).all()
+
+
+def test_errors_pass_through_pipelines_and_tables(bunch):
+    X = bunch.data
+    pipe = steps(bunch, TimingChannel(DenseSynchronizer(30), errors=True), ActionModel())
+    pipe = clone(pipe).set_output(transform="pandas").fit(X)
+    table = pipe[:-1].transform(X)
+    names = ["aspace0", "aspace1", "aspace2", "offset", "offset_error"]
+    assert list(table.columns) == names
+    assert table.index.nlevels == 2
+    np.testing.assert_allclose(
+        table["offset_error"].to_numpy().reshape(7, 30),
+        np.diff(Match.from_estimator(pipe, X).interval(0.6827, "percent"), axis=0)[0] / 2,
+    )
+    display = ActionModelDisplay.from_estimator(pipe, X, features=["offset_error", "pelvis_height"])
+    assert display.feature_names == ["offset_error", "pelvis_height"]
+    assert np.isfinite(cross_val_score(pipe, X, cv=2)).all()
+
+
+def test_errors_are_zero_where_a_warp_is_pinned(points):
+    lows = np.array([[x[:, 0].argmax()] for x in points])
+    channel = TimingChannel(DenseSynchronizer(30, pattern=2), errors=True)
+    channel.fit(points, keyframes=lows)
+    errors = channel.transform(points, keyframes=lows)[:, :, -1]
+    pinned = [0, 29, *np.floor(channel.synchronizer_.keyframes_).astype(int)]
+    np.testing.assert_allclose(errors[:, pinned], 0, atol=1e-9)
+    others = np.delete(errors, [0, 1, 28, 29, pinned[2] - 1, pinned[2], pinned[2] + 1], axis=1)
+    assert (np.delete(others, 2, axis=0) > 0).all()
+    # The pattern itself.
+    assert others[2].max() < 0.05 * np.median(others)
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        (
+            {"channel": "log_rate"},
+            "errors=True needs channel='offset': .*Set channel='offset' or errors=False",
+        ),
+        *(
+            (
+                {"synchronizer": each},
+                "errors=True needs DenseSynchronizer or PartSynchronizer, .*; got "
+                f"{type(each).__name__}. Set errors=False",
+            )
+            for each in (LinearSynchronizer(), KeyframeSynchronizer())
+        ),
+    ],
+)
+def test_errors_that_are_not_known_are_refused_in_fit(points, params, message):
+    channel = TimingChannel(DenseSynchronizer(), errors=True).set_params(**params)
+    for method in (channel.fit, channel.fit_transform):
+        with pytest.raises(ValueError, match=message) as raised:
+            method(points)
+        assert "\n" not in str(raised.value)
+    assert not hasattr(channel, "synchronizer_")
+
+
+def test_errors_of_parts_are_those_of_the_whole_body(points):
+    body = DenseSynchronizer(30)
+    expected = TimingChannel(body, errors=True).fit_transform(points)
+    parts = PartSynchronizer({"first": [0]}, synchronizer=body)
+    found = TimingChannel(parts, errors=True).fit_transform(points)
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_fit_refuses_a_feature_with_the_name_of_the_errors(points):
+    frames = [pd.DataFrame(x, columns=["p", "offset_error", "r"]) for x in points]
+    with pytest.raises(ValueError, match="has the name of the errors, 'offset_error': rename it"):
+        TimingChannel(DenseSynchronizer(30), errors=True).fit(frames)
+    assert TimingChannel(DenseSynchronizer(30)).fit(frames).n_frames_ == 30
+
+
+def group_of_trials(seed, spread):
+    """A template, 12 trials later than it, a third of them under much noise, and true offsets.
+
+    Trials are 5 % late in the middle, and differ by ``spread`` %.
+    """
+    rng, dense = np.random.default_rng(seed), np.linspace(0, 1, 2001)
+
+    def curves(moment):
+        bump = np.exp(-(((moment - 0.6) / 0.12) ** 2))
+        return np.stack([np.cos(2 * np.pi * moment), bump, np.sin(3 * np.pi * moment)], axis=-1)
+
+    def moment(t, late):
+        return t - late * np.sin(np.pi * t) ** 2
+
+    clock, trials = np.linspace(0, 1, 101), []
+    for noise in np.repeat([0.02, 0.05, 0.4], 4):
+        late = 0.05 + spread / 100 * rng.standard_normal()
+        x = curves(moment(np.linspace(0, 1, rng.integers(90, 120)), late))
+        trials.append(x + noise * rng.standard_normal(x.shape))
+    return curves(clock), trials, 100 * (np.interp(clock, moment(dense, 0.05), dense) - clock)
+
+
+def mean_errors(seed, spread, floor):
+    """How far the plain and the weighted mean offset of a group are from the truth, in per cent."""
+    pattern, trials, truth = group_of_trials(seed, spread)
+    # Where trials hardly differ in timing, matching explains little, and warns.
+    synchronizer = DenseSynchronizer(101, pattern=pattern, unsupported="warp")
+    channel = TimingChannel(synchronizer, errors=True)
+    offsets, errors = np.moveaxis(channel.fit_transform(trials)[:, :, -2:], 2, 0)
+    weights = 1 / (errors**2 + floor**2)
+    means = [offsets.mean(axis=0), np.average(offsets, axis=0, weights=weights)]
+    return np.sqrt([np.square(mean - truth).mean() for mean in means])
+
+
+def test_weighted_means_are_closer_to_the_truth_if_trials_differ_in_noise():
+    """Trials of the same timing: the error of the mean is due to noise alone."""
+    plain, weighted = np.transpose([mean_errors(seed, 0, 0.1) for seed in range(6)])
+    assert (weighted < plain).all()
+    assert weighted.mean() < 0.5 * plain.mean()
+
+
+def test_weights_with_the_spread_of_trials_do_no_harm_where_that_is_large():
+    """Trials of different timing: the spread is added to the errors, and the means are as good."""
+    plain, weighted = np.transpose([mean_errors(seed, 3, 3) for seed in range(6)])
+    assert weighted.mean() < 1.2 * plain.mean()
