@@ -4,21 +4,24 @@ The phase of a frame is read off the warp of the whole clip, the other way round
 """
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from events import P
 from live_peers import Known
+from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, OnlineSynchronizer
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fold:
     """What is known of an action from all actors but one, and the clips of that one.
 
     ``truths``: the phases of the frames of each clip. ``moments`` {event: (n_clips,)}: when the
     clips show the events of events.py. ``landed`` {event: phase}: where the pattern has them.
-    ``wrong``: what the same actor does otherwise.
+    ``wrong``: what the same actor does otherwise. ``positions``: the joints of the clips.
+    ``points``: makes features of joint positions, ``names`` are theirs.
     """
 
     action: str
@@ -30,6 +33,9 @@ class Fold:
     moments: dict
     landed: dict
     wrong: list
+    positions: list
+    points: Callable
+    names: list
 
     @functools.cached_property
     def live(self):
@@ -77,27 +83,31 @@ def held_out(actions, space=True):
 
     The actions are of one archive.
     """
-    postures = {a.name: DirectionCosines(a.skeleton).fit_transform(a.data) for a in actions}
+    cosines = {a.name: DirectionCosines(a.skeleton).fit(a.data) for a in actions}
+    postures = {a.name: cosines[a.name].transform(a.data) for a in actions}
     folds: dict = {}
     for action in actions:
-        own = postures[action.name]
+        own, body = postures[action.name], cosines[action.name]
         for actor in np.unique(action.actors):
             train, test = (np.flatnonzero((action.actors == actor) == held) for held in (0, 1))
             others = [own[i] for i in train]
-            points = ASpace().fit(others).transform if space else list
+            points = ASpace().fit(others) if space else None
             wrong = [
                 postures[a.name][i]
                 for a in actions
                 if a is not action
                 for i in np.flatnonzero(a.actors == actor)
             ]
-            clips = points(others), points([own[i] for i in test]), points(wrong)
-            fold = _learn(action, train, test, *clips)
+            clips = others, [own[i] for i in test], wrong
+            if space:
+                # Of one action alone there is nothing wrong.
+                clips = [points.transform(some) if some else [] for some in clips]
+            fold = _learn(action, train, test, *clips, make_pipeline(*filter(None, (body, points))))
             folds.setdefault(action.name, []).append(fold)
     return folds
 
 
-def _learn(action, train, test, training, clips, wrong):
+def _learn(action, train, test, training, clips, wrong, features):
     online = OnlineSynchronizer(DenseSynchronizer(n_frames=P)).fit(training)
     sync = online.synchronizer_
     seen, whole = sync.match(training).times, sync.match(clips).times
@@ -117,4 +127,7 @@ def _learn(action, train, test, training, clips, wrong):
         moments={event: moments[test] for event, moments in action.moments.items()},
         landed=landed,
         wrong=wrong,
+        positions=[action.data[i] for i in test],
+        points=features.transform,
+        names=list(features.get_feature_names_out()),
     )

@@ -49,6 +49,8 @@ _LINE_LENGTH = 24
 _AHEAD = 0.1
 # Standard deviations on each side that contain 90 %.
 _BAND = 1.645
+# The opacity of the interval of the phase.
+_INTERVAL_OPACITY = 0.25
 # The number of points of a prediction.
 _N_POINTS = 60
 
@@ -57,10 +59,10 @@ class PhaseDisplay:
     """Running performances: their phase, its confidence, and a prediction.
 
     Panels for each performance: a dial of its phase, with an arc that ends at the phase after a
-    tenth of the mean duration at the present rate; the phase over time with its confidence; and
-    features, as far as they were observed, with the predicted rest: the mean from the phase on,
-    for as long as `OnlineSynchronizer.time_left` estimates. With ``body`` also a stick figure,
-    before the mean one at the end of that arc. Make one with `from_estimator` or
+    tenth of the mean duration at the present rate; the phase over time with its interval and its
+    confidence; and features, as far as they were observed, with the predicted rest: the mean from
+    the phase on, for as long as `OnlineSynchronizer.time_left` estimates. With ``body`` also a
+    stick figure, before the mean one at the end of that arc. Make one with `from_estimator` or
     `from_predictions`.
 
     Parameters
@@ -99,8 +101,9 @@ class PhaseDisplay:
     axes_ : list of Axes
         Row by row: a body if there are bodies, the dial, the phase, and one a feature.
     rows_ : list
-        The artists of each performance: ``row.dial.passed``, ``row.phase``, ``row.confidence``,
-        ``row.afterwards``, ``row.rest``, ``row.curves[k].seen``, ``row.curves[k].expected``.
+        The artists of each performance: ``row.dial.passed``, ``row.phase``, ``row.interval``,
+        ``row.confidence``, ``row.afterwards``, ``row.rest``, ``row.curves[k].seen``,
+        ``row.curves[k].expected``.
 
     Examples
     --------
@@ -399,8 +402,8 @@ def _as_list_of_phases(phases):
             f"as live.track(X) gives; got {phases!r:.80}."
         )
     if len(listed) == 1 and np.ndim(listed[0].phase) == 2:
-        streams = zip(*map(np.transpose, listed[0]), strict=True)
-        return [LivePhase(*stream) for stream in streams]
+        by_value = [values for values in listed[0] if values is not None]
+        return [LivePhase(*of) for of in zip(*map(np.transpose, by_value), strict=True)]
     return listed
 
 
@@ -484,7 +487,10 @@ class RunningPerformance(NamedTuple):
 
     Attributes
     ----------
-    phase, rate, confidence, times : ndarray, shape (n_frames,)
+    phase, rate, confidence : ndarray, shape (n_frames,)
+    lower, upper : ndarray (n_frames,), or None
+        The bounds of the phases.
+    times : ndarray, shape (n_frames,)
         The first time is 0.
     name : str
     seen : ndarray (n_frames, n_shown), or None
@@ -496,6 +502,8 @@ class RunningPerformance(NamedTuple):
     phase: np.ndarray
     rate: np.ndarray
     confidence: np.ndarray
+    lower: np.ndarray | None
+    upper: np.ndarray | None
     times: np.ndarray
     name: str
     seen: np.ndarray | None = None
@@ -537,6 +545,8 @@ class PerformanceRow:
         self.confidence = _empty_area(axis, grey, 0.75, "confidence")
         self.afterwards = None
         performance, percent = self._performance, 100 / (self._action.n_frames - 1)
+        label = _label("90 % band", performance.lower)
+        self.interval = _empty_area(axis, blue, _INTERVAL_OPACITY, label)
         if performance.afterwards is not None:
             style = {"color": COLORS["pattern"], "linewidth": 0.9, "linestyle": "--"}
             ys = percent * performance.afterwards
@@ -558,6 +568,9 @@ class PerformanceRow:
         self.dial.show(phase / last, ahead / last, rate, confidence)
         self.phase.set_data(p.times[past], 100 / last * p.phase[past])
         _fill_area(self.confidence, p.times[past], 0, 100 * p.confidence[past])
+        if p.lower is not None:
+            lower, upper = (100 / last * bound[past] for bound in (p.lower, p.upper))
+            _fill_area(self.interval, p.times[past], lower, upper)
         self.rest.set_data(rest[0], 100 / last * rest[1])
         if self.body is not None:
             self.body.show(now, ahead)

@@ -14,6 +14,13 @@ __all__ = ["LivePhase", "Session", "Streams", "check_observations", "check_times
 
 # Shares of the clock: the window of rate and cost, and how near a phase counts as right.
 _WINDOW, _TOLERANCE = 0.1, 0.05
+# Probabilities below the bounds of an interval; half of its least width, as a share of the clock.
+_TAILS, _LEAST = np.array([[0.05], [0.95]], dtype=np.float32), 0.01
+# Log-weights of phases are this at least.
+_MIN_LOG_WEIGHT = -80.0
+# Costs above so many times the typical one are those of other movements. Chosen on people of
+# HDM05, so that intervals of other actions are wide, and those under noise are not: docs/design.md.
+_UNUSUAL = 4
 # Frames that are kept in the history; a stream may run for days.
 _HISTORY_LENGTH = 100_000
 # Gaps longer than this share of the clock are not interpolated.
@@ -28,6 +35,9 @@ _FORGETTING = 3
 class LivePhase(NamedTuple):
     """The phase of a running performance, its rate, and how sure it is.
 
+    All values have the shape of the phase: numbers of a frame, arrays of several frames or
+    performances.
+
     Parameters
     ----------
     phase : float, or ndarray
@@ -36,6 +46,9 @@ class LivePhase(NamedTuple):
         Pace in units of the mean pace of the training performances.
     confidence : float, or ndarray
         Probability, from 0 to 1, that the phase is right to a twentieth of the clock.
+    lower, upper : float, or ndarray, default=None
+        Frames of the pattern between which the phase lies with a probability of 90 %, from 0 to
+        P - 1; the estimated phase is between them. None: unknown.
 
     See Also
     --------
@@ -44,14 +57,17 @@ class LivePhase(NamedTuple):
     Examples
     --------
     >>> from sklearn_motionsync import LivePhase
-    >>> LivePhase(phase=12.5, rate=1.0, confidence=0.9).phase
-    12.5
+    >>> now = LivePhase(phase=12.5, rate=1.0, confidence=0.9, lower=10.0, upper=16.0)
+    >>> now.phase, now.upper - now.lower
+    (12.5, 6.0)
     """
 
     # Numbers of a frame, arrays of several.
     phase: Any
     rate: Any
     confidence: Any
+    lower: Any = None
+    upper: Any = None
 
 
 class Session:
@@ -80,15 +96,15 @@ class Session:
         self._reference, self._shape = reference, frame.shape
         self._streams = Streams(reference, *frames.shape)
         self._resampler = Resampler(reference.step, reference.n_frames, frames, time)
-        # NaN: the stream begins with the next frame.
-        self._start = np.full(len(frames), np.nan)
+        # NaN: the stream begins with the next frame, as one of them does.
+        self._start, self._one_begins = np.full(len(frames), np.nan), True
         self.history = deque(maxlen=_HISTORY_LENGTH)
 
     def restart(self, stream):
         """Begin another performance of one stream with the next frame."""
         self._streams.restart(stream)
         self._resampler.restart(stream)
-        self._start[stream] = np.nan
+        self._start[stream], self._one_begins = np.nan, True
 
     def step(self, frame, time):
         """Take a frame, and estimate the phases: a `LivePhase` of numbers, or of arrays."""
@@ -97,7 +113,9 @@ class Session:
                 f"The frames before had the shape {self._shape}, this one has {frame.shape}: give "
                 "the same performances in each, NaN for what is not seen, or call reset()."
             )
-        self._start = np.where(np.isnan(self._start), time, self._start)
+        if self._one_begins:
+            self._start = np.where(np.isnan(self._start), time, self._start)
+            self._one_begins = False
         self.time = time
         for sample in self._resampler.add(np.atleast_2d(frame), time):
             self._streams.update(sample)
@@ -139,19 +157,23 @@ class Streams:
         self.mean_cost = np.zeros(n_streams)
         self._derivative = CausalDerivative(reference.width, (n_streams, n_features))
         self._window = window_length(reference.n_frames)
-        self._tolerance = max(1.0, _TOLERANCE * (reference.n_frames - 1))
-        table = reference.trellis.table
+        self._last, table = reference.n_frames - 1, reference.trellis.table
+        self._tolerance = max(1.0, _TOLERANCE * self._last)
+        # Positions of whole frames.
+        self._whole = slice(None, None, table.subframes)
         self._max_rate = table.steps.max() / table.subframes
         # Positions after the end of the movement have its last phase.
         positions = np.arange(len(reference.moving)) / table.subframes
-        self._phase_of_position = np.minimum(positions, reference.n_frames - 1)
+        self._phase_of_position = np.minimum(positions, self._last)
         # The phases of the last samples, the last one last.
         self._phases = np.zeros((self._window + 1, n_streams))
         self._n_samples = np.zeros(n_streams, dtype=np.intp)
         self._path_cost, self._fully_observed = np.zeros(n_streams), np.ones(n_streams)
         # The share of the last samples in which anything was observed.
         self._observed_share = np.ones(n_streams)
-        # Phases, rates and confidences, once computed, until the next sample.
+        # Of the features, the share that was observed in those samples.
+        self._feature_share = np.ones(n_streams)
+        # Phases and their bounds, rates and confidences, once computed, until the next sample.
         self._cached = None
 
     def restart(self, stream):
@@ -159,6 +181,7 @@ class Streams:
         self.trellis.restart(stream)
         self._derivative.restart(stream)
         self._n_samples[stream] = self._path_cost[stream] = self.mean_cost[stream] = 0
+        self._feature_share[stream] = 1
         self._phases[:, stream] = 0
         self._cached = None
 
@@ -189,12 +212,15 @@ class Streams:
         self._update_window(observed)
 
     def estimate(self, elapsed):
-        """Phases, rates and confidences, so many samples after the last one."""
+        """Phases with bounds, rates and confidences, so many samples after the last one."""
         if self._cached is None:
-            self._cached = self._phases[-1], self._rates(), self._confidences()
-        phase, rate, confidence = self._cached
-        phase = np.minimum(phase + rate * elapsed, self.reference.n_frames - 1)
-        return LivePhase(phase, rate, confidence)
+            gains = gains_of(self.trellis.costs)
+            excess = np.maximum(self.mean_cost / self.reference.typical_cost, 1)
+            phases = np.concatenate([self._phases[-1:], self._bounds(gains, excess)])
+            self._cached = phases, self._rates(), self._confidences(gains, excess)
+        phases, rate, confidence = self._cached
+        phase, lower, upper = np.minimum(phases + rate * elapsed, self._last)
+        return LivePhase(phase, rate, confidence, lower, upper)
 
     def _update_window(self, observed):
         """Phases, costs and observed shares of the window, with a sample of this observed share."""
@@ -207,6 +233,7 @@ class Streams:
         # Per observed feature, so that hidden features make a stream neither like nor unlike.
         cost = (costs - self._path_cost) / np.where(seen, observed, 1)
         self.mean_cost += weight * seen * (cost - self.mean_cost)
+        self._feature_share += weight * seen * (observed - self._feature_share)
         self._path_cost, self._cached = costs, None
 
     def _rates(self):
@@ -216,13 +243,21 @@ class Streams:
         rate = (moved + self._window - length) / self._window
         return np.minimum(np.maximum(rate, 0), self._max_rate)
 
-    def _confidences(self):
-        probabilities = phase_probabilities(self.trellis.costs, self.reference.temperature)
+    def _confidences(self, gains, excess):
+        probabilities = phase_probabilities(gains, self.reference.temperature)
         distances = np.abs(self._phase_of_position - self._phases[-1][:, np.newaxis])
         mass = np.vecdot(probabilities, distances <= self._tolerance)
-        excess = np.maximum(self.mean_cost / self.reference.typical_cost, 1)
         # A stream without samples is at the beginning.
         return np.where(self._n_samples > 0, self._observed_share * mass / excess**2, 1.0)
+
+    def _bounds(self, gains, excess):
+        """Bounds of the phases of the last sample: (2, n_streams)."""
+        # Noise raises all costs, and the differences between phases with them.
+        temperature = self.reference.interval_temperature * excess
+        temperature *= (np.maximum(excess / _UNUSUAL, 1) / self._feature_share) ** 2
+        found = phase_bounds(gains[:, self._whole], temperature, self._phases[-1], self._last)
+        # A stream without samples is at the beginning.
+        return found * (self._n_samples > 0)
 
 
 class Resampler:
@@ -260,9 +295,10 @@ class Resampler:
 
     def add(self, frame, time):
         """Yield the samples (n_streams, n_features) up to a new frame of that shape."""
-        self._seen[self._restarted] = frame[self._restarted]
-        self._seen_at[self._restarted] = self._time
-        self._restarted = []
+        if self._restarted:
+            self._seen[self._restarted] = frame[self._restarted]
+            self._seen_at[self._restarted] = self._time
+            self._restarted = []
         time -= self._origin
         gap = (time - self._time) / self._step
         if gap > _FORGETTING * self._n_frames:
@@ -299,13 +335,48 @@ def window_length(n_frames):
 
 def stack_phases(phases):
     """The `LivePhase` of each frame as one of arrays."""
+    if not phases:
+        return LivePhase(*np.empty((5, 0)))
     return LivePhase(*(np.array(values) for values in zip(*phases, strict=True)))
 
 
-def phase_probabilities(costs, temperature):
-    """Probabilities of phases with these path costs (..., Q): ``exp(-cost / temperature)``."""
-    weights = np.exp((costs.min(axis=-1, keepdims=True) - costs) / temperature)
+def gains_of(costs):
+    """The least path costs (..., Q) less the others: log-probabilities, but for their scale."""
+    return costs.min(axis=-1, keepdims=True) - costs
+
+
+def phase_probabilities(gains, temperature):
+    """Probabilities of phases with these `gains_of` costs (..., Q): ``exp(gain / temperature)``."""
+    weights = np.exp(gains / temperature)
     return weights / weights.sum(axis=-1, keepdims=True)
+
+
+def phase_bounds(gains, temperature, phase, last):
+    """Bounds between which phases lie with a probability of 90 %.
+
+    Parameters
+    ----------
+    gains : ndarray, shape (n, n_frames)
+        The `gains_of` costs, at whole frames, and at those after the end of the movement.
+    temperature : ndarray, shape (n,)
+        Gains over it are log-probabilities.
+    phase : ndarray, shape (n,)
+        The estimated phases, which are between the bounds.
+    last : int
+        P - 1.
+
+    Returns
+    -------
+    ndarray, shape (2, n)
+    """
+    # Half the digits are enough, and nothing overflows.
+    logs = np.maximum(gains / temperature[:, np.newaxis], _MIN_LOG_WEIGHT)
+    weights = np.exp(logs.astype(np.float32))
+    mass = weights.cumsum(axis=1)
+    bounds = (mass >= (mass[:, -1] * _TAILS)[..., np.newaxis]).argmax(axis=-1)
+    least = max(1.0, _LEAST * last)
+    lower = np.maximum(np.minimum(bounds[0], phase - least), 0)
+    return np.array([lower, np.minimum(np.maximum(bounds[1], phase + least), last)])
 
 
 def time_left(share, elapsed, duration):

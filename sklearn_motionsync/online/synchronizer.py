@@ -36,6 +36,8 @@ from .stream import (
     Session,
     check_observations,
     check_times,
+    gains_of,
+    phase_bounds,
     phase_probabilities,
     stack_phases,
     times_of_each,
@@ -228,8 +230,8 @@ class OnlineSynchronizer(
         Returns
         -------
         LivePhase
-            ``phase``, ``rate`` and ``confidence``: numbers for one performance, arrays
-            (n_streams,) for several.
+            ``phase``, ``rate``, ``confidence``, ``lower`` and ``upper``: numbers for one
+            performance, arrays (n_streams,) for several.
 
         Raises
         ------
@@ -294,13 +296,13 @@ class OnlineSynchronizer(
 
     @property
     def history(self) -> LivePhase:
-        """Phases, rates and confidences since the last ``reset`` of all: `LivePhase` of arrays.
+        """What ``step`` estimated since the last ``reset`` of all: `LivePhase` of arrays.
 
         Of a long stream these are the last 100,000 frames.
         """
         check_is_fitted(self)
         if self._session is None:
-            return LivePhase(*np.empty((3, 0)))
+            return stack_phases([])
         return stack_phases(self._session.history)
 
     def track(
@@ -377,6 +379,8 @@ class Reference:
         Path costs over it are negative log-probabilities of phases.
     typical_cost : float, default=inf
         Mean cost of a sample that half of the training performances never exceed.
+    interval_temperature : float, default=1.0
+        Path costs over it give the probabilities whose quantiles bound the phase.
 
     Attributes
     ----------
@@ -405,12 +409,14 @@ class Reference:
         max_rate,
         temperature=1.0,
         typical_cost=np.inf,
+        interval_temperature=1.0,
     ):
         last = len(mean) - 1
         self.cost, self.metric, self.unit = features.cost, features.metric, features.unit
         self.n_frames, self.width, self.step = len(mean), velocity_smoothing * last, duration / last
         self.duration = self.step * last
         self.temperature, self.typical_cost = temperature, typical_cost
+        self.interval_temperature = interval_temperature
         postures = self.unit(normalise([mean.astype(np.float64)], len(mean), _SUBFRAMES)[0])
         self.centre, self._n_positions = postures.mean(axis=0), len(postures)
         rest = max(1, math.ceil(_REST * self.width))
@@ -484,13 +490,19 @@ _TEMPERATURES = np.geomspace(0.01, 1e3, 41)
 _MIN_PROBABILITY = 1e-12
 # For a single training performance: medians of 16 actions of people, in mean squared features.
 _DEFAULT_TEMPERATURE, _DEFAULT_COST = 0.7, 0.5
+# Share of the training phases inside the intervals. Other training performances are partly of the
+# same person. For new people temperatures are raised: docs/design.md.
+_COVERAGE, _NEW_PEOPLE = 0.9, 1.5
+# Of intervals, for a single training performance: by pairs of people of HDM05.
+_DEFAULT_INTERVAL = 8.0
 
 
 def calibrate(reference_of, performances, warped, times, progress):
-    """Learn the temperature and the typical cost of a `Reference`.
+    """Learn the temperatures and the typical cost of a `Reference`.
 
     Each training performance is matched to the mean of the others. The temperature maximises the
-    likelihood of the phases of the synchronizer.
+    likelihood of the phases of the synchronizer. That of the intervals is the lowest at which nine
+    tenths of these phases are inside, raised for new people.
 
     Parameters
     ----------
@@ -505,27 +517,36 @@ def calibrate(reference_of, performances, warped, times, progress):
 
     Returns
     -------
-    temperature, typical_cost : float
+    temperature, typical_cost, interval_temperature : float
     """
     n, total = len(performances), warped.sum(axis=0, dtype=np.float64)
     chosen = np.unique(np.linspace(0, n - 1, _MAX_PERFORMANCES).round().astype(np.intp))
-    scores, largest = np.zeros(len(_TEMPERATURES)), []
+    scores, shares, largest = *np.zeros((2, len(_TEMPERATURES))), []
     # Of a constant mean all costs are 0, in any unit.
     energy = float(np.square(reference_of(total / n).moving).sum(axis=1).mean()) or 1.0
     if n == 1:
-        return energy * _DEFAULT_TEMPERATURE, energy * _DEFAULT_COST
+        return tuple(energy * x for x in (_DEFAULT_TEMPERATURE, _DEFAULT_COST, _DEFAULT_INTERVAL))
     step = progress.stage("calibrating", len(chosen))
     for i in chosen:
         reference = reference_of((total - warped[i]) / (n - 1))
         costs, truth, largest_cost = _match_live(reference, performances[i], times[i])
         largest.append(largest_cost)
+        subframes, last = reference.trellis.table.subframes, reference.n_frames - 1
+        phases, right_phases = np.minimum(costs.argmin(axis=1) / subframes, last), truth / subframes
+        gains = gains_of(costs)
         for k, temperature in enumerate((energy * _TEMPERATURES).tolist()):
-            right = phase_probabilities(costs, temperature)[np.arange(len(costs)), truth]
+            right = phase_probabilities(gains, temperature)[np.arange(len(costs)), truth]
             scores[k] += np.log(np.maximum(right, _MIN_PROBABILITY)).mean()
+            every = np.full(len(gains), temperature)
+            lower, upper = phase_bounds(gains[:, ::subframes], every, phases, last)
+            shares[k] += np.mean((lower <= right_phases) & (right_phases <= upper)) / len(chosen)
         step()
     # Copies of one performance have no costs but rounding.
     typical_cost = max(np.median(largest), _MIN_PROBABILITY * energy)
-    return float(energy * _TEMPERATURES[scores.argmax()]), float(typical_cost)
+    temperature = float(energy * _TEMPERATURES[scores.argmax()])
+    enough = np.append(np.flatnonzero(shares >= _COVERAGE), len(shares) - 1)[0]
+    interval_temperature = _NEW_PEOPLE * energy * _TEMPERATURES[enough]
+    return temperature, float(typical_cost), float(interval_temperature)
 
 
 def _match_live(reference, performance, times):

@@ -42,6 +42,10 @@ def test_artists_agree_with_the_estimator(live, display):
         np.testing.assert_allclose(row.phase.get_ydata(), 100 * expected.phase[past] / last)
         surface = row.confidence.get_paths()[0].vertices
         np.testing.assert_allclose(surface[past, 1], 100 * expected.confidence[past])
+        # One way along the upper bounds, and back along the lower ones.
+        band = row.interval.get_paths()[0].vertices[: 2 * (FRAME + 1), 1]
+        bounds = np.concatenate([expected.upper[past], expected.lower[past][::-1]])
+        np.testing.assert_allclose(band, 100 * bounds / last)
         # The final phases of a linear synchronizer are a straight line.
         np.testing.assert_allclose(
             row.afterwards.get_ydata(), np.linspace(0, 100, len(x)), atol=1e-6
@@ -166,7 +170,11 @@ def test_titles_and_predictions_fit_into_the_figure(live):
     (row,) = PhaseDisplay.from_predictions(stops, 51, duration=60).rows_
     assert row.rest.get_xdata()[-1] == 89 + 15
     assert row.axes[1].get_xlim()[1] > 89 + 15
-    PhaseDisplay.from_predictions(LivePhase([0], [1], [1]), 51)
+    # Bounds are not drawn where they are unknown.
+    (row,) = PhaseDisplay.from_predictions(LivePhase([0], [1], [1]), 51).rows_
+    assert row.interval.get_paths() == []
+    two = LivePhase(*np.ones((3, 9, 2)))
+    assert len(PhaseDisplay.from_predictions(two, 51).rows_) == 2
 
 
 def test_from_estimator_refuses(live):

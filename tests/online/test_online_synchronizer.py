@@ -119,7 +119,8 @@ def test_track_equals_step_and_does_not_look_ahead(fitted, live):
     x[0, 1] = x[7:9, 2] = np.nan
     whole, part = fitted.track([x, x[:40]])
     steps = step_all(live, x)
-    for values, name in zip(whole, ("phase", "rate", "confidence"), strict=True):
+    names = ("phase", "rate", "confidence", "lower", "upper")
+    for values, name in zip(whole, names, strict=True):
         np.testing.assert_array_equal(values, [getattr(step, name) for step in steps])
         np.testing.assert_array_equal(values[:40], getattr(part, name))
         np.testing.assert_array_equal(values, getattr(live.history, name))
@@ -473,7 +474,7 @@ def test_calibration_equals_streams_matched_to_the_mean_of_the_others():
             found = log_softmax(-np.array(rows) / temperature, axis=1)[np.arange(len(rows)), right]
             scores[k] += np.maximum(found[::every], np.log(1e-12)).mean()
     progress = Progress(None, verbose=0)
-    temperature, typical_cost = calibrate(reference_of, X, warped, match.times, progress)
+    temperature, typical_cost, _ = calibrate(reference_of, X, warped, match.times, progress)
     assert temperature == pytest.approx(temperatures[scores.argmax()])
     assert typical_cost == pytest.approx(np.median(largest), rel=1e-6)
 

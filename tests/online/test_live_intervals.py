@@ -1,0 +1,322 @@
+"""Intervals of the live phase: what they hold, when they widen, and how they are calibrated."""
+
+import copy
+
+import numpy as np
+import pytest
+from scipy.special import softmax
+from sklearn_motionsync import (
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    OnlineSynchronizer,
+)
+from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.online.stream import Streams, gains_of, phase_bounds
+from sklearn_motionsync.online.synchronizer import Reference, calibrate
+from sklearn_motionsync.utils.parallel import Progress
+
+P = 100
+BUNCH = make_bending(48, n_actors=8, n_frames=P, random_state=4)
+COSINES = DirectionCosines(BUNCH.skeleton).fit(BUNCH.data)
+KNOWN = np.flatnonzero(np.isin(BUNCH.actor, np.unique(BUNCH.actor)[:5]))
+NEW = np.setdiff1d(np.arange(48), KNOWN)
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    """Learnt of five of eight made actors."""
+    X = COSINES.transform([BUNCH.data[i] for i in KNOWN])
+    return OnlineSynchronizer(DenseSynchronizer(P)).fit(X)
+
+
+@pytest.fixture
+def live(fitted):
+    return copy.deepcopy(fitted)
+
+
+@pytest.fixture(scope="module")
+def clips():
+    """Those of the other three actors."""
+    return COSINES.transform([BUNCH.data[i] for i in NEW])
+
+
+@pytest.fixture(scope="module")
+def truths(fitted):
+    """The phases of the frames of these clips, by the times they were made with."""
+    pattern = BUNCH.times[KNOWN[fitted.synchronizer_.pattern_index_]]
+    clock = np.linspace(0, P - 1, len(pattern))
+    return [np.interp(BUNCH.times[i], pattern, clock) for i in NEW]
+
+
+def width(live):
+    return live.upper - live.lower
+
+
+def mean_width(lives):
+    return np.mean([width(live).mean() for live in lives])
+
+
+def held(lives, truths):
+    """The share of the truths inside."""
+    pairs = zip(lives, truths, strict=True)
+    return np.mean([np.mean((x.lower <= t) & (t <= x.upper)) for x, t in pairs])
+
+
+def check_bounds(live, last=P - 1):
+    assert (live.lower >= 0).all()
+    assert (live.lower <= live.phase).all()
+    assert (live.phase <= live.upper).all()
+    assert (live.upper <= last).all()
+
+
+# -- what they hold -----------------------------------------------------------------------
+
+
+def noisy(clips, rng):
+    return COSINES.transform(
+        [BUNCH.data[i] + rng.normal(0, 0.02, BUNCH.data[i].shape) for i in NEW]
+    )
+
+
+def with_gaps(clips, rng):
+    return [np.where(in_gap(x), np.nan, x) for x in clips]
+
+
+def in_gap(x):
+    share = np.linspace(0, 1, len(x))[:, np.newaxis]
+    return (share > 0.4) & (share < 0.6)
+
+
+def with_hidden_limb(clips, rng):
+    names = COSINES.get_feature_names_out()
+    arm = np.array([name[:-2] in ("right_arm", "right_forearm") for name in names])
+    return [np.where(arm, np.nan, x) for x in clips]
+
+
+@pytest.mark.parametrize("change", [None, noisy, with_gaps, with_hidden_limb])
+def test_intervals_hold_the_made_truth_of_new_people(fitted, clips, truths, change):
+    as_made = fitted.track(clips)
+    found = as_made
+    if change is not None:
+        found = fitted.track(change(clips, np.random.default_rng(0)))
+        assert mean_width(found) > 1.1 * mean_width(as_made)
+    for one in found:
+        check_bounds(one)
+    # More than 95 % where noise lets the costs overestimate it.
+    assert 0.85 <= held(found, truths) <= 0.99
+
+
+@pytest.mark.parametrize("action", ["depositFloorR", "grabHighR"])
+def test_intervals_hold_the_phases_of_real_people_held_out(real_data, action):
+    """The truth is the warp of the whole clip. Under another action they are wide."""
+    clips = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    other = {"depositFloorR": "grabHighR", "grabHighR": "depositFloorR"}[action]
+    shares, right, wrong = [], [], []
+    for actor in np.unique(clips.actor):
+
+        def load(action, held_out, actor=actor):
+            """Clips at 30 frames a second, by one actor or by the others."""
+            chosen = (clips.target == action) & ((clips.actor == actor) == held_out)
+            return [clips.data[i][::4] for i in np.flatnonzero(chosen)]
+
+        features = DirectionCosines(clips.skeleton)
+        training = features.fit_transform(load(action, held_out=False))
+        X = features.transform(load(action, held_out=True))
+        live = OnlineSynchronizer(DenseSynchronizer(P)).fit(training)
+        tracks, truths = live.track(X), []
+        for x, times in zip(X, live.synchronizer_.match(X).times, strict=True):
+            rising = times + 1e-9 * np.arange(P)
+            truths.append(np.interp(np.linspace(0, P - 1, len(x)), rising, np.arange(P)))
+        shares.append(held(tracks, truths))
+        right.append(mean_width(tracks))
+        wrong.append(mean_width(live.track(features.transform(load(other, held_out=True)))))
+    assert 0.82 <= np.mean(shares) <= 0.97
+    assert np.mean(right) < 15
+    assert np.mean(wrong) > 1.3 * np.mean(right)
+
+
+# -- when they widen ----------------------------------------------------------------------
+
+
+def test_intervals_widen_while_nothing_is_seen(fitted, clips):
+    x = clips[0]
+    hidden = np.flatnonzero(in_gap(x)[:, 0])
+    seen, found = fitted.track([x, np.where(in_gap(x), np.nan, x)])
+    before, last, after = width(found)[[hidden[0] - 1, hidden[-1], -1]]
+    assert last > 3 * before
+    assert (np.diff(width(found)[hidden]) > -2).all()
+    assert after == pytest.approx(width(seen)[-1], abs=2)
+    # Time without frames is like frames of NaN.
+    kept = np.flatnonzero(~in_gap(x)[:, 0])
+    (late,) = fitted.track([x[kept]], [kept])
+    np.testing.assert_allclose(width(late)[-20:], width(found)[-20:], atol=2)
+    # If nothing is seen from the start on, it widens as well.
+    (blind,) = fitted.track([np.full_like(x, np.nan)])
+    check_bounds(blind)
+    assert width(blind)[len(x) // 2] > 1.3 * width(blind)[len(x) // 8] > 4
+
+
+def test_intervals_of_another_movement_are_wide(fitted, clips):
+    x = clips[0]
+    right, other = fitted.track([x, np.roll(x, 7, axis=1)])
+    check_bounds(other)
+    assert width(other)[len(x) // 4 :].mean() > 5 * width(right)[len(x) // 4 :].mean()
+
+
+def test_intervals_begin_narrow_at_the_first_frame(fitted, live, clips):
+    for found in fitted.track(clips):
+        assert found.lower[0] == 0
+        assert found.upper[0] <= 2
+    # A performance that waits in the first posture stays there.
+    (waits,) = fitted.track([np.repeat(clips[0][:1], 100, axis=0)])
+    assert waits.lower.max() < 2
+    assert waits.lower[-20:].max() == 0
+    # So does a stream between its reset and its next sample.
+    live.step(clips[0][[30, 30]], 0)
+    for k in range(40):
+        live.step(clips[0][[k, k]], k + 1)
+    live.reset(0)
+    ahead = live.step(clips[0][[0, 40]], 40.01)
+    assert ahead.lower[0] <= ahead.phase[0] <= ahead.upper[0] < 1
+    assert ahead.upper[1] > 10
+
+
+# -- how they are computed ----------------------------------------------------------------
+
+
+def test_bounds_are_quantiles_about_the_phase():
+    rng = np.random.default_rng(0)
+    costs = np.abs(np.arange(130) - rng.uniform(0, 100, (20, 1))) + rng.random((20, 130))
+    costs[:, 125:] = np.inf
+    phase, temperature = rng.uniform(0, 99, 20), rng.uniform(0.1, 20, 20)
+    lower, upper = phase_bounds(gains_of(costs), temperature, phase, 99)
+    for i, at in enumerate(phase):
+        mass = softmax(-costs[i] / temperature[i]).cumsum()
+        first, last = (int(np.flatnonzero(mass >= q)[0]) for q in (0.05, 0.95))
+        assert lower[i] == max(min(first, at - 1), 0)
+        assert upper[i] == min(max(last, at + 1), 99)
+    # Costs of any size, and copies without costs.
+    huge = phase_bounds(gains_of(1e60 * costs), np.full(20, 1e-9), phase, 99)
+    assert np.isfinite(huge).all()
+
+
+def references_of(live):
+    """A function that makes the reference of a mean, as a fitted synchronizer does."""
+    settings = live.duration_, live.smoothness, live.velocity_smoothing, live.max_rate
+
+    def reference_of(mean, *calibration):
+        return Reference(live.synchronizer_.features_, mean, *settings, *calibration)
+
+    return reference_of
+
+
+def test_bounds_of_streams_equal_their_definition(fitted, clips):
+    """By excess of the cost and the share of the features, of which one limb is hidden at times."""
+    X, reference_of = COSINES.transform([BUNCH.data[i] for i in KNOWN]), references_of(fitted)
+    match = fitted.synchronizer_.match(X)
+    given = X, match.warp(X), match.times, Progress(None, verbose=0)
+    reference = reference_of(fitted.mean_, *calibrate(reference_of, *given))
+    streams = Streams(reference, 2, clips[0].shape[1])
+    x, y = clips[0][:60], np.roll(clips[1], 7, axis=1)[:60].copy()
+    x[20:40, 10:16] = np.nan
+    share, n_features = np.ones(2), x.shape[1]
+    for k, sample in enumerate(np.stack([x, y], axis=1)):
+        streams.update(sample)
+        found, n = streams.estimate(0.0), k + 1
+        # Velocities are unknown as long as their features.
+        seen = 1 - np.array([6 * (20 <= k < 40), 0]) / n_features
+        if k == 40:
+            seen[0] = 1 - 6 / n_features
+        share += (seen - share) / min(n, 10)
+        excess = np.maximum(streams.mean_cost / reference.typical_cost, 1)
+        temperature = reference.interval_temperature * excess / share**2
+        temperature *= np.maximum(excess / 4, 1) ** 2
+        gains = gains_of(streams.trellis.costs)[:, ::2]
+        bounds = phase_bounds(gains, temperature, found.phase, P - 1)
+        np.testing.assert_allclose([found.lower, found.upper], bounds, atol=1e-9)
+    assert streams.mean_cost[1] > 4 * reference.typical_cost
+    # Until the next sample they move with the phase.
+    later = streams.estimate(0.5)
+    for name in ("phase", "lower", "upper"):
+        expected = np.minimum(getattr(found, name) + found.rate / 2, P - 1)
+        np.testing.assert_allclose(getattr(later, name), expected)
+
+
+def test_streams_side_by_side_equal_streams_alone(fitted, live, clips):
+    x, y = clips[0].copy(), clips[1][: len(clips[0])]
+    x, y = x[: len(y)], y.copy()
+    x[30:40, 5:11] = y[50:60] = np.nan
+    both = [live.step(frames) for frames in np.stack([x, y], axis=1)]
+    for i, one in enumerate(fitted.track([x, y])):
+        for name in ("lower", "upper"):
+            # Where rounding decides, a bound is one frame off.
+            found = np.abs([getattr(step, name)[i] for step in both] - getattr(one, name))
+            assert found.max() <= 1 + 1e-9
+            assert np.mean(found > 1e-9) < 0.05
+    assert live.history.lower.shape == (len(x), 2)
+    live.reset()
+    assert all(len(values) == 0 for values in live.history)
+    assert len(live.history) == 5
+
+
+def test_calibration_is_the_lowest_temperature_that_holds_nine_tenths():
+    """Of the phases of training performances, each matched to the mean of the others."""
+    X = COSINES.transform([BUNCH.data[i] for i in KNOWN[:9]])
+    live = OnlineSynchronizer(DenseSynchronizer(60, metric=None, refine=False)).fit(X)
+    match, last = live.synchronizer_.match(X), 59
+    warped, reference_of = match.warp(X), references_of(live)
+    energy = np.square(reference_of(live.mean_).moving).sum(axis=1).mean()
+    temperatures, shares = np.geomspace(0.01, 1e3, 41), np.zeros(41)
+    for i, x in enumerate(X):
+        others = np.delete(warped, i, axis=0).mean(axis=0)
+        streams, rows = Streams(reference_of(others), 1, x.shape[1]), []
+        times = np.arange(0, len(x) - 1 + 1e-6, live.duration_ / last)
+        for t in times:
+            streams.update(np.array([[np.interp(t, np.arange(len(x)), c) for c in x.T]]))
+            rows.append(streams.trellis.costs[0])
+        phases = np.minimum(np.argmin(rows, axis=1) / 2, last)
+        clock = times / (len(x) - 1) * last
+        truth = np.interp(clock, match.times[i] + 1e-9 * np.arange(60), np.arange(60))
+        truth = np.round(2 * truth) / 2
+        for k, temperature in enumerate(energy * temperatures):
+            every = np.full(len(rows), temperature)
+            lower, upper = phase_bounds(gains_of(np.array(rows))[:, ::2], every, phases, last)
+            shares[k] += np.mean((lower <= truth) & (truth <= upper)) / len(X)
+    expected = 1.5 * energy * temperatures[np.flatnonzero(shares >= 0.9)[0]]
+    progress = Progress(None, verbose=0)
+    found = calibrate(reference_of, X, warped, match.times, progress)[2]
+    assert found == pytest.approx(expected)
+
+
+def test_intervals_do_not_depend_on_the_unit():
+    rng = np.random.default_rng(1)
+    t = np.linspace(0, 1, 50)
+    X = [np.column_stack([np.sin(3 * t**b), np.cos(5 * t**b)]) for b in rng.uniform(0.8, 1.2, 6)]
+    for n in (1, 5):
+        one, other = (
+            OnlineSynchronizer(LinearSynchronizer())
+            .fit([unit * x for x in X[:n]])
+            .track([unit * X[5]])[0]
+            for unit in (1, 2.0**-20)
+        )
+        check_bounds(one, 49)
+        np.testing.assert_allclose(other.lower, one.lower, atol=1)
+        np.testing.assert_allclose(other.upper, one.upper, atol=1)
+
+
+def test_a_single_training_performance_has_wider_intervals(fitted, clips, truths):
+    x = COSINES.transform([BUNCH.data[KNOWN[fitted.synchronizer_.pattern_index_]]])
+    alone = OnlineSynchronizer(DenseSynchronizer(P)).fit(x).track(clips)
+    assert mean_width(alone) > 1.5 * mean_width(fitted.track(clips))
+    assert held(alone, truths) > 0.85
+
+
+def test_what_costs_nothing_has_intervals_of_the_least_width():
+    x = COSINES.transform([BUNCH.data[0]])[0]
+    (found,) = OnlineSynchronizer(LinearSynchronizer()).fit([x] * 3).track([x])
+    check_bounds(found, len(x) - 1)
+    assert np.median(width(found)) <= 2.1
+    constant = OnlineSynchronizer(LinearSynchronizer()).fit([np.ones((40, 3))] * 2)
+    (found,) = constant.track([np.ones((40, 3))])
+    check_bounds(found, 39)
