@@ -167,6 +167,7 @@ def standard_errors(base, moving, times, noise_width=0.0):
         both = np.stack([pull, np.vecdot(slope, own) / rates])[..., np.newaxis]
         total, common = smooth(both, width)[:, 1:-1, 0]
         pull = pull[1:-1]
+        total = np.maximum(total, np.finfo(total.dtype).tiny)
         clean = pull * np.clip(common / total, _LEAST_SIGNAL, 1)
         system = band * stiffness
         system[-1] += clean

@@ -101,3 +101,17 @@ def test_standard_errors_are_those_of_repeated_noise(noise, width):
     ratio = np.median(stated[:, middle].mean(axis=1)) / found
     assert 0.8 < ratio < 1.4
     assert (stated[:, [0, -1]] == 0).all()
+
+
+def test_standard_errors_of_stretches_that_stand_still():
+    """Where nothing moves the errors are largest; equal sequences have none."""
+    t = np.clip(np.linspace(-1, 1.0, 80), 0, None)[:, np.newaxis]
+    base = np.hstack([np.sin(4 * t), t**2])
+    noise = 0.01 * np.random.default_rng(0).standard_normal((1, 80, 2))
+    times = np.arange(80.0)[np.newaxis]
+    errors = standard_errors(base, base + noise * (t > 0), times)[0]
+    assert np.isfinite(errors).all()
+    assert errors[10:35].mean() > 3 * errors[45:70].mean() > 0
+    np.testing.assert_allclose(standard_errors(base, base[np.newaxis], times), 0, atol=1e-8)
+    still = np.ones((1, 80, 2))
+    np.testing.assert_array_equal(standard_errors(still[0], still, times), 0)
