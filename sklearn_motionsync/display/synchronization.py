@@ -550,7 +550,7 @@ def _check_doubtful(doubtful, n_sequences):
     found = np.asarray(doubtful)
     if found.dtype != bool or found.shape != (n_sequences,):
         raise ValueError(
-            f"doubtful must be True or False for each of the {n_sequences} performances, as "
+            f"doubtful must be True or False for each of {counted(n_sequences, 'performance')}, as "
             f"match.doubtful is; got {reprlib.repr(doubtful)}."
         )
     return found

@@ -99,7 +99,7 @@ def draw_synchronization(**arguments):
         ({"intervals": [TIMES, BACKWARDS]}, "Performance 3: .* must not be above the upper one"),
         ({"intervals": [TIMES, with_one(TIMES, np.nan)]}, "Performance 3: intervals must be"),
         ({"intervals": ["low", "high"]}, "intervals"),
-        *(({"doubtful": bad}, "doubtful must be True or False for each of the 4 performances, .*")
+        *(({"doubtful": bad}, "doubtful must be True or False for each of 4 performances, .*")
           for bad in ([2], [0, 0, 1, 0], [True] * 3, True, "none", [[True]] * 4, [True, None] * 2)),
         *(({"coverage": bad}, "coverage must be a probability above 0 and below 1, .*; got")
           for bad in (0, 1, 90, "0.9", True, np.nan)),
