@@ -19,6 +19,7 @@ from .body.mirror import mirror
 from .body.skeleton import Skeleton
 from .inputs.long_tables import to_frame, to_sequences
 from .model.action_model import ActionModel
+from .model.comparison import GroupComparison, compare_groups
 from .model.departures import find_departures
 from .model.detector import ActionDetector
 from .online.particle_filter import Track
@@ -51,6 +52,7 @@ __all__ = [
     "DenseSynchronizer",
     "DirectionCosines",
     "FrameWise",
+    "GroupComparison",
     "JointPositions",
     "KeyframeSynchronizer",
     "Lags",
@@ -66,6 +68,7 @@ __all__ = [
     "TimingChannel",
     "Track",
     "blend_performances",
+    "compare_groups",
     "datasets",
     "display",
     "find_departures",

@@ -14,6 +14,7 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     MotionTracker,
     PartSynchronizer,
+    compare_groups,
     datasets,
     display,
     find_performances,
@@ -43,6 +44,11 @@ METHODS = {
     "ActionClassifier.fit(y)": (lambda y: ActionClassifier([], n_frames=10).fit(X, y), True),
     "MotionTracker.fit(groups)": (lambda g: MotionTracker(SYNC, 20).fit(X, groups=g), True),
     "PartSynchronizer.lags(groups)": (lambda g: PARTS.lags(X, groups=g), False),
+    "compare_groups(groups)": (lambda g: compare_groups(SYNC, X, g, n_permutations=19), True),
+    "compare_groups(people)": (
+        lambda p: compare_groups(SYNC, X, [0, 0, 0, 1, 1, 1], people=p, n_permutations=19),
+        True,
+    ),
     "find_performances(groups)": (lambda g: find_performances(SYNC, X[0], groups=g), True),
     "ActionModelDisplay.from_estimator(groups)": (
         lambda g: ActionModelDisplay.from_estimator(PIPE, X, groups=g),

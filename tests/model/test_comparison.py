@@ -1,0 +1,318 @@
+"""compare_groups: statistics against SciPy and slow versions, answers, designs, refusals."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn_motionsync import DenseSynchronizer, FrameWise, LinearSynchronizer, compare_groups
+from sklearn_motionsync.datasets import make_gait
+from sklearn_motionsync.model.comparison import Design, Family, Study, enhanced, scaled
+
+P = 61
+
+
+def studied(people=16, **params):
+    """Gait of two cycles a person and a synchronizer; features in units of their spread."""
+    gait = make_gait(people, 2, random_state=0, **params)
+    pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(gait.data)
+    return gait, pipe
+
+
+@pytest.fixture(scope="module")
+def late():
+    return studied(timing=6)
+
+
+@pytest.fixture(scope="module")
+def few():
+    """Curves of one feature that need no warp, for designs."""
+    rng, t = np.random.default_rng(1), np.linspace(0, 1, 30)
+    X = [np.sin(3 * t)[:, np.newaxis] + 0.1 * rng.standard_normal((30, 1)) for _ in range(16)]
+    return X, LinearSynchronizer(30).fit(X)
+
+
+# -- the statistics -----------------------------------------------------------------------
+
+
+def slow_enhancement(z, step=0.1):
+    """Run by run and height by height."""
+    out = np.zeros(len(z))
+    for sign in (1, -1):
+        for p in range(len(z)):
+            for h in np.arange(step, sign * z[p] + 1e-9, step):
+                first = last = p
+                while first > 0 and sign * z[first - 1] >= h - 1e-9:
+                    first -= 1
+                while last < len(z) - 1 and sign * z[last + 1] >= h - 1e-9:
+                    last += 1
+                out[p] += sign * (last - first + 1) ** 0.5 * h**2 * step
+    return out
+
+
+def test_enhancement_equals_its_definition():
+    rng = np.random.default_rng(0)
+    z = np.cumsum(rng.standard_normal((4, 40, 3)), axis=1) / 4
+    found = enhanced(z)
+    for i in range(4):
+        for k in range(3):
+            np.testing.assert_allclose(found[i, :, k], slow_enhancement(z[i, :, k]), atol=1e-3)
+
+
+def deviates(design, y):
+    values = scaled(y[:, np.newaxis, np.newaxis], not design.flips)
+    return design.deviates(design.rows[np.newaxis], values)[0, 0, 0]
+
+
+def test_deviates_have_the_tail_probabilities_of_the_tests():
+    rng = np.random.default_rng(0)
+    y, x = rng.standard_normal(15), rng.standard_normal(15)
+    groups = np.repeat([0, 1, 2], 5)
+    two = Study.of((groups > 0).tolist(), None, None, False, 15).design
+    of_two = stats.ttest_ind(y[5:], y[:5])
+    assert deviates(two, y) == pytest.approx(
+        np.sign(of_two.statistic) * stats.norm.isf(of_two.pvalue / 2)
+    )
+    three = Study.of(groups.tolist(), None, None, False, 15).design
+    of_three = stats.f_oneway(*(y[groups == g] for g in range(3)))
+    assert deviates(three, y) == pytest.approx(max(stats.norm.isf(of_three.pvalue), 0))
+    of_slope = stats.linregress(x, y)
+    found = deviates(Study.of(None, x, None, False, 15).design, y)
+    assert abs(found) == pytest.approx(stats.norm.isf(of_slope.pvalue / 2))
+    assert np.sign(found) == np.sign(of_slope.slope)
+    flips = Design(np.ones((15, 1)), flips=True)
+    one = stats.ttest_1samp(y + 0.4, 0)
+    assert deviates(flips, y + 0.4) == pytest.approx(stats.norm.isf(one.pvalue / 2))
+
+
+def test_p_values_of_one_value_are_those_of_a_permutation_test():
+    rng = np.random.default_rng(3)
+    y = rng.standard_normal(14) + np.repeat([0, 0.9], 7)
+    design = Study.of(np.repeat(["a", "b"], 7).tolist(), None, None, False, 14).design
+    draws = np.stack([design.rows, *(design.permuted(rng) for _ in range(4999))])
+    found = Family(design, y[:, np.newaxis, np.newaxis], draws).p_value
+    exact = stats.permutation_test(
+        (y[:7], y[7:]),
+        lambda a, b: abs(a.mean() - b.mean()),
+        n_resamples=np.inf,
+        alternative="greater",
+    )
+    # Deviates that are a tenth apart are ties, which count against a difference.
+    assert exact.pvalue - 0.01 < found < exact.pvalue + 0.04
+
+
+# -- the answers --------------------------------------------------------------------------
+
+
+def test_a_difference_in_timing_is_called_timing(late):
+    gait, pipe = late
+    found = compare_groups(
+        pipe, gait.data, gait.group, people=gait.person, signals=gait.data, n_permutations=499
+    )
+    assert found.to_frame()["differs"].tolist() == [True, False, True, True]
+    assert set(found.clusters["what"]) == {"timing"}
+    # Made 6 % later at 60 % of the cycle, and less around it.
+    worst = found.clusters.iloc[0]
+    assert worst.start < 60 < worst.end
+    assert worst.direction == "B later than A"
+    assert 2 < worst.lower < worst["size"] < worst.upper < 6
+    assert "they differ in timing (joint p = 0.0" in found.describe()
+    assert found.n_units == 16
+
+
+def test_a_difference_in_shape_is_called_shape_in_its_unit():
+    gait, pipe = studied(24, amplitude=18)
+    found = compare_groups(
+        pipe, gait.data, gait.group, people=gait.person, signals=gait.data, n_permutations=499
+    )
+    answers = found.to_frame()["differs"]
+    assert answers[["joint", "shape"]].all()
+    assert not answers["timing"]
+    assert set(found.clusters["what"]) == {"shape"}
+    largest = found.clusters.loc[found.clusters["size"].abs().idxmax()]
+    assert 4 < abs(largest["size"]) < 25  # degrees, not standard deviations
+    assert largest.lower < largest["size"] < largest.upper
+
+
+def test_nothing_is_found_where_nothing_differs():
+    gait, pipe = studied(16)
+    found = compare_groups(pipe, gait.data, gait.group, people=gait.person, n_permutations=499)
+    assert found.p_joint > 0.05
+    assert len(found.clusters) == 0
+    assert "no difference is found" in repr(found)
+
+
+def test_the_level_holds_for_noise(few):
+    """By chance 5 of 100 studies; more than 12 come in one of 1,000 series."""
+    _, sync = few
+    wrong, rng = 0, np.random.default_rng(0)
+    for seed in range(100):
+        X = np.cumsum(rng.standard_normal((12, 30, 2)), axis=1)
+        sync = LinearSynchronizer(30).fit(X)
+        groups = ["a", "b"] * 6
+        found = compare_groups(sync, X, groups, n_permutations=99, random_state=seed)
+        wrong += found.p_joint <= 0.05
+    assert wrong <= 12
+
+
+@pytest.mark.parametrize(("name", "what"), [("SimulatedA", "shape"), ("SimulatedB", "timing")])
+def test_published_simulations(name, what, real_data):
+    """Made by their authors to differ in amplitude, and in timing."""
+    table = np.loadtxt(real_data / "nlreg1d" / f"{name}.csv", delimiter=",")
+    X, groups = list(table[:, 1:, np.newaxis]), table[:, 0].astype(int)
+    sync = DenseSynchronizer(101).fit(X)
+    found = compare_groups(sync, X, groups, n_permutations=999)
+    assert found.p_joint < 0.02
+    assert set(found.clusters["what"]) == {what}
+
+
+# -- designs ------------------------------------------------------------------------------
+
+
+def bumps(heights, delays):
+    t = np.linspace(0, 1, 60)
+    noise = np.random.default_rng(0).standard_normal((len(heights), 60)) * 0.02
+    moments = t - np.asarray(delays)[:, np.newaxis] * np.sin(np.pi * t) ** 2
+    bump = np.exp(-(((moments - 0.5) / 0.1) ** 2))
+    return list((np.asarray(heights)[:, np.newaxis] * bump + noise)[:, :, np.newaxis])
+
+
+@pytest.mark.parametrize("design", ["paired", "between", "within", "three"])
+def test_designs_find_a_later_bump_and_a_higher_one(design):
+    rng, n = np.random.default_rng(5), 12
+    people = np.repeat(np.arange(n), 2)
+    second = np.tile([0, 1], n)
+    given = {"people": people.tolist(), "n_permutations": 499}
+    if design == "paired":
+        by, given = second, {**given, "groups": second.tolist(), "paired": True}
+    elif design == "within":
+        speed = second + 0.2 * rng.standard_normal(2 * n)
+        by, given = speed, {**given, "covariate": speed}
+    elif design == "between":
+        age = np.repeat(rng.uniform(0, 1, n), 2)
+        by, given = age, {**given, "covariate": age}
+    else:
+        by = np.repeat(np.arange(n) % 3, 2) / 2
+        given["groups"] = (2 * by).astype(int).tolist()
+    own = np.repeat(rng.normal(0, 0.05, n), 2)
+    for what in ("shape", "timing"):
+        heights = 1 + own + (0.5 * by if what == "shape" else 0)
+        delays = 0.2 * own + (0.08 * by if what == "timing" else 0)
+        X = bumps(heights, delays)
+        sync = DenseSynchronizer(60, unsupported="warp").fit(X)
+        found = compare_groups(sync, X, **given)
+        assert found.clusters.iloc[0]["what"] == what, (what, found)
+        assert found.n_units == n
+        word = found.clusters.iloc[0].direction
+        right = ("above", "higher") if what == "shape" else ("later",)
+        assert any(part in word for part in right)
+
+
+def test_sizes_are_those_of_welch_and_of_a_slope(few):
+    X, sync = few
+    groups = ["a"] * 9 + ["b"] * 7
+    X = [x + (k >= 9) + 0.3 * k * (k >= 9) for k, x in enumerate(X)]
+    found = compare_groups(sync, X, groups, n_permutations=199).clusters.iloc[0]
+    first, end = round(found.start * 29 / 100), round(found.end * 29 / 100) + 1
+    values = np.array([x[first:end].mean() for x in X])
+    welch = stats.ttest_ind(values[9:], values[:9], equal_var=False).confidence_interval()
+    np.testing.assert_allclose([found.lower, found.upper], welch)
+    assert found.direction == "b above a"
+    ages = np.linspace(20, 60, 16)
+    tilted = [x + 0.02 * age for x, age in zip(few[0], ages, strict=True)]
+    found = compare_groups(sync, tilted, covariate=ages, n_permutations=199).clusters.iloc[0]
+    first, end = round(found.start * 29 / 100), round(found.end * 29 / 100) + 1
+    slope = stats.linregress(ages, [x[first:end].mean() for x in tilted])
+    assert found["size"] == pytest.approx(slope.slope)
+    half = stats.t.ppf(0.975, 14) * slope.stderr
+    np.testing.assert_allclose([found.lower, found.upper], slope.slope + np.array([-half, half]))
+    assert found.direction == "higher with the covariate"
+
+
+def test_order_units_and_copies_of_trials_change_nothing(few):
+    X, sync = few
+    X = [x + 0.06 * (k % 2) for k, x in enumerate(X)]
+    groups = ["a", "b"] * 8
+    one = compare_groups(sync, X, groups, n_permutations=199)
+    # The draws depend on the order of the units, not on that of their trials.
+    twice = compare_groups(
+        sync,
+        X + X[::-1],
+        groups + groups[::-1],
+        people=[*range(16), *reversed(range(16))],
+        n_permutations=199,
+    )
+    assert one.to_frame().equals(twice.to_frame())
+    big = compare_groups(
+        LinearSynchronizer(30).fit([1e3 * x for x in X]),
+        [1e3 * x for x in X],
+        groups,
+        n_permutations=199,
+    )
+    np.testing.assert_allclose(big.to_frame()["p"], one.to_frame()["p"])
+    frames = compare_groups(sync, X, groups, n_permutations=199, unit="frames")
+    assert frames.p_joint == one.p_joint
+    again = compare_groups(sync, X, groups, n_permutations=199, random_state=7)
+    assert abs(again.p_joint - one.p_joint) < 0.1
+
+
+def test_names_and_chosen_features_of_tables():
+    gait, _ = studied(8, timing=6)
+    tables = [pd.DataFrame(x, columns=gait.feature_names) for x in gait.data]
+    sync = DenseSynchronizer(P).fit(tables)
+    found = compare_groups(
+        sync, tables, gait.group, people=gait.person, features="knee_flexion", n_permutations=199
+    )
+    assert set(found.clusters["feature"]) <= {"knee_flexion", "offset"}
+    forces = [x[["vertical_force"]].iloc[::2] for x in tables]
+    other = compare_groups(
+        sync, tables, gait.group, people=gait.person, signals=forces, n_permutations=199
+    )
+    assert set(other.clusters["feature"]) <= {"vertical_force", "offset"}
+    assert other.p_timing == found.p_timing
+
+
+# -- refused ------------------------------------------------------------------------------
+
+PAIRS = [f"p{i // 2}" for i in range(16)]
+GROUPS = ["a", "b"] * 8
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "Give either groups or a covariate"),
+        ({"groups": GROUPS, "covariate": range(16)}, "Give either groups or a covariate"),
+        ({"groups": ["a"] * 16}, "groups: all labels are equal"),
+        ({"groups": GROUPS[:5]}, "groups must have one label"),
+        (
+            {"groups": ["a"] * 15 + ["b"]},
+            "At least two people a group are needed, got 15 in 'a', 1",
+        ),
+        ({"groups": GROUPS, "people": PAIRS}, "'p0' has trials in several groups. Set paired=True"),
+        ({"groups": GROUPS, "paired": True}, "paired=True needs people and two groups"),
+        (
+            {"groups": GROUPS[:15] + ["a"], "people": PAIRS, "paired": True},
+            "'p7' has no trial in group 'b'",
+        ),
+        ({"covariate": range(16), "paired": True}, "needs two groups, not a covariate"),
+        ({"covariate": range(5)}, r"one number for each of 16 performances, got shape \(5,\)"),
+        ({"covariate": [1.0] * 16}, "must differ between performances"),
+        ({"covariate": [np.nan] * 16}, "must be finite"),
+        ({"covariate": range(16), "people": ["x"] * 8 + ["y"] * 8}, "At least 4 people are needed"),
+        ({"groups": GROUPS, "level": 5}, "level must be a number between 0 and 1"),
+        (
+            {"groups": GROUPS, "n_permutations": 9},
+            "n_permutations must be a whole number of at least 19",
+        ),
+        ({"groups": GROUPS, "unit": "seconds"}, "unit must be 'percent' or 'frames'"),
+        ({"groups": GROUPS, "signals": [np.ones((5, 1))] * 3}, "one sequence for each of 16 perf"),
+        ({"groups": GROUPS, "signals": [np.full((5, 1), np.nan)] * 16}, "Performance 0, frame"),
+        ({"groups": GROUPS, "features": "knee"}, "knee"),
+    ],
+)
+def test_refused_arguments(given, message, few):
+    X, sync = few
+    with pytest.raises(ValueError, match=message):
+        compare_groups(sync, X, **given)
