@@ -234,6 +234,7 @@ class GroupComparison:
         Returns
         -------
         str
+            What was compared, whether it differs, and three p-values.
         """
         found = self.clusters["what"].unique().tolist() if self.p_joint <= self.level else []
         answer = {
@@ -303,6 +304,7 @@ def compare_groups(
     Returns
     -------
     GroupComparison
+        Four p-values, and a table of where, what and how much.
 
     Raises
     ------
