@@ -5,7 +5,8 @@
 
 The key moments of events.py, on people that had no part in the fit; the moment of the pattern is to
 lie inside the interval of each clip. Then trials that are wrong (repeated, cut off, backwards, held
-still) among trials that are right, known warps, and the time it takes. Prints Markdown.
+still, of another action) among trials that are right, known warps, what departures and bands make
+of intervals, and the time they take. Prints Markdown.
 """
 
 import sys
@@ -20,7 +21,14 @@ from joblib import Parallel, delayed
 from people import fewer_clips, read_people
 from scipy.stats import spearmanr
 from sklearn.model_selection import GroupKFold
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    find_departures,
+)
 from sklearn_motionsync.datasets import make_bending
 
 NOMINAL = (0.8, 0.9, 0.95)
@@ -119,10 +127,16 @@ WRONG = {
 }
 
 
-def doubts(one):
-    """Shares of doubtful trials of people held out, by what was done to them."""
+OTHER = "another action"
+
+
+def doubts(one, others):
+    """Shares of doubtful trials of people held out, by what was done to them.
+
+    ``others`` are the actions of the same archive; of those the same people's trials are tried.
+    """
     warnings.simplefilter("ignore")
-    shares, is_weak = {kind: [] for kind in WRONG}, []
+    shares, is_weak = {kind: [] for kind in [*WRONG, OTHER]}, []
     folds = GroupKFold(min(4, len(set(one.actors))))
     for train, test in folds.split(one.X, groups=one.actors):
         space = ASpace().fit([one.postures[i] for i in train])
@@ -131,24 +145,37 @@ def doubts(one):
         is_weak.append(sync.evidence_.weak)
         for kind, change in WRONG.items():
             shares[kind].extend(sync.match([change(points[i]) for i in test]).doubtful)
-    return [np.mean(some) for some in shares.values()], np.mean(is_weak)
+        people = set(one.actors[test])
+        wrong = [
+            x
+            for other in others
+            for x, a in zip(other.postures, other.actors, strict=True)
+            if a in people
+        ]
+        if wrong:
+            shares[OTHER].extend(sync.match(space.transform(wrong)).doubtful)
+    return [np.mean(some) if some else np.nan for some in shares.values()], np.mean(is_weak)
 
 
 def doubts_table(people):
-    done = Parallel(n_jobs=-1)(delayed(doubts)(one) for one in people)
-    print("| doubtful, people held out | " + " | ".join(WRONG) + " |")
-    print("|---" * (1 + len(WRONG)) + "|")
+    work = []
+    for one in people:
+        others = [x for x in people if x is not one and x.archive == one.archive]
+        work.append(delayed(doubts)(one, others))
+    done = Parallel(n_jobs=-1)(work)
+    print("| doubtful, people held out | " + " | ".join([*WRONG, OTHER]) + " |")
+    print("|---" * (2 + len(WRONG)) + "|")
     supported = []
     for one, (shares, weak) in zip(people, done, strict=True):
         supported += [shares] * bool(weak == 0)
         mark = " (not supported)" * bool(weak > 0)
         print(f"| {one.archive}: `{one.name}`{mark} | " + percent(shares) + " |")
-    means = np.mean(supported, axis=0)
+    means = np.nanmean(supported, axis=0)
     print(f"| **mean of those supported** | {percent(means)} |\n", flush=True)
 
 
 def percent(shares):
-    return " | ".join(f"{share:.0%}" for share in shares)
+    return " | ".join("-" if np.isnan(share) else f"{share:.0%}" for share in shares)
 
 
 def time_line_table(people):
@@ -227,6 +254,81 @@ def warps_of_phases(phases, pattern):
     return np.array([np.interp(at, *pair) for pair in zip(phases, clocks, strict=True)])
 
 
+# -- what uses them ---------------------------------------------------------------------
+
+
+def departures_table(people, degrees=(20, 30, 40), random_state=0):
+    """The share of departures that timing may explain: as recorded, and of limbs turned away.
+
+    In every trial of people held out one of the twelve limbs is turned for 40 % of the time.
+    """
+    rng, found = np.random.default_rng(random_state), {angle: [] for angle in (0, *degrees)}
+    for one in people:
+        for train, test in GroupKFold(4).split(one.X, groups=one.actors):
+            pipe = make_pipeline(ASpace(), DenseSynchronizer(P), ActionModel())
+            known = [one.postures[i] for i in train]
+            pipe.fit(known, actionmodel__groups=np.asarray(one.actors)[train])
+            for angle, tables in found.items():
+                turned = [turn(one.postures[i], angle, rng) for i in test]
+                table = find_departures(pipe, [x for x, _ in turned])
+                limbs = table["performance"].map(dict(enumerate(limb for _, limb in turned)))
+                own = (table["feature"].str[1:].astype(int) - 1) // 3 == limbs.astype(int)
+                tables.append(table["timing"][own] if angle else table["timing"])
+    print("| departures, people held out | number | timing may explain |\n|---|---|---|")
+    for angle, tables in found.items():
+        timing = np.concatenate(tables).astype(float)
+        name = f"of a limb turned by {angle} degrees" if angle else "as recorded"
+        print(f"| {name} | {len(timing)} | {timing.mean():.0%} |")
+    print(flush=True)
+
+
+def turn(postures, degrees, rng):
+    """Cosines of one limb, drawn at random, turned about a random axis; and the limb."""
+    limb, start, out = int(rng.integers(12)), rng.uniform(0.1, 0.5), postures.copy()
+    axis = rng.standard_normal(3)
+    axis /= np.linalg.norm(axis)
+    share = np.linspace(0, 1, len(out))
+    there = np.clip(np.minimum(share - start, start + 0.4 - share) / 0.05, 0, 1)
+    angle, own = np.deg2rad(degrees) * there[:, np.newaxis], slice(1 + 3 * limb, 4 + 3 * limb)
+    x = out[:, own]
+    along = (x @ axis)[:, np.newaxis] * axis
+    out[:, own] = along + np.cos(angle) * (x - along) + np.sin(angle) * np.cross(axis, x)
+    return out, limb
+
+
+def bands_table(sizes=(8, 16, 40), n_fits=40):
+    """How often a band of 95 % holds the mean of 400 made bends, by fits to some of them."""
+    everybody = make_bending(400, random_state=0)
+    postures = DirectionCosines(everybody.skeleton).fit_transform(everybody.data)
+    pairs, shares = list(zip(postures, everybody.times, strict=True)), np.linspace(0, 1, P)
+    mean = np.mean([at_phases(*pair, shares) for pair in pairs], axis=0)
+    print("| mean inside a band of 95 %, bends | without | with the match | true warps |")
+    print("|---|---|---|---|")
+    for size in sizes:
+        held_by = []
+        for seed in range(n_fits):
+            chosen = np.random.default_rng(seed).permutation(len(pairs))[:size]
+            some = [pairs[i] for i in chosen]
+            curves = [x for x, _ in some]
+            points = ASpace().fit_transform(curves)
+            sync = DenseSynchronizer(P).fit(points)
+            match, phase = sync.match(points), some[sync.pattern_index_][1]
+            at = np.interp(shares, np.linspace(0, 1, len(phase)), phase)
+            target = at_phases(mean, shares, at)
+            model = ActionModel().fit(match.warp(curves))
+            true = ActionModel().fit([at_phases(*pair, at) for pair in some])
+            bands = model.mean_envelope(), model.mean_envelope(match=match), true.mean_envelope()
+            held_by.append([((low <= target) & (target <= high)).all() for low, high in bands])
+        print(f"| {size} of 400 | {percent(np.mean(held_by, axis=0))} |", flush=True)
+    print()
+
+
+def at_phases(x, phase, at):
+    """A trial with these phases of its frames, at other phases."""
+    frames = np.interp(at, phase, np.arange(len(x)))
+    return np.stack([np.interp(frames, np.arange(len(x)), column) for column in x.T], axis=1)
+
+
 # -- time -------------------------------------------------------------------------------
 
 
@@ -256,6 +358,8 @@ def main():
     throws = [event for event in EVENTS if event[:2] == THROW]
     time_line_table([*people, fewer_clips(folder, throws, 12)])
     known_table()
+    departures_table([one for one in people if one.archive == "hdm05"][:4])
+    bands_table()
     cost_table(people[:3])
 
 

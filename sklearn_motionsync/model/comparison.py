@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 from scipy.stats import f as fisher
-from scipy.stats import norm
+from scipy.stats import linregress, norm
 from scipy.stats import t as student
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
@@ -546,12 +546,8 @@ class Study:
     def size(self, values, what):
         """Direction in words, size, and its interval of 95 %, of one value a unit."""
         if self.covariate is not None:
-            centred = self.covariate - self.covariate.mean()
-            slope = centred @ values / (centred @ centred)
-            left = len(values) - 2
-            rest = values - values.mean() - slope * centred
-            error = np.sqrt(rest @ rest / left / (centred @ centred))
-            return self._interval(slope, error, left, what, [])
+            line = linregress(self.covariate, values)
+            return self._interval(line.slope, line.stderr, len(values) - 2, what, [])
         if self.groups is None:
             n = len(values)
             error = values.std(ddof=1) / np.sqrt(n)

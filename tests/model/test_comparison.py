@@ -143,9 +143,8 @@ def test_nothing_is_found_where_nothing_differs():
     assert "no difference is found" in repr(found)
 
 
-def test_the_level_holds_for_noise(few):
+def test_the_level_holds_for_noise():
     """By chance 5 of 100 studies; more than 12 come in one of 1,000 series."""
-    _, sync = few
     wrong, rng = 0, np.random.default_rng(0)
     for seed in range(100):
         X = np.cumsum(rng.standard_normal((12, 30, 2)), axis=1)
