@@ -17,9 +17,9 @@ from .body.direction_cosines import DirectionCosines
 from .body.joint_positions import JointPositions
 from .body.mirror import mirror
 from .body.skeleton import Skeleton
+from .comparison.groups import GroupComparison, compare_groups
 from .inputs.long_tables import to_frame, to_sequences
 from .model.action_model import ActionModel
-from .model.comparison import GroupComparison, compare_groups
 from .model.departures import find_departures
 from .model.detector import ActionDetector
 from .online.particle_filter import Track
@@ -85,6 +85,7 @@ __all__ = [
 # The displays are named in ``display``; they can be imported from here, too.
 from .display import ActionModelDisplay as ActionModelDisplay
 from .display import CycleDisplay as CycleDisplay
+from .display import GroupDisplay as GroupDisplay
 from .display import LagDisplay as LagDisplay
 from .display import MetricDisplay as MetricDisplay
 from .display import PhaseDisplay as PhaseDisplay

@@ -18,7 +18,7 @@ FLOORS = [
     {"body", "metrics", "transformers"},
     {"io", "synchronizers"},
     {"datasets", "model", "online"},
-    {"recognition", "segmentation"},
+    {"comparison", "recognition", "segmentation"},
     {"display"},
 ]
 

@@ -6,6 +6,7 @@ attributes with a trailing underscore. matplotlib, in the extra ``plot``, is imp
 """
 
 from .cycles import CycleDisplay
+from .groups import GroupDisplay
 from .lags import LagDisplay
 from .live import PhaseDisplay
 from .metric import MetricDisplay
@@ -19,6 +20,7 @@ from .trellis import TrellisDisplay
 __all__ = [
     "ActionModelDisplay",
     "CycleDisplay",
+    "GroupDisplay",
     "LagDisplay",
     "MetricDisplay",
     "PhaseDisplay",

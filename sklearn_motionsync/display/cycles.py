@@ -19,7 +19,7 @@ from ..segmentation.cycles import (
     start_curves,
 )
 from ..segmentation.self_correlation import required_strength
-from ..synchronizers.match import rates_of
+from ..synchronizers.match import UNITS, rates_of
 from .arguments import AxesLike, as_index
 from .drawing import COLORS, WIDTH, legend_above, panels
 from .time_axis import TimeAxis
@@ -205,9 +205,7 @@ class CycleDisplay:
             self.period_ = upper.axvline(period, color=orange, linewidth=1, label="period")
         upper.set_xlim(0, times[-1])
         upper.set_ylim(min(-0.5, self.correlation.min() - 0.05), 1.05)
-        upper.set_xlabel(
-            f"lag ({'%' if unit == 'percent' else 's' if unit == 'seconds' else unit})"
-        )
+        upper.set_xlabel(f"lag ({UNITS[unit]})")
         upper.set_ylabel("self-correlation")
         upper.set_title(self._describe(), fontsize="medium")
         legend_above([upper], *upper.get_legend_handles_labels())

@@ -15,6 +15,7 @@ __all__ = [
     "keyframes_of_estimator",
     "named_keyframes",
     "own_keyframes",
+    "text_of_keyframe",
 ]
 
 _LINE = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2)), "zorder": 1.5}
@@ -89,6 +90,14 @@ def check_pattern_keyframes(keyframes, n_frames):
     return series
 
 
+def text_of_keyframe(name):
+    """The text of a name, or of a pair such as label and context; empty for a number."""
+    if isinstance(name, (int, np.integer)):
+        return ""
+    text = ", ".join(map(str, name)) if isinstance(name, tuple) else str(name)
+    return text.replace("$", r"\$")
+
+
 def draw_keyframes(axis, times, names=(), *, by_diagonal=False):
     """Draw key-frames as vertical lines, with their names beside them.
 
@@ -109,13 +118,12 @@ def draw_keyframes(axis, times, names=(), *, by_diagonal=False):
     lines = [axis.axvline(at, **_LINE) for at in times if np.isfinite(at)]
     middle = np.mean(axis.get_xlim())
     for at, name in zip(times, names, strict=False):
-        if isinstance(name, (int, np.integer)) or not np.isfinite(at):
+        if not (text := text_of_keyframe(name)) or not np.isfinite(at):
             continue
-        text = ", ".join(map(str, name)) if isinstance(name, tuple) else str(name)
         at_top = by_diagonal and at < middle
         height = (0.78 if at_top else 0.22) if by_diagonal else 0.04
         axis.annotate(
-            text.replace("$", r"\$"),
+            text,
             (at, height),
             xycoords=axis.get_xaxis_transform(),
             xytext=(2, 0),

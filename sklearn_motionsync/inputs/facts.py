@@ -11,7 +11,14 @@ import pandas as pd
 from .recorded import SAME_RATE, frame_rate_of_rows
 from .wording import within
 
-__all__ = ["TIMELESS", "check_facts", "compare_facts", "facts_in_fit", "facts_of"]
+__all__ = [
+    "TIMELESS",
+    "check_facts",
+    "compare_facts",
+    "facts_in_fit",
+    "facts_of",
+    "units_of_columns",
+]
 
 # Attribute of estimators: the different values of each fact in the training set.
 _FACTS = "_facts_in"
@@ -145,17 +152,30 @@ def _equal(a, b):
     return a == b if isinstance(a, str) or isinstance(b, str) else abs(a - b) <= SAME_RATE * b
 
 
-def _unit(x):
-    """The unit of a table as one text, or those of its columns by their names; None without any."""
-    given, names = x.attrs.get("units"), x.attrs.get("channels")
-    given = given if isinstance(given, (list, tuple)) else [given]
-    units = [unit.strip() if isinstance(unit, str) else "" for unit in given]
-    units = [_UNITS.get(unit.lower().removesuffix("s"), unit) for unit in units]
-    if len(set(units)) < 2:
-        return units[0] or None if units else None
+def units_of_columns(x):
+    """The known units of the columns of a performance: a dict by their names."""
+    if not isinstance(x, pd.DataFrame):
+        return {}
+    units, names = _spelled_units(x), x.attrs.get("channels")
+    if len(units) == 1:
+        units = units * len(x.columns)
     # pandas leaves attrs as they are where columns are selected or rearranged.
     names = names if isinstance(names, (list, tuple)) and len(names) == len(units) else x.columns
-    if len(names) == len(units):
-        known = dict(zip(names, units, strict=True))
+    known = dict(zip(names, units, strict=True)) if len(names) == len(units) else {}
+    return {name: known[name] for name in x.columns if known.get(name)}
+
+
+def _unit(x):
+    """The unit of a table as one text, or those of its columns by their names; None without any."""
+    units = _spelled_units(x)
+    if len(set(units)) > 1 and (known := units_of_columns(x)):
         units = [known.get(name, "") for name in sorted(x.columns, key=str)]
-    return " ".join(units[:1] if len(set(units)) == 1 else units)
+    return " ".join(units[:1] if len(set(units)) == 1 else units) or None
+
+
+def _spelled_units(x):
+    """The units that a table states, each spelled in one way."""
+    given = x.attrs.get("units")
+    given = given if isinstance(given, (list, tuple)) else [given]
+    units = [unit.strip() if isinstance(unit, str) else "" for unit in given]
+    return [_UNITS.get(unit.lower().removesuffix("s"), unit) for unit in units]

@@ -22,9 +22,11 @@ class Keyframes:
         Performances in the set.
     frame_rate : float, or array-like of shape (n_sequences,), default=None
         Frames per second: key-frames are seconds.
+    name : str, default="keyframes"
+        The argument, for messages.
     """
 
-    def __init__(self, given, n_sequences, frame_rate=None):
+    def __init__(self, given, n_sequences, frame_rate=None, *, name="keyframes"):
         self._labels = None
         if isinstance(given, (pd.DataFrame, pd.Series)):
             # One row a performance; iterating would give columns.
@@ -33,7 +35,7 @@ class Keyframes:
             given = given.to_numpy()
         if not hasattr(given, "__len__") or len(given) != n_sequences:
             raise ValueError(
-                f"keyframes must be a list of {n_sequences} arrays (n_keyframes,), one a "
+                f"{name} must be a list of {n_sequences} arrays (n_keyframes,), one a "
                 f"performance; got {given!r:.200}."
             )
         self._rows, self._rates = list(given), None

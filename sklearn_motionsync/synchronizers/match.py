@@ -44,8 +44,8 @@ __all__ = [
 
 # Coverage of one standard error to both sides, of a normal distribution.
 STANDARD = 0.6827
-# Units of time of the clock of the pattern.
-UNITS = ("frames", "percent", "seconds")
+# Units of time of the clock of the pattern, and their symbols.
+UNITS = {"frames": "frames", "percent": "%", "seconds": "s"}
 # Times may decrease by rounding errors, by this share of the clock.
 _ROUNDING = 1e-9
 # The smallest rate, so that logarithms are finite.

@@ -38,6 +38,7 @@ PATTERN = np.zeros((10, 3))
 ESTIMATORS = {
     "ActionModelDisplay": ActionModel(),
     "CycleDisplay": None,
+    "GroupDisplay": DenseSynchronizer(),
     "LagDisplay": PartSynchronizer(),
     "MetricDisplay": DenseSynchronizer(),
     "PhaseDisplay": OnlineSynchronizer(),

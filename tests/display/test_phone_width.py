@@ -94,6 +94,9 @@ DRAWN = {
         pipe, [BUNCH.data[0][::-1]]
     ),
     "bodies": lambda pipe, postures: display.SkeletonDisplay.from_estimator(pipe, BUNCH.data),
+    "groups": lambda pipe, postures: display.GroupDisplay.from_estimator(
+        pipe, BUNCH.data, ["young"] * 4 + ["old"] * 4, units="m", features=range(4)
+    ),
     "lags": lambda pipe, postures: display.LagDisplay.from_estimator(
         PartSynchronizer(synchronizer=DenseSynchronizer(30)).fit(postures),
         postures,

@@ -21,7 +21,12 @@ from sklearn_motionsync import (
     io,
     metrics,
 )
-from sklearn_motionsync.display import ActionModelDisplay, LagDisplay, SynchronizationDisplay
+from sklearn_motionsync.display import (
+    ActionModelDisplay,
+    GroupDisplay,
+    LagDisplay,
+    SynchronizationDisplay,
+)
 from sklearn_motionsync.utils.groups import encode_classes, encode_groups, names_of_groups
 
 N, T = 6, np.linspace(0, 1, 20)
@@ -48,6 +53,14 @@ METHODS = {
     "compare_groups(people)": (
         lambda p: compare_groups(SYNC, X, [0, 0, 0, 1, 1, 1], people=p, n_permutations=19),
         True,
+    ),
+    "GroupDisplay.from_estimator(groups)": (
+        lambda g: GroupDisplay.from_estimator(SYNC, X, g),
+        False,
+    ),
+    "GroupDisplay.from_estimator(people)": (
+        lambda p: GroupDisplay.from_estimator(SYNC, X, people=p),
+        False,
     ),
     "find_performances(groups)": (lambda g: find_performances(SYNC, X[0], groups=g), True),
     "ActionModelDisplay.from_estimator(groups)": (

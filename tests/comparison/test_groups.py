@@ -4,11 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
+from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import DenseSynchronizer, FrameWise, LinearSynchronizer, compare_groups
+from sklearn_motionsync.comparison.permutation import Design, enhanced, families, scaled
+from sklearn_motionsync.comparison.study import Study
 from sklearn_motionsync.datasets import make_gait
-from sklearn_motionsync.model.comparison import Design, Family, Study, enhanced, scaled
+from sklearn_motionsync.utils.parallel import Progress
 
 P = 61
 
@@ -90,8 +93,8 @@ def test_p_values_of_one_value_are_those_of_a_permutation_test():
     rng = np.random.default_rng(3)
     y = rng.standard_normal(14) + np.repeat([0, 0.9], 7)
     design = Study.of(np.repeat(["a", "b"], 7).tolist(), None, None, False, 14).design
-    draws = np.stack([design.rows, *(design.permuted(rng) for _ in range(4999))])
-    found = Family(design, y[:, np.newaxis, np.newaxis], draws).p_value
+    curve, quiet = y[:, np.newaxis, np.newaxis], Progress(None, 0)
+    found = families(design, [curve], 4999, rng, progress=quiet)[0].p_value
     exact = stats.permutation_test(
         (y[:7], y[7:]),
         lambda a, b: abs(a.mean() - b.mean()),
@@ -256,6 +259,39 @@ def test_order_units_and_copies_of_trials_change_nothing(few):
     assert abs(again.p_joint - one.p_joint) < 0.1
 
 
+def test_sizes_are_in_the_units_of_the_trials(late, capsys):
+    gait, pipe = late
+    tables = [pd.DataFrame(x, columns=gait.feature_names) for x in gait.data]
+    for x in tables:
+        x.attrs["units"] = list(gait.units)
+    of_tables = clone(pipe).fit(tables)
+    given = {"people": gait.person, "n_permutations": 99, "level": 0.5}
+    found = compare_groups(of_tables, tables, gait.group, **given, n_jobs=2, verbose=1)
+    assert "[compare_groups] permutations: 100 %" in capsys.readouterr().out
+    plain = compare_groups(pipe, gait.data, gait.group, **given, signals=gait.data)
+    pd.testing.assert_frame_equal(
+        found.clusters.drop(columns=["feature", "unit"]),
+        plain.clusters.drop(columns=["feature", "unit"]),
+    )
+    assert set(found.clusters["unit"]) <= {"deg", "body weight", "%"}
+    assert set(plain.clusters["unit"]) == {"", "%"}
+    seconds = compare_groups(of_tables, tables, gait.group, **given, unit="seconds", frame_rate=100)
+    lasts = (np.median([len(x) for x in tables]) - 1) / 100
+    np.testing.assert_allclose(seconds.clusters["start"], found.clusters["start"] * lasts / 100)
+    timing = seconds.clusters["what"] == "timing"
+    assert set(seconds.clusters.loc[timing, "unit"]) == {"s"}
+
+
+def test_all_of_many_features_are_compared():
+    rng = np.random.default_rng(0)
+    X = [np.cumsum(rng.standard_normal((30, 7)), axis=0) for _ in range(12)]
+    for x in X[::2]:
+        x[:, 6] += 30
+    sync = LinearSynchronizer(30).fit(X)
+    found = compare_groups(sync, X, ["a", "b"] * 6, n_permutations=199)
+    assert found.clusters["feature"].tolist() == ["x6"]
+
+
 def test_names_and_chosen_features_of_tables():
     gait, _ = studied(8, timing=6)
     tables = [pd.DataFrame(x, columns=gait.feature_names) for x in gait.data]
@@ -305,7 +341,8 @@ GROUPS = ["a", "b"] * 8
             {"groups": GROUPS, "n_permutations": 9},
             "n_permutations must be a whole number of at least 19",
         ),
-        ({"groups": GROUPS, "unit": "seconds"}, "unit must be 'percent' or 'frames'"),
+        ({"groups": GROUPS, "unit": "hours"}, "unit must be one of"),
+        ({"groups": GROUPS, "unit": "seconds"}, "needs X and frame_rate"),
         ({"groups": GROUPS, "signals": [np.ones((5, 1))] * 3}, "one sequence for each of 16 perf"),
         ({"groups": GROUPS, "signals": [np.full((5, 1), np.nan)] * 16}, "Performance 0, frame"),
         ({"groups": GROUPS, "features": "knee"}, "knee"),

@@ -1,0 +1,1 @@
+"""Whether groups differ in shape or in timing, and whether a subject differs from a norm."""

@@ -1,0 +1,115 @@
+"""The curves and the offsets of trials on one clock, which are compared between people."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..inputs.collections import as_collection
+from ..inputs.facts import units_of_columns
+from ..inputs.features import choose_features, names_of_features
+from ..inputs.numbers import check_finite
+from ..inputs.validation import read_collection
+from ..inputs.wording import counted
+from ..synchronizers.match import Match, check_unit, match_of_times, rates_of
+from ..utils.pipelines import Routed, route_to_synchronizer
+
+__all__ = ["AlignedCurves"]
+
+
+class AlignedCurves(NamedTuple):
+    """Signals of trials on the clock of the template, and the timing that this took away.
+
+    Attributes
+    ----------
+    names : list of str
+        Of the signals.
+    units : list of str
+        Of the signals; empty where none is known.
+    curves, even : ndarray, shape (n_sequences, P, n_signals)
+        Aligned, and after linear normalisation.
+    offsets : ndarray, shape (n_sequences, P)
+        In the unit of time.
+    clock : ndarray, shape (P,)
+        The times of the frames of the template, in the unit of time.
+    match : Match
+    reached : Routed
+        The synchronizer, and the performances that reach it.
+    """
+
+    names: list
+    units: list
+    curves: np.ndarray
+    even: np.ndarray
+    offsets: np.ndarray
+    clock: np.ndarray
+    match: Match
+    reached: Routed
+
+    @classmethod
+    def of(cls, estimator, X, params, caller, *, signals, features, unit, frame_rate):
+        """Match performances, and warp their signals.
+
+        Parameters
+        ----------
+        estimator : synchronizer, or Pipeline with one
+            Fitted.
+        X : performances, as the estimator takes them
+        params : dict
+            Other arguments of ``match``.
+        caller : str
+            The function that the user called, for messages.
+        signals : performances, or None
+            One sequence of any length a performance. None: X itself, if what reaches the
+            synchronizer has the same features, such as after scaling; otherwise that.
+        features : int, str or list of them, or None
+            Those of the signals; None for all.
+        unit : {"frames", "percent", "seconds"}
+            Of time.
+        frame_rate : float, array-like or None
+            As in `Match.offsets_in`.
+        """
+        check_unit(unit)
+        reached = route_to_synchronizer(estimator, X, params, caller)
+        lengths = [len(x) for x in reached.performances]
+        rates = rates_of(X, frame_rate, unit)
+        names, units, given = _signals(X, reached, signals, features)
+        match, n = reached.match(), len(lengths)
+        last = reached.synchronizer.n_frames_ - 1
+        offsets = match.offsets_in(unit, lengths, rates)
+        clock = np.arange(last + 1.0)
+        if unit == "percent":
+            clock *= 100 / last
+        elif unit == "seconds":
+            clock *= np.median((np.array(lengths) - 1) / rates) / last
+        even = match_of_times(np.tile(np.arange(last + 1.0), (n, 1)), n).warp(given)
+        return cls(names, units, match.warp(given), even, offsets, clock, match, reached)
+
+
+def _signals(X, reached, signals, features):
+    """Names and units of the chosen signals, and their arrays (n_frames_i, n_chosen)."""
+    given = reached.performances
+    n, width = len(given), given[0].shape[1]
+    names = names_of_features(reached.before, reached.synchronizer, width)
+    units = [""] * width
+    if signals is None and as_collection(X) is not None:
+        arrays, own = read_collection(X)
+        if (own or [f"x{i}" for i in range(arrays[0].shape[1])]) == names:
+            signals = X
+    if signals is not None:
+        given, own = read_collection(signals)
+        if len(given) != n:
+            raise ValueError(
+                f"signals must have one sequence for each of {counted(n, 'performance')}, got "
+                f"{len(given)}."
+            )
+        names = own or [f"x{i}" for i in range(given[0].shape[1])]
+        known = units_of_columns(as_collection(signals)[0])
+        units = [known.get(name, "") for name in names]
+    chosen = range(len(names)) if features is None else choose_features(features, names)
+    names, units = [names[i] for i in chosen], [units[i] for i in chosen]
+    given = [x[:, chosen] for x in given]
+    for i, x in enumerate(given):
+        check_finite(x, f"Performance {i}, frame", names)
+    return names, units, given

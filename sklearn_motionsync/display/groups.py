@@ -1,0 +1,458 @@
+"""GroupDisplay: means of groups with bands, their timing, and where they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, Self
+
+import numpy as np
+import pandas as pd
+from sklearn.base import BaseEstimator
+
+from ..comparison.curves import AlignedCurves
+from ..comparison.groups import GroupComparison
+from ..comparison.study import GroupsOfPeople, band_of_mean
+from ..inputs.features import choose_features
+from ..inputs.keyframes import Keyframes
+from ..inputs.types import (
+    Features,
+    Labels,
+    NumbersLike,
+    PerformancesLike,
+    Unit,
+    ValuesLike,
+)
+from ..synchronizers.match import UNITS, check_coverage
+from .arguments import AxesLike, as_names
+from .drawing import WIDTH, curves, front_line, group_styles, legend_above, panels
+from .keyframes import draw_keyframes, text_of_keyframe
+from .time_axis import TimeAxis
+
+__all__ = ["GroupDisplay"]
+
+# Signals that are shown when none are named; of more, the first few.
+_MOST = 6
+# Characters of a label and its unit that are too long for one line.
+_LONG = 18
+# Titles of the legend.
+_STATISTICS = {
+    "sd": "mean ± standard deviation of {whom}",
+    "se": "mean ± standard error of {whom}",
+    "interval": "mean of {whom} and its interval of {share:.3g} %",
+}
+# The place of bars of differences, as a share of the panel, and dots beside each other, of the
+# clock.
+_BAR, _BESIDE = 0.015, 0.014
+
+
+class GroupDisplay:
+    """Means of groups with bands, the timing of their people, and where they differ.
+
+    A panel for each signal, and one of the offsets, with a dot a person. Use `from_estimator`.
+
+    Parameters
+    ----------
+    curves : list of ndarray, shape (n_people_k, P, n_shown)
+        For each group the aligned signals of its people.
+    offsets : list of ndarray, shape (n_people_k, P)
+        Their offsets, in the unit of time.
+    labels : list of str
+        Entries of the legend, one a group.
+    ylabels : list of str
+        Labels of the signals.
+    feature_names : list of str
+        Names of the signals, as in the table of clusters.
+    statistic : {"sd", "se", "interval"}, default="sd"
+        The band: see `from_estimator`.
+    coverage : float, default=0.95
+        Probability of ``"interval"``.
+    whom : str, default="people"
+        What the units are, for the legend.
+    trials : list of ndarray, shape (n_trials_k, P, n_shown), default=None
+        For each group its trials, drawn thin.
+    events : DataFrame, shape (n_people, n_events), default=None
+        Where the events of people are on the clock, in frames: lines and their spread.
+    clusters : DataFrame, default=None
+        As of `GroupComparison`, in the same unit: bars.
+    level : float, default=0.05
+        Level of the clusters, for the legend.
+    note : str, default=""
+        What is not shown, for the legend.
+    pairs : bool, default=False
+        Whether people of all groups are the same, in the same order: their dots are joined.
+    unit : {"frames", "percent", "seconds"}, default="percent"
+        Unit of time.
+    frame_rate : float, default=None
+        Frames of the clock a second, for seconds.
+
+    Attributes
+    ----------
+    figure_ : Figure
+        The figure of the last plot.
+    axes_ : list of Axes
+        One a signal, then that of the offsets.
+    means_ : list of list of Line2D
+        For each panel the mean of each group.
+    bands_ : list of list of FillBetweenPolyCollection
+        For each panel the bands; a group of one person has none.
+    trials_ : list of list of LineCollection
+        For each signal the trials of each group; empty without trials.
+    dots_ : list of PathCollection
+        The people of each group, in the panel of the offsets.
+    clusters_ : list of LineCollection
+        For each panel the bars; empty without clusters.
+    events_ : list of list of Line2D
+        For each panel the events; empty without any.
+
+    Examples
+    --------
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from sklearn.preprocessing import StandardScaler
+    >>> from sklearn_motionsync import DenseSynchronizer, FrameWise
+    >>> from sklearn_motionsync.display import GroupDisplay
+    >>> from sklearn_motionsync.datasets import make_gait
+    >>> gait = make_gait(8, timing=5, random_state=0)
+    >>> pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(101)).fit(gait.data)
+    >>> display = GroupDisplay.from_estimator(
+    ...     pipe, gait.data, gait.group, people=gait.person, features=[0, 1], units="degrees"
+    ... )
+    >>> display.labels
+    ['A: 12 trials of 4 people', 'B: 12 trials of 4 people']
+    """
+
+    def __init__(
+        self,
+        curves: Sequence[PerformancesLike],
+        offsets: Sequence[NumbersLike],
+        labels: Sequence[str],
+        *,
+        ylabels: Sequence[str],
+        feature_names: Sequence[str],
+        statistic: Literal["sd", "se", "interval"] = "sd",
+        coverage: float = 0.95,
+        whom: str = "people",
+        trials: Sequence[PerformancesLike] | None = None,
+        events: pd.DataFrame | None = None,
+        clusters: pd.DataFrame | None = None,
+        level: float = 0.05,
+        note: str = "",
+        pairs: bool = False,
+        unit: Unit = "percent",
+        frame_rate: float | None = None,
+    ) -> None:
+        self.curves, self.offsets = list(map(np.asarray, curves)), list(map(np.asarray, offsets))
+        self.labels, self.ylabels, self.feature_names = labels, ylabels, feature_names
+        self.statistic, self.coverage, self.whom = statistic, coverage, whom
+        self.trials = None if trials is None else list(map(np.asarray, trials))
+        self.events, self.clusters, self.level = events, clusters, level
+        self.note, self.pairs, self.unit, self.frame_rate = note, pairs, unit, frame_rate
+        self._axis = TimeAxis(unit, self.offsets[0].shape[1], None, frame_rate)
+
+    def __repr__(self):
+        return f"GroupDisplay({self.labels}, {self.feature_names})"
+
+    @classmethod
+    def from_estimator(
+        cls,
+        estimator: BaseEstimator,
+        X: PerformancesLike,
+        groups: Labels | None = None,
+        *,
+        people: Labels | None = None,
+        signals: PerformancesLike | None = None,
+        features: Features | None = None,
+        statistic: Literal["sd", "se", "interval"] = "sd",
+        coverage: float = 0.95,
+        trials: bool = False,
+        comparison: GroupComparison | None = None,
+        events: NumbersLike | pd.DataFrame | None = None,
+        ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
+        units: str | Sequence[str] | Mapping[str, str] | None = None,
+        unit: Unit = "percent",
+        frame_rate: float | ValuesLike | None = None,
+        ax: AxesLike | None = None,
+        **params: Any,
+    ) -> Self:
+        """Draw groups of performances on the clock of one template.
+
+        Parameters
+        ----------
+        estimator : synchronizer, or Pipeline with one
+            Fitted on the performances of all groups together.
+        X : performances
+            As the estimator takes them.
+        groups : sequence of length n_sequences, default=None
+            The group of each performance. None draws all as one group.
+        people : sequence of length n_sequences, default=None
+            The subject of each performance. Means and bands are of the means of people. By default
+            every performance counts as a person.
+        signals : performances, default=None
+            What is drawn, as in `compare_groups`. By default X in its own units, if the same
+            features reach the synchronizer, scaled or not.
+        features : int, str or list of them, default=None
+            Those of the signals that are drawn. By default all, or of more than six the first four;
+            the legend then names how many there are.
+        statistic : {"sd", "se", "interval"}, default="sd"
+            The band about the mean of a group, at each frame: ``"sd"``, the standard deviation of
+            people; ``"se"``, the standard error of the mean; ``"interval"``, the interval of the
+            mean by Student's t.
+        coverage : float, default=0.95
+            Probability of ``"interval"``.
+        trials : bool, default=False
+            Whether to draw all performances, thin.
+        comparison : GroupComparison, default=None
+            From `compare_groups` of the same groups: its clusters are bars at the lower edges.
+        events : array-like, shape (n_sequences, n_events), default=None
+            Events in frames of each performance, NaN where one is not known, such as of
+            `keyframes_from_events`: lines at their mean place, in a band of one standard deviation
+            of people. The columns of a table are their names. By default ``keyframes``. The panel
+            of offsets has its dots there; without events, where timing differs most: at the peak of
+            a cluster, or where offsets of people vary most.
+        ylabel : str, list of str or dict, default=None
+            Labels of the signals in place of their names: one each, or by name.
+        units : str, list of str or dict, default=None
+            Units of the signals for their labels: of all, one each, or by name. By default what
+            tables tell in ``attrs["units"]``.
+        unit : {"frames", "percent", "seconds"}, default="percent"
+            Unit of time, as in `compare_groups`.
+        frame_rate : float, or array-like of shape (n_sequences,), default=None
+            Frames a second of X, for seconds; by default what tables tell.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
+        **params : dict
+            Further arguments of the ``match`` of the synchronizer, such as ``keyframes``.
+
+        Returns
+        -------
+        GroupDisplay
+            The display, drawn.
+
+        Raises
+        ------
+        ValueError
+            If there is no such statistic, coverage, feature or unit; labels or units do not fit the
+            signals; the comparison is in another unit; or as from `compare_groups`.
+
+        See Also
+        --------
+        sklearn_motionsync.compare_groups : Tests what this figure shows.
+        """
+        if statistic not in _STATISTICS:
+            raise ValueError(f"statistic must be one of {list(_STATISTICS)}, got {statistic!r}.")
+        check_coverage(coverage)
+        if comparison is not None and comparison.unit != unit:
+            raise ValueError(
+                f"The comparison is in {comparison.unit}, and the figure in {unit}. Set "
+                f"unit={comparison.unit!r}."
+            )
+        given = {"signals": signals, "features": features, "unit": unit, "frame_rate": frame_rate}
+        aligned = AlignedCurves.of(estimator, X, params, f"{cls.__name__}.from_estimator", **given)
+        n, names, note = len(aligned.curves), aligned.names, ""
+        chosen = list(range(len(names)))
+        if features is None and len(names) > _MOST:
+            chosen = choose_features(None, names)
+            note = f"{len(chosen)} of {len(names)} signals"
+        names = [names[i] for i in chosen]
+        clusters = None if comparison is None else comparison.clusters
+        if clusters is not None:
+            more = clusters[(clusters["what"] == "shape") & ~clusters["feature"].isin(names)]
+            if len(more):
+                note += f"{', ' if note else ''}differences also in "
+                note += ", ".join(dict.fromkeys(more["feature"]))
+        default = dict(zip(aligned.names, aligned.units, strict=True))
+        units = _by_name(units, names, default, "units")
+        ylabels = _by_name(ylabel, names, dict(zip(names, names, strict=True)), "ylabel")
+        of_people = GroupsOfPeople.of(groups, people, n)
+        shown = aligned.curves[:, :, chosen]
+        display = cls(
+            of_people.means(shown),
+            of_people.means(aligned.offsets),
+            of_people.describe(people is not None),
+            ylabels=[_with_unit(*both) for both in zip(ylabels, units, strict=True)],
+            feature_names=names,
+            statistic=statistic,
+            coverage=coverage,
+            whom="trials" if people is None else "people",
+            trials=[shown[maker.any(axis=0)] for maker in of_people.makers] if trials else None,
+            events=_events_on_clock(events, params, aligned, of_people),
+            clusters=clusters,
+            level=0.05 if comparison is None else comparison.level,
+            note=note,
+            pairs=people is not None and of_people.are_pairs,
+            unit=unit,
+            frame_rate=(len(aligned.clock) - 1) / aligned.clock[-1] if unit == "seconds" else None,
+        )
+        return display.plot(ax)
+
+    def plot(self, ax: AxesLike | None = None) -> Self:
+        """Draw.
+
+        Parameters
+        ----------
+        ax : Axes or array-like of Axes, default=None
+            One of a figure's subplots is divided into the panels; or one axes a signal and one for
+            the offsets. None makes a figure.
+
+        Returns
+        -------
+        GroupDisplay
+            The display itself.
+        """
+        count = len(self.ylabels)
+        n_cols = 1 if count < 3 else 2
+        n_rows = -(-count // n_cols)
+        cells = [divmod(i, n_cols) for i in range(count)] + [(n_rows, slice(None))]
+        more = 0.2 * max(len(self.labels) - 2, 0) + 0.5 * (self.events is not None)
+        size = (WIDTH, 1.9 * (n_rows + 1) + 0.6 + more)
+        self.figure_, self.axes_ = panels(ax, cells, n_rows + 1, n_cols, size)
+        self.means_, self.bands_, self.trials_ = [], [], []
+        self.dots_, self.clusters_, self.events_ = [], [], []
+        styles = list(group_styles(self.labels).values())
+        *above, timing = self.axes_
+        for i, (axis, label) in enumerate(zip(above, self.ylabels, strict=True)):
+            if self.trials is not None:
+                self.trials_.append(self._draw_trials(axis, i, styles))
+            self._draw_groups(axis, [x[:, :, i] for x in self.curves], styles)
+            axis.set_ylabel(label)
+        timing.axhline(0, color="0.6", linewidth=0.8, zorder=0)
+        self._draw_groups(timing, self.offsets, styles)
+        timing.set_ylabel(f"offset ({UNITS[self.unit]}),\nlater is above")
+        timing.set_xlabel(self._axis.label)
+        clock = self._axis.clock
+        for axis in self.axes_:
+            axis.set_xlim(clock[0], clock[-1])
+        if self.events is not None:
+            self._draw_events()
+        self._draw_dots(timing, styles)
+        bars = [] if self.clusters is None else self._draw_clusters()
+        handles = list(zip(self.bands_[0], self.means_[0], strict=True))
+        labels = list(self.labels)
+        if bars:
+            handles.append(bars[0])
+            labels.append(f"differs, p at most {self.level:g}")
+        title = _STATISTICS[self.statistic].format(whom=self.whom, share=100 * self.coverage)
+        title += f"; {self.note}" if self.note else ""
+        legend_above(above, handles, labels, title, below=self.axes_[:n_cols], n_cols=1)
+        return self
+
+    def _draw_trials(self, axis, i, styles):
+        """Draw signal i of all trials."""
+        clock, style = self._axis.clock, {"linewidths": 0.5, "alpha": 0.35}
+        return [
+            curves(axis, [clock] * len(x), x[:, :, i], colors=color, **style)
+            for x, (color, _) in zip(self.trials, styles, strict=True)
+        ]
+
+    def _draw_groups(self, axis, of_groups, styles):
+        """Draw the mean and the band of each group, of curves (n_people_k, P)."""
+        clock, means, bands = self._axis.clock, [], []
+        for values, (color, line) in zip(of_groups, styles, strict=True):
+            mean, half = band_of_mean(values, self.statistic, self.coverage)
+            style = {"color": color, "alpha": 0.18, "linewidth": 0}
+            bands.append(axis.fill_between(clock, mean - half, mean + half, **style))
+            means.append(front_line(axis, clock, mean, color=color, linestyle=line))
+        self.means_.append(means)
+        self.bands_.append(bands)
+
+    def _draw_events(self):
+        """Draw the mean place of each event, and its spread between people, in all panels."""
+        mean, spread = self.events.mean().to_numpy(), self.events.std().to_numpy()
+        at, spread = self._axis.convert(mean), self._axis.convert(spread)
+        for axis in self.axes_:
+            for middle, half in zip(at, spread, strict=True):
+                axis.axvspan(middle - half, middle + half, color="0.5", alpha=0.12, linewidth=0)
+            self.events_.append(draw_keyframes(axis, at))
+        texts = [text_of_keyframe(name) for name in self.events.columns]
+        style = {"rotation": 20, "rotation_mode": "anchor", "ha": "left", "fontsize": "small"}
+        self.axes_[-1].secondary_xaxis("top").set_xticks(at, texts, **style)
+
+    def _draw_dots(self, axis, styles):
+        """Draw the offsets of people at the events, or where the timing differs most."""
+        width, at = self._axis.clock[-1], self._moments()
+        low, high = np.floor(at).astype(int), np.ceil(at).astype(int)
+        xs, ys = [], []
+        for k, offsets in enumerate(self.offsets):
+            beside = (k - (len(self.offsets) - 1) / 2) * _BESIDE * width
+            x = np.clip(self._axis.convert(at) + beside, 0, width)
+            y = offsets[:, low] + (at - low) * (offsets[:, high] - offsets[:, low])
+            xs.append(np.broadcast_to(x, y.shape))
+            ys.append(y)
+        if self.pairs:
+            pairs = (np.reshape(values, (len(xs), -1)) for values in (xs, ys))
+            axis.plot(*pairs, color="0.6", linewidth=0.6, zorder=4)
+        for x, y, (color, _) in zip(xs, ys, styles, strict=True):
+            style = {"s": 12, "color": color, "edgecolor": "white", "linewidth": 0.4, "zorder": 5}
+            self.dots_.append(axis.scatter(x.ravel(), y.ravel(), **style))
+
+    def _moments(self):
+        """The frames of the clock at which offsets are shown person by person."""
+        if self.events is not None:
+            return self.events.mean().to_numpy()
+        if self.clusters is not None and len(found := self._clusters_of("timing")):
+            clock = self._axis.clock
+            return found["peak"].to_numpy() / clock[-1] * (len(clock) - 1)
+        return np.array([np.concatenate(self.offsets).var(axis=0).argmax()], dtype=float)
+
+    def _clusters_of(self, what, feature=None):
+        """The clusters of the timing, or of a signal."""
+        found = self.clusters[self.clusters["what"] == what]
+        return found if feature is None else found[found["feature"] == feature]
+
+    def _draw_clusters(self):
+        """Draw the clusters of each panel as bars along its lower edge."""
+        from matplotlib.collections import LineCollection
+
+        for axis, name in zip(self.axes_, [*self.feature_names, None], strict=True):
+            found = self._clusters_of("timing" if name is None else "shape", name)
+            ends = found[["start", "end"]].to_numpy()
+            bars = np.stack([ends, np.full_like(ends, _BAR)], axis=2)
+            style = {"colors": "black", "linewidths": 3.5, "capstyle": "butt", "zorder": 6}
+            lines = LineCollection(bars, transform=axis.get_xaxis_transform(), **style)
+            self.clusters_.append(axis.add_collection(lines, autolim=False))
+        return [lines for lines in self.clusters_ if len(lines.get_segments())]
+
+
+def _events_on_clock(events, params, aligned, of_people):
+    """Where the events of people are on the clock, in frames: a table; None without events."""
+    given = params.get("keyframes") if events is None else events
+    if given is None:
+        return None
+    performances = aligned.reached.performances
+    rate = None if events is not None else params.get("frame_rate")
+    name = "keyframes" if events is None else "events"
+    shares = Keyframes(given, len(performances), rate, name=name).known(performances)
+    last = len(aligned.clock) - 1
+    frames = np.arange(last + 1.0)
+    places = np.array(
+        [np.interp(s * last, t, frames) for s, t in zip(shares, aligned.match.times, strict=True)]
+    )
+    names = given.columns if isinstance(given, pd.DataFrame) else range(places.shape[1])
+    known = np.isfinite(places)
+    rows = []
+    for maker in of_people.makers:
+        weights = maker @ known
+        sums = maker @ np.where(known, places, 0)
+        rows.append(np.where(weights > 0, sums / np.where(weights > 0, weights, 1), np.nan))
+    return pd.DataFrame(np.concatenate(rows), columns=pd.Index(names, tupleize_cols=False))
+
+
+def _with_unit(label, unit):
+    """A label with its unit, below it if they are long."""
+    if not unit:
+        return label
+    return f"{label}{' ' if len(label) + len(unit) < _LONG else chr(10)}({unit})"
+
+
+def _by_name(given, names, default, what):
+    """A text for each signal: as given of all, one each, or by name."""
+    if given is None or isinstance(given, Mapping):
+        unknown = set(given or ()) - set(default)
+        if unknown:
+            raise ValueError(
+                f"{what}: there is no signal {sorted(map(str, unknown))[0]!r}; there are "
+                f"{', '.join(default)}."
+            )
+        return [str((given or {}).get(name, default[name])) for name in names]
+    if isinstance(given, str):
+        return [given] * len(names)
+    return as_names(given, len(names), what, "signals")
