@@ -225,7 +225,9 @@ by_hand = KeyframeSynchronizer(n_frames=100).fit_transform(points, keyframes=bun
 for column, axis in enumerate(axes[2]):
     axis.plot(by_hand[:, :, column].T, color="#009E73", alpha=0.5, linewidth=0.9)
     axis.set_xlabel("frame of the template")
-shown = ActionModelDisplay.from_estimator(pipe, bunch.data, features=range(n_dims), ax=axes[3])
+shown = ActionModelDisplay.from_estimator(
+    pipe, bunch.data, features=range(n_dims), band="points", ax=axes[3]
+)
 shown.axes_[0].get_legend().remove()
 given = "given" if "keyframes" in bunch else "found"
 titles = (

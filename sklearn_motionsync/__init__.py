@@ -18,6 +18,7 @@ from .body.joint_positions import JointPositions
 from .body.mirror import mirror
 from .body.skeleton import Skeleton
 from .comparison.groups import GroupComparison, compare_groups
+from .comparison.norm import NormComparison, compare_to_norm
 from .inputs.long_tables import to_frame, to_sequences
 from .model.action_model import ActionModel
 from .model.departures import find_departures
@@ -60,6 +61,7 @@ __all__ = [
     "LivePhase",
     "Match",
     "MotionTracker",
+    "NormComparison",
     "OnlineSynchronizer",
     "PartSynchronizer",
     "Skeleton",
@@ -69,6 +71,7 @@ __all__ = [
     "Track",
     "blend_performances",
     "compare_groups",
+    "compare_to_norm",
     "datasets",
     "display",
     "find_departures",
@@ -88,6 +91,7 @@ from .display import CycleDisplay as CycleDisplay
 from .display import GroupDisplay as GroupDisplay
 from .display import LagDisplay as LagDisplay
 from .display import MetricDisplay as MetricDisplay
+from .display import NormDisplay as NormDisplay
 from .display import PhaseDisplay as PhaseDisplay
 from .display import SearchDisplay as SearchDisplay
 from .display import SkeletonDisplay as SkeletonDisplay

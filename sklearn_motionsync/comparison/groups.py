@@ -252,19 +252,8 @@ def compare_groups(
     )
 
 
-_COLUMNS = [
-    "what",
-    "feature",
-    "start",
-    "end",
-    "peak",
-    "p",
-    "direction",
-    "size",
-    "lower",
-    "upper",
-    "unit",
-]
+_COLUMNS = ["what", "feature", "start", "end", "peak", "p"]
+_COLUMNS += ["direction", "size", "lower", "upper", "unit"]
 
 
 def _clusters(what, family, values, names, units, study, least, level):

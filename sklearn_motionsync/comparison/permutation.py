@@ -11,7 +11,16 @@ from scipy.stats import t as student
 
 from ..utils.parallel import run
 
-__all__ = ["Design", "Family", "check_test", "enhanced", "families", "scaled", "share_at_most"]
+__all__ = [
+    "Design",
+    "Family",
+    "check_level",
+    "check_test",
+    "enhanced",
+    "families",
+    "scaled",
+    "share_at_most",
+]
 
 # A value varies if its spread is more than this share of the largest of its feature.
 _VARIES = 1e-3
@@ -180,11 +189,16 @@ def share_at_most(draws, values):
     return ordered.searchsorted(np.asarray(values) + _ROUNDING, "right") / len(ordered)
 
 
-def check_test(level, n_permutations):
-    """Refuse a level outside of (0, 1), and too few permutations for it."""
+def check_level(level):
+    """Refuse a level outside of (0, 1)."""
     is_number = isinstance(level, Real) and not isinstance(level, bool)
     if not (is_number and 0 < level < 1):
         raise ValueError(f"level must be a number between 0 and 1, such as 0.05; got {level!r}.")
+
+
+def check_test(level, n_permutations):
+    """Refuse such a level, and too few permutations for it."""
+    check_level(level)
     is_whole = isinstance(n_permutations, Integral) and not isinstance(n_permutations, bool)
     if not (is_whole and n_permutations >= 1 / level - 1):
         raise ValueError(

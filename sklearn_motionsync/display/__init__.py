@@ -11,6 +11,7 @@ from .lags import LagDisplay
 from .live import PhaseDisplay
 from .metric import MetricDisplay
 from .model import ActionModelDisplay
+from .norm import NormDisplay
 from .search import SearchDisplay
 from .stick_figures import SkeletonDisplay
 from .synchronization import SynchronizationDisplay
@@ -23,6 +24,7 @@ __all__ = [
     "GroupDisplay",
     "LagDisplay",
     "MetricDisplay",
+    "NormDisplay",
     "PhaseDisplay",
     "SearchDisplay",
     "SkeletonDisplay",

@@ -33,6 +33,7 @@ __all__ = [
     "as_names",
     "as_performances",
     "labels_as_text",
+    "labels_of_signals",
     "named_groups",
     "one_each",
     "times_from_zero",
@@ -40,6 +41,8 @@ __all__ = [
 
 # Labels of the time axis of live takes, by unit.
 TIME_LABELS = {"frames": "time (frames)", "seconds": "time (s)"}
+# Characters of a label and its unit that are too long for one line.
+_LONG = 18
 # The largest number of panels.
 _MAX_PANELS = 1000
 
@@ -112,6 +115,38 @@ def labels_as_text(performances):
     """Labels of performances, the levels of a label joined by commas."""
     labels = labels_of(performances)[0]
     return [", ".join(map(str, n)) if isinstance(n, tuple) else str(n) for n in labels]
+
+
+def labels_of_signals(names, known_units, ylabel=None, units=None):
+    """Labels of signals with their units, which are below if both are long.
+
+    Parameters
+    ----------
+    names : list of str
+    known_units : dict of str to str
+        The units of these and other signals; empty where one is not known.
+    ylabel, units : str, list of str, dict of str to str, or None
+        In place of the names and the known units: of all signals, one each, or by name.
+    """
+    labels = _by_name(ylabel, names, dict(zip(names, names, strict=True)), "ylabel")
+    out = []
+    for label, unit in zip(labels, _by_name(units, names, known_units, "units"), strict=True):
+        space = " " if len(label) + len(unit) < _LONG else "\n"
+        out.append(f"{label}{space}({unit})" if unit else label)
+    return out
+
+
+def _by_name(given, names, default, what):
+    if isinstance(given, str):
+        return [given] * len(names)
+    if given is not None and not isinstance(given, Mapping):
+        return as_names(given, len(names), what, "signals")
+    given = given or {}
+    for name in given:
+        if name not in default:
+            known = ", ".join(map(str, default))
+            raise ValueError(f"{what}: there is no signal {name!r}; there are {known}.")
+    return [str(given.get(name, default[name])) for name in names]
 
 
 def one_each(values, count, what, each="performances"):

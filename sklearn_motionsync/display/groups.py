@@ -23,7 +23,7 @@ from ..inputs.types import (
     ValuesLike,
 )
 from ..synchronizers.match import UNITS, check_coverage
-from .arguments import AxesLike, as_names
+from .arguments import AxesLike, labels_of_signals
 from .drawing import WIDTH, curves, front_line, group_styles, legend_above, panels
 from .keyframes import draw_keyframes, text_of_keyframe
 from .time_axis import TimeAxis
@@ -32,8 +32,6 @@ __all__ = ["GroupDisplay"]
 
 # Signals that are shown when none are named; of more, the first few.
 _MOST = 6
-# Characters of a label and its unit that are too long for one line.
-_LONG = 18
 # Titles of the legend.
 _STATISTICS = {
     "sd": "mean ± standard deviation of {whom}",
@@ -260,15 +258,14 @@ class GroupDisplay:
                 note += f"{', ' if note else ''}differences also in "
                 note += ", ".join(dict.fromkeys(more["feature"]))
         default = dict(zip(aligned.names, aligned.units, strict=True))
-        units = _by_name(units, names, default, "units")
-        ylabels = _by_name(ylabel, names, dict(zip(names, names, strict=True)), "ylabel")
+        ylabels = labels_of_signals(names, default, ylabel, units)
         of_people = GroupsOfPeople.of(groups, people, n)
         shown = aligned.curves[:, :, chosen]
         display = cls(
             of_people.means(shown),
             of_people.means(aligned.offsets),
             of_people.describe(people is not None),
-            ylabels=[_with_unit(*both) for both in zip(ylabels, units, strict=True)],
+            ylabels=ylabels,
             feature_names=names,
             statistic=statistic,
             coverage=coverage,
@@ -434,25 +431,3 @@ def _events_on_clock(events, params, aligned, of_people):
         sums = maker @ np.where(known, places, 0)
         rows.append(np.where(weights > 0, sums / np.where(weights > 0, weights, 1), np.nan))
     return pd.DataFrame(np.concatenate(rows), columns=pd.Index(names, tupleize_cols=False))
-
-
-def _with_unit(label, unit):
-    """A label with its unit, below it if they are long."""
-    if not unit:
-        return label
-    return f"{label}{' ' if len(label) + len(unit) < _LONG else chr(10)}({unit})"
-
-
-def _by_name(given, names, default, what):
-    """A text for each signal: as given of all, one each, or by name."""
-    if given is None or isinstance(given, Mapping):
-        unknown = set(given or ()) - set(default)
-        if unknown:
-            raise ValueError(
-                f"{what}: there is no signal {sorted(map(str, unknown))[0]!r}; there are "
-                f"{', '.join(default)}."
-            )
-        return [str((given or {}).get(name, default[name])) for name in names]
-    if isinstance(given, str):
-        return [given] * len(names)
-    return as_names(given, len(names), what, "signals")

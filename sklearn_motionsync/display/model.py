@@ -175,8 +175,8 @@ class ActionModelDisplay:
             model is then fitted again on the postures of the performances that it keeps. By default
             the first four of the model.
         band : {"points", "performances", "mean"}, default=None
-            The band about the mean, named in the legend; by default ``"points"``, with groups
-            ``"performances"``:
+            The band about the mean, named in the legend; by default ``"performances"``, without X
+            ``"points"``:
 
             - ``"points"``: ``model.envelope()``, ``n_std`` standard deviations at each frame. It
               holds most postures of new subjects, but few of their performances from the first
@@ -232,7 +232,7 @@ class ActionModelDisplay:
         SkeletonDisplay.from_departures : The limbs that depart, on stick figures.
         """
         if band is None:
-            band = "points" if groups is None else "performances"
+            band = "points" if X is None else "performances"
         if band not in list(_BAND_TITLES):
             raise ValueError(f"band must be one of {list(_BAND_TITLES)}, got {band!r}.")
         caller = f"{cls.__name__}.from_estimator"

@@ -20,6 +20,7 @@ __all__ = [
     "log_moments",
     "movement_energies",
     "t_prediction_limit",
+    "t_prediction_tail",
 ]
 
 # A dissimilarity is the mean over so many nearest neighbours: a single one may be an outlier.
@@ -336,9 +337,24 @@ def t_prediction_limit(n, squares, coverage, prior_variance=_PRIOR_VARIANCE):
     -------
     float
     """
+    freedom, scale = _prediction(n, squares, prior_variance)
+    return float(student.ppf(coverage, freedom) * scale)
+
+
+def t_prediction_tail(n, squares, value, prior_variance=_PRIOR_VARIANCE):
+    """The probability that a new value is above ``value``, which is given less the mean.
+
+    The parameters are those of `t_prediction_limit`.
+    """
+    freedom, scale = _prediction(n, squares, prior_variance)
+    return float(student.sf(value / scale, freedom))
+
+
+def _prediction(n, squares, prior_variance):
+    """Degrees of freedom, and standard error of a new value less the mean."""
     freedom = n - 1 + _PRIOR_COUNT
     squares = squares + _PRIOR_COUNT * prior_variance
-    return float(student.ppf(coverage, freedom) * np.sqrt(squares / freedom * (1 + 1 / n)))
+    return freedom, np.sqrt(squares / freedom * (1 + 1 / n))
 
 
 # -- performances that come one after the other: moments of all, and a sample of them --------

@@ -28,10 +28,10 @@ _FLOOR, _CONSTANT = 1e-9, 1e-15
 _N_DRAWS, _MIN_DRAWS = 2000, 50
 
 
-def predictive_variance(performances, groups):
+def predictive_variance(performances, groups, shrinkage=_SHRINKAGE):
     """Variance of a new person's postures about the mean of the performances.
 
-    ``v = ((n - 1) s^2 + 5 mean(s^2)) / (n + 4) (1 + 1 / n)``, where ``s^2`` is the mean squared
+    ``v = ((n - 1) s^2 + k mean(s^2)) / (n - 1 + k) (1 + 1 / n)``, where ``s^2`` is the mean squared
     deviation of performances from the mean of all performances of *other* groups, and its mean
     is that over the frames, feature by feature.
 
@@ -41,6 +41,8 @@ def predictive_variance(performances, groups):
         At least 2. NaN in gaps: then n is the number of deviations that are known of a value.
     groups : ndarray of int, shape (n,)
         If all are of one group, each performance counts as a group of its own.
+    shrinkage : float, default=5
+        ``k``: the mean over the frames weighs as much as so many performances.
 
     Returns
     -------
@@ -55,7 +57,7 @@ def predictive_variance(performances, groups):
         n, squares = np.maximum(n, 1), np.where(n > 0, squares, np.nan)
     else:
         squares = np.square(performances - mean_of_others(performances, codes)).mean(axis=0)
-    return np.maximum(_shrink(squares, n) * (1 + 1 / n), _floor(performances))
+    return np.maximum(_shrink(squares, n, shrinkage) * (1 + 1 / n), _floor(performances))
 
 
 def simultaneous_factor(performances, groups, coverage):
@@ -188,16 +190,16 @@ def _at_least_two(groups):
     return codes if codes.max() > 0 else np.arange(len(codes))
 
 
-def _shrink(squares, n):
+def _shrink(squares, n, shrinkage=_SHRINKAGE):
     """Variances (P, n_features) shrunk towards their mean over the frames.
 
     Where one is not known (NaN) it is that mean.
     """
     known = ~np.isnan(squares)
     if known.all():
-        return ((n - 1) * squares + _SHRINKAGE * squares.mean(axis=0)) / (n - 1 + _SHRINKAGE)
+        return ((n - 1) * squares + shrinkage * squares.mean(axis=0)) / (n - 1 + shrinkage)
     mean = np.nansum(squares, axis=0) / np.maximum(known.sum(axis=0), 1)
-    return np.where(known, ((n - 1) * squares + _SHRINKAGE * mean) / (n - 1 + _SHRINKAGE), mean)
+    return np.where(known, ((n - 1) * squares + shrinkage * mean) / (n - 1 + shrinkage), mean)
 
 
 def _floor(performances):

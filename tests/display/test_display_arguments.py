@@ -153,7 +153,11 @@ def test_trellis_refuses_unknown_performance(pipe, performance):
     )
 
 
-@pytest.mark.parametrize("name", display.__all__)
+def test_every_display_is_drawn_of_an_estimator_but_that_of_a_comparison():
+    assert set(ESTIMATORS) == set(display.__all__) - {"NormDisplay"}
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
 def test_from_estimator_refuses_other_and_unfitted_estimators(name):
     from_estimator = getattr(display, name).from_estimator
     performances = [] if name == "MetricDisplay" else [POSITIONS]

@@ -17,7 +17,9 @@ P = 30
 
 
 def test_mean_envelope_and_performances(bunch, pipe):
-    display = ActionModelDisplay.from_estimator(pipe, bunch.data, features=["aspace1", 0])
+    display = ActionModelDisplay.from_estimator(
+        pipe, bunch.data, features=["aspace1", 0], band="points"
+    )
     model = pipe[-1]
     lower, upper = model.envelope()
     warped = pipe[:3].transform(bunch.data)

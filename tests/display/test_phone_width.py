@@ -14,6 +14,7 @@ from sklearn_motionsync import (
     MotionTracker,
     OnlineSynchronizer,
     PartSynchronizer,
+    compare_to_norm,
     display,
 )
 from sklearn_motionsync.datasets import make_bending, make_gait
@@ -32,6 +33,12 @@ def pipe():
 @pytest.fixture(scope="module")
 def postures(pipe):
     return pipe[0].transform(BUNCH.data)
+
+
+def norm(pipe, postures):
+    groups = ["norm"] * 6 + ["new"] * 2
+    found = compare_to_norm(pipe, BUNCH.data, groups, norm="norm")
+    return display.NormDisplay.from_comparison(found, 6)
 
 
 def search(pipe, postures):
@@ -109,6 +116,7 @@ DRAWN = {
     "trellis": lambda pipe, postures: display.TrellisDisplay.from_estimator(
         pipe[:-1], BUNCH.data, performance=1
     ),
+    "norm": norm,
     "search": search,
     "cycles": cycles,
     "phases": phases,

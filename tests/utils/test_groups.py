@@ -15,6 +15,7 @@ from sklearn_motionsync import (
     MotionTracker,
     PartSynchronizer,
     compare_groups,
+    compare_to_norm,
     datasets,
     display,
     find_performances,
@@ -37,6 +38,10 @@ PIPE = make_pipeline(LinearSynchronizer(10), ActionModel()).fit(X)
 BEFORE, AFTER, TIMES = [np.zeros((10, 1))] * N, np.zeros((N, 10, 1)), np.zeros((N, 10))
 
 
+def first_of(labels):
+    return next(iter(labels)) if hasattr(labels, "__iter__") else labels
+
+
 # What each method does with groups of the N performances; whether it needs two of them.
 METHODS = {
     "ActionModel.fit(groups)": (lambda g: ActionModel().fit(X, groups=g), True),
@@ -52,6 +57,11 @@ METHODS = {
     "compare_groups(groups)": (lambda g: compare_groups(SYNC, X, g, n_permutations=19), True),
     "compare_groups(people)": (
         lambda p: compare_groups(SYNC, X, [0, 0, 0, 1, 1, 1], people=p, n_permutations=19),
+        True,
+    ),
+    "compare_to_norm(groups)": (lambda g: compare_to_norm(SYNC, X, g, norm=first_of(g)), True),
+    "compare_to_norm(people)": (
+        lambda p: compare_to_norm(SYNC, X, [0, 0, 0, 1, 1, 1], norm=0, people=p),
         True,
     ),
     "GroupDisplay.from_estimator(groups)": (

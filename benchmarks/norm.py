@@ -1,0 +1,85 @@
+"""How many patients `compare_to_norm` finds, and how many people of the norm it calls different.
+
+    python benchmarks/norm.py [N_NORMS [N_JOBS]]
+
+Norms of `make_gait`: 18 people with 53 strides, or 10 with 30. Twelve new people of each kind, with
+one stride or three: normal; late, toe-off 3 or 5 % of the cycle later; weak, knee flexion 15 or 20
+degrees less in swing, or a force that is 15 % less. Prints Markdown: per cent of them that differ,
+at a level of 10 and of 5 %; how many are called shape and timing at 10 %; the largest and the mean
+number of rows of departures, of those that have some.
+"""
+
+import os
+import sys
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+import warnings
+
+import numpy as np
+from joblib import Parallel, delayed
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn_motionsync import DenseSynchronizer, FrameWise, compare_to_norm
+from sklearn_motionsync.datasets import make_gait
+
+P, NEW = 101, 12
+KINDS = {
+    "normal": {},
+    "late, 3 %": {"timing": 3},
+    "late, 5 %": {"timing": 5},
+    "weak, 15 degrees": {"amplitude": -15},
+    "weak, 20 degrees": {"amplitude": -20},
+    "weak, force": {},
+}
+COLUMNS = ("differ at 10 %", "at 5 %", "shape", "timing", "most rows", "mean rows")
+
+
+def new_people(kind, n_cycles, seed):
+    """Trials and subjects of one kind."""
+    gait = make_gait(2 * NEW, n_cycles, random_state=seed, **KINDS[kind])
+    own = np.flatnonzero(gait.group == "B")
+    trials = [gait.data[i].copy() for i in own]
+    if kind == "weak, force":
+        for x in trials:
+            x[:, 3] *= 0.85
+    return trials, [f"{kind} {gait.person[i]}" for i in own]
+
+
+def study(seed, n_people, n_strides, n_cycles):
+    """The figures of each kind, for one norm."""
+    warnings.simplefilter("ignore")
+    gait = make_gait(n_people, 3, random_state=seed)
+    data, people = gait.data[:n_strides], list(gait.person[:n_strides])
+    pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(data)
+    rows = []
+    for k, kind in enumerate(KINDS):
+        trials, subjects = new_people(kind, n_cycles, 1000 + len(KINDS) * seed + k)
+        groups = ["norm"] * len(data) + ["new"] * len(trials)
+        given = {"norm": "norm", "people": people + subjects, "level": 0.1}
+        found = compare_to_norm(pipe, data + trials, groups, **given)
+        p = found.verdicts[["p", "p_shape", "p_timing"]].to_numpy()
+        counts = found.departures.groupby("subject").size()
+        shares = np.column_stack([p[:, 0] <= 0.1, p[:, 0] <= 0.05, 2 * p[:, 1:] <= 0.1])
+        rows.append([*100 * shares.mean(axis=0), counts.max(), counts.mean()])
+    return rows
+
+
+def main():
+    n_norms = int(sys.argv[1]) if len(sys.argv) > 1 else 40
+    n_jobs = int(sys.argv[2]) if len(sys.argv) > 2 else 2
+    for n_people, n_strides in ((18, 53), (10, 30)):
+        for n_cycles in (1, 3):
+            work = (delayed(study)(s, n_people, n_strides, n_cycles) for s in range(n_norms))
+            figures = np.array(Parallel(n_jobs)(work), dtype=float)
+            print(f"\n| norm of {n_people}, {n_cycles} stride(s) | " + " | ".join(COLUMNS) + " |")
+            print("|---" * (1 + len(COLUMNS)) + "|")
+            for k, kind in enumerate(KINDS):
+                means = np.nanmean(figures[:, k], axis=0)
+                means[4] = np.nanmax(figures[:, k, 4])
+                print(f"| {kind} | " + " | ".join(f"{x:.1f}" for x in means) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

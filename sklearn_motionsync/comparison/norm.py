@@ -1,0 +1,435 @@
+"""compare_to_norm: whether single subjects differ from a norm in shape or in timing, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from sklearn.base import BaseEstimator
+
+from ..inputs.types import Features, Labels, PerformancesLike, Unit, ValuesLike
+from ..inputs.wording import counted
+from ..model.departures import runs
+from ..model.similarity import t_prediction_limit, t_prediction_tail
+from ..model.variation import predictive_variance
+from ..synchronizers.match import UNITS
+from ..utils.groups import encode_groups
+from .curves import AlignedCurves
+from .permutation import check_level
+
+__all__ = ["NormComparison", "compare_to_norm"]
+
+# The variance at a frame is shrunk to the mean over the frames, which weighs as many people.
+_SHRINKAGE = 20
+# Prior variance of the logarithm of the largest deviation, as of `simultaneous_factor`.
+_PRIOR_VARIANCE = 0.1
+# Departures of one feature are one if between them the deviation stays above this share of the
+# limit.
+_BETWEEN = 0.5
+# Most departures of a subject.
+_MOST = 5
+_COLUMNS = ["subject", "what", "feature", "start", "end", "peak"]
+_COLUMNS += ["direction", "size", "unit", "deviation"]
+# Fewest people of a norm.
+_FEWEST = 3
+
+
+@dataclass(frozen=True, eq=False)
+class NormComparison:
+    """What `compare_to_norm` found.
+
+    Parameters
+    ----------
+    verdicts : DataFrame
+        One row a subject: ``group``, ``n_trials``; ``p``, that a new person of the norm deviates as
+        much, in shape or in timing; ``p_shape`` and ``p_timing`` alone; and ``differs``.
+    departures : DataFrame
+        Where: one row a stretch, of each subject the largest first, five at most. ``subject``;
+        ``what``, "shape" or "timing"; ``feature``; ``start``, ``end`` and ``peak``, in the unit of
+        time; ``direction``; ``size``, the difference from the mean of the norm at the peak, in its
+        ``unit``; ``deviation``, the same in standard deviations of people.
+    profile : DataFrame
+        One row a subject and feature: root mean square over the frames of the difference from the
+        mean of the norm. ``aligned``; ``linear``, after linear normalisation; ``norm``, the median
+        of the people of the norm, aligned, each against the others; ``unit``.
+    level : float
+        As given.
+    n_people : int
+        Of the norm.
+    unit : str
+        Of time.
+    clock : ndarray, shape (P,)
+        Times of the frames of the template.
+    features, units : list of str
+        Names and units of the signals, and of the offset at last.
+    mean, std : ndarray, shape (P, n_signals + 1)
+        Of the norm: mean, and standard deviation predicted for a new person.
+    limits : ndarray, shape (n_subjects, n_signals + 1)
+        The largest deviation that is no departure, in these standard deviations.
+    curves : ndarray, shape (n_subjects, P, n_signals + 1)
+        Mean of the trials of each subject, in the order of ``verdicts``.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync import DenseSynchronizer, compare_to_norm
+    >>> from sklearn_motionsync.datasets import make_gait
+    >>> gait = make_gait(20, timing=6, random_state=0)
+    >>> in_norm = gait.group == "A"
+    >>> norm = [x for x, one in zip(gait.data, in_norm) if one]
+    >>> sync = DenseSynchronizer(n_frames=101).fit(norm)
+    >>> found = compare_to_norm(sync, gait.data, gait.group, norm="A", people=gait.person)
+    >>> bool(found.verdicts["differs"].mean() > 0.8)
+    True
+    """
+
+    verdicts: pd.DataFrame
+    departures: pd.DataFrame
+    profile: pd.DataFrame
+    level: float
+    n_people: int
+    unit: str
+    clock: np.ndarray
+    features: list
+    units: list
+    mean: np.ndarray
+    std: np.ndarray
+    limits: np.ndarray
+    curves: np.ndarray
+
+    def __repr__(self):
+        return f"NormComparison({self.describe()!r})"
+
+    def describe(self, subject: Hashable | None = None) -> str:
+        """The answer in a sentence.
+
+        Parameters
+        ----------
+        subject : label of a subject, default=None
+            By default all of them are counted.
+
+        Returns
+        -------
+        str
+            How many differ; or whether the subject does, with p and its largest departure.
+        """
+        norm = f"the norm of {self.n_people} people"
+        if subject is None:
+            n = int(self.verdicts["differs"].sum())
+            word = "differs" if n == 1 else "differ"
+            return f"{n} of {counted(len(self.verdicts), 'subject')} {word} from {norm}."
+        row = self.verdicts.loc[[subject]].iloc[0]
+        if not row["differs"]:
+            return f"{subject} stays within {norm}, p = {row['p']:.2g}."
+        found = self.departures[self.departures["subject"] == subject].iloc[0]
+        where = "" if found["what"] == "timing" else f" in {found['feature']}"
+        size = f"{abs(found['size']):.3g} {found['unit']}".strip()
+        return (
+            f"{subject} differs from {norm}, p = {row['p']:.2g}: {size} {found['direction']}{where}"
+            f", at {found['peak']:.3g} {UNITS[self.unit]}."
+        )
+
+
+def compare_to_norm(
+    estimator: BaseEstimator,
+    X: PerformancesLike,
+    groups: Labels,
+    *,
+    norm: Hashable,
+    people: Labels | None = None,
+    signals: PerformancesLike | None = None,
+    features: Features | None = None,
+    level: float = 0.05,
+    unit: Unit = "percent",
+    frame_rate: float | ValuesLike | None = None,
+    **params: Any,
+) -> NormComparison:
+    """Tell of single subjects whether they differ from a norm, in shape or in timing, and where.
+
+    All trials are on the clock of one template. A subject is compared by the mean of the trials,
+    in the aligned curves and in the offsets.
+
+    Parameters
+    ----------
+    estimator : synchronizer, or Pipeline with one
+        Fitted on the norm, or on all trials.
+    X : performances
+        Those of the norm and of the subjects, as the estimator takes them.
+    groups : sequence of length n_sequences
+        The group of each performance.
+    norm : label
+        The group that is the norm. The people of all others are compared with it.
+    people : sequence of length n_sequences, default=None
+        The subject of each performance. By default every performance is of another person.
+    signals : performances, default=None
+        What is compared, as in `compare_groups`: by default X in its own units, or what reaches the
+        synchronizer.
+    features : int, str or list of them, default=None
+        Those of the signals that are compared; by default all.
+    level : float, default=0.05
+        Share of new people of the norm that are called different.
+    unit : {"percent", "frames", "seconds"}, default="percent"
+        Of places and offsets.
+    frame_rate : float, or array-like of shape (n_sequences,), default=None
+        Frames a second of X, for seconds; by default what tables tell.
+    **params : dict
+        What synchronizing X takes besides, such as ``keyframes``.
+
+    Returns
+    -------
+    NormComparison
+        A verdict of each subject; departures, one row a stretch; and mean deviations by feature.
+
+    Raises
+    ------
+    ValueError
+        If there is no such group, or nothing but the norm; a person is in several groups; the norm
+        has fewer than three people; and as from `compare_groups`.
+
+    See Also
+    --------
+    compare_groups : Tests whether groups differ.
+    find_departures : Departures of performances from an `ActionModel`.
+    sklearn_motionsync.display.NormDisplay : Draws a subject before the norm.
+
+    Notes
+    -----
+    1. Deviations are in standard deviations predicted for a new person. The variance at a frame is
+       shrunk to the mean over the frames, which weighs as much as 20 people.
+    2. The largest deviation, over all frames and signals, is that of shape; over all frames of the
+       offset, that of timing.
+    3. Every person of the norm is left out in turn and compared with the others, in as many trials
+       as the subject has. The logarithms of their largest deviations predict that of a new
+       person by Student's t. So p of shape and timing have their level, whatever the number of
+       signals. p is twice the smaller one.
+
+    The root mean square by feature is the gait variable score of Baker and others (*Gait and
+    Posture* 30, 2009), if X are single strides and the signals are joint angles: ``linear`` is as
+    published, in ``aligned`` no timing is left. Their gait profile score is its root mean square
+    over the angles.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync import DenseSynchronizer, compare_to_norm
+    >>> from sklearn_motionsync.datasets import make_gait
+    >>> gait = make_gait(24, timing=7, random_state=0)
+    >>> norm = [x for x, group in zip(gait.data, gait.group) if group == "A"]
+    >>> sync = DenseSynchronizer(n_frames=101).fit(norm)
+    >>> found = compare_to_norm(sync, gait.data, gait.group, norm="A", people=gait.person)
+    >>> bool(found.verdicts["differs"].mean() > 0.8)
+    True
+    >>> found.departures["direction"].unique().tolist()
+    ['later']
+    """
+    check_level(level)
+    given = {"signals": signals, "features": features, "unit": unit, "frame_rate": frame_rate}
+    aligned = AlignedCurves.of(estimator, X, params, "compare_to_norm", **given)
+    study = _Subjects.of(groups, norm, people, len(aligned.curves))
+    timing = aligned.offsets[:, :, np.newaxis]
+    values = np.concatenate([aligned.curves, timing], axis=2).astype(np.float64, copy=False)
+    families = [slice(0, -1), slice(-1, None)]
+    of_norm = [values[own] for own in study.of_norm]
+    subjects = [values[own] for own in study.of_subjects]
+    reference = NormReference.of(np.stack([x.mean(axis=0) for x in of_norm]))
+    curves = np.stack([x.mean(axis=0) for x in subjects])
+    z = reference.deviations(curves)
+    counts = [len(x) for x in subjects]
+    chances = {k: [_LargestDeviation(of_norm, k, part) for part in families] for k in set(counts)}
+    p, limits = np.empty((len(z), 2)), np.empty((len(z), z.shape[2]))
+    for i, k in enumerate(counts):
+        for j, part in enumerate(families):
+            p[i, j] = chances[k][j].tail(np.abs(z[i][:, part]).max())
+            limits[i, part] = chances[k][j].limit(level / 2)
+    joint = np.minimum(1, 2 * p.min(axis=1))
+    verdicts = pd.DataFrame(
+        {
+            "group": study.groups,
+            "n_trials": counts,
+            "p": joint,
+            "p_shape": p[:, 0],
+            "p_timing": p[:, 1],
+            "differs": joint <= level,
+        },
+        index=pd.Index(study.labels, name="subject", tupleize_cols=False),
+    )
+    names, units = [*aligned.names, "offset"], [*aligned.units, UNITS[unit]]
+    return NormComparison(
+        verdicts=verdicts,
+        departures=_departures(z, curves - reference.mean, limits, verdicts, names, units, aligned),
+        profile=_profile(curves, of_norm, aligned, study, names, units, verdicts.index),
+        level=float(level),
+        n_people=len(of_norm),
+        unit=unit,
+        clock=aligned.clock,
+        features=names,
+        units=units,
+        mean=reference.mean,
+        std=reference.std,
+        limits=limits,
+        curves=curves,
+    )
+
+
+class NormReference(NamedTuple):
+    """Mean of a norm, and standard deviation of a new person, (P, n_features)."""
+
+    mean: np.ndarray
+    std: np.ndarray
+
+    @classmethod
+    def of(cls, means):
+        """Those of the means of people, (n_people, P, n_features)."""
+        variance = predictive_variance(means, np.arange(len(means)), _SHRINKAGE)
+        return cls(means.mean(axis=0), np.sqrt(variance))
+
+    def deviations(self, curves):
+        """Differences from the mean, in standard deviations."""
+        return (curves - self.mean) / self.std
+
+
+class _LargestDeviation:
+    """The largest deviation of a new person of a norm, of the mean of k trials.
+
+    Parameters
+    ----------
+    of_people : list of ndarray, shape (n_trials_i, P, n_features)
+    k : int
+    part : slice
+        Of the features.
+    """
+
+    def __init__(self, of_people, k, part):
+        means = np.stack([x[:, :, part].mean(axis=0) for x in of_people])
+        logs, weights = [], []
+        for i, x in enumerate(of_people):
+            others = NormReference.of(np.delete(means, i, axis=0))
+            # Means of k trials, of which each begins with another one.
+            n = len(x)
+            starts = range(n) if k < n else [0]
+            some = [x[(np.arange(min(k, n)) + start) % n, :, part].mean(axis=0) for start in starts]
+            z = np.abs(others.deviations(np.stack(some))).max(axis=(1, 2))
+            logs.append(np.log(np.maximum(z, np.finfo(float).tiny)))
+            weights.append(np.full(len(z), 1 / len(z)))
+        logs, weights = np.concatenate(logs), np.concatenate(weights)
+        self._n, self._mean = len(means), np.average(logs, weights=weights)
+        self._squares = float(weights @ np.square(logs - self._mean))
+
+    def tail(self, largest):
+        """The probability that a new person deviates more."""
+        value = np.log(max(largest, np.finfo(float).tiny)) - self._mean
+        return t_prediction_tail(self._n, self._squares, value, _PRIOR_VARIANCE)
+
+    def limit(self, p):
+        """The deviation with this tail probability."""
+        half = t_prediction_limit(self._n, self._squares, 1 - p, _PRIOR_VARIANCE)
+        return float(np.exp(self._mean + half))
+
+
+class _Subjects(NamedTuple):
+    """Whose trials are whose.
+
+    Attributes
+    ----------
+    of_norm, of_subjects : list of ndarray of int
+        The performances of each person of the norm, and of each subject.
+    labels, groups : list
+        Of the subjects.
+    """
+
+    of_norm: list
+    of_subjects: list
+    labels: list
+    groups: list
+
+    @classmethod
+    def of(cls, groups, norm, people, n):
+        codes, names = encode_groups(groups, n, at_least=2)
+        if norm not in names:
+            raise ValueError(f"norm={norm!r} is none of the groups {names[:6]}.")
+        persons, labels = encode_groups(people, n, name="people", at_least=2)
+        in_norm = codes == names.index(norm)
+        of_norm, of_subjects, of = [], [], []
+        for person, label in enumerate(labels):
+            own = np.flatnonzero(persons == person)
+            if len(set(codes[own])) > 1:
+                several = [names[code] for code in sorted(set(codes[own]))]
+                raise ValueError(
+                    f"people: {label!r} has trials in the groups {several}. Give people one name a "
+                    f"group, such as '{label} {several[0]}'."
+                )
+            if in_norm[own[0]]:
+                of_norm.append(own)
+            else:
+                of_subjects.append(own)
+                of.append((label, names[codes[own[0]]]))
+        if len(of_norm) < _FEWEST:
+            raise ValueError(
+                f"The norm needs at least {_FEWEST} people, got {len(of_norm)} in {norm!r}."
+            )
+        labels, groups = map(list, zip(*of, strict=True))
+        return cls(of_norm, of_subjects, labels, groups)
+
+
+def _departures(z, differences, limits, verdicts, names, units, aligned):
+    """The table of departures, at most five a subject."""
+    rows = []
+    size = np.abs(z)
+    for i, label in enumerate(verdicts.index):
+        own = []
+        # Stretches above a share of the limit, in which it is exceeded somewhere.
+        found = runs(z[i : i + 1] / limits[i], _BETWEEN)
+        for feature, first, last, peak in zip(
+            found.feature, found.first, found.last, found.peak, strict=True
+        ):
+            beyond = first + np.flatnonzero(size[i, first : last + 1, feature] > limits[i, feature])
+            if not len(beyond):
+                continue
+            is_timing = feature == len(names) - 1
+            above, below = ("later", "earlier") if is_timing else ("above", "below")
+            own.append(
+                {
+                    "subject": label,
+                    "what": "timing" if is_timing else "shape",
+                    "feature": names[feature],
+                    "start": aligned.clock[beyond[0]],
+                    "end": aligned.clock[beyond[-1]],
+                    "peak": aligned.clock[peak],
+                    "direction": above if z[i, peak, feature] > 0 else below,
+                    "size": differences[i, peak, feature],
+                    "unit": units[feature],
+                    "deviation": z[i, peak, feature],
+                }
+            )
+        rows += sorted(own, key=lambda row: -abs(row["deviation"]))[:_MOST]
+    return pd.DataFrame(rows, columns=_COLUMNS)
+
+
+def _profile(curves, of_norm, aligned, study, names, units, labels):
+    """Root mean squares of differences from the mean of the norm, by subject and feature."""
+    means = np.stack([x.mean(axis=0) for x in of_norm])
+    even = aligned.even.astype(np.float64, copy=False)
+    of_even = [
+        [even[own].mean(axis=0) for own in some] for some in (study.of_norm, study.of_subjects)
+    ]
+    linear = np.full((len(curves), len(names)), np.nan)
+    linear[:, :-1] = _root_mean_squares(np.stack(of_even[1]) - np.mean(of_even[0], axis=0))
+    n = len(means)
+    others = (means.sum(axis=0) - means) / (n - 1)
+    typical = np.median(_root_mean_squares(means - others), axis=0)
+    index = pd.MultiIndex.from_product([labels, names], names=["subject", "feature"])
+    return pd.DataFrame(
+        {
+            "aligned": _root_mean_squares(curves - means.mean(axis=0)).ravel(),
+            "linear": linear.ravel(),
+            "norm": np.tile(typical, len(curves)),
+            "unit": np.tile(np.array(units, dtype=object), len(curves)),
+        },
+        index=index,
+    )
+
+
+def _root_mean_squares(differences):
+    """Over the frames: (n, n_features)."""
+    return np.sqrt(np.square(differences).mean(axis=1))

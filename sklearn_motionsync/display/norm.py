@@ -1,0 +1,234 @@
+"""NormDisplay: a subject before a norm, in shape and timing."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Self
+
+import numpy as np
+
+from ..comparison.norm import NormComparison
+from ..inputs.features import choose_features
+from ..inputs.types import Features, PerformanceLike, Unit, ValuesLike
+from ..inputs.wording import counted
+from .arguments import AxesLike, labels_of_signals
+from .drawing import COLORS, WIDTH, curves, front_line, legend_above, panels, parts_outside
+from .time_axis import TimeAxis
+
+__all__ = ["NormDisplay"]
+
+
+class NormDisplay:
+    """A subject before a norm: a panel for each signal, and one of the offset.
+
+    The subject is the strongest line, violet where it departs. Use `from_comparison`.
+
+    Parameters
+    ----------
+    curve : array-like, shape (P, n_shown)
+        Of the subject: signals, and the offset at last.
+    mean, std : array-like, shape (P, n_shown)
+        Of the norm, as of `NormComparison`.
+    limits : array-like, shape (n_shown,)
+        The largest deviation that is no departure, in standard deviations.
+    labels : list of str
+        Of the panels.
+    title : str, default=""
+        The answer, in words.
+    subject : str, default="subject"
+        Its name, for the legend.
+    n_trials, n_people : int, default=1
+        Trials of the subject, and people of the norm.
+    level : float, default=0.05
+        Share of people of the norm that depart.
+    unit : {"frames", "percent", "seconds"}, default="percent"
+        Unit of time.
+    frame_rate : float, default=None
+        Frames of the clock a second, for seconds.
+
+    Attributes
+    ----------
+    figure_ : Figure
+        The figure of the last plot.
+    axes_ : list of Axes
+        One a signal, then that of the offset.
+    subject_, mean_ : list of Line2D
+        The subject and the mean of the norm, one a panel.
+    bands_ : list of FillBetweenPolyCollection
+        The limits of the norm, one a panel.
+    spread_ : list of FillBetweenPolyCollection
+        One standard deviation of the norm, one a panel.
+    departures_ : list of LineCollection
+        The parts of the subject outside the limits, one a panel.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync import DenseSynchronizer, compare_to_norm
+    >>> from sklearn_motionsync.display import NormDisplay
+    >>> from sklearn_motionsync.datasets import make_gait
+    >>> gait = make_gait(16, timing=6, random_state=0)
+    >>> sync = DenseSynchronizer(n_frames=101).fit(gait.data)
+    >>> found = compare_to_norm(sync, gait.data, gait.group, norm="A", people=gait.person)
+    >>> display = NormDisplay.from_comparison(found, "person1", features=[0, 1], units="degrees")
+    >>> len(display.axes_)
+    3
+    """
+
+    def __init__(
+        self,
+        curve: PerformanceLike,
+        mean: PerformanceLike,
+        std: PerformanceLike,
+        limits: ValuesLike,
+        *,
+        labels: Sequence[str],
+        title: str = "",
+        subject: str = "subject",
+        n_trials: int = 1,
+        n_people: int = 1,
+        level: float = 0.05,
+        unit: Unit = "percent",
+        frame_rate: float | None = None,
+    ) -> None:
+        self.curve, self.mean, self.std = map(np.asarray, (curve, mean, std))
+        self.limits, self.labels, self.title, self.subject = (
+            np.asarray(limits),
+            labels,
+            title,
+            subject,
+        )
+        self.n_trials, self.n_people, self.level = n_trials, n_people, level
+        self.unit, self.frame_rate = unit, frame_rate
+        self._axis = TimeAxis(unit, len(self.curve), None, frame_rate)
+
+    def __repr__(self):
+        return f"NormDisplay({self.title!r})"
+
+    @classmethod
+    def from_comparison(
+        cls,
+        comparison: NormComparison,
+        subject: Hashable,
+        *,
+        features: Features | None = None,
+        ylabel: str | Sequence[str] | Mapping[str, str] | None = None,
+        units: str | Sequence[str] | Mapping[str, str] | None = None,
+        ax: AxesLike | None = None,
+    ) -> Self:
+        """Draw a subject of a comparison.
+
+        Parameters
+        ----------
+        comparison : NormComparison
+            From `compare_to_norm`.
+        subject : label
+            One of ``comparison.verdicts.index``.
+        features : int, str or list of them, default=None
+            Signals that are drawn, by index or name. By default those with a departure and the
+            first ones, four in all. The offset is always drawn.
+        ylabel : str, list of str or dict, default=None
+            Labels of the signals in place of their names: one each, or by name.
+        units : str, list of str or dict, default=None
+            Units of the signals for their labels: of all, one each, or by name. By default what
+            tables tell.
+        ax : Axes or array-like of Axes, default=None
+            See `plot`.
+
+        Returns
+        -------
+        NormDisplay
+            The display, drawn.
+
+        Raises
+        ------
+        ValueError
+            If there is no such subject or feature, or labels or units do not fit the signals.
+
+        See Also
+        --------
+        sklearn_motionsync.compare_to_norm : Makes the comparison.
+        """
+        if not isinstance(comparison, NormComparison):
+            raise ValueError(f"Give what compare_to_norm returns, got {type(comparison).__name__}.")
+        subjects = comparison.verdicts.index.to_list()
+        if subject not in subjects:
+            raise ValueError(f"There is no subject {subject!r}; there are {subjects[:8]}.")
+        i, signals = subjects.index(subject), comparison.features[:-1]
+        if features is None:
+            found = comparison.departures
+            own = found[(found["subject"] == subject) & (found["what"] == "shape")]["feature"]
+            order = list(dict.fromkeys([*map(signals.index, own), *range(len(signals))]))
+            chosen = sorted(order[: len(choose_features(None, signals))])
+        else:
+            chosen = choose_features(features, signals)
+        names = [signals[k] for k in chosen]
+        known = dict(zip(comparison.features, comparison.units, strict=True))
+        labels = labels_of_signals(names, known, ylabel, units)
+        shown = [*chosen, len(signals)]
+        clock = comparison.clock
+        display = cls(
+            comparison.curves[i][:, shown],
+            comparison.mean[:, shown],
+            comparison.std[:, shown],
+            comparison.limits[i, shown],
+            labels=[*labels, f"offset ({known['offset']}),\nlater is above"],
+            title=comparison.describe(subject),
+            subject=str(subject),
+            n_trials=int(comparison.verdicts["n_trials"].iloc[i]),
+            n_people=comparison.n_people,
+            level=comparison.level,
+            unit=comparison.unit,
+            frame_rate=(len(clock) - 1) / clock[-1] if comparison.unit == "seconds" else None,
+        )
+        return display.plot(ax)
+
+    def plot(self, ax: AxesLike | None = None) -> Self:
+        """Draw.
+
+        Parameters
+        ----------
+        ax : Axes or array-like of Axes, default=None
+            One of a figure's subplots is divided into the panels; or one axes a signal and one for
+            the offset. None makes a figure.
+
+        Returns
+        -------
+        NormDisplay
+            The display itself.
+        """
+        count = len(self.labels) - 1
+        n_cols = 1 if count < 3 else 2
+        n_rows = -(-count // n_cols)
+        cells = [divmod(i, n_cols) for i in range(count)] + [(n_rows, slice(None))]
+        size = (WIDTH, 1.9 * (n_rows + 1) + 1.0)
+        self.figure_, self.axes_ = panels(ax, cells, n_rows + 1, n_cols, size)
+        self.subject_, self.mean_, self.bands_ = [], [], []
+        self.spread_, self.departures_ = [], []
+        clock = self._axis.clock
+        for i, (axis, label) in enumerate(zip(self.axes_, self.labels, strict=True)):
+            mean, std, own = self.mean[:, i], self.std[:, i], self.curve[:, i]
+            lower, upper = mean - self.limits[i] * std, mean + self.limits[i] * std
+            band = {"color": COLORS["envelope"], "linewidth": 0}
+            self.bands_.append(axis.fill_between(clock, lower, upper, alpha=0.3, **band))
+            self.spread_.append(axis.fill_between(clock, mean - std, mean + std, alpha=0.5, **band))
+            self.mean_.extend(axis.plot(clock, mean, color="0.3", linewidth=1, linestyle="--"))
+            style = {"color": COLORS["performance"], "linewidth": 2.4}
+            self.subject_.append(front_line(axis, clock, own, **style))
+            xs, ys = parts_outside(own[np.newaxis], lower, upper)
+            style = {"colors": COLORS["departure"], "linewidths": 2.8, "zorder": 5}
+            self.departures_.append(curves(axis, self._axis.convert(xs), ys, **style))
+            axis.set_ylabel(label)
+            axis.set_xlim(clock[0], clock[-1])
+        self.axes_[-1].set_xlabel(self._axis.label)
+        handles = [self.subject_[0], (self.spread_[0], self.mean_[0]), self.bands_[0]]
+        labels = [
+            f"{self.subject}: {counted(self.n_trials, 'trial')}",
+            f"norm: mean and standard deviation of {self.n_people} people",
+            f"{100 * (1 - self.level):.3g} % of new people stay inside in all panels",
+        ]
+        if any(len(lines.get_segments()) for lines in self.departures_):
+            handles.insert(1, self.departures_[0])
+            labels.insert(1, "departs")
+        below = self.axes_[:n_cols]
+        legend_above(self.axes_[:-1], handles, labels, self.title, below=below, n_cols=1)
+        return self

@@ -1,0 +1,78 @@
+"""NormDisplay: the subject, the norm and the departures are those of the comparison."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from artists import segments, texts
+from sklearn_motionsync import DenseSynchronizer, compare_to_norm
+from sklearn_motionsync.datasets import make_gait
+from sklearn_motionsync.display import NormDisplay
+
+GAIT = make_gait(24, 2, timing=7, amplitude=-25, random_state=1)
+
+
+@pytest.fixture(scope="module")
+def found():
+    norm = [x for x, group in zip(GAIT.data, GAIT.group, strict=True) if group == "A"]
+    sync = DenseSynchronizer(51).fit(norm)
+    return compare_to_norm(sync, GAIT.data, GAIT.group, norm="A", people=GAIT.person, level=0.2)
+
+
+@pytest.fixture(autouse=True)
+def close():
+    yield
+    plt.close("all")
+
+
+def test_lines_and_bands_are_those_of_the_comparison(found):
+    subject = found.departures.loc[found.departures["what"] == "shape", "subject"].iloc[0]
+    i = found.verdicts.index.get_loc(subject)
+    display = NormDisplay.from_comparison(found, subject, units={"x1": "degrees"})
+    assert len(display.axes_) == 5
+    for k in range(5):
+        np.testing.assert_array_equal(display.subject_[k].get_ydata(), found.curves[i, :, k])
+        np.testing.assert_array_equal(display.mean_[k].get_ydata(), found.mean[:, k])
+        reach = found.limits[i, k] * found.std[:, k]
+        heights = display.bands_[k].get_paths()[0].vertices[:, 1]
+        assert heights.max() == pytest.approx((found.mean[:, k] + reach).max())
+        assert heights.min() == pytest.approx((found.mean[:, k] - reach).min())
+        # Violet where a row of the table is, and nowhere else.
+        rows = found.departures[found.departures["subject"] == subject]
+        rows = rows[rows["feature"] == found.features[k]]
+        drawn = [xy[:, 0] for xy in segments(display.departures_[k])]
+        assert bool(drawn) == bool(len(rows))
+        if drawn:
+            drawn = np.concatenate(drawn)
+            assert abs(drawn.min() - rows["start"].min()) < 2
+            assert abs(drawn.max() - rows["end"].max()) < 2
+    assert display.axes_[1].get_ylabel() == "x1 (degrees)"
+    assert "80 % of new people stay inside in all panels" in texts(display.axes_[0])
+    title = display.axes_[0].get_legend().get_title().get_text().replace("\n", " ")
+    assert title == found.describe(subject)
+
+
+def test_signals_with_departures_are_shown_first():
+    rng = np.random.default_rng(0)
+    X = rng.standard_normal((20, 30, 6)) + np.sin(np.linspace(0, 3, 30))[:, np.newaxis]
+    X[19, 10:14, 5] += 30
+    sync = DenseSynchronizer(30, unsupported="warp").fit(X[:19])
+    found = compare_to_norm(sync, X, ["n"] * 18 + ["p"] * 2, norm="n")
+    display = NormDisplay.from_comparison(found, 19)
+    assert display.labels[:-1] == ["x0", "x1", "x2", "x5"]
+    assert "departs" in texts(display.axes_[0])
+    quiet = NormDisplay.from_comparison(found, 18)
+    assert quiet.labels[:-1] == ["x0", "x1", "x2", "x3"]
+    assert "departs" not in texts(quiet.axes_[0])
+    one = NormDisplay.from_comparison(found, 19, features="x5", ylabel="knee")
+    assert one.axes_[0].get_ylabel() == "knee"
+
+
+def test_refused_arguments(found):
+    with pytest.raises(ValueError, match="There is no subject 'person0'; there are"):
+        NormDisplay.from_comparison(found, "person0")
+    with pytest.raises(ValueError, match="Give what compare_to_norm returns, got dict"):
+        NormDisplay.from_comparison({}, "person1")
+    with pytest.raises(ValueError, match="There is no feature 'elbow'"):
+        NormDisplay.from_comparison(found, "person1", features="elbow")
+    with pytest.raises(ValueError, match="units: there is no signal 'elbow'"):
+        NormDisplay.from_comparison(found, "person1", units={"elbow": "deg"})
