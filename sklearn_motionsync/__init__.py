@@ -17,6 +17,7 @@ from .body.direction_cosines import DirectionCosines
 from .body.joint_positions import JointPositions
 from .body.mirror import mirror
 from .body.skeleton import Skeleton
+from .comparison.events import compare_events
 from .comparison.groups import GroupComparison, compare_groups
 from .comparison.norm import NormComparison, compare_to_norm
 from .inputs.long_tables import to_frame, to_sequences
@@ -70,6 +71,7 @@ __all__ = [
     "TimingChannel",
     "Track",
     "blend_performances",
+    "compare_events",
     "compare_groups",
     "compare_to_norm",
     "datasets",

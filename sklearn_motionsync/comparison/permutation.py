@@ -82,8 +82,15 @@ class Design:
 
 
 def scaled(values, centred):
-    """Values (n_units, P, n_features) of squared length 1 over the units; 0 where none vary."""
-    values = values - values.mean(axis=0) if centred else values
+    """Values (n_units, P, n_features) of squared length 1 over the units; 0 where none vary.
+
+    What is not known (NaN) becomes the mean.
+    """
+    known = ~np.isnan(values)
+    if centred:
+        counts = np.maximum(known.sum(axis=0), 1)
+        values = values - np.where(known, values, 0).sum(axis=0) / counts
+    values = np.where(known, values, 0)
     length = np.sqrt(np.square(values).sum(axis=0))
     varies = length > _VARIES * length.max(axis=0)
     return np.where(varies, values / np.where(varies, length, 1), 0)
@@ -93,8 +100,10 @@ def enhanced(deviates):
     """Threshold-free cluster enhancement along the frames, with signs: the shape of ``deviates``.
 
     The sum, over heights h below a value, of ``extent^0.5 h^2``; the extent is the number of frames
-    around it that are above h.
+    around it that are above h. A single frame has no extent, and keeps its value.
     """
+    if deviates.shape[1] == 1:
+        return deviates
     n, n_frames, n_features = deviates.shape
     # A column for each curve and sign.
     both = np.concatenate([deviates, -deviates]).astype(np.float32)

@@ -48,8 +48,12 @@ class Study:
     words: str
 
     def units(self, values):
-        """Values (n_units, ...) of those of the performances."""
-        return np.tensordot(self.maker, values.astype(np.float64, copy=False), 1)
+        """Values (n_units, ...) of those of the performances; NaN where one of these is."""
+        missing = np.isnan(values)
+        found = np.tensordot(self.maker, np.where(missing, 0.0, values), 1)
+        if missing.any():
+            found[np.tensordot(self.maker != 0, missing, 1) > 0] = np.nan
+        return found
 
     @classmethod
     def of(cls, groups, covariate, people, paired, n):
@@ -125,17 +129,20 @@ class Study:
         return cls(design, maker, None, None, [], words)
 
     def size(self, values, what):
-        """Direction in words, size, and its interval of 95 %, of one value a unit."""
+        """Direction in words, size, and its interval of 95 %, of a value a unit; NaN is unknown."""
+        known = ~np.isnan(values)
+        values = values[known]
         if self.covariate is not None:
-            line = linregress(self.covariate, values)
+            line = linregress(self.covariate[known], values)
             return self._interval(line.slope, line.stderr, len(values) - 2, what, [])
         if self.groups is None:
             n = len(values)
             error = values.std(ddof=1) / np.sqrt(n)
             return self._interval(values.mean(), error, n - 1, what, self.labels)
-        means = [values[self.groups == k].mean() for k in range(len(self.labels))]
+        parts = [values[self.groups[known] == k] for k in range(len(self.labels))]
+        means = [part.mean() for part in parts]
         low, high = (0, 1) if len(means) == 2 else (int(np.argmin(means)), int(np.argmax(means)))
-        a, b = (values[self.groups == k] for k in (low, high))
+        a, b = parts[low], parts[high]
         # Welch's test, for groups that vary differently.
         shares = np.array([x.var(ddof=1) / len(x) for x in (a, b)])
         degrees = np.sum(shares**2 / [len(a) - 1, len(b) - 1])
@@ -210,8 +217,22 @@ class GroupsOfPeople:
         return entries
 
     def means(self, values):
-        """Means (n_people_k, ...) of people in each group, of values of the performances."""
-        return [np.tensordot(maker, values, 1) for maker in self.makers]
+        """Means (n_people_k, ...) of people in each group, of the known values of performances."""
+        known = ~np.isnan(values)
+        means = []
+        for maker in self.makers:
+            weights = np.tensordot(maker, known.astype(float), 1)
+            sums = np.tensordot(maker, np.where(known, values, 0.0), 1)
+            means.append(np.where(weights > 0, sums / np.where(weights > 0, weights, 1), np.nan))
+        return means
+
+    def fill(self, values):
+        """Values of performances, those that are not known by the mean of the same person."""
+        filled = np.array(values, dtype=float)
+        for maker, means in zip(self.makers, self.means(values), strict=True):
+            for row, mean in zip(maker > 0, means, strict=True):
+                filled[row] = np.where(np.isnan(filled[row]), mean, filled[row])
+        return filled
 
 
 def band_of_mean(values, statistic, coverage):

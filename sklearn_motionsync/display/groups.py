@@ -424,10 +424,5 @@ def _events_on_clock(events, params, aligned, of_people):
         [np.interp(s * last, t, frames) for s, t in zip(shares, aligned.match.times, strict=True)]
     )
     names = given.columns if isinstance(given, pd.DataFrame) else range(places.shape[1])
-    known = np.isfinite(places)
-    rows = []
-    for maker in of_people.makers:
-        weights = maker @ known
-        sums = maker @ np.where(known, places, 0)
-        rows.append(np.where(weights > 0, sums / np.where(weights > 0, weights, 1), np.nan))
+    rows = of_people.means(places)
     return pd.DataFrame(np.concatenate(rows), columns=pd.Index(names, tupleize_cols=False))

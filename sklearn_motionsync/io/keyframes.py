@@ -25,7 +25,7 @@ from ..inputs.types import PerformancesLike, Table, ValuesLike
 from ..inputs.wording import counted, within
 from .events import read_events, words_of
 
-__all__ = ["keyframes_from_events"]
+__all__ = ["is_table_of_events", "keyframes_from_events"]
 
 # Columns of a table of events, in lower case.
 _EVENTS, _CONTEXT, _FRAMES = ("event", "label"), "context", ("frame", "frames")
@@ -146,6 +146,12 @@ def keyframes_from_events(
         values = values[_order(values.to_numpy() / lengths[:, np.newaxis], values.columns, trials)]
     _check_order(values, trials)
     return values.set_axis(index_of(labels, levels[:-1]))
+
+
+def is_table_of_events(given):
+    """Whether something is a table with one row an event."""
+    columns = getattr(as_pandas(given), "columns", ())
+    return any(str(name).strip().casefold() in _EVENTS for name in columns)
 
 
 # -- events of each trial, as triples of label, context and time --------------------------

@@ -14,6 +14,7 @@ from sklearn_motionsync import (
     LinearSynchronizer,
     MotionTracker,
     PartSynchronizer,
+    compare_events,
     compare_groups,
     compare_to_norm,
     datasets,
@@ -35,6 +36,7 @@ X = np.stack([a * np.column_stack([np.sin(5 * T), T**2]) for a in (0.8, 0.9, 1.0
 PARTS = PartSynchronizer({"arm": [0]}, synchronizer=DenseSynchronizer(10)).fit(X)
 SYNC = LinearSynchronizer(10).fit(X)
 PIPE = make_pipeline(LinearSynchronizer(10), ActionModel()).fit(X)
+EVENTS = [[k + 3, 15] for k in range(N)]
 BEFORE, AFTER, TIMES = [np.zeros((10, 1))] * N, np.zeros((N, 10, 1)), np.zeros((N, 10))
 
 
@@ -54,6 +56,14 @@ METHODS = {
     "ActionClassifier.fit(y)": (lambda y: ActionClassifier([], n_frames=10).fit(X, y), True),
     "MotionTracker.fit(groups)": (lambda g: MotionTracker(SYNC, 20).fit(X, groups=g), True),
     "PartSynchronizer.lags(groups)": (lambda g: PARTS.lags(X, groups=g), False),
+    "compare_events(groups)": (
+        lambda g: compare_events(X, EVENTS, g, n_permutations=19),
+        True,
+    ),
+    "compare_events(people)": (
+        lambda p: compare_events(X, EVENTS, [0, 0, 0, 1, 1, 1], people=p, n_permutations=19),
+        True,
+    ),
     "compare_groups(groups)": (lambda g: compare_groups(SYNC, X, g, n_permutations=19), True),
     "compare_groups(people)": (
         lambda p: compare_groups(SYNC, X, [0, 0, 0, 1, 1, 1], people=p, n_permutations=19),

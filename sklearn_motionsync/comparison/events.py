@@ -1,0 +1,174 @@
+"""compare_events: when events happen, by group, and whether groups differ in it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from sklearn.base import BaseEstimator
+from sklearn.utils import check_random_state
+
+from ..inputs.keyframes import Keyframes
+from ..inputs.resampling import as_frame_rates
+from ..inputs.types import (
+    Labels,
+    NumbersLike,
+    PerformancesLike,
+    RandomState,
+    Table,
+    Unit,
+    ValuesLike,
+)
+from ..inputs.validation import SequenceLevelMixin, check_performances
+from ..io.keyframes import is_table_of_events, keyframes_from_events
+from ..synchronizers.match import check_unit, rates_of
+from ..utils.parallel import Progress
+from .permutation import check_test, families
+from .study import GroupsOfPeople, Study
+
+__all__ = ["compare_events"]
+
+
+def compare_events(
+    X: PerformancesLike,
+    events: Table | NumbersLike | None = None,
+    groups: Labels | None = None,
+    *,
+    covariate: ValuesLike | None = None,
+    people: Labels | None = None,
+    paired: bool = False,
+    unit: Unit = "percent",
+    frame_rate: float | ValuesLike | None = None,
+    level: float = 0.05,
+    n_permutations: int = 1999,
+    random_state: RandomState = 0,
+) -> pd.DataFrame:
+    """When events happen, by group, and whether groups differ in it.
+
+    No trial is warped. An event is at a share of its trial, such as a toe-off at 62 % of the gait
+    cycle, or so many seconds after its beginning.
+
+    Parameters
+    ----------
+    X : performances
+        The trials: their labels, lengths, and frame rates count.
+    events : DataFrame or array-like, default=None
+        One row an event, with the trial, the event, and the time in seconds or frames, as in
+        `io.keyframes_from_events`; or what that returns: frames, one row a trial and one column an
+        event, NaN where one is not known. By default the events in ``attrs`` of the trials.
+    groups : sequence of length n_sequences, default=None
+        The group of each performance. Without groups and covariate there is no test.
+    covariate : array-like of numbers, shape (n_sequences,), default=None
+        Such as speed or age, instead of groups: a regression.
+    people : sequence of length n_sequences, default=None
+        The subject of each performance. By default every performance is of another person.
+    paired : bool, default=False
+        Whether every person has trials in both of two groups.
+    unit : {"percent", "frames", "seconds"}, default="percent"
+        Unit of the result: per cent of each trial, its frames, or seconds from its first frame.
+    frame_rate : float, or array-like of shape (n_sequences,), default=None
+        Frames a second of X, for seconds; by default what tables tell.
+    level : float, default=0.05
+        Level of the test, of all events together.
+    n_permutations : int, default=1999
+        Number of random permutations, or of flips of signs if paired.
+    random_state : int, RandomState instance or None, default=0
+        Draws the permutations.
+
+    Returns
+    -------
+    DataFrame
+        One row an event. For each group ``mean``, ``sd`` and ``n`` of people, behind the name of
+        the group if there are several. With groups or a covariate also ``size``, the mean
+        difference, with the ``lower`` and ``upper`` end of its interval of 95 %; its ``direction``;
+        ``p``, corrected for the number of events; and ``differs``.
+
+    Raises
+    ------
+    ValueError
+        As from `io.keyframes_from_events` and `compare_groups`; or if an event is known in fewer
+        than two people of a group.
+
+    See Also
+    --------
+    compare_groups : Tests whole curves and their timing.
+    io.keyframes_from_events : Reads the table.
+
+    Notes
+    -----
+    A person counts once, by the mean of the trials that have the event. A person without it does
+    not count for this event. p is by permutations of people, as in `compare_groups`, of the largest
+    deviate over all events.
+
+    Examples
+    --------
+    Toe-off is 5 % of the cycle later in group B.
+
+    >>> from sklearn_motionsync import compare_events
+    >>> from sklearn_motionsync.datasets import make_gait
+    >>> gait = make_gait(16, timing=5, random_state=0)
+    >>> table = compare_events(gait.data, gait.keyframes, gait.group, people=gait.person)
+    >>> table.loc[3, ["A mean", "B mean", "size", "direction"]].tolist()  # the fourth is toe-off
+    [...'B later than A']
+
+    A table of events in seconds, without groups:
+
+    >>> import pandas as pd
+    >>> from sklearn_motionsync import to_frame, to_sequences
+    >>> names = pd.Index([*"abcd"], name="trial")
+    >>> trials = to_sequences(to_frame(gait.data[:4], performances=names))
+    >>> events = pd.DataFrame({"trial": names, "event": "toe-off", "seconds": [0.6, 0.6, 0.7, 0.6]})
+    >>> compare_events(trials, events, frame_rate=100).round(1)
+             mean   sd  n
+    event
+    toe-off   6...
+    """
+    check_unit(unit)
+    check_test(level, n_permutations)
+    if events is None or is_table_of_events(events):
+        events = keyframes_from_events(X, events, frame_rate=frame_rate)
+    reader = type("compare_events", (SequenceLevelMixin, BaseEstimator), {})()
+    trials = check_performances(reader, X, reset=True, level="sequence", finite="allow-nan")
+    n, last = len(trials), np.array([[len(x) - 1] for x in trials])
+    frames = Keyframes(events, n, name="events").known(trials) * last
+    scale = np.ones((n, 1))
+    if unit == "percent":
+        scale = 100 / last
+    elif unit == "seconds":
+        if (rates := rates_of(X, frame_rate)) is None:
+            raise ValueError(
+                "unit='seconds' needs frame_rate, frames a second of the performances."
+            )
+        scale = 1 / np.broadcast_to(as_frame_rates(rates, n), (n, 1))
+    values = frames * scale
+    names = events.columns if isinstance(events, pd.DataFrame) else range(values.shape[1])
+    is_tested = groups is not None or covariate is not None
+    study = Study.of(groups, covariate, people, paired, n) if is_tested else None
+    of_people = GroupsOfPeople.of(groups, people, n)
+    index = pd.Index(names, name="event", tupleize_cols=False)
+    table = pd.DataFrame(index=index)
+    for label, means in zip(of_people.labels, of_people.means(values), strict=True):
+        counts = (~np.isnan(means)).sum(axis=0)
+        if counts.min() < 2:
+            k = int(counts.argmin())
+            where = f" of group {label!r}" if label else ""
+            raise ValueError(
+                f"events: {names[k]!r} is known in {counts[k]} people"
+                f"{where}, and at least 2 are needed. Leave it out."
+            )
+        prefix = f"{label} " if label else ""
+        table[f"{prefix}mean"] = np.nanmean(means, axis=0)
+        table[f"{prefix}sd"] = np.nanstd(means, axis=0, ddof=1)
+        table[f"{prefix}n"] = counts
+    if study is None:
+        return table
+    units = study.units(of_people.fill(values))
+    progress = Progress(None, 0)
+    rng = check_random_state(random_state)
+    (family,) = families(
+        study.design, [units[:, np.newaxis]], n_permutations, rng, progress=progress
+    )
+    sizes = [study.size(units[:, k], "timing") for k in range(values.shape[1])]
+    table[["direction", "size", "lower", "upper"]] = pd.DataFrame(sizes, index=index)
+    table["p"] = family.shares(np.abs(family.found[0]))
+    table["differs"] = table["p"] <= level
+    return table

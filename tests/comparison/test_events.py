@@ -1,0 +1,130 @@
+"""compare_events: means and spread of people, tests against SciPy, tables, gaps, refusals."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+from sklearn_motionsync import compare_events, to_frame, to_sequences
+from sklearn_motionsync.datasets import make_gait
+
+GAIT = make_gait(16, 2, timing=3, random_state=0)
+K = pd.DataFrame(GAIT.keyframes, columns=GAIT.keyframe_names)
+SHARES = 100 * GAIT.keyframes / [[len(x) - 1] for x in GAIT.data]
+GIVEN = {"groups": GAIT.group, "people": GAIT.person}
+
+
+def of_people(values=SHARES):
+    return pd.DataFrame(values).groupby(list(GAIT.person), sort=False).mean().to_numpy()
+
+
+def test_means_spreads_and_sizes_are_those_of_people():
+    found = compare_events(GAIT.data, K, **GIVEN)
+    a, b = of_people()[::2], of_people()[1::2]
+    for label, people in (("A", a), ("B", b)):
+        np.testing.assert_allclose(found[f"{label} mean"], people.mean(axis=0))
+        np.testing.assert_allclose(found[f"{label} sd"], people.std(axis=0, ddof=1))
+        assert (found[f"{label} n"] == 8).all()
+    welch = stats.ttest_ind(b, a, equal_var=False)
+    np.testing.assert_allclose(found["size"], b.mean(axis=0) - a.mean(axis=0))
+    np.testing.assert_allclose(found["lower"], welch.confidence_interval().low)
+    np.testing.assert_allclose(found["upper"], welch.confidence_interval().high)
+    assert found.loc["toe-off", "direction"] == "B later than A"
+    assert found.loc["toe-off", "differs"]
+    # Corrected for five events: not below the p of each alone.
+    assert (found["p"] > stats.ttest_ind(b, a).pvalue - 0.01).all()
+
+
+def test_p_of_one_event_is_that_of_a_permutation_test():
+    events = K[["valley of the force"]]
+    found = compare_events(GAIT.data, events, **GIVEN, n_permutations=4999)
+    values = of_people()[:, [list(K).index("valley of the force")]][:, 0]
+    exact = stats.permutation_test(
+        (values[::2], values[1::2]),
+        lambda a, b: abs(a.mean() - b.mean()),
+        n_resamples=np.inf,
+        alternative="greater",
+    )
+    assert found["p"].iloc[0] == pytest.approx(exact.pvalue, abs=0.015)
+
+
+def test_the_level_holds_over_all_events():
+    """By chance 10 of 100 studies; more than 20 come in one of 2,000 series."""
+    rng, wrong = np.random.default_rng(0), 0
+    X = [np.zeros((101, 1)) for _ in range(12)]
+    for seed in range(100):
+        events = np.sort(rng.uniform(1, 99, (12, 4)))
+        given = {"level": 0.1, "n_permutations": 99, "random_state": seed}
+        wrong += compare_events(X, events, ["a", "b"] * 6, **given)["differs"].any()
+    assert wrong <= 20
+
+
+def test_a_table_in_seconds_without_groups():
+    names = pd.MultiIndex.from_arrays([GAIT.person, GAIT.cycle], names=["subject", "trial"])
+    trials = to_sequences(to_frame(GAIT.data, performances=names))
+    rows = (K.set_axis(names) / 100).rename_axis(columns="event").stack().rename("seconds")
+    found = compare_events(trials, rows.reset_index(), people=GAIT.person, frame_rate=100)
+    assert list(found) == ["mean", "sd", "n"]
+    np.testing.assert_allclose(found["mean"].loc[list(K)], of_people().mean(axis=0))
+    seconds = compare_events(trials, rows.reset_index(), unit="seconds", frame_rate=100)
+    np.testing.assert_allclose(seconds["mean"].loc[list(K)], K.mean() / 100)
+    frames = compare_events(trials, K.set_axis(names), unit="frames")
+    np.testing.assert_allclose(frames["mean"], K.mean())
+
+
+def test_events_in_attrs():
+    trials = [pd.DataFrame(x) for x in GAIT.data]
+    for x, row in zip(trials, GAIT.keyframes, strict=True):
+        x.attrs["events"] = [{"label": "Foot Off", "context": "Right", "frame": row[3]}]
+    found = compare_events(trials)
+    assert found.index.tolist() == [("Foot Off", "Right")]
+    assert found["mean"].iloc[0] == pytest.approx(SHARES[:, 3].mean())
+
+
+def test_pairs_and_a_covariate():
+    second = np.tile([0, 1], 16)
+    paired = compare_events(GAIT.data, K, second, people=GAIT.person, paired=True)
+    differences = SHARES[1::2] - SHARES[::2]
+    np.testing.assert_allclose(paired["size"], differences.mean(axis=0))
+    half = stats.t.ppf(0.975, 15) * stats.sem(differences)
+    np.testing.assert_allclose(paired["upper"], differences.mean(axis=0) + half)
+    speed = dict(zip(dict.fromkeys(GAIT.person), np.linspace(1, 2, 16), strict=True))
+    values = [speed[p] for p in GAIT.person]
+    found = compare_events(GAIT.data, K, covariate=values, people=GAIT.person)
+    slope = stats.linregress(np.linspace(1, 2, 16), of_people()[:, 3]).slope
+    assert found.loc["toe-off", "size"] == pytest.approx(slope)
+    assert "with the covariate" in found.loc["toe-off", "direction"]
+
+
+def test_events_that_some_trials_and_people_lack():
+    events = K.copy()
+    events.iloc[0, 3] = np.nan  # person 0 has another trial
+    events.iloc[2:4, 3] = np.nan  # person 1 has none
+    found = compare_events(GAIT.data, events, **GIVEN)
+    assert found.loc["toe-off", ["A n", "B n"]].tolist() == [8, 7]
+    assert found.loc["peak knee flexion", "B n"] == 8
+    values = SHARES.copy()
+    values[0, 3] = np.nan
+    values[2:4, 3] = np.nan
+    people = of_people(values)[:, 3]
+    assert found.loc["toe-off", "A mean"] == pytest.approx(people[::2].mean())
+    assert found.loc["toe-off", "B mean"] == pytest.approx(np.nanmean(people[1::2]))
+    welch = stats.ttest_ind(people[3::2], people[::2], equal_var=False).confidence_interval()
+    assert found.loc["toe-off", "lower"] == pytest.approx(welch.low)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"events": np.ones((3, 2))}, "events must be a list of 32 arrays"),
+        ({"events": K.iloc[:, ::-1]}, "key-frames must be 5 increasing frames"),
+        ({"unit": "hours"}, "unit must be one of"),
+        ({"unit": "seconds"}, "unit='seconds' needs frame_rate"),
+        ({"level": 0}, "level must be a number"),
+        ({"covariate": range(32)}, "Give either groups or a covariate"),
+        ({"groups": ["A"] * 30 + ["B"] * 2, "people": None, "events": K.iloc[:31].reindex(K.index)},
+         "'first force peak' is known in 1 people of group 'B', and at least 2 are needed"),
+    ],
+)  # fmt: skip
+def test_refused_arguments(given, message):
+    with pytest.raises(ValueError, match=message):
+        compare_events(GAIT.data, **({"events": K} | GIVEN | given))
