@@ -1,11 +1,16 @@
 """Whether `compare_groups` keeps its level, and what it finds, on made gait with known differences.
 
     python benchmarks/comparison.py [N_STUDIES [N_JOBS]]
+    python benchmarks/comparison.py level [N_STUDIES [N_JOBS [FOLDER]]]
 
 Studies of `make_gait` with two strides a person, all four signals. In null studies nothing differs;
 groups, pairs, or a covariate are drawn at random. Signals are scaled for the match and compared in
-their units, by 399 permutations at 5 %. Prints Markdown: per cent of the studies in which each
-answer is given. *Called* is what the clusters say, if shape and timing together differ.
+their units, by 399 permutations at 5 %. *Level* has null studies alone, 1000 by default: of 8 to 30
+people, one to four signals, and templates of group A alone; and of people drawn from the forces of
+a muscle in FOLDER, ../shared/data/nlreg1d, in groups at random. By 199 permutations.
+
+Prints Markdown: per cent of the studies in which each answer is given. *Called* is what the
+clusters say, if shape and timing together differ.
 """
 
 import os
@@ -15,6 +20,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -67,14 +73,70 @@ def study(seed, n_people, params, kind):
     gait = make_gait(n_people, 2, random_state=seed, **params)
     pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(gait.data)
     given = compared(gait, kind, np.random.default_rng(seed))
-    given |= {"people": gait.person, "signals": gait.data, "n_permutations": PERMUTATIONS}
+    given |= {"people": gait.person, "n_permutations": PERMUTATIONS}
     found = compare_groups(pipe, gait.data, **given, random_state=seed)
     differs = found.to_frame()["differs"].tolist()
     called = set(found.clusters["what"]) if differs[0] else set()
     return [*differs, "shape" in called, "timing" in called]
 
 
+def null_study(seed):
+    """Answers of each design, for a set in which nothing differs."""
+    warnings.simplefilter("ignore")
+    rng = np.random.default_rng(seed)
+    n_people, signals = rng.choice([8, 10, 14, 20, 30]), rng.permutation(4)[: rng.integers(1, 5)]
+    gait = make_gait(n_people, 2, random_state=seed)
+    data = [x[:, signals] for x in gait.data]
+    pipe = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P)).fit(data)
+    one = make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer(P))
+    one.fit([x for x, group in zip(data, gait.group, strict=True) if group == "A"])
+    rows = []
+    for kind in ("two", "three", "paired", "covariate", "within", "template of A"):
+        given = compared(gait, "two" if kind == "template of A" else kind, rng)
+        given |= {"people": gait.person, "n_permutations": 199, "random_state": seed}
+        found = compare_groups(one if kind == "template of A" else pipe, data, **given)
+        rows.append(found.to_frame()["differs"].tolist())
+    return rows
+
+
+def null_study_of_forces(seed, curves):
+    """The same of real curves, one a person."""
+    warnings.simplefilter("ignore")
+    rng = np.random.default_rng(seed)
+    n = rng.choice([8, 10, 14, 20, 30])
+    X = list(curves[rng.permutation(len(curves))[:n], :, np.newaxis])
+    sync, rows = DenseSynchronizer(P).fit(X), []
+    three, age = (np.arange(n) % 3).tolist(), rng.normal(size=n)
+    for given in ({"groups": ["A", "B"] * (n // 2)}, {"groups": three}, {"covariate": age}):
+        found = compare_groups(sync, X, **given, n_permutations=199, random_state=seed)
+        rows.append(found.to_frame()["differs"].tolist())
+    return rows
+
+
+def levels(n_studies, n_jobs, folder=None):
+    """Print how often each answer is given where nothing differs."""
+    kinds = ["two groups", "three groups", "paired", "covariate", "covariate within people"]
+    kinds.append("two groups, template of A alone")
+    found = Parallel(n_jobs)(delayed(null_study)(seed) for seed in range(n_studies))
+    rows = dict(zip(kinds, 100 * np.mean(found, axis=0), strict=True))
+    if folder is not None:
+        table = np.loadtxt(Path(folder) / "Besier2009-vastus.csv", delimiter=",")
+        work = (delayed(null_study_of_forces)(seed, table[:, 1:]) for seed in range(n_studies))
+        shares = 100 * np.mean(Parallel(n_jobs)(work), axis=0)
+        names = [f"forces, {kind}" for kind in ("two groups", "three groups", "covariate")]
+        rows |= dict(zip(names, shares, strict=True))
+    print(f"\n| nothing differs, {n_studies} studies | " + " | ".join(ANSWERS[:4]) + " |")
+    print("|---" * 5 + "|")
+    for name, shares in rows.items():
+        print(f"| {name} | " + " | ".join(f"{x:.1f}" for x in shares) + " |", flush=True)
+
+
 def main():
+    if sys.argv[1:2] == ["level"]:
+        given = [1000, 2, None]
+        given[: len(sys.argv) - 2] = sys.argv[2:]
+        levels(int(given[0]), int(given[1]), given[2])
+        return
     n_studies = int(sys.argv[1]) if len(sys.argv) > 1 else 400
     n_jobs = int(sys.argv[2]) if len(sys.argv) > 2 else 2
     for n_people in PEOPLE:

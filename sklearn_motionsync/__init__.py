@@ -29,6 +29,7 @@ from .online.stream import LivePhase
 from .online.synchronizer import OnlineSynchronizer
 from .online.tracker import MotionTracker
 from .recognition import ActionClassifier, synchronization_distances
+from .report.report import write_report
 from .segmentation.cycles import CycleSegmenter
 from .segmentation.search import find_performances
 from .segmentation.self_correlation import self_correlation
@@ -85,6 +86,7 @@ __all__ = [
     "synchronization_distances",
     "to_frame",
     "to_sequences",
+    "write_report",
 ]
 
 # The displays are named in ``display``; they can be imported from here, too.

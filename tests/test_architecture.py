@@ -20,6 +20,7 @@ FLOORS = [
     {"datasets", "model", "online"},
     {"comparison", "recognition", "segmentation"},
     {"display"},
+    {"report"},
 ]
 
 # Private names of scikit-learn that third parties rely on.

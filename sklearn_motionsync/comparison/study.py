@@ -60,7 +60,7 @@ class Study:
         """The study of groups or of a covariate."""
         if (groups is None) == (covariate is None):
             raise ValueError("Give either groups or a covariate.")
-        persons, _ = encode_groups(people, n, name="people", at_least=2)
+        persons, names = encode_groups(people, n, name="people", at_least=2)
         if covariate is not None:
             if paired:
                 raise ValueError("paired=True needs two groups, not a covariate.")
@@ -68,11 +68,11 @@ class Study:
         codes, labels = encode_groups(groups, n, at_least=2)
         labels = [str(label) for label in labels]
         if paired:
-            return cls._of_pairs(codes, labels, persons, people)
+            return cls._of_pairs(codes, labels, persons, None if people is None else names)
         for person in range(persons.max() + 1):
             if len(set(codes[persons == person])) > 1:
                 raise ValueError(
-                    f"people: {people[int(np.argmax(persons == person))]!r} has trials in several "
+                    f"people: {names[person]!r} has trials in several "
                     "groups. Set paired=True for two groups with the same people; otherwise each "
                     "person belongs to one group."
                 )
@@ -88,18 +88,18 @@ class Study:
         return cls(design, maker, of_units, None, labels, words)
 
     @classmethod
-    def _of_pairs(cls, codes, labels, persons, people):
+    def _of_pairs(cls, codes, labels, persons, names):
         """Differences between the second and the first group, person by person."""
-        if people is None or len(labels) != 2:
+        if names is None or len(labels) != 2:
             raise ValueError(
                 f"paired=True needs people and two groups, got {counted(len(labels), 'group')}"
-                f"{'' if people is not None else ' and no people'}."
+                f"{'' if names is not None else ' and no people'}."
             )
         makers = [_means(persons, codes == k) for k in (0, 1)]
         for maker, label in zip(makers, labels, strict=True):
             missing = np.flatnonzero(~maker.any(axis=1))
             if len(missing):
-                name = people[int(np.argmax(persons == missing[0]))]
+                name = names[missing[0]]
                 raise ValueError(
                     f"people: {name!r} has no trial in group {label!r}: leave them out."
                 )

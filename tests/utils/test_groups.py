@@ -1,6 +1,8 @@
 """Groups and classes: every public method that takes them encodes and refuses the same."""
 
 import inspect
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
@@ -22,6 +24,7 @@ from sklearn_motionsync import (
     find_performances,
     io,
     metrics,
+    write_report,
 )
 from sklearn_motionsync.display import (
     ActionModelDisplay,
@@ -42,6 +45,11 @@ BEFORE, AFTER, TIMES = [np.zeros((10, 1))] * N, np.zeros((N, 10, 1)), np.zeros((
 
 def first_of(labels):
     return next(iter(labels)) if hasattr(labels, "__iter__") else labels
+
+
+def report(**given):
+    with TemporaryDirectory() as folder:
+        write_report(Path(folder) / "report.html", SYNC, X, **given)
 
 
 # What each method does with groups of the N performances; whether it needs two of them.
@@ -82,6 +90,8 @@ METHODS = {
         lambda p: GroupDisplay.from_estimator(SYNC, X, people=p),
         False,
     ),
+    "write_report(groups)": (lambda g: report(groups=g), True),
+    "write_report(people)": (lambda p: report(people=p), False),
     "find_performances(groups)": (lambda g: find_performances(SYNC, X[0], groups=g), True),
     "ActionModelDisplay.from_estimator(groups)": (
         lambda g: ActionModelDisplay.from_estimator(PIPE, X, groups=g),
