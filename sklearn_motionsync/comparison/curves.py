@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import NamedTuple
 
 import numpy as np
+from sklearn.base import clone
 
 from ..inputs.collections import as_collection
 from ..inputs.facts import units_of_columns
@@ -12,10 +14,14 @@ from ..inputs.features import choose_features, names_of_features
 from ..inputs.numbers import check_finite
 from ..inputs.validation import read_collection
 from ..inputs.wording import counted
+from ..synchronizers.dense import DenseSynchronizer
 from ..synchronizers.match import Match, check_unit, match_of_times, rates_of
 from ..utils.pipelines import Routed, route_to_synchronizer
 
 __all__ = ["AlignedCurves"]
+
+# Features are left out of a match in so many parts.
+_MOST_PARTS = 8
 
 
 class AlignedCurves(NamedTuple):
@@ -85,6 +91,29 @@ class AlignedCurves(NamedTuple):
             clock *= np.median((np.array(lengths) - 1) / rates) / last
         even = match_of_times(np.tile(np.arange(last + 1.0), (n, 1)), n).warp(given)
         return cls(names, units, match.warp(given), even, offsets, clock, match, reached)
+
+    def offsets_of_others(self):
+        """Offsets of matches in which some features are left out, each in turn: at most 8 parts.
+
+        Yields
+        ------
+        ndarray, shape (n_sequences, P)
+            In frames. None with a single feature, or of other synchronizers than a
+            `DenseSynchronizer`.
+        """
+        reached = self.reached
+        sync, given = reached.synchronizer, reached.performances
+        n = given[0].shape[1]
+        if not isinstance(sync, DenseSynchronizer) or n < 2:
+            return
+        # Confidences belong to all features.
+        params = {k: v for k, v in reached.params.items() if k in ("keyframes", "frame_rate")}
+        for out in np.array_split(np.arange(n), min(n, _MOST_PARTS)):
+            others = [np.delete(x, out, axis=1) for x in given]
+            one = clone(sync).set_params(pattern=np.delete(sync.pattern_, out, axis=1), verbose=0)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                yield one.fit(others, **params).match(others, **params).offsets
 
 
 def _signals(X, reached, signals, features):

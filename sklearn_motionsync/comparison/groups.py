@@ -19,6 +19,9 @@ from .study import Study
 
 __all__ = ["GroupComparison", "compare_groups"]
 
+# A difference in timing that is left, as a share, whichever signal is left out of the match.
+_REMAINS = 0.5
+
 # -- the result ----------------------------------------------------------------------------
 
 
@@ -98,9 +101,10 @@ class GroupComparison:
         str
             What was compared, whether it differs, and three p-values.
         """
-        found = self.clusters["what"].unique().tolist() if self.p_joint <= self.level else []
+        found = self.clusters["what"].unique().tolist()
+        none = "they differ, in shape or in timing" if self.p_joint <= self.level else ""
         answer = {
-            (): "no difference is found",
+            (): none or "no difference is found",
             ("shape",): "they differ in shape",
             ("timing",): "they differ in timing",
         }.get(tuple(sorted(found)), "they differ in shape and timing")
@@ -198,10 +202,15 @@ def compare_groups(
     3. The largest value over all frames and features, in each permutation, gives p of shape; over
        all frames of the offset, p of timing. The smaller of both, in each permutation, gives the
        joint p (Tippett). Clusters are corrected by it.
+    4. A warp may take a difference in the shape of one signal for timing. Timing is what signals
+       share: a cluster of timing counts if at least half of it is left whichever signal is left out
+       of the match (of more than eight, an eighth of them), by a fit of `DenseSynchronizer` without
+       it. Otherwise it is left out of the table. ``p_timing`` is of the offsets as they are.
 
-    Frames at which nothing varies do not count, such as both ends of the offset.
-    Offsets depend on the features that were matched. A difference in the shape of all
-    of them may move warps, and one in timing that no warp can follow stays in the curves.
+    Frames at which nothing varies do not count, such as both ends of the offset. A single signal
+    leaves open what is shape and what is timing: a warp explains what it can. A difference in the
+    shape of all signals may move warps, and one in timing that no warp can follow stays in the
+    curves.
 
     Examples
     --------
@@ -236,6 +245,9 @@ def compare_groups(
         *_clusters("shape", shape, curves, aligned.names, aligned.units, study, least, level),
         *_clusters("timing", timing, offsets, ["offset"], [UNITS[unit]], study, least, level),
     ]
+    rows = [
+        row for row, is_sure in zip(rows, _confirm(rows, aligned, study), strict=True) if is_sure
+    ]
     table = pd.DataFrame(rows, columns=_COLUMNS).sort_values("p", kind="stable", ignore_index=True)
     for name in ("start", "end", "peak"):
         table[name] = aligned.clock[table[name].to_numpy(dtype=int)]
@@ -267,3 +279,22 @@ def _clusters(what, family, values, names, units, study, least, level):
             peak = first + int(np.abs(family.found[here, k]).argmax())
             size = study.size(values[:, here, k].mean(axis=1), what)
             yield [what, feature, first, end - 1, peak, p[here, k].min(), *size, units[k]]
+
+
+def _confirm(rows, aligned, study):
+    """Whether each stretch is what it is called: timing must not hinge on one signal."""
+    confirmed = np.ones(len(rows), dtype=bool)
+    timing = [i for i, row in enumerate(rows) if row[0] == "timing"]
+    if not timing:
+        return confirmed
+    stretches = [slice(rows[i][2], rows[i][3] + 1) for i in timing]
+
+    def effects(offsets):
+        units = study.units(offsets)
+        return [study.design.rows.T @ units[:, here].mean(axis=1) for here in stretches]
+
+    whole = effects(aligned.match.offsets)
+    for offsets in aligned.offsets_of_others():
+        for i, own, others in zip(timing, whole, effects(offsets), strict=True):
+            confirmed[i] &= others @ own >= _REMAINS * (own @ own)
+    return confirmed

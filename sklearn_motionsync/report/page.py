@@ -116,7 +116,7 @@ def table_of(table, caption, by_row=()):
 
 def _texts(column, by_row):
     if column.dtype.kind == "b":
-        return ["yes" if value else "" for value in column]
+        return ["yes" if value else "no" for value in column]
     if column.dtype.kind != "f":
         return [str(value) for value in column]
     largest = None if by_row else column.abs().max()

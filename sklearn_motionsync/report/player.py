@@ -3,6 +3,7 @@
 import base64
 
 import numpy as np
+from sklearn.pipeline import make_pipeline
 
 from ..body.base import PositionsTransformer
 from ..display.arguments import as_performances
@@ -16,9 +17,9 @@ from ..display.bodies import (
 from ..display.drawing import COLORS
 from ..inputs.wording import counted
 from ..synchronizers.match import match_of_times
-from ..utils.pipelines import find_synchronizer, flat_steps, union_transformers
+from ..utils.pipelines import find_synchronizer, flat_steps, transform_through, union_transformers
 
-__all__ = ["player_of", "skeleton_of"]
+__all__ = ["bodies_of", "player_of"]
 
 # Coordinates that a report holds, at most, of two bytes each: 4 MB of text. And frames a trial that
 # a movement needs at least; where these are too many, there are fewer trials.
@@ -29,12 +30,27 @@ _LARGEST, _MISSING = 32767, -32768
 _UNKNOWN = 4.0
 
 
-def skeleton_of(estimator):
-    """The skeleton of the joint positions that a pipeline takes; None if it takes others."""
-    before, _ = find_synchronizer(estimator)
+def bodies_of(estimator, X, params):
+    """The joint positions that reach the first step with a skeleton, and that; else X and None.
+
+    Parameters
+    ----------
+    estimator : synchronizer, or Pipeline with one
+    X : performances, as the estimator takes them
+    params : dict
+        As for `transform_through`.
+    """
+    before, synchronizer = find_synchronizer(estimator)
     steps = [] if before is None else flat_steps(before)
-    parts = (part for step in steps for part in union_transformers(step))
-    return next((part.skeleton for part in parts if isinstance(part, PositionsTransformer)), None)
+    for k, step in enumerate(steps):
+        for part in union_transformers(step):
+            if isinstance(part, PositionsTransformer):
+                earlier = make_pipeline(*steps[:k]) if k else None
+                # Later ones take the other params.
+                also = [*(later.transform for later in steps[k:]), synchronizer.match]
+                X = transform_through(earlier, X, params, "write_report", also=also)
+                return X, part.skeleton
+    return X, None
 
 
 def player_of(trials, X, skeleton):

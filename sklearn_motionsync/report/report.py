@@ -31,7 +31,7 @@ from ..synchronizers.match import UNITS
 from ..utils.pipelines import flat_steps
 from .figures import draw_offsets, draw_signals, own_figures
 from .page import Page, list_of, number, paragraph, picture, read_part, table_of
-from .player import player_of, skeleton_of
+from .player import bodies_of, player_of
 from .tables import TrialSet, as_text
 
 __all__ = ["write_report"]
@@ -169,9 +169,11 @@ def write_report(
         if found is not None:
             _add_test(page, found, figure, groups is not None)
         _add_doubtful(page, trials)
-        skeleton = skeleton_of(estimator) if skeleton is None else skeleton
+        bodies = X
+        if skeleton is None:
+            bodies, skeleton = bodies_of(estimator, X, params)
         if skeleton is not None:
-            page.player, note = player_of(trials, X, skeleton)
+            page.player, note = player_of(trials, bodies, skeleton)
             page.add("Stick figures", read_part("player.html"), paragraph(note))
     # The version is known once the package is imported.
     from .. import __version__
@@ -290,8 +292,10 @@ def _add_test(page, found, figure, is_of_groups):
     shown["size"] = [
         f"{number(size)} {unit}" for size, unit in zip(sizes[:, 0], clusters["unit"], strict=True)
     ]
-    shown["interval of 95 %"] = [f"{number(low)} to {number(high)}" for low, high in sizes[:, 1:]]
-    shown["p"] = clusters["p"]
+    shown["interval of 95\u00a0%"] = [
+        f"{number(low)} to {number(high)}" for low, high in sizes[:, 1:]
+    ]
+    shown["p"] = clusters["p"].map("{:.3f}".format)
     p_values = found.to_frame().reset_index()
     none = "" if len(clusters) else f"No stretch of frames differs at p = {found.level:g}."
     page.add(
@@ -300,7 +304,10 @@ def _add_test(page, found, figure, is_of_groups):
         picture(figure, f"Means, bands, and where they differ. {found.describe()}"),
         table_of(shown, "Where they differ"),
         paragraph(none),
-        table_of(p_values, "Probability of such differences by chance"),
+        table_of(
+            p_values.assign(p=p_values["p"].map("{:.3f}".format)),
+            "Probability of such differences by chance",
+        ),
         paragraph(
             "Joint is the test of shape and timing together. Linear is the test of time-normalised "
             "curves, which does not tell them apart."

@@ -7,6 +7,7 @@ import os
 import re
 import sys
 from html.parser import HTMLParser
+from operator import itemgetter
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -223,6 +224,18 @@ def test_bodies_have_a_player(tmp_path):
     drawn = [np.linalg.norm(points[:, a] - points[:, b], axis=1) for a, b in bones]
     assert min(np.abs(own - lengths).max() for own in drawn) < 1e-3
     assert points[..., 1].min() == pytest.approx(0, abs=1e-3)
+
+
+def test_bodies_are_those_that_reach_the_step_with_a_skeleton(tmp_path):
+    wide = [np.hstack([x[:, :2], x]) for x in BENDING.data]
+    chosen = FrameWise(FunctionTransformer(itemgetter((slice(None), slice(2, None)))))
+    steps = DirectionCosines(BENDING.skeleton), DenseSynchronizer(30)
+    keyframes = [[len(x) // 2] for x in wide]
+    pipe = make_pipeline(chosen, *steps).fit(wide, densesynchronizer__keyframes=keyframes)
+    page = Text(write_report(tmp_path / "a.html", pipe, wide, keyframes=keyframes))
+    plain = make_pipeline(*steps).fit(BENDING.data)
+    expected = Text(write_report(tmp_path / "b.html", plain, BENDING.data))
+    assert page.data["player"]["positions"] == expected.data["player"]["positions"]
 
 
 def test_a_player_without_bones_and_with_gaps(tmp_path):
