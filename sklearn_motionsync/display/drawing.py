@@ -16,6 +16,7 @@ __all__ = [
     "panels",
     "parts_outside",
     "pyplot",
+    "signal_panels",
     "stage",
 ]
 
@@ -98,6 +99,32 @@ def panels(ax, cells, n_rows, n_cols, size, drawn=()):
     axes[0].set_axis_off()
     grid = axes[0].get_subplotspec().subgridspec(n_rows, n_cols)
     return figure, [figure.add_subplot(grid[cell]) for cell in cells]
+
+
+def signal_panels(ax, count, more=0.0):
+    """Panels of signals, two in a row if there are three or more, above a wide one of their timing.
+
+    Parameters
+    ----------
+    ax : None, Axes, or array-like of Axes
+        As of `panels`.
+    count : int
+        Of the signals.
+    more : float, default=0.0
+        Height in inches beside that of the panels.
+
+    Returns
+    -------
+    figure : Figure or SubFigure
+    axes : list of Axes
+    upper : list of Axes
+        Those in the first row.
+    """
+    n_cols = 1 if count < 3 else 2
+    n_rows = -(-count // n_cols)
+    cells = [divmod(i, n_cols) for i in range(count)] + [(n_rows, slice(None))]
+    figure, axes = panels(ax, cells, n_rows + 1, n_cols, (WIDTH, 1.9 * (n_rows + 1) + more))
+    return figure, axes, axes[:n_cols]
 
 
 def stage(axis, title, low, high):

@@ -24,7 +24,7 @@ from ..inputs.types import (
 )
 from ..synchronizers.match import UNITS, check_coverage
 from .arguments import AxesLike, labels_of_signals
-from .drawing import WIDTH, curves, front_line, group_styles, legend_above, panels
+from .drawing import curves, front_line, group_styles, legend_above, signal_panels
 from .keyframes import draw_keyframes, text_of_keyframe
 from .time_axis import TimeAxis
 
@@ -295,13 +295,8 @@ class GroupDisplay:
         GroupDisplay
             The display itself.
         """
-        count = len(self.ylabels)
-        n_cols = 1 if count < 3 else 2
-        n_rows = -(-count // n_cols)
-        cells = [divmod(i, n_cols) for i in range(count)] + [(n_rows, slice(None))]
-        more = 0.2 * max(len(self.labels) - 2, 0) + 0.5 * (self.events is not None)
-        size = (WIDTH, 1.9 * (n_rows + 1) + 0.6 + more)
-        self.figure_, self.axes_ = panels(ax, cells, n_rows + 1, n_cols, size)
+        more = 0.6 + 0.2 * max(len(self.labels) - 2, 0) + 0.5 * (self.events is not None)
+        self.figure_, self.axes_, top = signal_panels(ax, len(self.ylabels), more)
         self.means_, self.bands_, self.trials_ = [], [], []
         self.dots_, self.clusters_, self.events_ = [], [], []
         styles = list(group_styles(self.labels).values())
@@ -329,7 +324,7 @@ class GroupDisplay:
             labels.append(f"differs, p at most {self.level:g}")
         title = _STATISTICS[self.statistic].format(whom=self.whom, share=100 * self.coverage)
         title += f"; {self.note}" if self.note else ""
-        legend_above(above, handles, labels, title, below=self.axes_[:n_cols], n_cols=1)
+        legend_above(above, handles, labels, title, below=top, n_cols=1)
         return self
 
     def _draw_trials(self, axis, i, styles):

@@ -12,7 +12,7 @@ from ..inputs.features import choose_features
 from ..inputs.types import Features, PerformanceLike, Unit, ValuesLike
 from ..inputs.wording import counted
 from .arguments import AxesLike, labels_of_signals
-from .drawing import COLORS, WIDTH, curves, front_line, legend_above, panels, parts_outside
+from .drawing import COLORS, curves, front_line, legend_above, parts_outside, signal_panels
 from .time_axis import TimeAxis
 
 __all__ = ["NormDisplay"]
@@ -196,12 +196,7 @@ class NormDisplay:
         NormDisplay
             The display itself.
         """
-        count = len(self.labels) - 1
-        n_cols = 1 if count < 3 else 2
-        n_rows = -(-count // n_cols)
-        cells = [divmod(i, n_cols) for i in range(count)] + [(n_rows, slice(None))]
-        size = (WIDTH, 1.9 * (n_rows + 1) + 1.0)
-        self.figure_, self.axes_ = panels(ax, cells, n_rows + 1, n_cols, size)
+        self.figure_, self.axes_, top = signal_panels(ax, len(self.labels) - 1, 1.0)
         self.subject_, self.mean_, self.bands_ = [], [], []
         self.spread_, self.departures_ = [], []
         clock = self._axis.clock
@@ -229,6 +224,5 @@ class NormDisplay:
         if any(len(lines.get_segments()) for lines in self.departures_):
             handles.insert(1, self.departures_[0])
             labels.insert(1, "departs")
-        below = self.axes_[:n_cols]
-        legend_above(self.axes_[:-1], handles, labels, self.title, below=below, n_cols=1)
+        legend_above(self.axes_[:-1], handles, labels, self.title, below=top, n_cols=1)
         return self
