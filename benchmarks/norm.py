@@ -1,12 +1,19 @@
 """How many patients `compare_to_norm` finds, and how many people of the norm it calls different.
 
     python benchmarks/norm.py [N_NORMS [N_JOBS]]
+    python benchmarks/norm.py people FOLDER
 
 Norms of `make_gait`: 18 people with 53 strides, or 10 with 30. Twelve new people of each kind, with
 one stride or three: normal; late, toe-off 3 or 5 % of the cycle later; weak, knee flexion 15 or 20
 degrees less in swing, or a force that is 15 % less. Prints Markdown: per cent of them that differ,
 at a level of 10 and of 5 %; how many are called shape and timing at 10 %; the largest and the mean
 number of rows of departures, of those that have some.
+
+*People*: exercises of UI-PRMD in FOLDER, such as ../shared/data. The norm are the right repetitions
+of nine people; new is the tenth, by one, five or ten repetitions drawn at random: done right, done
+wrong, and the right ones made 5 and 10 % late. Those of people who use the other side are mirrored.
+Compared are the dimensions of an aSpace of limb directions. Prints per cent that differ at a level
+of 10 %, by exercise.
 """
 
 import os
@@ -16,12 +23,21 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn_motionsync import DenseSynchronizer, FrameWise, compare_to_norm
+from sklearn_motionsync import (
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    FrameWise,
+    Skeleton,
+    compare_to_norm,
+    mirror,
+)
 from sklearn_motionsync.datasets import make_gait
 
 P, NEW = 101, 12
@@ -66,7 +82,85 @@ def study(seed, n_people, n_strides, n_cycles):
     return rows
 
 
+LANDMARKS = {
+    "pelvis": ("LASI", "RASI", "LPSI", "RPSI"),
+    "neck": ("C7", "CLAV"),
+    "head": ("LFHD", "RFHD", "LBHD", "RBHD"),
+    **{f"{side}_{joint}": tuple(letter + name for name in names)
+       for side, letter in (("left", "L"), ("right", "R"))
+       for joint, names in {
+           "shoulder": ("SHO",), "elbow": ("ELB",), "wrist": ("WRA", "WRB"),
+           "hip": ("ASI", "PSI"), "knee": ("KNE",), "ankle": ("ANK",),
+       }.items()},
+}  # fmt: skip
+
+
+# People who use the other side.
+OTHER_SIDE = {
+    "inline lunge": ("s02", "s07", "s10"),
+    "shoulder abduction": ("s07", "s10"),
+    "shoulder rotation": ("s07", "s10"),
+}
+
+
+def made_late(x, largest):
+    """A trial whose middle is later by a share of its time."""
+    t = np.linspace(0, 1, len(x))
+    moments = t - largest * np.sin(np.pi * t) ** 2
+    return np.stack([np.interp(moments, t, column) for column in x.T], axis=1)
+
+
+def exercises(folder):
+    """Name, postures, people, and whether it is right, of each exercise."""
+    with np.load(Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz") as file:
+        joints, parents = file["joints"].tolist(), file["parents"].tolist()
+        skeleton = Skeleton(joints, parents, landmarks=LANDMARKS, up="z")
+        x = file["positions"].reshape(len(file["positions"]), -1).astype(float)
+        trials = np.split(x, file["offsets"][1:-1])
+        pairs = zip(file["label"], file["actor"], strict=True)
+        other = [i for i, (name, actor) in enumerate(pairs) if actor in OTHER_SIDE.get(name, ())]
+        for i, turned in zip(other, mirror([trials[i] for i in other], skeleton), strict=True):
+            trials[i] = np.asarray(turned)
+        trials = DirectionCosines(skeleton).fit_transform(trials)
+        for name in np.unique(file["label"]):
+            own = np.flatnonzero(file["label"] == name)
+            yield name, [trials[i] for i in own], file["actor"][own], file["correct"][own]
+
+
+def people(folder):
+    warnings.simplefilter("ignore")
+    kinds = ("right", "5 % late", "10 % late", "wrong")
+    counts, rng = (1, 5, 10), np.random.default_rng(0)
+    rows = {}
+    for name, trials, actors, right in exercises(folder):
+        rows[name] = np.zeros((len(counts), len(kinds)))
+        for actor in np.unique(actors):
+            norm = np.flatnonzero((actors != actor) & right)
+            whose = actors == actor
+            good, bad = (rng.permutation(np.flatnonzero(whose & (right == k))) for k in (1, 0))
+            pipe = make_pipeline(ASpace(0.95), DenseSynchronizer(P)).fit([trials[i] for i in norm])
+            for k, count in enumerate(counts):
+                own = [trials[i] for i in good[:count]]
+                late = [[made_late(x, share) for x in own] for share in (0.05, 0.1)]
+                new = [own, *late, [trials[i] for i in bad[:count]]]
+                X = [trials[i] for i in norm] + [x for some in new for x in some]
+                kind = [name for name, some in zip(kinds, new, strict=True) for _ in some]
+                given = {"norm": "norm", "people": actors[norm].tolist() + kind, "level": 0.1}
+                found = compare_to_norm(pipe, X, ["norm"] * len(norm) + kind, **given)
+                rows[name][k] += found.verdicts["differs"].reindex(kinds).to_numpy(dtype=float)
+        rows[name] *= 100 / len(np.unique(actors))
+    rows["all"] = np.mean(list(rows.values()), axis=0)
+    for k, count in enumerate(counts):
+        print(f"\n| {count} repetition(s) | " + " | ".join(kinds) + " |")
+        print("|---" * (1 + len(kinds)) + "|")
+        for name, shares in rows.items():
+            print(f"| {name} | " + " | ".join(f"{x:.0f}" for x in shares[k]) + " |", flush=True)
+
+
 def main():
+    if sys.argv[1:2] == ["people"]:
+        people(sys.argv[2])
+        return
     n_norms = int(sys.argv[1]) if len(sys.argv) > 1 else 40
     n_jobs = int(sys.argv[2]) if len(sys.argv) > 2 else 2
     for n_people, n_strides in ((18, 53), (10, 30)):

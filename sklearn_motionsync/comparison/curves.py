@@ -39,6 +39,8 @@ class AlignedCurves(NamedTuple):
         In the unit of time.
     clock : ndarray, shape (P,)
         The times of the frames of the template, in the unit of time.
+    unit : str
+        Of time.
     match : Match
     reached : Routed
         The synchronizer, and the performances that reach it.
@@ -50,6 +52,7 @@ class AlignedCurves(NamedTuple):
     even: np.ndarray
     offsets: np.ndarray
     clock: np.ndarray
+    unit: str
     match: Match
     reached: Routed
 
@@ -78,7 +81,8 @@ class AlignedCurves(NamedTuple):
         """
         check_unit(unit)
         reached = route_to_synchronizer(estimator, X, params, caller)
-        lengths = [len(x) for x in reached.performances]
+        # As recorded: steps before the synchronizer may resample.
+        lengths = [len(x) for x in as_collection(X) or reached.performances]
         rates = rates_of(X, frame_rate, unit)
         names, units, given = _signals(X, reached, signals, features)
         match, n = reached.match(), len(lengths)
@@ -90,7 +94,7 @@ class AlignedCurves(NamedTuple):
         elif unit == "seconds":
             clock *= np.median((np.array(lengths) - 1) / rates) / last
         even = match_of_times(np.tile(np.arange(last + 1.0), (n, 1)), n).warp(given)
-        return cls(names, units, match.warp(given), even, offsets, clock, match, reached)
+        return cls(names, units, match.warp(given), even, offsets, clock, unit, match, reached)
 
     def offsets_of_others(self):
         """Offsets of matches in which some features are left out, each in turn: at most 8 parts.
@@ -98,8 +102,8 @@ class AlignedCurves(NamedTuple):
         Yields
         ------
         ndarray, shape (n_sequences, P)
-            In frames. None with a single feature, or of other synchronizers than a
-            `DenseSynchronizer`.
+            In frames. Nothing with a single feature, of other synchronizers than a
+            `DenseSynchronizer`, or where the features that are left support no warps.
         """
         reached = self.reached
         sync, given = reached.synchronizer, reached.performances
@@ -113,7 +117,9 @@ class AlignedCurves(NamedTuple):
             one = clone(sync).set_params(pattern=np.delete(sync.pattern_, out, axis=1), verbose=0)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                yield one.fit(others, **params).match(others, **params).offsets
+                offsets = one.fit(others, **params).match(others, **params).offsets
+            if offsets.any():
+                yield offsets
 
 
 def _signals(X, reached, signals, features):

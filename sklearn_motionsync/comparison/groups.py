@@ -17,7 +17,7 @@ from .curves import AlignedCurves
 from .permutation import check_test, families, share_at_most
 from .study import Study
 
-__all__ = ["GroupComparison", "compare_groups"]
+__all__ = ["GroupComparison", "compare_aligned", "compare_groups"]
 
 # A difference in timing that is left, as a share, whichever signal is left out of the match.
 _REMAINS = 0.5
@@ -191,6 +191,8 @@ def compare_groups(
 
     See Also
     --------
+    compare_events : Tests when events happen.
+    compare_to_norm : Tells of single subjects.
     TimingChannel : Curves and offsets for a test or a model of your own.
 
     Notes
@@ -205,7 +207,8 @@ def compare_groups(
     4. A warp may take a difference in the shape of one signal for timing. Timing is what signals
        share: a cluster of timing counts if at least half of it is left whichever signal is left out
        of the match (of more than eight, an eighth of them), by a fit of `DenseSynchronizer` without
-       it. Otherwise it is left out of the table. ``p_timing`` is of the offsets as they are.
+       it. Signals that support no warps, such as a constant, tell nothing. Otherwise the cluster is
+       left out of the table. ``p_timing`` is of the offsets as they are.
 
     Frames at which nothing varies do not count, such as both ends of the offset. A single signal
     leaves open what is shape and what is timing: a warp explains what it can. A difference in the
@@ -229,6 +232,25 @@ def compare_groups(
     check_test(level, n_permutations)
     given = {"signals": signals, "features": features, "unit": unit, "frame_rate": frame_rate}
     aligned = AlignedCurves.of(estimator, X, params, "compare_groups", **given)
+    design = {"covariate": covariate, "people": people, "paired": paired}
+    how = {"n_permutations": n_permutations, "random_state": random_state, "n_jobs": n_jobs}
+    return compare_aligned(aligned, groups, **design, level=level, **how, verbose=verbose)
+
+
+def compare_aligned(
+    aligned,
+    groups,
+    *,
+    covariate=None,
+    people=None,
+    paired=False,
+    level=0.05,
+    n_permutations=1999,
+    random_state=0,
+    n_jobs=None,
+    verbose=0,
+):
+    """The comparison of performances that are matched already: `AlignedCurves`."""
     study = Study.of(groups, covariate, people, paired, len(aligned.curves))
     values = aligned.curves, aligned.offsets[:, :, np.newaxis], aligned.even
     curves, offsets, even = map(study.units, values)
@@ -243,7 +265,9 @@ def compare_groups(
     least = np.minimum(shape.ranks, timing.ranks)
     rows = [
         *_clusters("shape", shape, curves, aligned.names, aligned.units, study, least, level),
-        *_clusters("timing", timing, offsets, ["offset"], [UNITS[unit]], study, least, level),
+        *_clusters(
+            "timing", timing, offsets, ["offset"], [UNITS[aligned.unit]], study, least, level
+        ),
     ]
     rows = [
         row for row, is_sure in zip(rows, _confirm(rows, aligned, study), strict=True) if is_sure
@@ -260,7 +284,7 @@ def compare_groups(
         n_units=len(study.maker),
         level=float(level),
         design=study.words,
-        unit=unit,
+        unit=aligned.unit,
     )
 
 

@@ -261,7 +261,7 @@ def compare_to_norm(
         profile=_profile(curves, of_norm, aligned, study, names, units, verdicts.index),
         level=float(level),
         n_people=len(of_norm),
-        unit=unit,
+        unit=aligned.unit,
         clock=aligned.clock,
         features=names,
         units=units,

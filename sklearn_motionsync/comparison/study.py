@@ -83,7 +83,8 @@ class Study:
             of = ", ".join(f"{c} in {name!r}" for c, name in zip(counts, labels, strict=True))
             raise ValueError(f"At least two people a group are needed, got {of}.")
         columns = (of_units[:, np.newaxis] == np.arange(1, len(labels))).astype(float)
-        words = f"{' and '.join(labels)}, {counted(len(of_units), 'unit')}"
+        listed = f"{', '.join(labels[:-1])} and {labels[-1]}"
+        words = f"{listed}, {counted(len(of_units), 'unit')}"
         design = Design(columns - columns.mean(axis=0))
         return cls(design, maker, of_units, None, labels, words)
 

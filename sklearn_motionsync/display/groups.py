@@ -22,13 +22,13 @@ from ..inputs.types import (
     Unit,
     ValuesLike,
 )
-from ..synchronizers.match import UNITS, check_coverage
+from ..synchronizers.match import check_coverage
 from .arguments import AxesLike, labels_of_signals
 from .drawing import curves, front_line, group_styles, legend_above, signal_panels
 from .keyframes import draw_keyframes, text_of_keyframe
-from .time_axis import TimeAxis
+from .time_axis import TimeAxis, clock_rate, offset_label
 
-__all__ = ["GroupDisplay"]
+__all__ = ["GroupDisplay", "display_of_groups"]
 
 # Signals that are shown when none are named; of more, the first few.
 _MOST = 6
@@ -245,41 +245,10 @@ class GroupDisplay:
             )
         given = {"signals": signals, "features": features, "unit": unit, "frame_rate": frame_rate}
         aligned = AlignedCurves.of(estimator, X, params, f"{cls.__name__}.from_estimator", **given)
-        n, names, note = len(aligned.curves), aligned.names, ""
-        chosen = list(range(len(names)))
-        if features is None and len(names) > _MOST:
-            chosen = choose_features(None, names)
-            note = f"{len(chosen)} of {len(names)} signals"
-        names = [names[i] for i in chosen]
-        clusters = None if comparison is None else comparison.clusters
-        if clusters is not None:
-            more = clusters[(clusters["what"] == "shape") & ~clusters["feature"].isin(names)]
-            if len(more):
-                note += f"{', ' if note else ''}differences also in "
-                note += ", ".join(dict.fromkeys(more["feature"]))
-        default = dict(zip(aligned.names, aligned.units, strict=True))
-        ylabels = labels_of_signals(names, default, ylabel, units)
-        of_people = GroupsOfPeople.of(groups, people, n)
-        shown = aligned.curves[:, :, chosen]
-        display = cls(
-            of_people.means(shown),
-            of_people.means(aligned.offsets),
-            of_people.describe(people is not None),
-            ylabels=ylabels,
-            feature_names=names,
-            statistic=statistic,
-            coverage=coverage,
-            whom="trials" if people is None else "people",
-            trials=[shown[maker.any(axis=0)] for maker in of_people.makers] if trials else None,
-            events=_events_on_clock(events, params, aligned, of_people),
-            clusters=clusters,
-            level=0.05 if comparison is None else comparison.level,
-            note=note,
-            pairs=people is not None and of_people.are_pairs,
-            unit=unit,
-            frame_rate=(len(aligned.clock) - 1) / aligned.clock[-1] if unit == "seconds" else None,
-        )
-        return display.plot(ax)
+        how = {"statistic": statistic, "coverage": coverage, "trials": trials, "events": events}
+        labels = {"features": features, "ylabel": ylabel, "units": units}
+        given = display_of_groups(aligned, groups, people, comparison, params, **how, **labels)
+        return given.plot(ax)
 
     def plot(self, ax: AxesLike | None = None) -> Self:
         """Draw.
@@ -308,7 +277,7 @@ class GroupDisplay:
             axis.set_ylabel(label)
         timing.axhline(0, color="0.6", linewidth=0.8, zorder=0)
         self._draw_groups(timing, self.offsets, styles)
-        timing.set_ylabel(f"offset ({UNITS[self.unit]}),\nlater is above")
+        timing.set_ylabel(offset_label(self.unit))
         timing.set_xlabel(self._axis.label)
         clock = self._axis.clock
         for axis in self.axes_:
@@ -382,7 +351,7 @@ class GroupDisplay:
             return self.events.mean().to_numpy()
         if self.clusters is not None and len(found := self._clusters_of("timing")):
             clock = self._axis.clock
-            return found["peak"].to_numpy() / clock[-1] * (len(clock) - 1)
+            return found["peak"].to_numpy() * clock_rate(clock)
         return np.array([np.concatenate(self.offsets).var(axis=0).argmax()], dtype=float)
 
     def _clusters_of(self, what, feature=None):
@@ -402,6 +371,61 @@ class GroupDisplay:
             lines = LineCollection(bars, transform=axis.get_xaxis_transform(), **style)
             self.clusters_.append(axis.add_collection(lines, autolim=False))
         return [lines for lines in self.clusters_ if len(lines.get_segments())]
+
+
+def display_of_groups(
+    aligned,
+    groups,
+    people,
+    comparison,
+    params,
+    *,
+    features=None,
+    statistic="sd",
+    coverage=0.95,
+    trials=False,
+    events=None,
+    ylabel=None,
+    units=None,
+):
+    """The display of performances that are matched already: `AlignedCurves` of ``features``.
+
+    The others are those of `GroupDisplay.from_estimator`.
+    """
+    n, names, note = len(aligned.curves), aligned.names, ""
+    chosen = list(range(len(names)))
+    if features is None and len(names) > _MOST:
+        chosen = choose_features(None, names)
+        note = f"{len(chosen)} of {len(names)} signals"
+    names = [names[i] for i in chosen]
+    clusters = None if comparison is None else comparison.clusters
+    if clusters is not None:
+        more = clusters[(clusters["what"] == "shape") & ~clusters["feature"].isin(names)]
+        if len(more):
+            note += f"{', ' if note else ''}differences also in "
+            note += ", ".join(dict.fromkeys(more["feature"]))
+    default = dict(zip(aligned.names, aligned.units, strict=True))
+    ylabels = labels_of_signals(names, default, ylabel, units)
+    of_people = GroupsOfPeople.of(groups, people, n)
+    shown = aligned.curves[:, :, chosen]
+    return GroupDisplay(
+        of_people.means(shown),
+        of_people.means(aligned.offsets),
+        of_people.describe(people is not None),
+        ylabels=ylabels,
+        feature_names=names,
+        statistic=statistic,
+        coverage=coverage,
+        whom="trials" if people is None else "people",
+        trials=[shown[maker.any(axis=0)] for maker in of_people.makers] if trials else None,
+        events=_events_on_clock(events, params, aligned, of_people),
+        clusters=clusters,
+        level=0.05 if comparison is None else comparison.level,
+        note=note,
+        pairs=people is not None and of_people.are_pairs,
+        unit=aligned.unit,
+        frame_rate=clock_rate(aligned.clock),
+    )
 
 
 def _events_on_clock(events, params, aligned, of_people):

@@ -27,7 +27,7 @@ from .drawing import (
     parts_outside,
 )
 from .keyframes import check_pattern_keyframes, draw_keyframes, keyframes_of_estimator
-from .time_axis import TimeAxis
+from .time_axis import TimeAxis, clock_rate
 
 __all__ = ["ActionModelDisplay"]
 
@@ -258,7 +258,7 @@ class ActionModelDisplay:
         if unit == "seconds" and X is not None:
             rates = rates_of(X, frame_rate)
             clock = TimeAxis(unit, mean.shape[-2], _lengths(X), rates).clock
-            frame_rate = (len(clock) - 1) / clock[-1]
+            frame_rate = clock_rate(clock)
         display = cls(
             mean[..., chosen],
             lower[..., chosen],

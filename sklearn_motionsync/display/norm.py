@@ -13,7 +13,7 @@ from ..inputs.types import Features, PerformanceLike, Unit, ValuesLike
 from ..inputs.wording import counted
 from .arguments import AxesLike, labels_of_signals
 from .drawing import COLORS, curves, front_line, legend_above, parts_outside, signal_panels
-from .time_axis import TimeAxis
+from .time_axis import TimeAxis, clock_rate, offset_label
 
 __all__ = ["NormDisplay"]
 
@@ -165,20 +165,19 @@ class NormDisplay:
         known = dict(zip(comparison.features, comparison.units, strict=True))
         labels = labels_of_signals(names, known, ylabel, units)
         shown = [*chosen, len(signals)]
-        clock = comparison.clock
         display = cls(
             comparison.curves[i][:, shown],
             comparison.mean[:, shown],
             comparison.std[:, shown],
             comparison.limits[i, shown],
-            labels=[*labels, f"offset ({known['offset']}),\nlater is above"],
+            labels=[*labels, offset_label(comparison.unit)],
             title=comparison.describe(subject),
             subject=str(subject),
             n_trials=int(comparison.verdicts["n_trials"].iloc[i]),
             n_people=comparison.n_people,
             level=comparison.level,
             unit=comparison.unit,
-            frame_rate=(len(clock) - 1) / clock[-1] if comparison.unit == "seconds" else None,
+            frame_rate=clock_rate(comparison.clock),
         )
         return display.plot(ax)
 

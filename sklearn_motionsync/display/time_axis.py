@@ -3,9 +3,9 @@
 import numpy as np
 
 from ..inputs.resampling import as_frame_rates
-from ..synchronizers.match import check_unit
+from ..synchronizers.match import UNITS, check_unit
 
-__all__ = ["TimeAxis"]
+__all__ = ["TimeAxis", "clock_rate", "offset_label"]
 
 _PERFORMANCE_LABELS = {
     "frames": "frame of the trial",
@@ -72,6 +72,16 @@ class TimeAxis:
         """Frames of the clock, whole or not, in the unit."""
         scale = self.clock[-1] / (len(self.clock) - 1)
         return frames if self.unit == "frames" else frames * scale
+
+
+def clock_rate(clock):
+    """Frames of the clock in a unit of time, such as a second."""
+    return (len(clock) - 1) / clock[-1]
+
+
+def offset_label(unit):
+    """The label of an axis of offsets."""
+    return f"offset ({UNITS[unit]}),\nlater is above"
 
 
 def _frame_rates(frame_rate, lengths):

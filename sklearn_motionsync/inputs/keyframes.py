@@ -27,7 +27,7 @@ class Keyframes:
     """
 
     def __init__(self, given, n_sequences, frame_rate=None, *, name="keyframes"):
-        self._labels = None
+        self._labels, self._name = None, name
         if isinstance(given, (pd.DataFrame, pd.Series)):
             # One row a performance; iterating would give columns.
             if not isinstance(given.index, pd.RangeIndex):
@@ -77,15 +77,15 @@ class Keyframes:
         if len(missing) or not out.shape[1]:
             which = f"key-frame {missing[0]}" if len(missing) else "a key-frame"
             raise ValueError(
-                f"keyframes: {which} is known in no performance. Leave it out, or give its frame "
-                "in at least one."
+                f"{self._name}: {which} is known in no performance. Leave it out, or give its "
+                "frame in at least one."
             )
         return out
 
     def _checked(self, i, n_frames, count, complete):
         """The key-frames of one performance, as shares."""
         given = self._rows[i]
-        frames = as_numbers(given, f"Performance {i}: keyframes", dtype=np.float64)
+        frames = as_numbers(given, f"Performance {i}: {self._name}", dtype=np.float64)
         known = frames[~np.isnan(frames)] if frames.shape == (count,) else frames.ravel()
         if self._rates is not None:
             frames, known = frames * self._rates[i], known * self._rates[i]
@@ -110,7 +110,7 @@ class Keyframes:
         for place, (label, i) in enumerate(zip(labels, own, strict=True)):
             if self._labels[i] != label:
                 raise ValueError(
-                    f"Performance {place} is labelled {label!r}, and its row of keyframes "
+                    f"Performance {place} is labelled {label!r}, and its row of {self._name} "
                     f"{self._labels[i]!r}. Give rows in the order of the performances: "
-                    "keyframes.loc[labels]."
+                    f"{self._name}.loc[labels]."
                 )

@@ -67,6 +67,7 @@ def find_departures(
 
     See Also
     --------
+    compare_to_norm : A verdict of each subject, also on timing.
     sklearn_motionsync.display.SkeletonDisplay.from_departures : Draws them as stick figures.
 
     Examples

@@ -7,8 +7,7 @@ import numpy as np
 from ..display.drawing import WIDTH, curves, front_line, group_styles, legend_above, panels, pyplot
 from ..display.keyframes import draw_keyframes, named_keyframes
 from ..display.synchronization import SynchronizationDisplay
-from ..display.time_axis import TimeAxis
-from ..synchronizers.match import UNITS
+from ..display.time_axis import TimeAxis, clock_rate, offset_label
 
 __all__ = ["draw_offsets", "draw_signals", "own_figures"]
 
@@ -24,12 +23,6 @@ def own_figures():
     finally:
         for number in set(plt.get_fignums()) - before:
             plt.close(number)
-
-
-def _clock_rate(trials):
-    """Frames of the clock in a unit of time, such as a second."""
-    clock = trials.aligned.clock
-    return (len(clock) - 1) / clock[-1]
 
 
 def draw_signals(trials, shown, params):
@@ -52,8 +45,8 @@ def draw_signals(trials, shown, params):
         feature_names=[trials.signals[i] for i in shown],
         pattern=None if template is None else aligned.curves[template][:, shown],
         groups=trials.known.get("group"),
-        unit=trials.unit,
-        frame_rate=_clock_rate(trials),
+        unit=aligned.unit,
+        frame_rate=clock_rate(aligned.clock),
         pattern_keyframes=named_keyframes(aligned.reached.synchronizer, params.get("keyframes")),
         doubtful=aligned.match.doubtful if tells else None,
     ).plot(warps=False)
@@ -67,7 +60,7 @@ def draw_offsets(trials, params):
     """The offsets of all trials, and the mean of each group."""
     aligned = trials.aligned
     offsets, clock = aligned.offsets, aligned.clock
-    axis_of_time = TimeAxis(trials.unit, len(clock), None, _clock_rate(trials))
+    axis_of_time = TimeAxis(aligned.unit, len(clock), None, clock_rate(clock))
     figure, (axis,) = panels(None, [(0, 0)], 1, 1, (WIDTH, 3.4))
     names = list(trials.known.get("group", [""] * len(offsets)))
     styles = group_styles(names)
@@ -80,7 +73,7 @@ def draw_offsets(trials, params):
     axis.axhline(0, color="0.4", linewidth=0.8, zorder=0)
     axis.set_xlim(clock[0], clock[-1])
     axis.set_xlabel(axis_of_time.label)
-    axis.set_ylabel(f"offset ({UNITS[trials.unit]}),\nlater is above")
+    axis.set_ylabel(offset_label(aligned.unit))
     keyframes = named_keyframes(aligned.reached.synchronizer, params.get("keyframes"))
     if keyframes is not None:
         draw_keyframes(axis, axis_of_time.convert(keyframes.to_numpy()), keyframes.index)

@@ -14,8 +14,8 @@ from sklearn.base import BaseEstimator
 
 from ..body.skeleton import Skeleton
 from ..comparison.curves import AlignedCurves
-from ..comparison.groups import compare_groups
-from ..display.groups import GroupDisplay
+from ..comparison.groups import compare_aligned
+from ..display.groups import display_of_groups
 from ..inputs.features import choose_features
 from ..inputs.types import (
     Features,
@@ -156,12 +156,11 @@ def write_report(
         aligned = AlignedCurves.of(estimator, X, params, "write_report", **given)
         found = figure = None
         if groups is not None or covariate is not None or paired:
-            design = {"groups": groups, "people": people, "paired": paired, "covariate": covariate}
-            how = {"random_state": random_state, **given, **params}
-            found = compare_groups(estimator, X, **design, **how)
-            shown = {"people": people, "comparison": found, **given, **params}
-            figure = GroupDisplay.from_estimator(estimator, X, groups, **shown).figure_
-        trials = TrialSet.of(X, aligned, unit, frame_rate, groups, people, covariate)
+            design = {"people": people, "paired": paired, "covariate": covariate}
+            found = compare_aligned(aligned, groups, **design, random_state=random_state)
+            drawn = display_of_groups(aligned, groups, people, found, params, features=features)
+            figure = drawn.plot().figure_
+        trials = TrialSet.of(X, aligned, frame_rate, groups, people, covariate)
         page = Page()
         _add_set(page, trials, estimator, left_out)
         _add_signals(page, trials, features, params)
@@ -247,7 +246,7 @@ def _add_signals(page, trials, features, params):
 def _add_timing(page, trials, params):
     table, (_, largest, at) = trials.table(), trials.columns
     where = table[largest].abs().idxmax()
-    offset, unit = table.loc[where, largest], UNITS[trials.unit]
+    offset, unit = table.loc[where, largest], UNITS[trials.aligned.unit]
     finding = (
         f"The largest offset is that of trial {trials.names[where]}: {number(abs(offset))} {unit} "
         f"{'later' if offset > 0 else 'earlier'} than the template, at "

@@ -33,8 +33,6 @@ class TrialSet(NamedTuple):
     Attributes
     ----------
     aligned : AlignedCurves
-    unit : str
-        Of time.
     names : list of str
     template : int or None
         Its index, if it is one of the trials.
@@ -50,7 +48,6 @@ class TrialSet(NamedTuple):
     """
 
     aligned: AlignedCurves
-    unit: str
     names: list
     template: int | None
     known: pd.DataFrame
@@ -60,7 +57,7 @@ class TrialSet(NamedTuple):
     signals: list
 
     @classmethod
-    def of(cls, X, aligned, unit, frame_rate, groups, people, covariate):
+    def of(cls, X, aligned, frame_rate, groups, people, covariate):
         """Those of the arguments of `write_report`."""
         reached, n = aligned.reached, len(aligned.curves)
         of_groups = GroupsOfPeople.of(groups, people, n)
@@ -76,7 +73,6 @@ class TrialSet(NamedTuple):
         units = dict(zip(aligned.names, aligned.units, strict=True))
         return cls(
             aligned,
-            unit,
             list(map(as_text, labels_of_input(X, reached.performances)[0])),
             index_of_pattern(reached.synchronizer, reached.performances),
             pd.DataFrame(known, index=range(n)),
@@ -100,7 +96,7 @@ class TrialSet(NamedTuple):
     @property
     def columns(self):
         """Names of the columns of timing: the mean, the largest, and where that is."""
-        unit = UNITS[self.unit]
+        unit = UNITS[self.aligned.unit]
         return f"mean absolute offset ({unit})", f"largest offset ({unit})", f"at ({unit})"
 
     def table(self):
@@ -168,11 +164,11 @@ class TrialSet(NamedTuple):
         """Two tables with a row a trial and frame: the timing, and the aligned curves."""
         match, clock = self.aligned.match, self.aligned.clock
         kept = np.arange(0, len(clock), self.step)
-        n, unit = len(match.times), UNITS[self.unit]
+        n, unit = len(match.times), UNITS[self.aligned.unit]
         index = self.known.loc[np.repeat(range(n), len(kept))].reset_index(drop=True)
         index.insert(0, "trial", np.repeat(self.names, len(kept)))
         index["frame of the template"] = np.tile(kept, n)
-        if self.unit != "frames":
+        if self.aligned.unit != "frames":
             index[f"time of the template ({unit})"] = np.tile(clock[kept], n)
         timing = index.copy()
         timing[f"offset ({unit})"] = self.aligned.offsets[:, kept].ravel()

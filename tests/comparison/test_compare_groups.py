@@ -162,6 +162,14 @@ def test_a_bump_in_one_of_four_signals_is_not_called_timing():
     assert len(hip.clusters) == 0
 
 
+def test_a_constant_signal_leaves_timing_what_it_is(late):
+    gait, _ = late
+    knee = [np.column_stack([x[:, 1], np.ones(len(x))]) for x in gait.data]
+    sync = DenseSynchronizer(P).fit(knee)
+    found = compare_groups(sync, knee, gait.group, people=gait.person, n_permutations=199)
+    assert set(found.clusters["what"]) == {"timing"}
+
+
 def test_nothing_is_found_where_nothing_differs():
     gait, pipe = studied(16)
     found = compare_groups(pipe, gait.data, gait.group, people=gait.person, n_permutations=499)

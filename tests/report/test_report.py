@@ -244,7 +244,7 @@ def test_a_player_without_bones_and_with_gaps(tmp_path):
     holes = [x.copy() for x in BENDING.data]
     holes[2][5:9, :3] = np.nan
     sync = DenseSynchronizer(30).fit(angles)
-    trials = tables.TrialSet.of(angles, aligned_of(sync, angles), "percent", None, None, None, None)
+    trials = tables.TrialSet.of(angles, aligned_of(sync, angles), None, None, None, None)
     for body, n_dots in ((BENDING.skeleton, 1), (bare, 15)):
         data, _ = player.player_of(trials, holes, body)
         assert np.isnan(positions_of(data)).any(axis=(1, 2)).sum() == 4
