@@ -7,6 +7,7 @@ from sklearn_motionsync.model.variation import (
     mean_band,
     predictive_variance,
     simultaneous_factor,
+    within_variance,
 )
 
 GROUPS = np.array([3, 0, 0, 7, 7, 7, 3, 1])
@@ -63,6 +64,59 @@ def test_predictive_variance_equals_slow_loop():
     X, _ = people([1] * 8)
     for groups in (GROUPS, np.arange(8)):
         np.testing.assert_allclose(predictive_variance(X, groups), slow_variance(X, groups))
+
+
+def slow_within(X, groups):
+    """Value by value, of what is shown."""
+    s2, d = np.full(X.shape[1:], np.nan), np.zeros(X.shape[1:])
+    for p, k in np.ndindex(s2.shape):
+        total = 0
+        for group in set(groups):
+            seen = [x[p, k] for x in X[groups == group] if not np.isnan(x[p, k])]
+            if len(seen) > 1:
+                total += np.square(np.array(seen) - np.mean(seen)).sum()
+                d[p, k] += len(seen) - 1
+        if d[p, k]:
+            s2[p, k] = total / d[p, k]
+    mean = np.nanmean(s2, axis=0)
+    return np.where(d > 0, (d * np.nan_to_num(s2) + 5 * mean) / (d + 5), mean)
+
+
+def test_within_variance_equals_slow_loop():
+    X, _ = people([1] * 8)
+    np.testing.assert_allclose(within_variance(X, GROUPS), slow_within(X, GROUPS))
+    one = np.zeros(8, dtype=int)
+    np.testing.assert_allclose(within_variance(X, one), slow_within(X, one))
+    gappy = X.copy()
+    gappy[[0, 1, 3, 4, 5], :6, 1] = np.nan
+    gappy[2, 9:, 0] = np.nan
+    np.testing.assert_allclose(within_variance(gappy, GROUPS), slow_within(gappy, GROUPS))
+
+
+def test_within_variance_of_many_people_is_that_of_their_moods():
+    X, groups = people([3] * 2000, own=0.5)
+    alone, whose = people([1] * 2000, own=0.5)
+    total, within = predictive_variance(alone, whose), within_variance(X, groups)
+    # The variances of persons and moods are 1 and 0.25 of a wave.
+    np.testing.assert_allclose(within / total, 0.2, rtol=0.15)
+
+
+def test_without_two_performances_of_anyone_the_variance_within_is_a_share():
+    X, groups = people([1] * 6)
+    np.testing.assert_allclose(within_variance(X, groups), 0.32 * predictive_variance(X, groups))
+    # The second feature is never seen twice in a group.
+    groups, X = np.array([0, 0, 1, 1, 2, 2]), X.copy()
+    X[::2, :, 1] = np.nan
+    expected = 0.32 * predictive_variance(X, groups)[:, 1]
+    np.testing.assert_allclose(within_variance(X, groups)[:, 1], expected)
+    expected = slow_within(X[..., :1], groups)[:, 0]
+    np.testing.assert_allclose(within_variance(X, groups)[:, 0], expected)
+
+
+def test_within_variance_is_positive_where_performances_are_equal():
+    X, groups = people([2, 2])
+    X[1], X[3] = X[0], X[2]
+    assert (within_variance(X, groups) > 0).all()
 
 
 @pytest.mark.parametrize("coverage", [0.5, 0.8, 0.95, 0.99])
