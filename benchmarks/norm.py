@@ -23,20 +23,17 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 import warnings
-from pathlib import Path
 
 import numpy as np
+from exercises import read_exercises
 from joblib import Parallel, delayed
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn_motionsync import (
     ASpace,
     DenseSynchronizer,
-    DirectionCosines,
     FrameWise,
-    Skeleton,
     compare_to_norm,
-    mirror,
 )
 from sklearn_motionsync.datasets import make_gait
 
@@ -82,27 +79,6 @@ def study(seed, n_people, n_strides, n_cycles):
     return rows
 
 
-LANDMARKS = {
-    "pelvis": ("LASI", "RASI", "LPSI", "RPSI"),
-    "neck": ("C7", "CLAV"),
-    "head": ("LFHD", "RFHD", "LBHD", "RBHD"),
-    **{f"{side}_{joint}": tuple(letter + name for name in names)
-       for side, letter in (("left", "L"), ("right", "R"))
-       for joint, names in {
-           "shoulder": ("SHO",), "elbow": ("ELB",), "wrist": ("WRA", "WRB"),
-           "hip": ("ASI", "PSI"), "knee": ("KNE",), "ankle": ("ANK",),
-       }.items()},
-}  # fmt: skip
-
-
-# People who use the other side.
-OTHER_SIDE = {
-    "inline lunge": ("s02", "s07", "s10"),
-    "shoulder abduction": ("s07", "s10"),
-    "shoulder rotation": ("s07", "s10"),
-}
-
-
 def made_late(x, largest):
     """A trial whose middle is later by a share of its time."""
     t = np.linspace(0, 1, len(x))
@@ -110,29 +86,12 @@ def made_late(x, largest):
     return np.stack([np.interp(moments, t, column) for column in x.T], axis=1)
 
 
-def exercises(folder):
-    """Name, postures, people, and whether it is right, of each exercise."""
-    with np.load(Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz") as file:
-        joints, parents = file["joints"].tolist(), file["parents"].tolist()
-        skeleton = Skeleton(joints, parents, landmarks=LANDMARKS, up="z")
-        x = file["positions"].reshape(len(file["positions"]), -1).astype(float)
-        trials = np.split(x, file["offsets"][1:-1])
-        pairs = zip(file["label"], file["actor"], strict=True)
-        other = [i for i, (name, actor) in enumerate(pairs) if actor in OTHER_SIDE.get(name, ())]
-        for i, turned in zip(other, mirror([trials[i] for i in other], skeleton), strict=True):
-            trials[i] = np.asarray(turned)
-        trials = DirectionCosines(skeleton).fit_transform(trials)
-        for name in np.unique(file["label"]):
-            own = np.flatnonzero(file["label"] == name)
-            yield name, [trials[i] for i in own], file["actor"][own], file["correct"][own]
-
-
 def people(folder):
     warnings.simplefilter("ignore")
     kinds = ("right", "5 % late", "10 % late", "wrong")
     counts, rng = (1, 5, 10), np.random.default_rng(0)
     rows = {}
-    for name, trials, actors, right in exercises(folder):
+    for name, trials, actors, right, _ in read_exercises(folder):
         rows[name] = np.zeros((len(counts), len(kinds)))
         for actor in np.unique(actors):
             norm = np.flatnonzero((actors != actor) & right)

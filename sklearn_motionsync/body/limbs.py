@@ -10,6 +10,7 @@ __all__ = [
     "LATERAL_LIMBS",
     "LIMBS",
     "LIMB_NAMES",
+    "PARTS",
     "body_size",
     "complete_legs",
     "features_of_parts",
@@ -20,6 +21,7 @@ __all__ = [
     "limbs_between",
     "lowest_height",
     "median_lengths",
+    "names_of_cosines",
     "nearest_ancestor",
     "parts_of_names",
     "parts_of_postures",
@@ -220,6 +222,30 @@ def parts_of_postures(performances):
     squares = np.square(cosines.reshape(-1, n_limbs, n_dims)).sum(axis=2)
     are_directions = np.abs(squares - 1).mean(axis=0) < _UNIT_TOLERANCE
     return features_of_parts(LIMB_NAMES, n_dims, 1) if are_directions.all() else {}
+
+
+def names_of_cosines(performances, names):
+    """Names of features that are direction cosines, whether or not they came with names.
+
+    Parameters
+    ----------
+    performances : sequence of ndarray (n_frames_i, n_features)
+    names : list of str
+
+    Returns
+    -------
+    list of str, or None
+        ``names`` if some are those of limbs whose cosines have length 1; the names of
+        `DirectionCosines` for postures that `parts_of_postures` recognises; otherwise None.
+    """
+    parts = parts_of_names(names)
+    if not parts:
+        known = ["pelvis_height", *(f"{limb}_{axis}" for limb in LIMB_NAMES for axis in AXES[3])]
+        return known if parts_of_postures(performances) else None
+    cosines = [k for features in parts.values() for k in features]
+    squares = np.concatenate([np.square(x[:, cosines]).sum(axis=1) for x in performances])
+    n_limbs = len({names[k].rpartition("_")[0] for k in cosines})
+    return names if abs(np.nanmean(squares) / n_limbs - 1) < _UNIT_TOLERANCE else None
 
 
 def _by_part(limb_of):

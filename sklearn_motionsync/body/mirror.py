@@ -12,12 +12,12 @@ from ..inputs.numbers import as_numbers, column_names
 from ..inputs.tables import as_pandas
 from ..inputs.types import PerformancesLike, Transformed
 from .axes import UP_AXES, heading_axes, to_y_up
-from .formats import LANDMARKS
+from .formats import AXES, LANDMARKS
 from .landmarks import as_tuple, other_side
 from .limbs import LATERAL_LIMBS, LIMBS, unit_vectors
 from .skeleton import Skeleton, check_columns
 
-__all__ = ["mirror"]
+__all__ = ["exchange_of_sides", "mirror"]
 
 # A joint without a counterpart is on one side if it is never nearer to the median plane than this,
 # in widths of the hips or the shoulders.
@@ -218,3 +218,39 @@ def _check_middle(arrays, skeleton, alone):
         if _OFF_CENTRE < distance < np.inf:
             where = "on one side in every frame"
             raise ValueError(_no_counterpart(skeleton.joints[joint], where, skeleton.joints))
+
+
+# -- the mirror image of cosines ------------------------------------------------------------
+
+
+def exchange_of_sides(names, limbs=None):
+    """The columns and signs that make the mirror image of postures from direction cosines.
+
+    Parameters
+    ----------
+    names : list of str
+        Of the features. Those that are no cosine ``<limb>_<axis>`` stay.
+    limbs : list of str, default=None
+        Limbs of which left and right are exchanged; the others stay. By default the whole body is
+        mirrored: hip line and shoulder line, and the middle, too.
+
+    Returns
+    -------
+    columns : ndarray of int, signs : ndarray
+        The image is ``signs * postures[..., columns]``. None if a limb lacks its counterpart, or
+        there is no left and right.
+    """
+    names = [str(name) for name in names]
+    columns, signs, found = np.arange(len(names)), np.ones(len(names)), False
+    for k, name in enumerate(names):
+        limb, _, axis = name.rpartition("_")
+        if limb not in LIMBS or axis not in AXES[3] or (limbs is not None and limb not in limbs):
+            continue
+        other = other_side(limb) or limb
+        if f"{other}_{axis}" not in names:
+            return None
+        found |= other != limb
+        columns[k] = names.index(f"{other}_{axis}")
+        # Hip line and shoulder line go from right to left: their mirror images the other way.
+        signs[k] = -1 if (axis == AXES[3][0]) != (limb in LATERAL_LIMBS) else 1
+    return (columns, signs) if found else None

@@ -25,8 +25,9 @@ from ..utils.groups import encode_groups
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .hidden import fill_with_mean, group_counts, is_gappy
+from .personal import PersonalReference
 from .sampling import sample_performances, sample_postures
-from .similarity import Neighbours, PerformanceStream, log_moments
+from .similarity import LEAST, Neighbours, PerformanceStream, learn_weights, log_moments
 from .variation import clock_error, mean_band, predictive_variance, simultaneous_factor
 
 __all__ = ["ActionModel"]
@@ -99,16 +100,24 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
        normal distributions (Fig. 3d).
     2. The envelope is the mean, plus and minus ``n_std`` standard deviations. A pose is accepted at
        a frame if all of its features lie inside.
-    3. The dissimilarity of a trial y is the mean over the two most similar training trials y_i of
+    3. The dissimilarity of a trial y is the mean over the three most similar training trials y_i
+       of
 
        ``r(y, y_i) = |y - y_i|^2 / (|y|^2 + |y_i|^2)``.
 
-       Half of it is of poses less their own mean over time, to which a tenth of the squared
+       Half of it is of poses less their own mean over time, to which a share of the squared
        distance of these means is added. Half of it is of velocities. 0 is equal, and 1 as
-       dissimilar as standing still.
+       dissimilar as standing still. The training set tells what counts: a feature has the factor
+       ``v^(-1/4)`` with its variance v among trials, at most 3.2 times the least factor. The
+       distance of mean poses makes a twentieth of a typical r, with a weight of at most 0.1.
     4. For the threshold every training trial is compared with those of *other groups*. A trial of a
        new person stays below it with probability ``coverage``. Standing still is always above,
        unless no training trial moves.
+    5. With good trials of the person as ``reference``, the dissimilarity is that to the most
+       similar of them. Their mean is first moved towards that of all people, by the variances
+       within and between people. The threshold is that of training trials compared with as many
+       others of the same person, so some ``groups`` need several trials. The reference is aligned
+       as X is, by ``pipe[:-1].transform(own)``; `ActionDetector` takes it as it was recorded.
 
     **Gaps.** NaN is what was not seen, in training and after it. Mean and variances are those of
     what was seen at each frame, feature by feature; every value must have been seen in two groups.
@@ -116,11 +125,10 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     both trials: it is a ratio, so trials with and without gaps have one threshold. Bands hold what
     is seen of a trial. Samples have no gaps.
 
-    Give ``groups``, such as subjects, whenever people come more than once. Without them the
-    threshold rests on how people repeat themselves, and new people are rejected too often:
-    docs/accuracy.md. In a pipeline they are given as ``pipe.fit(X, actionmodel__groups=groups)``,
-    or with scikit-learn's metadata routing as ``pipe.fit(X, groups=groups)`` after
-    ``set_fit_request(groups=True)``.
+    Give ``groups``, such as subjects, whenever people come more than once. Without them new people
+    are rejected too often (docs/accuracy.md). In a pipeline: ``pipe.fit(X,
+    actionmodel__groups=groups)``, or with scikit-learn's metadata routing ``pipe.fit(X,
+    groups=groups)`` after ``set_fit_request(groups=True)``.
     """
 
     _parameter_constraints: dict = {
@@ -346,32 +354,40 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         return float(np.average(densities, weights=sample_weight))
 
     @snapshot
-    def dissimilarity(self, X: PerformancesLike) -> np.ndarray:
-        """Mean dissimilarity of performances to the two most similar training performances.
-
-        What was not seen of both performances of a pair counts in no sum of theirs.
+    def dissimilarity(
+        self, X: PerformancesLike, reference: PerformancesLike | None = None
+    ) -> np.ndarray:
+        """Mean dissimilarity of performances to the three most similar training performances.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
             Synchronised performances.
+        reference : as X, default=None
+            Good performances of the person that X is of, two to five (note 5).
 
         Returns
         -------
         ndarray, shape (n_sequences,)
             0 for equal performances, 1 for standing still.
+
+        Raises
+        ------
+        ValueError
+            With a reference, if no group of the training set has two performances.
         """
         performances = self.check_performances(X)
-        return self._neighbours.dissimilarity(performances)
+        return self._judge(reference).dissimilarity(performances)
 
     @snapshot
-    def threshold_at(self, coverage: float) -> float:
+    def threshold_at(self, coverage: float, reference: PerformancesLike | None = None) -> float:
         """The threshold of another coverage.
 
         Parameters
         ----------
         coverage : float
             Share of performances of new people to be accepted, between 0 and 1.
+        reference : as for `dissimilarity`, default=None
 
         Returns
         -------
@@ -386,40 +402,48 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         self._check_groups_seen()
         if not (isinstance(coverage, Real) and 0 < coverage < 1):
             raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
-        return self._neighbours.limit(self._log_moments, coverage)
+        if reference is None:
+            return self._neighbours.limit(self._log_moments, coverage)
+        return self._judge(reference).limit(coverage)
 
     @snapshot
-    def decision_function(self, X: PerformancesLike) -> np.ndarray:
-        """How far below the threshold the dissimilarity of performances is.
+    def decision_function(
+        self, X: PerformancesLike, reference: PerformancesLike | None = None
+    ) -> np.ndarray:
+        """How far below the threshold the dissimilarity of performances is, as a logarithm.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
             Synchronised performances.
+        reference : as for `dissimilarity`, default=None
 
         Returns
         -------
         ndarray, shape (n_sequences,)
-            ``threshold_`` less the dissimilarity: negative for performances that are rejected.
+            ``log(threshold / dissimilarity)``, with ``threshold_`` or that of the person: negative
+            for performances that are rejected. A ratio has the same scale in every model.
         """
-        dissimilarity = self.dissimilarity(X)
-        return self.threshold_ - dissimilarity
+        performances, judge = self.check_performances(X), self._judge(reference)
+        limit = self.threshold_ if reference is None else judge.limit(self.coverage)
+        return np.log(limit / np.maximum(judge.dissimilarity(performances), LEAST))
 
     @snapshot
-    def predict(self, X: PerformancesLike) -> np.ndarray:
+    def predict(self, X: PerformancesLike, reference: PerformancesLike | None = None) -> np.ndarray:
         """Whether performances are the action.
 
         Parameters
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
             Synchronised performances.
+        reference : as for `dissimilarity`, default=None
 
         Returns
         -------
         ndarray of int, shape (n_sequences,)
-            1 if the dissimilarity is at most ``threshold_``, else -1.
+            1 if the dissimilarity is at most the threshold, else -1.
         """
-        return np.where(self.decision_function(X) >= 0, 1, -1)
+        return np.where(self.decision_function(X, reference) >= 0, 1, -1)
 
     @snapshot
     def standard_scores(self, X: PerformancesLike) -> np.ndarray:
@@ -638,7 +662,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             kept = stream.kept.astype(np.float64)
             variance = predictive_variance(kept, stream.groups)
             self.predictive_variance_ = variance.astype(dtype)
-            self._neighbours = Neighbours(kept, stream.groups, mean=stream.mean)
+            weights = learn_weights(fill_with_mean(kept, stream.mean), stream.groups)
+            self._neighbours = Neighbours(kept, stream.groups, mean=stream.mean, weights=weights)
             known = self._neighbours.dissimilarity(before.kept, before.groups)
         else:
             known = self._kept_dissimilarities
@@ -649,6 +674,14 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         dropped = stream.dropped + log_moments(compared[~is_kept])
         self._stream = replace(stream, dropped=dropped)
         self.threshold_ = self._neighbours.limit(self._log_moments, self.coverage)
+
+    def _judge(self, reference):
+        """What dissimilarities are to: the training performances, or those of a person."""
+        if reference is None:
+            return self._neighbours
+        own = np.stack(self.check_performances(reference)).astype(np.float64)
+        kept, stream = self._stream.kept.astype(np.float64), self._stream
+        return PersonalReference(kept, stream.groups, stream.mean, own)
 
     def _describe_unseen(self, stream):
         """A text about a value that the performances of fewer than two groups show; or none."""

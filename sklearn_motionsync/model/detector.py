@@ -2,47 +2,60 @@
 
 from __future__ import annotations
 
+from functools import partial
 from numbers import Real
-from typing import Any, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 import pandas as pd
+from scipy.stats import t as student
 from sklearn import get_config
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, clone
-from sklearn.utils._param_validation import HasMethods, Interval
+from sklearn.utils._param_validation import HasMethods, Interval, StrOptions
 from sklearn.utils.metadata_routing import MetadataRouter, MethodMapping
 from sklearn.utils.validation import check_is_fitted
 
+from ..body.limbs import PARTS, names_of_cosines
+from ..body.mirror import exchange_of_sides
 from ..inputs.tables import index_of
 from ..inputs.types import Labels, PerformancesLike
 from ..inputs.validation import labels_of_input
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
-from ..utils.groups import encode_groups, sums_of_groups
+from ..utils.groups import encode_groups
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
 from ..utils.pipelines import (
     MissingMetadata,
     accepted_params,
-    find_step,
-    find_synchronizer,
     flat_steps,
     route_to_synchronizer,
     steps_to_fit,
     takes_gaps,
 )
+from .acceptance import Acceptance, Contrast, LogPredictionInterval, log_tails, standardised_logs
 from .action_model import ActionModel
-from .similarity import movement_energies, t_prediction_limit
+from .hidden import fill_with_mean, group_counts, is_gappy
+from .personal import PersonalReference
+from .similarity import PerformanceStream, movement_energies
+from .views import curves_of
 
 __all__ = ["ActionDetector"]
 
 # Reasons for the rejection of a performance below, or above, the accepted interval.
 _REASONS = {
     "movement": (None, "another movement"),
+    "own": (None, "unlike the reference"),
     "course": (None, "another course"),
     "duration": ("too short", "too long"),
     "energy": ("too weak", "too strong"),
+    "mirror": (None, "the other side"),
+    "arms": (None, "the other arm"),
+    "reversal": (None, "the other way"),
 }
+_TWO_SIDED = "duration", "energy"
+# A statistic beyond so many times its limit is a rejection, whatever the others are.
+_ALONE = 1.5
 
 
 class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEstimator):
@@ -73,19 +86,24 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         gets are compared. It is cloned, not changed.
     coverage : float, default=0.95
         Share of performances of new people that ``predict`` is to accept, between 0 and 1.
-        The share that is rejected is divided evenly among the tests. It replaces the coverage
-        of the model.
+        It replaces the coverage of the model.
     duration : bool, default=True
         Whether the number of frames counts. Frames are time only if all performances have one
         frame rate, in ``fit`` and after it, and are cut where the action begins and ends: else
         give False, or resample them to one rate.
+    sides : bool or "auto", default="auto"
+        Whether it matters on which side of the body the movement is done. ``"auto"``: if the
+        training set shows that it does.
 
     Attributes
     ----------
     estimator_ : Pipeline
         The fitted clone.
     borders_ : dict of str to (float, float)
-        The accepted interval of each test: of dissimilarities, frames, and squared features.
+        The interval of each test beyond which it is a reason for a rejection: of dissimilarities,
+        frames, and squared features.
+    images_ : list of str
+        The images that the movement clearly differs from: ``"mirror"``, ``"arms"``, ``"reversal"``.
     offset_ : float
         The threshold of ``score_samples``, -1.
     n_features_in_ : int
@@ -96,16 +114,33 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
     See Also
     --------
     ActionModel : Makes the first test only.
+    find_departures : When, and with which limb, a trial departs.
 
     Notes
     -----
-    A trial must pass four tests. The acceptance region of each is estimated from how people differ.
+    Four tests are learnt from how people differ, each by leaving people out.
 
-    1. **movement**: the dissimilarity to the model *after* alignment, `ActionModel.dissimilarity`.
+    1. **movement**: the dissimilarity after alignment, `ActionModel.dissimilarity`. With an
+       `ASpace` in the pipeline it is that of whole poses, with what the aSpace leaves out.
     2. **course**: the same after linear normalisation alone, which keeps the timing of its parts.
     3. **duration**: the number of frames, as a ratio to the geometric mean.
     4. **energy**: the mean squared distance of the poses from their own mean, as a ratio to the
        geometric mean.
+
+    Each gives the probability p of a deviation as large. Their score is
+    ``sqrt(- log p_movement - 0.15 (log p_course + log p_duration + log p_energy))``, Fisher's
+    combination with weights. Its limit is learnt from the scores of trials of people left out. A
+    trial is also refused if one test alone is one and a half times beyond its limit.
+
+    Where the movement clearly differs from an image of itself, a trial that is more like the image
+    is refused: **mirror** (left and right exchanged), **arms** (only the arms exchanged) and
+    **reversal** (the way back). The first two need `DirectionCosines` in the pipeline, or poses
+    from it. The contrast is the projection of a trial less its image on the mean of such
+    differences. It counts if its mean is at least twice its standard deviation.
+
+    With good trials of the person as ``reference``, **own** is one more test: the dissimilarity to
+    the most similar of them, as in note 5 of `ActionModel`. It has weight 1 then, and all others
+    0.15.
 
     Give ``groups``, such as subjects, whenever people come more than once: acceptance regions
     are then those of differences between people. Variation between people is accepted: copies
@@ -136,14 +171,20 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         "estimator": [HasMethods(["fit"])],
         "coverage": [Interval(Real, 0, 1, closed="neither")],
         "duration": ["boolean"],
+        "sides": ["boolean", StrOptions({"auto"})],
     }
 
     def __init__(
-        self, estimator: BaseEstimator, coverage: float = 0.95, duration: bool = True
+        self,
+        estimator: BaseEstimator,
+        coverage: float = 0.95,
+        duration: bool = True,
+        sides: bool | Literal["auto"] = "auto",
     ) -> None:
         self.estimator = estimator
         self.coverage = coverage
         self.duration = duration
+        self.sides = sides
 
     @atomic_fit
     @validated_with_nested
@@ -174,8 +215,8 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         Raises
         ------
         ValueError
-            If the pipeline does not end in an `ActionModel` or has no synchronizer, and as from
-            its ``fit``.
+            If the pipeline does not end in an `ActionModel` or has no synchronizer, if ``sides``
+            is True and there are no limbs with a left and a right, and as from its ``fit``.
         """
         self.estimator_ = clone(self.estimator)
         name = self._check_steps()
@@ -184,44 +225,53 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         with self._progress(fits=True) as progress:
             with progress.fitting(self.estimator_, "fitting the pipeline"):
                 self.estimator_.fit(X, y, **given, **params)
-            before, synchronizer = find_synchronizer(self.estimator_)
             also = {name.rpartition("__")[2]: value for name, value in params.items()}
-            steps = [] if before is None else flat_steps(before)
-            taken = [accepted_params(step.transform, also) for step in steps]
+            steps = flat_steps(self.estimator_)[:-1]
+            takers = [getattr(step, "match", step.transform) for step in steps]
+            taken = [accepted_params(taker, also) for taker in takers]
             also = {name: value for params in taken for name, value in params.items()}
-            reached = route_to_synchronizer(self.estimator_, X, also, "ActionDetector.fit")
-            self._learn(reached.performances, synchronizer, groups)
+            self._learn(X, also, groups)
         for name in ("n_features_in_", "feature_names_in_"):
             if hasattr(self.estimator_, name):
                 setattr(self, name, getattr(self.estimator_, name))
         return self
 
     @snapshot
-    def predict(self, X: PerformancesLike, **params: Any) -> np.ndarray:
+    def predict(
+        self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
+    ) -> np.ndarray:
         """Whether performances are the action.
 
         Parameters
         ----------
         X : performances
             As the pipeline takes them.
+        reference : performances, as the pipeline takes them, default=None
+            Good ones of the person that X is of, two to five. It needs training groups with several
+            performances.
         **params : dict
             What steps take besides in ``transform``, such as ``keyframes``.
 
         Returns
         -------
         ndarray of int, shape (n_sequences,)
-            1 if all tests are passed, else -1.
+            1 if the score is below its limit, and all contrasts are above theirs; else -1.
         """
-        return np.where(self._largest_statistic(X, params, "predict") <= 1, 1, -1)
+        return np.where(self._scores(X, reference, params, "predict") <= 1, 1, -1)
 
     @snapshot
-    def decision_function(self, X: PerformancesLike, **params: Any) -> np.ndarray:
-        """Distance of the largest test statistic of performances from its limit.
+    def decision_function(
+        self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
+    ) -> np.ndarray:
+        """Distance of the score of performances from its limit.
 
         Parameters
         ----------
         X : performances
             As the pipeline takes them.
+        reference : performances, as the pipeline takes them, default=None
+            Good ones of the person that X is of, two to five. It needs training groups with several
+            performances.
         **params : dict
             What steps take besides in ``transform``, such as ``keyframes``.
 
@@ -230,16 +280,21 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         ndarray, shape (n_sequences,)
             ``score_samples`` less ``offset_``: negative for performances that are rejected.
         """
-        return 1 - self._largest_statistic(X, params, "decision_function")
+        return 1 - self._scores(X, reference, params, "decision_function")
 
     @snapshot
-    def score_samples(self, X: PerformancesLike, **params: Any) -> np.ndarray:
-        """The largest absolute test statistic of performances, negated.
+    def score_samples(
+        self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
+    ) -> np.ndarray:
+        """The score of performances in units of its limit, negated.
 
         Parameters
         ----------
         X : performances
             As the pipeline takes them.
+        reference : performances, as the pipeline takes them, default=None
+            Good ones of the person that X is of, two to five. It needs training groups with several
+            performances.
         **params : dict
             What steps take besides in ``transform``, such as ``keyframes``.
 
@@ -248,31 +303,38 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         ndarray, shape (n_sequences,)
             At least ``offset_`` for performances that are accepted.
         """
-        return -self._largest_statistic(X, params, "score_samples")
+        return -self._scores(X, reference, params, "score_samples")
 
     @snapshot
-    def report(self, X: PerformancesLike, **params: Any) -> pd.DataFrame:
+    def report(
+        self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
+    ) -> pd.DataFrame:
         """The test statistics of performances, and the reason for a rejection.
 
         Parameters
         ----------
         X : performances
             As the pipeline takes them.
+        reference : performances, as the pipeline takes them, default=None
+            Good ones of the person that X is of, two to five. It needs training groups with several
+            performances.
         **params : dict
             What steps take besides in ``transform``, such as ``keyframes``.
 
         Returns
         -------
         DataFrame, one row a performance
-            ``movement`` and ``course`` in units of their limit: 0 is equal, up to 1 accepted.
-            ``duration`` (if it counts) and ``energy``: 0 is the mean, -1 to 1 accepted, below are
-            those that are too short or too weak. ``reason`` of a rejection, such as "too long,
-            too weak"; empty if the performance is accepted.
+            ``movement``, ``own`` (with a reference), ``course``, and the contrasts that count,
+            ``mirror``, ``arms`` and ``reversal``, in units of their limit: up to 1 is usual.
+            ``duration`` (if it counts) and ``energy``: 0 is the mean, -1 to 1 usual, below are
+            those that are too short or too weak. ``score``: up to 1 is accepted. ``reason`` of a
+            rejection, such as "too long, too weak"; empty if the performance is accepted.
         """
-        table, performances = self._test(X, params, "report")
-        labels, levels = labels_of_input(X, performances)
-        table = pd.DataFrame(table, index=index_of(labels, levels[:-1]))
-        table["reason"] = [_reason(row) for row in table.to_dict("records")]
+        found = self._test(X, reference, params, "report")
+        labels, levels = labels_of_input(X, found.performances)
+        table = pd.DataFrame(found.statistics, index=index_of(labels, levels[:-1]))
+        table["score"] = found.scores
+        table["reason"] = _reasons(found)
         return table
 
     def get_metadata_routing(self):
@@ -312,17 +374,20 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         last.set_fit_request(groups=True)
         return "groups"
 
-    def _learn(self, performances, synchronizer, groups):
-        """Estimate acceptance regions from performances as the synchronizer gets them."""
+    def _learn(self, X, params, groups):
+        """Estimate all tests from training performances."""
+        caller = "ActionDetector.fit"
+        reached = route_to_synchronizer(self.estimator_, X, params, caller)
+        performances, synchronizer = reached.performances, reached.synchronizer
         codes, _ = encode_groups(groups, len(performances), at_least=2)
-        on_clock = synchronizer.normalize(performances)
         coverage = 1 - (1 - self.coverage) / (4 if self.duration else 3)
-        _, model = find_step(self.estimator_, ActionModel)
+        curves = curves_of(self.estimator_, X, params, caller)
+        self._columns = _seen_columns(curves.whole, codes)
+        whole, on_clock = curves.whole[..., self._columns], synchronizer.normalize(performances)
+        self._aligned = ActionModel(coverage=coverage).fit(whole, groups=codes)
         self._unaligned = ActionModel(coverage=coverage).fit(on_clock, groups=codes)
-        self.borders_ = {
-            "movement": (0.0, model.threshold_at(coverage)),
-            "course": (0.0, self._unaligned.threshold_),
-        }
+        models = {"movement": self._aligned, "course": self._unaligned}
+        self.borders_ = {name: (0.0, model.threshold_) for name, model in models.items()}
         measures = {"duration": _durations(performances)} if self.duration else {}
         measures["energy"], self._energy_floor = movement_energies(on_clock)
         self._intervals = {
@@ -330,90 +395,165 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             for name, values in measures.items()
         }
         self.borders_ |= {name: (i.lower, i.upper) for name, i in self._intervals.items()}
+        # The ends of an interval, in standard deviations.
+        n = len(whole)
+        self._end = student.ppf((1 + coverage) / 2, n + 2) * np.sqrt(1 + 1 / n)
+        tails = {
+            name: log_tails(standardised_logs(model.dissimilarities_), len(whole))
+            for name, model in models.items()
+        }
+        for name, interval in self._intervals.items():
+            tails[name] = log_tails(self._end * interval.deviations, len(whole), two_sided=True)
+        self._acceptance = Acceptance(tails, codes, self.coverage)
+        self._contrasts = self._learn_contrasts(whole, curves.names, codes)
+        self.images_ = [name for name in _REASONS if name in self._contrasts]
+        # Those that a reference is judged by, at most 64.
+        stream = PerformanceStream.starting_at(whole[0])
+        stream, _, is_kept = stream.extend(whole, codes)
+        self._stream, self._kept_tails = stream, {k: v[is_kept] for k, v in tails.items()}
         self.offset_ = -1.0
 
-    def _test(self, X, params, method):
-        """Test statistics by name, (n_sequences,) each, and the synchronizer's performances."""
+    def _learn_contrasts(self, whole, names, codes):
+        """Contrasts to images of the action that count."""
+        exchanges = {"reversal": _reversed}
+        cosines = names_of_cosines(whole, [names[k] for k in self._columns])
+        if self.sides is not False and cosines is not None:
+            arms = [limb for part in ("left arm", "right arm") for limb in PARTS[part]]
+            for name, limbs in (("mirror", None), ("arms", arms)):
+                exchange = exchange_of_sides(cosines, limbs)
+                if exchange is not None:
+                    exchanges[name] = partial(_exchanged, *exchange)
+        if self.sides is True and len(exchanges) == 1:
+            raise ValueError(
+                "sides=True needs limbs with a left and a right: put a DirectionCosines before the "
+                f"synchronizer. The features are {', '.join(names[:4])}, ..."
+            )
+        filled = fill_with_mean(whole, self._aligned.mean_)
+        found = {name: Contrast(filled, e, codes) for name, e in exchanges.items()}
+        always = () if self.sides == "auto" else ("mirror", "arms")
+        return {
+            name: c for name, c in found.items() if c.is_clear or (name in always and c.middle > 0)
+        }
+
+    def _test(self, X, reference, params, method):
+        """All statistics of performances, and their scores."""
         check_is_fitted(self)
         caller = f"ActionDetector.{method}"
         try:
             reached = route_to_synchronizer(self.estimator_, X, params, caller, uses=("transform",))
-            performances = reached.performances
-            first = 0 if reached.before is None else len(flat_steps(reached.before))
-            synchronised = performances
-            for step in flat_steps(self.estimator_)[first:-1]:
-                synchronised = step.transform(
-                    synchronised, **accepted_params(step.transform, params)
-                )
+            curves = curves_of(self.estimator_, X, params, caller)
+            own = reference
+            if own is not None:
+                own = curves_of(self.estimator_, own, {}, caller).whole[..., self._columns]
+                own = fill_with_mean(own, self._aligned.mean_)
         except MissingMetadata as error:
             reason, name, _ = error.args
             raise MissingMetadata(reason, name, f"{caller}(X, {{name}}=[...])") from error
-        _, model = find_step(self.estimator_, ActionModel)
+        performances, whole = reached.performances, curves.whole[..., self._columns]
         on_clock = reached.synchronizer.normalize(performances)
+        statistics, tails = {}, {}
+        acceptance = self._acceptance
+
+        def compare(name, dissimilarity, held_out, limit):
+            statistics[name] = dissimilarity / limit
+            tails[name] = log_tails(standardised_logs(held_out, dissimilarity), len(held_out))
+
+        model = self._aligned
+        compare("movement", model.dissimilarity(whole), model.dissimilarities_, model.threshold_)
+        if own is not None:
+            stream = self._stream
+            person = PersonalReference(stream.kept, stream.groups, stream.mean, own)
+            known = np.isfinite(person.held_out)
+            held_out, found = person.held_out[known], person.dissimilarity(whole)
+            compare("own", found, held_out, person.limit(model.coverage))
+            held = {name: values[known] for name, values in self._kept_tails.items()}
+            held["own"] = log_tails(standardised_logs(held_out), len(held_out))
+            acceptance = Acceptance(held, stream.groups[known], self.coverage, main="own")
+        model = self._unaligned
+        compare("course", model.dissimilarity(on_clock), model.dissimilarities_, model.threshold_)
         measures = {
             "duration": _durations(performances),
             "energy": movement_energies(on_clock, self._energy_floor)[0],
         }
-        statistics = {
-            "movement": model.dissimilarity(synchronised) / self.borders_["movement"][1],
-            "course": self._unaligned.dissimilarity(on_clock) / self._unaligned.threshold_,
-        }
         for name, interval in self._intervals.items():
             statistics[name] = interval.standardize(measures[name])
-        return statistics, performances
+            n = len(self._aligned.dissimilarities_)
+            tails[name] = log_tails(self._end * statistics[name], n, two_sided=True)
+        scores = acceptance.scores(tails)
+        # A person may differ from others, but not from the reference.
+        alone = [values for name, values in statistics.items() if own is None or name != "movement"]
+        far = np.abs(alone).max(axis=0) / _ALONE
+        filled = fill_with_mean(whole, self._aligned.mean_)
+        for name, contrast in self._contrasts.items():
+            if own is not None and contrast.standardize(own).mean() > 1:
+                # The person does it the other way.
+                continue
+            statistics[name] = contrast.standardize(filled)
+            # More like the image than like the action.
+            far = np.maximum(far, statistics[name])
+        scores = np.where(far > 1, np.maximum(scores, far), scores)
+        return _Tested(statistics, scores, acceptance.shares(tails), list(tails), performances)
 
-    def _largest_statistic(self, X, params, method):
-        statistics, _ = self._test(X, params, method)
-        return np.max(np.abs(list(statistics.values())), axis=0)
+    def _scores(self, X, reference, params, method):
+        return self._test(X, reference, params, method).scores
+
+
+class _Tested(NamedTuple):
+    """What was found of performances.
+
+    Attributes
+    ----------
+    statistics : dict of str to ndarray (n,)
+        In units of their limits.
+    scores : ndarray (n,)
+        At most 1 is accepted.
+    shares : ndarray (n, n_tests)
+        What the tests ``names`` add to the squared score.
+    names : list of str
+    performances : sequence of ndarray
+        As they reach the synchronizer.
+    """
+
+    statistics: dict
+    scores: np.ndarray
+    shares: np.ndarray
+    names: list
+    performances: tuple
+
+
+def _reversed(performances):
+    return performances[:, ::-1]
+
+
+def _exchanged(columns, signs, performances):
+    return signs * performances[..., columns]
+
+
+def _seen_columns(whole, codes):
+    """Features of which two groups show every frame: all, unless there are gaps."""
+    if not is_gappy(whole):
+        return np.arange(whole.shape[2])
+    n_groups = (group_counts(whole, codes) > 0).sum(axis=0)
+    return np.flatnonzero(n_groups.min(axis=0) > 1)
 
 
 def _durations(performances):
     return np.array([len(x) for x in performances], dtype=np.float64)
 
 
-def _reason(row):
-    """The reason for the rejection of a performance with these statistics."""
-    reasons = {
-        name: _REASONS[name][int(value > 0)] for name, value in row.items() if abs(value) > 1
-    }
-    if "movement" in reasons:
-        # Another movement has another course.
-        reasons.pop("course", None)
-    return ", ".join(reasons.values())
-
-
-class LogPredictionInterval:
-    """Prediction interval of positive values of new people, by their logarithms.
-
-    Its middle is the mean logarithm; its width follows from the deviations of values from the mean
-    of the other groups.
-
-    Parameters
-    ----------
-    values : ndarray (n_sequences,)
-        Above 0.
-    groups : ndarray of int (n_sequences,)
-        From 0, at least two different ones.
-    coverage : float
-        Share of new values in the interval.
-
-    Attributes
-    ----------
-    lower, upper : float
-    """
-
-    def __init__(self, values, groups, coverage):
-        logs, n = np.log(values), len(values)
-        self._mean = float(logs.mean())
-        # The uncertainty of the mean of the others is in the deviations, and in the limit.
-        sums, counts = sums_of_groups(logs, groups)
-        of_others = (logs.sum() - sums[groups]) / (n - counts[groups])
-        deviations = (logs - of_others) * np.sqrt((n - 1) / (n + 1))
-        squares = np.square(deviations).sum()
-        self._half_width = t_prediction_limit(n, squares, (1 + coverage) / 2)
-        ends = np.exp([self._mean - self._half_width, self._mean + self._half_width])
-        self.lower, self.upper = map(float, ends)
-
-    def standardize(self, values):
-        """Values on the scale on which the interval is -1 to 1."""
-        return (np.log(values) - self._mean) / self._half_width
+def _reasons(found):
+    """The reason for the rejection of each performance; empty if it is accepted."""
+    reasons = []
+    for i, score in enumerate(found.scores):
+        values = {name: values[i] for name, values in found.statistics.items()}
+        beyond = [name for name, value in values.items() if abs(value) > 1]
+        beyond = [name for name in beyond if name in _TWO_SIDED or values[name] > 1]
+        if not beyond:
+            # No test alone: the one that adds most.
+            beyond = [found.names[int(found.shares[i].argmax())]]
+        if "movement" in beyond:
+            # Another movement has another course.
+            beyond = [name for name in beyond if name != "course"]
+        texts = [_REASONS[name][int(values[name] > 0)] for name in beyond]
+        reasons.append(", ".join(texts) if score > 1 else "")
+    return reasons

@@ -14,9 +14,13 @@ from .hidden import fill_with_mean, is_gappy
 
 __all__ = [
     "DIFFERENCES",
+    "DISSIMILARITY_VARIANCE",
+    "LEAST",
     "LogMoments",
     "Neighbours",
     "PerformanceStream",
+    "Weights",
+    "learn_weights",
     "log_moments",
     "movement_energies",
     "t_prediction_limit",
@@ -24,16 +28,23 @@ __all__ = [
 ]
 
 # A dissimilarity is the mean over so many nearest neighbours: a single one may be an outlier.
-_N_NEAREST = 2
+_N_NEAREST, _N_NEAREST_LEARNT = 2, 3
 # Weight of the mean posture: people stand differently, but an action elsewhere is another action.
+# Where it is learnt it is at most this.
 _MEAN_WEIGHT = 0.1
+# The share of a typical dissimilarity that mean postures make: of people among each other, and of
+# the performances of a person, whose mean posture tells more.
+_MEAN_SHARE, _OWN_MEAN_SHARE = 0.05, 0.2
+# The least variance of a feature that is weighted, as a share of the largest.
+_LEAST_VARIANCE = 0.01
 # Standard deviation of the Gaussian under which velocities are estimated, as a share of the clock.
 _VELOCITY_SMOOTHING = 0.01
 # Variance of the logarithm over performances of one action (16 actions of people); it weighs as
-# much as that of so many performances.
+# much as that of so many performances. That of a dissimilarity is the mean over 21 actions.
 _PRIOR_VARIANCE, _PRIOR_COUNT = 0.07, 3
+DISSIMILARITY_VARIANCE = 0.12
 # Smaller dissimilarities, and energies as a share of the total variance, are rounding.
-_LEAST = 1e-9
+LEAST = 1e-9
 # Standing still has the dissimilarity 1 and is never accepted.
 _STILL_LIMIT = 1 - 1e-6
 # Performances compared at a time: bounds the memory. Matrix products take rows in tiles of one
@@ -86,12 +97,78 @@ def _velocities(performances):
     return smooth(performances, _VELOCITY_SMOOTHING * (performances.shape[1] - 1), order=1)
 
 
+class Weights(NamedTuple):
+    """What counts how much in a dissimilarity.
+
+    Attributes
+    ----------
+    scale : ndarray (n_features,) or float, default=1
+        The factor of each feature.
+    mean : float, default=0.1
+        The weight of the squared distance of mean postures.
+    n_nearest : int, default=2
+        A dissimilarity is the mean over so many nearest neighbours.
+    """
+
+    scale: np.ndarray | float = 1.0
+    mean: float = _MEAN_WEIGHT
+    n_nearest: int = _N_NEAREST
+
+
+_FIXED = Weights()
+
+
+def learn_weights(performances, groups, own=False):
+    """Weights by how performances of an action differ.
+
+    A feature has the factor ``v^(-1/4)``, where v is its variance among performances less their own
+    mean posture, averaged over the frames: deviations where people agree count more. Mean postures
+    make a twentieth of a typical dissimilarity, where their weight would not exceed a tenth.
+
+    Parameters
+    ----------
+    performances : ndarray (n, P, n_features), float64
+        Without gaps.
+    groups : ndarray of int (n,)
+    own : bool, default=False
+        Weights to compare a performance with others of its group, instead of those of other groups:
+        features have equal factors, mean postures make a fifth, and the nearest one decides alone.
+
+    Returns
+    -------
+    Weights
+    """
+    n, n_frames, _ = performances.shape
+    share, n_nearest = (_OWN_MEAN_SHARE, 1) if own else (_MEAN_SHARE, _N_NEAREST_LEARNT)
+    energies, floor = movement_energies(performances)
+    if energies.max() <= floor:
+        # All stand still: mean postures alone tell them apart.
+        return Weights(n_nearest=n_nearest)
+    means = performances.mean(axis=1)
+    moved = performances - means[:, np.newaxis]
+    variance = moved.var(axis=0).mean(axis=0)
+    largest = variance.max()
+    scale = np.ones(len(variance))
+    if not own and largest > LEAST * np.square(moved).mean():
+        scale = (largest / np.maximum(variance, _LEAST_VARIANCE * largest)) ** 0.25
+    moved, means = (moved * scale).reshape(n, -1), means * scale
+    is_pair = np.triu((groups[:, np.newaxis] == groups) == own, 1)
+    apart, offset = (PRODUCTS.distances(x, x)[is_pair] for x in (moved, means - means.mean(axis=0)))
+    norms = PRODUCTS.norms(moved)
+    energy = np.maximum((norms[:, np.newaxis] + norms)[is_pair], floor * n_frames)
+    typical, of_means = (np.median(x / energy) for x in (apart, offset))
+    # So they do where movements do not differ.
+    differ = typical > LEAST and of_means > 0
+    weight = share * typical / (n_frames * of_means) if differ else _MEAN_WEIGHT
+    return Weights(scale, float(min(weight, _MEAN_WEIGHT)), n_nearest)
+
+
 class Neighbours:
     """Training performances that others are compared with.
 
     The dissimilarity of two performances is the mean of ``|y - y_i|^2 / (|y|^2 + |y_i|^2)`` of
     postures less their own mean over time, and of the same ratio of features: 0 for equal ones, 1
-    if one of them stands still, 2 for opposite ones. A tenth of the squared distance of the mean
+    if one of them stands still, 2 for opposite ones. The weighted squared distance of the mean
     postures is added to the first numerator.
 
     Parameters
@@ -104,6 +181,7 @@ class Neighbours:
     mean : ndarray (P, n_features), default=None
         The mean performance, by which gaps (NaN) of performances are filled for their velocities
         and means. What was not seen of both performances of a pair counts in no sum of theirs.
+    weights : Weights, default=Weights()
 
     Attributes
     ----------
@@ -111,15 +189,23 @@ class Neighbours:
         Whether no training performance moves: then only postures are compared.
     """
 
-    def __init__(self, performances, groups, features=_velocities, kernel=PRODUCTS, mean=None):
+    def __init__(
+        self,
+        performances,
+        groups,
+        features=_velocities,
+        kernel=PRODUCTS,
+        mean=None,
+        weights=_FIXED,
+    ):
         self._groups, self._features, self._kernel = groups, features, kernel
-        self._mean, self._seen = mean, None
+        self._mean, self._seen, self._weights = mean, None, weights
         if mean is not None and is_gappy(performances):
             self._seen = ~np.isnan(performances)
             performances = fill_with_mean(performances, mean)
-        self._center = performances.mean(axis=(0, 1))
+        self._center = weights.scale * performances.mean(axis=(0, 1))
         self._known = self._parts(performances)
-        energy, floor = movement_energies(performances)
+        energy, floor = movement_energies(weights.scale * performances)
         self.stand_still = bool(energy.max() <= floor)
         self._floor = floor * performances.shape[1]
 
@@ -152,7 +238,7 @@ class Neighbours:
                 ratios = self._ratios(some)
             if groups is not None:
                 ratios[groups[rows, np.newaxis] == self._groups] = np.inf
-            nearest = np.sort(ratios, axis=1)[:, :_N_NEAREST]
+            nearest = np.sort(ratios, axis=1)[:, : self._weights.n_nearest]
             counts = np.isfinite(nearest)
             found[rows] = np.where(counts, nearest, 0).sum(axis=1) / counts.sum(axis=1)
         return found
@@ -171,7 +257,7 @@ class Neighbours:
         float
             Below that of standing still, unless no training performance moves.
         """
-        limit = moments.upper_limit(coverage)
+        limit = moments.upper_limit(coverage, DISSIMILARITY_VARIANCE)
         return limit if self.stand_still else min(limit, _STILL_LIMIT)
 
     def _ratios(self, performances):
@@ -180,7 +266,7 @@ class Neighbours:
         known_postures, known_energy, known_features, known_power = self._known
         apart = self._kernel.distances(postures, known_postures)
         if self.stand_still:
-            return apart * _LEAST / self._floor
+            return apart * LEAST / self._floor
         ratios = apart / np.maximum(energy[:, np.newaxis] + known_energy, self._floor)
         # Where neither moves, the distance is 0, too.
         sums = np.maximum(power[:, np.newaxis] + known_power, np.finfo(float).tiny)
@@ -205,7 +291,7 @@ class Neighbours:
         offsets = postures[:, -width:] - known_postures[:, -width:]
         moved += (shares * np.square(offsets)).sum(axis=1)
         if self.stand_still:
-            ratios = 2 * moved * _LEAST / self._floor
+            ratios = 2 * moved * LEAST / self._floor
         else:
             ratios = moved / np.maximum(energy, self._floor)
             ratios += changed / np.maximum(power, np.finfo(float).tiny)
@@ -214,9 +300,10 @@ class Neighbours:
     def _parts(self, performances):
         """Centred postures beside their weighted mean, features, and the squared norms of both."""
         n, n_frames, _ = performances.shape
+        performances = self._weights.scale * performances
         mean = performances.mean(axis=1)
         moved = (performances - mean[:, np.newaxis]).reshape(n, -1)
-        offset = np.sqrt(_MEAN_WEIGHT * n_frames) * (mean - self._center)
+        offset = np.sqrt(self._weights.mean * n_frames) * (mean - self._center)
         features = self._features(performances).reshape(n, -1)
         norms = self._kernel.norms
         return np.hstack([moved, offset]), norms(moved), features, norms(features)
@@ -254,7 +341,7 @@ def movement_energies(on_clock, floor=None):
         variance = np.square(on_clock - on_clock.mean(axis=(0, 1))).sum(axis=2).mean()
     if floor is None:
         rounding = np.square(64 * np.finfo(float).eps * np.nanmax(np.abs(on_clock)))
-        floor = max(_LEAST * variance, rounding * on_clock.shape[2], np.finfo(float).tiny)
+        floor = max(LEAST * variance, rounding * on_clock.shape[2], np.finfo(float).tiny)
     return np.maximum(energy, floor), float(floor)
 
 
@@ -304,19 +391,20 @@ class LogMoments:
         squares = self.squares + other.squares + apart**2 * self.n * other.n / n
         return LogMoments(n, self.mean + apart * other.n / n, squares)
 
-    def upper_limit(self, coverage):
+    def upper_limit(self, coverage, prior_variance=_PRIOR_VARIANCE):
         """What a new value stays below with this probability."""
-        return float(np.exp(self.mean + t_prediction_limit(self.n, self.squares, coverage)))
+        limit = t_prediction_limit(self.n, self.squares, coverage, prior_variance)
+        return float(np.exp(self.mean + limit))
 
-    def standardize(self, values):
+    def standardize(self, values, prior_variance=_PRIOR_VARIANCE):
         """Deviations of the logarithms of values from the mean, in standard deviations."""
-        squares = self.squares + _PRIOR_COUNT * _PRIOR_VARIANCE
+        squares = self.squares + _PRIOR_COUNT * prior_variance
         return (np.log(values) - self.mean) / np.sqrt(squares / (self.n + _PRIOR_COUNT))
 
 
 def log_moments(dissimilarities):
     """The `LogMoments` of dissimilarities, of which those below 1e-9 are rounding."""
-    return LogMoments.of(np.maximum(dissimilarities, _LEAST))
+    return LogMoments.of(np.maximum(dissimilarities, LEAST))
 
 
 def t_prediction_limit(n, squares, coverage, prior_variance=_PRIOR_VARIANCE):

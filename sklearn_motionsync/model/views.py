@@ -21,7 +21,7 @@ from ..utils.pipelines import (
 )
 from .action_model import ActionModel
 
-__all__ = ["ClassModel", "View", "models_of_classes", "view_of"]
+__all__ = ["ClassModel", "Curves", "View", "curves_of", "models_of_classes", "view_of"]
 
 # Residual variance of a new person at a frame, in units of the mean residual variance of the
 # training postures after the aSpace: with this 93 and 94 % of held-out actors have no rare
@@ -116,15 +116,53 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
         points, labels = np.stack(given), labels_of_input(X, given)[0]
     if inverse is None:
         return View(model, names, points, points, labels, model, given, np.zeros(len(names)))
-    aspace = inverse.aspace
-    beside = names[len(aspace.components_) :]
-    names = [*names_of_features(inverse.before, aspace, aspace.n_features_in_), *beside]
-    variance = np.append(_RESIDUAL_FACTOR * aspace.left_out_variance_, np.zeros(len(beside)))
+    variance = _RESIDUAL_FACTOR * inverse.aspace.left_out_variance_
+    names = inverse.names(names)
+    variance = np.append(variance, np.zeros(len(names) - len(variance)))
     # About the mean of all training performances, not of those that were kept.
     kept = model.mean_ + model.deviations_ - model.deviations_.mean(axis=0)
     back = clone(model).fit(inverse.transform(kept), groups=model.groups_)
     synchronised = None if points is None else inverse.transform(points)
     return View(back, names, synchronised, whole, labels, model, given, variance)
+
+
+class Curves(NamedTuple):
+    """Performances on the clock of a model.
+
+    Attributes
+    ----------
+    names : list of str
+        The features of ``whole``.
+    given : sequence of ndarray (P, n_own_features)
+        As they reach the model, checked.
+    whole : ndarray (n_sequences, P, n_features)
+        The postures before an aSpace, if there is one; otherwise the same.
+    """
+
+    names: list
+    given: tuple
+    whole: np.ndarray
+
+
+def curves_of(estimator, X, params, caller):
+    """Performances on the clock of the model of an estimator, with what an aSpace leaves out.
+
+    Parameters
+    ----------
+    estimator, X, params, caller : as for `view_of`
+
+    Returns
+    -------
+    Curves
+    """
+    before, model = find_step(estimator, ActionModel)
+    names = names_of_features(before, model, model.mean_.shape[1])
+    inverse = None if before is None else _find_inverse(before, names, is_needed=False)
+    if inverse is None:
+        given = model.check_performances(transform_through(before, X, params, caller))
+        return Curves(names, given, np.stack(given))
+    synchronised, whole = inverse.synchronise(X, params, caller)
+    return Curves(inverse.names(names), model.check_performances(synchronised), whole)
 
 
 class _Inverse(NamedTuple):
@@ -136,6 +174,12 @@ class _Inverse(NamedTuple):
     before: Pipeline | None
     aspace: ASpace
     after: list
+
+    def names(self, own):
+        """The features of postures, and those beside the points of the aSpace, of ``own``."""
+        aspace = self.aspace
+        of_postures = names_of_features(self.before, aspace, aspace.n_features_in_)
+        return [*of_postures, *own[len(aspace.components_) :]]
 
     def transform(self, points):
         """Postures of points of the aSpace."""

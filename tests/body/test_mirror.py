@@ -8,6 +8,7 @@ import polars as pl
 import pytest
 from sklearn_motionsync import DirectionCosines, JointPositions, Skeleton, mirror, to_frame
 from sklearn_motionsync.body.formats import FORMATS
+from sklearn_motionsync.body.mirror import exchange_of_sides
 from sklearn_motionsync.datasets import load_performances, make_bending
 
 from made_bodies import columns_of
@@ -238,3 +239,31 @@ def test_mirror_refuses_wrong_input():
         mirror(BUNCH.data, None)
     with pytest.raises(ValueError, match="Found 0 performances"):
         mirror([], PAPER)
+
+
+# -- the mirror image of cosines --------------------------------------------------------------
+
+
+@pytest.mark.parametrize("reference", ["heading", "parent"])
+def test_the_exchange_of_cosines_is_that_of_positions(bending, reference):
+    cosines = DirectionCosines(bending.skeleton, reference=reference).fit(bending.data)
+    x = bending.data[1]
+    columns, signs = exchange_of_sides(cosines.get_feature_names_out())
+    expected = cosines.transform([mirror(x, bending.skeleton)])[0]
+    np.testing.assert_allclose(signs * cosines.transform([x])[0][:, columns], expected, atol=1e-9)
+
+
+def test_arms_alone_are_exchanged(bending):
+    names = list(DirectionCosines(bending.skeleton).fit(bending.data).get_feature_names_out())
+    columns, signs = exchange_of_sides(names, ["left_arm", "right_arm"])
+    moved = [names[k] for k in np.flatnonzero(columns != np.arange(len(names)))]
+    assert moved == [f"{side}_arm_{axis}" for side in ("left", "right") for axis in "xyz"]
+    assert [name for name, sign in zip(names, signs, strict=True) if sign < 0] == [
+        "left_arm_x",
+        "right_arm_x",
+    ]
+
+
+@pytest.mark.parametrize("names", [["a", "b"], ["left_arm_x"], ["torso_x", "torso_y"], []])
+def test_there_is_no_exchange_without_both_sides(names):
+    assert exchange_of_sides(names) is None

@@ -19,9 +19,10 @@ from sklearn_motionsync import (
     find_departures,
     to_frame,
 )
+from sklearn_motionsync.body.mirror import exchange_of_sides
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.metrics import SpreadScorer
-from sklearn_motionsync.model.detector import LogPredictionInterval
+from sklearn_motionsync.model.acceptance import Contrast, LogPredictionInterval
 from sklearn_motionsync.model.similarity import movement_energies
 
 TESTS = ["movement", "course", "duration", "energy"]
@@ -62,16 +63,44 @@ def detector():
     return make().fit(X, groups=GROUPS)
 
 
-# -- the four tests --------------------------------------------------------------------
+# -- the tests and their score ----------------------------------------------------------
 
 
 def slow_interval(values, groups, coverage):
-    """The mean logarithm, and the half-width of the prediction interval."""
+    """The mean logarithm, the half-width of the prediction interval, and what is left out."""
     logs = np.log(values)
     left = [x - np.mean(logs[groups != g]) for x, g in zip(logs, groups, strict=True)]
     n = len(logs)
-    variance = (np.sum(np.square(left)) * (n - 1) / (n + 1) + 3 * 0.07) / (n + 2)
-    return logs.mean(), student(n + 2).ppf((1 + coverage) / 2) * np.sqrt(variance * (1 + 1 / n))
+    left = np.array(left) * np.sqrt((n - 1) / (n + 1))
+    variance = (np.sum(np.square(left)) + 3 * 0.07) / (n + 2)
+    return (
+        logs.mean(),
+        student(n + 2).ppf((1 + coverage) / 2) * np.sqrt(variance * (1 + 1 / n)),
+        left,
+    )
+
+
+def slow_tail(held_out, values):
+    """-log of the probability of new dissimilarities as large, by a t distribution of logs."""
+    logs, n = np.log(held_out), len(held_out)
+    std = np.sqrt((((logs - logs.mean()) ** 2).sum() + 3 * 0.12) / (n + 3))
+    std = std * np.sqrt(1 + 1 / n)
+    return [-np.log(student(n + 2).sf((np.log(x) - logs.mean()) / std)) for x in values]
+
+
+def slow_reversal(X, groups, new):
+    """1 less the projection on the mean difference from the reversed curves, over its mean."""
+    d = [x - x[::-1] for x in X]
+    noise = 0.3 * np.mean([((a - np.mean(d, axis=0)) ** 2).sum() for a in d])
+
+    def project(a, mean):
+        return (a * mean).sum() / ((mean**2).sum() + noise)
+
+    others = [
+        np.mean([b for b, h in zip(d, groups, strict=True) if h != g], axis=0) for g in groups
+    ]
+    middle = np.mean([project(a, mean) for a, mean in zip(d, others, strict=True)])
+    return [1 - project(x - x[::-1], np.mean(d, axis=0)) / middle for x in new]
 
 
 @pytest.mark.parametrize(("duration", "n_tests"), [(True, 4), (False, 3)])
@@ -80,18 +109,25 @@ def test_report_equals_slow_loops(duration, n_tests, grouped):
     groups = GROUPS if grouped else None
     codes = GROUPS if grouped else np.arange(len(X))
     found = make(coverage=0.9, duration=duration).fit(X, groups=groups)
-    new = [wave(80), wave(30, 0.5), *people(7, seed=1)[0]]
+    new = [wave(80), wave(30, 0.5), wave(middle=0.7), *people(7, seed=1)[0], wave()[::-1]]
     report = found.report(new)
     each = 1 - 0.1 / n_tests
-    for name, steps in (
-        ("movement", make_pipeline(DenseSynchronizer(30))),
-        ("course", LinearSynchronizer(30)),
+    squares, of_training = 0, 0
+    for name, steps, weight in (
+        ("movement", make_pipeline(DenseSynchronizer(30)), 1),
+        ("course", LinearSynchronizer(30), 0.15),
     ):
         on_clock = steps.fit_transform(X)
         model = ActionModel(coverage=each).fit(on_clock, groups=groups)
-        expected = model.dissimilarity(steps.transform(new)) / model.threshold_
-        np.testing.assert_allclose(report[name], expected, rtol=1e-9)
+        unlike = model.dissimilarity(steps.transform(new))
+        np.testing.assert_allclose(report[name], unlike / model.threshold_, rtol=1e-9)
         np.testing.assert_allclose(found.borders_[name], [0, model.threshold_], rtol=1e-9)
+        known = model.dissimilarities_
+        squares = squares + weight * np.array(slow_tail(known, unlike))
+        of_training = of_training + weight * np.array(slow_tail(known, known))
+    warped = make_pipeline(DenseSynchronizer(30)).fit(X)
+    curves = warped.transform(X), codes, warped.transform(new)
+    np.testing.assert_allclose(report["reversal"], slow_reversal(*curves), rtol=1e-7)
 
     def energy(performances):
         on_clock = LinearSynchronizer(30).fit(X).transform(performances)
@@ -101,17 +137,29 @@ def test_report_equals_slow_loops(duration, n_tests, grouped):
         return np.array([len(x) for x in performances])
 
     for name, measure in [("energy", energy), *([("duration", frames)] if duration else [])]:
-        middle, reach = slow_interval(measure(X), codes, each)
+        middle, reach, left = slow_interval(measure(X), codes, each)
         np.testing.assert_allclose(report[name], (np.log(measure(new)) - middle) / reach)
         ends = np.exp([middle - reach, middle + reach])
         np.testing.assert_allclose(found.borders_[name], ends)
+        t = student(len(X) + 2)
+        end = t.ppf((1 + each) / 2)
+        squares = squares - 0.15 * np.log(2 * t.sf(end * np.abs(report[name])))
+        of_training = of_training - 0.15 * np.log(2 * t.sf(end * np.abs(left / reach)))
     names = [name for name in TESTS if duration or name != "duration"]
-    assert list(report.columns) == [*names, "reason"]
-    worst = report[names].abs().max(axis=1)
-    np.testing.assert_array_equal(found.score_samples(new), -worst)
-    np.testing.assert_array_equal(found.decision_function(new), -worst - found.offset_)
-    np.testing.assert_array_equal(found.predict(new), np.where(worst <= 1, 1, -1))
-    assert ((report["reason"] == "") == (worst <= 1)).all()
+    assert list(report.columns) == [*names, "reversal", "score", "reason"]
+    assert found.images_ == ["reversal"]
+    known, n, n_people = np.sqrt(of_training), len(X), len(set(codes))
+    variance = (known.var() * n + 3 * 0.3) / (n + 2)
+    limit = known.mean() + student(n + 2).ppf(0.9) * np.sqrt(variance * (1 + 1 / n_people))
+    alone = np.maximum(report[names].abs().max(axis=1) / 1.5, report["reversal"])
+    score = np.where(
+        alone > 1, np.maximum(np.sqrt(squares) / limit, alone), np.sqrt(squares) / limit
+    )
+    np.testing.assert_allclose(report["score"], score, rtol=1e-7)
+    np.testing.assert_array_equal(found.score_samples(new), -report["score"])
+    np.testing.assert_array_equal(found.decision_function(new), -report["score"] - found.offset_)
+    np.testing.assert_array_equal(found.predict(new), np.where(score <= 1, 1, -1))
+    assert ((report["reason"] == "") == (score <= 1)).all()
     assert set(found.predict(new)) == {-1, 1}
 
 
@@ -120,9 +168,10 @@ WRONG = {
     "too short": wave(30),
     "too weak": wave(size=0.54),
     "too strong": wave(size=2),
-    "another course": wave(middle=0.8),
+    "another course": wave(middle=0.82),
     "too short, too weak": wave(20, size=0.54),
     "another movement": wave()[:, ::-1],
+    "another movement, the other way": wave()[::-1],
     "another movement, too weak": 0 * wave(),
 }
 
@@ -180,7 +229,7 @@ def test_bends_of_a_new_person_are_accepted_and_altered_ones_rejected(bends):
         "half": [x[: len(x) // 2] for x in own],
         "weak": [x.mean(axis=0) + 0.4 * (x - x.mean(axis=0)) for x in own],
         "still": [np.repeat(x[:1], len(x), axis=0) for x in own],
-        "in slow motion": [np.repeat(x, 3, axis=0) for x in own],
+        "in slow motion": [np.repeat(x, 4, axis=0) for x in own],
     }
     for name, performances in wrong.items():
         assert (detector.predict(performances) == -1).mean() > 0.9, name
@@ -237,7 +286,7 @@ def test_groups_reach_the_model_and_the_detector():
 
 
 def test_detector_in_cross_validation_with_wrong_performances(detector):
-    wrong = [wave(middle=m) for m in np.linspace(0.8, 0.9, 10)]
+    wrong = [wave(middle=m) for m in np.linspace(0.85, 0.95, 10)]
     y = np.repeat([1, -1], [len(X), len(wrong)])
     own = np.arange(len(X))
     # Wrong ones are in no training set.
@@ -263,10 +312,11 @@ def test_key_frames_reach_the_synchronizer(routed):
         detector = ActionDetector(make_pipeline(*steps))
         detector.fit(marked.data, groups=marked.actor, **{how: marked.keyframes})
         report = detector.report(marked.data, keyframes=marked.keyframes)
-        synchronised = detector.estimator_[:2].transform(marked.data)
-        model = detector.estimator_[-1]
-        matched = detector.estimator_[2].transform(synchronised, keyframes=marked.keyframes)
-        expected = model.dissimilarity(matched) / detector.borders_["movement"][1]
+        cosines, space, synchronizer, _ = (step for _, step in detector.estimator_.steps)
+        bodies = cosines.transform(marked.data)
+        match = synchronizer.match(space.transform(bodies), keyframes=marked.keyframes)
+        model = ActionModel().fit(match.warp(bodies), groups=marked.actor)
+        expected = model.dissimilarity(match.warp(bodies)) / detector.borders_["movement"][1]
         np.testing.assert_allclose(report["movement"], expected, rtol=1e-9, atol=1e-9)
         with pytest.raises(ValueError, match=r"ActionDetector.predict\(X, keyframes=\[...\]\)"):
             detector.predict(marked.data)
@@ -360,3 +410,95 @@ def test_energy_of_standing_still_is_the_floor():
 def test_detector_refuses_pipelines_without_model_or_synchronizer(estimator, message):
     with pytest.raises(ValueError, match=message):
         ActionDetector(estimator).fit(X)
+
+
+# -- images of the movement ---------------------------------------------------------------
+
+
+def arms(n, side, seed=0):
+    """Bends of people who raise an arm to the side meanwhile: "right", "left" or "both"."""
+    bunch = make_bending(n, n_actors=n // 2, n_frames=40, style=1, random_state=seed)
+    cosines = DirectionCosines(bunch.skeleton).fit(bunch.data)
+    names, rng = list(cosines.get_feature_names_out()), np.random.default_rng(seed)
+    X = [np.asarray(x).copy() for x in cosines.transform(bunch.data)]
+    for x in X:
+        angle = rng.uniform(0.8, 1.2) * np.sin(np.linspace(0, np.pi, len(x))) ** 2
+        for name, sign in (("left", 1), ("right", -1)):
+            if side not in (name, "both"):
+                continue
+            for limb in ("arm", "forearm"):
+                at = names.index(f"{name}_{limb}_x")
+                x[:, at] = sign * np.sin(angle)
+                x[:, at + 1], x[:, at + 2] = -np.cos(angle), 0
+    return X, bunch.actor, names
+
+
+def swapped(X, names, limbs=None):
+    columns, signs = exchange_of_sides(names, limbs)
+    return [signs * x[:, columns] for x in X]
+
+
+BOTH_ARMS = [f"{side}_{limb}" for side in ("left", "right") for limb in ("arm", "forearm")]
+
+
+def test_the_other_side_is_refused_where_the_movement_has_one():
+    X, people, names = arms(12, "right")
+    new = arms(6, "right", seed=1)[0]
+    pipe = make_pipeline(ASpace(0.95), DenseSynchronizer(30), ActionModel())
+    found = ActionDetector(pipe).fit(X, groups=people)
+    assert found.images_[:2] == ["mirror", "arms"]
+    assert (found.predict(new) == 1).all()
+    for some in (swapped(new, names), swapped(new, names, BOTH_ARMS)):
+        report = found.report(some)
+        assert (found.predict(some) == -1).all()
+        assert report["reason"].str.contains("the other side, the other arm").all()
+        assert (report[["mirror", "arms"]] > 1).all(axis=None)
+    blind = clone(found).set_params(sides=False).fit(X, groups=people)
+    assert not {"mirror", "arms"} & set(blind.images_)
+    # With names, and behind the step that makes the cosines, it is the same.
+    tables = [pd.DataFrame(x, columns=names) for x in X]
+    named = clone(found).fit(tables, groups=people)
+    assert named.images_ == found.images_
+
+
+def test_sides_do_not_matter_where_both_arms_move():
+    X, people, names = arms(12, "both")
+    new = arms(6, "both", seed=1)[0]
+    pipe = make_pipeline(ASpace(0.95), DenseSynchronizer(30), ActionModel())
+    found = ActionDetector(pipe).fit(X, groups=people)
+    assert not {"mirror", "arms"} & set(found.images_)
+    for some in (new, swapped(new, names, BOTH_ARMS)):
+        assert (found.predict(some) == 1).all()
+    # Nor where people use either side.
+    right = arms(12, "right")[0]
+    mixed = ActionDetector(pipe).fit([*right, *swapped(right, names)], groups=[*people] * 2)
+    assert not {"mirror", "arms"} & set(mixed.images_)
+
+
+def test_sides_need_limbs():
+    with pytest.raises(ValueError, match=r"sides=True needs limbs .* The features are x0, x1"):
+        make(sides=True).fit(X, groups=GROUPS)
+
+
+def test_a_person_who_does_it_the_other_way_is_judged_by_the_reference():
+    X, people, names = arms(12, "right")
+    pipe = make_pipeline(ASpace(0.95), DenseSynchronizer(30), ActionModel())
+    found = ActionDetector(pipe).fit(X, groups=people)
+    mine = swapped(arms(6, "right", seed=4)[0], names)
+    assert (found.report(mine[3:])["mirror"] > 1).all()
+    assert "mirror" not in found.report(mine[3:], reference=mine[:3])
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_a_contrast_is_one_for_the_action_and_minus_one_for_its_image(symmetric):
+    rng = np.random.default_rng(0)
+    t = np.linspace(0, 1, 30)
+    base = np.sin(np.pi * t) if symmetric else t**2
+    curves = base[:, np.newaxis] * rng.uniform(0.9, 1.1, (20, 1, 1))
+    curves = curves + 0.01 * rng.standard_normal((20, 30, 1))
+    contrast = Contrast(curves, lambda x: x[:, ::-1], np.arange(20) % 5)
+    assert contrast.is_clear is not symmetric
+    if not symmetric:
+        new = base[np.newaxis, :, np.newaxis]
+        statistics = contrast.standardize(np.concatenate([new, new[:, ::-1], 0 * new]))
+        np.testing.assert_allclose(statistics, [0, 2, 1], atol=0.05)

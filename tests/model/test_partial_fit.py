@@ -15,7 +15,13 @@ from hypothesis import strategies as st
 from sklearn.exceptions import NotFittedError
 from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import ActionModel, find_departures, to_frame
-from test_similarity import curves, kept_of, slow_dissimilarity, slow_ratio, slow_threshold
+from test_similarity import (
+    curves,
+    kept_of,
+    slow_dissimilarity,
+    slow_threshold,
+    slow_weights,
+)
 
 few = settings(max_examples=12, deadline=None, derandomize=True, database=None)
 
@@ -144,16 +150,14 @@ def test_kept_performances_are_evenly_spread(groups):
 def test_dropped_performances_keep_their_dissimilarity_in_the_threshold():
     """In three portions, by loops."""
     X, groups = curves(80, n_frames=8), np.arange(80) % 9
-    ratios = np.array(
-        [[slow_ratio(x, y) if i > j else 0 for j, y in enumerate(X)] for i, x in enumerate(X)]
-    )
-    ratios += ratios.T
     edges, kept, values = [0, 68, 74, 80], [], {}
     for start, stop in pairwise(edges):
         compared = [*kept, *range(start, stop)]
         kept = slow_choice(groups[:stop])
+        weights = slow_weights(X[kept], groups[kept])
         for i in compared:
-            values[i] = np.mean(sorted(ratios[i, j] for j in kept if groups[j] != groups[i])[:2])
+            others = [X[j] for j in kept if groups[j] != groups[i]]
+            values[i] = slow_dissimilarity(X[i], others, weights)
     model = in_portions(X, groups, edges)
     np.testing.assert_array_equal(model.groups_, groups[kept])
     np.testing.assert_allclose(model.threshold_, slow_threshold(list(values.values()), 0.95))
@@ -194,7 +198,8 @@ def test_many_of_one_group_before_another():
     kept = slow_choice(groups)
     compared = [*known, *range(140, 150)]
     others = [[X[j] for j in kept if groups[j] != groups[i]] for i in compared]
-    values = [slow_dissimilarity(X[i], y) for i, y in zip(compared, others, strict=True)]
+    weights = slow_weights(X[kept], np.array(groups)[kept])
+    values = [slow_dissimilarity(X[i], y, weights) for i, y in zip(compared, others, strict=True)]
     np.testing.assert_allclose(model.threshold_, slow_threshold(values, 0.95))
 
 

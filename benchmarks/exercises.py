@@ -1,0 +1,211 @@
+"""Exercises done right and wrong: learnt from right trials of other people, one person left out.
+
+    pip install .
+    python benchmarks/exercises.py DATA_FOLDER
+
+DATA_FOLDER holds uiprmd/uiprmd_odd_positions.npz: five exercises of ten people. Everything is
+learnt from the right trials with odd numbers of nine people and judges all trials of the tenth but
+the first three right ones, which are the reference where there is one. The baseline is the mean
+squared z of cosines after linear normalisation. All five exercises were looked at while the weights
+of the tests were chosen. Then the wrong side: trials of HDM05 and UTKinect, of people left out,
+mirrored, with the arms exchanged, and backwards. Then how many right trials are accepted by what
+learnt from few or many. Prints Markdown.
+"""
+
+import os
+import sys
+import warnings
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from accuracy import print_head, print_row
+from negatives import as_clips, backwards
+from sklearn.metrics import roc_auc_score
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionDetector,
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    Skeleton,
+    mirror,
+)
+from sklearn_motionsync.body.limbs import PARTS
+from sklearn_motionsync.body.mirror import exchange_of_sides
+from sklearn_motionsync.datasets import load_performances
+
+P, N_OWN = 60, 3
+LANDMARKS = {
+    "pelvis": ("LASI", "RASI", "LPSI", "RPSI"),
+    "neck": ("C7", "CLAV"),
+    "head": ("LFHD", "RFHD", "LBHD", "RBHD"),
+    **{f"{side}_{joint}": tuple(letter + name for name in names)
+       for side, letter in (("left", "L"), ("right", "R"))
+       for joint, names in {
+           "shoulder": ("SHO",), "elbow": ("ELB",), "wrist": ("WRA", "WRB"),
+           "hip": ("ASI", "PSI"), "knee": ("KNE",), "ankle": ("ANK",),
+       }.items()},
+}  # fmt: skip
+
+
+# People who use the other side.
+OTHER_SIDE = {
+    "inline lunge": ("s02", "s07", "s10"),
+    "shoulder abduction": ("s07", "s10"),
+    "shoulder rotation": ("s07", "s10"),
+}
+
+
+def read_exercises(folder):
+    """Name, postures, people, whether it is right, and number of the trial, of each exercise."""
+    with np.load(Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz") as file:
+        joints, parents = file["joints"].tolist(), file["parents"].tolist()
+        skeleton = Skeleton(joints, parents, landmarks=LANDMARKS, up="z")
+        x = file["positions"].reshape(len(file["positions"]), -1).astype(float)
+        trials = np.split(x, file["offsets"][1:-1])
+        pairs = zip(file["label"], file["actor"], strict=True)
+        other = [i for i, (name, actor) in enumerate(pairs) if actor in OTHER_SIDE.get(name, ())]
+        for i, turned in zip(other, mirror([trials[i] for i in other], skeleton), strict=True):
+            trials[i] = np.asarray(turned)
+        trials = DirectionCosines(skeleton).fit_transform(trials)
+        columns = [file[name] for name in ("actor", "correct", "take")]
+        for name in np.unique(file["label"]):
+            own = np.flatnonzero(file["label"] == name)
+            yield name, [trials[i] for i in own], *(column[own] for column in columns)
+
+
+# -- right or wrong ---------------------------------------------------------------------
+
+
+def pipeline():
+    return make_pipeline(ASpace(0.95), DenseSynchronizer(P), ActionModel())
+
+
+def by_model(known, groups, own, tested):
+    pipe = pipeline().fit(known, actionmodel__groups=groups)
+    reference = pipe[:-1].transform(own) if own else None
+    return -pipe[-1].decision_function(pipe[:-1].transform(tested), reference)
+
+
+def by_detector(known, groups, own, tested):
+    detector = ActionDetector(pipeline()).fit(known, groups=groups)
+    return -detector.decision_function(tested, reference=own or None)
+
+
+def by_z(known, groups, own, tested):
+    """Mean squared z, of the variance within and between people or within and of own ones."""
+    linear = LinearSynchronizer(P).fit(known)
+    known, tested = (np.stack(linear.transform(x)) for x in (known, tested))
+    people = [known[groups == g] for g in np.unique(groups)]
+    variance = np.mean([p.var(axis=0, ddof=1) for p in people], axis=0)
+    if own:
+        own = np.stack(linear.transform(own))
+        centre, variance = own.mean(axis=0), variance * (1 + 1 / len(own))
+    else:
+        centre = known.mean(axis=0)
+        variance = variance + np.var([p.mean(axis=0) for p in people], axis=0, ddof=1)
+    return (np.square(tested - centre) / (variance + 0.05 * variance.mean(axis=0))).mean((1, 2))
+
+
+def judge(way, trials, people, right, takes, n_own):
+    """Pooled area, mean area within people, right ones accepted, wrong ones found."""
+    wrong, scores = [], []
+    for person in np.unique(people):
+        known = np.flatnonzero((people != person) & right & (takes % 2 == 1))
+        own = np.flatnonzero((people == person) & right)[:N_OWN]
+        tested = np.setdiff1d(np.flatnonzero(people == person), own)
+        chosen = [[trials[i] for i in rows] for rows in (known, own[:n_own], tested)]
+        scores.append(way(chosen[0], people[known], *chosen[1:]))
+        wrong.append(~right[tested])
+    within = np.mean([roc_auc_score(w, s) for w, s in zip(wrong, scores, strict=True)])
+    wrong, scores = np.concatenate(wrong), np.concatenate(scores)
+    accepted, found = (scores[~wrong] <= 0).mean(), (scores[wrong] > 0).mean()
+    return roc_auc_score(wrong, scores), within, 100 * accepted, 100 * found
+
+
+def right_or_wrong(folder):
+    exercises = list(read_exercises(folder))
+    header = [*(name for name, *_ in exercises), "mean", "within", "accepted", "found"]
+    print_head("area under the curve, pooled over people", header)
+    ways = {"`ActionModel`": by_model, "`ActionDetector`": by_detector, "z, linear": by_z}
+    for n_own in (0, 1, 2, 3):
+        for name, way in ways.items():
+            found = np.array([judge(way, *rest, n_own) for _, *rest in exercises])
+            mean = found.mean(axis=0)
+            cells = [f"{x:.3f}" for x in (*found[:, 0], mean[0], mean[1])]
+            # No border comes with z.
+            cells += [f"{x:.0f}" if way is not by_z else "-" for x in mean[2:]]
+            print_row(f"{name}, {n_own} of the person" if n_own else name, cells)
+
+
+# -- the wrong side, and the way back -----------------------------------------------------
+
+
+def exchanged(columns, signs, x):
+    return signs * x[:, columns]
+
+
+def wrong_sides(clips, names):
+    """Of every action: right ones accepted, their images and other actions refused."""
+    arms = PARTS["left arm"] + PARTS["right arm"]
+    images = {
+        "mirrored": partial(exchanged, *exchange_of_sides(names)),
+        "arms exchanged": partial(exchanged, *exchange_of_sides(names, arms)),
+        "backwards": backwards,
+    }
+    print_head(f"{clips.name}: accepted / refused", ["right", *images, "other actions", "images"])
+    for action in dict.fromkeys(clips.actions):
+        shares, found = {}, set()
+        for actor in dict.fromkeys(clips.actors[clips.actions == action]):
+            is_it, is_held = clips.actions == action, clips.actors == actor
+            detector = ActionDetector(pipeline())
+            detector.fit(clips.some(is_it & ~is_held), groups=clips.actors[is_it & ~is_held])
+            own, found = clips.some(is_it & is_held), found | set(detector.images_)
+            tried = {"right": own, **{k: [image(x) for x in own] for k, image in images.items()}}
+            tried["other"] = clips.some(~is_it & is_held)
+            for name, some in tried.items():
+                accepted = detector.predict(some) == 1
+                shares.setdefault(name, []).extend(accepted if name == "right" else ~accepted)
+        cells = [f"{100 * np.mean(of_kind):.0f}" for of_kind in shares.values()]
+        print_row(f"`{action}`", [*cells, ", ".join(sorted(found)) or "none"])
+
+
+# -- few and many -------------------------------------------------------------------------
+
+
+def learnt_from(folder, sizes=(5, 10, 20, 40)):
+    print_head("right trials accepted, learnt from", [*map(str, sizes)])
+    rng = np.random.default_rng(0)
+    accepted = {name: {n: [] for n in sizes} for name in ("`ActionModel`", "`ActionDetector`")}
+    for _, trials, people, right, _ in read_exercises(folder):
+        for person in np.unique(people):
+            others = np.flatnonzero((people != person) & right)
+            own = [trials[i] for i in np.flatnonzero((people == person) & right)]
+            for n in sizes:
+                known = rng.permutation(others)[:n]
+                given = [trials[i] for i in known], people[known], [], own
+                for name, way in zip(accepted, (by_model, by_detector), strict=True):
+                    accepted[name][n].extend(way(*given) <= 0)
+    for name, of_sizes in accepted.items():
+        print_row(name, [f"{100 * np.mean(values):.1f}" for values in of_sizes.values()])
+
+
+def main(folder):
+    warnings.simplefilter("ignore")
+    right_or_wrong(folder)
+    for archive, name in (("hdm05", "HDM05"), ("utkinect", "UTKinect")):
+        bunch = load_performances(Path(folder) / archive / f"{archive}_positions.npz")
+        names = DirectionCosines(bunch.skeleton).fit(bunch.data).get_feature_names_out()
+        wrong_sides(as_clips(name, bunch), names)
+    learnt_from(folder)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,202 @@
+"""Good trials of the person as the reference: against loops, on made people and on real ones."""
+
+import numpy as np
+import pytest
+from sklearn.metrics import roc_auc_score
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import ActionDetector, ActionModel, ASpace, DenseSynchronizer
+from sklearn_motionsync.model.personal import PersonalReference
+from test_similarity import slow_threshold, slow_velocity
+
+P = 40
+
+
+def people(n_people, n_times, seed=0, style=0.5, repeat=0.05):
+    """Performances of people with a style, who repeat themselves nearly; (n, P, 2), and who."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 1, P)
+    base = np.stack([np.sin(2 * np.pi * t), np.cos(3 * t)], axis=1)
+    parts = np.stack([np.ones(P), t, t**2, np.sin(4 * np.pi * t)], axis=1)
+
+    def drawn(size, n):
+        return size * np.einsum("tk,nkf->ntf", parts, rng.standard_normal((n, 4, 2)))
+
+    styles = np.repeat(drawn(style, n_people), n_times, axis=0)
+    return base + styles + drawn(repeat, n_people * n_times), np.repeat(range(n_people), n_times)
+
+
+X, GROUPS = people(6, 5)
+NEW, PERSONS = people(4, 8, seed=1)
+
+
+def slow_ratio(y, z, weight):
+    apart = ((y - y.mean(0) - z + z.mean(0)) ** 2).sum()
+    apart += weight * len(y) * ((y.mean(0) - z.mean(0)) ** 2).sum()
+    moved = ((y - y.mean(0)) ** 2).sum() + ((z - z.mean(0)) ** 2).sum()
+    v, w = slow_velocity(y), slow_velocity(z)
+    return apart / moved / 2 + ((v - w) ** 2).sum() / ((v**2).sum() + (w**2).sum()) / 2
+
+
+def slow_weight(X, groups):
+    """A fifth of a typical distance of poses, among the performances of a person."""
+    apart, offset = [], []
+    for i, y in enumerate(X):
+        for z in (X[j] for j in range(i) if groups[j] == groups[i]):
+            energy = ((y - y.mean(0)) ** 2).sum() + ((z - z.mean(0)) ** 2).sum()
+            apart.append(((y - y.mean(0) - z + z.mean(0)) ** 2).sum() / energy)
+            offset.append(P * ((y.mean(0) - z.mean(0)) ** 2).sum() / energy)
+    return min(0.1, 0.2 * np.median(apart) / np.median(offset))
+
+
+def slow_factors(X, groups, m):
+    """Between over between and within over m, of each feature; variances are means over frames."""
+    people = [X[groups == g] for g in sorted(set(groups))]
+    freedom = sum(len(x) - 1 for x in people)
+    within = sum(((x - x.mean(0)) ** 2).sum(0) for x in people) / freedom
+    within = np.mean((freedom * within + 5 * within.mean(0)) / (freedom + 5), axis=0)
+    between = np.var([x.mean(0) for x in people], axis=0, ddof=1).mean(0)
+    between = np.maximum(between - within * np.mean([1 / len(x) for x in people]), 0)
+    return between / (between + within / m)
+
+
+@pytest.mark.parametrize("m", [1, 3])
+def test_dissimilarity_and_threshold_equal_slow_loops(m):
+    model = ActionModel(coverage=0.9).fit(X, groups=GROUPS)
+    own, new = NEW[PERSONS == 2][:m], NEW[PERSONS == 2][m:]
+    weight, factors = slow_weight(X, GROUPS), slow_factors(X, GROUPS, m)
+
+    def moved(some, mean):
+        return some + (factors - 1) * (some.mean(axis=0) - mean)
+
+    def nearest(y, some, mean):
+        return min(slow_ratio(y, z, weight) for z in moved(some, mean))
+
+    expected = [nearest(y, own, X.mean(axis=0)) for y in new]
+    np.testing.assert_allclose(model.dissimilarity(new, reference=own), expected, rtol=1e-9)
+    left = []
+    for i, y in enumerate(X):
+        others = [5 * (i // 5) + (i + k) % 5 for k in range(1, m + 1)]
+        left.append(nearest(y, X[others], X[GROUPS[i] != GROUPS].mean(axis=0)))
+    limit = slow_threshold(left, 0.9)
+    np.testing.assert_allclose(model.threshold_at(0.9, reference=own), limit, rtol=1e-9)
+    decisions = model.decision_function(new, reference=own)
+    np.testing.assert_allclose(decisions, np.log(limit / np.array(expected)), atol=1e-8)
+    signs = np.where(decisions >= 0, 1, -1)
+    np.testing.assert_array_equal(model.predict(new, reference=own), signs)
+    # None is as without the parameter.
+    np.testing.assert_array_equal(model.dissimilarity(new, None), model.dissimilarity(new))
+
+
+def test_own_performances_tell_what_those_of_others_cannot():
+    """A deviation that is small among people is large for a person; other people are refused."""
+    found = {"own": [], "bent": [], "others": [], "without": []}
+    model = ActionModel().fit(*people(12, 6, seed=3)[:1], groups=people(12, 6, seed=3)[1])
+    for person in range(4):
+        mine, others = NEW[person == PERSONS], NEW[person != PERSONS]
+        bent = mine[3:] + 0.15 * np.sin(np.linspace(0, 6 * np.pi, P))[:, np.newaxis]
+        for name, some in (("own", mine[3:]), ("bent", bent), ("others", others)):
+            found[name].extend(model.predict(some, reference=mine[:3]))
+        found["without"].extend(model.predict(bent))
+    shares = {name: np.mean(np.equal(values, 1)) for name, values in found.items()}
+    assert shares["own"] > 0.85
+    assert shares["bent"] < 0.1
+    assert shares["others"] < 0.1
+    assert shares["without"] > 0.6
+
+
+def test_gaps_and_other_performances_change_nothing_else():
+    model, own = ActionModel().fit(X, groups=GROUPS), NEW[PERSONS == 1].copy()
+    together = model.dissimilarity(own[3:], reference=own[:3])
+    for y, value in zip(own[3:], together, strict=True):
+        assert model.dissimilarity([y], reference=own[:3])[0] == value
+    own[0, 10:12, 1] = np.nan
+    gappy = model.dissimilarity(own[3:], reference=own[:3])
+    np.testing.assert_allclose(gappy, together, rtol=0.2)
+
+
+def test_a_reference_needs_people_who_come_twice():
+    model = ActionModel().fit(X[::5], groups=GROUPS[::5])
+    for ask in (model.predict, model.dissimilarity, model.decision_function):
+        with pytest.raises(ValueError, match="no group of the training set has two performances"):
+            ask(X, reference=NEW[:2])
+    with pytest.raises(ValueError, match=r"reference needs .* give groups to fit"):
+        model.threshold_at(0.9, reference=NEW[:2])
+    found = ActionModel().fit(X, groups=GROUPS)
+    with pytest.raises(ValueError, match="The performances have 7 frames, the model 40"):
+        found.predict(X, reference=NEW[:2, :7])
+
+
+def test_people_with_one_performance_are_left_out_of_the_limit():
+    rows = [0, *range(5, 30)]
+    known = PersonalReference(X[rows], GROUPS[rows], X[rows].mean(axis=0), NEW[:2])
+    assert np.isnan(known.held_out[0])
+    assert known.moments.n == 25
+
+
+# -- the detector -------------------------------------------------------------------------
+
+
+def raw(some, seed=0):
+    """Of different lengths."""
+    rng = np.random.default_rng(seed)
+    t, n = np.linspace(0, 1, P), rng.integers(36, 46, len(some))
+    return [
+        np.column_stack([np.interp(np.linspace(0, 1, k), t, column) for column in x.T])
+        for k, x in zip(n, some, strict=True)
+    ]
+
+
+def test_a_detector_takes_a_reference_as_it_was_recorded():
+    pipe = make_pipeline(ASpace(2), DenseSynchronizer(30), ActionModel())
+    detector = ActionDetector(pipe).fit(raw(X), groups=GROUPS)
+    mine = NEW[PERSONS == 1]
+    bent = mine[3:] + 0.4 * np.sin(np.linspace(0, 6 * np.pi, P))[:, np.newaxis]
+    report = detector.report(raw([*mine[3:], *bent], 5), reference=raw(mine[:3], 6))
+    assert list(report.columns)[:3] == ["movement", "own", "course"]
+    assert (report["reason"][:5] == "").sum() >= 4
+    assert report["reason"][5:].str.contains("unlike the reference").all()
+    predicted = detector.predict(raw([*mine[3:], *bent], 5), reference=raw(mine[:3], 6))
+    np.testing.assert_array_equal(predicted, np.where(report["reason"] == "", 1, -1))
+    # The statistic is that of a model of the poses, with the limit of its share.
+    curves = detector.estimator_[1].match(detector.estimator_[0].transform(raw(X))).warp(raw(X))
+    model = ActionModel(coverage=1 - 0.05 / 4).fit(curves, groups=GROUPS)
+    match = detector.estimator_[1].match(detector.estimator_[0].transform(raw(mine[:3], 6)))
+    own = match.warp(raw(mine[:3], 6))
+    new = raw([*mine[3:], *bent], 5)
+    warped = detector.estimator_[1].match(detector.estimator_[0].transform(new)).warp(new)
+    unlike = model.dissimilarity(warped, reference=own) / model.threshold_at(
+        model.coverage, reference=own
+    )
+    np.testing.assert_allclose(report["own"], unlike, rtol=1e-8)
+
+
+# -- exercises of people ------------------------------------------------------------------
+
+
+def test_exercises_of_people_done_right_and_wrong(benchmark, real_data):
+    """Two people held out; shoulder rotation, where people differ more than right from wrong."""
+    read = benchmark("exercises").read_exercises(real_data)
+    found = {name: rest for name, *rest in read}
+    postures, people, correct, takes = found["shoulder rotation"]
+    areas = {"others": [], "own": [], "detector": []}
+    for person in ("s03", "s06"):
+        train = np.flatnonzero((people != person) & correct & (takes % 2 == 1))
+        mine = np.flatnonzero(people == person)
+        own, rest = mine[correct[mine]][:3], np.setdiff1d(mine, mine[correct[mine]][:3])
+
+        def some(rows):
+            return [postures[i] for i in rows]
+
+        pipe = make_pipeline(ASpace(0.95), DenseSynchronizer(60), ActionModel())
+        pipe.fit(some(train), actionmodel__groups=people[train])
+        steps, model = pipe[:-1], pipe[-1]
+        wrong, new = ~correct[rest], steps.transform(some(rest))
+        reference = steps.transform(some(own))
+        areas["others"].append(roc_auc_score(wrong, model.dissimilarity(new)))
+        areas["own"].append(roc_auc_score(wrong, model.dissimilarity(new, reference)))
+        detector = ActionDetector(pipe).fit(some(train), groups=people[train])
+        scores = -detector.decision_function(some(rest), reference=some(own))
+        areas["detector"].append(roc_auc_score(wrong, scores))
+    assert min(areas["own"]) > 0.95
+    assert min(areas["detector"]) > 0.95
+    assert np.mean(areas["others"]) < np.mean(areas["own"])
