@@ -23,6 +23,7 @@ __all__ = [
     "median_lengths",
     "names_of_cosines",
     "nearest_ancestor",
+    "part_of_limb",
     "parts_of_names",
     "parts_of_postures",
     "scale_missing_lengths",
@@ -246,6 +247,11 @@ def names_of_cosines(performances, names):
     squares = np.concatenate([np.square(x[:, cosines]).sum(axis=1) for x in performances])
     n_limbs = len({names[k].rpartition("_")[0] for k in cosines})
     return names if abs(np.nanmean(squares) / n_limbs - 1) < _UNIT_TOLERANCE else None
+
+
+def part_of_limb(limb):
+    """The part of the body of a limb, such as ``"left arm"``; the pelvis is of the trunk."""
+    return next((part for part, limbs in PARTS.items() if limb in limbs), "trunk")
 
 
 def _by_part(limb_of):

@@ -1,24 +1,26 @@
 """Limbs that depart from an action: when, how far, and the bones that represent them."""
 
+from functools import partial
 from numbers import Real
-from typing import NamedTuple
 
 import numpy as np
-from sklearn.pipeline import FeatureUnion
 
+from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
 from ..body.limbs import LIMBS
-from ..model.views import view_of
-from ..transformers.aspace import ASpace
-from ..utils.pipelines import flat_steps
-from .arguments import as_frames
+from ..inputs.tables import name_performance
+from ..model.departures import judge
+from ..model.views import models_of_classes
+from ..utils.pipelines import find_step, find_synchronizer, flat_steps, union_transformers
+from .arguments import as_frames, as_index
 
 __all__ = [
     "bones_of_limbs",
-    "departs_outside_aspace",
+    "describe_departure",
+    "draw_departures",
     "limb_departures",
     "limb_of",
-    "view_of_limbs",
+    "split_at_synchronizer",
 ]
 
 # The pelvis is no limb; its height is marked on the hips.
@@ -27,19 +29,17 @@ _HEIGHT, _PELVIS = "pelvis_height", "hip"
 _FAR = 1 / 12
 
 
-def limb_departures(scores, features, frames, limit, skeleton):
-    """The frames of largest departure, and the limbs that depart around them.
+def limb_departures(rows, n_frames, frames, skeleton):
+    """The frames to show, and the limbs that depart around them.
 
     Parameters
     ----------
-    scores : ndarray, shape (P, n_features)
-        Deviations of one performance in predicted standard deviations.
-    features : list of str
-        ``pelvis_height``, ``hip_x``, ...
+    rows : list of Departure
+        Of one performance, the most important first.
+    n_frames : int
+        Of the clock.
     frames : int or list of int
         As for `SkeletonDisplay.from_departures`.
-    limit : float
-        A feature departs beyond this number of standard deviations.
     skeleton : Skeleton
         Its joints are landmarks.
 
@@ -48,37 +48,50 @@ def limb_departures(scores, features, frames, limit, skeleton):
     frames : list of int
         One a panel.
     titles : list of str
-        The frame and the limb that departs most.
+        The frame and the most important departure.
     marked : list of list of (int, int)
         The bones that depart around each frame.
     """
-    limbs = list(dict.fromkeys(map(limb_of, features)))
-    columns = [[k for k, name in enumerate(features) if limb_of(name) == limb] for limb in limbs]
-    # The score of a limb is the largest of its cosines.
-    sizes = np.stack([np.abs(scores[:, c]).max(axis=1) for c in columns], axis=1)
-    shown, stretches = _stretches(frames, sizes.max(axis=1), limit)
+    rows = [row for row in rows if row.limb is not None]
+    shown, stretches = _stretches(rows, frames, n_frames)
     titles, marked = [], []
     for frame, stretch in zip(shown, stretches, strict=True):
-        peaks = sizes[stretch].max(axis=0)
-        departing = [limb for limb, peak in zip(limbs, peaks, strict=True) if peak > limit]
-        worst, peak = limbs[int(peaks.argmax())], peaks.max()
-        text = f"{worst} {peak:.{0 if peak >= 10 else 1}f} std" if departing else "no limb departs"
+        departing = [row for row in rows if _is_in(row, stretch)]
+        text = describe_departure(departing[0]) if departing else "no limb departs"
         titles.append(f"frame {frame}\n{text}")
-        marked.append(bones_of_limbs(departing, skeleton))
+        limbs = list(dict.fromkeys(row.limb for row in departing))
+        marked.append(bones_of_limbs(limbs, skeleton))
     return shown, titles, marked
 
 
-def _stretches(frames, largest, limit):
+def describe_departure(row):
+    """A departure in plain words, such as ``"left forearm 31\N{DEGREE SIGN} off"``."""
+    limb = row.limb.replace("_", " ")
+    if row.kind == "angle":
+        return f"{limb} {row.size:.0f}\N{DEGREE SIGN} off"
+    if row.kind in ("late", "early"):
+        return f"{limb} {row.size:.0f} % {row.kind}"
+    if row.unit == "ratio":
+        return f"{limb} moves {row.size:.1f} times as far"
+    return f"{limb} {abs(row.size):.2f} {'higher' if row.size > 0 else 'lower'}"
+
+
+def _is_in(row, stretch):
+    """Whether a departure lies in one of some frames, which follow each other."""
+    return len(stretch) > 0 and row.first <= stretch[-1] and row.last >= stretch[0]
+
+
+def _stretches(rows, frames, n_frames):
     """The frames to show, and the frames of the clock that each of them represents."""
-    n_frames = len(largest)
     if isinstance(frames, Real):
         count = min(len(as_frames(frames, n_frames)), n_frames)
         edges = np.linspace(0, n_frames, count + 1).round().astype(int)
-        stretches = np.split(np.arange(n_frames), edges[1:-1])
-        peaks = [stretch[largest[stretch].argmax()] for stretch in stretches]
-        middles = [stretch[(len(stretch) - 1) // 2] for stretch in stretches]
-        shown = np.where(largest[peaks] > limit, peaks, middles)
-        return shown.tolist(), stretches
+        stretches, shown = np.split(np.arange(n_frames), edges[1:-1]), []
+        for stretch in stretches:
+            # The peak of the most important departure, or the middle.
+            peaks = [row.peak for row in rows if stretch[0] <= row.peak <= stretch[-1]]
+            shown.append([*peaks, int(stretch[(len(stretch) - 1) // 2])][0])
+        return shown, stretches
     shown = as_frames(frames, n_frames)
     distances = np.abs(np.arange(n_frames) - np.array(shown)[:, np.newaxis])
     near = (distances == distances.min(axis=0)) & (distances <= _FAR * n_frames)
@@ -103,83 +116,94 @@ def _bones_of_limb(limb, skeleton):
     return [ends] if ends in skeleton.bones else [b for b in skeleton.bones if b[1] in ends]
 
 
-class LimbColumns(NamedTuple):
-    """The direction cosines among the features of a view, and the way back to them.
-
-    Attributes
-    ----------
-    cosines : DirectionCosines
-    columns : slice
-        The columns of the cosines.
-    steps : list of transformer
-        The steps between the cosines and the features, such as scalers.
-    """
-
-    cosines: DirectionCosines
-    columns: slice
-    steps: list
-
-    def invert(self, features):
-        """The cosines of features of the view, (n, 37)."""
-        for step in reversed(self.steps):
-            features = np.asarray(step.inverse_transform(features))
-        return features[:, self.columns]
-
-
-def view_of_limbs(before, parts, estimator, X, params, caller):
-    """A view of the model and performances of a pipeline, and its limbs.
+def draw_departures(estimator, X, params, caller, *, performance, frames, limit, reference):
+    """What `SkeletonDisplay` draws of the departures of a performance, as its parameters.
 
     Parameters
     ----------
-    before : Pipeline
-        The steps before the synchronizer.
-    parts : list of transformer
-        Those of them with a skeleton.
     estimator : Pipeline
-        The whole pipeline.
     X, params, caller
         As for `view_of`.
+    performance, frames, limit, reference
+        As for `SkeletonDisplay.from_departures`.
     """
     if X is None:
         raise ValueError(f"{caller} needs performances X, whose departures are drawn; got None.")
-    view = view_of(estimator, X, params, caller, postures=True)
-    cosines = [part for part in parts if isinstance(part, DirectionCosines)]
-    # With several of them the columns are ambiguous.
-    columns = _columns_of(cosines[0], view.names) if len(cosines) == 1 else None
-    steps = flat_steps(before)
-    found = [k for k, step in enumerate(steps) if cosines and _passes_on(step, cosines[0])]
-    after = [step for step in steps[sum(found[:1]) + 1 :] if not isinstance(step, ASpace)]
-    invertible = found and all(hasattr(step, "inverse_transform") for step in after)
-    if columns is None or not invertible:
+    index = partial(as_index, performance, what="performance")
+    models = models_of_classes(estimator, X, params, caller, index)
+    if models is not None:
+        (model,) = models
+        estimator, X, params = model.estimator, model.performances, {}
+    before, _ = split_at_synchronizer(estimator)
+    if limit is not None and not limit > 0:
+        raise ValueError(
+            f"limit must be a number of standard deviations above 0, or None; got {limit!r}."
+        )
+    chosen = index if models is None else None
+    judged = judge(estimator, X, params, caller, reference=reference, only=chosen)
+    view, limbs = judged.view, judged.space.limbs
+    if limbs is None:
         raise ValueError(
             "Limbs that depart need a pipeline of DirectionCosines, an ASpace if you like, "
             "synchronizers and an ActionModel, whose features lead back to limbs; those found "
             f"are {', '.join(view.names[:4])}, ..., by way of "
-            f"{[type(step).__name__ for step in steps]}."
+            f"{[type(step).__name__ for step in flat_steps(before)]}."
         )
-    return view, LimbColumns(cosines[0], columns, after)
+    if models is None:
+        i, note = index(len(view.given)), ""
+        name = name_performance(i, view.labels[i])
+    else:
+        i, note = 0, " by the model of that class"
+        name = name_performance(int(model.indices[0]), model.labels[0])
+        name = f"{name}, most like {str(model.label)!r},"
+    rows, skeleton = judged.rows(i, limit), limbs.cosines.skeleton.body()
+    shown, titles, marked = limb_departures(rows, len(judged.mean), frames, skeleton)
+    bodies, shadows = (
+        np.asarray(limbs.cosines.inverse_transform(limbs.invert(x)))
+        for x in (judged.curves[i], judged.mean)
+    )
+    bodies, shadows = (x.reshape(len(x), -1, skeleton.n_dims) for x in (bodies, shadows))
+    if not skeleton.has_height:
+        # Without a height of the pelvis both have the same floor.
+        floor = min(bodies[..., 1].min(), shadows[..., 1].min())
+        bodies[..., 1] -= floor
+        shadows[..., 1] -= floor
+    verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
+    if verdict == "accepted" and _departs_outside_aspace(view, i, limbs.columns):
+        note += ": the model sees what the aSpace keeps, "
+        note += "which leaves out how far some limbs depart"
+    whose = "a new person" if reference is None else "this person"
+    rare = [describe_departure(row) for row in rows if row.rare and row.limb is not None]
+    return {
+        "scenes": [[bodies[[frame]]] for frame in shown],
+        "skeleton": skeleton,
+        "titles": titles,
+        "marked": marked,
+        "behind": [[shadows[[frame]]] for frame in shown],
+        "heading": f"{name.replace('Performance', 'Trial', 1)} is {verdict}{note}.\n"
+        f"Rare: {', '.join(rare) if rare else 'nothing'}. Violet: limbs that depart at or around "
+        f"that frame. Pale: what is expected of {whose}.",
+    }
 
 
-def departs_outside_aspace(view, i, columns):
+def split_at_synchronizer(estimator):
+    """The steps of a pipeline before its synchronizer, and those of them with a skeleton."""
+    before, _ = find_synchronizer(estimator)
+    if before is None:
+        raise ValueError(
+            "Stick figures need a pipeline that begins with DirectionCosines; for a synchronizer "
+            "by itself use from_predictions with the joint positions."
+        )
+    parts = [part for step in flat_steps(before) for part in union_transformers(step)]
+    views = [part for part in parts if isinstance(part, PositionsTransformer)]
+    if not views:
+        # Raises an error that names the steps.
+        find_step(before, DirectionCosines)
+    return before, views
+
+
+def _departs_outside_aspace(view, i, columns):
     """Whether limbs depart beyond what is rare, but not in the aSpace of the model."""
     kept = (view.synchronised[i] - view.model.mean_) / view.predicted
     whole, kept = (np.abs(z[:, columns]).max() for z in (view.scores[i], kept))
     return whole > view.model.simultaneous_factor() >= kept
-
-
-def _passes_on(step, cosines):
-    """Whether a step, or a union, returns the features of cosines unchanged."""
-    if not isinstance(step, FeatureUnion):
-        return step is cosines
-    views = [flat_steps(view) for _, view in step.transformer_list if not isinstance(view, str)]
-    return any(_passes_on(inner[-1], cosines) for inner in views if inner)
-
-
-def _columns_of(cosines, names):
-    """The columns of the features of DirectionCosines, also in a union; None without them."""
-    own = list(cosines.get_feature_names_out())
-    for k, name in enumerate(names):
-        prefix = name.removesuffix(own[0])
-        if names[k : k + len(own)] == [f"{prefix}{x}" for x in own]:
-            return slice(k, k + len(own))
-    return None

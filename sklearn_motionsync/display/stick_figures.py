@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from numbers import Real
 from textwrap import fill
 from typing import Any, Self
@@ -12,29 +11,23 @@ import numpy as np
 from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
-from ..body.base import PositionsTransformer
 from ..body.direction_cosines import DirectionCosines
 from ..body.skeleton import Skeleton
-from ..inputs.tables import name_performance
 from ..inputs.types import NumbersLike, PerformancesLike, RandomState
 from ..inputs.wording import counted
 from ..model.action_model import ActionModel
-from ..model.views import models_of_classes
 from ..synchronizers.match import match_of_times
 from ..utils.pipelines import (
     find_step,
     find_synchronizer,
-    flat_steps,
     index_of_pattern,
     route_to_synchronizer,
-    union_transformers,
 )
 from .animation import animate
 from .arguments import (
     Animation,
     AxesLike,
     as_frames,
-    as_index,
     as_indices,
     as_names,
     as_performances,
@@ -49,7 +42,7 @@ from .bodies import (
     read_positions,
 )
 from .drawing import COLORS, WIDTH, bone_lines, panels, stage
-from .limb_departures import departs_outside_aspace, limb_departures, view_of_limbs
+from .limb_departures import draw_departures, split_at_synchronizer
 
 __all__ = ["SkeletonDisplay", "postures_at"]
 
@@ -340,7 +333,7 @@ class SkeletonDisplay:
         SkeletonDisplay
             The display, drawn at the beginning; see `animate`.
         """
-        _, views = _split_at_synchronizer(estimator)
+        _, views = split_at_synchronizer(estimator)
         reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
         match = reached.match()
         pattern = index_of_pattern(reached.synchronizer, reached.performances)
@@ -393,7 +386,7 @@ class SkeletonDisplay:
             The display, drawn.
         """
         _, model = find_step(estimator, ActionModel)
-        before, views = _split_at_synchronizer(estimator)
+        before, views = split_at_synchronizer(estimator)
         check_is_fitted(model)
         if not hasattr(before, "inverse_transform"):
             raise ValueError(
@@ -434,19 +427,20 @@ class SkeletonDisplay:
         performance: int = 0,
         frames: int | Sequence[int] | np.ndarray = 6,
         limit: float | None = None,
+        reference: PerformancesLike | None = None,
         ax: AxesLike | None = None,
         at: float = 0.0,
         azimuth: float = -60,
         **params: Any,
     ) -> Self:
-        """Draw when a performance departs from an action, and with which limbs.
+        """Draw what is wrong with a performance: when, and with which limbs.
 
         The figure shows postures of the performance on the clock of the model, before pale shadows
-        of the mean performance. Limbs that depart are violet: one of their cosines is farther from
-        the mean than ``limit``; for the height of the pelvis the hips are marked. Titles name the
-        limb that departs most. The heading says whether the model accepts the performance; it may
-        do so although limbs depart, because it evaluates only what the `ASpace` keeps, and the
-        heading then says so.
+        of what is expected. Limbs that depart are violet: those of the rows of `find_departures`;
+        for the height of the pelvis the hips are marked. Titles tell the most important departure:
+        the limb, and by how much it is off, late, or moves too little or too far. The heading says
+        whether the model accepts the performance, and what is rare; it may accept it although limbs
+        depart, because it evaluates only what the `ASpace` keeps, and the heading then says so.
 
         Parameters
         ----------
@@ -459,14 +453,14 @@ class SkeletonDisplay:
         performance : int, default=0
             The index of the performance.
         frames : int or list of int, default=6
-            A number cuts the clock into as many equal parts, each shown at the frame of its largest
-            departure, or in its middle without one. A list gives frames of the model, each of which
-            represents the frames that are nearest to it, up to a twelfth of the clock away. A limb
-            is marked if it departs anywhere in its part.
+            A number cuts the clock into as many equal parts, each shown at the peak of its most
+            important departure, or in its middle without one. A list gives frames of the model,
+            each of which represents the frames that are nearest to it, up to a twelfth of the clock
+            away. A limb is marked if it departs anywhere in its part.
         limit : float, default=None
-            In standard deviations predicted for a new subject; by default ``n_std`` of the model.
-            Correct performances exceed 3 occasionally; the heading names the deviation that is
-            rare (`ActionModel.simultaneous_factor`).
+            As for `find_departures`.
+        reference : performances, default=None
+            One to five right performances of the same person, as for `find_departures`.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
         at : float in [0, 1], default=0.0
@@ -492,56 +486,17 @@ class SkeletonDisplay:
         sklearn_motionsync.find_departures : The departures as a table.
         ActionModelDisplay : The curves of the performance, and the band that they leave.
         """
-        caller = f"{cls.__name__}.from_departures"
-        index = partial(as_index, performance, what="performance")
-        models = models_of_classes(estimator, X, params, caller, index)
-        if models is not None:
-            (model,) = models
-            estimator, X, params = model.estimator, model.performances, {}
-        before, parts = _split_at_synchronizer(estimator)
-        view, limbs = view_of_limbs(before, parts, estimator, X, params, caller)
-        if models is None:
-            i, note = index(len(view.given)), ""
-            name = name_performance(i, view.labels[i])
-        else:
-            i, note = 0, " by the model of that class"
-            name = name_performance(int(model.indices[0]), model.labels[0])
-            name = f"{name}, most like {str(model.label)!r},"
-        limit = view.model.n_std if limit is None else limit
-        if not limit > 0:
-            raise ValueError(
-                f"limit must be a number of standard deviations above 0, or None; got {limit!r}."
-            )
-        features = list(limbs.cosines.get_feature_names_out())
-        skeleton = limbs.cosines.skeleton.body()
-        scores = view.scores[i][:, limbs.columns]
-        shown, titles, marked = limb_departures(scores, features, frames, limit, skeleton)
-        bodies, shadows = (
-            np.asarray(limbs.cosines.inverse_transform(limbs.invert(x)))
-            for x in (view.whole[i], view.model.mean_)
+        drawn = draw_departures(
+            estimator,
+            X,
+            params,
+            f"{cls.__name__}.from_departures",
+            performance=performance,
+            frames=frames,
+            limit=limit,
+            reference=reference,
         )
-        bodies, shadows = (x.reshape(len(x), -1, skeleton.n_dims) for x in (bodies, shadows))
-        if not skeleton.has_height:
-            # Without a height of the pelvis both have the same floor.
-            floor = min(bodies[..., 1].min(), shadows[..., 1].min())
-            bodies[..., 1] -= floor
-            shadows[..., 1] -= floor
-        verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
-        if verdict == "accepted" and departs_outside_aspace(view, i, limbs.columns):
-            note += ": the model sees what the aSpace keeps, "
-            note += "which leaves out how far some limbs depart"
-        display = cls(
-            postures_at(shown, bodies),
-            skeleton,
-            titles,
-            marked=marked,
-            behind=postures_at(shown, shadows),
-            heading=f"{name.replace('Performance', 'Trial', 1)} is {verdict}{note}.\n"
-            f"Violet: limbs more than {limit:.3g} standard deviations from what is expected of a "
-            "new person, at or around that frame; beyond "
-            f"{view.model.simultaneous_factor():.2g} is rare. Pale: the mean.",
-        )
-        return display.plot(ax, at=at, azimuth=azimuth)
+        return cls(**drawn).plot(ax, at=at, azimuth=azimuth)
 
     def plot(self, ax: AxesLike | None = None, *, at: float = 0.0, azimuth: float = -60) -> Self:
         """Draw.
@@ -727,19 +682,3 @@ def _frames_of_model(frames, n_frames):
         ]
     what = "frames, those that are no shares between 0 and 1,"
     return as_indices(listed, n_frames, what)
-
-
-def _split_at_synchronizer(estimator):
-    """The steps of a pipeline before its synchronizer, and those of them with a skeleton."""
-    before, _ = find_synchronizer(estimator)
-    if before is None:
-        raise ValueError(
-            "Stick figures need a pipeline that begins with DirectionCosines; for a synchronizer "
-            "by itself use from_predictions with the joint positions."
-        )
-    parts = [part for step in flat_steps(before) for part in union_transformers(step)]
-    views = [part for part in parts if isinstance(part, PositionsTransformer)]
-    if not views:
-        # Raises an error that names the steps.
-        find_step(before, DirectionCosines)
-    return before, views

@@ -1,4 +1,4 @@
-"""Departures of performances from a model: runs of frames beyond a limit."""
+"""Departures of performances from a model: the table of what is wrong with them."""
 
 from __future__ import annotations
 
@@ -9,27 +9,46 @@ import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator
 
+from ..body.limbs import part_of_limb
 from ..inputs.features import choose_features
 from ..inputs.types import Features, PerformancesLike
+from ..synchronizers.linear import LinearSynchronizer
 from ..utils.pipelines import find_synchronizer, route_to_synchronizer
-from .views import models_of_classes, view_of
+from .faults import FaultFinder, Part, expected_performance
+from .hidden import fill_with_mean
+from .views import View, limbs_of, models_of_classes, view_of
 
-__all__ = ["find_departures"]
+__all__ = ["Judged", "find_departures", "judge"]
+
+# A floor of the variance of limbs, in units of that outside of the components that hold so much.
+# Chosen on HDM05 and two exercises of UI-PRMD.
+_OUTSIDE, _HELD = 8, 0.95
+# Of residuals, as a share of the clock.
+_CORRELATION_TIME = 0.1
+# Frames around a peak belong to it if they deviate by so much of it.
+_OF_PEAK = 0.5
+_DTYPES = {
+    "first": np.intp, "last": np.intp, "peak": np.intp,
+    "size": np.float64, "deviation": np.float64, "rare": bool,
+}  # fmt: skip
 
 
 def find_departures(
     estimator: BaseEstimator,
     X: PerformancesLike,
     *,
+    reference: PerformancesLike | None = None,
     features: Features | None = None,
     limit: float | None = None,
     **params: Any,
 ) -> pd.DataFrame:
-    """Departures of performances from a model: when, in which feature, and how far.
+    """What is wrong with performances: the limb, the kind of fault, when, and how large.
 
-    A posture departs if its deviation from the mean exceeds a limit, in the standard deviations
-    predicted for a *new person* (`ActionModel.standard_scores`). Postures include the residuals of
-    an `ASpace`.
+    A fault changes one limb, or one feature where there are no limbs: by an angle over a window of
+    time, by a lag, or in its amplitude. The most important fault is that with the largest gain in
+    the log likelihood; it is taken away, and the next one is sought, up to five. A limb is judged
+    along the axes of its parent limb, so an arm does not depart because the trunk leans. Lags are
+    sought before synchronisation, which takes them away.
 
     Parameters
     ----------
@@ -38,27 +57,49 @@ def find_departures(
         rejection; these models are fitted by the call (`ActionClassifier.model_of`).
     X : performances
         As the estimator takes them.
+    reference : performances, default=None
+        One to five right performances of the same person, as the estimator takes them. What is
+        expected is then a weighted mean of theirs and of the model's: the posterior mean, with the
+        variance within people, which is learnt from the groups of the model. They are synchronised
+        without ``params``.
     features : int, str or list of them, default=None
-        Features of the model, or of the postures before its `ASpace`, by index or name. By default
-        those of postures, if there is such an aSpace, otherwise all of the model.
+        Features of the model, or of the postures before its `ASpace`, by index or name: each is
+        judged by itself. By default the limbs of `DirectionCosines`, if they lead to the model,
+        otherwise all features: those of postures before an `ASpace`, or of the model.
     limit : float, default=None
-        Largest deviation that is no departure, in standard deviations; by default ``n_std`` of the
-        model. About half of all correct performances exceed 3 somewhere, few by much.
+        Largest deviation that is no departure, in standard deviations. By default the evidence
+        decides: half of all correct performances of new people have a fault with as much. A fault
+        also counts that exceeds `ActionModel.simultaneous_factor`.
     **params : dict
         What synchronizing X takes besides, such as ``keyframes``.
 
     Returns
     -------
     DataFrame
-        One row a run of frames, by performance and then the largest deviation first:
-        ``performance``, its number or label, a tuple if an index has several levels; with a
-        classifier ``class``, the predicted one; ``feature``; ``first`` and ``last``, frames of the
-        model, counted from 0; ``peak``, the frame of the largest deviation; ``deviation``, in
-        standard deviations, negative below the mean; ``rare``, whether it exceeds
-        `ActionModel.simultaneous_factor`, which a share of ``coverage`` of the performances of new
-        people does at no frame and in no feature; ``timing``, whether the clock may be the reason:
-        inside the intervals of 90 % of its times (`Match.interval`) the performance has values
-        within the limit. False where no `DenseSynchronizer` tells.
+        One row a fault, by performance and then the most important first:
+
+        - ``performance``, its number or label, a tuple if an index has several levels; with a
+          classifier ``class``, the predicted one.
+        - ``kind``: ``"angle"`` of a limb, ``"value"`` of a feature, ``"late"``, ``"early"``,
+          ``"too small"`` or ``"too large"``, of the amplitude.
+        - ``limb``, such as ``"left_forearm"``, and ``region``, such as ``"left arm"`` or
+          ``"trunk"``: only where there are limbs; None of other features.
+        - ``feature``: the one with the largest deviation.
+        - ``first``, ``last`` and ``peak``, the frame of the largest deviation: frames of the
+          model, counted from 0. Lags and amplitudes are those of the whole movement.
+        - ``size`` and ``unit``: the angle in ``"degrees"``; the lag in ``"percent"`` of the clock;
+          the ``"ratio"`` of the amplitude to the expected one; the height of the pelvis in
+          ``"leg lengths"``; other features differ so much on average, in their own unit, an empty
+          text.
+        - ``deviation``, in standard deviations of people: negative below the mean, early, and too
+          small.
+        - ``rare``: whether the evidence exceeds what a share of ``coverage`` of the performances of
+          new people does in no limb and by no kind of fault. It is calibrated by leaving groups
+          out of the training set; with a reference, every performance of a person, the others
+          being the reference.
+        - ``timing``, whether the clock may be the reason: inside the intervals of 90 % of its times
+          (`Match.interval`) the performance has values within the limit, or
+          ``n_std`` standard deviations. False where no `DenseSynchronizer` tells.
 
     Raises
     ------
@@ -70,6 +111,11 @@ def find_departures(
     compare_to_norm : A verdict of each subject, also on timing.
     sklearn_motionsync.display.SkeletonDisplay.from_departures : Draws them as stick figures.
 
+    Notes
+    -----
+    An `ASpace` keeps no residuals of the training set, so limbs are named better without one: see
+    `What is wrong with this trial </howto/faults>` and `Accuracy </accuracy>`.
+
     Examples
     --------
     >>> import numpy as np
@@ -78,21 +124,21 @@ def find_departures(
     >>> model = ActionModel().fit([a * np.sin(3 * t) for a in (0.8, 0.9, 1.0, 1.1, 1.2)])
     >>> new = np.sin(3 * t)
     >>> new[20:25] += 3
-    >>> find_departures(model, [np.sin(3 * t), new]).round(0)
-       performance feature  first  last  peak  deviation  rare  timing
-    0            1      x0     20    24    20       19.0  True   False
+    >>> found = find_departures(model, [np.sin(3 * t), new])
+    >>> found[["performance", "kind", "first", "last", "size", "deviation", "rare"]].round(0)
+       performance   kind  first  last  size  deviation  rare
+    0            1  value     20    24   3.0       19.0  True
     """
     is_number = isinstance(limit, Real) and not isinstance(limit, bool)
     if limit is not None and not (is_number and 0 < limit < np.inf):
         raise ValueError(f"limit must be a number above 0, or None; got {limit!r}.")
-    caller = "find_departures"
+    caller, how = "find_departures", (features, limit, reference)
     models = models_of_classes(estimator, X, params, caller)
     if models is None:
-        return _departures(estimator, X, params, caller, features, limit)
+        return _departures(estimator, X, params, caller, *how)
     # Params are those of the steps before a classifier; its models take none.
     parts = [
-        _departures(part.estimator, part.performances, {}, caller, features, limit, part)
-        for part in models
+        _departures(part.estimator, part.performances, {}, caller, *how, part) for part in models
     ]
     order = np.concatenate(
         [part.indices[t.pop("index")] for part, t in zip(models, parts, strict=True)]
@@ -101,53 +147,322 @@ def find_departures(
     return table.reset_index(drop=True).infer_objects()
 
 
-def _departures(estimator, X, params, caller, features, limit, part=None):
+def _departures(estimator, X, params, caller, features, limit, reference, part=None):
     """The table of one model; of the model of a class with the class, and indices in it."""
-    view = view_of(estimator, X, params, caller, features=features, postures=features is None)
-    names, scores, curves = view.names, view.scores, view.whole
-    mean, std = view.model.mean_, view.predicted
-    if features is not None:
-        chosen = choose_features(features, names)
-        names, scores, curves = (
-            [names[i] for i in chosen],
-            scores[:, :, chosen],
-            curves[..., chosen],
-        )
-        mean, std = mean[:, chosen], std[:, chosen]
-    limit = view.model.n_std if limit is None else limit
-    found = runs(scores, limit)
+    judged = judge(estimator, X, params, caller, features=features, reference=reference)
+    view, space = judged.view, judged.space
+    rows = [row for i in range(len(judged.scores)) for row in judged.rows(i, limit)]
     labels = view.labels if part is None else part.labels
     # A label may be a tuple, which an array would unpack.
-    columns = {"performance": pd.Series([labels[i] for i in found.performance], dtype=object)}
+    columns = {"performance": pd.Series([labels[row.performance] for row in rows], dtype=object)}
     if part is not None:
-        columns["class"] = np.full(len(found.first), part.label, dtype=object)
-        columns["index"] = found.performance
-    columns |= {
-        "feature": np.array(names, dtype=object)[found.feature],
-        "first": found.first,
-        "last": found.last,
-        "peak": found.peak,
-        "deviation": found.score,
-        "rare": np.abs(found.score) > view.model.simultaneous_factor(),
-        "timing": np.zeros(len(found.first), dtype=bool),
-    }
-    match = _match_of(estimator, X, params) if len(found.first) else None
-    if match is not None:
-        bounds = mean - limit * std, mean + limit * std
-        columns["timing"] = explained_by_timing(found, curves, *bounds, match)
-    table = pd.DataFrame(columns)
-    order = np.lexsort((found.first, found.feature, -np.abs(found.score), found.performance))
-    return table.iloc[order].reset_index(drop=True).infer_objects()
+        columns["class"] = np.full(len(rows), part.label, dtype=object)
+        columns["index"] = np.array([row.performance for row in rows], dtype=np.intp)
+    texts = ["kind", "limb", "region"] if space.limbs is not None else ["kind"]
+    for name in [*texts, "feature", "first", "last", "peak", "size", "unit", "deviation", "rare"]:
+        column = [getattr(row, name) for row in rows]
+        if name == "feature":
+            column = [space.names[k] for k in column]
+        columns[name] = np.array(column, dtype=_DTYPES.get(name, object))
+    columns["timing"] = np.zeros(len(rows), dtype=bool)
+    if rows and judged.match is not None and judged.match.intervals is not None:
+        fields = "performance", "feature", "first", "last", "peak", "deviation"
+        found = Runs(*(np.array([getattr(row, name) for row in rows]) for name in fields))
+        reach = (view.model.n_std if limit is None else limit) * judged.std
+        bounds = judged.mean - reach, judged.mean + reach
+        columns["timing"] = explained_by_timing(found, judged.curves, *bounds, judged.match)
+    return pd.DataFrame(columns).infer_objects()
 
 
-def _match_of(estimator, X, params):
-    """The match of performances, if a synchronizer of the estimator tells how sure it is."""
+class Departure(NamedTuple):
+    """A row of the table; ``feature`` is an index."""
+
+    performance: int
+    kind: str
+    limb: str | None
+    region: str | None
+    feature: int
+    first: int
+    last: int
+    peak: int
+    size: float
+    unit: str
+    deviation: float
+    rare: bool
+
+
+class Judged(NamedTuple):
+    """Performances beside what is expected of them.
+
+    Attributes
+    ----------
+    view : View
+    space : FaultSpace
+    curves : ndarray (n, P, n_features)
+        The performances on the clock, in the features of ``space.names``; NaN in gaps.
+    mean, std : ndarray (P, n_features)
+        What is expected of them.
+    scores : ndarray (n, P, n_features)
+        Deviations from the mean in standard deviations.
+    faults : list of list of FoundFault
+    usual_score, rare_score : float
+        Scores of faults that half, and nearly all, of new people do not exceed.
+    far : float
+        `ActionModel.simultaneous_factor`.
+    match : Match or None
+    """
+
+    view: View
+    space: FaultSpace
+    curves: np.ndarray
+    mean: np.ndarray
+    std: np.ndarray
+    scores: np.ndarray
+    faults: list
+    usual_score: float
+    rare_score: float
+    far: float
+    match: object
+
+    def rows(self, i, limit):
+        """The rows of a performance, the most important first.
+
+        Those beyond a limit of the deviation. If it is None, those with more evidence than usual,
+        and those that are far away: a body that is wrong altogether has no limb that is.
+        """
+        rows = []
+        for fault in self.faults[i]:
+            row = self._row(i, fault)
+            if row is None or not abs(row.deviation) > (limit or 0):
+                continue
+            far = abs(self.scores[i, row.peak, row.feature]) > self.far
+            if limit is None and not (far or fault.score > self.usual_score):
+                continue
+            same = [r for r in rows if r.feature == row.feature and r.unit == row.unit]
+            if not any(r.first <= row.peak <= r.last for r in same):
+                rows.append(row)
+        return rows
+
+    def _row(self, i, fault):
+        part, last_frame = self.space.parts[fault.part], self.scores.shape[1] - 1
+        first, last = round(fault.start * last_frame), round(fault.stop * last_frame)
+        inside = np.abs(self.scores[i, first : last + 1, part.features])
+        # Without a value there is no departure.
+        if np.isnan(inside).all():
+            return None
+        of, frame = np.unravel_index(np.nanargmax(inside), inside.shape)
+        feature, peak = part.features[of], first + int(frame)
+        deviation, kind, size = fault.deviation, fault.kind, fault.size
+        is_limb = part.region is not None and len(part.columns) > 1
+        if kind == "off":
+            deviation, kind = float(self.scores[i, peak, feature]), "angle" if is_limb else "value"
+            if is_limb:
+                chord = np.linalg.norm(size)
+                size, unit = float(np.degrees(2 * np.arcsin(min(chord / 2, 1)))), "degrees"
+            else:
+                first, last = around_peak(self.scores[i, :, feature], peak)
+                off = (self.curves[i] - self.mean)[first : last + 1, feature]
+                size, unit = float(np.nanmean(off)), "leg lengths" if part.region else ""
+        elif kind in ("late", "early"):
+            size, unit = 100 * abs(size) / last_frame, "percent"
+        else:
+            unit = "ratio"
+        limb = None if part.region is None else part.name
+        return Departure(
+            i, kind, limb, part.region, feature, first, last, peak, size, unit, deviation,
+            fault.score > self.rare_score,
+        )  # fmt: skip
+
+
+def judge(estimator, X, params, caller, *, features=None, reference=None, only=None):
+    """Performances of an estimator beside what is expected of them, and their faults.
+
+    Parameters
+    ----------
+    estimator, X, params, caller
+        As for `view_of`.
+    features : int, str or list of them, default=None
+        Those that are judged, each by itself; by default limbs, or all.
+    reference : performances, default=None
+        Right ones of the person.
+    only : callable, default=None
+        Gives the index of the performance whose faults are sought, of their number; by default
+        those of all are.
+
+    Returns
+    -------
+    Judged
+    """
+    how = {"features": features, "postures": features is None}
+    view = view_of(estimator, X, params, caller, **how)
+    sought = range(len(view.given)) if only is None else [only(len(view.given))]
+    names, chosen = view.names, np.arange(len(view.names))
+    if features is not None:
+        chosen = np.array(choose_features(features, names))
+    try:
+        before = find_synchronizer(estimator)[0]
+    except ValueError:
+        before = None
+    limbs = limbs_of(before, names) if features is None else None
+    space = FaultSpace([names[i] for i in chosen], limbs)
+    training, groups = view.training[..., chosen].astype(np.float64), view.model.groups_
+    mean, std, own = view.model.mean_[:, chosen], view.predicted[:, chosen], None
+    if reference is not None:
+        given = view_of(estimator, reference, {}, caller, **how).whole[..., chosen]
+        own = fill_with_mean(given.astype(np.float64), mean)
+        mean, variance = expected_performance(training, groups, own)
+        std = np.sqrt(variance + view.residual_variance[chosen] * (1 + 1 / len(own)))
+    curves, left_out = view.whole[..., chosen], view.residual_variance[chosen]
+    filled = fill_with_mean(curves.astype(np.float64), mean)
+    match = _match_of(estimator, X, params, caller)
+    linear, later = None, [None] * len(filled)
+    examples = view.in_linear_time
+    if match is not None and examples is not None and not _is_linear(estimator):
+        width = int((chosen < examples.shape[2]).sum())
+        # Features that come last are unknown in linear time, such as a `TimingChannel`.
+        padded = np.zeros((*examples.shape[:2], len(names)))
+        padded[..., : examples.shape[2]] = examples
+        whose = view.own.groups_
+        if not len(examples) == len(whose) == view.own.n_samples_seen_:
+            whose = np.arange(len(examples))
+        to_space = lambda x: space.convert(x)[..., :width]  # noqa: E731
+        of_reference = None
+        if own is not None:
+            times = _match_of(estimator, reference, {}, caller).times
+            of_reference = to_space(unwarped(own, times))
+        if width:
+            examples = with_residuals(padded[..., chosen], whose, left_out)
+            linear = to_space(examples), whose, of_reference
+            later = to_space(unwarped(filled, match.times))
+    known = space.convert(with_residuals(training, groups, left_out))
+    finder = FaultFinder(
+        known, groups, space.parts, None if own is None else space.convert(own),
+        coverage=view.model.coverage,
+        floor=space.outside(known),
+        linear=linear,
+    )  # fmt: skip
+    pairs = enumerate(zip(space.convert(filled), later, strict=True))
+    faults = [finder.find(*pair) if i in sought else [] for i, pair in pairs]
+    scores = (curves - mean) / std
+    limits = finder.usual_score, finder.rare_score, view.model.simultaneous_factor()
+    return Judged(view, space, curves, mean, std, scores, faults, *limits, match)
+
+
+class FaultSpace:
+    """The features in which faults are sought: limbs along their parents' axes, and others.
+
+    Parameters
+    ----------
+    names : list of str
+        Features of the view.
+    limbs : LimbColumns or None
+        None if each feature is judged by itself.
+    """
+
+    def __init__(self, names, limbs):
+        self.names, self.limbs = names, limbs
+        self.parts = []
+        others = list(range(len(names)))
+        if limbs is not None:
+            skeleton, start = limbs.cosines.skeleton, limbs.columns.start
+            first, n_dims = int(skeleton.has_height), skeleton.n_dims
+            spans = [("pelvis_height", [0])] if first else []
+            for k, limb in enumerate(skeleton.limbs):
+                spans.append((limb, list(range(first + n_dims * k, first + n_dims * (k + 1)))))
+            for limb, columns in spans:
+                own = [start + k for k in columns]
+                self.parts.append(Part(limb, columns, own, part_of_limb(limb)))
+            others = [k for k in others if not start <= k < limbs.columns.stop]
+        self._others, n_cosines = others, len(names) - len(others)
+        self.parts += [Part(names[k], [n_cosines + j], [k], None) for j, k in enumerate(others)]
+
+    def convert(self, performances):
+        """Performances (n, P, n_features) of the view, without gaps: (n, P, n_columns)."""
+        if self.limbs is None:
+            return performances
+        cosines = self.limbs.in_parent_axes(performances)
+        return np.concatenate([cosines, performances[..., self._others]], axis=2)
+
+    def outside(self, known):
+        """A floor of the variance of limbs, of each column.
+
+        It is eight times the variance outside of the components that hold 95 % of that of the known
+        performances (n, P, n_columns): new people do what none of these did.
+        """
+        floor = np.zeros(known.shape[2])
+        if self.limbs is not None:
+            n_cosines = known.shape[2] - len(self._others)
+            postures = known[..., :n_cosines].reshape(-1, n_cosines)
+            values, vectors = np.linalg.eigh(np.cov(postures, rowvar=False))
+            left_out = np.cumsum(values) <= (1 - _HELD) * values.sum()
+            squares = np.square(vectors[:, left_out]) @ np.maximum(values[left_out], 0)
+            floor[:n_cosines] = _OUTSIDE * squares
+        return floor
+
+
+def with_residuals(performances, groups, variance):
+    """Performances in an aSpace with residuals in place of those that it took.
+
+    They are drawn, always the same ones: half of their variance is an offset of a group, the other
+    half changes within a tenth of the clock.
+
+    Parameters
+    ----------
+    performances : ndarray (n, P, n_features)
+    groups : ndarray of int (n,)
+    variance : ndarray (n_features,)
+        Of the residuals; all 0 without an aSpace.
+    """
+    if not variance.any():
+        return performances
+    n, n_frames, width = performances.shape
+    codes = np.unique(groups, return_inverse=True)[1].ravel()
+    rng, t = np.random.default_rng(0), np.linspace(0, 1, n_frames)
+    offsets = rng.standard_normal((codes.max() + 1, 1, width))[codes]
+    kernel = np.exp(-0.5 * np.square((t[:, np.newaxis] - t) / _CORRELATION_TIME))
+    factor = np.linalg.cholesky(kernel + 1e-6 * np.eye(n_frames))
+    courses = factor @ rng.standard_normal((n, n_frames, width))
+    return performances + np.sqrt(variance / 2) * (offsets + courses)
+
+
+def around_peak(scores, peak):
+    """First and last frame around a peak in which scores are at least half of it; gaps between."""
+    enough = scores * np.sign(scores[peak]) >= _OF_PEAK * abs(scores[peak])
+    fits = enough | np.isnan(scores)
+    first, last = peak, peak
+    while first > 0 and fits[first - 1]:
+        first -= 1
+    while last < len(scores) - 1 and fits[last + 1]:
+        last += 1
+    # A run ends in what was seen.
+    seen = np.flatnonzero(enough[first : last + 1])
+    return first + int(seen[0]), first + int(seen[-1])
+
+
+def unwarped(performances, times):
+    """Performances (n, P, n_features) on the clock, in linear time, by their times (n, P)."""
+    frames, out = np.arange(performances.shape[1]), np.empty_like(performances)
+    for x, own, unwound in zip(performances, times, out, strict=True):
+        at = np.interp(frames, own, frames)
+        below = np.minimum(at.astype(np.intp), len(frames) - 2)
+        weight = (at - below)[:, np.newaxis]
+        unwound[:] = x[below] * (1 - weight) + x[below + 1] * weight
+    return out
+
+
+def _match_of(estimator, X, params, caller):
+    """The match of performances; None without a synchronizer."""
     try:
         find_synchronizer(estimator)
     except ValueError:
         return None
-    match = route_to_synchronizer(estimator, X, params, "find_departures").match()
-    return None if match.intervals is None else match
+    return route_to_synchronizer(estimator, X, params, caller).match()
+
+
+def _is_linear(estimator):
+    """Whether the synchronizer leaves time as it is."""
+    synchronizer = find_synchronizer(estimator)[1]
+    return isinstance(getattr(synchronizer, "synchronizer_", synchronizer), LinearSynchronizer)
 
 
 class Runs(NamedTuple):
@@ -226,6 +541,8 @@ def explained_by_timing(found, curves, lower, upper, match):
     starts, ends = np.minimum(spans[:, 0], frames), np.maximum(spans[:, 1], frames + 1)
     for k, (i, feature) in enumerate(zip(found.performance, found.feature, strict=True)):
         own, run = curves[i, :, feature], frames[found.first[k] : found.last[k] + 1]
+        # A fault may last over a gap, in which nothing was seen.
+        run = run[~np.isnan(own[run])]
         seen = [own[starts[i, p] : ends[i, p]] for p in run]
         low, high = (np.array([extreme(x) for x in seen]) for extreme in (np.nanmin, np.nanmax))
         explained[k] = np.all((low <= upper[run, feature]) & (high >= lower[run, feature]))

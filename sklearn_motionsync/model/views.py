@@ -1,12 +1,15 @@
-"""The models inside fitted estimators: in chosen features, and of each class of a classifier."""
+"""The models inside fitted estimators: in chosen features, in limbs, and of each class."""
 
 from typing import NamedTuple
 
 import numpy as np
 from sklearn.base import clone
-from sklearn.pipeline import Pipeline
+from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils.validation import check_is_fitted
 
+from ..body.axes import convert_to_parent_axes
+from ..body.direction_cosines import DirectionCosines
+from ..body.limbs import LIMB_NAMES, limb_indices, unit_vectors
 from ..inputs.collections import as_collection
 from ..inputs.features import as_features, names_of_features
 from ..inputs.validation import check_performances, labels_of_input
@@ -16,12 +19,23 @@ from ..utils.pipelines import (
     explain_missing,
     find_classifier,
     find_step,
+    find_synchronizer,
     flat_steps,
     transform_through,
+    union_transformers,
 )
 from .action_model import ActionModel
 
-__all__ = ["ClassModel", "Curves", "View", "curves_of", "models_of_classes", "view_of"]
+__all__ = [
+    "ClassModel",
+    "Curves",
+    "LimbColumns",
+    "View",
+    "curves_of",
+    "limbs_of",
+    "models_of_classes",
+    "view_of",
+]
 
 # Residual variance of a new person at a frame, in units of the mean residual variance of the
 # training postures after the aSpace: with this 93 and 94 % of held-out actors have no rare
@@ -50,6 +64,9 @@ class View(NamedTuple):
         Performances in those, checked.
     residual_variance : ndarray (n_features,)
         Variance of a new person outside the aSpace.
+    in_linear_time : ndarray (n_examples, P, n_known) or None
+        Training performances before synchronisation, linearly normalised, in the first of these
+        features, as many as the synchronizer takes. None without a synchronizer that keeps some.
     """
 
     model: ActionModel
@@ -60,6 +77,13 @@ class View(NamedTuple):
     own: ActionModel
     given: tuple | None
     residual_variance: np.ndarray
+    in_linear_time: np.ndarray | None = None
+
+    @property
+    def training(self):
+        """Training performances that are kept, about the mean of all: (n_kept, P, n_features)."""
+        deviations = self.model.deviations_
+        return self.model.mean_ + deviations - deviations.mean(axis=0)
 
     @property
     def scores(self):
@@ -114,8 +138,10 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
             synchronised, whole = inverse.synchronise(X, params, caller)
             given = model.check_performances(synchronised)
         points, labels = np.stack(given), labels_of_input(X, given)[0]
+    linear = _examples(before, inverse, len(names))
     if inverse is None:
-        return View(model, names, points, points, labels, model, given, np.zeros(len(names)))
+        left_out = np.zeros(len(names))
+        return View(model, names, points, points, labels, model, given, left_out, linear)
     variance = _RESIDUAL_FACTOR * inverse.aspace.left_out_variance_
     names = inverse.names(names)
     variance = np.append(variance, np.zeros(len(names) - len(variance)))
@@ -123,7 +149,24 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
     kept = model.mean_ + model.deviations_ - model.deviations_.mean(axis=0)
     back = clone(model).fit(inverse.transform(kept), groups=model.groups_)
     synchronised = None if points is None else inverse.transform(points)
-    return View(back, names, synchronised, whole, labels, model, given, variance)
+    return View(back, names, synchronised, whole, labels, model, given, variance, linear)
+
+
+def _examples(before, inverse, n_features):
+    """Training performances in linear time, in features of the model or in postures; or None."""
+    try:
+        synchronizer = find_synchronizer(before)[1] if before is not None else None
+    except ValueError:
+        return None
+    inner = getattr(synchronizer, "synchronizer_", synchronizer)
+    examples = getattr(synchronizer, "examples_", getattr(inner, "examples_", None))
+    if examples is None:
+        return None
+    if inverse is None:
+        steps = flat_steps(before)
+        return examples if steps[-1] is synchronizer and examples.shape[2] <= n_features else None
+    fits = examples.shape[2] == len(inverse.aspace.components_)
+    return inverse.transform(examples) if fits else None
 
 
 class Curves(NamedTuple):
@@ -219,6 +262,104 @@ def _find_inverse(before, names, is_needed):
             f"features of the model, {', '.join(names)}."
         )
     return None if others else _Inverse(before_aspace, aspace, after)
+
+
+# -- limbs -----------------------------------------------------------------------------------
+
+
+class LimbColumns(NamedTuple):
+    """The direction cosines among the features of a view, and the way back to them.
+
+    Attributes
+    ----------
+    cosines : DirectionCosines
+    columns : slice
+        The columns of the cosines.
+    steps : list of transformer
+        The steps between the cosines and the features, such as scalers.
+    """
+
+    cosines: DirectionCosines
+    columns: slice
+    steps: list
+
+    def invert(self, features):
+        """The cosines of features of the view, (n, 37)."""
+        for step in reversed(self.steps):
+            # Features that were appended later, such as a `TimingChannel`, are none of the step.
+            width = getattr(step, "n_features_in_", features.shape[1])
+            features = np.asarray(step.inverse_transform(features[:, :width]))
+        return features[:, self.columns]
+
+    def in_parent_axes(self, performances):
+        """The height, if there is one, and the cosines along the axes of the parent limbs.
+
+        Parameters
+        ----------
+        performances : ndarray (n, P, n_features)
+            In features of the view, without gaps.
+
+        Returns
+        -------
+        ndarray (n, P, n_cosines)
+            Cosines of length 1.
+        """
+        skeleton = self.cosines.skeleton
+        limbs, n_dims, first = skeleton.limbs, skeleton.n_dims, int(skeleton.has_height)
+        n, n_frames, width = performances.shape
+        given = self.invert(performances.reshape(-1, width))
+        own = given[:, first:].reshape(len(given), -1, n_dims)
+        cosines = np.zeros((len(own), len(LIMB_NAMES), n_dims))
+        cosines[:, limb_indices(limbs)] = unit_vectors(own)
+        if self.cosines.reference != "parent":
+            cosines = convert_to_parent_axes(cosines, limbs)
+        own = cosines[:, limb_indices(limbs)].reshape(len(given), -1)
+        return np.column_stack([given[:, :first], own]).reshape(n, n_frames, -1)
+
+
+def limbs_of(before, names):
+    """The limbs among the features of a view; None if they do not lead back to limbs.
+
+    Parameters
+    ----------
+    before : Pipeline or None
+        The steps before the synchronizer.
+    names : list of str
+        Features of the view.
+
+    Returns
+    -------
+    LimbColumns or None
+    """
+    if before is None:
+        return None
+    steps = flat_steps(before)
+    parts = [part for step in steps for part in union_transformers(step)]
+    cosines = [part for part in parts if isinstance(part, DirectionCosines)]
+    # With several of them the columns are ambiguous.
+    columns = _columns_of(cosines[0], names) if len(cosines) == 1 else None
+    found = [k for k, step in enumerate(steps) if cosines and _passes_on(step, cosines[0])]
+    after = [step for step in steps[sum(found[:1]) + 1 :] if not isinstance(step, ASpace)]
+    invertible = found and all(hasattr(step, "inverse_transform") for step in after)
+    return LimbColumns(cosines[0], columns, after) if columns is not None and invertible else None
+
+
+def _passes_on(step, cosines):
+    """Whether a step, or a union, returns the features of cosines unchanged."""
+    if not isinstance(step, FeatureUnion):
+        return step is cosines
+    views = [flat_steps(view) for _, view in step.transformer_list if not isinstance(view, str)]
+    return any(_passes_on(inner[-1], cosines) for inner in views if inner)
+
+
+def _columns_of(cosines, names):
+    """The columns of the features of DirectionCosines, also in a union; None without them."""
+    own = list(cosines.get_feature_names_out())
+    for k, name in enumerate(names):
+        prefix = name.removesuffix(own[0])
+        if names[k : k + len(own)] == [f"{prefix}{x}" for x in own]:
+            return slice(k, k + len(own))
+    return None
 
 
 # -- the models of a classifier ------------------------------------------------------------

@@ -18,10 +18,11 @@ from sklearn_motionsync import (
     Skeleton,
     find_departures,
 )
-from sklearn_motionsync.body.limbs import LIMBS
+from sklearn_motionsync.body.limbs import LIMBS, part_of_limb
 from sklearn_motionsync.datasets import make_bending
 from sklearn_motionsync.display import SkeletonDisplay
-from sklearn_motionsync.display.limb_departures import limb_departures
+from sklearn_motionsync.display.limb_departures import describe_departure, limb_departures
+from sklearn_motionsync.model.departures import Departure
 
 PAPER = Skeleton.paper()
 NAMES = list(DirectionCosines(PAPER).get_feature_names_out())
@@ -38,60 +39,76 @@ def bones(*pairs):
     return sorted((PAPER.joints.index(a), PAPER.joints.index(b)) for a, b in pairs)
 
 
-def scores_of(n_frames=60, **peaks):
-    """Scores of 0 but for those of some features at some frames."""
-    scores = np.zeros((n_frames, len(NAMES)))
-    for name, at in peaks.items():
-        for frame, score in at.items():
-            scores[frame, NAMES.index(name)] = score
-    return scores
+def row(limb, first, last, peak=None, kind="angle", size=30.0, unit="degrees"):
+    peak = first if peak is None else peak
+    region = part_of_limb(limb)
+    return Departure(0, kind, limb, region, 0, first, last, peak, size, unit, 5.0, True)
 
 
-def departures(scores, frames):
-    return limb_departures(scores, NAMES, frames, 3, PAPER)
+def departures(rows, frames):
+    return limb_departures(rows, 60, frames, PAPER)
 
 
 @pytest.mark.parametrize("limb", ENDS)
 def test_a_limb_is_marked_on_its_bones(limb):
-    feature = limb if limb == "pelvis_height" else f"{limb}_y"
-    _, titles, marked = departures(scores_of(**{feature: {20: -7}}), [20])
+    _, titles, marked = departures([row(limb, 20, 20)], [20])
     assert sorted(marked[0]) == bones(*ENDS[limb])
-    assert titles == [f"frame 20\n{limb} 7.0 std"]
+    assert titles == [f"frame 20\n{limb.replace('_', ' ')} 30° off"]
 
 
 def test_every_limb_has_bones():
     for limb in LIMBS:
-        _, _, (marked,) = departures(scores_of(**{f"{limb}_x": {0: 5}}), 1)
+        _, _, (marked,) = departures([row(limb, 0, 0)], 1)
         assert len(marked) == (2 if limb in ("hip", "shoulder") else 1)
 
 
-def test_each_part_of_the_clock_is_shown_at_its_largest_departure():
-    scores = scores_of(torso_z={3: 4, 12: 12.4}, left_thigh_x={14: -30, 44: 2.9}, hip_x={59: 3.1})
-    frames, titles, marked = departures(scores, 6)
-    # A part without departures is shown in its middle: 20 to 29, ...
-    assert frames == [3, 14, 24, 34, 44, 59]
+@pytest.mark.parametrize(
+    ("kind", "size", "unit", "text"),
+    [
+        ("angle", 30.4, "degrees", "left arm 30° off"),
+        ("late", 12.3, "percent", "left arm 12 % late"),
+        ("early", 7.6, "percent", "left arm 8 % early"),
+        ("too small", 0.52, "ratio", "left arm moves 0.5 times as far"),
+        ("too large", 1.6, "ratio", "left arm moves 1.6 times as far"),
+    ],
+)
+def test_departures_in_plain_words(kind, size, unit, text):
+    assert describe_departure(row("left_arm", 0, 59, 3, kind, size, unit)) == text
+
+
+def test_the_height_of_the_pelvis_in_plain_words():
+    given = "pelvis_height", 0, 5, 3, "value"
+    assert describe_departure(row(*given, -0.123, "leg lengths")) == "pelvis height 0.12 lower"
+    assert describe_departure(row(*given, 0.3, "leg lengths")) == "pelvis height 0.30 higher"
+
+
+def test_each_part_of_the_clock_is_shown_at_its_most_important_departure():
+    rows = [row("left_thigh", 12, 16, 14), row("torso", 3, 13, 12), row("hip", 57, 59, 59)]
+    frames, titles, marked = departures(rows, 6)
+    # A part without a peak is shown in its middle: 20 to 29, ...
+    assert frames == [4, 14, 24, 34, 44, 59]
     assert [title.split("\n")[1] for title in titles] == [
-        "torso 4.0 std",
-        "left_thigh 30 std",
+        "torso 30° off",
+        "left thigh 30° off",
         *["no limb departs"] * 3,
-        "hip 3.1 std",
+        "hip 30° off",
     ]
     thigh, torso = bones(*ENDS["left_thigh"]), bones(*ENDS["torso"])
     assert [sorted(m) for m in marked] == [
         torso, sorted(thigh + torso), [], [], [], bones(*ENDS["hip"])
     ]  # fmt: skip
-    assert departures(scores, 1)[0] == [14]
-    assert departures(scores, 100)[0] == list(range(60))
+    assert departures(rows, 1)[0] == [14]
+    assert departures(rows, 100)[0] == list(range(60))
 
 
 def test_a_chosen_frame_represents_the_frames_around_it():
-    scores = scores_of(torso_z={24: 9, 27: 8, 36: 5})
+    rows = [row("torso", 24, 24), row("neck", 27, 27), row("hip", 36, 36)]
     # Frame 26 is as far from 22 as from 30; 5 frames are a twelfth of the clock.
-    titles = departures(scores, [22, 30])[1]
-    assert titles == ["frame 22\ntorso 9.0 std", "frame 30\ntorso 8.0 std"]
-    assert departures(scores, [30, 22, 30])[1] == [titles[1], titles[0], titles[1]]
-    assert departures(scores, [41])[1] == ["frame 41\ntorso 5.0 std"]
-    assert departures(scores, [42])[1] == ["frame 42\nno limb departs"]
+    titles = departures(rows, [22, 30])[1]
+    assert titles == ["frame 22\ntorso 30° off", "frame 30\nneck 30° off"]
+    assert departures(rows, [30, 22, 30])[1] == [titles[1], titles[0], titles[1]]
+    assert departures(rows, [41])[1] == ["frame 41\nhip 30° off"]
+    assert departures(rows, [42])[1] == ["frame 42\nno limb departs"]
 
 
 # -- stick figures ----------------------------------------------------------------------
@@ -134,18 +151,43 @@ def test_standing_still_departs_from_bending(bunch, pipe):
 
 def test_titles_agree_with_find_departures(bunch, pipe):
     people = [bunch.data[0][::-1], bunch.data[1]]
-    for i, limit in ((0, None), (1, 1.5)):
+    for i, limit in ((0, None), (1, 0.1)):
         table = find_departures(pipe, people, limit=limit)
-        table = table[table.performance == i]
+        worst = table[table.performance == i].iloc[0]
         display = SkeletonDisplay.from_departures(pipe, people, performance=i, limit=limit)
-        worst = table.iloc[0]
-        limb = worst.feature if worst.feature == "pelvis_height" else worst.feature[:-2]
-        size = abs(worst.deviation)
-        size = f"{size:.0f}" if size >= 10 else f"{size:.1f}"
-        assert f"frame {worst.peak}\n{limb} {size} std" in display.titles
-    assert "more than 1.5 standard deviations" in display.heading
+        at = [title for title in display.titles if title.startswith(f"frame {worst.peak}\n")]
+        assert len(at) == 1
+        assert at[0].split("\n")[1].startswith(f"{worst.limb.replace('_', ' ')} ")
+        assert f"{worst['size']:.0f}" in at[0]
     display = SkeletonDisplay.from_departures(pipe, people, frames=[5, 30], limit=1e9)
     assert display.titles == ["frame 5\nno limb departs", "frame 30\nno limb departs"]
+    assert "Rare: nothing." in display.heading
+
+
+def test_a_reference_is_what_is_expected(bunch, pipe):
+    """A person who always bends with an arm lifted departs from others, not from the own trials."""
+    shift = np.zeros((15, 3))
+    shift[PAPER.joints.index("left_wrist"), 1] = 0.3
+    own = [bunch.data[2] + k * shift.ravel() for k in (0.99, 1.0, 1.01, 0.995, 1.005)]
+    alone = SkeletonDisplay.from_departures(pipe, own[3:], limit=1e-3)
+    display = SkeletonDisplay.from_departures(pipe, own[3:], reference=own[:3], limit=1e-3)
+    assert "expected of a new person" in alone.heading
+    assert "expected of this person" in display.heading
+    wrist = PAPER.joints.index("left_wrist")
+    body, others, of_person = (
+        np.array([scene[0][0, wrist] for scene in scenes])
+        for scenes in (display.scenes, alone.behind, display.behind)
+    )
+    first = find_departures(pipe, own[3:4]).iloc[0]
+    assert (first.limb, first.rare) == ("left_forearm", True)
+    assert np.linalg.norm(body - of_person, axis=1).max() < 0.3
+    assert np.linalg.norm(body - others, axis=1).max() > 0.2
+    # One performance helps, three help more.
+    sizes = [first["size"]]
+    for n in (1, 3):
+        table = find_departures(pipe, own[3:4], reference=own[:n], limit=1e-3)
+        sizes.append(table.query("limb == 'left_forearm' and kind == 'angle'")["size"].max())
+    assert sizes[0] > 2 * sizes[1] > 4 * sizes[2]
 
 
 def test_tables_and_key_frames_are_accepted(bunch):
@@ -185,7 +227,7 @@ def test_a_pipeline_without_aspace_on_axes_of_the_user(bunch):
     assert display.marked[0] == []
     assert marked_joints(display, 1) == {"left_elbow", "left_wrist"}
     assert len(display.bones_[1]["departing"].get_paths()) == 2
-    assert display.axes_[1].get_title().startswith("frame 15\nleft_")
+    assert display.axes_[1].get_title().startswith("frame 15\nleft arm ")
 
 
 @pytest.mark.parametrize(
@@ -231,7 +273,8 @@ def test_real_subject_is_accepted_unless_standing_still(real_bends_of_three):
     good, bad = (SkeletonDisplay.from_departures(pipe, [new, still], performance=i) for i in (0, 1))
     assert "is accepted" in good.heading
     assert "is not accepted" in bad.heading
-    assert sum(map(len, good.marked)) < sum(map(len, bad.marked))
+    assert all(bad.marked)
+    assert "Rare: nothing" in good.heading
     assert any("neck" in marked_joints(bad, panel) for panel in (2, 3)), "upright at its height"
 
 

@@ -64,6 +64,7 @@ def test_a_lifted_forearm_is_no_timing_and_departures_of_people_often_are(bends)
         x[len(x) // 3 :, arm] = 0, 1, 0
     of_arm = find_departures(pipe, lifted)
     of_arm = of_arm[of_arm["feature"].isin([f"x{i}" for i in arm])]
+    of_arm = of_arm.groupby("performance").head(1)
     assert of_arm["performance"].nunique() == len(new)
     assert of_arm["timing"].mean() < 0.2
     untouched = find_departures(pipe, [postures[i] for i in new], limit=2)

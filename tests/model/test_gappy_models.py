@@ -341,8 +341,13 @@ def test_departures_are_those_of_what_was_seen():
     table = find_departures(model, new)
     runs = table[table["feature"] == "x1"][["performance", "first", "last"]].to_numpy().tolist()
     assert [1, 10, 19] in runs
-    assert [2, 10, 12] in runs
+    # A fault lasts over a gap, and begins and ends in what was seen.
+    assert [2, 10, 19] in runs
+    new[2, 10:13, 1] = np.nan
+    table = find_departures(model, new)
+    runs = table[table["feature"] == "x1"][["performance", "first", "last"]].to_numpy().tolist()
     assert [2, 16, 19] in runs
+    assert [2, 10, 19] not in runs
 
 
 def test_departures_of_a_pipeline_are_those_of_limbs_that_were_seen():

@@ -537,13 +537,13 @@ def test_departures_are_those_from_the_predicted_class(bends):
     pipe.fit(X, y, actionclassifier__groups=people)
     new = [X[13].copy(), X[0], X[14], X[1]]
     new[0][5:12, 3 * pipe[0].skeleton.index_of("left_wrist") + 1] += 0.4
-    found = find_departures(pipe, new, limit=1)
+    found = find_departures(pipe, new, limit=0.1)
     classes = found.groupby("performance")["class"].unique()
     assert classes.explode().to_dict() == {0: "half", 1: "bend", 2: "half", 3: "bend"}
     assert found["performance"].is_monotonic_increasing
     assert found["feature"][0].startswith("left_forearm")
     half = make_pipeline(*pipe[:-1], *pipe[-1].model_of("half"))
-    expected = find_departures(half, new[::2], limit=1).drop(columns="performance")
+    expected = find_departures(half, new[::2], limit=0.1).drop(columns="performance")
     own = found[found["class"] == "half"].drop(columns=["class", "performance"])
     pd.testing.assert_frame_equal(own.reset_index(drop=True), expected)
     display = SkeletonDisplay.from_departures(pipe, new, performance=2, limit=1)

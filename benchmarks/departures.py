@@ -1,0 +1,336 @@
+"""What `find_departures` says of faults that were put into trials of people held out.
+
+    python benchmarks/departures.py DATA_FOLDER [--all]
+
+DATA_FOLDER holds hdm05/hdm05_positions.npz and uiprmd/uiprmd_odd_positions.npz. Every subject of each
+class is held out in turn; everything is learnt from right trials of the others. The first three
+trials of the subject are the reference, the others are tested: as they are, and with a fault. A limb
+is turned about its upper joint, with all below it. Eight kinds: one limb 20, 30 or 40 degrees off in
+40 % of the time, a forearm or shank 30, the trunk 20; a limb late by 12 % of the time, or with 0.5 or
+1.6 times its amplitude. Choices were made on HDM05 and two exercises of UI-PRMD; ``--all`` gives
+the other three as well. Prints Markdown, in per cent.
+"""
+
+import os
+import sys
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from norm import LANDMARKS, OTHER_SIDE
+from scipy.spatial.transform import Rotation
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    LinearSynchronizer,
+    Match,
+    Skeleton,
+    find_departures,
+    mirror,
+)
+from sklearn_motionsync.datasets import load_performances
+
+P = 60
+BODY = Skeleton.paper()
+CHOSEN = ("inline lunge", "shoulder rotation")
+UNSEEN = ("deep squat", "shoulder abduction", "sit to stand")
+# Upper and lower joint, what is below the lower one, and the part of the body.
+LIMBS = {"torso": ("pelvis", "neck", ["head"], "trunk")}
+for _side in ("left", "right"):
+    LIMBS[f"{_side}_arm"] = (
+        f"{_side}_shoulder",
+        f"{_side}_elbow",
+        [f"{_side}_wrist"],
+        f"{_side} arm",
+    )
+    LIMBS[f"{_side}_forearm"] = (f"{_side}_elbow", f"{_side}_wrist", [], f"{_side} arm")
+    LIMBS[f"{_side}_thigh"] = (f"{_side}_hip", f"{_side}_knee", [f"{_side}_ankle"], f"{_side} leg")
+    LIMBS[f"{_side}_leg"] = (f"{_side}_knee", f"{_side}_ankle", [], f"{_side} leg")
+    LIMBS["torso"][2].extend(f"{_side}_{joint}" for joint in ("shoulder", "elbow", "wrist"))
+MOVABLE = [limb for limb in LIMBS if limb != "torso"]
+DISTAL = [limb for limb in MOVABLE if limb.endswith(("forearm", "leg"))]
+# Degrees that a limb deviates from its mean direction, root mean square, at least, to be late or small.
+MOVES = 20
+KINDS = {
+    "20 degrees": ("angle", MOVABLE, 20),
+    "30 degrees": ("angle", MOVABLE, 30),
+    "40 degrees": ("angle", MOVABLE, 40),
+    "forearm, shank 30": ("angle", DISTAL, 30),
+    "trunk 20": ("angle", ["torso"], 20),
+    "late 12 %": ("late", MOVABLE, 0.12),
+    "amplitude x 0.5": ("too small", MOVABLE, 0.5),
+    "amplitude x 1.6": ("too large", MOVABLE, 1.6),
+}
+
+
+class Fault(NamedTuple):
+    """A trial with a fault: which, where, and when, as shares of the time."""
+
+    trial: np.ndarray
+    kind: str
+    limb: str
+    start: float
+    stop: float
+
+
+def put_fault(x, name, rng):
+    """A trial (n_frames, 45) of `BODY` with a fault of a kind, or None if no limb moves enough."""
+    kind, limbs, size = KINDS[name]
+    x = x.reshape(len(x), -1, 3)
+    if kind != "angle":
+        limbs = [limb for limb in limbs if _spread(_directions(x, limb)) >= MOVES]
+        if not limbs:
+            return None
+    limb = limbs[rng.integers(len(limbs))]
+    t, d = np.linspace(0, 1, len(x)), _directions(x, limb)
+    start, stop = 0.0, 1.0
+    if kind == "angle":
+        start = rng.uniform(0.05, 0.55)
+        stop = start + 0.4
+        # Half of the angle at both ends.
+        weight = _ramp((t - start) / 0.08 + 0.5) * _ramp((stop - t) / 0.08 + 0.5)
+        middle = d[(t > start) & (t < stop)].mean(axis=0)
+        axis = np.cross(middle, rng.standard_normal(3))
+        turns = np.radians(size) * weight[:, np.newaxis] * axis / np.linalg.norm(axis)
+    elif kind == "late":
+        return Fault(_late(x, limb, size).reshape(len(x), -1), kind, limb, start, stop)
+    else:
+        mean = d.mean(axis=0) / np.linalg.norm(d.mean(axis=0))
+        axis = np.cross(mean, d)
+        sine, cosine = np.linalg.norm(axis, axis=1), d @ mean
+        axis /= np.maximum(sine, 1e-9)[:, np.newaxis]
+        turns = (size - 1) * np.arctan2(sine, cosine)[:, np.newaxis] * axis
+    moved, upper, below = x.copy(), *_joints(limb)
+    turn = Rotation.from_rotvec(turns)
+    for joint in below:
+        moved[:, joint] = x[:, upper] + turn.apply(x[:, joint] - x[:, upper])
+    return Fault(moved.reshape(len(x), -1), kind, limb, start, stop)
+
+
+def _late(x, limb, share):
+    """All below the upper joint of a limb as it was before a share of the time."""
+    moved, upper, below = x.copy(), *_joints(limb)
+    frames = np.arange(len(x))
+    before = np.clip(frames - share * (len(x) - 1), 0, None)
+    for joint in below:
+        relative = x[:, joint] - x[:, upper]
+        for k in range(3):
+            moved[:, joint, k] = x[:, upper, k] + np.interp(before, frames, relative[:, k])
+    return moved
+
+
+def _ramp(share):
+    share = np.clip(share, 0, 1)
+    return share**2 * (3 - 2 * share)
+
+
+def _joints(limb):
+    upper, lower, below, _ = LIMBS[limb]
+    return BODY.joints.index(upper), [BODY.joints.index(name) for name in (lower, *below)]
+
+
+def _directions(x, limb):
+    upper, below = _joints(limb)
+    d = x[:, below[0]] - x[:, upper]
+    return d / np.linalg.norm(d, axis=1, keepdims=True)
+
+
+def _spread(directions):
+    mean = directions.mean(axis=0)
+    cosines = np.clip(directions @ mean / np.linalg.norm(mean), -1, 1)
+    return np.degrees(np.sqrt(np.square(np.arccos(cosines)).mean()))
+
+
+# -- trials -----------------------------------------------------------------------------
+
+
+class Trials(NamedTuple):
+    """Right trials of a class on `BODY`, and their subjects and takes."""
+
+    name: str
+    data: list
+    actors: np.ndarray
+    takes: np.ndarray
+
+
+def classes_of_hdm05(folder):
+    bunch = load_performances(Path(folder) / "hdm05" / "hdm05_positions.npz")
+    data = as_bodies(bunch.data, bunch.skeleton)
+    for name in np.unique(bunch.target):
+        rows = np.flatnonzero(bunch.target == name)
+        # No odd and even takes: all of the others are learnt from.
+        yield Trials(
+            name, [data[i] for i in rows], bunch.actor[rows], np.ones(len(rows), dtype=int)
+        )
+
+
+def exercises_of_uiprmd(folder, wanted):
+    with np.load(Path(folder) / "uiprmd" / "uiprmd_odd_positions.npz") as file:
+        z = dict(file)
+    markers = np.split(z["positions"].astype(float), z["offsets"][1:-1])
+    skeleton = Skeleton(z["joints"].tolist(), z["parents"].tolist(), landmarks=LANDMARKS, up="z")
+    for name in wanted:
+        rows = np.flatnonzero((z["label"] == name) & z["correct"])
+        data = as_bodies([markers[i].reshape(len(markers[i]), -1) for i in rows], skeleton)
+        turned = [k for k, i in enumerate(rows) if z["actor"][i] in OTHER_SIDE.get(name, ())]
+        if turned:
+            for k, x in zip(turned, mirror([data[k] for k in turned], BODY), strict=True):
+                data[k] = np.asarray(x)
+        yield Trials(name, data, z["actor"][rows], z["take"][rows])
+
+
+def as_bodies(data, skeleton):
+    """Trials as joint positions of `BODY`: cosines, and limbs of the mean body."""
+    cosines = DirectionCosines(skeleton)
+    return [np.asarray(x) for x in cosines.inverse_transform(cosines.fit_transform(data))]
+
+
+class Fold(NamedTuple):
+    """Right trials of others and their subjects; the reference, the tested ones, faults of each."""
+
+    training: list
+    groups: np.ndarray
+    reference: list
+    tested: list
+    faults: list
+
+
+def folds(trials, seed=0, n_reference=3):
+    """A fold of each subject with more trials than the reference takes."""
+    for number, actor in enumerate(np.unique(trials.actors)):
+        own = np.flatnonzero(trials.actors == actor)
+        if len(own) <= n_reference:
+            continue
+        others = np.flatnonzero((trials.actors != actor) & (trials.takes % 2 == 1))
+        reference, tested = own[:n_reference], own[n_reference:]
+        rng = np.random.default_rng([seed, number])
+        faults = [{name: put_fault(trials.data[i], name, rng) for name in KINDS} for i in tested]
+        some = lambda rows: [trials.data[i] for i in rows]  # noqa: E731
+        yield Fold(some(others), trials.actors[others], some(reference), some(tested), faults)
+
+
+# -- what is said of them ---------------------------------------------------------------
+
+
+class Said(NamedTuple):
+    """Of a trial with a fault, or without one (``kind`` is then None)."""
+
+    name: str
+    kind: str | None
+    region: bool = False
+    limb: bool = False
+    overlap: float = np.nan
+    told: str = ""
+    rare: bool = False
+
+
+def departures_of(fold, pipe, reference, limit=0.1):
+    """What `find_departures` says first, whatever the evidence."""
+    pairs = [(name, fault) for faults in fold.faults for name, fault in faults.items() if fault]
+    trials = [fault.trial for _, fault in pairs]
+    given = {"reference": reference} if reference else {}
+    tables = [find_departures(pipe, X, limit=limit, **given) for X in (trials, fold.tested)]
+    firsts = tables[0].groupby("performance").head(1).set_index("performance")
+    rare = [set(table.loc[table["rare"], "performance"]) for table in tables]
+    times = Match.from_estimator(pipe, trials).times / (P - 1)
+    said = [Said("untouched", None, rare=i in rare[1]) for i in range(len(fold.tested))]
+    for i, (name, fault) in enumerate(pairs):
+        if i not in firsts.index:
+            said.append(Said(name, fault.kind, rare=i in rare[0]))
+            continue
+        row = firsts.loc[i]
+        found = row["limb"], times[i][row["first"]], times[i][row["last"]]
+        said.append(judged(name, fault, *found, row["kind"], i in rare[0]))
+    return said
+
+
+def plain_scores(fold):
+    """The baseline: the largest z of cosines after linear normalisation, and its run beyond 3."""
+    cosines, linear = DirectionCosines(BODY).fit(fold.training), LinearSynchronizer(P)
+    synchronised = linear.fit(cosines.transform(fold.training)).transform
+    model = ActionModel().fit(synchronised(cosines.transform(fold.training)), groups=fold.groups)
+    names = cosines.get_feature_names_out()[1:]
+    pairs = [(name, fault) for faults in fold.faults for name, fault in faults.items() if fault]
+    curves = synchronised(cosines.transform([fault.trial for _, fault in pairs]))
+    said = []
+    for (name, fault), z in zip(pairs, model.standard_scores(curves), strict=True):
+        z = np.abs(z[:, 1:])
+        peak, feature = np.unravel_index(z.argmax(), z.shape)
+        within = z[:, feature] > 3
+        first = peak - np.argmin(np.append(within[:peak][::-1], False))
+        last = peak + np.argmin(np.append(within[peak + 1 :], False))
+        limb = names[feature].rpartition("_")[0]
+        said.append(judged(name, fault, limb, first / (P - 1), last / (P - 1), "angle", False))
+    return said
+
+
+def judged(name, fault, limb, start, stop, told, is_rare):
+    """What is said of a trial, beside the truth."""
+    regions = {limb: region for limb, (*_, region) in LIMBS.items()}
+    regions |= dict.fromkeys(("hip", "shoulder", "neck", "pelvis_height"), "trunk")
+    is_region = regions[limb] == regions[fault.limb]
+    overlap = np.nan
+    if fault.kind == "angle" and is_region:
+        both = max(0, min(stop, fault.stop) - max(start, fault.start))
+        overlap = both / (max(stop, fault.stop) - min(start, fault.start))
+    is_limb = limb == fault.limb
+    return Said(name, fault.kind, is_region, is_limb, overlap, told, is_rare)
+
+
+def measure(classes):
+    """Everything that is said of all folds: {way: list of Said}."""
+    found = {}
+    for trials in classes:
+        for fold in folds(trials):
+            found.setdefault("plain z, linear", []).extend(plain_scores(fold))
+            for aspace in (None, 0.95):
+                steps = [] if aspace is None else [ASpace(aspace)]
+                pipe = make_pipeline(
+                    DirectionCosines(BODY), *steps, DenseSynchronizer(P), ActionModel()
+                ).fit(fold.training, actionmodel__groups=fold.groups)
+                for n in (0, 1, 3):
+                    way = f"{'no aSpace' if aspace is None else 'ASpace(0.95)'}, reference of {n}"
+                    said = departures_of(fold, pipe, fold.reference[3 - n :])
+                    found.setdefault(way, []).extend(said)
+    return found
+
+
+def print_table(title, found):
+    print(f"\n| {title} | region | limb | overlap | late told | rare found | rare, untouched |")
+    print("|---|---|---|---|---|---|---|")
+    for way, said in found.items():
+        table = pd.DataFrame(said)
+        faults, right = table[table["kind"].notna()], table[table["kind"].isna()]
+        late = faults[faults["kind"] == "late"]["told"] == "late"
+        print(
+            f"| {way} | {100 * faults['region'].mean():.0f} | {100 * faults['limb'].mean():.0f} | "
+            f"{faults['overlap'].mean():.2f} | {100 * late.mean():.0f} | "
+            f"{100 * faults['rare'].mean():.0f} | "
+            f"{100 * right['rare'].mean() if len(right) else np.nan:.1f} |"
+        )
+    print(f"\n| {title}, region (limb) | " + " | ".join(KINDS) + " |")
+    print("|---|" + "---|" * len(KINDS))
+    for way, said in found.items():
+        by_kind = pd.DataFrame(said).groupby("name")[["region", "limb"]].mean() * 100
+        cells = [f"{by_kind.region[k]:.0f} ({by_kind.limb[k]:.0f})" for k in KINDS]
+        print(f"| {way} | " + " | ".join(cells) + " |")
+    sys.stdout.flush()
+
+
+def main(folder, is_all=False):
+    print_table("HDM05", measure(classes_of_hdm05(folder)))
+    print_table(" and ".join(CHOSEN), measure(exercises_of_uiprmd(folder, CHOSEN)))
+    if is_all:
+        print_table(" and ".join(UNSEEN), measure(exercises_of_uiprmd(folder, UNSEEN)))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], "--all" in sys.argv[2:])

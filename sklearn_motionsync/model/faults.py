@@ -1,0 +1,582 @@
+"""What is wrong with a performance: the part of it, the kind of fault, when, and how large.
+
+A fault changes one part, such as a limb: by a constant over a window of time, by a lag, or in its
+amplitude. The evidence is twice the gain in the log likelihood of the deviations from what is
+expected, which are normal, with a covariance over time and one between features. Both are those of
+training performances from the expectation by other people.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .similarity import t_prediction_limit
+from .variation import predictive_variance, within_variance
+
+__all__ = ["Expectation", "FaultFinder", "FoundFault", "Part", "expected_performance"]
+
+# All was chosen on HDM05 and two exercises of UI-PRMD (benchmarks/departures.py).
+# Frames of the clock on which faults are sought, at most.
+_MOST_FRAMES = 60
+# Lengths of windows, and the ramp at their ends, as shares of the clock.
+_LENGTHS = 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6, 0.7
+_RAMP, _STEP = 0.08, 0.05
+# With so few frames every run of frames is a window.
+_FEW_FRAMES = 20
+# The largest lag, as a share of the clock.
+_LARGEST_LAG = 0.2
+# The largest ratio of amplitudes: a mean that hardly moves has none.
+_LARGEST_RATIO = 3.0
+# Share of white noise in the covariance over time, and of independence between features.
+_WHITE, _INDEPENDENT = 0.1, 0.2
+# Rows that the covariance over time is worth in which it depends on the lag only.
+_STATIONARY_ROWS = 100
+# A floor of the variance, as a share of its mean over time and the features of a part.
+_VARIANCE_FLOOR, _SMALLEST = 0.05, 1e-12
+# Variance between people, as a share of that within, at least.
+_LEAST_BETWEEN = 0.05
+# Degrees of freedom that the variance within others weighs against that of the reference.
+_PRIOR_COUNT = 2
+# A fault is a lag, or of amplitude, if this explains so much of what a window explains.
+_LAG_EXPLAINS, _RATIO_EXPLAINS = 0.4, 0.5
+# Prior variance of the logarithm of the largest score, as in `simultaneous_factor`.
+_PRIOR_VARIANCE, _BELOW_MEDIAN = 0.1, 1.0
+# Lags and log ratios of people vary by so much at least: frames, and in the logarithm.
+_LEAST_LAG, _LEAST_RATIO = 1.0, 0.05
+# Most faults of a performance, and most that are taken away to find them.
+_MOST_FAULTS, _MOST_STEPS = 5, 12
+
+
+class Part(NamedTuple):
+    """A part of a performance: a limb, or a feature.
+
+    Attributes
+    ----------
+    name : str
+    columns : list of int
+        Its columns in the performances in which faults are sought.
+    features : list of int
+        Its features in the view.
+    region : str or None
+        The part of the body; None if it is no limb.
+    """
+
+    name: str
+    columns: list
+    features: list
+    region: str | None
+
+
+class FoundFault(NamedTuple):
+    """A fault of a performance.
+
+    Attributes
+    ----------
+    part : int
+    kind : str
+        ``"off"``, ``"late"``, ``"early"``, ``"too small"`` or ``"too large"``.
+    start, stop : float
+        Shares of the clock.
+    size : ndarray or float
+        The change of each column of the part; frames of lag; or the ratio of amplitudes.
+    deviation : float
+        Of lags and ratios, in standard deviations of people; NaN of others.
+    score : float
+        Square root of the gain, relative to that of right performances: of the part where the
+        others are known, of the part alone, or of a body that hardly moves, the largest.
+    """
+
+    part: int
+    kind: str
+    start: float
+    stop: float
+    size: object
+    deviation: float
+    score: float
+
+
+def expected_performance(performances, groups, reference=None):
+    """Mean and variance of a new performance.
+
+    Of a new person they are the mean of the performances and `predictive_variance`, v. With n
+    reference performances of the person, the mean is that of the posterior distribution:
+    ``m + k (r - m)`` with ``k = b / (b + w / n)``, where r is the mean of the reference, w is the
+    variance within people and ``b = v - w`` that between them. The variance is ``w (1 + k / n)``.
+    If the reference varies more than that of other people, w is raised, feature by feature.
+
+    Parameters
+    ----------
+    performances : ndarray, shape (n, P, n_features)
+    groups : ndarray of int, shape (n,)
+    reference : ndarray, shape (n_reference, P, n_features), default=None
+
+    Returns
+    -------
+    mean, variance : ndarray, shape (P, n_features)
+    """
+    mean, variance = performances.mean(axis=0), predictive_variance(performances, groups)
+    if reference is None:
+        return mean, variance
+    within, n = within_variance(performances, groups), len(reference)
+    if n > 1:
+        # A person whose own performances differ more than those of others do.
+        own = reference.var(axis=0, ddof=1).mean(axis=0) / within.mean(axis=0)
+        within = within * np.maximum((_PRIOR_COUNT + (n - 1) * own) / (_PRIOR_COUNT + n - 1), 1)
+    between = np.maximum(variance - within, _LEAST_BETWEEN * within)
+    weight = between / (between + within / n)
+    return mean + weight * (reference.mean(axis=0) - mean), within * (1 + weight / n)
+
+
+class Expectation:
+    """What is expected of a performance, and the gain of every fault of one that differs.
+
+    Parameters
+    ----------
+    mean, variance : ndarray (K, n_columns)
+    over_time : ndarray (K, K)
+        Inverse of the covariance over time, in units of the variance.
+    between : ndarray (n_columns, n_columns)
+        Inverse of the correlation between columns.
+    parts : list of Part
+    """
+
+    def __init__(self, mean, variance, over_time, between, parts):
+        self.mean, self.scale = mean, 1 / np.sqrt(variance)
+        self.over_time, self.between, self.parts = over_time, between, parts
+        self._belongs = np.zeros((len(between), len(parts)))
+        for k, part in enumerate(parts):
+            self._belongs[part.columns, k] = 1
+        # Parts of as many columns are treated together.
+        widths = sorted({len(part.columns) for part in parts})
+        self._alike = []
+        for width in widths:
+            of = np.array([k for k, part in enumerate(parts) if len(part.columns) == width])
+            columns = np.array([parts[k].columns for k in of])
+            blocks = between[columns[:, :, np.newaxis], columns[:, np.newaxis]]
+            self._alike.append((of, columns, blocks))
+
+    def seek_windows(self, windows):
+        """Prepare `of_windows`, for windows (n_windows, K) of values from 0 to 1."""
+        self._windows = windows[:, :, np.newaxis] * self.scale
+        weighted = np.einsum("pq,wqf->wpf", self.over_time, self._windows, optimize=True)
+        norms = np.einsum("wpf,wpf->wf", self._windows, weighted)
+        self._alone = 1 / np.maximum(norms, _SMALLEST * max(norms.max(initial=0), _SMALLEST))
+        self._inverse = []
+        for _, columns, blocks in self._alike:
+            own, other = self._windows[:, :, columns], weighted[:, :, columns]
+            products = np.einsum("wpki,wpkj->wkij", own, other, optimize=True) * blocks
+            trace = np.trace(products, axis1=2, axis2=3)[..., np.newaxis, np.newaxis]
+            eye = np.eye(columns.shape[1])
+            self._inverse.append(np.linalg.inv(products + 1e-9 * (trace + _SMALLEST) * eye))
+        return self
+
+    def seek_lags(self, lags):
+        """Prepare `of_lags`: the mean so many frames later."""
+        self.lags = lags
+        shifts = [(shifted(self.mean, lag) - self.mean) * self.scale for lag in lags]
+        self._shifts = np.array(shifts).reshape(len(lags), *self.mean.shape)
+        self._shift_norms = np.array([self._norms(x) for x in self._shifts])
+        return self
+
+    def seek_amplitudes(self):
+        """Prepare `of_amplitude`."""
+        self._swing = (self.mean - self.mean.mean(axis=0)) * self.scale
+        self._swing_norms = self._norms(self._swing)
+        self._whole_norm = np.sum(self._swing * (self.over_time @ self._swing @ self.between))
+        return self
+
+    def weigh(self, deviations):
+        """Deviations (K, n_columns) in standard units, by the inverse covariances."""
+        return self.over_time @ (deviations * self.scale) @ self.between
+
+    def of_windows(self, weighed):
+        """Gains (n_windows, n_parts), and the changes of each part, (n_windows, n_columns)."""
+        sums = np.einsum("wpf,pf->wf", self._windows, weighed, optimize=True)
+        gains, changes = np.empty((len(sums), len(self.parts))), np.empty_like(sums)
+        for (of, columns, _), inverse in zip(self._alike, self._inverse, strict=True):
+            own = sums[:, columns]
+            change = np.einsum("wkij,wkj->wki", inverse, own)
+            gains[:, of] = (own * change).sum(axis=2)
+            changes[:, columns] = change
+        return gains, changes
+
+    def of_windows_alone(self, deviations):
+        """The largest gain (n_parts,) of a window where other parts tell nothing."""
+        weighed = self.over_time @ (deviations * self.scale)
+        sums = np.einsum("wpf,pf->wf", self._windows, weighed, optimize=True)
+        return ((sums**2 * self._alone) @ self._belongs).max(axis=0)
+
+    def of_lags(self, weighed):
+        """The largest gain of a lag of each part, at least 0, and the lag: (n_parts,)."""
+        if not len(self.lags):
+            return np.zeros(len(self.parts)), np.zeros(len(self.parts))
+        sums = np.einsum("lpf,pf->lf", self._shifts, weighed, optimize=True) @ self._belongs
+        gains = 2 * sums - self._shift_norms
+        best = gains.argmax(axis=0)
+        largest = gains[best, np.arange(len(self.parts))]
+        return np.maximum(largest, 0), np.where(largest > 0, self.lags[best], 0)
+
+    def of_amplitude(self, weighed):
+        """The gain of another amplitude of each part, and its ratio: (n_parts,)."""
+        sums = (self._swing * weighed).sum(axis=0) @ self._belongs
+        change = sums / np.maximum(self._swing_norms, _SMALLEST)
+        change = np.clip(np.where(self._swing_norms > _SMALLEST, change, 0), -1, _LARGEST_RATIO - 1)
+        return 2 * change * sums - change**2 * self._swing_norms, 1 + change
+
+    def of_standing_still(self, weighed):
+        """The gain of a smaller amplitude of all parts together, if it is less than half."""
+        whole = np.sum(self._swing * weighed)
+        change = max(whole / max(self._whole_norm, _SMALLEST), -1)
+        return 2 * change * whole - change**2 * self._whole_norm if change < -0.5 else 0.0
+
+    def _norms(self, x):
+        out = np.empty(len(self.parts))
+        weighted = self.over_time @ x
+        for of, columns, blocks in self._alike:
+            own, other = x[:, columns], weighted[:, columns]
+            out[of] = np.einsum("pki,pkj,kij->k", own, other, blocks, optimize=True)
+        return out
+
+
+class FaultFinder:
+    """Finds the faults of performances on the clock of a model.
+
+    Parameters
+    ----------
+    performances : ndarray (n, P, n_columns)
+        Right ones on the clock, without gaps.
+    groups : ndarray of int (n,)
+    parts : list of Part
+    reference : ndarray (n_reference, P, n_columns), default=None
+        Right ones of the person.
+    coverage : float, default=0.95
+        The share of performances of new people without a rare fault.
+    floor : ndarray (n_columns,), default=0
+        Variance that is added to that of all.
+    linear : tuple of ndarray, default=None
+        Performances in linear time, their groups, and the reference in it, or None: for lags.
+    """
+
+    def __init__(
+        self, performances, groups, parts, reference=None, *, coverage=0.95, floor=0.0,
+        linear=None,
+    ):  # fmt: skip
+        self.parts = parts
+        n_frames = min(performances.shape[1], _MOST_FRAMES)
+        self._n_frames, self._last = n_frames, performances.shape[1] - 1
+        self._windows, self._spans = windows_of(n_frames)
+        largest = int(_LARGEST_LAG * n_frames)
+        self._lags = np.array([lag for lag in range(-largest, largest + 1) if lag])
+        given = reference if reference is None else self._coarse(reference)
+        on_clock = self._coarse(performances), groups, given
+        self._clock = _Learnt(*on_clock, parts, floor)
+        self._linear = None
+        if linear is not None:
+            of_linear = self._coarse(linear[0]), linear[1]
+            given = None if reference is None else self._coarse(linear[2])
+            columns = linear[0].shape[2]
+            known = [part for part in parts if max(part.columns) < columns]
+            self._known = np.array([k for k, part in enumerate(parts) if part in known])
+            floor = np.broadcast_to(floor, performances.shape[2:])[:columns]
+            self._linear = _Learnt(*of_linear, given, known, floor)
+        self._calibrate(coverage)
+        self._expected = self._prepared(self._clock.expectation)
+        if self._linear is not None:
+            self._late = self._prepared(self._linear.expectation)
+
+    def find(self, performance, in_linear_time=None):
+        """The faults of a performance (P, n_columns), the most important first.
+
+        Parameters
+        ----------
+        performance : ndarray (P, n_columns)
+            On the clock, without gaps.
+        in_linear_time : ndarray (P, n_columns), default=None
+            The same linearly normalised.
+
+        Returns
+        -------
+        list of FoundFault
+        """
+        rest = self._coarse(performance[np.newaxis])[0] - self._expected.mean
+        later = None
+        if self._linear is not None:
+            later = self._coarse(in_linear_time[np.newaxis])[0] - self._late.mean
+        faults, is_open = [], np.ones(len(self.parts), dtype=bool)
+        for _ in range(_MOST_STEPS):
+            fault, effect = self._largest(rest, later, is_open)
+            if fault is None:
+                break
+            columns = self.parts[fault.part].columns
+            if fault.kind == "off":
+                rest[:, columns] -= effect
+            else:
+                # The whole course of the part is explained.
+                is_open[fault.part] = False
+                rest[:, columns] = 0
+                if later is not None and max(columns) < later.shape[1]:
+                    later[:, columns] = 0
+            if not any(_overlap(fault, known) for known in faults):
+                faults.append(fault)
+        return faults[:_MOST_FAULTS]
+
+    def _largest(self, rest, later, is_open):
+        """The fault with the largest gain, and its effect on the part; None without one."""
+        expected = self._expected
+        evidence = self._evidence(expected, rest)
+        of_late = None if later is None else self._evidence(self._late, later)
+        total = self._total(evidence, of_late)
+        total = np.where(is_open, total, -1)
+        part = int(total.argmax())
+        if not total[part] > 0:
+            return None, None
+        window = int(evidence.windows[:, part].argmax())
+        off = max(evidence.windows[window, part], _SMALLEST)
+        # By how much of what a window explains a lag, or another amplitude, explains it.
+        share, lag = evidence.lag_gains[part] / off, evidence.lags[part]
+        if of_late is not None and part in self._known:
+            k = int(np.flatnonzero(self._known == part)[0])
+            in_time = of_late.lag_gains[k] / max(of_late.windows[:, k].max(), _SMALLEST)
+            # The clock follows a limb that is late, and others are early on it.
+            if in_time >= _LAG_EXPLAINS or in_time >= share:
+                share, lag = in_time, of_late.lags[k]
+        share /= _LAG_EXPLAINS
+        ratio = evidence.ratios[part]
+        of_ratio = evidence.ratio_gains[part] / off / _RATIO_EXPLAINS
+        of_all = np.array([total[part], evidence.alone[part], evidence.still])
+        score = np.sqrt((of_all / self._usual).max())
+        if max(share, of_ratio) < 1:
+            columns = self.parts[part].columns
+            change = evidence.changes[window, columns]
+            effect = self._windows[window][:, np.newaxis] * change
+            return FoundFault(
+                part, "off", *self._spans[window], change, np.nan, float(score)
+            ), effect
+        if share >= of_ratio:
+            kind, size = "late" if lag > 0 else "early", lag * self._last / (self._n_frames - 1)
+            deviation = lag / self._lag_spread[part]
+        else:
+            kind, size = "too large" if ratio > 1 else "too small", ratio
+            deviation = np.log(max(ratio, 0.01)) / self._ratio_spread[part]
+        return FoundFault(part, kind, 0.0, 1.0, float(size), float(deviation), float(score)), None
+
+    def _prepared(self, expectation):
+        expectation.seek_windows(self._windows).seek_lags(self._lags)
+        return expectation.seek_amplitudes()
+
+    def _evidence(self, expectation, deviations):
+        weighed = expectation.weigh(deviations)
+        gains, changes = expectation.of_windows(weighed)
+        lag_gains, lags = expectation.of_lags(weighed)
+        alone = expectation.of_windows_alone(deviations)
+        of_ratio = expectation.of_amplitude(weighed)
+        still = expectation.of_standing_still(weighed)
+        return _Evidence(gains, changes, lag_gains, lags, *of_ratio, alone, still)
+
+    def _total(self, evidence, of_late):
+        """The evidence that something is wrong with each part."""
+        total = np.maximum(evidence.windows.max(axis=0), evidence.ratio_gains)
+        if of_late is None:
+            return np.maximum(total, evidence.lag_gains)
+        total[self._known] = np.maximum(total[self._known], of_late.lag_gains)
+        return total
+
+    def _calibrate(self, coverage):
+        """The scores that are usual and rare, and how lags and amplitudes of people vary."""
+        late = {}
+        if self._linear is not None:
+            for i, expectation, deviations in self._linear.left_out():
+                expectation.seek_windows(self._windows[:0]).seek_lags(self._lags)
+                late[i] = expectation.of_lags(expectation.weigh(deviations))
+        scores, alone, still, lags, ratios = [], [], [], [], []
+        pairs = self._linear is not None and len(self._linear.indices) == len(self._clock.indices)
+        for i, expectation, deviations in self._clock.left_out():
+            evidence = self._evidence(self._prepared(expectation), deviations)
+            total = np.maximum(evidence.windows.max(axis=0), evidence.ratio_gains)
+            if self._linear is None:
+                total = np.maximum(total, evidence.lag_gains)
+            elif pairs:
+                total[self._known] = np.maximum(total[self._known], late[i][0])
+            scores.append(total.max()), alone.append(evidence.alone.max())
+            still.append(evidence.still)
+            lags.append(evidence.lags), ratios.append(evidence.ratios)
+        if self._linear is not None and not pairs:
+            # Others are kept in linear time: the larger ones of both.
+            of_late = np.sort([gains.max() for gains, _ in late.values()])
+            ranks = np.linspace(0, len(of_late) - 1, len(scores))
+            scores = np.maximum(np.sort(scores), np.interp(ranks, range(len(of_late)), of_late))
+        gains = np.maximum([scores, alone, still], _SMALLEST)
+        self._usual = np.exp(np.log(gains).mean(axis=1))
+        self._usual[2] = self._usual[0]
+        codes = np.array([group for *_, group in self._clock.indices])
+        logs = 0.5 * np.log((gains / self._usual[:, np.newaxis]).max(axis=0))
+        logs = np.maximum(logs, np.median(logs) - _BELOW_MEDIAN)
+        # A new performance is one of a new group.
+        of_groups = [logs[codes == group] for group in np.unique(codes)]
+        means = np.array([x.mean() for x in of_groups])
+        within = np.mean([x.var(ddof=1) * (1 - 1 / len(x)) if len(x) > 1 else 0 for x in of_groups])
+        squares = np.square(means - means.mean()).sum() + (len(means) + 2) * within
+        limit = t_prediction_limit(len(means), squares, coverage, _PRIOR_VARIANCE)
+        self.usual_score = float(np.exp(means.mean()))
+        self.rare_score = float(np.exp(means.mean() + limit))
+        self._lag_spread = _spread(np.array(lags), _LEAST_LAG)
+        self._ratio_spread = _spread(np.log(np.maximum(ratios, 0.01)), _LEAST_RATIO)
+
+    def _coarse(self, performances):
+        """Performances at the frames on which faults are sought."""
+        n_frames = performances.shape[1]
+        if n_frames == self._n_frames:
+            return performances.astype(np.float64)
+        at = np.linspace(0, n_frames - 1, self._n_frames)
+        below = np.minimum(at.astype(np.intp), n_frames - 2)
+        weight = (at - below)[:, np.newaxis]
+        return performances[:, below] * (1 - weight) + performances[:, below + 1] * weight
+
+
+class _Evidence(NamedTuple):
+    """Gains of faults: of windows, lags and amplitudes, with the changes, lags and ratios.
+
+    ``alone`` are those of windows where other parts tell nothing, and ``still`` is that of a body
+    that hardly moves: where all is wrong, no part is by itself.
+    """
+
+    windows: np.ndarray
+    changes: np.ndarray
+    lag_gains: np.ndarray
+    lags: np.ndarray
+    ratio_gains: np.ndarray
+    ratios: np.ndarray
+    alone: np.ndarray
+    still: float
+
+
+class _Learnt:
+    """What is expected of a new performance, and of those of each group by the other groups."""
+
+    def __init__(self, performances, groups, reference, parts, floor):
+        self._performances, self._parts = performances, parts
+        codes = np.unique(groups, return_inverse=True)[1].ravel()
+        n_reference = 0 if reference is None else len(reference)
+        if n_reference and np.bincount(codes).max() < 2:
+            # No group tells how a person varies about the own performances.
+            n_reference = 0
+        self._expected, self.indices = {}, []
+        for i in range(len(performances)):
+            own = np.flatnonzero(codes == codes[i])
+            own = own[own != i][:n_reference]
+            if n_reference and not len(own):
+                continue
+            others = codes != codes[i]
+            if others.sum() < 2:
+                others[:] = True
+            key = (codes[i], i) if n_reference else codes[i]
+            if key not in self._expected:
+                given = performances[own] if n_reference else None
+                mean, variance = expected_performance(performances[others], codes[others], given)
+                self._expected[key] = mean, self._raised(variance, floor)
+            self.indices.append((i, key, codes[i]))
+        deviations = [performances[i] - self._expected[key][0] for i, key, _ in self.indices]
+        scales = [1 / np.sqrt(self._expected[key][1]) for _, key, _ in self.indices]
+        self._scores = np.array(deviations) * np.array(scales)
+        mean, variance = expected_performance(performances, codes, reference)
+        variance, whole = self._raised(variance, floor), precisions(self._scores)
+        self.expectation = Expectation(mean, variance, *whole, parts)
+
+    def left_out(self):
+        """Each performance that was left out: index, expectation by others, and deviations."""
+        known, before = {}, None
+        for i, key, group in self.indices:
+            if group not in known:
+                others = np.array([other != group for _, _, other in self.indices])
+                known = {group: precisions(self._scores[others] if others.any() else self._scores)}
+            mean, variance = self._expected[key]
+            if key != before:
+                expectation, before = Expectation(mean, variance, *known[group], self._parts), key
+            yield i, expectation, self._performances[i] - mean
+
+    def _raised(self, variance, floor):
+        """Variances with a floor."""
+        raised = variance + floor
+        for part in self._parts:
+            mean = variance[:, part.columns].mean()
+            raised[:, part.columns] += _VARIANCE_FLOOR * mean
+        return np.maximum(raised, _SMALLEST * max(raised.max(), _SMALLEST))
+
+
+def precisions(scores):
+    """Inverse covariance over time, and inverse correlation between columns, of scores.
+
+    The covariance over time is pooled over the columns, and shrunk towards one that depends on the
+    lag only, and to white noise; the correlation, towards independence.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (n, K, n_columns)
+
+    Returns
+    -------
+    over_time : ndarray, shape (K, K)
+    between : ndarray, shape (n_columns, n_columns)
+    """
+    n_frames, width = scores.shape[1:]
+    rows = scores.transpose(0, 2, 1).reshape(-1, n_frames)
+    covariance = rows.T @ rows / len(rows)
+    size = np.trace(covariance) / n_frames
+    if not size > 0:
+        return np.eye(n_frames), np.eye(width)
+    deviations = np.sqrt(np.maximum(np.diag(covariance), _SMALLEST * size))
+    correlation = covariance / np.outer(deviations, deviations)
+    by_lag = np.array([np.trace(correlation, k) for k in range(n_frames)]) / n_frames
+    frames = np.arange(n_frames)
+    stationary = by_lag[np.abs(frames[:, np.newaxis] - frames)]
+    share = _STATIONARY_ROWS / (_STATIONARY_ROWS + len(rows))
+    correlation = (1 - share) * correlation + share * stationary
+    correlation = (1 - _WHITE) * correlation + _WHITE * np.eye(n_frames)
+    inverse = np.linalg.inv(correlation)
+    products = np.einsum("npf,pq,nqg->fg", scores, inverse, scores, optimize=True)
+    norms = np.sqrt(np.maximum(np.diag(products), _SMALLEST * np.diag(products).max()))
+    between = (1 - _INDEPENDENT) * products / np.outer(norms, norms)
+    np.fill_diagonal(between, 1.0)
+    return inverse / size, np.linalg.inv(between)
+
+
+def windows_of(n_frames):
+    """Windows (n_windows, n_frames) of values from 0 to 1, and their spans (n_windows, 2)."""
+    t = np.linspace(0, 1, n_frames)
+    if n_frames <= _FEW_FRAMES:
+        runs = [(a, b) for a in range(n_frames) for b in range(a, n_frames)]
+        frames = np.arange(n_frames)
+        windows = np.array([(frames >= a) & (frames <= b) for a, b in runs], dtype=np.float64)
+        return windows, t[np.array(runs)]
+    spans = [(0.0, 1.0)]
+    for length in _LENGTHS:
+        starts = np.arange(-_STEP, 1 + _STEP - length + 1e-9, min(_STEP, length / 2))
+        spans += [(start, start + length) for start in starts]
+    spans = np.array(spans)
+    ramp = np.minimum(_RAMP, np.diff(spans))
+    rising, falling = ((t - spans[:, :1]) / ramp + 0.5, (spans[:, 1:] - t) / ramp + 0.5)
+    windows = _smooth_step(rising) * _smooth_step(falling)
+    windows[0] = 1
+    return windows, np.clip(spans, 0, 1)
+
+
+def shifted(curves, lag):
+    """Curves (K, n_columns) so many frames later; the first value stays."""
+    at = np.clip(np.arange(len(curves)) - lag, 0, len(curves) - 1)
+    return curves[at]
+
+
+def _smooth_step(x):
+    x = np.clip(x, 0, 1)
+    return x**2 * (3 - 2 * x)
+
+
+def _overlap(fault, other):
+    """Whether two faults of a part are at the same time."""
+    return fault.part == other.part and fault.start < other.stop and other.start < fault.stop
+
+
+def _spread(values, least):
+    """Root mean squares (n_parts,) of values (n, n_parts), shrunk to that of all parts."""
+    squares, n = np.square(values), len(values)
+    return np.sqrt(np.maximum((squares.sum(axis=0) + 5 * squares.mean()) / (n + 5), least**2))
