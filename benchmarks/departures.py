@@ -2,13 +2,14 @@
 
     python benchmarks/departures.py DATA_FOLDER [--all]
 
-DATA_FOLDER holds hdm05/hdm05_positions.npz and uiprmd/uiprmd_odd_positions.npz. Every subject of each
-class is held out in turn; everything is learnt from right trials of the others. The first three
-trials of the subject are the reference, the others are tested: as they are, and with a fault. A limb
-is turned about its upper joint, with all below it. Eight kinds: one limb 20, 30 or 40 degrees off in
-40 % of the time, a forearm or shank 30, the trunk 20; a limb late by 12 % of the time, or with 0.5 or
-1.6 times its amplitude. Choices were made on HDM05 and two exercises of UI-PRMD; ``--all`` gives
-the other three as well. Prints Markdown, in per cent.
+DATA_FOLDER holds hdm05/hdm05_positions.npz and uiprmd/uiprmd_odd_positions.npz. Every subject of
+each class is held out in turn; everything is learnt from right trials of the others. Three trials
+of the subject are the reference, the next ones are tested: as they are, and, four at most, with a
+fault. A limb is turned about its upper joint, with all below it. Eight kinds: one limb 20, 30 or 40
+degrees off in 40 % of the time, a forearm or shank 30, the trunk 20; a limb late by 12 % of the
+time, or with 0.5 or 1.6 times its amplitude. What is judged is the most important row, whatever its
+evidence; overlap is that of the time, of faults with the right region. Choices were made on HDM05
+and two exercises of UI-PRMD; ``--all`` gives the other three as well. Prints Markdown, in per cent.
 """
 
 import os
@@ -42,6 +43,8 @@ P = 60
 BODY = Skeleton.paper()
 CHOSEN = ("inline lunge", "shoulder rotation")
 UNSEEN = ("deep squat", "shoulder abduction", "sit to stand")
+# Most trials of a subject that get faults.
+SPOILT = 4
 # Upper and lower joint, what is below the lower one, and the part of the body.
 LIMBS = {"torso": ("pelvis", "neck", ["head"], "trunk")}
 for _side in ("left", "right"):
@@ -57,7 +60,7 @@ for _side in ("left", "right"):
     LIMBS["torso"][2].extend(f"{_side}_{joint}" for joint in ("shoulder", "elbow", "wrist"))
 MOVABLE = [limb for limb in LIMBS if limb != "torso"]
 DISTAL = [limb for limb in MOVABLE if limb.endswith(("forearm", "leg"))]
-# Degrees that a limb deviates from its mean direction, root mean square, at least, to be late or small.
+# Degrees that a limb deviates from its mean direction, root mean square, to be late or small.
 MOVES = 20
 KINDS = {
     "20 degrees": ("angle", MOVABLE, 20),
@@ -212,7 +215,9 @@ def folds(trials, seed=0, n_reference=3):
         others = np.flatnonzero((trials.actors != actor) & (trials.takes % 2 == 1))
         reference, tested = own[:n_reference], own[n_reference:]
         rng = np.random.default_rng([seed, number])
-        faults = [{name: put_fault(trials.data[i], name, rng) for name in KINDS} for i in tested]
+        faults = [
+            {name: put_fault(trials.data[i], name, rng) for name in KINDS} for i in tested[:SPOILT]
+        ]
         some = lambda rows: [trials.data[i] for i in rows]  # noqa: E731
         yield Fold(some(others), trials.actors[others], some(reference), some(tested), faults)
 
@@ -296,7 +301,7 @@ def measure(classes):
                 pipe = make_pipeline(
                     DirectionCosines(BODY), *steps, DenseSynchronizer(P), ActionModel()
                 ).fit(fold.training, actionmodel__groups=fold.groups)
-                for n in (0, 1, 3):
+                for n in (0, 1, 3) if aspace is None else (0, 3):
                     way = f"{'no aSpace' if aspace is None else 'ASpace(0.95)'}, reference of {n}"
                     said = departures_of(fold, pipe, fold.reference[3 - n :])
                     found.setdefault(way, []).extend(said)

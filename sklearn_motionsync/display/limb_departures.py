@@ -1,5 +1,6 @@
 """Limbs that depart from an action: when, how far, and the bones that represent them."""
 
+import re
 from functools import partial
 from numbers import Real
 
@@ -57,7 +58,11 @@ def limb_departures(rows, n_frames, frames, skeleton):
     titles, marked = [], []
     for frame, stretch in zip(shown, stretches, strict=True):
         departing = [row for row in rows if _is_in(row, stretch)]
-        text = describe_departure(departing[0]) if departing else "no limb departs"
+        text = "no limb departs"
+        if departing:
+            # A panel has no room for more.
+            text = describe_departure(departing[0])
+            text = re.sub(r"moves (\S+) times as far", r"x \1", text)
         titles.append(f"frame {frame}\n{text}")
         limbs = list(dict.fromkeys(row.limb for row in departing))
         marked.append(bones_of_limbs(limbs, skeleton))

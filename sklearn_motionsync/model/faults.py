@@ -318,7 +318,9 @@ class FaultFinder:
                     later[:, columns] = 0
             if not any(_overlap(fault, known) for known in faults):
                 faults.append(fault)
-        return faults[:_MOST_FAULTS]
+            if len(faults) == _MOST_FAULTS:
+                break
+        return faults
 
     def _largest(self, rest, later, is_open):
         """The fault with the largest gain, and its effect on the part; None without one."""
