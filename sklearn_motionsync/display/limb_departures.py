@@ -54,6 +54,8 @@ def limb_departures(rows, n_frames, frames, skeleton):
         The bones that depart around each frame.
     """
     rows = [row for row in rows if row.limb is not None]
+    # Hints beside what is rare would hide it.
+    rows = [row for row in rows if row.rare] or rows
     shown, stretches = _stretches(rows, frames, n_frames)
     titles, marked = [], []
     for frame, stretch in zip(shown, stretches, strict=True):
