@@ -10,7 +10,6 @@ from typing import Literal, Self
 
 import numpy as np
 import pandas as pd
-from scipy.spatial.distance import cdist
 from scipy.special import softmax
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.pipeline import Pipeline
@@ -28,17 +27,14 @@ from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import add_unknown_label, encode_classes, encode_groups
 from ..utils.parallel import LongWorkMixin, run
 from ..utils.parameters import validated
-from .distances import SETTINGS, normalise_time, pairwise_distances
+from .distances import SETTINGS
+from .kernel import MotionKernel
 from .regression import assign_folds, decision_values, fit_regression
 
 __all__ = ["ActionClassifier"]
 
 # The coverage of reject_below="auto".
 _COVERAGE = 0.95
-# Standard deviations below this share of the size of the data are rounding.
-_ROUNDING = 2.0**-44
-# Frames that are averaged for the start and the end of a performance.
-_N_END_FRAMES = 3
 # The golden ratio less 1.
 _GOLDEN = (5**0.5 - 1) / 2
 
@@ -81,8 +77,7 @@ class ActionClassifier(
     gamma : float, default=1
         A kernel is ``exp(-gamma D / median(D))``, the median over all training pairs.
     summaries : bool, default=True
-        Whether mean, standard deviation, minimum, maximum, start and end of every feature make a
-        kernel, too.
+        Whether summaries of every feature make kernels, too: of its values, and of its changes.
     n_landmarks : int or None, default=250
         If there are more than twice as many performances, they are compared with so many of them
         only, chosen evenly from all classes and groups (Nyström's method). None compares all.
@@ -116,11 +111,20 @@ class ActionClassifier(
         The classes, sorted.
     landmarks_ : ndarray of int, shape (n_landmarks,)
         The training performances that others are compared with: their indices, rising.
+    weights_ : ndarray, shape (n_kernels,)
+        The weights of shape, postures, summaries and changes, of those that ``costs`` and
+        ``summaries`` name, in this order. They sum to 1.
     temperature_ : float
         The factor of decision values in probabilities, estimated from held-out performances.
     held_out_ : ndarray, shape (n_sequences,)
         The largest decision value of each training performance when it and all of its group
         (without groups a fifth of every class) are held out; NaN where one class is left.
+    held_out_right_ : ndarray of bool, shape (n_sequences,)
+        Whether it was given its class then.
+    held_out_gain_ : float
+        What decision values gain from the fold that was held out, in the median: the gain from
+        the last but one fold, extrapolated. With ``G`` folds, usually 5, it is ``(G - 2) / G`` of
+        what a second held-out fold takes from ``held_out_``.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -134,11 +138,17 @@ class ActionClassifier(
 
     Notes
     -----
-    The similarity of two trials is the mean of four kernels. Three are of their synchronisation
-    distances, one a cost, with velocities normalised by each trial's own energy. One is of summary
-    statistics, without any warp. A multinomial logistic regression with this kernel separates the
-    classes. Trials are not warped to the template of a class: that makes unknown movements resemble
-    it.
+    The similarity of two trials is a weighted mean of four kernels. The first is that of shape, by
+    the synchronisation distances of velocities, each divided by its own energy; the second that of
+    postures. The third compares mean, standard deviation, minimum, maximum, start and end of every
+    feature. The fourth compares its changes over 4 and 16 % of the clock: minimum, maximum, and for
+    how much of the clock they exceed levels. Summaries are not warped. The weight of a kernel,
+    ``weights_``, is the sixth power of its alignment with the classes, over pairs of different
+    groups. A multinomial logistic regression with this kernel separates the classes. Trials are not
+    warped to the template of a class: that makes unknown movements resemble it.
+
+    Two classes may be a movement done right and done wrong. Give ``groups`` then: what tells people
+    apart gets little weight.
 
     Gaps (NaN) are refused. An `ASpace` before it takes them: ``ASpace(1.0)`` keeps all features.
 
@@ -223,7 +233,9 @@ class ActionClassifier(
             If the input breaks the contract, there are not two classes, there is not a class or
             group for each performance, or costs are unknown.
         """
-        kernel = MotionKernel(self._comparisons(), self.gamma, self.summaries)
+        kernel = MotionKernel(
+            self._comparisons(), self.gamma, self.summaries, n_frames=int(self.n_frames)
+        )
         performances = self._check_training_set(X)
         self.classes_, codes = encode_classes(y, performances, type(self).__name__)
         if groups is not None:
@@ -231,13 +243,14 @@ class ActionClassifier(
         self.landmarks_ = choose_landmarks(codes, groups, self.n_landmarks)
         with self._progress(fits=True) as progress:
             jobs = {"n_jobs": self.n_jobs, "progress": progress}
-            matrix = kernel.fit(performances, self.landmarks_, **jobs)
+            matrix = kernel.fit(performances, self.landmarks_, codes, groups, **jobs)
             folds = assign_folds(codes, groups)
             fit_in_portion = partial(fit_regression, self.C, folds, self.landmarks_)
-            ((self._regression, self.temperature_, self.held_out_),) = run(
-                fit_in_portion, [(matrix, codes)], step=progress.stage("regression", 1)
-            )
-        self._kernel = kernel
+            (found,) = run(fit_in_portion, [(matrix, codes)], step=progress.stage("regression", 1))
+        self._regression, self.temperature_ = found.regression, found.temperature
+        self.held_out_, self.held_out_right_ = found.held_out, found.right
+        self.held_out_gain_ = found.gain
+        self._kernel, self.weights_ = kernel, kernel.weights
         # Copies, which do not change with the user's arrays.
         self._training = [np.array(x) for x in performances], codes, groups
         return self
@@ -350,7 +363,8 @@ class ActionClassifier(
         Returns
         -------
         float
-            The quantile of ``held_out_`` that as many exceed; of few performances the smallest.
+            The quantile of ``held_out_`` that as many exceed of those that ``held_out_right_``
+            names, interpolated, and ``held_out_gain_``.
 
         Raises
         ------
@@ -360,14 +374,15 @@ class ActionClassifier(
         check_is_fitted(self)
         if not (isinstance(coverage, Real) and 0 < coverage < 1):
             raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
-        known = np.sort(self.held_out_[np.isfinite(self.held_out_)])
-        if not len(known):
+        known = np.isfinite(self.held_out_)
+        if not known.any():
             raise ValueError(
                 "There is no threshold, as no performance could be held out: give at least two "
                 "performances, and two groups, of two classes, or a number as reject_below."
             )
-        rank = int((1 - coverage) * (len(known) + 1))
-        return float(known[max(rank - 1, 0)])
+        right = known & self.held_out_right_
+        values = self.held_out_[right if right.any() else known]
+        return float(np.quantile(values, 1 - coverage) + self.held_out_gain_)
 
     @snapshot
     def model_of(self, label: Hashable) -> Pipeline:
@@ -481,117 +496,3 @@ def _ranks(cells, keys):
     ranks = np.empty(len(cells), dtype=np.intp)
     ranks[order] = np.arange(len(cells)) - np.searchsorted(cells[order], cells[order])
     return ranks
-
-
-class MotionKernel:
-    """The mean of kernels ``exp(-gamma D / median(D))``, medians over the training pairs.
-
-    One ``D`` a comparison is that of its synchronisation distances. The last is the squared
-    Euclidean distance of the `summary_statistics`, in standard deviations of the training set.
-
-    Performances are compared with landmarks of the training set. If these are not all of it, the
-    kernels are not added up, but stand side by side: each then has a regression of its own, which
-    comes nearer to that of all pairs.
-
-    Parameters
-    ----------
-    comparisons : list of Comparison
-    gamma : float
-    summaries : bool
-        Whether the last one is there.
-    """
-
-    def __init__(self, comparisons, gamma, summaries):
-        self.comparisons, self.gamma, self.summaries = comparisons, gamma, summaries
-
-    def fit(self, performances, landmarks, **jobs):
-        """Estimate units and medians from the training set, and return its kernel.
-
-        Parameters
-        ----------
-        performances : sequence of ndarray (n_frames_i, n_features)
-        landmarks : ndarray of int, shape (n_landmarks,)
-        **jobs : dict
-            ``n_jobs`` and ``progress``.
-
-        Returns
-        -------
-        ndarray, shape (n, n), or (n, n_kernels * n_landmarks)
-        """
-        frames = [x.astype(np.float64, copy=False) for x in performances]
-        self._center = np.concatenate(frames).mean(axis=0)
-        variances = [np.square(x - self._center).sum(axis=1).mean() for x in frames]
-        self._unit = np.sqrt(np.mean(variances)) or 1.0
-        scaled = self._scale(performances)
-        features = self._compared(scaled)
-        self._features = [f[landmarks] for f in features]
-        # Landmarks among themselves, so that no pair is compared twice, and the others with them.
-        is_other = np.ones(len(scaled), dtype=bool)
-        is_other[landmarks] = False
-        distances = np.empty((len(self.comparisons) + self.summaries, len(scaled), len(landmarks)))
-        for i, (c, f) in enumerate(zip(self.comparisons, features, strict=True)):
-            d, known, name = distances[i], self._features[i], f" by {c.cost}"
-            d[landmarks] = pairwise_distances(c, known, name=name, **jobs)
-            if is_other.any():
-                d[is_other] = pairwise_distances(c, f[is_other], known, name=name, **jobs)
-        if self.summaries:
-            statistics = np.array([summary_statistics(x) for x in scaled])
-            self._mean, std = statistics.mean(axis=0), statistics.std(axis=0)
-            # Statistics that are constant in the training set have no weight.
-            rounding = _ROUNDING * max(1.0, np.abs(self._center).max() / self._unit)
-            self._std = np.where(std > rounding, std, np.inf)
-            statistics = (statistics - self._mean) / self._std
-            self._statistics = statistics[landmarks]
-            distances[-1] = cdist(statistics, self._statistics, "sqeuclidean")
-        is_pair = np.ones(distances[0].shape, dtype=bool)
-        is_pair[landmarks, np.arange(len(landmarks))] = False
-        self._medians = [_positive_median(d[is_pair]) for d in distances]
-        self._side_by_side = bool(is_other.any())
-        return self._combined(distances)
-
-    def __call__(self, performances, **jobs):
-        """The kernel of other performances and the landmarks."""
-        scaled = self._scale(performances)
-        distances = [
-            pairwise_distances(c, new, known, name=f" by {c.cost}", **jobs)
-            for c, new, known in zip(
-                self.comparisons, self._compared(scaled), self._features, strict=True
-            )
-        ]
-        if self.summaries:
-            statistics = np.array([summary_statistics(x) for x in scaled])
-            statistics = (statistics - self._mean) / self._std
-            distances.append(cdist(statistics, self._statistics, "sqeuclidean"))
-        return self._combined(distances)
-
-    def _scale(self, performances):
-        """Performances about the mean posture, in the unit of the training set."""
-        return [(x.astype(np.float64) - self._center) / self._unit for x in performances]
-
-    def _compared(self, scaled):
-        """The features that each comparison compares."""
-        if not self.comparisons:
-            return []
-        on_clock = normalise_time(scaled, self.comparisons[0].n_frames)
-        return [c.features(on_clock) for c in self.comparisons]
-
-    def _combined(self, distances):
-        kernels = [
-            np.exp(-self.gamma * d / median)
-            for d, median in zip(distances, self._medians, strict=True)
-        ]
-        return (np.hstack(kernels) if self._side_by_side else sum(kernels)) / len(distances)
-
-
-def summary_statistics(x):
-    """Mean, standard deviation, extremes and ends of a performance (n_frames, n_features)."""
-    ends = x[:_N_END_FRAMES].mean(axis=0), x[-_N_END_FRAMES:].mean(axis=0)
-    parts = [x.mean(axis=0), x.std(axis=0), x.min(axis=0), x.max(axis=0), *ends]
-    return np.concatenate(parts)
-
-
-def _positive_median(distances):
-    """The median; if that is 0, the mean, and if that is, 1."""
-    if not distances.size:
-        return 1.0
-    return float(np.median(distances)) or float(distances.mean()) or 1.0

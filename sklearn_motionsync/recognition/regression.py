@@ -1,5 +1,7 @@
 """Multinomial logistic regression with a kernel, its folds and its probabilities."""
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
@@ -8,11 +10,13 @@ from sklearn.linear_model import LogisticRegression
 from sklearn.model_selection import GroupKFold
 
 __all__ = [
+    "Fitted",
     "KernelRegression",
     "assign_folds",
     "decision_values",
     "fit_regression",
     "fit_temperature",
+    "fold_gain",
     "held_out_decisions",
 ]
 
@@ -157,10 +161,61 @@ def fit_temperature(decisions, codes):
     return float(_PRIOR_TEMPERATURE * np.exp(found.x))
 
 
+def fold_gain(regression, kernel, codes, folds, decisions):
+    """What the largest decision value of a performance gains from one more fold, in the median.
+
+    Held-out values come from all folds but one, those of new performances from all ``G`` of them.
+    Fits without two neighbouring folds tell what the last but one brings. The error of a fit falls
+    with the inverse of what it learns from, so the last fold brings ``(G - 2) / G`` of that.
+
+    Parameters
+    ----------
+    regression : KernelRegression
+    kernel : ndarray, shape (n, n_kernels * n_landmarks)
+    codes, folds : ndarray of int, shape (n,)
+    decisions : ndarray, shape (n, n_classes)
+        As `held_out_decisions` returns them.
+
+    Returns
+    -------
+    float
+        0 with two folds, or if no fit without two of them knows two classes.
+    """
+    numbers = np.unique(folds)
+    right = decisions.argmax(axis=1) == codes
+    losses = []
+    for pair in zip(numbers, np.roll(numbers, -1), strict=True) if len(numbers) > 2 else ():
+        out = np.isin(folds, pair)
+        told = out & right & np.isfinite(decisions).any(axis=1)
+        if len(np.unique(codes[~out])) > 1 and (~out)[regression.landmarks].any():
+            less = decision_values(kernel[told], *regression.fit(codes, ~out))
+            losses.extend(decisions[told].max(axis=1) - less.max(axis=1))
+    return float(np.median(losses)) * (1 - 2 / len(numbers)) if losses else 0.0
+
+
+class Fitted(NamedTuple):
+    """A regression ``(A, b)``, its temperature, and what was found of those held out."""
+
+    regression: tuple
+    temperature: float
+    # The largest decision value (n,), and whether it was that of the class.
+    held_out: np.ndarray
+    right: np.ndarray
+    # By `fold_gain`.
+    gain: float
+
+
 def fit_regression(C, folds, landmarks, kernel, codes):
-    """The regression (A, b), its temperature, and the largest held-out decision values (n,)."""
+    """Fit the regression, and others without one fold and without two."""
     regression = KernelRegression(kernel, C, landmarks)
     decisions = held_out_decisions(regression, kernel, codes, folds)
+    gain = fold_gain(regression, kernel, codes, folds, decisions)
     A, b = regression.fit(codes)
-    temperature = fit_temperature(decisions, codes)
-    return (np.ascontiguousarray(A.T).T, b), temperature, decisions.max(axis=1)
+    largest = decisions.max(axis=1)
+    return Fitted(
+        (np.ascontiguousarray(A.T).T, b),
+        fit_temperature(decisions, codes),
+        largest,
+        np.isfinite(largest) & (decisions.argmax(axis=1) == codes),
+        gain,
+    )

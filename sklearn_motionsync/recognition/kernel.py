@@ -1,0 +1,258 @@
+"""MotionKernel: how alike performances are, by their synchronisation and by summaries."""
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from .distances import normalise_time, pairwise_distances
+
+__all__ = ["MotionKernel", "align_weights", "change_extremes", "change_shares", "changes_of"]
+
+# The cost that compares postures; the others compare velocities.
+_POSTURE = "posture"
+# Standard deviations below this share of the size of the data are rounding.
+_ROUNDING = 2.0**-44
+# Frames that are averaged for the start and the end of a performance.
+_N_END_FRAMES = 3
+# Changes are those over these shares of the clock before and after a frame.
+_REACHES = 0.04, 0.16
+# Levels whose excess is counted, in mean absolute changes, and how soft the count is.
+_LEVELS, _SOFTNESS = np.array([-2, -1, -0.3, 0, 0.3, 1, 2]), 0.5
+# The weight of a view is this power of its alignment with the classes.
+_POWER = 6
+
+
+class MotionKernel:
+    """A weighted mean of kernels ``exp(-gamma D / median(D))``, medians over the training pairs.
+
+    There are up to four views of performances. `comparisons` of velocities make the first, those of
+    postures the second, each ``D`` a matrix of synchronisation distances. The third is of
+    `summary_statistics`, the last of `change_extremes` and `change_shares`: squared Euclidean
+    distances, in standard deviations of the training set. A view is the mean of its kernels.
+
+    Performances are compared with landmarks of the training set. If these are not all of it, the
+    views are not added up, but stand side by side: each then has a regression of its own, which
+    comes nearer to that of all pairs.
+
+    Parameters
+    ----------
+    comparisons : list of Comparison
+    gamma : float
+    summaries : bool
+        Whether the last two views are there.
+    n_frames : int
+        Of the clock.
+
+    Attributes
+    ----------
+    weights : ndarray, shape (n_views,)
+        By `align_weights`.
+    """
+
+    def __init__(self, comparisons, gamma, summaries, *, n_frames):
+        self.comparisons, self.gamma, self.summaries = comparisons, gamma, summaries
+        self.n_frames = n_frames
+        views = [int(c.cost == _POSTURE) for c in comparisons] + [2, 3, 3] * bool(summaries)
+        self._views = np.unique(views, return_inverse=True)[1]
+
+    def fit(self, performances, landmarks, codes, groups=None, **jobs):
+        """Estimate units, medians and weights from the training set, and return its kernel.
+
+        Parameters
+        ----------
+        performances : sequence of ndarray (n_frames_i, n_features)
+        landmarks : ndarray of int, shape (n_landmarks,)
+        codes : ndarray of int, shape (n,)
+            Classes.
+        groups : ndarray of int, shape (n,), default=None
+        **jobs : dict
+            ``n_jobs`` and ``progress``.
+
+        Returns
+        -------
+        ndarray, shape (n, n), or (n, n_views * n_landmarks)
+        """
+        frames = [x.astype(np.float64, copy=False) for x in performances]
+        self._center = np.concatenate(frames).mean(axis=0)
+        variances = [np.square(x - self._center).sum(axis=1).mean() for x in frames]
+        self._unit = np.sqrt(np.mean(variances)) or 1.0
+        scaled = self._scale(performances)
+        on_clock = normalise_time(scaled, self.n_frames)
+        features = [c.features(on_clock) for c in self.comparisons]
+        self._features = [f[landmarks] for f in features]
+        # Landmarks among themselves, so that no pair is compared twice, and the others with them.
+        is_other = np.ones(len(scaled), dtype=bool)
+        is_other[landmarks] = False
+        distances = np.empty((len(self._views), len(scaled), len(landmarks)))
+        for i, (c, f) in enumerate(zip(self.comparisons, features, strict=True)):
+            d, known, name = distances[i], self._features[i], f" by {c.cost}"
+            d[landmarks] = pairwise_distances(c, known, name=name, **jobs)
+            if is_other.any():
+                d[is_other] = pairwise_distances(c, f[is_other], known, name=name, **jobs)
+        if self.summaries:
+            rounding = _ROUNDING * max(1.0, np.abs(self._center).max() / self._unit)
+            self._change_units = _change_units(on_clock, rounding)
+            self._scalings, self._summaries = [], []
+            for d, statistics in zip(
+                distances[len(features) :], self._summarised(scaled, on_clock), strict=True
+            ):
+                mean, std = statistics.mean(axis=0), statistics.std(axis=0)
+                # Statistics that are constant in the training set have no weight.
+                self._scalings.append((mean, np.where(std > rounding, std, np.inf)))
+                statistics = (statistics - mean) / self._scalings[-1][1]
+                self._summaries.append(statistics[landmarks])
+                d[:] = cdist(statistics, self._summaries[-1], "sqeuclidean")
+        is_pair = np.ones(distances[0].shape, dtype=bool)
+        is_pair[landmarks, np.arange(len(landmarks))] = False
+        self._medians = [_positive_median(d[is_pair]) for d in distances]
+        self._side_by_side = bool(is_other.any())
+        views = self._as_views(distances)
+        groups = np.arange(len(scaled)) if groups is None else groups
+        self.weights = align_weights(views, codes, groups, landmarks)
+        return self._combined(views)
+
+    def __call__(self, performances, **jobs):
+        """The kernel of other performances and the landmarks."""
+        scaled = self._scale(performances)
+        on_clock = normalise_time(scaled, self.n_frames)
+        distances = [
+            pairwise_distances(c, c.features(on_clock), known, name=f" by {c.cost}", **jobs)
+            for c, known in zip(self.comparisons, self._features, strict=True)
+        ]
+        if self.summaries:
+            distances += [
+                cdist((statistics - mean) / std, known, "sqeuclidean")
+                for statistics, (mean, std), known in zip(
+                    self._summarised(scaled, on_clock),
+                    self._scalings,
+                    self._summaries,
+                    strict=True,
+                )
+            ]
+        return self._combined(self._as_views(distances))
+
+    def _scale(self, performances):
+        """Performances about the mean posture, in the unit of the training set."""
+        return [(x.astype(np.float64) - self._center) / self._unit for x in performances]
+
+    def _summarised(self, scaled, on_clock):
+        """Statistics (n, n_statistics) of values, extremes of changes, and shares of the clock."""
+        # One performance at a time: no result depends on the others.
+        changes = [changes_of(x) for x in on_clock]
+        units = self._change_units
+        return [
+            np.array([summary_statistics(x) for x in scaled]),
+            np.array([change_extremes(c) for c in changes]),
+            np.array([change_shares(c, units) for c in changes]),
+        ]
+
+    def _as_views(self, distances):
+        """The mean kernel of each view: (n_views, n, n_landmarks)."""
+        kernels = [
+            np.exp(-self.gamma * d / median)
+            for d, median in zip(distances, self._medians, strict=True)
+        ]
+        return np.stack(
+            [
+                sum(k for k, view in zip(kernels, self._views, strict=True) if view == v)
+                / np.sum(self._views == v)
+                for v in range(self._views[-1] + 1)
+            ]
+        )
+
+    def _combined(self, views):
+        weighted = [weight * view for weight, view in zip(self.weights, views, strict=True)]
+        return np.hstack(weighted) if self._side_by_side else sum(weighted)
+
+
+def align_weights(views, codes, groups, landmarks):
+    """Weights of kernels, the larger the better these tell classes across groups.
+
+    They are powers of the alignment of a kernel with the classes: of the correlation, over pairs of
+    different groups, of the kernel and of whether a pair is of one class, both centred by row and
+    by column. Kernels that are not aligned have no weight; if none is, all have the same.
+
+    Parameters
+    ----------
+    views : ndarray, shape (n_views, n, n_landmarks)
+    codes, groups : ndarray of int, shape (n,)
+    landmarks : ndarray of int, shape (n_landmarks,)
+
+    Returns
+    -------
+    ndarray, shape (n_views,)
+        They sum to 1.
+    """
+    is_pair = groups[:, np.newaxis] != groups[landmarks]
+    same = _centred(codes[:, np.newaxis] == codes[landmarks])[is_pair]
+    alignments = np.zeros(len(views))
+    for i, view in enumerate(views):
+        centred = _centred(view)[is_pair]
+        size = np.sqrt(np.square(centred).sum() * np.square(same).sum())
+        alignments[i] = max((centred * same).sum() / size, 0) if size else 0
+    if not alignments.any():
+        return np.full(len(views), 1 / len(views))
+    weights = (alignments / alignments.max()) ** _POWER
+    return weights / weights.sum()
+
+
+def _centred(matrix):
+    """A matrix less means of rows and of columns."""
+    matrix = matrix - np.mean(matrix, axis=0)
+    return matrix - matrix.mean(axis=1, keepdims=True)
+
+
+def summary_statistics(x):
+    """Mean, standard deviation, extremes and ends of a performance (n_frames, n_features)."""
+    ends = x[:_N_END_FRAMES].mean(axis=0), x[-_N_END_FRAMES:].mean(axis=0)
+    parts = [x.mean(axis=0), x.std(axis=0), x.min(axis=0), x.max(axis=0), *ends]
+    return np.concatenate(parts)
+
+
+def changes_of(x):
+    """Changes of a performance (P, n_features) on the clock: (n_reaches, P, n_features).
+
+    That at a frame is the value some frames later less that as many earlier. Before its start and
+    after its end a performance stands still.
+    """
+    frames = np.arange(len(x))
+    reaches = [max(round(share * len(x)), 1) for share in _REACHES]
+    return np.stack(
+        [x[np.minimum(frames + r, frames[-1])] - x[np.maximum(frames - r, 0)] for r in reaches]
+    )
+
+
+def _change_units(on_clock, rounding):
+    """Mean absolute changes (n_reaches, n_features) of performances; infinite if rounding."""
+    sizes = np.mean([np.abs(changes_of(x)).mean(axis=1) for x in on_clock], axis=0)
+    return np.where(sizes > rounding, sizes, np.inf)
+
+
+def change_extremes(changes):
+    """Minima and maxima of changes (n_reaches, P, n_features), of every feature and reach."""
+    return np.concatenate([changes.min(axis=1), changes.max(axis=1)], axis=None)
+
+
+def change_shares(changes, units):
+    """For how much of the clock changes exceed levels, of every feature, reach and level.
+
+    A frame counts ``tanh`` of its excess, from -1 to 1, so that no count jumps with rounding.
+
+    Parameters
+    ----------
+    changes : ndarray, shape (n_reaches, P, n_features)
+    units : ndarray, shape (n_reaches, n_features)
+
+    Returns
+    -------
+    ndarray, shape (n_levels * n_reaches * n_features,)
+    """
+    levels = _LEVELS[:, np.newaxis, np.newaxis, np.newaxis]
+    excess = (changes / units[:, np.newaxis] - levels) / _SOFTNESS
+    return np.tanh(excess).mean(axis=2).ravel()
+
+
+def _positive_median(distances):
+    """The median; if that is 0, the mean, and if that is, 1."""
+    if not distances.size:
+        return 1.0
+    return float(np.median(distances)) or float(distances.mean()) or 1.0
