@@ -155,7 +155,7 @@ class MotionKernel:
             [
                 sum(k for k, view in zip(kernels, self._views, strict=True) if view == v)
                 / np.sum(self._views == v)
-                for v in range(self._views[-1] + 1)
+                for v in range(self._views.max() + 1)
             ]
         )
 

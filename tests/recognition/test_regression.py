@@ -9,6 +9,7 @@ from sklearn_motionsync.recognition.regression import (
     assign_folds,
     decision_values,
     fit_temperature,
+    fold_gain,
     held_out_decisions,
 )
 
@@ -131,6 +132,26 @@ def test_held_out_decisions_are_those_of_the_other_folds():
     found = held_out_decisions(regression, K, codes, one_left)
     assert np.isnan(found[one_left == 1]).all()
     assert np.isfinite(found[one_left == 0, 1:]).all()
+
+
+def test_gain_of_a_fold_is_the_median_over_those_told_right():
+    K, codes = points(n=30)
+    folds = np.arange(30) // 3 % 4
+    regression = KernelRegression(K, 5)
+    decisions = held_out_decisions(regression, K, codes, folds)
+    losses = []
+    for pair in ((0, 1), (1, 2), (2, 3), (3, 0)):
+        A, b = regression.fit(codes, ~np.isin(folds, pair))
+        for i in np.flatnonzero(np.isin(folds, pair)):
+            if np.argmax(decisions[i]) == codes[i]:
+                losses.append(max(decisions[i]) - max(K[i] @ A + b))
+    found = fold_gain(regression, K, codes, folds, decisions)
+    assert found == pytest.approx(np.median(losses) / 2)
+    assert found != 0
+    # Of two folds, and where two of three hold all classes but one, there is none.
+    assert fold_gain(regression, K, codes, folds % 2, decisions) == 0
+    alone = held_out_decisions(regression, K, codes, codes)
+    assert fold_gain(regression, K, codes, codes, alone) == 0
 
 
 def test_folds_do_not_divide_groups_and_divide_classes_evenly():

@@ -1,0 +1,158 @@
+"""The views of performances and their weights: against convolutions, loops and simulated people."""
+
+import numpy as np
+import pytest
+from sklearn.preprocessing import scale
+from sklearn_motionsync import ActionClassifier
+from sklearn_motionsync.recognition.kernel import (
+    align_weights,
+    change_extremes,
+    change_shares,
+    changes_of,
+)
+
+
+def walk(n_frames=50, n_features=3, seed=0):
+    return np.random.default_rng(seed).standard_normal((n_frames, n_features)).cumsum(axis=0)
+
+
+def convolved(x, reach):
+    """The changes of one feature (P,), which stands still before and after."""
+    still = np.r_[np.full(reach, x[0]), x, np.full(reach, x[-1])]
+    return np.convolve(still, [1, *[0] * (2 * reach - 1), -1], mode="valid")
+
+
+# -- changes ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("n_frames", "reaches"), [(50, (2, 8)), (100, (4, 16)), (2, (1, 1))])
+def test_changes_equal_convolutions(n_frames, reaches):
+    x = walk(n_frames)
+    expected = [np.column_stack([convolved(f, r) for f in x.T]) for r in reaches]
+    np.testing.assert_allclose(changes_of(x), expected, atol=1e-12)
+
+
+def test_extremes_and_shares_equal_loops():
+    x, units = walk(), np.array([[1, 2, 0.5], [4, 3, 2]])
+    curves = [(convolved(f, r), r, i) for r in (2, 8) for i, f in enumerate(x.T)]
+    lowest, highest = [c.min() for c, *_ in curves], [c.max() for c, *_ in curves]
+    np.testing.assert_allclose(change_extremes(changes_of(x)), [*lowest, *highest])
+    expected = []
+    for level in (-2, -1, -0.3, 0, 0.3, 1, 2):
+        for curve, reach, i in curves:
+            unit = units[0 if reach == 2 else 1, i]
+            # Twice a logistic function, less 1.
+            over = [2 / (1 + np.exp(-4 * (c / unit - level))) - 1 for c in curve]
+            expected.append(np.mean(over))
+    np.testing.assert_allclose(change_shares(changes_of(x), units), expected, atol=1e-12)
+
+
+def test_changes_do_not_depend_on_the_origin_and_change_sign_with_direction():
+    x, units = walk(), np.ones((2, 3))
+    moved = changes_of(x + [5, -3, 100])
+    np.testing.assert_allclose(moved, changes_of(x), atol=1e-12)
+    there, back = (change_shares(changes_of(way), units) for way in (x, x[::-1]))
+    # Levels are symmetric: shares of the way back are minus those of the opposite levels.
+    np.testing.assert_allclose(back.reshape(7, -1), -there.reshape(7, -1)[::-1], atol=1e-12)
+    # A feature that does not change in the training set has no unit, and one share always.
+    units[:, 1] = np.inf
+    still = [change_shares(changes_of(walk(seed=s)), units).reshape(7, 2, 3) for s in (1, 2)]
+    np.testing.assert_array_equal(still[0][..., 1], still[1][..., 1])
+    assert (still[0][..., 0] != still[1][..., 0]).all()
+
+
+# -- weights ----------------------------------------------------------------------------
+
+
+def views_and_labels(n=40, seed=0):
+    """Kernels of classes, of people, and of neither, and noise in all of them."""
+    rng = np.random.default_rng(seed)
+    codes, groups = np.arange(n) % 3, np.arange(n) // 8
+    points = [np.eye(3)[codes], np.eye(5)[groups], np.zeros((n, 1))]
+    points = [np.hstack([p, 0.2 * rng.standard_normal((n, 4))]) for p in points]
+    apart = [((p[:, np.newaxis] - p) ** 2).sum(axis=2) for p in points]
+    return np.stack([np.exp(-d) for d in apart]), codes, groups
+
+
+@pytest.mark.parametrize("landmarks", [np.arange(40), np.arange(1, 40, 2)])
+def test_weights_are_powers_of_correlations_over_pairs_of_different_groups(landmarks):
+    views, codes, groups = views_and_labels()
+    views = 0.6 * views + 0.4 * views[[1, 2, 0]]
+    views = views[:, :, landmarks]
+    pairs = [
+        (i, j)
+        for i in range(40)
+        for j, landmark in enumerate(landmarks)
+        if groups[i] != groups[landmark]
+    ]
+    same = (codes[:, None] == codes[landmarks]).astype(float)
+    alignments = []
+    for view in views:
+        # Both ways of centring, by the library: columns, then rows.
+        k, t = (scale(scale(m, with_std=False), axis=1, with_std=False) for m in (view, same))
+        kt, kk, tt = (sum(a[p] * b[p] for p in pairs) for a, b in ((k, t), (k, k), (t, t)))
+        alignments.append(max(kt / np.sqrt(kk * tt), 0))
+    expected = np.array(alignments) ** 6
+    found = align_weights(views, codes, groups, landmarks)
+    np.testing.assert_allclose(found, expected / expected.sum(), rtol=1e-6)
+    assert found.sum() == pytest.approx(1)
+
+
+def test_views_that_tell_classes_count_and_those_that_tell_people_do_not():
+    views, codes, groups = views_and_labels()
+    weights = align_weights(views, codes, groups, np.arange(40))
+    assert weights[0] > 0.99
+    # Labels that are the people's: no pair of other people is alike.
+    assert align_weights(views, groups, np.arange(40), np.arange(40))[1] > 0.99
+    constant = np.ones((2, 40, 40))
+    np.testing.assert_array_equal(align_weights(constant, codes, groups, np.arange(40)), [0.5, 0.5])
+
+
+def exercises(n=40, seed=0):
+    """People who stand differently swing an arm, in time or with a rest: data, labels, people."""
+    rng = np.random.default_rng(seed)
+    X, y, people = [], np.arange(n) % 2, np.arange(n) // 4
+    stance = 3 * np.random.default_rng(9).standard_normal((n // 4, 4))
+    for i in range(n):
+        t = np.linspace(0, 1, rng.integers(40, 60)) ** rng.uniform(0.8, 1.25)
+        angle = np.sin(2 * np.pi * t)
+        swing = np.sign(angle) * np.abs(angle) ** (0.6 if y[i] else 1)
+        x = stance[people[i]] + 0.02 * rng.standard_normal((len(t), 4))
+        x[:, 0] += rng.uniform(0.8, 1.2) * swing
+        X.append(x)
+    return X, y, people
+
+
+def test_groups_take_the_weight_off_what_tells_people_apart():
+    X, y, people = exercises()
+    train, test = people < 8, people >= 8
+    known, new = ([X[i] for i in np.flatnonzero(some)] for some in (train, test))
+    classifier = ActionClassifier(n_frames=25).fit(known, y[train], groups=people[train])
+    assert classifier.weights_.shape == (4,)
+    assert classifier.weights_.sum() == pytest.approx(1)
+    postures, summaries = classifier.weights_[1:3]
+    assert classifier.weights_[[0, 3]].min() > 10 * max(postures, summaries)
+    assert classifier.score(new, y[test]) == 1
+    alone = ActionClassifier("posture", n_frames=25, summaries=False)
+    alone.fit(known, y[train], groups=people[train])
+    np.testing.assert_array_equal(alone.weights_, [1])
+    assert alone.score(new, y[test]) < 1
+
+
+@pytest.mark.parametrize(
+    ("costs", "summaries", "n_views"),
+    [
+        (("velocity", "posture"), True, 4),
+        ("elastic", True, 3),
+        (("posture", "velocity"), False, 2),
+        ((), True, 2),
+    ],
+)
+def test_views_are_those_that_are_asked_for(costs, summaries, n_views):
+    X, y, people = exercises(16)
+    classifier = ActionClassifier(costs, n_frames=10, summaries=summaries)
+    weights = classifier.fit(X, y, groups=people).weights_
+    assert weights.shape == (n_views,)
+    if n_views == 2 and costs:
+        # Shape comes before postures, in whatever order the costs are named.
+        assert weights[0] > weights[1]
