@@ -1,17 +1,20 @@
 """Which action it is, of people not seen: the classifier, and other packages' and other ways.
 
     pip install . aeon dtaidistance
-    python benchmarks/recognition.py DATA_FOLDER
+    python benchmarks/recognition.py DATA_FOLDER [TABLES ...]
 
+TABLES are some of actions, rejected, exercises and times; without them all are printed.
 DATA_FOLDER holds hdm05/hdm05_positions.npz and utkinect of the same form, with
 utkinect/utkinect_splits.json: ten halves of the actors to learn from, on which published results
-stand. Nothing of `ActionClassifier` is chosen here. Of every other way the best setting is shown,
+stand; and uiprmd/uiprmd_odd_positions.npz, exercises done right and wrong.
+Nothing of `ActionClassifier` is chosen here. Of every other way the best setting is shown,
 chosen by the result: view (cosines, positions or both), length and scale with the largest
 accuracy; and in a row of its own the best that any of their settings reaches, every number by
 itself. Probabilities of theirs have one temperature, learnt of training actors left out in turn.
-Unknown actions are those of UTKinect, left out of the training in turn: the area under the curve
-of the novelty of all test clips (theirs: minus the largest score), mean over splits and actions.
-Prints Markdown.
+Unknown actions are left out of the training in turn: the area under the curve of the novelty of
+all test clips (theirs: minus the largest score), mean over splits and actions.
+Exercises are told right from wrong, of one subject after the other, by all trials of the others or
+by every second: the area under the curve of all subjects together. Prints Markdown.
 """
 
 import json
@@ -27,14 +30,18 @@ from accuracy import print_head, print_row
 from joblib import Parallel, delayed
 from judges import version_of
 from negatives import SPOILT
+from norm import exercises
 from recognizers import (
     BOTH,
     CLASSIFIER,
     COSINES,
+    ROCKET,
     Classifier,
+    Recordings,
     as_recordings,
     classifier,
     on_clock,
+    rocket,
     ways,
 )
 from sklearn.metrics import roc_auc_score
@@ -223,9 +230,10 @@ def rejected_on_split(recordings, train, test):
     return found
 
 
-def rejection_table(recordings, splits):
+def rejection_table(recordings, splits, name):
     """What the classifier rejects on cosines, and how well its novelty tells that."""
-    print_head('`ActionClassifier(reject_below="auto")`', ["rejected", "AUC to known actions"])
+    head = f'`ActionClassifier(reject_below="auto")`, {recordings.name}, {name}'
+    print_head(head, ["rejected", "AUC to known actions"])
     work = [delayed(rejected_on_split)(recordings, *split) for split in splits]
     found = Parallel(n_jobs=-1)(work)
     for kind in found[0]:
@@ -237,6 +245,58 @@ def rejection_table(recordings, splits):
             strange = np.repeat([0, 1], list(map(len, both)))
             areas.append(roc_auc_score(strange, np.concatenate(both)))
         print_row(kind, [share(rejected), f"{np.mean(areas):.2f}" if areas else "-"])
+
+
+# -- exercises done right and wrong -----------------------------------------------------
+
+
+def exercise_recordings(folder):
+    """Of each exercise, whether a trial is done right is its action."""
+    for name, trials, actors, right in exercises(folder):
+        trials = [np.asarray(x) for x in trials]
+        yield Recordings(str(name), {COSINES: trials}, np.asarray(right).astype(int), actors)
+
+
+def every_second(recordings):
+    """Whether a trial is the first, third, fifth ... of its subject and kind (n,)."""
+    chosen = np.zeros(len(recordings.actors), dtype=bool)
+    for actor in np.unique(recordings.actors):
+        for action in np.unique(recordings.actions):
+            own = (recordings.actors == actor) & (recordings.actions == action)
+            chosen[np.flatnonzero(own)[::2]] = True
+    return chosen
+
+
+def judged_exercise(recognizer, recordings, learnt):
+    """Area under the curve, of all subjects, each judged by the learnt trials of the others."""
+    scores = np.empty(len(recordings.actors))
+    for train, test in actors_left_out(recordings.actors):
+        scores[test] = recognizer.contrast(train[learnt[train]], test)
+    return roc_auc_score(recordings.actions, scores)
+
+
+def exercise_table(every, name, choose):
+    """Of all exercises, by trials that ``choose(recordings)`` tells to learn from."""
+    makers = {CLASSIFIER: partial(Classifier, view=COSINES)}
+    if version_of("aeon") is not None:
+        for n_frames in (50, 100):
+            way = f"{ROCKET}, {n_frames} frames"
+            makers[way] = lambda recordings, n=n_frames: rocket(recordings, COSINES, n)[ROCKET][""]
+    print_head(f"right against wrong, {name}", makers)
+    found = []
+    for recordings in every:
+        learnt = choose(recordings)
+        areas = [judged_exercise(make(recordings), recordings, learnt) for make in makers.values()]
+        print_row(recordings.name, map(three_digits, areas))
+        found.append(areas)
+    print_row("mean", map(three_digits, np.mean(found, axis=0)))
+
+
+def exercise_tables(every):
+    """By all trials, and by every second."""
+    every = list(every)
+    exercise_table(every, "learnt from all trials", lambda some: np.ones(len(some.actors), bool))
+    exercise_table(every, "learnt from every second trial", every_second)
 
 
 # -- time -------------------------------------------------------------------------------
@@ -317,26 +377,36 @@ def warped(X, window):
 # -- all of it --------------------------------------------------------------------------
 
 
-def print_tables(kinect, splits, optical):
-    """Of clips with splits of their actors, and of clips of few actors."""
+TABLES = "actions", "rejected", "exercises", "times"
+
+
+def print_tables(kinect, splits, optical, every, tables=TABLES):
+    """Of clips with splits of their actors, of clips of few actors, and of exercises."""
     left_out = partial(examine_fold, LEFT_OUT)
-    tasks = [(examine_split, splits), (left_out, actors_left_out(kinect.actors))]
-    recognition_table(kinect.name, examine_all(kinect, tasks), SPLIT_COLUMNS)
-    rejection_table(kinect, splits)
-    tasks = [
-        (left_out, actors_left_out(optical.actors)),
-        (partial(examine_fold, ALONE), actors_alone(optical.actors)),
-    ]
-    recognition_table(optical.name, examine_all(optical, tasks), FOLD_COLUMNS)
-    time_table(kinect, *splits[0])
-    distance_table(kinect)
+    if "actions" in tables:
+        tasks = [(examine_split, splits), (left_out, actors_left_out(kinect.actors))]
+        recognition_table(kinect.name, examine_all(kinect, tasks), SPLIT_COLUMNS)
+        tasks = [
+            (left_out, actors_left_out(optical.actors)),
+            (partial(examine_fold, ALONE), actors_alone(optical.actors)),
+        ]
+        recognition_table(optical.name, examine_all(optical, tasks), FOLD_COLUMNS)
+    if "rejected" in tables:
+        rejection_table(kinect, splits, SPLITS)
+        for recordings in (kinect, optical):
+            rejection_table(recordings, actors_left_out(recordings.actors), LEFT_OUT)
+    if "exercises" in tables:
+        exercise_tables(every)
+    if "times" in tables:
+        time_table(kinect, *splits[0])
+        distance_table(kinect)
 
 
 def main():
     """Print the tables."""
-    if len(sys.argv) != 2:
+    if len(sys.argv) < 2 or not set(sys.argv[2:]) <= set(TABLES):
         sys.exit(__doc__)
-    folder = Path(sys.argv[1])
+    folder, tables = Path(sys.argv[1]), sys.argv[2:] or TABLES
     packages = ("sklearn_motionsync", "numpy", "scipy", "scikit-learn", "aeon", "dtaidistance")
     versions = {package: version_of(package) for package in packages}
     print(", ".join(f"{name} {version or 'not installed'}" for name, version in versions.items()))
@@ -348,7 +418,7 @@ def main():
         for archive, name in (("utkinect", "UTKinect"), ("hdm05", "HDM05"))
     )
     splits = published_splits(folder / "utkinect" / "utkinect_splits.json", kinect.actors)
-    print_tables(kinect, splits, optical)
+    print_tables(kinect, splits, optical, exercise_recordings(folder), tables)
 
 
 if __name__ == "__main__":

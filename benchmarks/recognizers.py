@@ -86,6 +86,10 @@ class Classifier:
         """The larger, the less like any class (n_test,)."""
         return -self.learnt(train).score_samples(self._recordings.some(self._view, test))
 
+    def contrast(self, train, test):
+        """The larger, the more like the second of two classes (n_test,)."""
+        return self.learnt(train).decision_function(self._recordings.some(self._view, test))
+
     def learnt(self, train):
         """The classifier of some of the recordings."""
         actions, actors = self._recordings.actions[train], self._recordings.actors[train]
@@ -126,6 +130,10 @@ class Scored:
     def novelty(self, train, test):
         """The larger, the less like any class (n_test,)."""
         return -self._decide(train, test)[1].max(axis=1)
+
+    def contrast(self, train, test):
+        """The larger, the more like the second of two classes (n_test,)."""
+        return np.diff(self._decide(train, test)[1], axis=1)[:, 0]
 
     def _slope(self, classes, train):
         """Of everybody in the training set, when the others are learnt from."""
@@ -271,7 +279,9 @@ def rocket(recordings, view, n_frames):
         ridge = RidgeClassifierCV(np.logspace(-3, 3, 10))
         pipe = make_pipeline(StandardScaler(with_mean=False), ridge)
         pipe.fit(X[train], recordings.actions[train])
-        return pipe.classes_, pipe.decision_function(X[test])
+        scores = pipe.decision_function(X[test])
+        # Of two classes the library gives one column.
+        return pipe.classes_, scores if scores.ndim > 1 else np.column_stack([-scores, scores])
 
     return {ROCKET: {"": Scored(recordings, decide)}}
 

@@ -172,6 +172,46 @@ def test_benchmarked_pipeline_is_that_of_the_manual(recognizers, bunch, recordin
     np.testing.assert_array_equal(one.predict(train, test), bunch.target[test])
 
 
+# -- exercises --------------------------------------------------------------------------
+
+
+class Alike:
+    """A contrast of one number a clip."""
+
+    def __init__(self, values):
+        self.values, self.seen = values, []
+
+    def contrast(self, train, test):
+        self.seen.append(train.tolist())
+        return self.values[test]
+
+
+def test_an_exercise_is_judged_by_other_subjects(recognition, recognizers):
+    actors, right = np.repeat(["a", "b", "c"], 4), np.tile([1, 0, 1, 0], 3)
+    recordings = recognizers.Recordings("one", {}, right, actors)
+    some = recognition.every_second(recordings)
+    np.testing.assert_array_equal(some, np.tile([True, True, False, False], 3))
+    # In one of 36 pairs of a right and a wrong trial the wrong one has more.
+    values = np.array([9, 1, 8, 4.5, 7, 2, 6, 3, 5, 1, 4, 0])
+    judge = Alike(values)
+    found = recognition.judged_exercise(judge, recordings, some)
+    assert found == pytest.approx(1 - 1 / 36)
+    assert judge.seen == [[4, 5, 8, 9], [0, 1, 8, 9], [0, 1, 4, 5]]
+
+
+def test_contrast_is_of_the_second_class(recognizers, recordings):
+    right = (recordings.actions == "bending").astype(int)
+    some = recordings._replace(actions=right)
+    train, test = np.flatnonzero(some.actors != "s03"), np.flatnonzero(some.actors == "s03")
+    decide = Nearest(np.where(right == 1, 5.0, 2.0), right)
+    for recognizer in (
+        recognizers.Scored(some, decide),
+        recognizers.Classifier(some, recognizers.COSINES),
+    ):
+        found = recognizer.contrast(train, test)
+        assert found[right[test] == 1].min() > found[right[test] == 0].max()
+
+
 # -- tables -----------------------------------------------------------------------------
 
 
@@ -200,12 +240,15 @@ def test_all_tables_of_a_tiny_set_without_peers(
         recordings.actions[two],
         recordings.actors[two],
     )
+    right = (recordings.actions == "bending").astype(int)
+    every = [recordings._replace(name="bend", actions=right)]
     with threadpool_limits(1), parallel_config(backend="sequential"):
-        recognition.print_tables(recordings, splits, few)
+        recognition.print_tables(recordings, splits, few, every)
     tables = capsys.readouterr().out.strip().split("\n\n")
     rows = [[line.strip("| ").split(" | ") for line in table.splitlines()] for table in tables]
     for head, _, *body in rows:
         assert {len(row) for row in body} == {len(head)}
-    assert [len(body) - 2 for body in rows] == [4, 8, 4, 2, 6]
+    assert [len(body) - 2 for body in rows] == [4, 4, 8, 8, 8, 2, 2, 2, 6]
+    assert [row[0] for row in rows[5][2:]] == ["bend", "mean"]
     ours = {row[0]: row[1:] for row in rows[0][2:]}["`ActionClassifier`, cosines"]
     assert ours[:3] == ["100.0"] * 3
