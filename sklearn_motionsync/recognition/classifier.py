@@ -119,12 +119,10 @@ class ActionClassifier(
     held_out_ : ndarray, shape (n_sequences,)
         The largest decision value of each training performance when it and all of its group
         (without groups a fifth of every class) are held out; NaN where one class is left.
-    held_out_right_ : ndarray of bool, shape (n_sequences,)
-        Whether it was given its class then.
     held_out_gain_ : float
-        What decision values gain from the fold that was held out, in the median: the gain from
-        the last but one fold, extrapolated. With ``G`` folds, usually 5, it is ``(G - 2) / G`` of
-        what a second held-out fold takes from ``held_out_``.
+        What decision values gain from the fold that was held out, extrapolated from another: with
+        ``G`` folds, usually 5, ``(G - 2) / G`` of what a second held-out fold takes from
+        ``held_out_``, in the median of performances that were given their class.
     n_features_in_ : int
         Features of a frame (columns, for 2-D input).
     feature_names_in_ : ndarray of str
@@ -248,8 +246,7 @@ class ActionClassifier(
             fit_in_portion = partial(fit_regression, self.C, folds, self.landmarks_)
             (found,) = run(fit_in_portion, [(matrix, codes)], step=progress.stage("regression", 1))
         self._regression, self.temperature_ = found.regression, found.temperature
-        self.held_out_, self.held_out_right_ = found.held_out, found.right
-        self.held_out_gain_ = found.gain
+        self.held_out_, self.held_out_gain_ = found.held_out, found.gain
         self._kernel, self.weights_ = kernel, kernel.weights
         # Copies, which do not change with the user's arrays.
         self._training = [np.array(x) for x in performances], codes, groups
@@ -363,8 +360,8 @@ class ActionClassifier(
         Returns
         -------
         float
-            The quantile of ``held_out_`` that as many exceed of those that ``held_out_right_``
-            names, interpolated, and ``held_out_gain_``.
+            The quantile of ``held_out_`` that as many exceed, interpolated, and
+            ``held_out_gain_``.
 
         Raises
         ------
@@ -374,15 +371,13 @@ class ActionClassifier(
         check_is_fitted(self)
         if not (isinstance(coverage, Real) and 0 < coverage < 1):
             raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
-        known = np.isfinite(self.held_out_)
-        if not known.any():
+        known = self.held_out_[np.isfinite(self.held_out_)]
+        if not len(known):
             raise ValueError(
                 "There is no threshold, as no performance could be held out: give at least two "
                 "performances, and two groups, of two classes, or a number as reject_below."
             )
-        right = known & self.held_out_right_
-        values = self.held_out_[right if right.any() else known]
-        return float(np.quantile(values, 1 - coverage) + self.held_out_gain_)
+        return float(np.quantile(known, 1 - coverage) + self.held_out_gain_)
 
     @snapshot
     def model_of(self, label: Hashable) -> Pipeline:

@@ -194,14 +194,13 @@ def fold_gain(regression, kernel, codes, folds, decisions):
 
 
 class Fitted(NamedTuple):
-    """A regression ``(A, b)``, its temperature, and what was found of those held out."""
+    """A regression ``(A, b)``, its temperature, the largest held-out decision values (n,), and
+    what they gain from the last fold.
+    """
 
     regression: tuple
     temperature: float
-    # The largest decision value (n,), and whether it was that of the class.
     held_out: np.ndarray
-    right: np.ndarray
-    # By `fold_gain`.
     gain: float
 
 
@@ -211,11 +210,5 @@ def fit_regression(C, folds, landmarks, kernel, codes):
     decisions = held_out_decisions(regression, kernel, codes, folds)
     gain = fold_gain(regression, kernel, codes, folds, decisions)
     A, b = regression.fit(codes)
-    largest = decisions.max(axis=1)
-    return Fitted(
-        (np.ascontiguousarray(A.T).T, b),
-        fit_temperature(decisions, codes),
-        largest,
-        np.isfinite(largest) & (decisions.argmax(axis=1) == codes),
-        gain,
-    )
+    regression = np.ascontiguousarray(A.T).T, b
+    return Fitted(regression, fit_temperature(decisions, codes), decisions.max(axis=1), gain)
