@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from norm import LANDMARKS, OTHER_SIDE
+from exercises import LANDMARKS, OTHER_SIDE
 from scipy.spatial.transform import Rotation
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (

@@ -27,10 +27,10 @@ from pathlib import Path
 
 import numpy as np
 from accuracy import print_head, print_row
+from exercises import read_exercises
 from joblib import Parallel, delayed
 from judges import version_of
 from negatives import SPOILT
-from norm import exercises
 from recognizers import (
     BOTH,
     CLASSIFIER,
@@ -252,7 +252,7 @@ def rejection_table(recordings, splits, name):
 
 def exercise_recordings(folder):
     """Of each exercise, whether a trial is done right is its action."""
-    for name, trials, actors, right in exercises(folder):
+    for name, trials, actors, right, _ in read_exercises(folder):
         trials = [np.asarray(x) for x in trials]
         yield Recordings(str(name), {COSINES: trials}, np.asarray(right).astype(int), actors)
 
