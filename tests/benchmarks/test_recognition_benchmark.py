@@ -201,7 +201,7 @@ def test_an_exercise_is_judged_by_other_subjects(recognition, recognizers):
 
 def test_contrast_is_of_the_second_class(recognizers, recordings):
     right = (recordings.actions == "bending").astype(int)
-    some = recordings._replace(actions=right)
+    some = recognizers.Recordings("bend", recordings.views, right, recordings.actors)
     train, test = np.flatnonzero(some.actors != "s03"), np.flatnonzero(some.actors == "s03")
     decide = Nearest(np.where(right == 1, 5.0, 2.0), right)
     for recognizer in (
@@ -241,7 +241,7 @@ def test_all_tables_of_a_tiny_set_without_peers(
         recordings.actors[two],
     )
     right = (recordings.actions == "bending").astype(int)
-    every = [recordings._replace(name="bend", actions=right)]
+    every = [recognizers.Recordings("bend", recordings.views, right, recordings.actors)]
     with threadpool_limits(1), parallel_config(backend="sequential"):
         recognition.print_tables(recordings, splits, few, every)
     tables = capsys.readouterr().out.strip().split("\n\n")
