@@ -462,7 +462,8 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         compare("movement", model.dissimilarity(whole), model.dissimilarities_, model.threshold_)
         if own is not None:
             stream = self._stream
-            person = PersonalReference(stream.kept, stream.groups, stream.mean, own)
+            kept, own = (x.astype(np.float64) for x in (stream.kept, own))
+            person = PersonalReference(kept, stream.groups, stream.mean, own)
             known = np.isfinite(person.held_out)
             held_out, found = person.held_out[known], person.dissimilarity(whole)
             compare("own", found, held_out, person.limit(model.coverage))
