@@ -95,8 +95,8 @@ _ = figure.suptitle(f"The model refuses {refused} of {len(shown)} (orange)")
 # %%
 # What is wrong
 # -------------
-# The table tells when a trial departs, in which signals, and by how many standard deviations of a
-# new person. A departure is rare if 95 % of new people have none as large.
+# The table tells which limb departs, when, and by how many degrees. A departure is rare if 95 % of
+# new people have none with as much evidence.
 
 departures = find_departures(pipe, [shown["left arm lifted"]])
 departures.head().round(1)
