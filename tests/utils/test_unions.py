@@ -108,7 +108,7 @@ def test_departures_of_a_raised_arm_mark_its_limbs(union, reduced):
     wrist, elbow, shoulder = (BUNCH.skeleton.index_of(f"left_{j}") for j in
                               ("wrist", "elbow", "shoulder"))  # fmt: skip
     # It waves, raised.
-    angle = np.sin(np.linspace(0, 6 * np.pi, len(odd)))
+    angle = 0.4 * np.sin(np.linspace(0, 6 * np.pi, len(odd)))
     up = np.column_stack([np.sin(angle), np.cos(angle), 0 * angle])
     odd[:, elbow] = odd[:, shoulder] + 0.3 * up
     odd[:, wrist] = odd[:, elbow] + 0.25 * up
