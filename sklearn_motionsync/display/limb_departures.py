@@ -54,8 +54,6 @@ def limb_departures(rows, n_frames, frames, skeleton):
         The bones that depart around each frame.
     """
     rows = [row for row in rows if row.limb is not None]
-    # Hints beside what is rare would hide it.
-    rows = [row for row in rows if row.rare] or rows
     shown, stretches = _stretches(rows, frames, n_frames)
     titles, marked = [], []
     for frame, stretch in zip(shown, stretches, strict=True):
@@ -164,6 +162,10 @@ def draw_departures(estimator, X, params, caller, *, performance, frames, limit,
         name = name_performance(int(model.indices[0]), model.labels[0])
         name = f"{name}, most like {str(model.label)!r},"
     rows, skeleton = judged.rows(i, limit), limbs.cosines.skeleton.body()
+    is_accepted = view.own.predict(view.given.take([i]))[0] == 1
+    if limit is None:
+        # Hints would hide what is rare, and most right performances have some.
+        rows = [row for row in rows if row.rare] or ([] if is_accepted else rows)
     shown, titles, marked = limb_departures(rows, len(judged.mean), frames, skeleton)
     bodies, shadows = (
         np.asarray(limbs.cosines.inverse_transform(limbs.invert(x)))
@@ -175,8 +177,8 @@ def draw_departures(estimator, X, params, caller, *, performance, frames, limit,
         floor = min(bodies[..., 1].min(), shadows[..., 1].min())
         bodies[..., 1] -= floor
         shadows[..., 1] -= floor
-    verdict = "accepted" if view.own.predict(view.given.take([i]))[0] == 1 else "not accepted"
-    if verdict == "accepted" and _departs_outside_aspace(view, i, limbs.columns):
+    verdict = "accepted" if is_accepted else "not accepted"
+    if is_accepted and _departs_outside_aspace(view, i, limbs.columns):
         note += ": the model sees what the aSpace keeps, "
         note += "which leaves out how far some limbs depart"
     whose = "a new person" if reference is None else "this person"

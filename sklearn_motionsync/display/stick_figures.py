@@ -436,12 +436,13 @@ class SkeletonDisplay:
         """Draw what is wrong with a performance: when, and with which limbs.
 
         The figure shows postures of the performance on the clock of the model, before pale shadows
-        of what is expected. Limbs that depart are violet: those of the rows of `find_departures`,
-        of the rare ones if there are any; for the height of the pelvis the hips are marked. Titles
-        tell the most important departure: the limb, and by how much it is off, late, or moves too
-        little or too far. The heading says whether the model accepts the performance, and what is
-        rare; it may accept it although limbs depart, because it evaluates only what the `ASpace`
-        keeps, and the heading then says so.
+        of what is expected. Limbs that depart are violet: those of the rows of `find_departures`
+        that are rare; without one, and without ``limit``, those of all rows if the model refuses
+        the performance, and otherwise none; for the height of the pelvis the hips are marked.
+        Titles tell the most important departure: the limb, and by how much it is off, late, or
+        moves too little or too far. The heading says whether the model accepts the performance, and
+        what is rare; it may accept it although limbs depart, because it evaluates only what the
+        `ASpace` keeps, and the heading then says so.
 
         Parameters
         ----------

@@ -68,7 +68,7 @@ def find_departures(
         otherwise all features: those of postures before an `ASpace`, or of the model.
     limit : float, default=None
         Largest deviation that is no departure, in standard deviations. By default the evidence
-        decides: half of all correct performances of new people have a fault with as much. A fault
+        decides: two in three correct performances of new people have a fault with as much. A fault
         also counts that exceeds `ActionModel.simultaneous_factor`.
     **params : dict
         What synchronizing X takes besides, such as ``keyframes``.
@@ -206,7 +206,7 @@ class Judged(NamedTuple):
         Deviations from the mean in standard deviations.
     faults : list of list of FoundFault
     usual_score, rare_score : float
-        Scores of faults that half, and nearly all, of new people do not exceed.
+        Scores of faults that are listed, and that nearly all of new people do not exceed.
     far : float
         `ActionModel.simultaneous_factor`.
     match : Match or None

@@ -39,6 +39,10 @@ _LEAST_BETWEEN = 0.05
 _PRIOR_COUNT = 2
 # A fault is a lag, or of amplitude, if this explains so much of what a window explains.
 _LAG_EXPLAINS, _RATIO_EXPLAINS = 0.4, 0.5
+# Evidence is listed from this share of the median of right performances on: then 72 % of
+# faults in three classes of HDM05 have their region in the first row, with 1 it is 59 %; of right
+# performances 72 % have a row, with 1 it is 39 %.
+_HINT = 0.75
 # Prior variance of the logarithm of the largest score, as in `simultaneous_factor`.
 _PRIOR_VARIANCE, _BELOW_MEDIAN = 0.1, 1.0
 # Lags and log ratios of people vary by so much at least: frames, and in the logarithm.
@@ -419,7 +423,7 @@ class FaultFinder:
         within = np.mean([x.var(ddof=1) * (1 - 1 / len(x)) if len(x) > 1 else 0 for x in of_groups])
         squares = np.square(means - means.mean()).sum() + (len(means) + 2) * within
         limit = t_prediction_limit(len(means), squares, coverage, _PRIOR_VARIANCE)
-        self.usual_score = float(np.exp(means.mean()))
+        self.usual_score = float(_HINT * np.exp(means.mean()))
         self.rare_score = float(np.exp(means.mean() + limit))
         self._lag_spread = _spread(np.array(lags), _LEAST_LAG)
         self._ratio_spread = _spread(np.log(np.maximum(ratios, 0.01)), _LEAST_RATIO)
