@@ -327,12 +327,10 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
     ) -> float:
         """Mean log-density of performances, to compare models of equal ``P``, features and scaling.
 
-        It is a sum over all frames and features, in the unit of the data. So twice the frames
-        double it, and millimetres in place of metres lower it: a search by it chooses ``n_frames``,
-        features or scaling for that reason alone. To choose ``n_frames`` and the parameters of a
-        synchronizer, give the search ``scoring=FeatureHoldoutScorer()``, which has no unit and
-        hardly depends on ``P``. To choose features or scaling, score decisions: by the accuracy of
-        an `ActionClassifier`, or as the example of `ActionDetector` does.
+        It is a sum over all frames and features: twice the frames double it, and another unit
+        changes it. To choose ``n_frames`` and the parameters of a synchronizer, give the search
+        ``scoring=FeatureHoldoutScorer()``, which has no unit and hardly depends on ``P``. To choose
+        features or scaling, score decisions, as the example of `ActionDetector` does.
 
         Parameters
         ----------
@@ -387,7 +385,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         ----------
         coverage : float
             Share of performances of new people to be accepted, between 0 and 1.
-        reference : as for `dissimilarity`, default=None
+        reference : performances, default=None
+            As for `dissimilarity`.
 
         Returns
         -------
@@ -416,13 +415,13 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
             Synchronised performances.
-        reference : as for `dissimilarity`, default=None
+        reference : as X, default=None
+            As for `dissimilarity`.
 
         Returns
         -------
         ndarray, shape (n_sequences,)
-            ``log(threshold / dissimilarity)``, with ``threshold_`` or that of the person: negative
-            for performances that are rejected. A ratio has the same scale in every model.
+            ``log(threshold / dissimilarity)``: negative for performances that are rejected.
         """
         performances, judge = self.check_performances(X), self._judge(reference)
         limit = self.threshold_ if reference is None else judge.limit(self.coverage)
@@ -436,7 +435,8 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         ----------
         X : array, shape (n_sequences, P, n_features), or list of arrays (P, n_features)
             Synchronised performances.
-        reference : as for `dissimilarity`, default=None
+        reference : as X, default=None
+            As for `dissimilarity`.
 
         Returns
         -------
