@@ -325,7 +325,10 @@ def judge(estimator, X, params, caller, *, features=None, reference=None, only=N
         whose = view.own.groups_
         if not len(examples) == len(whose) == view.own.n_samples_seen_:
             whose = np.arange(len(examples))
-        to_space = lambda x: space.convert(x)[..., :width]  # noqa: E731
+
+        def to_space(performances):
+            return space.convert(performances)[..., :width]
+
         of_reference = None
         if own is not None:
             times = _match_of(estimator, reference, {}, caller).times

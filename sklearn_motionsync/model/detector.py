@@ -442,9 +442,9 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         try:
             reached = route_to_synchronizer(self.estimator_, X, params, caller, uses=("transform",))
             curves = curves_of(self.estimator_, X, params, caller)
-            own = reference
-            if own is not None:
-                own = curves_of(self.estimator_, own, {}, caller).whole[..., self._columns]
+            own = None
+            if reference is not None:
+                own = curves_of(self.estimator_, reference, {}, caller).whole[..., self._columns]
                 own = fill_with_mean(own, self._aligned.mean_)
         except MissingMetadata as error:
             reason, name, _ = error.args
@@ -476,9 +476,9 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             "duration": _durations(performances),
             "energy": movement_energies(on_clock, self._energy_floor)[0],
         }
+        n = len(model.dissimilarities_)
         for name, interval in self._intervals.items():
             statistics[name] = interval.standardize(measures[name])
-            n = len(self._aligned.dissimilarities_)
             tails[name] = log_tails(self._end * statistics[name], n, two_sided=True)
         scores = acceptance.scores(tails)
         # A person may differ from others, but not from the reference.

@@ -82,8 +82,7 @@ class View(NamedTuple):
     @property
     def training(self):
         """Training performances that are kept, about the mean of all: (n_kept, P, n_features)."""
-        deviations = self.model.deviations_
-        return self.model.mean_ + deviations - deviations.mean(axis=0)
+        return _training_of(self.model)
 
     @property
     def scores(self):
@@ -145,11 +144,15 @@ def view_of(estimator, X=None, params=None, caller="", *, features=None, posture
     variance = _RESIDUAL_FACTOR * inverse.aspace.left_out_variance_
     names = inverse.names(names)
     variance = np.append(variance, np.zeros(len(names) - len(variance)))
-    # About the mean of all training performances, not of those that were kept.
-    kept = model.mean_ + model.deviations_ - model.deviations_.mean(axis=0)
-    back = clone(model).fit(inverse.transform(kept), groups=model.groups_)
+    back = clone(model).fit(inverse.transform(_training_of(model)), groups=model.groups_)
     synchronised = None if points is None else inverse.transform(points)
     return View(back, names, synchronised, whole, labels, model, given, variance, linear)
+
+
+def _training_of(model):
+    """Training performances that a model kept, about the mean of all, not of these."""
+    deviations = model.deviations_
+    return model.mean_ + deviations - deviations.mean(axis=0)
 
 
 def _examples(before, inverse, n_features):

@@ -99,7 +99,7 @@ def test_few_new_people_have_rare_departures():
     new, _ = people([1] * 200, 77, n_frames=30)
     table = find_departures(MODEL, new)
     of_some = table.groupby("performance")["rare"].any()
-    # Half of the people have evidence above the usual one, and 5 % rare evidence.
+    # Two in three people have evidence that is listed, and 5 % rare evidence.
     assert 0.3 * 200 < len(of_some) < 0.8 * 200
     assert of_some.sum() < 0.12 * 200
     beyond = find_departures(MODEL, new, limit=3)
