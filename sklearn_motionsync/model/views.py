@@ -179,14 +179,11 @@ class Curves(NamedTuple):
     ----------
     names : list of str
         The features of ``whole``.
-    given : sequence of ndarray (P, n_own_features)
-        As they reach the model, checked.
     whole : ndarray (n_sequences, P, n_features)
         The postures before an aSpace, if there is one; otherwise the same.
     """
 
     names: list
-    given: tuple
     whole: np.ndarray
 
 
@@ -206,9 +203,8 @@ def curves_of(estimator, X, params, caller):
     inverse = None if before is None else _find_inverse(before, names, is_needed=False)
     if inverse is None:
         given = model.check_performances(transform_through(before, X, params, caller))
-        return Curves(names, given, np.stack(given))
-    synchronised, whole = inverse.synchronise(X, params, caller)
-    return Curves(inverse.names(names), model.check_performances(synchronised), whole)
+        return Curves(names, np.stack(given))
+    return Curves(inverse.names(names), inverse.synchronise(X, params, caller)[1])
 
 
 class _Inverse(NamedTuple):
