@@ -20,6 +20,8 @@ from .body.skeleton import Skeleton
 from .comparison.events import compare_events
 from .comparison.groups import GroupComparison, compare_groups
 from .comparison.norm import NormComparison, compare_to_norm
+from .gait.events import gait_events
+from .gait.parameters import gait_parameters
 from .inputs.long_tables import to_frame, to_sequences
 from .model.action_model import ActionModel
 from .model.departures import find_departures
@@ -79,6 +81,8 @@ __all__ = [
     "display",
     "find_departures",
     "find_performances",
+    "gait_events",
+    "gait_parameters",
     "io",
     "metrics",
     "mirror",
@@ -92,6 +96,7 @@ __all__ = [
 # The displays are named in ``display``; they can be imported from here, too.
 from .display import ActionModelDisplay as ActionModelDisplay
 from .display import CycleDisplay as CycleDisplay
+from .display import GaitDisplay as GaitDisplay
 from .display import GroupDisplay as GroupDisplay
 from .display import LagDisplay as LagDisplay
 from .display import MetricDisplay as MetricDisplay

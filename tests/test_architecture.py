@@ -16,7 +16,7 @@ PACKAGE = ROOT / "sklearn_motionsync"
 FLOORS = [
     {"inputs", "matching", "utils"},
     {"body", "metrics", "transformers"},
-    {"io", "synchronizers"},
+    {"gait", "io", "synchronizers"},
     {"datasets", "model", "online"},
     {"comparison", "recognition", "segmentation"},
     {"display"},

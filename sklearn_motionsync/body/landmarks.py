@@ -8,6 +8,7 @@ from .formats import FORMATS, LANDMARKS, SIDES
 __all__ = [
     "add_midpoints",
     "as_tuple",
+    "guess_feet",
     "guess_landmarks",
     "missing_counterparts",
     "other_side",
@@ -33,6 +34,12 @@ _PAIRS = {
     "head": [("left", "ear", "right", "ear"), ("left", "fhd", "right", "fhd")],
     **{f"{side}_wrist": [(side, "wra", side, "wrb")] for side in SIDES},
 }
+# Names of what is at both ends of a foot, the likeliest first; the joint of an ankle is neither.
+_ENDS_OF_FEET = {
+    "heel": ("heel", "hee", "calcaneus", "calcn", "calc", "cal"),
+    "toe": ("bigtoe", "toetip", "toe", "toes", "footindex", "toebase", "ball", "mt2", "mt1", "mt5",
+            "foot"),
+}  # fmt: skip
 # Formats with all landmarks at joints of their own. The names of the others are synonyms.
 _KNOWN = [
     known.landmarks
@@ -56,6 +63,18 @@ def guess_landmarks(joints, names=()):
         if None not in landmarks.values():
             return {name: joint for name, joint in landmarks.items() if joint in set(joints)}
     return _guess_by_synonyms(_plain_names(joints))
+
+
+def guess_feet(joints, landmarks):
+    """The joints at heels and toes, ``left_heel`` and so on, as far as names tell."""
+    plain, held = _plain_names(joints), {j for at in landmarks.values() for j in as_tuple(at)}
+    plain = {name: joint for name, joint in plain.items() if joint not in held}
+    found = {
+        f"{side}_{part}": _find(plain, side, synonyms)
+        for side in SIDES
+        for part, synonyms in _ENDS_OF_FEET.items()
+    }
+    return {name: joint for name, joint in found.items() if joint is not None}
 
 
 def add_midpoints(landmarks):

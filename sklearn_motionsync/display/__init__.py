@@ -6,6 +6,7 @@ attributes with a trailing underscore. matplotlib, in the extra ``plot``, is imp
 """
 
 from .cycles import CycleDisplay
+from .gait import GaitDisplay
 from .groups import GroupDisplay
 from .lags import LagDisplay
 from .live import PhaseDisplay
@@ -21,6 +22,7 @@ from .trellis import TrellisDisplay
 __all__ = [
     "ActionModelDisplay",
     "CycleDisplay",
+    "GaitDisplay",
     "GroupDisplay",
     "LagDisplay",
     "MetricDisplay",

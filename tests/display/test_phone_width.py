@@ -17,11 +17,12 @@ from sklearn_motionsync import (
     compare_to_norm,
     display,
 )
-from sklearn_motionsync.datasets import make_bending, make_gait
+from sklearn_motionsync.datasets import make_bending, make_gait, make_walk
 
 # At 388 pixels, the width of a page on a phone, letters of 10 points are still 8 pixels high.
 LARGEST_WIDTH = 6.5
 BUNCH = make_bending(8, n_frames=50, random_state=0)
+WALK = make_walk(1, random_state=0)
 STEPS = DirectionCosines(BUNCH.skeleton), ASpace(4), DenseSynchronizer(30), ActionModel()
 
 
@@ -109,6 +110,9 @@ DRAWN = {
         postures,
         groups=BUNCH.actor,
         unit="percent",
+    ),
+    "gait": lambda pipe, postures: display.GaitDisplay.from_positions(
+        WALK.data, WALK.skeleton, frame_rate=100
     ),
     "metric": lambda pipe, postures: display.MetricDisplay.from_estimator(
         make_pipeline(*pipe[:1], DenseSynchronizer(30)).fit(BUNCH.data)

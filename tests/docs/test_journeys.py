@@ -2,6 +2,7 @@
 
 import contextlib
 import re
+import struct
 import warnings
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 from sklearn_motionsync import Match
-from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.datasets import make_bending, make_walk
 from sklearn_motionsync.io import read_motion
 
 from motion_files import c3d, texts, trc
@@ -26,9 +27,9 @@ TRIALS = [("ann", 1), ("ann", 2), ("ben", 1), ("ben", 2), ("cas", 1)]
 
 def test_journeys_page_has_ten_sections():
     assert (
-        sum(bool(blocks) for blocks in SECTIONS.values()) == 11
+        sum(bool(blocks) for blocks in SECTIONS.values()) == 12
     )  # landmarks in space, in pictures
-    assert PAGE.count("```python") == len(BLOCKS) == 14
+    assert PAGE.count("```python") == len(BLOCKS) == 15
     assert list(SECTIONS)[-1] == "What is refused"
 
 
@@ -434,6 +435,37 @@ def test_angles_of_several_laboratories(curves, tmp_path, monkeypatch):
     saved = pd.read_csv("strides.csv", index_col=["recording", "part", "frame"])
     check_saved(saved, strides, left["synchronizer"].match(left["strides"]))
     check_picture("strides.png")
+
+
+def test_gait_report(tmp_path, monkeypatch):
+    """Heels and toes of Plug-in Gait; five strides of known length and time."""
+    made = make_walk(1, n_strides=5, random_state=0)
+    joints = made.skeleton.joints
+    names = MARKERS | {
+        "left_heel": "LHEE", "right_heel": "RHEE", "left_toe": "LTOE", "right_toe": "RTOE",
+    }  # fmt: skip
+    x = made.data[0].reshape(len(made.data[0]), -1, 3)
+    turned = 1000 * np.stack([x[..., 0], -x[..., 2], x[..., 1]], axis=-1)
+    places = turned[:, [joints.index(name) for name in names]]
+    changes = {"LABELS": texts(*names.values()), "RATE": (4, [], struct.pack("<f", 100.0))}
+    (tmp_path / "steps").mkdir()
+    (tmp_path / "steps" / "walk.c3d").write_bytes(c3d(places, changes=changes))
+    left = go("A gait report of C3D files", tmp_path, monkeypatch)
+    saved = pd.read_csv("gait.csv", index_col=["recording", "parameter"]).loc["walk"]
+    assert saved.loc["stride length", "unit"] == "m"
+    assert saved.loc["stride length", "mean"] == pytest.approx(made.stride_length[0], rel=0.03)
+    assert saved.loc["speed", "mean"] == pytest.approx(made.speed[0], rel=0.03)
+    strikes = [
+        event["frame"] for event in made.events[0]
+        if (event["label"], event["context"]) == ("Foot Strike", "Left")
+    ]  # fmt: skip
+    assert len(left["strides"]) == len(strikes) - 1
+    np.testing.assert_allclose(
+        [stride.attrs["rows"] for stride in left["strides"]],
+        np.stack([strikes[:-1], strikes[1:]], axis=1),
+        atol=2,
+    )
+    check_picture("gait.png")
 
 
 # -- reading files --------------------------------------------------------------------------------

@@ -1,0 +1,188 @@
+"""Foot strikes and foot-offs: of made walks, of people against geometry, and of labelled files.
+
+    python benchmarks/gait.py DATA_FOLDER [--files FILE.c3d ...]
+
+Errors are milliseconds; an event farther off than 150 ms is missed, one that no true event is near
+is found in excess. Made walks have known events. HDM05's jogs and CMU's walks have none: by
+geometry a foot is on the ground while its ankle or its toe moves by less than a third of the mean
+speed of the pelvis. At lower frame rates, and with noise, events are also held against those of
+the recording as it is. C3D files are those whose events name strikes and foot-offs, such as those
+of force plates. Their heels are left out once, and once their toes, too.
+
+What is refused: people that stand, and most that exercise on the spot, have no events.
+"""
+
+import argparse
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from exercises import LANDMARKS
+from scipy.ndimage import gaussian_filter1d
+from sklearn_motionsync import Skeleton, gait_events
+from sklearn_motionsync.datasets import load_performances, make_walk
+from sklearn_motionsync.gait.feet import joints_of_feet
+from sklearn_motionsync.io import read_motion
+
+PEOPLE = {"hdm05": ("jogLeftCircle4StepsRstart", 1.0), "cmu07_walk": ("walk", 0.01)}
+LABELS = ("Foot Strike", "Foot Off")
+NEAR = 0.15
+# Frame rates, and noise in metres.
+SETTINGS = [(None, 0.0), (60, 0.0), (30, 0.0), (25, 0.0), (None, 0.01), (30, 0.01)]
+# A foot that moves by less than this share of the speed of the pelvis stands; seconds of smoothing.
+SLOW, SMOOTHING = 1 / 3, 0.02
+
+
+def thinned(x, rate, wanted):
+    """Positions (n_frames, n) at a lower frame rate, on straight lines; NaN beside NaN."""
+    if wanted is None or wanted >= rate:
+        return x, rate
+    times = np.arange(len(x)) / rate
+    new = np.arange(0, times[-1] + 1e-9, 1 / wanted)
+    return np.stack([np.interp(new, times, column) for column in x.T], axis=1), wanted
+
+
+def compare(found, true):
+    """Errors in seconds of the true events that are found, the number missed, and that in excess.
+
+    Both are lists of (label, context, seconds).
+    """
+    errors, missed, used = {label: [] for label in LABELS}, dict.fromkeys(LABELS, 0), set()
+    for label, context, time in true:
+        near = [
+            (abs(t - time), k) for k, (n, c, t) in enumerate(found) if (n, c) == (label, context)
+        ]
+        distance, k = min(near, default=(np.inf, None))
+        if distance < NEAR:
+            errors[label].append(found[k][2] - time)
+            used.add(k)
+        else:
+            missed[label] += 1
+    return errors, missed, len(found) - len(used)
+
+
+def find(x, rate, skeleton, **how):
+    """Events of one recording as (label, context, seconds)."""
+    table = gait_events([x], skeleton, frame_rate=rate, **how)
+    return list(table[["label", "context", "time"]].itertuples(index=False, name=None))
+
+
+def by_geometry(x, rate, skeleton):
+    """Events of feet that stand while their ankle or their toe moves slowly."""
+    joints = x.reshape(len(x), -1, 3)
+    smooth = gaussian_filter1d(joints, SMOOTHING * rate, axis=0)
+    speed = np.linalg.norm(np.gradient(smooth, 1 / rate, axis=0)[..., [0, 2]], axis=2)
+    pelvis = speed[:, list(skeleton.indices_of("pelvis"))].mean()
+    ends = joints_of_feet(skeleton)
+    events = []
+    for side in ("left", "right"):
+        at = [*skeleton.indices_of(f"{side}_ankle"), *ends[f"{side}_toe"]]
+        stands = speed[:, at].min(axis=1) < SLOW * pelvis
+        for k in np.flatnonzero(np.diff(stands.astype(int))) + 1:
+            label = LABELS[0] if stands[k] else LABELS[1]
+            events.append((label, side.capitalize(), k / rate))
+    return events
+
+
+def report(name, triples):
+    """Print mean and absolute errors of many recordings."""
+    for label in LABELS:
+        errors = 1000 * np.concatenate([np.array(e[label]) for e, _, _ in triples])
+        missed = sum(m[label] for _, m, _ in triples)
+        line = (
+            f"bias {errors.mean():6.1f}, error {np.abs(errors).mean():5.1f}" if len(errors) else ""
+        )
+        print(f"  {name:28s} {label:12s} {len(errors):4d} found, {missed:3d} missed, {line}")
+
+
+def name_of(setting):
+    rate, noise = setting
+    return f"{rate or 'own'} Hz" + (f", {100 * noise:g} cm of noise" if noise else "")
+
+
+def made_walks():
+    print("Made walks, 12 people")
+    for rate, noise in SETTINGS:
+        walk = make_walk(12, frame_rate=rate or 120, noise=noise or 0.001, random_state=0)
+        triples = []
+        for x, events in zip(walk.data, walk.events, strict=True):
+            true = [(e["label"], e["context"], e["time"]) for e in events]
+            triples.append(compare(find(x, walk.frame_rate, walk.skeleton), true))
+        report(name_of((rate, noise)), triples)
+
+
+def people(folder):
+    for archive, (label, metres) in PEOPLE.items():
+        bunch = load_performances(folder / archive / f"{archive}_positions.npz")
+        chosen = np.flatnonzero(bunch.target == label)
+        print(f"{archive}, {len(chosen)} takes")
+        against = {"geometry": {}, "whole": {}}
+        for k in chosen:
+            x, rate = np.asarray(bunch.data[k], dtype=float) * metres, bunch.frame_rate[k]
+            geometry = by_geometry(x, rate, bunch.skeleton)
+            whole = find(x, rate, bunch.skeleton)
+            for setting in SETTINGS:
+                noise = np.random.default_rng(k).normal(0, setting[1], x.shape)
+                found = find(*thinned(x + noise, rate, setting[0]), bunch.skeleton)
+                against["geometry"].setdefault(setting, []).append(compare(found, geometry))
+                against["whole"].setdefault(setting, []).append(compare(found, whole))
+        for what, of_settings in against.items():
+            print(f" against {what}")
+            for setting, triples in of_settings.items():
+                report(name_of(setting), triples)
+
+
+def labelled(files):
+    print(f"{len(files)} labelled files")
+    marks = ("HEE", "TOE")
+    for what, left_out in (("heel and toe", ()), ("ankle and toe", marks[:1]), ("ankle", marks)):
+        for setting in SETTINGS if not left_out else SETTINGS[:1]:
+            triples = []
+            for path in files:
+                df = read_motion(path)
+                names = [c for c in df if not any(c[:-2].endswith(mark) for mark in left_out)]
+                true = [
+                    (e["label"], e["context"], e["frame"] / df.attrs["frame_rate"])
+                    for e in df.attrs["events"] if e["label"] in LABELS
+                ]  # fmt: skip
+                skeleton = Skeleton.from_frame(df[names])
+                x, rate = df[names].to_numpy(dtype=float), df.attrs["frame_rate"]
+                x = x + np.random.default_rng(0).normal(0, 1000 * setting[1], x.shape)
+                x, rate = thinned(x, rate, setting[0])
+                triples.append(compare(find(x, rate, skeleton), true))
+            report(f"{what}, {name_of(setting)}", triples)
+
+
+def refused(folder):
+    """People that stand, and exercises on the spot: sit to stand, shoulders up and turned."""
+    bunch = load_performances(folder / "uiprmd" / "uiprmd_odd_positions.npz")
+    skeleton = Skeleton(bunch.joints, bunch.skeleton.parents, LANDMARKS, up="z")
+    rng = np.random.default_rng(0)
+    counts = {"standing": []} | {name: [] for name in np.unique(bunch.target)}
+    for x, label, rate in zip(bunch.data, bunch.target, bunch.frame_rate, strict=True):
+        counts[label].append(len(find(np.asarray(x, dtype=float), rate, skeleton)))
+        sway = 20 * gaussian_filter1d(rng.normal(size=(250, 1, 3)), 25, axis=0)
+        still = x[0].reshape(1, -1, 3) + sway + rng.normal(0, 1, (250, x.shape[1] // 3, 3))
+        counts["standing"].append(len(find(still.reshape(250, -1), rate, skeleton)))
+    for name, found in counts.items():
+        share = 100 * np.mean(np.array(found) > 0)
+        print(f"Refused, {name}: events in {share:.1f} % of {len(found)} recordings")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--files", type=Path, nargs="*", default=[])
+    given = parser.parse_args()
+    warnings.simplefilter("ignore")
+    pd.set_option("display.width", 120)
+    made_walks()
+    people(given.folder)
+    refused(given.folder)
+    if given.files:
+        labelled(given.files)
+
+
+if __name__ == "__main__":
+    main()

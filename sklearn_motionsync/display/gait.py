@@ -1,0 +1,221 @@
+"""GaitDisplay: heights of heels and toes, with strikes and foot-offs, and when each foot stands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Self
+
+import numpy as np
+import pandas as pd
+
+from ..body.formats import SIDES
+from ..body.skeleton import Skeleton
+from ..gait.events import find_events
+from ..gait.recordings import CONTEXTS, FOOT_OFF, FOOT_STRIKE, Recordings
+from ..inputs.types import NumbersLike, PerformancesLike, Table, ValuesLike
+from ..inputs.wording import counted
+from .arguments import AxesLike, as_index
+from .drawing import WIDTH, legend_above, panels
+
+__all__ = ["GaitDisplay"]
+
+# Colours of the feet, and of strikes and foot-offs.
+_COLORS = {"left": "#D55E00", "right": "#0072B2"}
+_STYLES = {FOOT_STRIKE: "-", FOOT_OFF: ":"}
+
+
+class GaitDisplay:
+    """Heights of heels and toes of a recording, its foot strikes and foot-offs, and the stances.
+
+    Above each foot by itself: the heights of its heel and its toe, with lines at its events. Below
+    a bar for each stance: where two bars overlap, both feet are on the ground. Use
+    `from_positions`.
+
+    Parameters
+    ----------
+    times : array-like, shape (n_frames,)
+        Seconds.
+    heights : mapping of str to array-like (n_frames,)
+        Of ``left_heel``, ``left_toe``, ``right_heel`` and ``right_toe``, as far as they are known.
+    events : DataFrame
+        ``label``, ``context`` and ``time`` of the events, as from `gait_events`.
+    unit : str, default=""
+        Of the heights.
+
+    Attributes
+    ----------
+    figure_ : Figure
+        The figure of the last plot.
+    axes_ : list of Axes
+        A panel for each foot, and that of the stances.
+    stances_ : dict of str to list of (float, float)
+        Seconds of the strike and duration of each stance, by foot.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync.datasets import make_walk
+    >>> from sklearn_motionsync.display import GaitDisplay
+    >>> walk = make_walk(1, n_strides=3, random_state=0)
+    >>> GaitDisplay.from_positions(walk.data, walk.skeleton, frame_rate=walk.frame_rate)
+    GaitDisplay(8 strikes, 8 foot-offs)
+    """
+
+    def __init__(
+        self,
+        times: ValuesLike,
+        heights: Mapping[str, NumbersLike],
+        events: pd.DataFrame,
+        *,
+        unit: str = "",
+    ) -> None:
+        self.times, self.unit = np.asarray(times), unit
+        self.heights = {name: np.asarray(values) for name, values in heights.items()}
+        self.events = events
+
+    def __repr__(self):
+        counts = [int((self.events["label"] == label).sum()) for label in (FOOT_STRIKE, FOOT_OFF)]
+        return f"GaitDisplay({counted(counts[0], 'strike')}, {counted(counts[1], 'foot-off')})"
+
+    @classmethod
+    def from_positions(
+        cls,
+        X: PerformancesLike,
+        skeleton: Skeleton | None = None,
+        *,
+        events: Table | None = None,
+        recording: int = 0,
+        feet: Mapping[str, str | Sequence[str] | None] | None = None,
+        frame_rate: float | ValuesLike | None = None,
+        ax: AxesLike | None = None,
+    ) -> Self:
+        """Draw the feet and the events of a recording.
+
+        Parameters
+        ----------
+        X : list of arrays (n_frames_i, n_dims * n_joints), 3-D array, or one recording
+            Joint positions, as for `gait_events`.
+        skeleton : Skeleton, default=None
+            As for `gait_events`.
+        events : DataFrame, default=None
+            As for `gait_parameters`; by default those that `gait_events` finds.
+        recording : int, default=0
+            The index of the recording.
+        feet : mapping of str to str or tuple of str, default=None
+            As for `gait_events`.
+        frame_rate : float, or array-like of shape (n_recordings,), default=None
+            Frames a second; by default what tables tell.
+        ax : Axes, or one for each of the panels, default=None
+            A subplot to be divided, or one axes a panel. None makes a figure.
+
+        Returns
+        -------
+        GaitDisplay
+            The display, drawn.
+
+        Raises
+        ------
+        ValueError
+            If there is no such recording, or as from `gait_events`.
+        """
+        recordings = Recordings(X, skeleton, feet, frame_rate)
+        i = as_index(recording, len(recordings), "recording")
+        walk = recordings.walk(i)
+        found = find_events(walk)
+        if events is not None:
+            found = [
+                (label, side, row * walk.per_frame)
+                for label, side, row in recordings.split_events(events)[i]
+            ]
+        rows = np.arange(0, walk.n_samples, walk.per_frame)
+        scale, unit = recordings.length_of_leg(i, walk)
+        ends = {"heel": walk.heels, "toe": walk.toes}
+        heights = {
+            f"{side}_{end}": scale * of_sides[side][rows, 1]
+            for side in SIDES
+            for end, of_sides in ends.items()
+            if side in of_sides
+        }
+        floor = min(np.nanmin(values) for values in heights.values())
+        heights = {name: values - floor for name, values in heights.items()}
+        times = recordings.times_at(i, np.arange(len(rows)))
+        table = pd.DataFrame(
+            {
+                "label": [label for label, *_ in found],
+                "context": [CONTEXTS[side] for _, side, _ in found],
+                "time": recordings.times_at(i, [k / walk.per_frame for *_, k in found]),
+            }
+        )
+        return cls(times, heights, table, unit=unit).plot(ax)
+
+    def plot(self, ax: AxesLike | None = None) -> Self:
+        """Draw.
+
+        Parameters
+        ----------
+        ax : Axes, or one for each of the panels, default=None
+            A subplot to be divided, or one axes a panel. None makes a figure.
+
+        Returns
+        -------
+        GaitDisplay
+            The display itself.
+        """
+        sides = [side for side in SIDES if f"{side}_heel" in self.heights]
+        cells = [(k, 0) for k in range(len(sides) + 1)]
+        size = (WIDTH, 1.2 + 1.5 * len(cells))
+        self.figure_, self.axes_ = panels(ax, cells, len(cells), 1, size)
+        *feet, bars = self.axes_
+        self.stances_ = {side: self._stances(side) for side in sides}
+        for axis, side in zip(feet, sides, strict=True):
+            self._draw_foot(axis, side)
+        for k, side in enumerate(reversed(sides)):
+            bars.broken_barh(self.stances_[side], (k - 0.35, 0.7), facecolors=_COLORS[side])
+        bars.set_yticks(range(len(sides)), list(reversed(sides)))
+        bars.set_ylim(-0.6, len(sides) - 0.4)
+        bars.set_title("on the ground", fontsize="medium")
+        for axis in self.axes_:
+            axis.set_xlim(self.times[0], self.times[-1])
+        bars.set_xlabel("time (s)")
+        self._draw_legend()
+        return self
+
+    def _times_of(self, side, label):
+        rows = (self.events["context"] == CONTEXTS[side]) & (self.events["label"] == label)
+        return self.events.loc[rows, "time"].to_numpy()
+
+    def _stances(self, side):
+        """The strike of each stance, and how long it lasts; it may begin or end out of sight."""
+        strikes, offs = (self._times_of(side, label) for label in (FOOT_STRIKE, FOOT_OFF))
+        begins = list(strikes)
+        if len(offs) and not (strikes < offs[0]).any():
+            begins = [self.times[0], *begins]
+        spans = []
+        for k, begin in enumerate(begins):
+            following = begins[k + 1] if k + 1 < len(begins) else np.inf
+            later = offs[(offs > begin) & (offs < following)]
+            if len(later):
+                spans.append((float(begin), float(later[0] - begin)))
+            elif following == np.inf:
+                spans.append((float(begin), float(self.times[-1] - begin)))
+        return spans
+
+    def _draw_foot(self, axis, side):
+        for end, style in (("heel", "-"), ("toe", "--")):
+            if f"{side}_{end}" in self.heights:
+                axis.plot(self.times, self.heights[f"{side}_{end}"], style, color=_COLORS[side])
+        for label, style in _STYLES.items():
+            for time in self._times_of(side, label):
+                axis.axvline(time, color="black", linestyle=style, linewidth=0.9)
+        axis.set_ylabel(f"height ({self.unit})" if self.unit else "height")
+        axis.set_title(f"{side} foot", fontsize="medium")
+
+    def _draw_legend(self):
+        from matplotlib.lines import Line2D
+
+        shown = [("heel", "-")] + [("toe", "--")] * any(n.endswith("toe") for n in self.heights)
+        handles = [Line2D([], [], color="gray", linestyle=s, label=name) for name, s in shown]
+        handles += [
+            Line2D([], [], color="black", linestyle=style, linewidth=0.9, label=name)
+            for name, style in (("strike", "-"), ("foot-off", ":"))
+        ]
+        legend_above(self.axes_[:1], handles, [handle.get_label() for handle in handles])

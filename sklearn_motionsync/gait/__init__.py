@@ -1,0 +1,1 @@
+"""Walking and running: events of the feet, and spatio-temporal parameters."""

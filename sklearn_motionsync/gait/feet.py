@@ -1,0 +1,248 @@
+"""The feet of a recording: heels and toes beside the pelvis, along the direction of walking."""
+
+import math
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ..body.axes import to_y_up
+from ..body.formats import SIDES
+from ..body.landmarks import as_tuple, guess_feet
+from ..inputs.numbers import nanmean
+from ..matching.filters import smooth
+
+__all__ = ["ENDS_OF_FEET", "Walk", "joints_of_feet"]
+
+ENDS_OF_FEET = [f"{side}_{part}" for side in SIDES for part in ("heel", "toe")]
+# Positions are interpolated to at least so many samples a second.
+_LEAST_RATE = 240
+# Gaps up to this length, in seconds, are filled in. Shorter pieces between gaps are left out.
+_LONGEST_GAP, _SHORTEST_PIECE = 0.2, 0.25
+# Standard deviation, in seconds, of the Gaussian that smooths the direction of walking.
+_HEADING = 0.2
+# Variance of third differences of white noise of variance 1; median absolute deviation of a normal
+# distribution of standard deviation 1.
+_THIRD_DIFFERENCE, _NORMAL_MAD = 20, 0.6745
+
+
+def joints_of_feet(skeleton, feet=None):
+    """Indices of the joints at heels and toes; of those that are given, or guessed from the names.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    feet : mapping of str to str, tuple of str or None, default=None
+        The joints of some or all of `ENDS_OF_FEET`; None leaves one out.
+
+    Returns
+    -------
+    dict of str to tuple of int
+        Without those that are not known.
+    """
+    given = {} if feet is None else dict(feet)
+    for name, joints in given.items():
+        if name not in ENDS_OF_FEET:
+            raise ValueError(f"feet: {name!r} is none of {', '.join(ENDS_OF_FEET)}.")
+        for joint in () if joints is None else as_tuple(joints):
+            if joint not in skeleton.joints:
+                raise ValueError(
+                    f"feet: {name!r} is at {joint!r}, which is no joint of the skeleton; it has "
+                    f"{list(skeleton.joints)[:40]}."
+                )
+    known = guess_feet(skeleton.joints, skeleton.landmarks) | given
+    return {
+        name: tuple(skeleton.joints.index(joint) for joint in as_tuple(joints))
+        for name, joints in known.items()
+        if joints is not None
+    }
+
+
+class Walk:
+    """A recording of a body that walks, at an even rate of at least 240 samples a second.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (n_frames, n_dims * n_joints)
+        NaN where a joint is not seen.
+    skeleton : Skeleton
+    feet : dict of str to tuple of int
+        From `joints_of_feet`.
+    frame_rate : float
+    called : str
+        The name of the recording, with a capital letter.
+
+    Attributes
+    ----------
+    rate : float
+        Samples a second.
+    n_samples : int
+    per_frame : int
+        Samples a frame.
+    heels, toes : dict of str to ndarray (n_samples, n_dims)
+        By side, y up, in leg lengths; NaN in long gaps. The ankle stands for a missing heel. Feet
+        without toes have none.
+    has_heel : dict of str to bool
+    noise : dict of str to float
+        Standard deviation of the noise of the height of the heel in a frame.
+    pelvis : ndarray, shape (n_samples, n_dims)
+        A hip if there is no other.
+    forward : ndarray, shape (n_samples, n_dims - 1)
+        Horizontal unit vectors along which the body walks.
+    leg : float
+        Median height of the pelvis above the lower foot, the unit of the positions above.
+    """
+
+    def __init__(self, positions, skeleton, feet, frame_rate, called):
+        self._points = to_y_up(
+            positions.astype(np.float64).reshape(len(positions), -1, skeleton.n_dims), skeleton
+        )
+        self.per_frame = max(1, math.ceil(_LEAST_RATE / frame_rate))
+        self.rate, self._frame_rate = frame_rate * self.per_frame, frame_rate
+        self.n_samples = (len(positions) - 1) * self.per_frame + 1
+        self.heels, self.toes, self.has_heel, self.noise = {}, {}, {}, {}
+        for side in SIDES:
+            heel = feet.get(f"{side}_heel")
+            ankle = self._landmark(skeleton, f"{side}_ankle")
+            self.has_heel[side] = heel is not None
+            at = ankle if heel is None else heel
+            if at is None or np.isnan(self._mean(at)).any(axis=1).all():
+                continue
+            self.noise[side] = _noise(self._mean(at)[:, 1])
+            self.heels[side] = self._resample(at)
+            if f"{side}_toe" in feet:
+                self.toes[side] = self._resample(feet[f"{side}_toe"])
+        if not self.heels:
+            raise ValueError(
+                f"{called}: no heel and no ankle is seen. Name them: "
+                "feet={'left_heel': 'LHEE', ...}."
+            )
+        self.pelvis = self._resample(_pelvis(skeleton, called))
+        lowest = np.min([heel[:, 1] for heel in self.heels.values()], axis=0)
+        heights = self.pelvis[:, 1] - lowest
+        heights = heights[~np.isnan(heights)]
+        self.leg = float(np.median(heights)) if len(heights) else 0.0
+        if not self.leg > 0:
+            raise ValueError(
+                f"{called}: the pelvis is never seen above the feet. Look at the vertical axis of "
+                f"the skeleton, {skeleton.up!r}, and at the landmarks."
+            )
+        for of_all in (self.heels, self.toes, self.noise):
+            for side in of_all:
+                of_all[side] = of_all[side] / self.leg
+        self.pelvis = self.pelvis / self.leg
+        self.forward = self._directions(skeleton, called)
+
+    def ahead(self, points):
+        """How far points (n_samples, n_dims) are ahead of the pelvis."""
+        return np.einsum("ij,ij->i", _horizontal(points - self.pelvis), self.forward)
+
+    def filtered(self, values, width, order=0):
+        """Values (n_samples,) or (n_samples, n) under a Gaussian, or their derivative by time.
+
+        ``width`` is its standard deviation in seconds. NaN stays NaN.
+        """
+        flat = values.reshape(len(values), -1)
+        out = np.full_like(flat, np.nan)
+        for piece in pieces(flat):
+            if piece.stop - piece.start > 2:
+                part = np.ascontiguousarray(flat[piece])[np.newaxis]
+                out[piece] = smooth(part, width * self.rate, order)[0] * self.rate**order
+        return out.reshape(values.shape)
+
+    def _landmark(self, skeleton, name):
+        return skeleton.indices_of(name) if name in skeleton.landmarks else None
+
+    def _mean(self, joints):
+        return self._points[:, list(joints)].mean(axis=1)
+
+    def _resample(self, joints):
+        """Positions of the mean of some joints at the samples."""
+        x, frames = self._mean(joints), np.arange(len(self._points))
+        x = _fill_short_gaps(x, _LONGEST_GAP * self._frame_rate)
+        out = np.full((self.n_samples, x.shape[1]), np.nan)
+        for piece in pieces(x):
+            if piece.stop - piece.start < max(4, _SHORTEST_PIECE * self._frame_rate):
+                continue
+            samples = np.arange(piece.start * self.per_frame, (piece.stop - 1) * self.per_frame + 1)
+            spline = CubicSpline(frames[piece], x[piece])
+            out[samples] = spline(samples / self.per_frame)
+        return out
+
+    def _directions(self, skeleton, called):
+        """Where the body walks: along its feet, or across its hips or shoulders."""
+        if self.toes:
+            along = [self.toes[side] - self.heels[side] for side in self.toes]
+            return self._unit(nanmean([_horizontal(x) for x in along], axis=0), called)
+        if skeleton.n_dims == 3:
+            for part in ("hip", "shoulder"):
+                pair = [self._landmark(skeleton, f"{side}_{part}") for side in SIDES]
+                if None not in pair:
+                    left, right = map(self._resample, pair)
+                    across = _horizontal(left - right)
+                    return self._unit(np.stack([-across[:, 1], across[:, 0]], axis=1), called)
+        travel = self.pelvis[~np.isnan(self.pelvis).any(axis=1)]
+        way = _horizontal(travel[-1:] - travel[:1])[0] if len(travel) else np.zeros(1)
+        if not np.linalg.norm(way) > 1:
+            raise ValueError(
+                f"{called}: it is not known where the body faces. Name the toes: "
+                "feet={'left_toe': ..., 'right_toe': ...}; without hips, shoulders and toes the "
+                "body must walk farther than the length of a leg."
+            )
+        return np.tile(way / np.linalg.norm(way), (self.n_samples, 1))
+
+    def _unit(self, directions, called):
+        known = ~np.isnan(directions).any(axis=1)
+        if not known.any():
+            raise ValueError(f"{called}: both feet are never seen together with their toes.")
+        samples = np.arange(len(directions))
+        filled = np.stack(
+            [np.interp(samples, samples[known], x[known]) for x in directions.T], axis=1
+        )
+        filled = smooth(filled[np.newaxis], _HEADING * self.rate)[0]
+        size = np.linalg.norm(filled, axis=1, keepdims=True)
+        return filled / np.where(size > 0, size, 1)
+
+
+def _pelvis(skeleton, called):
+    """The joints whose mean is the pelvis, or the hips that there are."""
+    known = [name for name in ("pelvis", "left_hip", "right_hip") if name in skeleton.landmarks]
+    if not known:
+        raise ValueError(
+            f"{called}: the skeleton has no pelvis and no hip. Name one: "
+            "Skeleton(..., landmarks={'pelvis': ..., ...})."
+        )
+    return skeleton.indices_of(known[0])
+
+
+def pieces(x):
+    """Slices of rows (n, n_columns) without NaN."""
+    known = ~np.isnan(x).any(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8)))
+    return [slice(*edge) for edge in edges.reshape(-1, 2)]
+
+
+def _horizontal(points):
+    """The components (n, n_dims - 1) of points, y up, that are not vertical."""
+    return points[:, [0, 2]] if points.shape[1] == 3 else points[:, [0]]
+
+
+def _fill_short_gaps(x, longest):
+    """Straight lines across gaps of at most so many frames."""
+    x, known = x.copy(), ~np.isnan(x).any(axis=1)
+    frames = np.arange(len(x))
+    seen = frames[known]
+    steps = np.diff(seen)
+    for k in np.flatnonzero((steps > 1) & (steps <= longest + 1)):
+        before, step = seen[k], steps[k]
+        share = np.arange(1, step)[:, np.newaxis] / step
+        x[before + 1 : before + step] = (1 - share) * x[before] + share * x[before + step]
+    return x
+
+
+def _noise(heights):
+    """Standard deviation of white noise, from third differences."""
+    third = np.abs(np.diff(heights, 3))
+    third = third[~np.isnan(third)]
+    if not len(third):
+        return 0.0
+    return float(np.median(third)) / _NORMAL_MAD / math.sqrt(_THIRD_DIFFERENCE)

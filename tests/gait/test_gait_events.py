@@ -1,0 +1,241 @@
+"""gait_events: strikes and foot-offs of made walks, where the truth is known, and of people."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn_motionsync import DenseSynchronizer, Skeleton, gait_events
+from sklearn_motionsync.datasets import make_walk
+from sklearn_motionsync.io import cut_at_events, keyframes_from_events
+
+LABELS = ("Foot Strike", "Foot Off")
+
+
+@pytest.fixture(scope="module")
+def ruler(benchmark):
+    return benchmark("gait")
+
+
+@pytest.fixture(scope="module")
+def walk():
+    return make_walk(4, random_state=0)
+
+
+def errors(walk, found, ruler):
+    """Errors in milliseconds by label, the number missed, and that in excess."""
+    triples = []
+    for i, events in enumerate(walk.events):
+        own = found[found["performance"] == i]
+        listed = list(own[["label", "context", "time"]].itertuples(index=False, name=None))
+        true = [(event["label"], event["context"], event["time"]) for event in events]
+        triples.append(ruler.compare(listed, true))
+    by_label = {
+        label: 1000 * np.concatenate([np.array(e[label]) for e, *_ in triples]) for label in LABELS
+    }
+    missed = sum(sum(m.values()) for _, m, _ in triples)
+    return by_label, missed, sum(x for *_, x in triples)
+
+
+@pytest.mark.parametrize(
+    ("how", "bias", "error"),
+    [
+        ({}, 7, 7),
+        ({"treadmill": True}, 7, 7),
+        ({"frame_rate": 25}, 7, 8),
+        ({"frame_rate": 250, "asymmetry": 8}, 7, 7),
+        ({"frame_rate": 120, "noise": 0.01}, 9, 10),
+        ({"frame_rate": 30, "noise": 0.01}, 10, 12),
+    ],
+)
+def test_events_of_made_walks(ruler, how, bias, error):
+    walk = make_walk(8, random_state=1, **how)
+    found = gait_events(walk.data, walk.skeleton, frame_rate=walk.frame_rate)
+    by_label, missed, more = errors(walk, found, ruler)
+    assert (missed, more) == (0, 0)
+    for label in LABELS:
+        assert abs(by_label[label].mean()) < bias, label
+        assert np.abs(by_label[label]).mean() < error, label
+
+
+@pytest.mark.parametrize(
+    ("left_out", "most"), [(["heel"], 15), (["toe"], 10), (["heel", "toe"], 40)]
+)
+def test_without_heels_or_toes(walk, ruler, left_out, most):
+    named = {f"{side}_{end}": None for side in ("left", "right") for end in left_out}
+    found = gait_events(walk.data, walk.skeleton, feet=named, frame_rate=100)
+    by_label, missed, more = errors(walk, found, ruler)
+    assert (missed, more) == (0, 0)
+    assert all(np.abs(of_label).mean() < most for of_label in by_label.values())
+
+
+def test_side_view_from_a_camera(walk, ruler):
+    """Two axes, y down, pixels; the camera sees the walk from the other side, too."""
+    for sign in (1, -1):
+        pictures = []
+        for x in walk.data:
+            points = x.reshape(len(x), -1, 3)
+            image = np.stack([sign * points[..., 2], 2 - points[..., 1]], axis=2)
+            pictures.append(500 * image.reshape(len(x), -1))
+        joints = walk.skeleton.joints
+        flat = Skeleton(
+            joints, walk.skeleton.parents, dict(walk.skeleton.landmarks), up="-y", n_dims=2
+        )
+        found = gait_events(pictures, flat, frame_rate=100)
+        by_label, missed, more = errors(walk, found, ruler)
+        assert (missed, more) == (0, 0)
+        assert all(np.abs(of_label).mean() < 8 for of_label in by_label.values())
+
+
+def test_units_place_and_axes_do_not_matter(walk):
+    (x,), skeleton = walk.data[:1], walk.skeleton
+    expected = gait_events([x], skeleton, frame_rate=100)
+    points = 1000 * x.reshape(len(x), -1, 3)
+    angle = 2.0
+    turn = np.array(
+        [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+    )
+    turned = points @ turn.T + [500, -200, 30]
+    upright = Skeleton(skeleton.joints, skeleton.parents, dict(skeleton.landmarks), up="z")
+    # x, y, z of "y up" are y, z, x of "z up".
+    found = gait_events([turned[..., [2, 0, 1]].reshape(len(x), -1)], upright, frame_rate=100)
+    pd.testing.assert_frame_equal(found, expected, rtol=1e-6)
+
+
+def test_recording_that_turns_around(walk, ruler):
+    """The way bends by a half circle; events stay where they are."""
+    (x,) = walk.data[:1]
+    points = x.reshape(len(x), -1, 3).copy()
+    pelvis = points[:, :1] * [1, 0, 1]
+    angles = np.linspace(0, np.pi, len(x))
+    cosine, sine = np.cos(angles), np.sin(angles)
+    zero, one = np.zeros_like(cosine), np.ones_like(cosine)
+    turns = np.array([[cosine, zero, sine], [zero, one, zero], [-sine, zero, cosine]])
+    local = np.einsum("ijt,tkj->tki", turns, points - pelvis)
+    steps = np.diff(pelvis, axis=0, prepend=pelvis[:1])
+    way = np.cumsum(np.einsum("ijt,tkj->tki", turns, steps), axis=0)
+    found = gait_events([(local + way).reshape(len(x), -1)], walk.skeleton, frame_rate=100)
+    one_walk = {"events": walk.events[:1]}
+    by_label, missed, more = errors(type(walk)(**one_walk), found, ruler)
+    assert (missed, more) == (0, 0)
+    assert all(np.abs(of_label).mean() < 20 for of_label in by_label.values())
+
+
+def test_gaps(walk, ruler):
+    """Short gaps are filled. Of a long one the events are left out, and no other."""
+    (x,), skeleton = walk.data[:1], walk.skeleton
+    whole = gait_events([x], skeleton, frame_rate=100)
+    short, long = x.copy(), x.copy()
+    column = 3 * skeleton.joints.index("left_heel")
+    short[200:210, column : column + 3] = np.nan
+    long[200:320, column : column + 3] = np.nan
+    found = gait_events([short], skeleton, frame_rate=100)
+    assert np.abs(found["frame"] - whole["frame"]).max() < 2
+    found = gait_events([long], skeleton, frame_rate=100)
+    left = found[(found["context"] == "Left") & (found["label"] == "Foot Strike")]["frame"]
+    assert not left.between(200, 319).any()
+    outside = whole[(whole["context"] == "Left") & (whole["label"] == "Foot Strike")]["frame"]
+    outside = outside[~outside.between(180, 340)]
+    assert all(np.abs(left - at).min() < 3 for at in outside)
+    right = [table[table["context"] == "Right"]["frame"].to_numpy() for table in (found, whole)]
+    np.testing.assert_allclose(*right, atol=3)
+
+
+def test_table_fits_the_other_functions(walk):
+    """A recording that begins at frame 30: events count its frames, and cut it into strides."""
+    columns = walk.skeleton.column_names
+    df = pd.DataFrame(walk.data[0], columns=columns)
+    df.attrs |= {"frame_rate": 100.0, "units": "m", "up": "y"}
+    events = gait_events(df)
+    later = gait_events(df.iloc[30:])
+    shared = events[events["frame"] > 60].reset_index(drop=True)
+    rows = later["frame"] > 60
+    np.testing.assert_allclose(later[rows]["frame"], shared["frame"], atol=0.5)
+    np.testing.assert_allclose(later["time"], later["frame"] / 100)
+    df.attrs["events"] = events.to_dict("records")
+    strides = cut_at_events(df, ("Foot Strike", "Left"))
+    n_strikes = ((events["label"] == "Foot Strike") & (events["context"] == "Left")).sum()
+    assert len(strides) == n_strikes - 1
+    keyframes = keyframes_from_events(strides)
+    assert set(keyframes.columns) == {
+        ("Foot Off", "Right"), ("Foot Strike", "Right"), ("Foot Off", "Left")
+    }  # fmt: skip
+    DenseSynchronizer(50).fit(strides, keyframes=keyframes)
+
+
+def test_labels_of_recordings(walk):
+    tables = []
+    for k, x in enumerate(walk.data[:2]):
+        df = pd.DataFrame(x, columns=walk.skeleton.column_names)
+        df.attrs |= {"performance": f"walk {k}", "levels": ("trial", "frame"), "frame_rate": 100.0}
+        tables.append(df)
+    found = gait_events(tables)
+    assert found.columns.tolist() == ["trial", "label", "context", "frame", "time"]
+    assert found["trial"].unique().tolist() == ["walk 0", "walk 1"]
+
+
+def test_nothing_of_people_that_stand(ruler, real_data, capsys):
+    """Standing, sitting down and squatting have no strikes; only a lunge has steps."""
+    ruler.refused(real_data)
+    lines = dict(line.split(": events in ") for line in capsys.readouterr().out.splitlines())
+    assert len(lines) == 6
+    for name, found in lines.items():
+        assert found.startswith("0.0 %") is ("lunge" not in name), name
+
+
+def test_rate_and_noise_hardly_matter_on_people(ruler, real_data):
+    """Twelve walks: 30 frames a second, and a centimetre of noise."""
+    (label, metres) = ruler.PEOPLE["cmu07_walk"]
+    bunch = ruler.load_performances(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
+    for rate, noise, most in ((30, 0, 5), (None, 0.01, 12)):
+        triples = []
+        for k, x in enumerate(bunch.data):
+            x = metres * np.asarray(x, dtype=float)
+            whole = ruler.find(x, 60, bunch.skeleton)
+            x = x + np.random.default_rng(k).normal(0, noise, x.shape)
+            triples.append(
+                ruler.compare(ruler.find(*ruler.thinned(x, 60, rate), bunch.skeleton), whole)
+            )
+        for label in LABELS:
+            off = 1000 * np.concatenate([np.array(e[label]) for e, *_ in triples])
+            missed = sum(m[label] for _, m, _ in triples)
+            assert len(off) > 55
+            assert missed <= 3
+            assert np.abs(off).mean() < most
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"frame_rate": None}, "The frame rate of performance 0 is not known: give frame_rate="),
+        ({"skeleton": None}, "Arrays do not name their joints: give a skeleton"),
+        ({"feet": {"heel": "left_heel"}}, "feet: 'heel' is none of left_heel, left_toe"),
+        ({"feet": {"left_heel": "LHEE"}}, "feet: 'left_heel' is at 'LHEE', which is no joint"),
+        ({"X": [np.zeros((50, 6))]}, "Performance 0 has 6 features a frame, but the skeleton's 19"),
+    ],
+)
+def test_refused(walk, arguments, message):
+    given = {"X": walk.data, "skeleton": walk.skeleton, "frame_rate": 100} | arguments
+    with pytest.raises(ValueError, match=message):
+        gait_events(**given)
+
+
+def test_bodies_that_cannot_be_read(walk):
+    (x,), skeleton = walk.data[:1], walk.skeleton
+    hidden = x.copy()
+    for side in ("left", "right"):
+        for part in ("heel", "ankle"):
+            column = 3 * skeleton.joints.index(f"{side}_{part}")
+            hidden[:, column : column + 3] = np.nan
+    with pytest.raises(ValueError, match="Performance 0: no heel and no ankle is seen"):
+        gait_events([hidden], skeleton, frame_rate=100)
+    upside = Skeleton(skeleton.joints, skeleton.parents, dict(skeleton.landmarks), up="-y")
+    with pytest.raises(ValueError, match="Performance 0: the pelvis is never seen above the feet"):
+        gait_events([x], upside, frame_rate=100)
+    legs = {"left_knee": "left_knee", "left_ankle": "left_ankle"}
+    with pytest.raises(ValueError, match="Performance 0: the skeleton has no pelvis and no hip"):
+        gait_events([x], Skeleton(skeleton.joints, skeleton.parents, legs), frame_rate=100)
+    # On a treadmill, without toes, hips and shoulders, nobody knows where the body faces.
+    legs |= {"pelvis": "pelvis", "right_knee": "right_knee", "right_ankle": "right_ankle"}
+    bare = Skeleton(skeleton.joints, skeleton.parents, legs)
+    still = make_walk(1, treadmill=True, random_state=0).data
+    with pytest.raises(ValueError, match="it is not known where the body faces"):
+        gait_events(still, bare, feet={"left_toe": None, "right_toe": None}, frame_rate=100)

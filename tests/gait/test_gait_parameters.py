@@ -1,0 +1,126 @@
+"""gait_parameters: made walks have known lengths, times and asymmetries."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn_motionsync import gait_events, gait_parameters
+from sklearn_motionsync.datasets import make_walk
+
+
+@pytest.mark.parametrize("treadmill", [False, True])
+def test_known_lengths_and_times(treadmill):
+    walk = make_walk(4, n_strides=8, treadmill=treadmill, random_state=0)
+    table = gait_parameters(walk.data, walk.skeleton, frame_rate=walk.frame_rate)
+    for i in range(4):
+        own = table.loc[i]["mean"]
+        assert own["speed"] == pytest.approx(walk.speed[i], rel=0.03)
+        assert own["stride length"] == pytest.approx(walk.stride_length[i], rel=0.03)
+        assert own["step length"] == pytest.approx(walk.stride_length[i] / 2, rel=0.05)
+        assert own["step width"] == pytest.approx(walk.step_width[i], abs=0.01)
+        times = {
+            context: np.array([
+                event["time"] for event in walk.events[i]
+                if (event["label"], event["context"]) == ("Foot Strike", context)
+            ])
+            for context in ("Left", "Right")
+        }  # fmt: skip
+        strides = np.concatenate([np.diff(t) for t in times.values()])
+        assert own["stride time"] == pytest.approx(strides.mean(), rel=0.01)
+        steps = np.diff(np.sort(np.concatenate(list(times.values()))))
+        assert own["cadence"] == pytest.approx(60 / steps.mean(), rel=0.01)
+
+
+def test_shares_of_a_stride_add_up():
+    walk = make_walk(3, random_state=1)
+    table = gait_parameters(walk.data, walk.skeleton, frame_rate=walk.frame_rate)
+    for i in range(3):
+        own = table.loc[i][["left", "right"]]
+        total = own.loc["single support"] + own.loc["double support"]
+        np.testing.assert_allclose(total, own.loc["stance"], rtol=1e-9)
+        np.testing.assert_allclose(
+            own.loc["stance time"] + own.loc["swing time"], own.loc["stride time"], rtol=1e-9
+        )
+        assert (own.loc["flight"] == 0).all()
+
+
+def test_asymmetry():
+    """The left foot strikes 5 % of the stride late: its step takes 55 %, the right one 45 %."""
+    walk = make_walk(4, n_strides=10, asymmetry=5, random_state=0)
+    table = gait_parameters(walk.data, walk.skeleton, frame_rate=walk.frame_rate)
+    found = table.xs("step time", level="parameter")["asymmetry"]
+    np.testing.assert_allclose(found, 20, atol=2)
+    even = table.xs("stride time", level="parameter")["asymmetry"]
+    np.testing.assert_allclose(even, 0, atol=2)
+
+
+def test_running_flies():
+    """Events of a runner: each foot stands for 0.25 s of a stride of 0.7 s."""
+    walk = make_walk(1, n_strides=3, random_state=0)
+    rows = []
+    for k in range(4):
+        for context, start in (("Left", 0.7 * k), ("Right", 0.7 * k + 0.35)):
+            rows.append(("Foot Strike", context, start))
+            rows.append(("Foot Off", context, start + 0.25))
+    events = pd.DataFrame(rows, columns=["label", "context", "time"])
+    table = gait_parameters(walk.data, walk.skeleton, events=events, frame_rate=100).loc[0]
+    assert table.loc["flight", "mean"] == pytest.approx(100 * 0.2 / 0.7)
+    assert table.loc["double support", "mean"] == pytest.approx(0, abs=1e-9)
+    assert table.loc["stance", "mean"] == pytest.approx(100 * 0.25 / 0.7)
+
+
+def test_given_events_count():
+    walk = make_walk(2, random_state=0)
+    events = gait_events(walk.data, walk.skeleton, frame_rate=100)
+    expected = gait_parameters(walk.data, walk.skeleton, frame_rate=100)
+    for columns in (["label", "context", "frame"], ["label", "context", "time"]):
+        found = gait_parameters(
+            walk.data, walk.skeleton, events=events[["performance", *columns]], frame_rate=100
+        )
+        pd.testing.assert_frame_equal(found, expected)
+    # A strike that is missing leaves its strides out; it does not make long ones.
+    strikes = events.index[(events["label"] == "Foot Strike") & (events["context"] == "Left")]
+    fewer = events.drop(strikes[2])
+    found = gait_parameters(walk.data, walk.skeleton, events=fewer, frame_rate=100)
+    times = [table.loc[0].loc["stride time"] for table in (found, expected)]
+    assert times[0]["left"] == pytest.approx(times[1]["left"], rel=0.03)
+    assert times[0]["n"] == times[1]["n"] - 2
+
+
+def test_units():
+    walk = make_walk(1, random_state=0)
+    df = pd.DataFrame(1000 * walk.data[0], columns=walk.skeleton.column_names)
+    df.attrs |= {"frame_rate": 100.0, "units": "mm", "up": "y"}
+    table = gait_parameters(df).loc[0]
+    assert table.loc["stride length", "unit"] == "m"
+    assert table.loc["stride length", "mean"] == pytest.approx(walk.stride_length[0], rel=0.03)
+    assert table.loc["cadence", "unit"] == "steps/min"
+    bare = gait_parameters(walk.data, walk.skeleton, frame_rate=100).loc[0]
+    assert bare.loc["stride length", "unit"] == ""
+
+
+def test_no_strides():
+    """A body that stands has a table all the same."""
+    walk = make_walk(1, random_state=0)
+    still = np.repeat(walk.data[0][:1], 300, axis=0)
+    table = gait_parameters([still], walk.skeleton, frame_rate=100).loc[0]
+    assert (table["n"] == 0).all()
+    assert table["mean"].isna().all()
+
+
+@pytest.mark.parametrize(
+    ("events", "message"),
+    [
+        (pd.DataFrame({"label": [], "time": []}), "events: there is no column 'context'"),
+        (pd.DataFrame({"label": [], "context": []}), "events: there is no column 'frame'"),
+        (
+            pd.DataFrame(
+                {"performance": [7], "label": ["Foot Off"], "context": ["Left"], "time": [1]}
+            ),
+            "events: recording 7 is not in X, whose labels are",
+        ),
+    ],
+)
+def test_refused_events(events, message):
+    walk = make_walk(1, random_state=0)
+    with pytest.raises(ValueError, match=message):
+        gait_parameters(walk.data, walk.skeleton, events=events, frame_rate=100)
