@@ -18,14 +18,16 @@ __all__ = [
 # bones, the likeliest first. The last are names of bones in Plug-in Gait, and of its markers on
 # the skin, which stand for the joints where no joint centres were computed.
 _SYNONYMS = {
-    "pelvis": ("pelvis", "hips", "hip", "hipcenter", "midhip", "spinebase", "root", "pelo"),
+    "pelvis": ("pelvis", "hips", "hip", "hipcenter", "midhip", "spinebase", "root", "pelo",
+               "sacrum", "sacral", "vsacral"),
     "neck": ("neck", "neck1", "neck01", "necktwist01", "shouldercenter", "spineshoulder", "thorax",
              "trxo"),
     "head": ("head", "nose", "headtop", "headtopend", "hedo"),
     "shoulder": ("upperarm", "uparm", "uarm", "arm", "shoulder", "sjc", "clo", "sho"),
     "elbow": ("elbow", "forearm", "lowerarm", "lowarm", "farm", "larm", "ejc", "huo", "elb"),
     "wrist": ("wrist", "hand", "wjc", "rao"),
-    "hip": ("thigh", "upleg", "upperleg", "hip", "hipjoint", "hjc", "fep", "asi"),
+    "hip": ("thigh", "upleg", "upperleg", "hip", "hipjoint", "hjc", "fep", "asi",
+            "asis"),
     "knee": ("knee", "calf", "leg", "lowerleg", "lowleg", "shin", "shank", "kjc", "feo", "kne"),
     "ankle": ("ankle", "foot", "ajc", "tio", "ank"),
 }  # fmt: skip
@@ -114,6 +116,10 @@ def _plain_names(joints):
     prefix = re.match(r"(.*[^A-Za-z0-9])?", os.path.commonprefix(joints[1:])).group()  # noqa: RUF071
     # If one side was recorded, the side is in every name, and no prefix.
     prefix = re.sub(r"(?i)(?<![a-z0-9])(left|right|l|r)[^a-z0-9]+$", "", prefix)
+    # Of markers with and without the name of the subject, those with it are the body's.
+    subjects = {joint.rpartition(":")[0] for joint in joints if ":" in joint}
+    if not prefix and len(subjects) == 1:
+        prefix = f"{subjects.pop()}:"
     return {_plain(j.removeprefix(prefix)): j for j in reversed(joints)}
 
 

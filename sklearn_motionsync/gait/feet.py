@@ -101,15 +101,14 @@ class Walk:
         self.n_samples = (len(positions) - 1) * self.per_frame + 1
         self.heels, self.toes, self.has_heel, self.noise = {}, {}, {}, {}
         for side in SIDES:
-            heel = feet.get(f"{side}_heel")
-            ankle = self._landmark(skeleton, f"{side}_ankle")
-            self.has_heel[side] = heel is not None
-            at = ankle if heel is None else heel
-            if at is None or np.isnan(self._mean(at)).any(axis=1).all():
+            choices = [feet.get(f"{side}_heel"), self._landmark(skeleton, f"{side}_ankle")]
+            at = next((c for c in choices if c is not None and self._is_seen(c)), None)
+            if at is None:
                 continue
+            self.has_heel[side] = at == choices[0]
             self.noise[side] = _noise(self._mean(at)[:, 1])
             self.heels[side] = self._resample(at)
-            if f"{side}_toe" in feet:
+            if f"{side}_toe" in feet and self._is_seen(feet[f"{side}_toe"]):
                 self.toes[side] = self._resample(feet[f"{side}_toe"])
         if not self.heels:
             raise ValueError(
@@ -151,6 +150,9 @@ class Walk:
 
     def _landmark(self, skeleton, name):
         return skeleton.indices_of(name) if name in skeleton.landmarks else None
+
+    def _is_seen(self, joints):
+        return not np.isnan(self._mean(joints)).any(axis=1).all()
 
     def _mean(self, joints):
         return self._points[:, list(joints)].mean(axis=1)

@@ -139,6 +139,34 @@ def test_gaps(walk, ruler):
     np.testing.assert_allclose(*right, atol=3)
 
 
+def test_names_of_markers():
+    """Of one subject among nameless points; a heel that is never seen leaves the ankle."""
+    made = make_walk(1, random_state=0)
+    names = {
+        "left_hip": "LASI", "right_hip": "RASI", "left_knee": "LKNE", "right_knee": "RKNE",
+        "left_ankle": "LANK", "right_ankle": "RANK", "left_heel": "LHEE", "right_heel": "RHEE",
+        "left_toe": "LTOE", "right_toe": "RTOE",
+    }  # fmt: skip
+    columns = {}
+    for name, marker in names.items():
+        for axis in "xyz":
+            at = made.skeleton.column_names.index(f"{name}_{axis}")
+            columns[f"Ann:{marker}_{axis}"] = made.data[0][:, at]
+    df = pd.DataFrame(columns)
+    df[["M1_x", "M1_y", "M1_z"]] = 0.0
+    df.attrs |= {"frame_rate": 100.0, "up": "y"}
+    found = gait_events(df)
+    expected = gait_events(made.data, made.skeleton, frame_rate=100)
+    assert np.abs(found["frame"] - expected["frame"]).max() < 2
+    for axis in "xyz":
+        df[f"Ann:LHEE_{axis}"] = np.nan
+    left = [
+        t[(t["context"] == "Left") & (t["label"] == "Foot Strike")]
+        for t in (found, gait_events(df))
+    ]
+    assert np.abs(left[0]["frame"].to_numpy() - left[1]["frame"].to_numpy()).max() < 3
+
+
 def test_table_fits_the_other_functions(walk):
     """A recording that begins at frame 30: events count its frames, and cut it into strides."""
     columns = walk.skeleton.column_names
