@@ -82,16 +82,18 @@ _ = axis.set_title("Five people limp, and it shows")
 # %%
 # Where it fails
 # --------------
-# Nothing is found of people who stand. Someone who walks backwards has events as well, but wrong
-# ones: a foot is farthest ahead about when it leaves the ground. A walk played backwards shows it.
+# Nothing is found of people who stand. Key-points of a video may be 5 cm off in every frame: then
+# errors are large, and some events are missed or made up.
 
 still = np.repeat(walks[0][:1], 300, axis=0)
 print(len(gait_events([still], skeleton, frame_rate=rate)), "events of a person who stands")
-backwards = gait_events([walks[0][::-1]], skeleton, frame_rate=rate)
-strikes = backwards.loc[backwards["label"] == "Foot Strike", "time"]
-last = (len(walks[0]) - 1) / rate
-for label, what in (("Foot Strike", "leaves the ground"), ("Foot Off", "strikes")):
-    times = np.array([last - event["time"] for event in truth[0] if event["label"] == label])
-    off = 1000 * np.median([np.abs(times - time).min() for time in strikes])
-    print(f"'strikes' of backward walking are {off:.0f} ms from where a foot {what}")
+poor = [x[::4] + rng.normal(0, 0.05, x[::4].shape) for x in walks]
+found = gait_events(poor, skeleton, frame_rate=rate / 4)
+for label in ("Foot Strike", "Foot Off"):
+    off = errors(found, label)
+    n_true = sum(event["label"] == label for events in truth for event in events)
+    print(
+        f"{label}: {(found['label'] == label).sum()} found of {n_true}, "
+        f"{np.abs(off).mean():.0f} ms off on average"
+    )
 plt.show()

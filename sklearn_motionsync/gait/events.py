@@ -12,7 +12,7 @@ from scipy.signal import find_peaks
 from ..body.skeleton import Skeleton
 from ..inputs.numbers import nanmean
 from ..inputs.types import PerformancesLike, ValuesLike
-from .feet import Walk, pieces
+from .feet import Walk, horizontal, pieces
 from .recordings import CONTEXTS, FOOT_OFF, FOOT_STRIKE, Recordings
 
 __all__ = ["find_events", "gait_events"]
@@ -94,8 +94,8 @@ def gait_events(
     Raises
     ------
     ValueError
-        If the frame rate is not known, no heel and no ankle is seen, or the direction in which a
-        body without toes, hips and shoulders faces is not known.
+        If the frame rate is not known, no heel and no ankle is seen, or there is no pelvis above
+        the feet.
 
     See Also
     --------
@@ -116,8 +116,9 @@ def gait_events(
     farthest behind less than 40 ms after the other foot strikes, in the median. Without toes, the
     foot leaves the ground 20 ms after the ankle rises fastest.
 
-    Steps by less than 0.15 leg lengths, as in shuffling and turning on the spot, are not found.
-    Events of a body that walks backwards are wrong.
+    A body walks in the direction in which its feet swing while they are high; of a body that walks
+    backwards the toes strike. It walks in one of both ways throughout a recording. Steps by less
+    than 0.15 leg lengths, as in shuffling and turning on the spot, are not found.
 
     References
     ----------
@@ -299,7 +300,7 @@ def _farthest(walk, side, points, sign):
     least = max(_LEAST_SWING * (high - low), _LEAST_SHARE_OF_LEG)
     distance, out = max(1, int(_LEAST_STRIDE * walk.rate)), []
     others = [heel for other, heel in walk.heels.items() if other != side]
-    apart = walk.ahead(points) - walk.ahead(others[0]) if others else curve
+    apart = horizontal(points - (others[0] if others else walk.pelvis))
     reach = int(_SWING * walk.rate)
     for piece in pieces(curve[:, np.newaxis]):
         part = curve[piece]
@@ -308,12 +309,15 @@ def _farthest(walk, side, points, sign):
             np.concatenate([[floor], part, [floor]]), prominence=least, distance=distance
         )
         for k in peaks - 1:
-            is_end = not 2 < k < len(part) - 3
+            # At the first samples it may have been farther before.
+            is_first = k <= _POSITION * walk.rate
+            is_end = is_first or k >= len(part) - 3
             # A foot that is last seen on its way ahead has not been farthest.
             near = apart[max(0, piece.start + k - reach) : piece.start + k + reach]
             # Of a hidden foot it is not known.
-            steps = np.isnan(near).any() or np.ptp(near) >= _LEAST_SHARE_OF_LEG
-            if steps and (k <= 2 or not is_end):
+            moved = np.linalg.norm(np.ptp(near, axis=0))
+            steps = np.isnan(moved) or moved >= _LEAST_SHARE_OF_LEG
+            if steps and (is_first or not is_end):
                 out.append((piece.start + (k if is_end else _between(part, k)), is_end))
     return out
 

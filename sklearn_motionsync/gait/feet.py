@@ -11,18 +11,19 @@ from ..body.landmarks import as_tuple, guess_feet
 from ..inputs.numbers import nanmean
 from ..matching.filters import smooth
 
-__all__ = ["ENDS_OF_FEET", "Walk", "joints_of_feet"]
+__all__ = ["ENDS_OF_FEET", "Walk", "horizontal", "joints_of_feet", "pieces"]
 
 ENDS_OF_FEET = [f"{side}_{part}" for side in SIDES for part in ("heel", "toe")]
 # Positions are interpolated to at least so many samples a second.
 _LEAST_RATE = 240
 # Gaps up to this length, in seconds, are filled in. Shorter pieces between gaps are left out.
 _LONGEST_GAP, _SHORTEST_PIECE = 0.2, 0.25
-# Standard deviation, in seconds, of the Gaussian that smooths the direction of walking.
-_HEADING = 0.2
-# Variance of third differences of white noise of variance 1; median absolute deviation of a normal
-# distribution of standard deviation 1.
-_THIRD_DIFFERENCE, _NORMAL_MAD = 20, 0.6745
+# Standard deviations, in seconds, of the Gaussians for the direction of walking, and for the speed
+# of feet that swing.
+_HEADING, _SWING = 0.2, 0.03
+# Variance of third differences of white noise of variance 1; the share of them that is taken, those
+# of feet on the ground; and how large normal deviates are at most in such a share.
+_THIRD_DIFFERENCE, _SHARE, _DEVIATE = 20, 0.25, 0.3186
 
 
 def joints_of_feet(skeleton, feet=None):
@@ -87,7 +88,8 @@ class Walk:
     pelvis : ndarray, shape (n_samples, n_dims)
         A hip if there is no other.
     forward : ndarray, shape (n_samples, n_dims - 1)
-        Horizontal unit vectors along which the body walks.
+        Horizontal unit vectors along which the body walks. Of a body that walks backwards they
+        point back, and heels and toes are exchanged: its toes strike first.
     leg : float
         Median height of the pelvis above the lower foot, the unit of the positions above.
     """
@@ -129,11 +131,19 @@ class Walk:
             for side in of_all:
                 of_all[side] = of_all[side] / self.leg
         self.pelvis = self.pelvis / self.leg
-        self.forward = self._directions(skeleton, called)
+        self.forward = self._directions(skeleton)
+        self.forward *= self._sense_of_swings()
+        along = [
+            np.einsum("ij,ij->i", horizontal(toe - self.heels[side]), self.forward)
+            for side, toe in self.toes.items()
+        ]
+        if along and np.nanmean(np.concatenate(along)) < 0:
+            for side in self.toes:
+                self.heels[side], self.toes[side] = self.toes[side], self.heels[side]
 
     def ahead(self, points):
         """How far points (n_samples, n_dims) are ahead of the pelvis."""
-        return np.einsum("ij,ij->i", _horizontal(points - self.pelvis), self.forward)
+        return np.einsum("ij,ij->i", horizontal(points - self.pelvis), self.forward)
 
     def filtered(self, values, width, order=0):
         """Values (n_samples,) or (n_samples, n) under a Gaussian, or their derivative by time.
@@ -170,33 +180,39 @@ class Walk:
             out[samples] = spline(samples / self.per_frame)
         return out
 
-    def _directions(self, skeleton, called):
-        """Where the body walks: along its feet, or across its hips or shoulders."""
+    def _directions(self, skeleton):
+        """Horizontal unit vectors along the way, in either sense.
+
+        Across hips or shoulders, else along the feet, else along the line on which they come apart.
+        """
+        if skeleton.n_dims == 2:
+            return np.ones((self.n_samples, 1))
+        for part in ("hip", "shoulder"):
+            pair = [self._landmark(skeleton, f"{side}_{part}") for side in SIDES]
+            if None not in pair and all(map(self._is_seen, pair)):
+                left, right = map(self._resample, pair)
+                across = horizontal(left - right)
+                return self._unit(np.stack([-across[:, 1], across[:, 0]], axis=1))
         if self.toes:
             along = [self.toes[side] - self.heels[side] for side in self.toes]
-            return self._unit(nanmean([_horizontal(x) for x in along], axis=0), called)
-        if skeleton.n_dims == 3:
-            for part in ("hip", "shoulder"):
-                pair = [self._landmark(skeleton, f"{side}_{part}") for side in SIDES]
-                if None not in pair:
-                    left, right = map(self._resample, pair)
-                    across = _horizontal(left - right)
-                    return self._unit(np.stack([-across[:, 1], across[:, 0]], axis=1), called)
-        travel = self.pelvis[~np.isnan(self.pelvis).any(axis=1)]
-        way = _horizontal(travel[-1:] - travel[:1])[0] if len(travel) else np.zeros(1)
-        if not np.linalg.norm(way) > 1:
-            raise ValueError(
-                f"{called}: it is not known where the body faces. Name the toes: "
-                "feet={'left_toe': ..., 'right_toe': ...}; without hips, shoulders and toes the "
-                "body must walk farther than the length of a leg."
-            )
-        return np.tile(way / np.linalg.norm(way), (self.n_samples, 1))
+            return self._unit(nanmean([horizontal(x) for x in along], axis=0))
+        apart = np.concatenate([horizontal(heel - self.pelvis) for heel in self.heels.values()])
+        apart = apart[~np.isnan(apart).any(axis=1)]
+        _, _, axes = np.linalg.svd(apart - apart.mean(axis=0), full_matrices=False)
+        return np.tile(axes[0], (self.n_samples, 1))
 
-    def _unit(self, directions, called):
-        known = ~np.isnan(directions).any(axis=1)
-        if not known.any():
-            raise ValueError(f"{called}: both feet are never seen together with their toes.")
-        samples = np.arange(len(directions))
+    def _sense_of_swings(self):
+        """1 if feet swing along `forward`, in which they are higher than on the ground; else -1."""
+        total = 0.0
+        for heel in self.heels.values():
+            velocity = self.filtered(self.ahead(heel), _SWING, 1)
+            height = heel[:, 1] - self.pelvis[:, 1]
+            known = ~np.isnan(velocity) & ~np.isnan(height)
+            total += float(((height - height[known].mean()) * velocity)[known].sum())
+        return 1.0 if total >= 0 else -1.0
+
+    def _unit(self, directions):
+        known, samples = ~np.isnan(directions).any(axis=1), np.arange(len(directions))
         filled = np.stack(
             [np.interp(samples, samples[known], x[known]) for x in directions.T], axis=1
         )
@@ -223,7 +239,7 @@ def pieces(x):
     return [slice(*edge) for edge in edges.reshape(-1, 2)]
 
 
-def _horizontal(points):
+def horizontal(points):
     """The components (n, n_dims - 1) of points, y up, that are not vertical."""
     return points[:, [0, 2]] if points.shape[1] == 3 else points[:, [0]]
 
@@ -242,9 +258,9 @@ def _fill_short_gaps(x, longest):
 
 
 def _noise(heights):
-    """Standard deviation of white noise, from third differences."""
+    """Standard deviation of white noise, from the smallest third differences."""
     third = np.abs(np.diff(heights, 3))
     third = third[~np.isnan(third)]
     if not len(third):
         return 0.0
-    return float(np.median(third)) / _NORMAL_MAD / math.sqrt(_THIRD_DIFFERENCE)
+    return float(np.quantile(third, _SHARE)) / _DEVIATE / math.sqrt(_THIRD_DIFFERENCE)

@@ -12,6 +12,7 @@ from ..body.formats import SIDES
 from ..body.skeleton import Skeleton
 from ..inputs.types import PerformancesLike, Table, ValuesLike
 from .events import find_events
+from .feet import horizontal
 from .recordings import FOOT_OFF, FOOT_STRIKE, Recordings
 
 __all__ = ["gait_parameters"]
@@ -101,7 +102,7 @@ def gait_parameters(
     >>> table.loc[0].loc[["cadence", "stride length"], ["unit", "mean"]].round(2)
                         unit    mean
     parameter
-    cadence        steps/min  109.33
+    cadence        steps/min  109.40
     stride length               1.44
     """
     recordings = Recordings(X, skeleton, feet, frame_rate)
@@ -216,8 +217,7 @@ def _between(events, first, last):
 def _ground(walk, points, at, belt):
     """The horizontal place of a point at a sample, on the ground or on the belt."""
     k = int(np.clip(round(at), 0, len(points) - 1))
-    horizontal = points[k][[0, 2]] if points.shape[1] == 3 else points[k][[0]]
-    return horizontal - belt * at / walk.rate
+    return horizontal(points[k : k + 1])[0] - belt * at / walk.rate
 
 
 def _belt_velocity(walk, at):
@@ -231,10 +231,10 @@ def _belt_velocity(walk, at):
                 continue
             a, b = (round(first + share * (later[0] - first)) for share in _FLAT)
             if b < len(heel) and b > a:
-                way = (heel[b] - heel[a]) / (b - a) * walk.rate
-                velocities.append(way[[0, 2]] if len(way) == 3 else way[[0]])
+                way = horizontal(heel[[a, b]])
+                velocities.append((way[1] - way[0]) / (b - a) * walk.rate)
     known = [v for v in velocities if not np.isnan(v).any()]
     if not known:
-        return np.zeros(1 if walk.pelvis.shape[1] == 2 else 2)
+        return np.zeros(walk.forward.shape[1])
     mean = np.median(known, axis=0)
     return mean if np.linalg.norm(mean) > _BELT else np.zeros_like(mean)
