@@ -102,7 +102,7 @@ def gait_parameters(
     >>> table.loc[0].loc[["cadence", "stride length"], ["unit", "mean"]].round(2)
                         unit    mean
     parameter
-    cadence        steps/min  109.40
+    cadence        steps/min  109.32
     stride length               1.44
     """
     recordings = Recordings(X, skeleton, feet, frame_rate)
