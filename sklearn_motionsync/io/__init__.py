@@ -1,10 +1,11 @@
-"""Readers of motion capture files, and functions for gaps, events and tracked key-points."""
+"""Motion capture files, read and written; gaps, events and tracked key-points."""
 
 from .events import cut_at_events
 from .gaps import fill_gaps, find_gaps
 from .keyframes import keyframes_from_events
 from .motion import read_motion
 from .poses import from_poses
+from .writing import write_motion
 
 __all__ = [
     "cut_at_events",
@@ -13,4 +14,5 @@ __all__ = [
     "from_poses",
     "keyframes_from_events",
     "read_motion",
+    "write_motion",
 ]

@@ -39,6 +39,10 @@ def read_bvh(path):
         result[axes, moved] = values[:, columns].T
         return result
 
+    channels = [
+        [f"{name[:1].decode()}{name[1:].decode().lower()}" for name in joint.channels or ()]
+        for joint in joints
+    ]
     return {
         "joints": make_unique([joint.name for joint in joints]),
         "parents": parents,
@@ -47,6 +51,10 @@ def read_bvh(path):
         "units": None,
         "up": "y",
         "kind": "joints",
+        "rig": {
+            "offsets": offsets[:, :, 0].T.tolist(),
+            "channels": channels,
+        },
     }
 
 

@@ -121,6 +121,11 @@ def read_motion(
             The label of the recording in tables, which is the name of its file without the ending;
             and the names of the levels of their index, "recording" and "frame".
 
+        for BVH files also
+
+        rig : dict
+            ``offsets`` of the joints at rest and their ``channels``, which `write_motion` takes.
+
         for C3D and TRC files also
 
         first_frame : int

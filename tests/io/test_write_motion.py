@@ -1,0 +1,179 @@
+"""write_motion: files are read back, by another reader too, and bones keep their length."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    blend_performances,
+)
+from sklearn_motionsync.datasets import make_bending, make_walk
+from sklearn_motionsync.io import read_motion, write_motion
+
+from motion_files import body, put
+
+BENDING = make_bending(6, random_state=0)
+LEG = 0.85
+
+
+def written(tmp_path, X, *args, name="out.bvh", **how):
+    write_motion(tmp_path / name, X, *args, **how)
+    return read_motion(tmp_path / name)
+
+
+def joints_of(df, names):
+    return (
+        df[[f"{name}_{axis}" for name in names for axis in "xyz"]]
+        .to_numpy()
+        .reshape(len(df), -1, 3)
+    )
+
+
+@pytest.mark.parametrize("order", ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"])
+def test_bvh_is_read_back(tmp_path, benchmark, order):
+    """Hinges, joints that move in their parents, joints without channels; names and order."""
+    df = read_motion(put(tmp_path, body(order)))
+    again = written(tmp_path, df)
+    assert again.columns.tolist() == df.columns.tolist()
+    assert again.attrs["rig"]["channels"] == df.attrs["rig"]["channels"]
+    np.testing.assert_allclose(again, df, atol=1e-4)
+    assert again.attrs["frame_rate"] == pytest.approx(50)
+    plain = benchmark("readers").plain_bvh(tmp_path / "out.bvh")
+    np.testing.assert_allclose(plain.reshape(len(df), -1), again, atol=1e-9)
+
+
+def test_file_of_people_is_read_back(tmp_path, real_data, benchmark):
+    """142 joints; positions within 1e-4 of a leg, also by a reader that shares no code."""
+    (path,) = (real_data / "original_files" / "bvh").glob("*.bvh")
+    df = read_motion(path)
+    again = written(tmp_path, df)
+    assert again.columns.tolist() == df.columns.tolist()
+    leg = 90
+    assert np.abs(again.to_numpy() - df.to_numpy()).max() < 1e-4 * leg
+    plain = benchmark("readers").plain_bvh(tmp_path / "out.bvh")
+    np.testing.assert_allclose(plain.reshape(len(df), -1), df, atol=1e-4 * leg)
+    part = written(tmp_path, df.iloc[20:60:2])
+    assert part.attrs["frame_rate"] == pytest.approx(df.attrs["frame_rate"] / 2)
+    np.testing.assert_allclose(part, df.iloc[20:60:2], atol=1e-4 * leg)
+
+
+def bodies():
+    """Bodies that were synchronised, blended and sampled, and a walk with feet."""
+    pipe = make_pipeline(
+        DirectionCosines(BENDING.skeleton), ASpace(), DenseSynchronizer(40), ActionModel()
+    ).fit(BENDING.data, actionmodel__groups=BENDING.actor)
+    skeleton = BENDING.skeleton.body()
+    aligned = pipe[:-1].transform(BENDING.data[:1])
+    back = pipe[:2].inverse_transform(aligned)
+    sample = pipe[:2].inverse_transform(pipe[-1].sample(1, random_state=0))
+    blend = blend_performances(pipe[:-1], BENDING.data[:2], weights=[0.5, 0.5])
+    walk = make_walk(1, noise=0, random_state=0)
+    return {
+        "synchronised": (back[0], skeleton),
+        "sampled": (sample[0], skeleton),
+        "blended": (np.asarray(blend[0] if isinstance(blend, (list, tuple)) else blend), skeleton),
+        "walk": (walk.data[0], walk.skeleton),
+    }
+
+
+@pytest.mark.parametrize("kind", ["synchronised", "sampled", "blended", "walk"])
+def test_bones_keep_their_length_and_joints_their_place(tmp_path, kind):
+    x, skeleton = bodies()[kind]
+    x = np.asarray(x).reshape(-1, 3 * len(skeleton.joints))
+    df = written(tmp_path, x, skeleton, frame_rate=30)
+    found, given = joints_of(df, skeleton.joints), x.reshape(len(x), -1, 3)
+    for a, b in skeleton.bones:
+        length = np.linalg.norm(found[:, a] - found[:, b], axis=1)
+        assert np.ptp(length) < 1e-3 * length.mean()
+    assert np.linalg.norm(found - given, axis=2).max() < 0.01 * LEG
+
+
+def test_on_the_rig_of_another_file(tmp_path):
+    """Joints, offsets' directions and channels are those of the file, lengths those of the body."""
+    other, *_, mine = BENDING.data
+    rig = written(tmp_path, other, BENDING.skeleton, frame_rate=30, name="rig.bvh")
+    names = BENDING.skeleton.joints
+    for like in (rig, tmp_path / "rig.bvh"):
+        df = written(tmp_path, 1.2 * mine, BENDING.skeleton, frame_rate=60, like=like)
+        assert df.columns.tolist() == rig.columns.tolist()
+        assert df.attrs["rig"]["channels"] == rig.attrs["rig"]["channels"]
+        off = joints_of(df, names) - 1.2 * mine.reshape(len(mine), -1, 3)
+        assert np.linalg.norm(off, axis=2).mean() < 0.005
+    part = pd.DataFrame(mine, columns=BENDING.skeleton.column_names).iloc[:, 3:]
+    part.attrs |= {"frame_rate": 30.0}
+    with pytest.raises(ValueError, match=r"X lacks the joints \['pelvis'\] of the rig"):
+        written(tmp_path, part, like=rig)
+
+
+def test_axes_and_place(tmp_path):
+    """z up becomes y up; in place the root stays where it begins, and its height moves."""
+    walk = make_walk(1, noise=0, random_state=0)
+    names = walk.skeleton.column_names
+    df = pd.DataFrame(walk.data[0], columns=names)
+    turned = pd.DataFrame(
+        {
+            f"{j}_{a}": df[f"{j}_{b}"]
+            for j in walk.skeleton.joints
+            for a, b in zip("xyz", "zxy", strict=True)
+        }
+    )
+    turned.attrs |= {"frame_rate": 100.0, "up": "z"}
+    turned.attrs |= {"joints": list(walk.skeleton.joints), "parents": list(walk.skeleton.parents)}
+    found = written(tmp_path, turned)
+    # A rotation: x forward, y left, z up become z forward ... as `to_y_up` has it.
+    np.testing.assert_allclose(found["head_y"], df["head_y"], atol=0.01)
+    still = written(tmp_path, walk.data[0], walk.skeleton, frame_rate=100, in_place=True)
+    assert np.ptp(still[["pelvis_x", "pelvis_z"]].to_numpy(), axis=0).max() < 1e-5
+    np.testing.assert_allclose(still["pelvis_y"], df["pelvis_y"], atol=1e-5)
+
+
+def test_trc_is_read_back(tmp_path):
+    """Gaps stay gaps; times, units and names too."""
+    x = pd.DataFrame(BENDING.data[0], columns=BENDING.skeleton.column_names)
+    x.iloc[5:9, 3:6] = np.nan
+    x.attrs |= {"frame_rate": 60.0, "units": "m", "up": "y"}
+    with pytest.warns(UserWarning, match="missing"):
+        found = written(tmp_path, x, name="out.trc")
+    np.testing.assert_allclose(found, x, atol=1e-6)
+    assert found.columns.tolist() == x.columns.tolist()
+    assert (found.attrs["frame_rate"], found.attrs["units"]) == (60.0, "m")
+
+
+@pytest.mark.parametrize("ending", [".mot", ".sto"])
+def test_tables_of_opensim_are_read_back(tmp_path, ending):
+    angles = pd.DataFrame({"knee": [1.5, 2.25, 3.0], "hip": [0.0, -1e-3, 4e5]})
+    found = written(tmp_path, angles, name=f"out{ending}", frame_rate=50)
+    np.testing.assert_allclose(found, angles)
+    assert found.attrs["frame_rate"] == 50
+    assert found.attrs["units"] == "deg"
+
+
+@pytest.mark.parametrize(
+    ("how", "message"),
+    [
+        ({"name": "a.fbx"}, "for which there is no writer; the known endings are .bvh, .trc"),
+        ({"frame_rate": None}, "the frame rate is not known: give frame_rate="),
+        ({"skeleton": None}, "an array does not name its joints: give a skeleton"),
+        ({"X": np.full((4, 45), np.nan)}, "joint 'pelvis' is NaN in frame 0. Fill gaps first"),
+        ({"X": np.zeros((4, 44))}, "X has 44 columns, and 15 joints need 45"),
+        ({"name": "a.trc", "like": "b.bvh"}, "like= goes with .bvh files only"),
+        ({"name": "a.mot"}, "give a DataFrame, whose columns have names"),
+    ],
+)
+def test_refused(tmp_path, how, message):
+    given = {"X": BENDING.data[0], "skeleton": BENDING.skeleton, "frame_rate": 30} | how
+    name = given.pop("name", "a.bvh")
+    with pytest.raises(ValueError, match=message):
+        write_motion(tmp_path / name, given.pop("X"), **given)
+    assert not (tmp_path / name).exists()
+
+
+def test_markers_have_no_tree(tmp_path):
+    x = pd.DataFrame(BENDING.data[0], columns=BENDING.skeleton.column_names)
+    x.attrs |= {"frame_rate": 30.0}
+    with pytest.raises(ValueError, match="a BVH file has one root, got 15: give a skeleton"):
+        write_motion(tmp_path / "a.bvh", x)
