@@ -1,7 +1,8 @@
-"""CycleDisplay: the self-correlation of a take, and the cuts between its cycles."""
+"""CycleDisplay: the self-correlation of a take, its stretches, and the cuts between cycles."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
@@ -28,10 +29,10 @@ __all__ = ["CycleDisplay"]
 
 
 class CycleDisplay:
-    """The self-correlation of a take, its period, and the cuts between its cycles.
+    """The self-correlation of a take, where it repeats, and the cuts between its cycles.
 
-    Above the self-correlation over the lag: its peaks, the period, and the threshold. Below a curve
-    of the take, with its cuts. Use `from_estimator`.
+    Above the self-correlation of the longest stretch over the lag: its peaks, the period, and the
+    threshold. Below a curve of the take, its stretches shaded, and its cuts. Use `from_estimator`.
 
     Parameters
     ----------
@@ -43,6 +44,10 @@ class CycleDisplay:
         A curve of the take.
     cuts : array-like of int, default=()
         The frames at which cycles begin and end.
+    stretches : list of (int, int), default=()
+        The first frames of stretches that repeat, and the frames after their last ones.
+    n_cycles : int, default=None
+        The number of whole cycles; None is one less than there are cuts.
     threshold : float, default=0.4
         The self-correlation that a cyclic take needs.
     period : float, default=None
@@ -64,6 +69,8 @@ class CycleDisplay:
         The line at the period.
     cuts_ : LineCollection
         The lines at the cuts.
+    stretches_ : list of Rectangle
+        The shades of the stretches.
 
     Examples
     --------
@@ -83,6 +90,8 @@ class CycleDisplay:
         curve: ValuesLike,
         cuts: ValuesLike = (),
         *,
+        stretches: Sequence[tuple[int, int]] = (),
+        n_cycles: int | None = None,
         threshold: float = 0.4,
         period: float | None = None,
         name: str = "",
@@ -90,6 +99,8 @@ class CycleDisplay:
     ) -> None:
         self.correlation, self.curve = np.asarray(correlation), np.asarray(curve)
         self.peaks, self.cuts = np.asarray(peaks, dtype=int), np.asarray(cuts, dtype=int)
+        self.n_cycles = max(len(self.cuts) - 1, 0) if n_cycles is None else n_cycles
+        self.stretches = [(int(start), int(stop)) for start, stop in stretches]
         self.threshold, self.period, self.name, self.reason = threshold, period, name, reason
 
     def __repr__(self):
@@ -143,21 +154,23 @@ class CycleDisplay:
         segmenter = CycleSegmenter(**estimator.get_params()).set_params(not_cyclic="skip")
         given, takes = check_takes(segmenter, X, reset=True)
         i = as_index(take, len(takes), "take")
-        (x,), (found,) = correlate_takes(segmenter, given[i : i + 1], takes[i : i + 1])
-        found = as_learnt(estimator, x, found) if fitted else found
+        (x,), (repeats,) = correlate_takes(segmenter, given[i : i + 1], takes[i : i + 1])
+        found = (as_learnt(estimator, x, repeats) if fitted else repeats).found
         row = segmenter.report(given[i : i + 1]).iloc[0]
         name, curve = _curve_of(segmenter, estimator if fitted else None, given[i], x, feature)
-        cuts = np.array([], dtype=int)
+        cuts, n_cycles = np.array([], dtype=int), None
         if fitted and row["cyclic"]:
             _, origin = estimator.segment(given[i : i + 1])
             whole = origin[origin["complete"]]
-            cuts = np.unique([whole["start"], whole["stop"] - 1])
+            cuts, n_cycles = np.unique([whole["start"], whole["stop"] - 1]), len(whole)
         period = found.period if row["period"] > 0 else None
         display = cls(
             found.correlation,
             found.peaks,
             curve,
             cuts,
+            stretches=row["stretches"],
+            n_cycles=n_cycles,
             threshold=float(required_strength(np.inf, found.breadth, segmenter.threshold)),
             period=period,
             name=name,
@@ -193,8 +206,9 @@ class CycleDisplay:
         (self.correlation_,) = upper.plot(lags, self.correlation, color=blue)
         at, values = lags[self.peaks], self.correlation[self.peaks]
         (self.peaks_,) = upper.plot(at, values, "o", color=blue, fillstyle="none", label="peaks")
-        # The threshold is higher at lags of which a take holds less than two.
-        cycles = len(self.curve) / np.arange(1, len(lags))
+        # The threshold is higher at lags of which a stretch holds less than two.
+        longest = max((stop - start for start, stop in self.stretches), default=len(self.curve))
+        cycles = longest / np.arange(1, len(lags))
         asked = required_strength(cycles, np.inf, self.threshold)
         (self.threshold_,) = upper.plot(
             lags[1:], asked, color="0.4", linestyle="--", linewidth=1, label="threshold"
@@ -203,13 +217,20 @@ class CycleDisplay:
         if self.period is not None:
             period = np.interp(self.period, np.arange(len(lags)), lags)
             self.period_ = upper.axvline(period, color=orange, linewidth=1, label="period")
-        upper.set_xlim(0, times[-1])
+        upper.set_xlim(0, times[longest - 1])
         upper.set_ylim(min(-0.5, self.correlation.min() - 0.05), 1.05)
         upper.set_xlabel(f"lag ({UNITS[unit]})")
         upper.set_ylabel("self-correlation")
         upper.set_title(self._describe(), fontsize="medium")
-        legend_above([upper], *upper.get_legend_handles_labels())
         (self.curve_,) = lower.plot(times, self.curve, color=blue)
+        self.stretches_ = [
+            lower.axvspan(times[start], times[stop - 1], color=orange, alpha=0.15, linewidth=0)
+            for start, stop in self.stretches
+        ]
+        handles, labels = upper.get_legend_handles_labels()
+        if self.stretches_:
+            handles, labels = [*handles, self.stretches_[0]], [*labels, "repeats"]
+        legend_above([upper], handles, labels)
         self.cuts_ = lower.vlines(
             times[self.cuts], 0, 1, transform=lower.get_xaxis_transform(), color=black, linewidth=1
         )
@@ -219,10 +240,11 @@ class CycleDisplay:
         return self
 
     def _describe(self):
-        cycles = max(len(self.cuts) - 1, 0)
-        cut = f"{cycles} whole cycle{'s' * (cycles != 1)}" if len(self.cuts) else ""
+        n = self.n_cycles
+        cut = f"{n} whole cycle{'s' * (n != 1)}" if len(self.cuts) else ""
         found = "" if self.period is None else f"period {self.period:.1f} frames"
-        return ", ".join(filter(None, [self.reason, found, cut])) or "no period"
+        several = f"{len(self.stretches)} stretches" if len(self.stretches) > 1 else ""
+        return ", ".join(filter(None, [self.reason, several, found, cut])) or "no period"
 
 
 def _curve_of(segmenter, fitted, take, x, feature):

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from itertools import pairwise
 from numbers import Integral, Real
 from typing import Any, Literal, Self
 
 import numpy as np
 import pandas as pd
-from scipy.fft import irfft, rfft
 from sklearn.base import BaseEstimator, clone
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
@@ -24,16 +22,24 @@ from ..inputs.facts import TIMELESS
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.types import PerformancesLike
 from ..inputs.validation import check_performances, names_of_input, warn_of_clocks
-from ..matching.costs import StepTable, step_table
-from ..matching.filters import smooth
-from ..matching.trellis import Trellis
-from ..matching.warps import normalise
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from .cutting import as_takes, cut_takes
+from .phases import (
+    FOLLOWS,
+    PHASES,
+    SampledStretch,
+    average_cycle,
+    circular_peak,
+    constant_phases,
+    locate_cycles,
+    match_phases,
+    similarity,
+)
 from .self_correlation import LEAST_CYCLES, correlate, rejection_reason
+from .stretches import Stretch, find_repeats, summary_of
 
 __all__ = [
     "CycleSegmenter",
@@ -46,22 +52,19 @@ __all__ = [
 
 # A fit matches the takes to the template, and estimates it again, so many times.
 _ROUNDS = 2
-# Samples of a cycle, and positions per sample at which a path may stand.
-PHASES, _SUBFRAMES = 32, 4
-# Standard deviation, in samples, of the Gaussian derivative that gives velocities.
-_WIDTH = 1
-# Weight of (rho - 1)^2, for postures and velocities of mean square 1 each; the largest rate rho.
-_SMOOTHNESS, _FASTEST = 0.3, 2
 # Cycles are as long as the learnt ones up to the first ratio, and the same up to the second.
 _AS_LONG, _SAME = 1.25, 1.001
 # Cycles are warned of outside these shares of the period of their take. Right cuts last 0.68 to
 # 1.31 of it, those through several repetitions more than 1.5 (``benchmarks/cycles.py``).
 _SHORT, _LONG = 0.6, 1.5
-# Largest offset of a path from the mean pace, in cycles: at its beginning, and more per cycle.
-_BEGIN, _DRIFT = 0.55, 0.3
-# Cycles of the portions in which long takes are matched, and of their overlap.
-_PORTION, _OVERLAP = 16, 2
-_COLUMNS = {"take": int, "start": int, "stop": int, "complete": bool, "score": float}
+_COLUMNS = {
+    "take": int,
+    "stretch": int,
+    "start": int,
+    "stop": int,
+    "complete": bool,
+    "score": float,
+}
 
 
 class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
@@ -70,15 +73,18 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     A take is one recording of several repetitions. A cycle is one repetition: it becomes one trial
     (performance).
 
-    1. `self_correlation` gives the period of each take, and whether it is cyclic.
-    2. The template of one cycle is the mean of the cycles of all takes at constant period.
-    3. Dense matching aligns every take with the template, repeated periodically: a path may begin
-       and end at any phase. The template is averaged again, twice.
+    1. Stretches are the parts of a take in which it repeats. Standing, turning, starting and
+       stopping are in none. `self_correlation` of a stretch gives its period. A take with a stretch
+       is cyclic.
+    2. The template of one cycle is the mean of the cycles of all stretches at constant period.
+    3. Dense matching aligns every stretch with the template, repeated periodically: a path may
+       begin and end at any phase. The template is averaged again, twice.
     4. The template begins where a foot is farthest ahead, or where a feature is largest.
-    5. Takes are cut where their phase is a whole number.
+    5. Stretches are cut where their phase is a whole number.
 
-    The pieces before the first cut and after the last one are left out, without a warning. Such a
-    piece can hold almost a whole repetition. ``incomplete=True`` returns both pieces, too.
+    What is in no stretch is left out. So are the pieces of a stretch before the first cut and after
+    the last one, and cycles that do not follow the template; ``incomplete=True`` returns these. A
+    piece can hold almost a whole repetition.
 
     Takes that are segmented later are aligned with the template of ``fit``, so all are cut at the
     same phase. A take gives several performances, hence `segment` and no ``transform``.
@@ -97,17 +103,18 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         sign to cut where the hip is highest. None is ``"ahead"`` if the skeleton has feet in space,
         otherwise the feature that repeats best: see ``start_``.
     threshold : float, default=0.4
-        The self-correlation from which a take is cyclic, from 0 to 1. The limit is higher where
+        The self-correlation from which a stretch is cyclic, from 0 to 1. The limit is higher where
         chance correlations are larger: for movements in few directions (``breadth`` of
         `self_correlation`) up to ``(1 + 2 threshold) / 3`` for a single feature; below two cycles
-        it is divided by ``sqrt(n_cycles - 1)``.
+        it is divided by ``sqrt(n_cycles - 1)``; and if the take moves in other places, too.
     refine : bool, default=True
-        Whether takes are matched to the template; False cuts at their constant mean period.
+        Whether stretches are matched to the template; False cuts at their constant mean period.
     incomplete : bool, default=False
-        Whether to return the pieces before the first and after the last whole cycle, too. They are
-        trials with ``complete`` False in the table of `segment`. False leaves them out.
+        Whether to return the pieces of a stretch before its first and after its last whole cycle,
+        and cycles that do not follow the template, too. They are trials with ``complete`` False in
+        the table of `segment`. False leaves them out.
     not_cyclic : {"raise", "skip"}, default="raise"
-        What to do with a take that is not cyclic, or has fewer than 1.6 cycles.
+        What to do with a take without a stretch of at least 1.6 cycles.
     period : (float, float), default=None
         Least and largest number of frames of a cycle, for takes in which several cycles fit: a step
         and two, where every second one is stronger. None takes the shortest of those that repeat
@@ -122,7 +129,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     start_ : str
         What begins a cycle: ``"left"``, ``"right"``, or the name of a feature.
     periods_ : ndarray, shape (n_takes,)
-        Frames of a cycle of each take; NaN for takes that were skipped.
+        Frames of a cycle of each take, in its longest stretch; NaN for takes that were skipped.
     n_features_in_ : int
         Features of a frame.
     feature_names_in_ : ndarray of str
@@ -137,9 +144,10 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     -----
     Gaps (NaN) are refused: fill them before, as by `io.fill_gaps`.
 
-    A cycle lasts at least half the mean period of its take. The pace may change slowly, by a fifth
-    and more. Fit takes of different movements separately, as they have no common template. Scale
-    features of different units before, with ``FrameWise(StandardScaler())``.
+    A cycle lasts at least half the mean period of its stretch. The pace may change slowly, by a
+    fifth and more. Fit takes of different movements separately, as they have no common template;
+    stretches that do not follow it are left out. Scale features of different units before, with
+    ``FrameWise(StandardScaler())``.
 
     Examples
     --------
@@ -218,13 +226,28 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                 raise ValueError(
                     f"{none} cyclic. See report(X); give takes that repeat, or another threshold."
                 )
-            curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
-            sampled = [SampledTake(features[i], found[i].period) for i in kept]
+            stretches = [(i, stretch) for i in kept for stretch in found[i].stretches]
+            sampled = [sampled_stretch(features[i], stretch) for i, stretch in stretches]
             phases = self._learn_phases(sampled, progress)
-            self.start_, start = self._find_start(curves, sampled, phases)
+            template = average_cycle([t.values for t in sampled], phases)
+            follow = [
+                k
+                for k, (t, p) in enumerate(zip(sampled, phases, strict=True))
+                if similarity(template, t, p) >= FOLLOWS
+            ]
+            if 0 < len(follow) < len(stretches):
+                # The others show another movement.
+                stretches, sampled = ([x[k] for k in follow] for x in (stretches, sampled))
+                phases = self._learn_phases(sampled, progress)
+            kept = sorted({i for i, _ in stretches})
+            curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
+            takes_of = [kept.index(i) for i, _ in stretches]
+            self.start_, start = self._find_start(curves, sampled, takes_of, phases)
             self.template_ = average_cycle([t.values for t in sampled], [p - start for p in phases])
             self.periods_ = np.full(len(takes), np.nan)
-            self.periods_[kept] = [found[i].period for i in kept]
+            for i in kept:
+                own = summary_of([stretch for k, stretch in stretches if k == i])
+                self.periods_[i] = own.found.period
         return self
 
     @snapshot
@@ -233,7 +256,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
 
         Every cycle begins at the phase that `start` defines: about the frame where a foot is
         farthest ahead, or where the feature is largest. What precedes the first such frame of a
-        take, and what follows the last one, is left out; ``incomplete=True`` returns it, too.
+        stretch, and what follows the last one, is left out; ``incomplete=True`` returns it, too.
 
         Parameters
         ----------
@@ -248,9 +271,12 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             labelled by the label of the take and their number, and `to_frame` makes one table of
             them.
         locations : DataFrame
-            One row a performance: ``take``, index or label of the take, to group by; ``start`` and
-            ``stop``, frames of the take, ``stop`` excluded; ``complete``, whether it is a whole
-            cycle; ``score``, its cosine similarity to the template, at most 1.
+            One row a performance: ``take``, index or label of the take, to group by; ``stretch``,
+            the number of the stretch in the take, from 0; ``start`` and ``stop``, frames of the
+            take, ``stop`` excluded; ``complete``, whether it is a whole cycle that follows the
+            template; ``score``, its cosine similarity to the template, at most 1. A cycle follows
+            the template from a score of 0.5 on. The first and the last cycle of a stretch also move
+            at 0.85 of its speed where they begin and end, if the take goes on there.
 
         Raises
         ------
@@ -260,21 +286,22 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         Warns
         -----
         UserWarning
-            If a whole cycle lasts less than 0.6 or more than 1.5 periods of its take. A long one
+            If a whole cycle lasts less than 0.6 or more than 1.5 periods of its stretch. A long one
             may hold several repetitions, or a rest; a short one may be a part of a repetition. A
             take in which several cycles fit has the warning of ``fit`` instead.
         """
         check_is_fitted(self)
         given, takes = check_takes(self, X, reset=False)
-        rows, periods = [], np.full(len(takes), np.nan)
-        for i, take, phases, found in self._phases(given, takes):
+        rows, periods = [], []
+        for i, number, stretch, sampled, phases in self._phases(given, takes):
+            cycles = locate_cycles(sampled, phases, self.template_, self.incomplete)
+            own = [(i, number, *row) for row in cycles]
+            rows += own
             # Where several cycles fit there was a warning of that.
-            periods[i] = found.period if len(found.periods) == 1 else np.nan
-            rows += [
-                (i, *row) for row in locate_cycles(take, phases, self.template_, self.incomplete)
-            ]
+            found = stretch.found
+            periods += [found.period if len(found.periods) == 1 else np.nan] * len(own)
         table = pd.DataFrame(rows, columns=list(_COLUMNS)).astype(_COLUMNS)
-        _warn_of_lengths(takes, table[table["complete"]], periods)
+        _warn_of_lengths(takes, table, np.array(periods))
         return cut_takes(given, takes, table)
 
     @snapshot
@@ -289,18 +316,20 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         Returns
         -------
         list of ndarray (n_frames_i,)
-            In cycles: whole numbers where a cycle begins, from 0 to 1 at the first frame. NaN for
-            takes that are skipped.
+            In cycles: whole numbers where a cycle begins, from 0 to 1 at the first frame of the
+            first stretch; the next stretch goes on with the next number. NaN outside the stretches,
+            and for takes that are skipped.
         """
         check_is_fitted(self)
         given, takes = check_takes(self, X, reset=False)
         out = [np.full(len(take), np.nan) for take in takes]
-        for i, take, phases, _ in self._phases(given, takes):
-            out[i] = np.interp(np.arange(len(takes[i])), take.times, phases)
+        for i, _, stretch, sampled, phases in self._phases(given, takes):
+            inside = np.arange(stretch.start, stretch.stop)
+            out[i][inside] = np.interp(inside, sampled.times, phases)
         return out
 
     def report(self, X: PerformancesLike) -> pd.DataFrame:
-        """Whether takes are cyclic, by their self-correlation; no fit is needed.
+        """Whether takes are cyclic, and where, by their self-correlation; no fit is needed.
 
         Parameters
         ----------
@@ -311,42 +340,50 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         -------
         DataFrame
             One row a take, indexed by its label: ``n_frames``; ``period``, frames of a cycle, NaN
-            without any; ``n_cycles``; ``strength``, the self-correlation at the period; ``cyclic``,
-            whether it can be segmented; the ``reason`` why not; and ``periods``, of all cycles that
-            fit.
+            without any; ``n_cycles``, of all stretches; ``strength``, the self-correlation at the
+            period; ``cyclic``, whether it can be segmented; the ``reason`` why not; ``periods``, of
+            all cycles that fit; and ``stretches``, a list of their first frames and of the frames
+            after their last ones. Period, strength and periods are those of the longest stretch, or
+            of the take if it has none.
         """
         self._validate_params()
         given, takes = check_takes(clone(self), X, reset=True)
-        _, found = correlate_takes(self, given, takes)
-        reasons = [rejection_reason(f, self.threshold) for f in found]
-        rows = [
-            (len(x), f.period, f.n_cycles, f.strength, not reason, reason, f.periods.tolist())
-            for x, f, reason in zip(takes, found, reasons, strict=True)
-        ]
+        rows = []
+        for x, (stretches, found, reason) in zip(
+            takes, correlate_takes(self, given, takes)[1], strict=True
+        ):
+            measures = found.period, found.n_cycles, found.strength
+            ends = [(stretch.start, stretch.stop) for stretch in stretches]
+            rows.append((len(x), *measures, not reason, reason, found.periods.tolist(), ends))
         columns = ["n_frames", "period", "n_cycles", "strength", "cyclic", "reason", "periods"]
+        columns.append("stretches")
         index = pd.Index(takes.labels, tupleize_cols=False, name="take")
         return pd.DataFrame(rows, columns=columns, index=index)
 
     def _select_cyclic(self, takes, found):
         """Indices of the takes that are cyclic; an error if others are not to be skipped."""
-        reasons = [rejection_reason(f, self.threshold) for f in found]
-        kept = [i for i, reason in enumerate(reasons) if not reason]
+        kept = [i for i, (_, _, reason) in enumerate(found) if not reason]
         if len(kept) < len(takes) and self.not_cyclic == "raise":
-            i = next(i for i, reason in enumerate(reasons) if reason)
+            i, (_, best, reason) = next((i, f) for i, f in enumerate(found) if f.reason)
             within = "" if self.period is None else f" within period={self.period}"
             raise ValueError(
-                f"{takes.called(i)}: {reasons[i]}{within}. Its self-correlation is "
-                f"{found[i].strength:.2f} at {found[i].n_cycles:.2f} cycles; "
+                f"{takes.called(i)}: {reason}{within}. Its self-correlation is "
+                f"{best.strength:.2f} at {best.n_cycles:.2f} cycles; "
                 f"threshold={self.threshold:g} and at least {LEAST_CYCLES} cycles are required. "
                 'Leave it out, give a longer take, or set not_cyclic="skip"; see report(X).'
             )
-        several = [i for i in kept if len(found[i].periods) > 1]
+        several = {
+            i: stretch.found
+            for i in reversed(kept)
+            for stretch in found[i].stretches
+            if len(stretch.found.periods) > 1
+        }
         if several:
-            i = several[0]
-            periods = ", ".join(f"{period:.1f}" for period in found[i].periods)
+            i, first = min(several.items(), key=lambda item: item[0])
+            periods = ", ".join(f"{period:.1f}" for period in first.periods)
             warnings.warn(
                 f"{takes.called(i)}: several cycles fit, of {periods} frames; "
-                f"{found[i].period:.1f} is taken. This holds for {len(several)} of {len(takes)} "
+                f"{first.period:.1f} is taken. This holds for {len(several)} of {len(takes)} "
                 "takes. Give period=(least, largest), in frames, to choose; report(X)['periods'] "
                 "lists what fits.",
                 UserWarning,
@@ -355,14 +392,21 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         return kept
 
     def _phases(self, given, takes):
-        """Yield index, samples, their phases, and self-correlation of every take that is cyclic."""
+        """Yield, for every stretch of every cyclic take, what is known of it.
+
+        Index of the take, number of the stretch in it, the stretch, its samples, and their phases.
+        """
         features, found = correlate_takes(self, given, takes)
         found = [as_learnt(self, x, f) for x, f in zip(features, found, strict=True)]
         align = match_phases if self.refine else constant_phases
         for i in self._select_cyclic(takes, found):
-            take = SampledTake(features[i], found[i].period)
-            phases = align(self.template_, take)
-            yield i, take, phases - np.floor(phases[0]), found[i]
+            first = 0
+            for number, stretch in enumerate(found[i].stretches):
+                sampled = sampled_stretch(features[i], stretch)
+                phases = align(self.template_, sampled)
+                phases += first - np.floor(phases[0])
+                first = np.ceil(phases[-1])
+                yield i, number, stretch, sampled, phases
 
     def _learn_phases(self, sampled, progress):
         """Phases of takes without a template: at constant pace one by one, then matched."""
@@ -380,7 +424,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                 step()
         return phases
 
-    def _find_start(self, curves, sampled, phases):
+    def _find_start(self, curves, sampled, takes_of, phases):
         """The name of what begins a cycle, and its phase in the template."""
         if curves is None:
             width = sampled[0].values.shape[1] // 2
@@ -392,7 +436,10 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             return compared_names(self)[best], circular_peak(mean[:, best]) / PHASES
         cycles = {
             name: average_cycle(
-                [take.sample(c[:, np.newaxis]) for take, c in zip(sampled, of_all, strict=True)],
+                [
+                    stretch.sample(of_all[k][:, np.newaxis])
+                    for stretch, k in zip(sampled, takes_of, strict=True)
+                ],
                 phases,
             )[:, 0]
             for name, of_all in curves.items()
@@ -416,7 +463,7 @@ def check_takes(segmenter, X, *, reset):
 
 
 def correlate_takes(segmenter, given, takes, step=None):
-    """The compared features of takes, in float64, and their self-correlations.
+    """The compared features of takes, in float64, and what repeats in them.
 
     The features are the directions of limbs if there is a skeleton, else those of the takes.
     """
@@ -427,24 +474,35 @@ def correlate_takes(segmenter, given, takes, step=None):
     features = [np.asarray(x, dtype=np.float64) for x in takes]
     found = []
     for x in features:
-        found.append(correlate(x, limits))
+        found.append(find_repeats(x, segmenter.threshold, limits))
         if step is not None:
             step()
     return features, found
 
 
 def as_learnt(segmenter, features, found):
-    """The self-correlation of a take at the only cycle that is as long as those of the fit.
+    """What repeats in a take, at the only cycle that is as long as those of the fit.
 
-    It is returned as found if one cycle fits, or none or several are as long.
+    A stretch stays as found if one cycle fits, or none or several are as long.
     """
-    learnt, fits = segmenter.periods_, found.periods
-    near = (fits >= np.nanmin(learnt) / _AS_LONG) & (fits <= np.nanmax(learnt) * _AS_LONG)
-    if len(fits) < 2 or near.sum() != 1:
-        return found
-    (period,) = fits[near]
-    chosen = correlate(features, (period / _SAME, period * _SAME))
-    return found if rejection_reason(chosen, segmenter.threshold) else chosen
+    learnt, stretches = segmenter.periods_, []
+    for stretch in found.stretches:
+        fits = stretch.found.periods
+        near = (fits >= np.nanmin(learnt) / _AS_LONG) & (fits <= np.nanmax(learnt) * _AS_LONG)
+        if len(fits) > 1 and near.sum() == 1:
+            (period,) = fits[near]
+            inside = features[stretch.start : stretch.stop]
+            chosen = correlate(inside, (period / _SAME, period * _SAME))
+            if not rejection_reason(chosen, segmenter.threshold):
+                stretches.append(Stretch(stretch.start, stretch.stop, chosen))
+                continue
+        stretches.append(stretch)
+    return summary_of(stretches) if stretches else found
+
+
+def sampled_stretch(features, stretch):
+    """A stretch of a take with features, ready to be matched."""
+    return SampledStretch(features, stretch.found.period, stretch.start, stretch.stop)
 
 
 def _check_period(period):
@@ -505,8 +563,8 @@ def _has_feet(skeleton):
 
 
 def _warn_of_lengths(takes, table, periods):
-    """Warn of whole cycles that are far longer or far shorter than the period of their take."""
-    shares = (table["stop"] - 1 - table["start"]) / periods[table["take"]]
+    """Warn of whole cycles that are far longer or far shorter than the period of their stretch."""
+    shares = ((table["stop"] - 1 - table["start"]) / periods)[table["complete"]]
     odd = shares[(shares < _SHORT) | (shares > _LONG)]
     if odd.empty:
         return
@@ -515,150 +573,9 @@ def _warn_of_lengths(takes, table, periods):
     several = "several repetitions, or a rest" if odd[row] > 1 else "only a part of a repetition"
     warnings.warn(
         f"{takes.called(i)}: the cycle from start {start} to stop {stop} has {stop - start} "
-        f"frames, but the period of the take is {periods[i]:.1f}. It may hold {several}. This "
-        f"holds for {len(odd)} of {len(table)} whole cycles. Look at the cuts with CycleDisplay, "
+        f"frames, but the period of the take is {periods[row]:.1f}. It may hold {several}. This "
+        f"holds for {len(odd)} of {len(shares)} whole cycles. Look at the cuts with CycleDisplay, "
         "leave such cycles out by 'start' and 'stop' of the table, or cut by other features.",
         UserWarning,
         stacklevel=4,
     )
-
-
-# -- phases of a take: matching with one cycle that is repeated periodically ---------------
-
-
-class SampledTake:
-    """A take with about `PHASES` samples a cycle.
-
-    Parameters
-    ----------
-    features : ndarray, shape (n_frames, n_features)
-    period : float
-        Mean number of frames of a cycle.
-
-    Attributes
-    ----------
-    times : ndarray, shape (n_samples,)
-        Frames of the samples, from the first to the last.
-    values : ndarray, shape (n_samples, 2 * n_features)
-        Postures less their mean, and velocities; each of mean square 1.
-    mean_phases : ndarray, shape (n_samples,)
-        Phases at the mean pace, 0 at the first frame.
-    """
-
-    def __init__(self, features, period):
-        last = len(features) - 1
-        n_samples = max(round(last / period * PHASES), 1) + 1
-        self.times = np.linspace(0, last, n_samples)
-        self.mean_phases = self.times / period
-        postures = self.sample(smooth(features[np.newaxis], period / PHASES / 2)[0])
-        velocities = smooth(postures[np.newaxis], _WIDTH, 1)[0]
-        self.values = np.concatenate([_standardise(postures), _standardise(velocities)], axis=1)
-
-    def sample(self, values):
-        """Values of frames (n_frames, n) at the samples."""
-        return normalise([np.ascontiguousarray(values, dtype=np.float64)], len(self.times))[0]
-
-
-def _standardise(x):
-    x = x - x.mean(axis=0)
-    size = np.sqrt(np.square(x).sum() / len(x))
-    return x / size if size > 0 else x
-
-
-def average_cycle(many_values, many_phases):
-    """The mean cycle of values (n_samples, n) of known phases: (PHASES, n).
-
-    Each sample of the cycle is the mean over all cycles of all takes that have it.
-    """
-    sums = np.zeros((PHASES, many_values[0].shape[1]))
-    counts = np.zeros(PHASES)
-    for values, phases in zip(many_values, many_phases, strict=True):
-        places = PHASES * phases
-        wanted = np.arange(np.ceil(places[0]), np.floor(places[-1]) + 1)
-        after = np.clip(np.searchsorted(places, wanted), 1, len(places) - 1)
-        gaps = places[after] - places[after - 1]
-        share = ((wanted - places[after - 1]) / np.where(gaps > 0, gaps, 1))[:, np.newaxis]
-        found = (1 - share) * values[after - 1] + share * values[after]
-        at = wanted.astype(int) % PHASES
-        np.add.at(sums, at, found)
-        counts += np.bincount(at, minlength=PHASES)
-    return sums / np.maximum(counts, 1)[:, np.newaxis]
-
-
-def constant_phases(template, take):
-    """Phases at the mean pace, shifted to the best circular correlation with the template."""
-    own = average_cycle([take.values], [take.mean_phases])
-    products = rfft(template, axis=0) * rfft(own, axis=0).conj()
-    correlation = irfft(products.sum(axis=1), PHASES)
-    return take.mean_phases + correlation.argmax() / PHASES
-
-
-def match_phases(template, take):
-    """Phases of the best path of a take along the repeated template (Eqs. 12-17).
-
-    Takes of many cycles are matched in overlapping portions, so that time and memory grow linearly.
-    The phases of a portion end in the middle of the overlap with the next one.
-    """
-    values, cycle = take.values, _upsample(template)
-    whole, overlap = _PORTION * PHASES, _OVERLAP * PHASES
-    phases = _match_portion(cycle, values[: whole + overlap])
-    for start in range(whole, len(values) - overlap, whole):
-        portion = _match_portion(cycle, values[start : start + whole + overlap])
-        middle = overlap // 2
-        portion += np.round(phases[start + middle] - portion[middle])
-        phases = np.concatenate([phases[: start + middle], portion[middle:]])
-    return np.maximum.accumulate(phases)
-
-
-def _match_portion(cycle, values):
-    steps, moving, inner, _, _ = step_table("posture", _FASTEST, _SUBFRAMES)
-    table = StepTable(steps, moving, inner, np.square(steps / _SUBFRAMES - 1), _SUBFRAMES)
-    reach = int(np.ceil(PHASES * _BEGIN + _DRIFT * len(values)))
-    trellis = Trellis(table, _SMOOTHNESS, reach, free=True)
-    last = (len(values) - 1) * _SUBFRAMES
-    positions = np.arange(-trellis.width, last + 1 + trellis.width)
-    repeated = cycle[positions % len(cycle)]
-    (path,) = trellis.paths(values[np.newaxis], repeated[np.newaxis])[0]
-    return (np.arange(0, last + 1, _SUBFRAMES) + path) / len(cycle)
-
-
-def _upsample(template):
-    """The closed template at `_SUBFRAMES` positions per sample, by linear interpolation."""
-    share = (np.arange(_SUBFRAMES) / _SUBFRAMES)[:, np.newaxis]
-    following = np.roll(template, -1, axis=0)[:, np.newaxis]
-    fine = (1 - share) * template[:, np.newaxis] + share * following
-    return fine.reshape(-1, template.shape[1])
-
-
-def circular_peak(curve):
-    """Where a closed curve has its maximum, between samples, by a parabola."""
-    k = int(curve.argmax())
-    before, here, after = (curve[(k + j) % len(curve)] for j in (-1, 0, 1))
-    bend = before - 2 * here + after
-    return k + ((before - after) / (2 * bend) if bend < 0 else 0.0)
-
-
-def locate_cycles(take, phases, template, incomplete):
-    """Yield start, stop, completeness, and similarity to the template, of cycles of a take."""
-    last = int(take.times[-1])
-    whole = np.arange(np.ceil(phases[0]), np.floor(phases[-1]) + 1)
-    # np.interp needs phases that rise.
-    rising = phases + np.linspace(0, 1e-9, len(phases))
-    frames = np.round(np.interp(whole, rising, take.times)).astype(int)
-    ends = list(zip(whole, frames.tolist(), strict=True))
-    if incomplete:
-        ends = [(phases[0], 0), *ends, (phases[-1], last)]
-    for (first, start), (following, stop) in pairwise(ends):
-        if stop > start:
-            score = _similarity(template, take, phases, first, following)
-            yield start, stop + 1, bool(following - first > 1 - 1e-6), score
-
-
-def _similarity(template, take, phases, first, last):
-    """Cosine similarity of a take to the template, from one phase to another."""
-    inside = (phases >= first) & (phases < last)
-    cycle = _upsample(template)
-    expected = cycle[np.round(phases[inside] * len(cycle)).astype(int) % len(cycle)].ravel()
-    values = take.values[inside].ravel()
-    size = np.sqrt((values @ values) * (expected @ expected))
-    return float(values @ expected / size) if size > 0 else 0.0

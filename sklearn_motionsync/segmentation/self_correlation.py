@@ -19,10 +19,15 @@ from ..matching.filters import smooth
 __all__ = [
     "LEAST_CYCLES",
     "SelfCorrelation",
+    "breadth_of",
     "correlate",
+    "noise_gain",
+    "noise_of",
     "rejection_reason",
     "required_strength",
     "self_correlation",
+    "smoothing_width",
+    "with_period",
 ]
 
 # Cycles that a take must hold at least to show that it repeats.
@@ -32,6 +37,8 @@ _OVERLAP = 0.3
 # Multiples of a period have peaks, too: the period is at the first peak of this share of the
 # highest.
 _NEAR = 0.9
+# Of a period that many times longer than another one a take must hold two.
+_FAR = 2.5
 # Other cycles fit where the strength is this share of the one that the default threshold requires.
 _FITS, _THRESHOLD = 0.6, 0.4
 # A lag this near to a multiple of a period is that multiple; lags of a lower ratio are one.
@@ -165,13 +172,13 @@ def correlate(x, limits=None):
     n_frames = len(x)
     x = x.astype(np.float64) - x[0]
     x -= x.mean(axis=0)
-    width, n_lags, noise = _smoothing_width(x), int((1 - _OVERLAP) * n_frames) + 1, _noise(x)
+    width, n_lags, noise = smoothing_width(x), int((1 - _OVERLAP) * n_frames) + 1, noise_of(x)
     smoothed = [smooth(x[np.newaxis], width, order)[0] for order in (0, 1)]
     posture, velocity = (
-        _autocorrelation(y, n_lags, noise * _noise_gain(width, order))
+        _autocorrelation(y, n_lags, noise * noise_gain(width, order))
         for order, y in enumerate(smoothed)
     )
-    breadth, correlation = _breadth(smoothed[0]), (posture + velocity) / 2
+    breadth, correlation = breadth_of(smoothed[0]), (posture + velocity) / 2
     peaks = _find_peaks(correlation, posture)
     lags, values = _vertices(correlation, peaks)
     if limits is not None:
@@ -179,16 +186,32 @@ def correlate(x, limits=None):
         lags, values = lags[inside], values[inside]
     period, periods, strength, n_cycles = np.nan, np.empty(0), 0.0, 0.0
     if len(lags):
-        first = int(np.argmax(values >= _NEAR * values.max()))
+        required = required_strength(n_frames / lags, breadth, _THRESHOLD)
+        shown = _are_shown(n_frames, lags, values >= required)
+        first = int(np.argmax(values >= _NEAR * values[shown].max()))
         period, strength = float(lags[first]), float(values[first])
         n_cycles = n_frames / period
-        fits = values >= _FITS * required_strength(n_frames / lags, breadth, _THRESHOLD)
+        fits = shown & (values >= _FITS * required)
         fits &= np.maximum(lags / period, period / lags) >= _DISTINCT
         fits[first] = True
         periods = _distinct_periods(lags[fits], values[fits], period)
     return SelfCorrelation(
         correlation, posture, velocity, peaks, period, strength, n_cycles, breadth, periods
     )
+
+
+def with_period(found, period, n_cycles):
+    """A self-correlation with another period and number of cycles."""
+    return SelfCorrelation(*found[:4], period, found.strength, n_cycles, *found[7:])
+
+
+def _are_shown(n_frames, lags, strong):
+    """Whether a take shows that the movement of a lag repeats: it holds it twice.
+
+    Others count, too, unless one that is strong is far shorter.
+    """
+    far = lags > _FAR * (lags[strong][0] if strong.any() else np.inf)
+    return (n_frames >= 2 * lags) | ~far
 
 
 def _distinct_periods(lags, values, period):
@@ -227,7 +250,7 @@ def rejection_reason(found, threshold):
     return "" if enough else f"holds {np.floor(100 * found.n_cycles) / 100:.2f} cycles"
 
 
-def _breadth(x):
+def breadth_of(x):
     """The participation ratio of the variances of features along their principal components."""
     x = x - x.mean(axis=0)
     products = x.T @ x
@@ -235,7 +258,7 @@ def _breadth(x):
     return float(1 / np.square(products / total).sum()) if total > 0 else 1.0
 
 
-def _smoothing_width(x):
+def smoothing_width(x):
     """Standard deviation, in frames, of the Gaussian that smooths centred features."""
     change, bend = (np.square(np.diff(x, k, axis=0)).sum() / max(len(x) - k, 1) for k in (1, 2))
     # White noise of variance 1 has first differences of variance 2 and second ones of variance 6.
@@ -243,7 +266,7 @@ def _smoothing_width(x):
     return _SMOOTHING * np.sqrt(np.square(x).sum() / len(x) / change) if change > 0 else 0.0
 
 
-def _noise(x):
+def noise_of(x):
     """Variance of white noise in centred features, reduced by its share of the whole variance."""
     bends = np.diff(x, 3, axis=0)
     energy = np.square(x).sum() / len(x)
@@ -253,7 +276,7 @@ def _noise(x):
     return noise * max(1 - noise / energy, 0) if energy > 0 else 0.0
 
 
-def _noise_gain(width, order):
+def noise_gain(width, order):
     """The share of the variance of white noise that passes a filter."""
     middle = int(np.ceil(4 * width)) + 2
     impulse = np.zeros((1, 2 * middle + 1, 1))

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from sklearn_motionsync import CycleSegmenter
-from sklearn_motionsync.segmentation.cycles import (
+from sklearn_motionsync.segmentation.phases import (
     PHASES,
     average_cycle,
     circular_peak,
@@ -59,23 +59,45 @@ def test_cycles_end_where_their_phase_is_reached_and_are_scored_by_themselves():
     phases[np.abs(phases - 2) < 0.2] = 2
     values = TEMPLATE[np.round(phases * PHASES).astype(int) % PHASES]
     values[phases >= 4] = np.random.default_rng(0).normal(size=((phases >= 4).sum(), 3))
-    take = SimpleNamespace(times=times, values=values)
+    take = SimpleNamespace(times=times, values=values, begins=False, ends=False)
     rows = list(locate_cycles(take, phases, TEMPLATE, incomplete=True))
     stands = int(times[phases == 2][0])
     starts = [0, round(np.interp(1, phases, times)), stands]
     starts += [round(np.interp(k, phases, times)) for k in (3, 4, 5)]
     assert [row[0] for row in rows] == starts
     assert [row[1] for row in rows] == [start + 1 for start in [*starts[1:], 318]]
-    assert [row[2] for row in rows] == [False, True, True, True, True, False]
+    # The last but one is whole, and does not follow the template.
+    assert [row[2] for row in rows] == [False, True, True, True, False, False]
     assert all(row[3] > 0.99 for row in rows[:4])
-    assert max(row[3] for row in rows[4:]) < 0.7
+    assert max(row[3] for row in rows[4:]) < 0.5
     whole = list(locate_cycles(take, phases, TEMPLATE, incomplete=False))
-    assert whole == rows[1:-1]
+    assert whole == rows[1:4]
+
+
+@pytest.mark.parametrize("side", ["begins", "ends"])
+def test_a_cycle_that_begins_or_ends_in_standing_is_no_whole_one(side):
+    """Only where the take goes on there: else it was cut off in motion."""
+    phases, stands = np.linspace(0.25, 4.75, 145), (0.95, 1.2) if side == "begins" else (3.8, 4.05)
+    values = TEMPLATE[np.round(phases * PHASES).astype(int) % PHASES]
+    values = np.concatenate([values, np.roll(values, -8, axis=0)], axis=1)
+    template = np.concatenate([TEMPLATE, np.roll(TEMPLATE, -8, axis=0)], axis=1)
+    values[(phases > stands[0]) & (phases < stands[1]), 3:] *= 0.1
+    take = SimpleNamespace(times=np.arange(145.0), values=values, begins=False, ends=False)
+    rows = list(locate_cycles(take, phases, template, incomplete=False))
+    assert len(rows) == 3
+    setattr(take, side, True)
+    rest = rows[1:] if side == "begins" else rows[:-1]
+    assert list(locate_cycles(take, phases, template, incomplete=False)) == rest
+    pieces = list(locate_cycles(take, phases, template, incomplete=True))
+    assert [row[:3] for row in pieces if row[2]] == [row[:3] for row in rest]
+    longest = max(row[1] - row[0] for row in pieces if not row[2])
+    assert longest > 33
 
 
 def test_no_part_is_empty_where_a_take_begins_and_ends_with_a_whole_phase():
     phases = np.linspace(1, 3, 65)
-    take = SimpleNamespace(times=np.arange(65.0), values=np.tile(TEMPLATE, (3, 1))[:65])
+    values = np.tile(TEMPLATE, (3, 1))[:65]
+    take = SimpleNamespace(times=np.arange(65.0), values=values, begins=False, ends=False)
     rows = list(locate_cycles(take, phases, TEMPLATE, incomplete=True))
     assert [row[:3] for row in rows] == [(0, 33, True), (32, 65, True)]
 
