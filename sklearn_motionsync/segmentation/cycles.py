@@ -17,10 +17,12 @@ from ..body.direction_cosines import DirectionCosines
 from ..body.formats import SIDES
 from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
+from ..gait.events import find_events
+from ..gait.recordings import FOOT_STRIKE, Recordings
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS
 from ..inputs.features import choose_features, names_of_features
-from ..inputs.types import PerformancesLike
+from ..inputs.types import PerformancesLike, ValuesLike
 from ..inputs.validation import check_performances, names_of_input, warn_of_clocks
 from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
@@ -36,6 +38,7 @@ from .phases import (
     constant_phases,
     locate_cycles,
     match_phases,
+    move_to_events,
     similarity,
 )
 from .self_correlation import LEAST_CYCLES, correlate, rejection_reason
@@ -67,6 +70,10 @@ _COLUMNS = {
 }
 
 
+# The foot whose strike begins a cycle.
+STRIKES = {f"{side} strike": side for side in SIDES}
+
+
 class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
     """Cut long takes of walking, running, or any movement that repeats, into its cycles.
 
@@ -95,13 +102,15 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         Skeleton of joint positions: then directions of limbs are compared, independent of path and
         heading, and the positions are cut as they are. None compares the features themselves, each
         weighted by its variance.
-    start : {"left", "right", "ahead"}, str or int, default=None
+    start : {"left", "right", "ahead", "left strike", "right strike"}, str or int, default=None
         Where cycles begin. With a skeleton ``"left"`` or ``"right"``: where that ankle is farthest
-        ahead of the pelvis, about when the foot strikes; ``"ahead"``: the same for the foot that
-        comes farther. Or a compared feature, by name or index: where it is largest. In
-        pictures, where y runs down, the y of a hip is largest where the hip is lowest; change its
-        sign to cut where the hip is highest. None is ``"ahead"`` if the skeleton has feet in space,
-        otherwise the feature that repeats best: see ``start_``.
+        ahead of the pelvis, some hundredths of a second before the foot strikes; ``"ahead"``: the
+        same for the foot that comes farther; ``"left strike"`` or ``"right strike"``: where that
+        foot strikes, by `gait_events`, which needs the frame rate. Or a compared feature, by name
+        or index: where it is largest. In pictures, where y runs down, the y of a hip is largest
+        where the hip is lowest; change its sign to cut where the hip is highest. None is
+        ``"ahead"`` if the skeleton has feet in space, otherwise the feature that repeats best: see
+        ``start_``.
     threshold : float, default=0.4
         The self-correlation from which a stretch is cyclic, from 0 to 1. The limit is higher where
         chance correlations are larger: for movements in few directions (``breadth`` of
@@ -120,6 +129,8 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         and two, where every second one is stronger. None takes the shortest of those that repeat
         best, and warns of the others. After ``fit`` it is the only one as long as the cycles that
         were learnt, within a quarter, if there is one, without a warning.
+    frame_rate : float, or array-like of shape (n_takes,), default=None
+        Frames a second, for strikes; by default what tables tell.
 
     Attributes
     ----------
@@ -127,7 +138,8 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         The mean cycle from its start on: postures less the mean of their take, and velocities, each
         divided by its root mean square.
     start_ : str
-        What begins a cycle: ``"left"``, ``"right"``, or the name of a feature.
+        What begins a cycle: ``"left"``, ``"right"``, ``"left strike"``, ``"right strike"``, or the
+        name of a feature.
     periods_ : ndarray, shape (n_takes,)
         Frames of a cycle of each take, in its longest stretch; NaN for takes that were skipped.
     n_features_in_ : int
@@ -172,6 +184,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         "incomplete": ["boolean"],
         "not_cyclic": [StrOptions({"raise", "skip"})],
         "period": [tuple, list, np.ndarray, None],
+        "frame_rate": [Interval(Real, 0, None, closed="neither"), "array-like", None],
     }
 
     def __init__(
@@ -183,6 +196,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         incomplete: bool = False,
         not_cyclic: Literal["raise", "skip"] = "raise",
         period: Sequence[float] | np.ndarray | None = None,
+        frame_rate: float | ValuesLike | None = None,
     ) -> None:
         self.skeleton = skeleton
         self.start = start
@@ -191,6 +205,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         self.incomplete = incomplete
         self.not_cyclic = not_cyclic
         self.period = period
+        self.frame_rate = frame_rate
 
     @atomic_fit
     @validated
@@ -216,6 +231,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             ``not_cyclic="raise"``; no take is left; or there is no such `start`.
         """
         given, takes = check_takes(self, X, reset=True)
+        strikes = strikes_of(self, given) if self.start in STRIKES else None
         with self._progress(fits=True) as progress:
             step = progress.stage("correlating takes", len(takes))
             features, found = correlate_takes(self, given, takes, step)
@@ -240,9 +256,13 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                 stretches, sampled = ([x[k] for k in follow] for x in (stretches, sampled))
                 phases = self._learn_phases(sampled, progress)
             kept = sorted({i for i, _ in stretches})
-            curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
             takes_of = [kept.index(i) for i, _ in stretches]
-            self.start_, start = self._find_start(curves, sampled, takes_of, phases)
+            if strikes is not None:
+                own = [strikes[i] for i, _ in stretches]
+                self.start_, start = self.start, _phase_of(self.start, own, sampled, phases)
+            else:
+                curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
+                self.start_, start = self._find_start(curves, sampled, takes_of, phases)
             self.template_ = average_cycle([t.values for t in sampled], [p - start for p in phases])
             self.periods_ = np.full(len(takes), np.nan)
             for i in kept:
@@ -399,11 +419,14 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         features, found = correlate_takes(self, given, takes)
         found = [as_learnt(self, x, f) for x, f in zip(features, found, strict=True)]
         align = match_phases if self.refine else constant_phases
+        strikes = strikes_of(self, given) if self.start_ in STRIKES else None
         for i in self._select_cyclic(takes, found):
             first = 0
             for number, stretch in enumerate(found[i].stretches):
                 sampled = sampled_stretch(features[i], stretch)
                 phases = align(self.template_, sampled)
+                if strikes is not None:
+                    phases = move_to_events(sampled.times, phases, strikes[i])
                 phases += first - np.floor(phases[0])
                 first = np.ceil(phases[-1])
                 yield i, number, stretch, sampled, phases
@@ -538,6 +561,7 @@ def start_curves(segmenter, X, features):
     has_feet = _has_feet(skeleton)
     if start is None and not has_feet:
         return None
+    start = STRIKES.get(start, start)
     if start in (None, "ahead") or (start in SIDES and skeleton is not None):
         if not has_feet:
             raise ValueError(
@@ -552,6 +576,35 @@ def start_curves(segmenter, X, features):
     names = compared_names(segmenter)
     (k,) = choose_features([start], names)
     return {names[k]: [x[:, k] for x in features]}
+
+
+def strikes_of(segmenter, X):
+    """The frames of takes at which the foot of ``start`` strikes, with fractions."""
+    if segmenter.skeleton is None:
+        raise ValueError(
+            f"start={segmenter.start!r} needs skeleton=, that of joint positions, and the frame "
+            "rate: frame_rate=, or tables that tell it."
+        )
+    recordings = Recordings(X, segmenter.skeleton, None, segmenter.frame_rate)
+    side, found = STRIKES[segmenter.start], []
+    for i in range(len(recordings)):
+        walk = recordings.walk(i)
+        wanted = FOOT_STRIKE, side
+        found.append(np.array([k for *what, k in find_events(walk) if tuple(what) == wanted]))
+        found[-1] = found[-1] / walk.per_frame
+    return found
+
+
+def _phase_of(start, strikes, sampled, phases):
+    """The phase at which feet strike, in the mean of stretches."""
+    at = [
+        np.interp(own[(own >= take.times[0]) & (own <= take.times[-1])], take.times, of_take)
+        for own, take, of_take in zip(strikes, sampled, phases, strict=True)
+    ]
+    at = np.concatenate(at)
+    if not len(at):
+        raise ValueError(f"No {start} is found where the takes repeat; look at gait_events(X).")
+    return float(np.angle(np.exp(2j * np.pi * at).mean()) / (2 * np.pi))
 
 
 def _has_feet(skeleton):

@@ -19,6 +19,7 @@ __all__ = [
     "constant_phases",
     "locate_cycles",
     "match_phases",
+    "move_to_events",
     "similarity",
 ]
 
@@ -35,6 +36,8 @@ _BEGIN, _DRIFT = 0.55, 0.3
 _PACE, _OUTER = 0.85, 0.1
 # Cycles follow the template from this similarity on.
 FOLLOWS = 0.5
+# A known beginning of a cycle is at most so far from that of the match, in cycles.
+_NEAR = 0.2
 # Cycles of the portions in which long takes are matched, and of their overlap.
 _PORTION, _OVERLAP = 16, 2
 
@@ -159,6 +162,28 @@ def circular_peak(curve):
     before, here, after = (curve[(k + j) % len(curve)] for j in (-1, 0, 1))
     bend = before - 2 * here + after
     return k + ((before - after) / (2 * bend) if bend < 0 else 0.0)
+
+
+def move_to_events(times, phases, events):
+    """Phases that are whole numbers at events which are near such phases.
+
+    Parameters
+    ----------
+    times, phases : ndarray, shape (n_samples,)
+        Of a stretch.
+    events : ndarray
+        The times at which cycles begin, as far as they are known.
+    """
+    inside = events[(events >= times[0]) & (events <= times[-1])]
+    at = np.interp(inside, times, phases)
+    whole = np.round(at)
+    near = np.abs(at - whole) < _NEAR
+    # Of two events at the same beginning none is sure.
+    values, counts = np.unique(whole[near], return_counts=True)
+    near &= np.isin(whole, values[counts == 1])
+    if not near.any():
+        return phases
+    return np.maximum.accumulate(phases + np.interp(phases, at[near], (whole - at)[near]))
 
 
 def locate_cycles(take, phases, template, incomplete):

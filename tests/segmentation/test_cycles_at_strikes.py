@@ -1,0 +1,81 @@
+"""CycleSegmenter(start="left strike"): cycles begin where the foot strikes."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn_motionsync import CycleSegmenter, gait_events
+from sklearn_motionsync.datasets import load_performances, make_walk
+from sklearn_motionsync.segmentation.phases import move_to_events
+
+WALK = make_walk(4, n_strides=6, random_state=0)
+
+
+def strikes(x, skeleton, context, rate):
+    found = gait_events([x], skeleton, frame_rate=rate)
+    rows = (found["label"] == "Foot Strike") & (found["context"] == context)
+    return found.loc[rows, "frame"].to_numpy()
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_cuts_of_people_not_seen_are_the_strikes(side):
+    segmenter = CycleSegmenter(WALK.skeleton, start=f"{side} strike", frame_rate=100)
+    _, table = segmenter.fit(WALK.data[:2]).segment(WALK.data[2:])
+    assert segmenter.start_ == f"{side} strike"
+    for take in range(2):
+        known = strikes(WALK.data[2 + take], WALK.skeleton, side.capitalize(), 100)
+        starts = table.loc[table["take"] == take, "start"]
+        assert len(starts) == len(known) - 1
+        assert np.abs(starts - known[:-1]).max() <= 0.5
+        true = [
+            event["frame"] for event in WALK.events[2 + take]
+            if (event["label"], event["context"]) == ("Foot Strike", side.capitalize())
+        ]  # fmt: skip
+        assert np.abs(starts - true[:-1]).max() < 1.5
+
+
+def test_phases_are_whole_at_strikes():
+    segmenter = CycleSegmenter(WALK.skeleton, start="left strike", frame_rate=100).fit(WALK.data)
+    for x, phases in zip(WALK.data, segmenter.phases(WALK.data), strict=True):
+        at = np.interp(strikes(x, WALK.skeleton, "Left", 100), np.arange(len(x)), phases)
+        assert np.abs(at - np.round(at)).max() < 0.01
+
+
+def test_frame_rate_of_tables():
+    tables = []
+    for x in WALK.data:
+        df = pd.DataFrame(x, columns=WALK.skeleton.column_names)
+        df.attrs |= {"frame_rate": 100.0, "up": "y"}
+        tables.append(df)
+    plain = CycleSegmenter(WALK.skeleton, start="left strike", frame_rate=100).fit(WALK.data)
+    known = CycleSegmenter(WALK.skeleton, start="left strike").fit(tables)
+    expected, found = (s.segment(X)[1] for s, X in ((plain, WALK.data), (known, tables)))
+    assert found["start"].tolist() == expected["start"].tolist()
+
+
+def test_cuts_of_recorded_walks(real_data):
+    bunch = load_performances(real_data / "cmu07_walk" / "cmu07_walk_positions.npz")
+    segmenter = CycleSegmenter(bunch.skeleton, start="left strike", frame_rate=60)
+    _, table = segmenter.fit(bunch.data[:6]).segment(bunch.data[6:])
+    assert len(table) >= 12
+    for take, start in zip(table["take"], table["start"], strict=True):
+        known = strikes(bunch.data[6 + take], bunch.skeleton, "Left", 60)
+        assert np.abs(known - start).min() <= 0.5
+
+
+def test_events_far_from_a_beginning_do_not_count():
+    times, phases = np.arange(101.0), np.arange(101) / 25
+    moved = move_to_events(times, phases, np.array([27.0, 40.0, 74.0]))
+    np.testing.assert_allclose(moved[[27, 74]], [1, 3], atol=1e-9)
+    assert (np.diff(moved) >= 0).all()
+    same = move_to_events(times, phases, np.array([40.0]))
+    np.testing.assert_array_equal(same, phases)
+    # Of two near one beginning none is sure.
+    same = move_to_events(times, phases, np.array([24.0, 27.0]))
+    np.testing.assert_array_equal(same, phases)
+
+
+def test_refused():
+    with pytest.raises(ValueError, match=r"start='left strike' needs skeleton="):
+        CycleSegmenter(start="left strike").fit(WALK.data)
+    with pytest.raises(ValueError, match="The frame rate of performance 0 is not known"):
+        CycleSegmenter(WALK.skeleton, start="left strike").fit(WALK.data)
