@@ -12,7 +12,7 @@ from ..inputs.types import Unit
 from ..inputs.wording import counted
 from .match import timing_table
 
-__all__ = ["Lags"]
+__all__ = ["Lags", "common_delay", "share_apart"]
 
 # Level of the confidence intervals.
 _CONFIDENCE = 0.95
@@ -21,8 +21,9 @@ _CONFIDENCE = 0.95
 class Lags(NamedTuple):
     """How much later than the rest of the body each part is, at every frame of the pattern.
 
-    `PartSynchronizer.lags` returns them. Lags are relative to the pattern, whose lags are 0. Their
-    spread shows whether a lag is a habit of subjects or varies from performance to performance.
+    `PartSynchronizer.lags` returns them. Lags are counted from the mean of the training
+    performances. Their spread shows whether a lag is a habit of subjects or varies from performance
+    to performance.
 
     Parameters
     ----------
@@ -136,6 +137,45 @@ class Lags(NamedTuple):
             "sd_between": np.sqrt(between),
             "icc": icc,
         }
+
+
+def common_delay(offsets, apart):
+    """What several parts have in common: what nearly all of them are late by, or early; or 0.
+
+    It minimises the sum of the distances from all offsets, and, ``apart`` times as often, from 0;
+    of equally good ones it is the farthest from 0. So a part that is shifted hardly moves it.
+
+    Parameters
+    ----------
+    offsets : list of ndarray, shape (n_sequences, P)
+        Of each part, counted from their means.
+    apart : float
+        From 0, where all parts of people have one offset, to 1, where they differ as much as they
+        share.
+
+    Returns
+    -------
+    ndarray, shape (n_sequences, P); or 0.0, if there are no parts
+    """
+    if not offsets:
+        return 0.0
+    count = len(offsets)
+    agree = max(int(np.ceil((1 + apart) / 2 * count - 1e-9)), count // 2 + 1)
+    ranked = np.sort(offsets, axis=0)
+    return np.maximum(ranked[count - agree], 0) + np.minimum(ranked[agree - 1], 0)
+
+
+def share_apart(offsets):
+    """How far parts are from what they have in common, as a share of that; at most 1.
+
+    Parameters
+    ----------
+    offsets : ndarray, shape (n_parts, n_sequences, P)
+        Counted from their means.
+    """
+    common = np.median(offsets, axis=0)
+    apart, shared = np.abs(offsets - common).mean(), np.abs(common).mean()
+    return float(apart / shared) if apart < shared else 1.0
 
 
 def _sd(values):

@@ -7,7 +7,7 @@ import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Real
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from sklearn.base import clone
@@ -39,14 +39,16 @@ from ..utils.parameters import validated, validated_with_nested
 from .anchored import AnchoredSynchronizer
 from .dense import DenseSynchronizer
 from .gaps import with_confidence
-from .lags import Lags
+from .lags import Lags, common_delay, share_apart
 from .match import Match, rates_of
 from .portions import warp_in_portions
 
 __all__ = ["PartSynchronizer"]
 
 # What a part can be compared with besides another part; no part may have such a name.
-_REFERENCES = ("rest", "body")
+_REST, _BODY = _REFERENCES = ("rest", "body")
+# Most training performances, evenly spaced, whose mean warps are those of people.
+_MOST_OF_MEAN = 32
 # Fitted attributes of the synchronizer of the whole body that are also those of the parts.
 _SHARED = (
     "pattern_",
@@ -71,7 +73,7 @@ class PartSynchronizer(AnchoredSynchronizer):
 
     A single warp for the whole body cannot show that an arm is late while the legs are not: the
     delay stays in the synchronised postures. Here every part has its own warp, and ``lags`` reports
-    how much later each part is than the rest.
+    how much later each part is than it usually is, and than the others are.
 
     1. A `DenseSynchronizer` matches the whole body to the pattern: tau_body.
     2. Each part is matched to the same pattern by way of the same exemplars, by its own features,
@@ -159,7 +161,7 @@ class PartSynchronizer(AnchoredSynchronizer):
     >>> lags = sync.lags([X[5], last], unit="percent")
     >>> change = lags.values[1] - lags.values[0]
     >>> dict(zip(lags.parts, change.max(axis=1).round(1).tolist()))
-    {'left arm': 0.0, 'right arm': 5.1, 'left leg': 0.2, 'right leg': 0.8, 'trunk': 0.2}
+    {'left arm': 0.0, 'right arm': 5.1, 'left leg': 0.0, 'right leg': 0.0, 'trunk': 0.0}
     """
 
     _parameter_constraints: dict = {
@@ -224,7 +226,7 @@ class PartSynchronizer(AnchoredSynchronizer):
             progress.fitting(body, "learning the body and its parts"),
         ):
             given = self.parts, self.coupling, keyframes, frame_rate, confidence
-            self.parts_, self._warpers = fit_body_and_parts(body, X, *given)
+            self.parts_, self._warpers, self._people = fit_body_and_parts(body, X, *given)
         self.synchronizer_ = body
         for name in _SHARED:
             if hasattr(body, name):
@@ -286,7 +288,7 @@ class PartSynchronizer(AnchoredSynchronizer):
         """
         performances = self.check_performances(X)
         body = self.match(performances, **self._given(X, keyframes, frame_rate))
-        return self._match_parts(performances, body, "part")
+        return self._match_parts(performances, body, self.parts_)
 
     @snapshot
     def lags(
@@ -301,6 +303,12 @@ class PartSynchronizer(AnchoredSynchronizer):
     ) -> Lags:
         """How much later than the rest of the body each part is, at every frame of the pattern.
 
+        Offsets of every part are counted from their mean over training performances: where people
+        move an arm late, an arm that is as late has no lag. The rest of the body is late by what
+        its parts have in common, so one part that is late, or two, leave the lags of the others as
+        they are. How many parts must agree is learnt: all of them where parts of the training
+        performances differ as much as they share, a majority where they move together.
+
         Parameters
         ----------
         X : list of arrays (n_frames_i, n_features), 3-D array, or 2-D array
@@ -309,9 +317,9 @@ class PartSynchronizer(AnchoredSynchronizer):
             The subject of each performance: then the report separates the spread within and
             between subjects.
         against : {"rest", "body"} or name of a part, default="rest"
-            The reference. ``"rest"``: the body without the part, matched separately, or the whole
-            body where nothing else moves. ``"body"``: the whole body, whose warp follows a part
-            that moves most. A name: that part.
+            The reference. ``"rest"``: what the other parts that move have in common, features of no
+            part among them. ``"body"``: the whole body, whose warp follows a part that moves most.
+            A name: that part.
         unit : {"frames", "percent", "seconds"}, default="frames"
             Unit of the lags, as in ``Match.offsets_in``.
         frame_rate : float, or array-like of shape (n_sequences,), default=None
@@ -336,37 +344,48 @@ class PartSynchronizer(AnchoredSynchronizer):
         if groups is not None:
             groups, people = encode_groups(groups, len(performances))
         body = self.match(performances, **self._given(X, keyframes, None))
-        parts = self._match_parts(performances, body, "part")
-        references = dict.fromkeys(parts, parts.get(against, body))
-        if against == "rest":
-            references = self._match_parts(performances, body, "rest")
+        matches = self._match_parts(performances, body, self._warpers) | {_BODY: body}
         clock = unit, [len(x) for x in performances], rates_of(X, frame_rate, unit)
-        names = [name for name in parts if name != against]
-        values = [
-            parts[name].offsets_in(*clock) - references[name].offsets_in(*clock) for name in names
-        ]
-        values = np.stack(values, axis=1)
+        offsets = {
+            name: match.offsets_in(*clock) - self._usual(name, match).offsets_in(*clock)
+            for name, match in matches.items()
+        }
+        names = [name for name in self.parts_ if name != against]
+        if against == _REST:
+            moving = [name for name, warper in self._warpers.items() if warper is not None]
+            # What does not move has no lag.
+            references = [
+                common_delay([offsets[x] for x in moving if x != name], self._people.apart)
+                if name in moving
+                else offsets[name]
+                for name in names
+            ]
+        else:
+            references = [offsets[against]] * len(names)
+        own = (offsets[name] for name in names)
+        values = np.stack([x - y for x, y in zip(own, references, strict=True)], axis=1)
         return Lags(values, names, against, unit, groups, people, performances.labels)
 
     def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
         performances = with_confidence(performances, confidence)
         body = self.match(performances, keyframes, frame_rate)
         out = body.warp(performances)
-        for name, match in self._match_parts(performances, body, "part").items():
+        for name, match in self._match_parts(performances, body, self.parts_).items():
             columns = self.parts_[name]
             out[:, :, columns] = match.warp([x[:, columns] for x in performances])
         return out
 
-    def _match_parts(self, performances, body, what):
-        """Matches of the parts, or of the rest of the body without each, by the name of the part.
+    def _usual(self, name, match):
+        """The mean warp of a part in the training set, as a match of as many performances."""
+        return Match(np.broadcast_to(self._people.times[name], match.times.shape))
 
-        What does not move has the warp of the body.
-        """
+    def _match_parts(self, performances, body, names):
+        """Matches of parts by their names; what does not move has the warp of the body."""
         found, sync = {}, self.synchronizer_
         performances = self._without_gaps(performances)
         with Progress(self, sync.verbose) as progress:
-            for name in self.parts_:
-                warper = self._warpers[what].get(name)
+            for name in names:
+                warper = self._warpers[name]
                 if warper is None:
                     found[name] = Match(body.times)
                     continue
@@ -405,49 +424,74 @@ def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None
     -------
     parts : dict of str to ndarray of int
         Indices of the features of every part.
-    warpers : dict of dict of str to PartWarper or None
-        ``"part"``: of every part by name; ``"rest"``: of the body without it. None if nothing of it
-        moves. No warpers for an infinite coupling.
+    warpers : dict of str to PartWarper or None
+        Of every part by name, and of all features of no part as ``"rest"``, if there are any. None
+        for what does not move, and for an infinite coupling.
+    people : PartsOfPeople
     """
     performances = self._check_training_set(X, confidence)
     parts = choose_parts(parts, performances, names_of_input(self))
     with self._progress(fits=True) as progress:
         known = self._known(performances, X, keyframes, frame_rate)
         self._learn(performances, progress, known)
-        warpers = {"part": {}, "rest": {}}
+        source = self._given_pattern(performances)
+        if source is None:
+            source = performances[self.pattern_index_]
+        some = np.linspace(0, len(performances) - 1, min(len(performances), _MOST_OF_MEAN))
+        chosen = [*self.exemplars_, *some.round().astype(np.intp)]
+        arrays = [source, *(performances[k] for k in chosen)]
+        # In double precision, as all that is warped.
+        given = arrays = [x.astype(np.float64, copy=False) for x in arrays]
+        if performances.weights is not None:
+            index = self.pattern_index_
+            own = np.ones(len(source)) if index is None else performances.weights[index]
+            given = add_weights(given, [own, *(performances.weights[k] for k in chosen)])
+        if known is not None:
+            given = add_ramps(given, [self.keyframes_ / (self.n_frames_ - 1), *known[chosen]])
+        sizes = self.n_frames_, self.subframes
+        arrays, given = normalise(arrays, *sizes), normalise(given, *sizes)
+        (times,) = run(_warps_of_body, [(self._warper, given)])
+        # The pattern keeps its own pace.
+        times[0] = np.arange(self.n_frames_)
+        (bases, body), (arrays, people) = (
+            np.split(x, [1 + len(self.exemplars_)]) for x in (times, arrays)
+        )
+        columns, everything = dict(parts), np.arange(performances[0].shape[1])
+        others = np.setdiff1d(everything, np.concatenate([*parts.values(), []]))
+        if len(others):
+            columns[_REST] = others
+        warpers, warps = dict.fromkeys(columns), dict.fromkeys([*columns, _BODY], body)
         if coupling < math.inf:
-            source = self._given_pattern(performances)
-            if source is None:
-                source = performances[self.pattern_index_]
-            chosen = [source, *(performances[k] for k in self.exemplars_)]
-            # In double precision, as all that is warped.
-            chosen = [x.astype(np.float64, copy=False) for x in chosen]
-            sizes = self.n_frames_, self.subframes
-            given = chosen
-            if performances.weights is not None:
-                weights = [performances.weights[k] for k in self.exemplars_]
-                index = self.pattern_index_
-                own = np.ones(len(source)) if index is None else performances.weights[index]
-                given = add_weights(given, [own, *weights])
-            if known is not None:
-                own = self.keyframes_ / (self.n_frames_ - 1)
-                given = add_ramps(given, [own, *known[self.exemplars_]])
-            given, chosen = (normalise(x, *sizes) for x in (given, chosen))
-            (times,) = run(_warp_pattern_and_exemplars, [(self._warper, given)])
-            training = normalise(performances, self.n_frames_, self.subframes)
-            common = self._warper, times, training, chosen, coupling, self._settings()
-            everything = np.arange(performances[0].shape[1])
-            for what, columns in {
-                "part": parts,
-                "rest": {name: np.setdiff1d(everything, part) for name, part in parts.items()},
-            }.items():
-                portions = [(x, *common) for x in columns.values()]
-                stage = "learning parts" if what == "part" else "learning the rest of each part"
-                jobs = {"n_jobs": self.n_jobs, "step": progress.stage(stage, len(portions))}
-                found = run(PartWarper.of, portions, prefer="threads", **jobs)
-                warpers[what] = dict(zip(parts, found, strict=True))
+            training = normalise(performances, *sizes)
+            common = self._warper, bases, training, arrays, coupling, self._settings()
+            portions = [(own, *common) for own in columns.values()]
+            how = {"n_jobs": self.n_jobs, "prefer": "threads"}
+            how["step"] = progress.stage("learning parts", len(portions))
+            warpers = dict(zip(columns, run(PartWarper.of, portions, **how), strict=True))
+            moving = [name for name in columns if warpers[name] is not None]
+            portions = [(warpers[name], people, body) for name in moving]
+            how["step"] = progress.stage("warping parts", len(portions))
+            warps |= dict(zip(moving, run(_warps_of_part, portions, **how), strict=True))
+        mean = {name: each.mean(axis=0) for name, each in warps.items()}
+        own = [warps[name] - mean[name] for name in columns if warpers[name] is not None]
+        people = PartsOfPeople(mean, share_apart(np.stack(own)) if own else 1.0)
         self._number_as_given()
-    return parts, warpers
+    return parts, warpers, people
+
+
+class PartsOfPeople(NamedTuple):
+    """How parts of training performances move.
+
+    Attributes
+    ----------
+    times : dict of str to ndarray (P,)
+        The mean warp of each part, of the features of no part as ``"rest"``, and of the ``"body"``.
+    apart : float
+        As of `share_apart`.
+    """
+
+    times: dict
+    apart: float
 
 
 def choose_parts(parts, performances, names):
@@ -493,11 +537,12 @@ def choose_parts(parts, performances, names):
 _RIGID = 1e6
 
 
-def _warp_pattern_and_exemplars(warper, chosen):
-    """The body's warps of the pattern and its exemplars; the pattern keeps its own pace."""
-    times = warper.warps(warper.matcher.features.unit(chosen))[1]
-    times[0] = np.arange(times.shape[1])
-    return times
+def _warps_of_body(warper, given):
+    return warper.warps(warper.matcher.features.unit(given))[1]
+
+
+def _warps_of_part(warper, positions, body):
+    return warper.warps(positions, body)[1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,10 +52,22 @@ def of_parts(parts=None, coupling=0.001, **settings):
     return PartSynchronizer(parts, coupling, DenseSynchronizer(**settings))
 
 
+def made_postures(count, seed):
+    bunch = make_bending(count, n_frames=60, random_state=seed)
+    return DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+
+
+def clips_of(real_data, action):
+    """Recorded clips of an action as postures, and their actors."""
+    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    chosen = np.flatnonzero(bunch.target == action)
+    postures = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
+    return [x.astype(float) for x in postures], bunch.actor[chosen]
+
+
 @pytest.fixture(scope="module")
 def postures():
-    bunch = make_bending(7, n_frames=60, random_state=0)
-    return DirectionCosines(bunch.skeleton).fit_transform(bunch.data)
+    return made_postures(7, 0)
 
 
 @pytest.fixture(scope="module")
@@ -65,11 +77,7 @@ def fitted(postures):
 
 @pytest.fixture(scope="module")
 def grabs(real_data):
-    """Recorded grabs as postures, and their actors."""
-    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
-    chosen = np.flatnonzero(bunch.target == "grabHighR")
-    postures = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
-    return [x.astype(float) for x in postures], bunch.actor[chosen]
+    return clips_of(real_data, "grabHighR")
 
 
 # -- recordings --------------------------------------------------------------------------
@@ -291,18 +299,105 @@ def test_tables_in_and_out(postures):
 # -- reports of lags ---------------------------------------------------------------------
 
 
-def test_lags_are_differences_of_offsets(fitted, postures):
-    parts, body = fitted.match_parts(postures), fitted.match(postures)
-    offsets = np.stack([parts[name].offsets for name in PARTS], axis=1)
-    np.testing.assert_array_equal(
-        fitted.lags(postures, against="body").values, offsets - body.offsets[:, np.newaxis]
+def offsets_from_mean(fitted, training, X):
+    """Offsets of the parts and of the body less their means over a training set."""
+    found = fitted.match_parts(X) | {"body": fitted.match(X)}
+    usual = fitted.match_parts(training) | {"body": fitted.match(training)}
+    return {name: m.offsets - usual[name].offsets.mean(axis=0) for name, m in found.items()}
+
+
+def test_lags_are_differences_of_offsets_from_the_mean_of_people(fitted, postures):
+    new = made_postures(4, 3)
+    own = offsets_from_mean(fitted, postures, new)
+    for against in ("body", "trunk"):
+        lags = fitted.lags(new, against=against)
+        assert lags.parts == [name for name in PARTS if name != against]
+        expected = np.stack([own[name] - own[against] for name in lags.parts], axis=1)
+        np.testing.assert_allclose(lags.values, expected, atol=1e-9)
+    percent = fitted.lags(new, against="trunk", unit="percent").values
+    np.testing.assert_allclose(percent, expected * 100 / 59, atol=1e-9)
+    seconds = fitted.lags(new, against="trunk", unit="seconds", frame_rate=30).values
+    lasts = np.array([len(x) - 1 for x in new])[:, np.newaxis, np.newaxis]
+    np.testing.assert_allclose(seconds, percent / 100 * lasts / 30, atol=1e-9)
+    np.testing.assert_allclose(
+        fitted.lags(postures, against="body").values.mean(axis=0), 0, atol=1e-9
     )
-    between = fitted.lags(postures, against="trunk", unit="percent")
-    assert between.parts == PARTS[:-1]
-    np.testing.assert_allclose(between.values, (offsets[:, :-1] - offsets[:, -1:]) * 100 / 59)
-    seconds = fitted.lags(postures, against="trunk", unit="seconds", frame_rate=30).values
-    lasts = np.array([len(x) - 1 for x in postures])[:, np.newaxis, np.newaxis]
-    np.testing.assert_allclose(seconds, between.values / 100 * lasts / 30)
+
+
+def test_reference_is_a_least_absolute_fit(fitted, postures, real_data):
+    """Of equally good ones the farthest from the mean; features of no part vote, too."""
+    bends, _ = clips_of(real_data, "depositFloorR")
+    for X, new in ((postures, made_postures(4, 3)), (bends[:12], bends[12:18])):
+        left = np.setdiff1d(np.arange(37), np.concatenate([*fitted.parts_.values()]))
+        sync = of_parts({**fitted.parts_, "left": left}, 0, n_frames=60).fit(X)
+        own, taught = offsets_from_mean(sync, X, new), offsets_from_mean(sync, X, X)
+        taught = np.stack([taught[name] for name in [*PARTS, "left"]])
+        common = np.median(taught, axis=0)
+        apart = min(np.abs(taught - common).mean() / np.abs(common).mean(), 1)
+        assert (apart < 0.2) == (X is postures)
+        values = of_parts(fitted.parts_, 0, n_frames=60).fit(X).lags(new).values
+        for i, name in enumerate(PARTS):
+            others = np.stack([own[other] for other in [*PARTS, "left"] if other != name])
+            candidates = np.concatenate([others, np.zeros((1, *others.shape[1:]))])
+            losses = np.abs(candidates[:, np.newaxis] - others).sum(axis=1)
+            losses += (5 * apart - 1e-9) * np.abs(candidates)
+            best = np.take_along_axis(candidates, losses.argmin(axis=0)[np.newaxis], axis=0)[0]
+            assert (best != 0).any()
+            np.testing.assert_allclose(values[:, i], own[name] - best, atol=1e-6)
+
+
+def shifted(x, columns, share):
+    """A performance, with features that come late by this share of it; the first frame is held."""
+    frames, out = np.arange(len(x)), x.copy()
+    for k in columns:
+        out[:, k] = np.interp(frames - share * frames[-1], frames, x[:, k])
+    return out
+
+
+@pytest.mark.parametrize(
+    ("action", "late"),
+    [
+        ("depositFloorR", ["left arm"]),
+        ("depositFloorR", ["left arm", "right leg"]),
+        ("elbowToKnee1RepsLelbowStart", ["right leg"]),
+        ("elbowToKnee1RepsLelbowStart", ["right arm", "left arm"]),
+        ("grabHighR", ["right arm"]),
+    ],
+)
+def test_shifted_parts_of_new_people_leave_the_others(real_data, action, late):
+    """Nor does the part that moves most, which the whole body follows."""
+    X, actor = clips_of(real_data, action)
+    is_new = np.isin(actor, ["bd", "bk"])
+    sync = of_parts(coupling=0, n_frames=P).fit([X[i] for i in np.flatnonzero(~is_new)])
+    new = [X[i] for i in np.flatnonzero(is_new)]
+    columns = np.concatenate([sync.parts_[name] for name in late])
+    values = sync.lags([*new, *(shifted(x, columns, 0.05) for x in new)], unit="percent").values
+    change = values[len(new) :] - values[: len(new)]
+    times = {name: match.times * 100 / (P - 1) for name, match in sync.match_parts(new).items()}
+    for name, found in zip(PARTS, change.swapaxes(0, 1), strict=True):
+        # What is met in the last twentieth has no room to be late.
+        truth = np.minimum(5, 100 - times[name]) if name in late else 0
+        error = np.abs(found - truth)[:, 10:90]
+        assert np.median(error) < (0.6 if name in late else 0.5), name
+
+
+def test_delay_that_all_parts_share_is_no_lag(fitted, postures):
+    """Up to where a late end is cut off."""
+    late = [shifted(x, range(x.shape[1]), 0.05) for x in postures]
+    change = fitted.lags(late, unit="percent").values - fitted.lags(postures, unit="percent").values
+    own = fitted.match(late).offsets - fitted.match(postures).offsets
+    assert np.median(own[:, 10:50]) * 100 / 59 > 4
+    assert np.median(np.abs(change[:, :, 10:50])) < 1
+
+
+def test_part_that_does_not_move_has_no_lag_and_is_no_reference(postures):
+    X = [np.column_stack([x, np.full(len(x), 3.0)]) for x in postures]
+    arms = {"left": [22, 23, 24], "right": [25, 26, 27]}
+    sync = of_parts({**arms, "still": [37]}, 0, n_frames=40).fit(X)
+    without = of_parts({**arms}, 0, n_frames=40).fit(X)
+    lags = sync.lags(X)
+    assert (lags.values[:, 2] == 0).all()
+    np.testing.assert_allclose(lags.values[:, :2], without.lags(X).values, atol=1e-9)
 
 
 def test_spread_within_and_between_subjects_agrees_with_scipy():
