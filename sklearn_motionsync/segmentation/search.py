@@ -10,7 +10,6 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.signal import lfilter
 from sklearn.base import BaseEstimator
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
@@ -19,18 +18,18 @@ from ..inputs.collections import as_collection
 from ..inputs.facts import facts_in_fit, facts_of
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import SAME_RATE, timeless
+from ..inputs.resampling import as_frame_rates
 from ..inputs.tables import FRAME, as_pandas
-from ..inputs.types import Labels, PerformanceLike, PerformancesLike
+from ..inputs.types import Labels, PerformanceLike, PerformancesLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..inputs.wording import counted, within
-from ..matching.filters import SMOOTHING, smooth
 from ..matching.matcher import Features
 from ..matching.trellis import Trellis
-from ..matching.warps import at_times, even_slices, normalise
+from ..matching.warps import at_times, even_slices
 from ..model.action_model import ActionModel
-from ..model.similarity import DIFFERENCES, LogMoments, Neighbours, log_moments, movement_energies
 from ..synchronizers.dense import DenseSynchronizer
 from ..utils.groups import encode_groups
+from ..utils.parallel import Progress
 from ..utils.parameters import validated_function
 from ..utils.pipelines import (
     find_synchronizer,
@@ -39,6 +38,7 @@ from ..utils.pipelines import (
     union_transformers,
 )
 from .cutting import as_takes, cut_takes
+from .windows import WindowDissimilarity, example_indices
 
 __all__ = ["find_performances"]
 
@@ -49,6 +49,10 @@ _CLOCK = 100
 _MARGIN, _MARGIN_OF_ONE = 1.1, 1.5
 # Rates that differ by a larger ratio are mistakes.
 _MOST = 100
+# Rates of takes, as multiples of that of the pattern, that are tried where no rate is known and
+# nothing is found. Of 63 such takes of people at another rate 59 have hits at one of these, 56 at
+# the true one, and 10 of 115 takes without the action.
+_OTHER_RATES = (0.25, 0.5, 2.0, 4.0)
 # The shortest window, in frames.
 _SHORTEST = 3
 # The first step by which ends of a hit are moved, as a share of its length; later steps are halved.
@@ -56,6 +60,8 @@ _FIRST_MOVE = 1 / 8
 _MOVES = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
 # A window of more than so many times the dissimilarity of the threshold is not refined.
 _HOPELESS = 2
+# Scores are above it, whatever the dissimilarity.
+_NO_SCORE = 1e-300
 
 
 @validated_function(
@@ -63,6 +69,8 @@ _HOPELESS = 2
         "threshold": [Interval(Real, 0, 1, closed="both"), StrOptions({"auto"}), None],
         "coverage": [Interval(Real, 0, 1, closed="neither")],
         "max_hits": [Interval(Integral, 1, None, closed="left"), None],
+        "pattern_rate": [Interval(Real, 0, None, closed="neither"), None],
+        "verbose": ["verbose"],
     }
 )
 def find_performances(
@@ -70,10 +78,13 @@ def find_performances(
     X: PerformancesLike,
     *,
     threshold: float | Literal["auto"] | None = "auto",
-    coverage: float = 0.6,
+    coverage: float = 0.8,
     max_hits: int | None = None,
     durations: tuple[int, int] | None = None,
     groups: Labels | None = None,
+    frame_rate: float | ValuesLike | None = None,
+    pattern_rate: float | None = None,
+    verbose: int = 0,
 ) -> tuple[list[Any], pd.DataFrame]:
     """Find an action in long takes, and cut its performances out of them.
 
@@ -86,7 +97,8 @@ def find_performances(
     3. The ends of the best window are moved to where its score is best; then those of the best
        window that does not overlap it, and so on. Windows that reach the threshold are hits.
 
-    Time grows with the length of a take, memory does not.
+    Time grows with the length of a take, memory does not: an hour at 30 frames a second takes a few
+    seconds. It can be interrupted at any time.
 
     Parameters
     ----------
@@ -95,17 +107,21 @@ def find_performances(
         takes the takes. An array is a single performance, which carries no information about the
         differences between performances.
     X : array (n_frames, n_features), list of such arrays, or other collection
-        One take, or several. A take of a single feature may be one-dimensional. Tables that know
-        their frame rate, by ``attrs["frame_rate"]`` or an index in seconds, are resampled to that
-        of the training performances; what has no known rate is taken to have the same.
+        One take, or several. A take of a single feature may be one-dimensional. Takes of another
+        frame rate than the training performances are resampled to theirs. Tables know their rate,
+        by ``attrs["frame_rate"]`` or an index in seconds; for others give ``frame_rate`` and
+        ``pattern_rate``. If neither is known, both are taken to have the same; where then nothing
+        is found, a warning tells if there is something at half, twice, a quarter or four times the
+        rate.
     threshold : "auto", float or None, default="auto"
         The lowest score of a hit. ``"auto"``: learnt from the training performances, each compared
         with those of other groups, but not below what random movements among their postures rarely
-        exceed; at least 0.50 and at most 0.86. For an array 0.61, half as dissimilar as standing
-        still. None: all windows that are better than those they overlap.
-    coverage : float, default=0.6
-        Share of performances of new subjects, cut out by hand, that a threshold of ``"auto"``
-        accepts, unless random movements score as high.
+        exceed; at least 0.50 and at most 0.90. In a take it is higher where many windows reach it.
+        For an array 0.61, half as dissimilar as standing still. None: all windows that are better
+        than those they overlap.
+    coverage : float, default=0.8
+        Share of performances of new subjects, cut out by hand, that the learnt threshold accepts,
+        unless random movements score as high; less where many windows of a take do.
     max_hits : int, default=None
         How many hits are kept of each take, the best ones; by default all.
     durations : (int, int), default=None
@@ -115,6 +131,13 @@ def find_performances(
     groups : array-like, default=None
         Group of each training performance, such as its subject. By default the groups that an
         `ActionModel` in the pipeline was fitted with; it keeps those of at most 64 performances.
+    frame_rate : float, or array-like of shape (n_takes,), default=None
+        Frames a second of the takes. By default what tables tell.
+    pattern_rate : float, default=None
+        Frames a second of the training performances, or of an array. By default what tables told
+        the synchronizer in ``fit``.
+    verbose : int, default=0
+        Above 0 prints the progress.
 
     Returns
     -------
@@ -123,13 +146,19 @@ def find_performances(
         labelled by the label of their take and their number in it.
     locations : DataFrame
         One row a performance: ``take``, its index or label; ``start`` and ``stop``, frames of the
-        take as it was given, ``stop`` excluded; ``score``; ``threshold``, the given or learnt one.
+        take as it was given, ``stop`` excluded; ``score``; ``threshold``, the given one, or that of
+        its take.
 
     Raises
     ------
     ValueError
         If the takes break the input contract or have other features than the training set, or a
         parameter is invalid.
+
+    Warns
+    -----
+    UserWarning
+        If one frame rate only is known; or none, and nothing is found but at another one.
 
     See Also
     --------
@@ -138,9 +167,9 @@ def find_performances(
 
     Notes
     -----
-    The threshold of ``"auto"`` depends on how subjects differ, and not on what else in a take
-    resembles the action, which is unknown. Raise ``coverage`` to miss less, or the threshold for
-    fewer false hits; docs/design.md has figures. Actions that subjects perform in entirely
+    The threshold of ``"auto"`` depends on how subjects differ, and on how many windows of a take
+    resemble the action. Raise ``coverage`` to miss less, or the threshold for fewer false hits;
+    docs/design.md has figures. Actions that subjects perform in entirely
     different ways are found rarely.
 
     Examples
@@ -159,7 +188,8 @@ def find_performances(
     X = as_takes(X, univariate=True)
     checker = type("find_performances", (SequenceLevelMixin, BaseEstimator), {})()
     given = check_performances(checker, X, reset=True, level="sequence", facts=())
-    searched, paces = _at_rate_of(pattern, X, given)
+    searched, paces, known = _at_rate_of(pattern, X, given, frame_rate, pattern_rate)
+    groups_given = groups
     synchronizer, takes, groups = _reach(pattern, searched, groups)
     sources = given if searched is X else searched
     for i, (before, after) in enumerate(zip(sources, takes, strict=True)):
@@ -170,25 +200,43 @@ def find_performances(
             )
     dissimilarity = WindowDissimilarity(synchronizer, groups, length=durations is None)
     learns = threshold is None or threshold == "auto"
-    level = float(np.exp(-dissimilarity.threshold(coverage)) if learns else threshold)
-    lowest = 0.0 if threshold is None else level
-    rows = []
+    limit = dissimilarity.threshold(coverage) if learns else -np.log(max(threshold, _NO_SCORE))
+    hopeless = float(np.exp(-_HOPELESS * limit))
     proposers = {
         pace: Proposer.of(synchronizer, *_check_durations(synchronizer, durations, pace))
         for pace in set(paces)
     }
-    for i, (take, pace) in enumerate(zip(takes, paces, strict=True)):
-        take, propose = take.astype(np.float64, copy=False), proposers[pace]
-        search = WindowSearch(take, dissimilarity, propose.shortest, propose.longest)
-        hits = search.hits(propose(take), lowest, max_hits)
-        rows += [(i, *hit) for hit in in_frames_given(hits, pace, len(given[i]), durations)]
-    rows = pd.DataFrame(rows, columns=["take", "start", "stop", "score"])
-    rows = rows.astype({"take": int, "start": int, "stop": int, "score": float})
-    return cut_takes(X, given, rows.assign(threshold=level))
+    sizes = [proposers[pace].n_portions(len(x)) for pace, x in zip(paces, takes, strict=True)]
+    rows = []
+    with Progress(checker, verbose) as progress:
+        step = progress.stage("searching", 2 * sum(sizes))
+        for i, (take, pace, size) in enumerate(zip(takes, paces, sizes, strict=True)):
+            take, propose = take.astype(np.float64, copy=False), proposers[pace]
+            search = WindowSearch(take, dissimilarity, propose.shortest, propose.longest)
+            lowest = 0.0 if threshold is None else hopeless
+            hits = search.hits(propose(take, step), lowest, step, size)
+            level = threshold
+            if learns:
+                u = -np.log([hit.score for hit in hits if hit.proposed >= hopeless])
+                level = float(np.exp(-dissimilarity.threshold_of_take(limit, u, len(take))))
+            best = best_hits(hits, 0.0 if threshold is None else level, max_hits)
+            found = in_frames_given(best, pace, len(given[i]), durations)
+            rows += [(i, *hit, level) for hit in found]
+    types = {"take": int, "start": int, "stop": int, "score": float, "threshold": float}
+    rows = pd.DataFrame(rows, columns=list(types)).astype(types)
+    if threshold is not None and rows.empty and not known:
+        how = {"threshold": threshold, "coverage": coverage, "durations": durations}
+        _warn_of_other_rates(pattern, X, how | {"groups": groups_given})
+    return cut_takes(X, given, rows)
 
 
-def _at_rate_of(pattern, X, given):
+def _at_rate_of(pattern, X, given, frame_rate, pattern_rate):
     """Takes at the frame rate of the training set.
+
+    Parameters
+    ----------
+    pattern, frame_rate, pattern_rate : as for `find_performances`
+    X, given : the takes, and the same, checked
 
     Returns
     -------
@@ -196,35 +244,57 @@ def _at_rate_of(pattern, X, given):
         ``X``, if none is resampled.
     paces : list of float
         For each, the frames that were given in a frame that is searched.
+    known : bool
+        Whether any frame rate is known.
     """
     rates = [facts.get("frame_rate") for facts in given.facts] or [None] * len(given)
-    known = _frame_rate_of(pattern)
+    if frame_rate is not None:
+        rates = np.broadcast_to(as_frame_rates(frame_rate, len(given)).ravel(), len(given)).tolist()
+    known = _frame_rate_of(pattern) if pattern_rate is None else float(pattern_rate)
     unsure = [i for i, rate in enumerate(rates) if (rate is None) != (known is None)]
     if unsure:
         rate = rates[unsure[0]]
         first, second = ("The pattern", given.called(unsure[0]))[:: 1 if known is None else -1]
         warnings.warn(
             f"{first} has no known frame rate, {within(second)} has "
-            f"{known or rate:g} frames a second: both are taken to have the same. Resample if they "
-            "differ, or set x.attrs['frame_rate'] of tables, of performances before the fit.",
+            f"{known or rate:g} frames a second: both are taken to have the same. Give the other "
+            f"one, {'pattern_rate' if known is None else 'frame_rate'}=.",
             UserWarning,
             stacklevel=4,
         )
     paces = [1.0 if known is None or rate is None else rate / known for rate in rates]
     paces = [1.0 if abs(pace - 1) <= SAME_RATE else pace for pace in paces]
+    is_known = known is not None or any(rate is not None for rate in rates)
     if set(paces) == {1.0}:
-        return X, paces
+        return X, paces, is_known
     searched = list(as_collection(X))
     for i, pace in enumerate(paces):
         if not 1 / _MOST <= pace <= _MOST:
             raise ValueError(
                 f"{given.called(i)} has {rates[i]:g} frames a second, the pattern {known:g}: one "
                 f"is more than {_MOST} times the other. Correct the wrong one, "
-                "attrs['frame_rate'] or an index in seconds."
+                "attrs['frame_rate'], an index in seconds, frame_rate or pattern_rate."
             )
         if pace != 1:
             searched[i] = _resample(searched[i], given[i], pace, known)
-    return searched, paces
+    return searched, paces, is_known
+
+
+def _warn_of_other_rates(pattern, X, how):
+    """Warn if takes without hits would have some at another frame rate."""
+    counts = {}
+    for times in _OTHER_RATES:
+        _, found = find_performances(pattern, X, frame_rate=times, pattern_rate=1.0, **how)
+        counts[times] = len(found)
+    best = max(counts, key=counts.get)
+    if counts[best]:
+        warnings.warn(
+            "No window of the takes reaches the threshold. Their frame rate and that of the "
+            f"pattern are not known: at {best:g} times the pattern's rate "
+            f"{counts[best]} would. If they differ, give frame_rate and pattern_rate.",
+            UserWarning,
+            stacklevel=4,
+        )
 
 
 def _frame_rate_of(pattern):
@@ -239,10 +309,12 @@ def _frame_rate_of(pattern):
 
 
 def _resample(x, array, pace, rate):
-    """A table at another frame rate."""
+    """A take, a table or an array, at another frame rate."""
     n_steps = max(int((len(array) - 1) / pace + 1e-6), 1)
     times = np.arange(n_steps + 1) * pace
     values = at_times(array, times).astype(array.dtype, copy=False)
+    if not isinstance(x, pd.DataFrame):
+        return values
     out = pd.DataFrame(values, columns=x.columns).rename_axis(index=FRAME)
     out.attrs = timeless(x) | {"frame_rate": rate}
     return out
@@ -276,6 +348,29 @@ def in_frames_given(hits, pace, n_frames, durations=None):
     ]
 
 
+class Hit(NamedTuple):
+    """A window of a take whose ends were moved to where its score is best.
+
+    Attributes
+    ----------
+    start, stop : int
+    score : float
+    proposed : float
+        The score before its ends were moved.
+    """
+
+    start: int
+    stop: int
+    score: float
+    proposed: float
+
+
+def best_hits(hits, threshold, count):
+    """Start, stop and score of the best hits that reach a threshold, in order of time."""
+    found = sorted((h for h in hits if h.score >= threshold), key=lambda hit: -hit.score)
+    return sorted(hit[:3] for hit in found[:count])
+
+
 class WindowSearch:
     """The best windows of a take that do not overlap."""
 
@@ -283,22 +378,26 @@ class WindowSearch:
         self._take, self._dissimilarity = take, dissimilarity
         self._shortest, self._longest = shortest, longest
 
-    def hits(self, windows, threshold, count):
-        """Start, stop and score of the best of windows (n, 2), in order of time.
+    def hits(self, windows, lowest, step=None, n_steps=0):
+        """A `Hit` of each of windows (n, 2) that overlaps no better one, in order of time.
 
-        A window that is refined excludes those it overlaps even if it is rejected, so that the
-        threshold selects among hits and changes none.
+        Windows whose score is below ``lowest`` are not refined. One that is refined excludes those
+        it overlaps, whatever the threshold is, so that this selects among hits and changes none.
         """
         scores = np.exp(-self._dissimilarity(self._take, windows))
+        order = np.argsort(-scores, kind="stable")
+        order = order[: np.count_nonzero(scores >= lowest)]
+        due = np.diff(np.linspace(0, n_steps, max(len(order), 1) + 1).astype(int))
         refined = []
-        for k in np.argsort(-scores, kind="stable"):
-            if scores[k] < threshold**_HOPELESS:
-                break
+        for i, k in enumerate(order):
             limits = self._limits(windows[k], refined)
             if limits is not None:
                 insort(refined, self._refine(windows[k], scores[k], *limits))
-        found = sorted((hit for hit in refined if hit[2] >= threshold), key=lambda hit: -hit[2])
-        return sorted(found[:count])
+            for _ in range(due[i]):
+                step()
+        for _ in range(0 if len(order) else n_steps):
+            step()
+        return refined
 
     def _limits(self, window, refined):
         """The free interval about a window; None if it overlaps refined ones, sorted by time."""
@@ -310,6 +409,7 @@ class WindowSearch:
     def _refine(self, window, score, first, last):
         """The window with its ends moved, by smaller and smaller steps, to the best score."""
         window, move = np.asarray(window), max(1, int(_FIRST_MOVE * (window[1] - window[0])))
+        proposed = float(score)
         while move:
             some = window + move * _MOVES
             sizes = some[:, 1] - some[:, 0]
@@ -320,7 +420,7 @@ class WindowSearch:
                 window, score = some[scores.argmax()], scores.max()
             else:
                 move //= 2
-        return int(window[0]), int(window[1]), float(score)
+        return Hit(int(window[0]), int(window[1]), float(score), proposed)
 
 
 def _reach(pattern, X, groups):
@@ -362,19 +462,13 @@ def _check_pattern(pattern):
     return pattern if isinstance(pattern, pd.DataFrame) else array
 
 
-def _example_indices(synchronizer):
-    """Indices in the training set of the examples that the synchronizer keeps, evenly spaced."""
-    n_performances, n_examples = len(synchronizer.lengths_), len(synchronizer.examples_)
-    return np.linspace(0, n_performances - 1, n_examples).round().astype(np.intp)
-
-
 def _training_groups(pattern, reached, groups):
     """Codes of the groups of the training performances that the synchronizer keeps, or None."""
     synchronizer = reached.synchronizer
     count = len(synchronizer.lengths_)
     if groups is not None:
         codes, _ = encode_groups(groups, count, at_least=min(count, 2))
-        return codes[_example_indices(synchronizer)]
+        return codes[example_indices(synchronizer)]
     if count < 2:
         return None
     models = [step for step in flat_steps(pattern) if isinstance(step, ActionModel)]
@@ -466,30 +560,41 @@ class Proposer(NamedTuple):
         features = features.at_pace(1, share * features.velocity_smoothing)
         return cls(features, base, trellis, scales(shortest, longest), shortest, longest)
 
-    def __call__(self, take):
+    def __call__(self, take, step=None):
         """Distinct windows of a take (n_frames, n_features): (n_windows, 2) of start and stop."""
         lengths = self.lengths[self.lengths <= len(take)]
-        found = [self._at_scale(take, int(length)) for length in lengths]
+        found = [self._at_scale(take, int(length), step) for length in lengths]
         windows = np.concatenate([np.empty((0, 2), dtype=np.intp), *found])
         sizes = windows[:, 1] - windows[:, 0]
         fits = (self.shortest <= sizes) & (sizes <= self.longest)
         return np.unique(windows[fits], axis=0)
 
-    def _at_scale(self, take, length):
+    def n_portions(self, n_frames):
+        """How often a step is called in a take of so many frames."""
+        lengths = self.lengths[self.lengths <= n_frames].tolist()
+        return sum(-(-len(self._starts(n_frames, n)) // _PROPOSAL_BATCH) for n in lengths)
+
+    def _starts(self, n_frames, length):
+        """Where the portions of a take begin, for a pattern of about this number of frames."""
+        pace = (length - 1) / (self.base.shape[1] - 1)
+        count = int(np.ceil((n_frames - length) / max(self.trellis.width * pace, 1.0))) + 1
+        return np.linspace(0, n_frames - length, count)
+
+    def _at_scale(self, take, length, step):
         """The best window of every portion, for a pattern of about this number of frames."""
         n_frames, width = self.base.shape[1], self.trellis.width
-        step = (length - 1) / (n_frames - 1)
-        count = int(np.ceil((len(take) - length) / max(width * step, 1.0))) + 1
-        starts = np.linspace(0, len(take) - length, count)
-        clock = np.arange(-width, n_frames + width) * step
+        starts, pace = self._starts(len(take), length), (length - 1) / (n_frames - 1)
+        clock = np.arange(-width, n_frames + width) * pace
         found = []
-        for some in even_slices(count, _PROPOSAL_BATCH):
+        for some in even_slices(len(starts), _PROPOSAL_BATCH):
             portions = at_times(take, starts[some, np.newaxis] + clock)
             moving = self.features(self.features.unit(portions))
             paths = self.trellis.paths(self.base, moving)[0]
-            first, last = starts[some] + paths[:, 0] * step, starts[some] + length - 1
-            window = np.stack([first, last + paths[:, -1] * step + 1], axis=1)
+            first, last = starts[some] + paths[:, 0] * pace, starts[some] + length - 1
+            window = np.stack([first, last + paths[:, -1] * pace + 1], axis=1)
             found.append(np.clip(np.round(window).astype(np.intp), 0, len(take)))
+            if step is not None:
+                step()
         return np.concatenate(found)
 
 
@@ -497,145 +602,3 @@ def scales(shortest, longest):
     """Numbers of frames from the shortest to the longest, by a constant ratio of at most 1.6."""
     count = int(np.ceil(np.log(longest / shortest) / np.log(_RATIO))) + 1
     return np.unique(np.round(np.geomspace(shortest, longest, count)).astype(np.intp))
-
-
-# -- dissimilarity of windows of a take to training performances, and its threshold --------
-
-# Weight of the squared standard scores of length and energy in the logarithm of the dissimilarity.
-_LENGTH_ENERGY_WEIGHT = 0.05
-# Largest logarithm of the factor by which they raise it.
-_MAX_LOG_FACTOR = 3.0
-# Standing still has the dissimilarity 1. The upper limit keeps the threshold below it, however much
-# people differ; the lower one allows for noise in takes and windows that begin at whole frames.
-_MAX_THRESHOLD, _MIN_THRESHOLD = 0.7, 0.15
-# The threshold of a single performance, of which no variation can be learnt.
-_DEFAULT_THRESHOLD = 0.5
-# Random movements, and the share of them that may lie below the threshold.
-_N_RANDOM, _RANDOM_QUANTILE = 1000, 0.005
-# Windows that are compared at a time, which bounds the memory.
-_WINDOW_BATCH = 256
-# Largest number of positions of a window.
-_MAX_POSITIONS = 100
-
-
-class WindowDissimilarity:
-    """Dissimilarity of windows to training performances: 0 equal, 1 as that of standing still.
-
-    The mean over the two most similar training performances of::
-
-        r(y, y_i) = |y - y_i|^2 / (|y|^2 + |y_i|^2),
-
-    half of postures less their own mean over time, to which a tenth of the squared distance of
-    these means is added, half of the features of the synchronizer; times e to a twentieth of the
-    squared standard scores of the logarithms of length and energy.
-
-    Parameters
-    ----------
-    synchronizer : fitted Synchronizer
-    groups : array-like (n_examples,), default=None
-        Of the training performances that it keeps; by default each is its own.
-    length : bool, default=True
-        Whether the length counts.
-
-    Attributes
-    ----------
-    known : ndarray (n_examples,)
-        That of the training performances, each compared with those of other groups.
-    """
-
-    def __init__(self, synchronizer, groups=None, length=True):
-        lengths, examples = synchronizer.lengths_, synchronizer.examples_
-        self._set_clock(synchronizer.features_, synchronizer.n_frames_)
-        moments = LogMoments.of(lengths)
-        self._length = moments.standardize if length else np.zeros_like
-        self._typical_length = np.exp(np.log(lengths).mean())
-        count = len(examples)
-        positions = self._positions(examples)
-        energy, self._floor = movement_energies(positions)
-        if energy.max() <= self._floor:
-            raise ValueError(
-                "The pattern does not move: it fits every moment of a take in which nothing moves. "
-                "Give a pattern that moves, or fit on performances that do."
-            )
-        self._energy = LogMoments.of(energy).standardize
-        codes, _ = encode_groups(groups, count, at_least=min(count, 2))
-        self._neighbours = Neighbours(positions, codes, self._features, DIFFERENCES)
-        self._training, self.known = positions, np.empty(0)
-        if count > 1:
-            self.known = self._measure(positions, lengths[_example_indices(synchronizer)], codes)
-
-    def threshold(self, coverage):
-        """The dissimilarity below which a share of the performances of new people lies.
-
-        It is at most that of random movements.
-        """
-        if not len(self.known):
-            return _DEFAULT_THRESHOLD
-        learnt = min(log_moments(self.known).upper_limit(coverage), _MAX_THRESHOLD)
-        return max(min(learnt, self._random_limit()), _MIN_THRESHOLD)
-
-    def __call__(self, take, windows):
-        """The dissimilarity of windows (n_windows, 2), start and stop, of a take."""
-        out = np.empty(len(windows))
-        for rows in even_slices(len(windows), _WINDOW_BATCH):
-            positions = self._positions([take[start:stop] for start, stop in windows[rows]])
-            out[rows] = self._measure(positions, windows[rows, 1] - windows[rows, 0])
-        return out
-
-    def _set_clock(self, features, n_frames):
-        """The number of positions of a window, and the features at this pace."""
-        self._n_positions = min((n_frames - 1) * features.subframes + 1, _MAX_POSITIONS)
-        by_frame = (self._n_positions - 1) / (n_frames - 1)
-        self._features = features.at_pace(by_frame)
-
-    def _random_limit(self):
-        """A low quantile of the dissimilarity of random movements."""
-        portions = even_slices(_N_RANDOM, _WINDOW_BATCH)
-        counts = [portion.stop - portion.start for portion in portions]
-        movements = random_movements(self._training, counts)
-        found = [
-            self._measure(some, np.full(len(some), self._typical_length)) for some in movements
-        ]
-        return float(np.quantile(np.concatenate(found), _RANDOM_QUANTILE))
-
-    def _positions(self, performances):
-        """Performances at all positions, in the unit of the features, in double precision."""
-        arrays = [np.asarray(x, dtype=np.float64) for x in performances]
-        return self._features.unit(normalise(arrays, self._n_positions))
-
-    def _measure(self, positions, lengths, groups=None):
-        shape = self._neighbours.dissimilarity(positions, groups)
-        energy, _ = movement_energies(positions, self._floor)
-        scores = np.square(self._energy(energy)) + np.square(self._length(lengths))
-        return shape * np.exp(np.minimum(_LENGTH_ENERGY_WEIGHT * scores, _MAX_LOG_FACTOR))
-
-
-# -- random movements, which the threshold must reject -----------------------------------
-
-
-def random_movements(positions, counts):
-    """Movements with the mean and the covariance of postures, smooth as those of people.
-
-    Parameters
-    ----------
-    positions : ndarray, shape (n_sequences, Q, n_features)
-        Performances on the clock.
-    counts : iterable of int
-        How many at a time; always the same ones for the same ``counts``.
-
-    Yields
-    ------
-    ndarray, shape (count, Q, n_features)
-    """
-    _, n_positions, n_features = positions.shape
-    postures = positions.reshape(-1, n_features)
-    center = postures.mean(axis=0)
-    _, spread, axes = np.linalg.svd(postures - center, full_matrices=False)
-    axes *= spread[:, np.newaxis] / np.sqrt(len(postures))
-    kept, rng = np.exp(-1 / n_positions), np.random.default_rng(0)
-    for count in counts:
-        steps = rng.standard_normal((count, n_positions, len(axes)))
-        # Stationary from the first position on.
-        steps[:, 1:] *= np.sqrt(1 - kept**2)
-        course = lfilter([1], [1, -kept], steps, axis=1)
-        yield smooth(course, SMOOTHING * (n_positions - 1)) @ axes + center

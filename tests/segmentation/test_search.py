@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import norm
 from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
@@ -24,9 +25,12 @@ from sklearn_motionsync.matching.warps import normalise
 from sklearn_motionsync.model.similarity import log_moments
 from sklearn_motionsync.segmentation.search import (
     Proposer,
-    WindowDissimilarity,
     WindowSearch,
+    best_hits,
     in_frames_given,
+)
+from sklearn_motionsync.segmentation.windows import (
+    WindowDissimilarity,
     random_movements,
 )
 
@@ -167,7 +171,8 @@ def search_of(scores, n_frames, shortest=1, longest=90):
 
 
 def hits_of(scores, proposed, n_frames=60, threshold=0.5, count=None, **limits):
-    return search_of(scores, n_frames, **limits).hits(np.array(proposed), threshold, count)
+    found = search_of(scores, n_frames, **limits).hits(np.array(proposed), threshold**2)
+    return best_hits(found, threshold, count)
 
 
 def test_hits_may_touch_each_other_and_the_ends_of_the_take():
@@ -310,7 +315,8 @@ def test_unit_does_not_matter_and_input_is_not_changed(pipe):
 @pytest.mark.parametrize("take", [np.ones((300, 3)), np.ones((4, 3)), movement(20)])
 def test_takes_without_the_action_give_no_hits(pipe, take):
     for pattern in (pipe, movement(60)):
-        performances, locations = find_performances(pattern, take)
+        rates = {"frame_rate": 30, "pattern_rate": 30}
+        performances, locations = find_performances(pattern, take, **rates)
         assert performances == []
         assert list(locations.columns) == COLUMNS
         assert locations[["start", "stop"]].dtypes.tolist() == [np.dtype(int)] * 2
@@ -387,6 +393,30 @@ def test_warns_if_one_frame_rate_only_is_known(pipe, at_30):
         sync = DenseSynchronizer(40).fit([table(TRAINING[0], 30), table(TRAINING[1], 60)])
     with pytest.warns(UserWarning, match="The pattern has no known"):
         find_performances(sync, table(TAKE, 60))
+
+
+@pytest.mark.parametrize("rate", [7.5, 60, 120])
+def test_rates_may_be_given(pipe, at_30, rate):
+    expected = find_performances(at_30, table(TAKE, rate))[1]
+    arrays = [table(TAKE, rate).to_numpy(), TAKE]
+    parts, found = find_performances(pipe, arrays, frame_rate=[rate, 30], pattern_rate=30)
+    assert spans(found[found["take"] == 0]) == spans(expected)
+    np.testing.assert_allclose(spans(found[found["take"] == 1]), TRUE, atol=8)
+    np.testing.assert_array_equal(parts[0], arrays[0][slice(*spans(found)[0])])
+    # What is given goes before what tables tell.
+    wrong = attributed(table(TAKE, rate), frame_rate=29)
+    found = find_performances(at_30, wrong, frame_rate=rate)[1]
+    assert spans(found) == spans(expected)
+    found = find_performances(TRAINING[0], arrays[0], frame_rate=rate, pattern_rate=30)[1]
+    assert len(found) == 3
+
+
+def test_warns_of_another_frame_rate_if_none_is_known_and_nothing_is_found(pipe):
+    take = table(TAKE, 120).to_numpy()
+    with pytest.warns(UserWarning, match=r"No window .* at 4 times the pattern's rate 3 would"):
+        assert find_performances(pipe, take)[0] == []
+    # What is known is not doubted.
+    assert find_performances(pipe, take, frame_rate=30, pattern_rate=30)[0] == []
 
 
 def test_rates_within_a_hundredth_are_one(at_30):
@@ -477,6 +507,63 @@ def test_auto_threshold_rejects_random_movements():
     np.testing.assert_allclose(WindowDissimilarity(sync).threshold(0.99), limit, rtol=1e-6)
 
 
+def test_threshold_of_a_take_rejects_a_crowd_and_lies_in_gaps():
+    measure = WindowDissimilarity(DenseSynchronizer(40).fit(TRAINING), SUBJECTS)
+    logs, limit = np.log(measure.known), 0.4
+    spread = np.sqrt((np.square(logs - logs.mean()).sum() + 3 * 0.07) / (len(logs) + 3))
+
+    def value(level, hits, n):
+        """What is maximised."""
+        share = norm.cdf((np.log(1.5 * level) - logs.mean()) / spread)
+        near = np.exp(-np.square(np.log(hits / level) / 0.05) / 2).sum()
+        return share - (0.02 * (hits < level).sum() + 0.1 * near) / n
+
+    assert measure.threshold_of_take(limit, np.empty(0), 1000) == pytest.approx(limit)
+    typical = np.exp(np.log([len(x) for x in TRAINING]).mean())
+    for hits in ([0.1, 0.39], [0.11, *np.linspace(0.2, 0.4, 60)], [0.3] * 9):
+        hits = np.array(hits)
+        for n_lengths, n in ((9, 1), (45, 1), (450, 10)):
+            found = measure.threshold_of_take(limit, hits, n_lengths * typical)
+            best = max(value(level, hits, n) for level in np.linspace(0.1, limit, 3000))
+            assert value(found, hits, n) == pytest.approx(best, abs=0.01)
+            assert found < limit or n > 1
+    # Of a single performance nothing is known.
+    alone = WindowDissimilarity(DenseSynchronizer(40, pattern=0).fit(TRAINING[:1]))
+    assert alone.threshold_of_take(0.5, np.linspace(0.1, 0.5, 99), 900) == 0.5
+
+
+def test_action_that_is_repeated_without_end_is_found_throughout(pipe):
+    """However many hits there are, the threshold is that of one."""
+    rng, parts = np.random.default_rng(1), []
+    for _ in range(80):
+        parts.append(movement(rng.integers(52, 72), rng.uniform(0.9, 1.1), rng.uniform(0.95, 1.05)))
+    take = np.concatenate(parts)
+    _, locations = find_performances(pipe, take + 0.02 * rng.standard_normal(take.shape))
+    assert len(locations) >= 76
+
+
+def test_threshold_of_a_take_is_that_of_the_take():
+    rng = np.random.default_rng(0)
+    pipe = DenseSynchronizer(40).fit([x + 0.3 * rng.standard_normal(x.shape) for x in TRAINING])
+    crowd = take_of({k: movement(60, 0.7 + k / 1500) for k in range(0, 900, 65)}, 960, 0.4)
+    _, both = find_performances(pipe, [TAKE, crowd], threshold=None)
+    for i, take in enumerate((TAKE, crowd)):
+        alone = find_performances(pipe, take, threshold=None)[1]
+        own = both[both["take"] == i].assign(take=0).reset_index(drop=True)
+        pd.testing.assert_frame_equal(own, alone)
+        auto = find_performances(pipe, take)[1]
+        kept = alone[alone["score"] >= alone["threshold"]]
+        assert auto.to_numpy().tolist() == kept.to_numpy().tolist()
+    assert both.groupby("take")["threshold"].nunique().tolist() == [1, 1]
+    assert both["threshold"].nunique() == 2
+
+
+def test_progress_is_printed_to_the_end(pipe, capsys):
+    find_performances(pipe, [TAKE, 0 * TAKE], verbose=1)
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line.startswith("[find_performances] searching: 100 %")
+
+
 def test_auto_threshold_of_performances_that_share_nothing_is_at_most_half_of_all_scores():
     noise = list(np.random.default_rng(0).standard_normal((12, 40, 30)))
     dissimilarity = WindowDissimilarity(DenseSynchronizer(40, metric=None).fit(noise))
@@ -539,6 +626,9 @@ def test_memory_does_not_grow_with_the_take(pipe):
         ({"threshold": "learned"}, "The 'threshold' parameter"),
         ({"coverage": 1}, "The 'coverage' parameter"),
         ({"max_hits": 0}, "The 'max_hits' parameter"),
+        ({"pattern_rate": 0}, "The 'pattern_rate' parameter"),
+        ({"frame_rate": -1}, "frame_rate must be one number above 0"),
+        ({"frame_rate": [30, 30]}, "frame_rate must be one number above 0"),
         ({"durations": (9, 4)}, "durations must be two whole numbers"),
         ({"durations": 30}, "durations must be two whole numbers"),
         ({"groups": [0, 1]}, "groups must have one label for each .*, got 2 for 12"),
