@@ -6,7 +6,9 @@ overlaps a labelled part that no better hit has, by half of what both cover toge
 an actor of HDM05, joined in any order, are such a recording, too; they are searched at other frame
 rates than that of the clips, without the action, and as an hour. Takes a quarter of an hour.
 
-    python benchmarks/search.py ../shared/data [coverage=0.8 ...]
+Other archives of clips that are named are joined at a quarter of their rate, and searched, too.
+
+    python benchmarks/search.py ../shared/data [coverage=0.8 ...] [ARCHIVE.npz ...]
 """
 
 import resource
@@ -288,7 +290,7 @@ def main():
     folder = Path(sys.argv[1])
     recordings = Recordings.read(folder / "utkinect")
     joined = Recordings.joined(folder / "hdm05" / "hdm05_positions.npz")
-    settings = {k: float(v) for k, v in (text.split("=") for text in sys.argv[2:])}
+    settings = {k: float(v) for k, v in (text.split("=") for text in sys.argv[2:] if "=" in text)}
 
     def search(*given):
         return ours(*given, **settings)
@@ -304,6 +306,9 @@ def main():
         ("reported", recordings, FOLDS[CHOSEN_ON:]),
         ("HDM05, joined", joined, [(actor,) for actor in joined.actors_of_takes.tolist()]),
     ]
+    for path in (text for text in sys.argv[2:] if text.endswith(".npz")):
+        more = Recordings.joined(path, 4)
+        runs.append((Path(path).stem, more, [(actor,) for actor in more.actors_of_takes.tolist()]))
     for name, some, folds in runs:
         print(f"\n| {name} | {head} |\n|---|---|---|---|---|---|")
         table(some, folds, methods)

@@ -308,6 +308,7 @@ class PartSynchronizer(AnchoredSynchronizer):
         its parts have in common, so one part that is late, or two, leave the lags of the others as
         they are. How many parts must agree is learnt: all of them where parts of the training
         performances differ as much as they share, a majority where they move together.
+        Coupling draws late parts back, and others along: fit with ``coupling=0`` to measure lags.
 
         Parameters
         ----------
