@@ -59,6 +59,13 @@ def errors_of(sync, clips, part, size, against):
     return np.abs(values[len(clips) :] - values[: len(clips)] - truth)
 
 
+def errors_of_warps(sync, clips, part, size):
+    """The same of the warps of the part, which the coupling draws to the body."""
+    late = [delayed(x, sync.parts_[part], size) for x in clips]
+    found, before = (sync.match_parts(x)[part].times for x in (late, clips))
+    return np.abs(found - before - put_in(before, size))
+
+
 def held_out(postures, actors, **params):
     """A synchronizer of all other actors, and the clips, for each actor in turn."""
     for actor in np.unique(actors):
@@ -73,15 +80,15 @@ def told(errors):
 
 
 def show_recovery(postures, actors):
-    print("1. lag put in and found, coupling=0: median / mean error in frames / above 3 frames")
-    folds = list(held_out(postures, actors, coupling=0))
+    print("1. lag put in and found: median / mean error in frames / above 3 frames")
+    folds = list(held_out(postures, actors))
     for arm in ARMS:
         for size in SIZES:
             cells = {
                 against: told([errors_of(*fold, arm, size, against) for fold in folds])
                 for against in ("rest", "body")
             }
-            sync = PartSynchronizer(coupling=0, synchronizer=DenseSynchronizer(P))
+            sync = PartSynchronizer(synchronizer=DenseSynchronizer(P))
             same = []
             for i in range(0, len(postures), 8):
                 sync.set_params(synchronizer__pattern=i).fit(postures)
@@ -95,28 +102,28 @@ def show_recovery(postures, actors):
 
 def show_coupling(postures, actors):
     print(
-        "2. coupling: mean |d_part - d_body| of all parts; lag of 6 frames: median / mean / above 3"
+        "2. coupling: mean |d_part - d_body| of all parts; lag of 6 frames in the warps: median / "
+        "mean / above 3"
     )
     for coupling in COUPLINGS:
         apart, found = [], {arm: [] for arm in ARMS}
         for sync, clips in held_out(postures, actors, coupling=coupling):
-            apart.append(np.abs(sync.lags(clips, against="body").values).ravel())
+            body = sync.match(clips).times
+            parts = sync.match_parts(clips).values()
+            apart.append(np.abs([part.times - body for part in parts]).ravel())
             for arm in ARMS:
-                found[arm].append(errors_of(sync, clips, arm, 6, "rest"))
+                found[arm].append(errors_of_warps(sync, clips, arm, 6))
         cells = "".join(f"  {arm}: {told(x)}" for arm, x in found.items())
         print(f"   {coupling:7g}  {np.concatenate(apart).mean():5.2f}{cells}", flush=True)
 
 
 def show_people(postures, actors):
     print("3. lags of people, behind the rest of the body, mean over the clock")
-    for coupling in (0, 1e-3):
-        body = DenseSynchronizer(P)
-        sync = PartSynchronizer(coupling=coupling, synchronizer=body).fit(postures)
-        print(f"   coupling={coupling:g}")
-        print(sync.lags(postures, actors).summary().round(2).to_string())
-        if {"left leg", "right leg"} <= set(sync.parts_):
-            legs = sync.lags(postures, actors, against="right leg").summary().loc["left leg"]
-            print("   left leg behind right leg:", legs.round(2).to_dict())
+    sync = PartSynchronizer(synchronizer=DenseSynchronizer(P)).fit(postures)
+    print(sync.lags(postures, actors).summary().round(2).to_string())
+    if {"left leg", "right leg"} <= set(sync.parts_):
+        legs = sync.lags(postures, actors, against="right leg").summary().loc["left leg"]
+        print("   left leg behind right leg:", legs.round(2).to_dict())
 
 
 def shifted(x, columns, percent):
@@ -174,13 +181,13 @@ def main():
         show_recovery(postures, actors)
         show_coupling(postures, actors)
         show_people(postures, actors)
-        show_shifts(list(held_out(postures, actors, coupling=0)))
+        show_shifts(list(held_out(postures, actors)))
     bunch = read_archive(args.folder, "utkinect")
     chosen = [i for i in np.flatnonzero(bunch.target == "throw") if len(bunch.data[i]) >= 8]
     postures = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
     people = np.unique(bunch.actor[chosen], return_inverse=True)[1]
     print(f"throw: {len(postures)} clips of {people.max() + 1} people")
-    show_shifts(list(held_out(postures, people % 2, coupling=0)))
+    show_shifts(list(held_out(postures, people % 2)))
 
 
 if __name__ == "__main__":

@@ -85,12 +85,14 @@ _ = axis.set_title("The arms of two people are late, those of the others are not
 # %%
 # Where it fails
 # --------------
-# Coupling draws each part towards the whole body. It protects parts that move little from wrong
-# warps. A strong coupling also hides real lags. The table shows what is left of 6 %:
+# Coupling draws the warp of each part towards the whole body. It protects parts that move little
+# from wrong warps. A strong coupling also leaves in the poses what is late. The table shows how
+# much of 6 % the warps take out. Lags are measured without coupling.
 
 for coupling in (0, 0.001, 0.1):
-    values = sync.set_params(coupling=coupling).fit(usual).lags(X, unit="percent").values[:, arm]
-    found = values[arm_is_late].mean(axis=0) - values[~arm_is_late].mean(axis=0)
+    sync.set_params(coupling=coupling).fit(usual)
+    behind = sync.match_parts(X)["right arm"].times - sync.match(X).times  # frames of 60
+    found = 100 / 59 * (behind[arm_is_late].mean(axis=0) - behind[~arm_is_late].mean(axis=0))
     print(f"coupling {coupling:6g}: {np.abs(found).max():.1f} % of 6")
 
 # %%

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import reprlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import NamedTuple, Self
 
@@ -308,7 +308,8 @@ class PartSynchronizer(AnchoredSynchronizer):
         its parts have in common, so one part that is late, or two, leave the lags of the others as
         they are. How many parts must agree is learnt: all of them where parts of the training
         performances differ as much as they share, a majority where they move together.
-        Coupling draws late parts back, and others along: fit with ``coupling=0`` to measure lags.
+        Coupling would draw late parts back, and others along: lags are those of parts that are
+        matched without it, unlike those of `match_parts`. An infinite coupling leaves none.
 
         Parameters
         ----------
@@ -345,7 +346,7 @@ class PartSynchronizer(AnchoredSynchronizer):
         if groups is not None:
             groups, people = encode_groups(groups, len(performances))
         body = self.match(performances, **self._given(X, keyframes, None))
-        matches = self._match_parts(performances, body, self._warpers) | {_BODY: body}
+        matches = self._match_parts(performances, body, self._warpers, free=True) | {_BODY: body}
         clock = unit, [len(x) for x in performances], rates_of(X, frame_rate, unit)
         offsets = {
             name: match.offsets_in(*clock) - self._usual(name, match).offsets_in(*clock)
@@ -380,8 +381,11 @@ class PartSynchronizer(AnchoredSynchronizer):
         """The mean warp of a part in the training set, as a match of as many performances."""
         return Match(np.broadcast_to(self._people.times[name], match.times.shape))
 
-    def _match_parts(self, performances, body, names):
-        """Matches of parts by their names; what does not move has the warp of the body."""
+    def _match_parts(self, performances, body, names, free=False):
+        """Matches of parts by their names, perhaps free of the coupling to the body.
+
+        What does not move has the warp of the body.
+        """
         found, sync = {}, self.synchronizer_
         performances = self._without_gaps(performances)
         with Progress(self, sync.verbose) as progress:
@@ -390,6 +394,7 @@ class PartSynchronizer(AnchoredSynchronizer):
                 if warper is None:
                     found[name] = Match(body.times)
                     continue
+                warper = replace(warper, weight=0.0) if free else warper
                 portions = {"n_jobs": sync.n_jobs, "progress": progress, "name": f"warping {name}"}
                 distances, times = warp_in_portions(warper, performances, body.times, **portions)
                 found[name] = Match(times, warper.matcher.features.back(distances))
@@ -470,7 +475,7 @@ def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None
             how["step"] = progress.stage("learning parts", len(portions))
             warpers = dict(zip(columns, run(PartWarper.of, portions, **how), strict=True))
             moving = [name for name in columns if warpers[name] is not None]
-            portions = [(warpers[name], people, body) for name in moving]
+            portions = [(replace(warpers[name], weight=0.0), people, body) for name in moving]
             how["step"] = progress.stage("warping parts", len(portions))
             warps |= dict(zip(moving, run(_warps_of_part, portions, **how), strict=True))
         mean = {name: each.mean(axis=0) for name, each in warps.items()}

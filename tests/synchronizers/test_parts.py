@@ -99,7 +99,7 @@ def test_lag_of_an_arm_is_recovered_with_the_pattern_of_other_subjects(grabs):
         assert np.median(np.abs(errors)) < 1, (part, size)
 
 
-def test_lags_fall_with_the_coupling(grabs):
+def test_warps_of_parts_come_nearer_with_the_coupling(grabs):
     X, apart = grabs[0][::4], []
     for coupling in (0, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1, 1e6, np.inf):
         sync = of_parts(ARMS, coupling, n_frames=50).fit(X)
@@ -110,6 +110,26 @@ def test_lags_fall_with_the_coupling(grabs):
     assert np.max(apart[-2]) < 1e-6
 
 
+def test_lags_are_measured_without_coupling(postures):
+    """An arm that is 5 % late is found as late, while its warp is drawn to the body."""
+    sync = {c: of_parts(coupling=c, n_frames=60).fit(postures) for c in (0, 0.1)}
+    late = [x.copy() for x in postures]
+    for x in late:
+        frames = np.arange(len(x))
+        for k in sync[0].parts_["right arm"]:
+            x[:, k] = np.interp(frames - 0.05 * frames[-1], frames, x[:, k])
+    inner, found, warped = slice(6, -12), {}, {}
+    for coupling, own in sync.items():
+        values = [own.lags(X, unit="percent") for X in (postures, late)]
+        arm = values[0].parts.index("right arm")
+        found[coupling] = np.median((values[1].values - values[0].values)[:, arm, inner])
+        times = [own.match_parts(X)["right arm"].times for X in (postures, late)]
+        warped[coupling] = np.median((times[1] - times[0])[:, inner]) * 100 / 59
+    assert abs(found[0] - 5) < 0.6
+    assert abs(found[0.1] - 5) < 0.6
+    assert warped[0.1] < 2.5 < warped[0]
+
+
 def test_strong_coupling_follows_warps_steeper_than_a_path(real_data):
     """In clips of a few frames warps by way of others are steep and leave the band."""
     bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
@@ -118,7 +138,8 @@ def test_strong_coupling_follows_warps_steeper_than_a_path(real_data):
     trunk = {"trunk": Skeleton.paper().parts()["trunk"]}
     for coupling, most in ((10, 0.1), (1e6, 1e-6)):
         sync = of_parts(trunk, coupling, n_frames=60).fit(X)
-        assert np.abs(sync.lags(X, against="body").values).max() < most
+        apart = sync.match_parts(X)["trunk"].times - sync.match(X).times
+        assert np.abs(apart).max() < most
 
 
 # -- warps of parts ----------------------------------------------------------------------
