@@ -29,6 +29,9 @@ _WIDTH = 1 / 24
 # Frames repeat if their similarity exceeds the first number, and their movement the second one, as
 # a share of the mean energy of the stretch (at first: of the largest energy of the take).
 _SIMILAR, _MOVES = 0.4, 0.05
+# Where the evidence falls by so much, times the period, the movement pauses: by about 1 where the
+# body stands for a period.
+_PAUSE = 0.75
 # Proposals hold at least so many periods: fewer than `LEAST_CYCLES`, as their ends are not final.
 _LEAST_PROPOSED = 1.5
 # A stretch that ends so near to an end of the take, in periods, goes on to it: in the last part of
@@ -146,7 +149,7 @@ def _find_first(take, part, threshold):
         if not rejection_reason(found, threshold):
             required = take.required(found, group.places(start, stop), threshold)
             if min(found.strength, _HIGHEST) >= required:
-                return Stretch(start, stop, found)
+                return Stretch(int(start), int(stop), found)
     return None
 
 
@@ -199,7 +202,7 @@ class _Take:
         core = slice(inside[0] - first, inside[1] - first)
         signals = signals_at(self.x[first:last], lag, self.noise)
         evidence = evidence_at(lag, signals, [energy[core].mean() for _, energy in signals])
-        _, start, stop = _best_interval(evidence)
+        _, start, stop = _best_interval(evidence, _PAUSE * lag)
         start, stop = first + start, first + stop + lag
         if start < _NEAR_END * period:
             start = 0
@@ -285,9 +288,27 @@ def evidence_at(lag, signals, sizes):
     return total
 
 
-def _best_interval(values):
-    """The largest sum of neighbouring values, and where they begin and end, excluded."""
-    sums = np.concatenate([[0], np.cumsum(values, dtype=np.float64)])
+def _best_interval(values, deepest=np.inf):
+    """The largest sum of neighbouring values, and where they begin and end, excluded.
+
+    Within them the sum falls by ``deepest`` at most; otherwise they are the better one of both
+    sides of the fall.
+    """
+    first, last = 0, len(values)
+    while True:
+        total, start, stop = _largest_sum(values, first, last)
+        sums = np.concatenate([[0], np.cumsum(values[start:stop], dtype=np.float64)])
+        falls = np.maximum.accumulate(sums) - sums
+        if falls.max() <= deepest:
+            return total, start, stop
+        middle = start + int(falls.argmax())
+        sides = [(start, middle), (middle, stop)]
+        first, last = max(sides, key=lambda side: _largest_sum(values, *side)[0])
+
+
+def _largest_sum(values, first, last):
+    """The largest sum of neighbouring values in an interval, and where they begin and end."""
+    sums = np.concatenate([[0], np.cumsum(values[first:last], dtype=np.float64)])
     gains = sums - np.minimum.accumulate(sums)
     stop = int(gains.argmax())
-    return gains[stop], int(sums[: stop + 1].argmin()), stop
+    return gains[stop], first + int(sums[: stop + 1].argmin()), first + stop

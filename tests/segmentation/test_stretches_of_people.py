@@ -1,0 +1,64 @@
+"""Stretches of real takes: walks between standing, jogs among actions, gestures, single actions."""
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope="module")
+def stretches(benchmark):
+    return benchmark("stretches")
+
+
+@pytest.fixture(scope="module")
+def walks(stretches, real_data):
+    return list(stretches.walks(real_data))
+
+
+@pytest.mark.parametrize(
+    ("factor", "kind", "rate"), [(1, "sway", None), (4, "freeze", None), (2, "noise", 30)]
+)
+def test_walks_between_standing_are_found_and_cut_inside(stretches, walks, factor, kind, rate):
+    """95 % of them, with 95 % of the cuts in the walk, and hardly fewer cycles than alone."""
+    cyclic, right, _, inside, cuts, good, found = stretches.standing(walks, factor, kind, rate)
+    assert len(walks) == 26
+    assert cyclic >= 0.95 * len(walks)
+    assert right >= 0.95 * cyclic - 1
+    assert good >= 0.95 * cuts
+    assert inside >= 0.95 * 65  # the walks alone have 65
+    assert found <= len(walks) + 1
+
+
+def test_jogs_among_single_actions_are_found(stretches, real_data):
+    for n_actions in (2, 4):
+        takes, _, found, others = stretches.among_actions(real_data, n_actions, jogs=True)
+        assert found >= 0.9 * takes
+        assert others == 0
+
+
+def test_single_actions_one_after_the_other_are_not_cyclic(stretches, real_data):
+    called = [stretches.among_actions(real_data, n)[1] for n in (2, 3, 5)]
+    assert sum(called) == 0
+
+
+def test_gestures_are_found(stretches, real_data):
+    """In clips, and in recordings of ten actions, where no other stretch is found."""
+    *rows, (_, others) = stretches.gestures(real_data)
+    counts = {label: tuple(numbers) for label, *numbers in rows}
+    n_clips, cyclic, n_labels, found = counts["waveHands"]
+    assert (n_clips, n_labels) == (20, 20)
+    assert cyclic >= 0.9 * n_clips
+    assert cyclic + found >= 0.8 * (n_clips + n_labels)
+    assert others == 0
+
+
+def test_cycles_of_walks_between_standing_score_high(stretches, walks):
+    """The other frames of the take would score about 0.3."""
+    walk = next(w for w in walks if w["label"] == "walk")
+    others = [w["points"].reshape(len(w["points"]), -1) for w in walks if w["label"] == "walk"][1:]
+    take, (first, last) = stretches.with_standing(walk, 4, "sway", np.random.default_rng(0))
+    segmenter = stretches.CycleSegmenter(walk["skeleton"], start="left").fit(others)
+    table = segmenter.segment([take])[1]
+    assert len(table) >= 1
+    assert table["score"].min() > 0.9
+    assert table["start"].min() >= first - 1
+    assert table["stop"].max() <= last + 1
