@@ -227,6 +227,14 @@ def gestures(folder):
     yield "elsewhere in takes", sum(map(len, stretches)) - len(right) + others
 
 
+def exercises(folder):
+    """Exercises that are done once: how many, and how many are called cyclic."""
+    file = np.load(f"{folder}/uiprmd/uiprmd_odd_positions.npz")
+    positions = file["positions"] - file["positions"].mean(axis=1, keepdims=True)
+    takes = np.split(positions.reshape(len(positions), -1), file["offsets"][1:-1])
+    return len(takes), int(CycleSegmenter().report(takes)["cyclic"].sum())
+
+
 def noise(n_takes=10):
     """Takes of noise in few features, and how many are called cyclic."""
     rng, counts = np.random.default_rng(1), {}
@@ -242,7 +250,7 @@ def noise(n_takes=10):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("data", help="folder of hdm05, cmu07_walk and utkinect")
+    parser.add_argument("data", help="folder of hdm05, cmu07_walk, utkinect and uiprmd")
     folder = parser.parse_args().data
     every = list(walks(folder))
     print(
@@ -275,6 +283,7 @@ def main():
     print("\nutkinect               clips  cyclic  in takes  found")
     for name, *counts in gestures(folder):
         print(f"  {name:18}" + "".join(f"{n:8d}" for n in counts))
+    print(f"\nexercises done once, and called cyclic: {exercises(folder)}")
     print("\nnoise of so many features: called cyclic of 20")
     for (name, n_features), called in noise().items():
         print(f"  {name:12}{n_features:4d}{called:6d}")

@@ -38,6 +38,7 @@ def test_jogs_among_single_actions_are_found(stretches, real_data):
 def test_single_actions_one_after_the_other_are_not_cyclic(stretches, real_data):
     called = [stretches.among_actions(real_data, n)[1] for n in (2, 3, 5)]
     assert sum(called) == 0
+    assert stretches.exercises(real_data) == (980, 0)
 
 
 def test_gestures_are_found(stretches, real_data):
