@@ -61,6 +61,18 @@ axis.set_xlabel("true moment of the cut, from the median (% of a cycle)")
 _ = axis.set_title("Dense matching cuts closer to the same moment")
 
 # %%
+# Standing is no cycle
+# --------------------
+# This person stands, walks, stands again and walks on. Only the stretches in which the take repeats
+# are cut. They are shaded.
+
+still = np.repeat(new[0][:1], 250, axis=0) + 0.05 * np.random.default_rng(0).normal(size=(250, 4))
+walk = np.concatenate([still, new[0], still, new[1][:330], still])
+display = CycleDisplay.from_estimator(segmenter, [walk], unit="seconds", frame_rate=100)
+display.axes_[1].set_ylabel("hip flexion\n(standard deviations)")
+_ = display.figure_.suptitle("Two stretches of walking are found, and cut by themselves")
+
+# %%
 # From cycles to a model
 # ----------------------
 # The cycles are trials for any pipeline. ``locations`` holds the take of each. Given as groups, it
