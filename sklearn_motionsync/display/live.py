@@ -20,7 +20,7 @@ from ..inputs.types import (
     SupportsArray,
     ValuesLike,
 )
-from ..online.stream import LivePhase, time_left
+from ..online.stream import Course, LivePhase, each_value
 from ..online.synchronizer import OnlineSynchronizer
 from ..utils.pipelines import find_step
 from .animation import animate
@@ -35,6 +35,7 @@ from .arguments import (
     times_from_zero,
 )
 from .bodies import bones_by_side, bounds, invert_postures, landmark_track, project
+from .dial import PhaseDial
 from .drawing import COLORS, WIDTH, bone_lines, front_line, legend_above, panels, stage
 
 __all__ = ["PhaseDisplay"]
@@ -51,6 +52,8 @@ _AHEAD = 0.1
 _BAND = 1.645
 # The opacity of the interval of the phase.
 _INTERVAL_OPACITY = 0.25
+# Cycles on the time axis.
+_N_CYCLES = 5
 # The number of points of a prediction.
 _N_POINTS = 60
 
@@ -93,6 +96,8 @@ class PhaseDisplay:
         The names of the performances.
     unit : {"frames", "seconds"}, default="frames"
         The unit of the times.
+    cyclic : bool, default=False
+        Whether the phases are those of cycles. The time axis then shows the last few of them.
 
     Attributes
     ----------
@@ -137,6 +142,7 @@ class PhaseDisplay:
         skeleton: Skeleton | None = None,
         names: Sequence[str] | None = None,
         unit: Literal["frames", "seconds"] = "frames",
+        cyclic: bool = False,
     ) -> None:
         phases = _as_list_of_phases(phases)
         count, nothing = len(phases), [None] * len(phases)
@@ -144,16 +150,21 @@ class PhaseDisplay:
         self.unit, self.skeleton = unit, skeleton
         n_shown = 0 if seen is None else np.shape(seen[0])[1]
         self.features = [f"x{k}" for k in range(n_shown)] if features is None else features
-        self._action = LearntAction(n_frames, duration, *map(_as_floats, (mean, spread, mean_body)))
-        parts = (nothing if x is None else x for x in (times, seen, afterwards, bodies))
+        learnt = map(_as_floats, (mean, spread, mean_body))
+        self._action = LearntAction(n_frames, cyclic, duration, *learnt)
+        times = nothing if times is None else times
+        times = [times_from_zero(t, len(of.phase)) for t, of in zip(times, phases, strict=True)]
+        parts = (nothing if x is None else x for x in (seen, afterwards, bodies))
         self._performances = [
             RunningPerformance(
                 *map(_as_floats, phase),
-                times_from_zero(own_times, len(phase.phase)),
+                np.zeros(len(t), dtype=np.intp) if phase.cycle is None else phase.cycle,
+                t,
+                self._action.times_left(phase, t),
                 name,
                 *map(_as_floats, of_one),
             )
-            for phase, name, own_times, *of_one in zip(phases, self.names, *parts, strict=True)
+            for phase, name, t, *of_one in zip(phases, self.names, times, *parts, strict=True)
         ]
 
     def __repr__(self):
@@ -249,7 +260,9 @@ class PhaseDisplay:
             mean=live.mean_[:, shown],
             spread=None if training is None else _spread(live, training)[:, shown],
             afterwards=[
-                None if np.isnan(x).any() else _final_phases(live, takes.select([i]), len(x))
+                None
+                if live.cyclic or np.isnan(x).any()
+                else _final_phases(live, takes.select([i]), len(x))
                 for i, x in zip(chosen, seen, strict=True)
             ],
             features=[feature_names[k] for k in shown],
@@ -258,6 +271,7 @@ class PhaseDisplay:
             skeleton=skeleton,
             names=names,
             unit="frames" if live.frame_rate is None else "seconds",
+            cyclic=live.cyclic,
         )
         return display.plot(ax, frame=frame, azimuth=azimuth)
 
@@ -402,8 +416,12 @@ def _as_list_of_phases(phases):
             f"as live.track(X) gives; got {phases!r:.80}."
         )
     if len(listed) == 1 and np.ndim(listed[0].phase) == 2:
-        by_value = [values for values in listed[0] if values is not None]
-        return [LivePhase(*of) for of in zip(*map(np.transpose, by_value), strict=True)]
+        (many,) = listed
+        streams = range(many.phase.shape[1])
+        return [
+            each_value(many, lambda values, n=n: None if values is None else values[:, n])
+            for n in streams
+        ]
     return listed
 
 
@@ -436,6 +454,8 @@ class LearntAction(NamedTuple):
     ----------
     n_frames : int
         The length of the clock.
+    cyclic : bool
+        Whether it is a cycle.
     duration : float or None
         The mean duration in the unit of the times.
     mean, spread : ndarray (P, n_shown), or None
@@ -444,6 +464,7 @@ class LearntAction(NamedTuple):
     """
 
     n_frames: int
+    cyclic: bool = False
     duration: float | None = None
     mean: np.ndarray | None = None
     spread: np.ndarray | None = None
@@ -457,29 +478,34 @@ class LearntAction(NamedTuple):
         return found.reshape(*np.shape(phase), *values.shape[1:])
 
     def phase_ahead(self, phase, rate):
-        """The phase a tenth of the duration later at this rate."""
+        """The phase a tenth of the duration later at this rate; of a cycle maybe in the next."""
         last = self.n_frames - 1
-        return min(phase + _AHEAD * last * rate, last)
+        ahead = phase + _AHEAD * last * rate
+        return ahead if self.cyclic else min(ahead, last)
 
-    def time_left(self, phase, elapsed):
-        """The remaining time, as `OnlineSynchronizer.time_left` estimates it."""
-        return time_left(phase / (self.n_frames - 1), elapsed, self.duration)
+    def times_left(self, found, times):
+        """The time left at every frame, as `OnlineSynchronizer.time_left` estimates it."""
+        if self.duration is None:
+            return np.zeros(len(times))
+        course, out = Course(self.n_frames, self.duration, self.cyclic), []
+        cycles = np.zeros(len(times), dtype=np.intp) if found.cycle is None else found.cycle
+        for now in zip(times, found.phase, cycles, strict=True):
+            course.follow(*map(np.atleast_1d, now))
+            out.append(course.time_left()[0])
+        return np.array(out)
 
     def end_of(self, performance):
         """The latest time observed or predicted of a performance."""
-        phase, times = performance.phase, performance.times
-        if self.duration is None:
-            return times[-1]
-        expected = times + np.where(phase < self.n_frames - 1, self.time_left(phase, times), 0)
+        times = performance.times
+        expected = times + np.where(performance.phase < self.n_frames - 1, performance.left, 0)
         return max(times[-1], expected.max())
 
-    def predict(self, phase, elapsed):
+    def predict(self, phase, now, left):
         """The times and the phases of the rest, (n_points,) each; empty at the end."""
         last = self.n_frames - 1
         if self.duration is None or phase >= last:
             return np.empty((2, 0))
-        left = self.time_left(phase, elapsed)
-        return elapsed + np.linspace(0, left, _N_POINTS), np.linspace(phase, last, _N_POINTS)
+        return now + np.linspace(0, left, _N_POINTS), np.linspace(phase, last, _N_POINTS)
 
 
 class RunningPerformance(NamedTuple):
@@ -490,8 +516,11 @@ class RunningPerformance(NamedTuple):
     phase, rate, confidence : ndarray, shape (n_frames,)
     lower, upper : ndarray (n_frames,), or None
         The bounds of the phases.
+    cycle : ndarray of int, shape (n_frames,)
     times : ndarray, shape (n_frames,)
         The first time is 0.
+    left : ndarray, shape (n_frames,)
+        The time left.
     name : str
     seen : ndarray (n_frames, n_shown), or None
     afterwards : ndarray (n_frames,), or None
@@ -504,7 +533,9 @@ class RunningPerformance(NamedTuple):
     confidence: np.ndarray
     lower: np.ndarray | None
     upper: np.ndarray | None
+    cycle: np.ndarray
     times: np.ndarray
+    left: np.ndarray
     name: str
     seen: np.ndarray | None = None
     afterwards: np.ndarray | None = None
@@ -534,6 +565,7 @@ class PerformanceRow:
         if performance.body is not None:
             self.body = BodyPanel(axes.pop(0), performance, action, skeleton, azimuth)
         self.dial = PhaseDial(axes.pop(0))
+        self._time_axes = axes
         self._draw_phase(axes[0], end)
         self.curves = [
             FeaturePanel(axis, performance, action, k, name, end)
@@ -564,16 +596,25 @@ class PerformanceRow:
         now = max(np.searchsorted(p.times, time, side="right") - 1, 0)
         phase, rate, confidence = (x[now] for x in (p.phase, p.rate, p.confidence))
         last, past = action.n_frames - 1, slice(now + 1)
-        ahead, rest = action.phase_ahead(phase, rate), action.predict(phase, p.times[now])
-        self.dial.show(phase / last, ahead / last, rate, confidence)
-        self.phase.set_data(p.times[past], 100 / last * p.phase[past])
+        ahead = action.phase_ahead(phase, rate)
+        rest = action.predict(phase, p.times[now], p.left[now])
+        number = p.cycle[now] if action.cyclic else None
+        self.dial.show(phase / last, ahead / last, rate, confidence, number)
+        # The line has a gap where a cycle begins.
+        begins = 1 + np.flatnonzero(np.diff(p.cycle[past]))
+        line = p.times[past], 100 / last * p.phase[past]
+        self.phase.set_data(*(np.insert(values, begins, np.nan) for values in line))
         _fill_area(self.confidence, p.times[past], 0, 100 * p.confidence[past])
         if p.lower is not None:
             lower, upper = (100 / last * bound[past] for bound in (p.lower, p.upper))
-            _fill_area(self.interval, p.times[past], lower, upper)
+            _fill_area(self.interval, p.times[past], lower, upper, begins)
+        if action.cyclic and action.duration is not None:
+            stop = p.times[now] + action.duration
+            for axis in self._time_axes:
+                axis.set_xlim(max(0, stop - _N_CYCLES * action.duration), stop)
         self.rest.set_data(rest[0], 100 / last * rest[1])
         if self.body is not None:
-            self.body.show(now, ahead)
+            self.body.show(now, ahead % last if action.cyclic else ahead)
         for curve in self.curves:
             curve.show(now, *rest)
 
@@ -663,85 +704,9 @@ def _empty_area(axis, color, alpha, label):
     return axis.add_collection(area, autolim=False)
 
 
-def _fill_area(area, xs, lower, upper):
-    """Fill the area between two curves."""
-    if len(xs) == 0:
-        area.set_verts([])
-        return
+def _fill_area(area, xs, lower, upper, gaps=()):
+    """Fill the area between two curves, but for gaps before these indices."""
     lower, upper = np.broadcast_to(lower, xs.shape), np.broadcast_to(upper, xs.shape)
-    there, back = np.column_stack([xs, upper]), np.column_stack([xs, lower])[::-1]
-    area.set_verts([np.concatenate([there, back])])
-
-
-# -- the dial ----------------------------------------------------------------------------
-
-# Inner and outer radius of the ring and of the arc around it; the radius of the numbers, and the
-# inner radius of the hand.
-_RING, _ARC, _NUMBERS, _HAND = (0.78, 1.0), (1.05, 1.13), 1.28, 0.62
-# The opacity of the ring at confidence 0.
-_MIN_OPACITY = 0.12
-
-
-class PhaseDial:
-    """A ring from 0 % at the top clockwise to 100 %.
-
-    Parameters
-    ----------
-    axis : Axes
-
-    Attributes
-    ----------
-    passed : Wedge
-        From 0 to the phase; the opacity shows the confidence.
-    ahead : Wedge
-        From the phase to the phase ahead.
-    hand : Line2D
-        The line width shows the confidence.
-    share, state : Text
-        The phase in per cent; rate and confidence.
-    """
-
-    def __init__(self, axis):
-        from matplotlib.patches import Wedge
-
-        axis.set_aspect("equal")
-        axis.set_xlim(-1.5, 1.5)
-        axis.set_ylim(-1.75, 1.45)
-        axis.axis("off")
-
-        def ring(color, radii, zorder, end=90):
-            style = {"width": radii[1] - radii[0], "facecolor": color, "linewidth": 0}
-            return axis.add_patch(Wedge((0, 0), radii[1], end, 90, zorder=zorder, **style))
-
-        ring(COLORS["shadow"], _RING, 1, end=-270)
-        self.passed = ring(COLORS["performance"], _RING, 2)
-        self.ahead = ring(COLORS["mean"], _ARC, 3)
-        style = {"color": COLORS["pattern"], "solid_capstyle": "round", "zorder": 4}
-        (self.hand,) = axis.plot([], [], **style)
-        style = {"ha": "center", "va": "center", "color": "0.35", "fontsize": "x-small"}
-        for quarter, text in enumerate(("0 %", "25", "50", "75")):
-            x, y = _on_circle(quarter / 4, _NUMBERS + 0.02 * (quarter % 2))
-            axis.text(x, y, text, **style)
-        self.share = axis.text(0, 0, "", ha="center", va="center", fontsize="large")
-        self.state = axis.text(0, -1.62, "", ha="center", va="center", fontsize="small")
-
-    def show(self, share, ahead, rate, confidence):
-        """Move the hand to a share of the action."""
-        # Rounding may take a sum of probabilities above 1.
-        confidence = min(confidence, 1)
-        self.passed.set_theta1(90 - 360 * share)
-        self.passed.set_alpha(_MIN_OPACITY + (1 - _MIN_OPACITY) * confidence)
-        self.ahead.set_theta1(90 - 360 * ahead)
-        self.ahead.set_theta2(90 - 360 * share)
-        # A wedge of no length would be drawn as a whole ring.
-        self.ahead.set_visible(ahead > share)
-        self.hand.set_data(*np.transpose([_on_circle(share, _HAND), _on_circle(share, _RING[1])]))
-        self.hand.set_linewidth(1 + 4 * confidence)
-        self.share.set_text(f"{100 * share:.0f} %")
-        self.state.set_text(f"rate {rate:.1f}, confidence {confidence:.2f}")
-
-
-def _on_circle(share, radius):
-    """The point at a share of a circle, clockwise from the top."""
-    angle = 2 * np.pi * share
-    return radius * np.sin(angle), radius * np.cos(angle)
+    there, back = np.column_stack([xs, upper]), np.column_stack([xs, lower])
+    pairs = zip(np.split(there, gaps), np.split(back, gaps), strict=True)
+    area.set_verts([np.concatenate([a, b[::-1]]) for a, b in pairs if len(a)])

@@ -5,29 +5,38 @@ width of a filter. The sequence it is compared with goes through the same filter
 delay.
 """
 
+import math
+
 import numpy as np
 from scipy.signal import lfilter
 
 from .factors import Bases, right_factor
 from .trellis import TIE, Tile
 
-__all__ = ["CausalDerivative", "CausalTrellis", "causal_costs", "causal_velocity"]
+__all__ = ["CausalDerivative", "CausalTrellis", "causal_velocity"]
 
 # Gaps longer than this, in widths of the filter, are not bridged: the filter restarts.
 _BRIDGED = 3
+# After so many widths both filters have forgotten everything.
+_FORGOTTEN = 40
+# After so many samples costs are counted from the least one, so that they stay precise.
+REBASED = 4096
 
 
 class CausalDerivative:
-    """The velocity of streams at their last sample; before their first sample they are at rest.
+    """The velocity of streams at their last sample.
 
     Parameters
     ----------
     width : float
         Time constant of both filters, in samples; 0 for the plain difference.
     shape : tuple (n_streams, n_features)
+    from_rest : bool, default=True
+        Whether streams are at rest before their first sample; else their velocity is known from the
+        second one on.
     """
 
-    def __init__(self, width, shape):
+    def __init__(self, width, shape, from_rest=True):
         self._keep = _kept_share(width)
         self._longest = max(1.0, _BRIDGED * width)
         self._last = np.full(shape, np.nan)
@@ -36,12 +45,12 @@ class CausalDerivative:
         self._steady = False
         self._age = np.zeros(shape)
         self._filtered = np.zeros((2, *shape))
-        self._weight = np.ones((2, *shape))
+        self._from_rest, self._weight = from_rest, np.full((2, *shape), float(from_rest))
 
     def restart(self, stream):
         """Forget the past of one stream."""
         self._last[stream], self._age[stream] = np.nan, 0
-        self._filtered[:, stream], self._weight[:, stream] = 0, 1
+        self._filtered[:, stream], self._weight[:, stream] = 0, self._from_rest
         self._steady = False
 
     def step(self, sample):
@@ -63,9 +72,11 @@ class CausalDerivative:
         # Some features are or were not observed.
         self._age += 1
         seen = ~np.isnan(sample)
-        lost = seen & (self._age > self._longest) & ~np.isnan(self._last)
-        self._weight[:, lost] = 0
         first = seen & np.isnan(self._last)
+        lost = seen & (self._age > self._longest) & ~first
+        if not self._from_rest:
+            lost |= first
+        self._weight[:, lost] = 0
         known = seen & ~lost
         gap = np.where(known, self._age, 1)
         difference = np.where(known & ~first, sample - self._last, 0) / gap
@@ -84,7 +95,7 @@ class CausalDerivative:
         return np.where(known, velocity, np.nan)
 
 
-def causal_velocity(positions, subframes, width):
+def causal_velocity(positions, subframes, width, cyclic=False):
     """Causal velocity of a whole sequence, at every position, by the frame.
 
     Parameters
@@ -95,11 +106,19 @@ def causal_velocity(positions, subframes, width):
     subframes : int
     width : float
         Time constant in frames.
+    cyclic : bool, default=False
+        Whether the sequence was repeated before, and its last position is the first one again.
+        Otherwise it was at rest.
 
     Returns
     -------
     ndarray, shape (Q, n_features)
     """
+    if cyclic:
+        n = len(positions) - 1
+        before = math.ceil((_FORGOTTEN * width + 1) * subframes)
+        repeated = np.concatenate([positions[np.arange(-before, 0) % n], positions])
+        return causal_velocity(repeated, subframes, width)[before:]
     velocity = positions.copy()
     # Before the first position is rest.
     velocity[:subframes] -= positions[0]
@@ -129,27 +148,38 @@ class CausalTrellis:
         With ``running=True``.
     moving : ndarray, shape (Q, n_features)
     n_streams : int, default=1
+    cyclic : bool, default=False
+        Whether the moving sequence goes on with its first position after the last one, which is
+        the same. Paths then begin at any position.
+    restart_cost : float, default=inf
+        What a new attempt pays: a path that goes on from any position to the first one.
 
     Attributes
     ----------
     n_samples : int
         Samples so far.
+    attempts : ndarray of int, shape (n_streams,)
+        How often a new attempt became cheaper than the one before, which then ends.
     """
 
-    def __init__(self, trellis, moving, n_streams=1):
+    def __init__(self, trellis, moving, n_streams=1, cyclic=False, restart_cost=np.inf):
         self.trellis, self.n_samples = trellis, 0
+        self._cyclic, self._restart_cost = cyclic, restart_cost
         empty = np.empty((n_streams, 0, moving.shape[1]), dtype=moving.dtype)
         self._tile = Tile(Bases(trellis, empty), right_factor(moving[np.newaxis], trellis))
-        self._states = self._tile.states(2)
+        # The rows of paths, and of those that begin another attempt.
+        self._states, self._others = self._tile.states(2), self._tile.states(2)
         self._energy = np.full(n_streams, self._tile.right[:, 0, -2].sum())
+        self._least_energy, self._passed = self._energy[0], np.zeros(n_streams)
         self._rank = TIE[moving.dtype] * np.arange(trellis.width + 1.0)[:, np.newaxis]
         self._begins = np.zeros(n_streams, dtype=bool)
+        self.attempts = np.zeros(n_streams, dtype=np.intp)
 
     def restart(self, stream):
         """Start a new path of one stream at its next sample."""
         self._begins[stream] = True
 
-    def advance(self, samples, own=None):
+    def advance(self, samples, own=None, moves=None):
         """Take one sample of every stream.
 
         Parameters
@@ -158,28 +188,39 @@ class CausalTrellis:
         own : dict of {tuple of int: (ndarray (n, n_features'), ndarray (Q, n_features'))}
             For streams with missing features: the observed features of their samples and of
             the moving sequence; None where all are missing.
+        moves : ndarray of bool, shape (n_streams,), default=None
+            Streams that move: the others begin no other attempt meanwhile. None: all.
         """
-        tile, p = self._tile, self.n_samples
-        high = int(min(self.trellis.width, self.trellis.slopes.max() * p))
+        tile, p, high = self._tile, self.n_samples, self.trellis.width
+        if not self._cyclic:
+            high = int(min(high, self.trellis.slopes.max() * p))
+        self._begins |= p == 0
         local = tile.costs_of_sample(p, self._left(samples), 0, high)
         by_stream = local.reshape(len(local), high + 1, -1)
         self._energy += np.vecdot(samples, samples)
         for streams, parts in (own or {}).items():
             by_stream[:, :, streams] = self._costs_of_part(parts, len(streams), high)
-        tile.take_row(self._states, p, local, 0, high)
+        if p > 0:
+            self._lead_in(p)
+            tile.take_row(self._states, p, local, 0, high)
+        if self._restart_cost < np.inf and p > 0:
+            tile.take_row(self._others, p, local, 0, high)
+            self._compare_attempts(p, moves)
         if self._begins.any():
-            unit = self.trellis.unit_group
-            row = self._states[p % 2].reshape(-1, len(self._begins))
-            row[:, self._begins] = np.inf
-            first = by_stream[unit, 0, self._begins] - self.trellis.groups[unit].penalty
-            row[self.trellis.centre, self._begins] = first
-            self._begins[:] = False
+            self._begin(p, by_stream)
         self.n_samples += 1
+        if self._cyclic:
+            # The last position is the first one.
+            row = self._last_row()
+            row[[0, -1]] = np.minimum(row[0], row[-1])
+        if self.n_samples % REBASED == 0:
+            self._rebase()
 
     @property
     def costs(self):
-        """``S(p, q)`` of the last sample: (n_streams, Q)."""
-        return np.maximum(self._last_row().T, 0)
+        """``S(p, q)`` of the last sample: (n_streams, Q); of a cycle without its last position."""
+        row = self._last_row()
+        return np.maximum(row[:-1] if self._cyclic else row, 0).T
 
     def best(self):
         """Where the best paths end, in positions, and their costs: (n_streams,) each.
@@ -188,11 +229,60 @@ class CausalTrellis:
         """
         row = self._last_row()
         ends = (row + self._rank * self._energy).argmin(axis=0)
-        return ends, np.maximum(row[ends, np.arange(len(ends))], 0)
+        return ends, np.maximum(self._passed + row[ends, np.arange(len(ends))], 0)
 
     def _last_row(self):
-        row = self._states[(self.n_samples - 1) % 2].reshape(-1, len(self._energy))
-        return row[self.trellis.centre : self.trellis.centre + self.trellis.width + 1]
+        return self._inside(self._states, self.n_samples - 1)
+
+    def _rows(self, states, p):
+        return states[p % 2].reshape(-1, len(self._energy))
+
+    def _inside(self, states, p):
+        first = self.trellis.centre
+        return self._rows(states, p)[first : first + self.trellis.width + 1]
+
+    def _begin(self, p, costs):
+        """Begin the streams that do, given the local costs (n_groups, n_positions, n_streams)."""
+        unit, begins = self.trellis.unit_group, self._begins
+        for states in (self._states, self._others):
+            self._rows(states, p)[:, begins] = np.inf
+        # A cycle begins anywhere.
+        stop = costs.shape[1] if self._cyclic else 1
+        first = costs[unit, :stop, begins].T - self.trellis.groups[unit].penalty
+        self._inside(self._states, p)[:stop, begins] = first
+        self._passed[begins] = self.attempts[begins] = 0
+        begins[:] = False
+
+    def _lead_in(self, p):
+        """Fill the cells before the first position, from which steps lead to row p."""
+        first, before = self.trellis.centre, self._last_row()
+        if self._cyclic:
+            pad = self.trellis.pad
+            self._rows(self._states, p - 1)[first - pad : first] = before[-1 - pad : -1]
+        elif self._restart_cost < np.inf:
+            entry = first - self.trellis.table.subframes
+            self._rows(self._others, p - 1)[entry] = before.min(axis=0) + self._restart_cost
+
+    def _compare_attempts(self, p, moves):
+        """Go on with the other attempt of a stream where it is cheaper in row p."""
+        now, others = (self._inside(states, p) for states in (self._states, self._others))
+        least = now.min(axis=0)
+        if moves is not None and not moves.all():
+            gained = least - self._inside(self._states, p - 1).min(axis=0)
+            others[:, ~moves] = (self._inside(self._others, p - 1) + gained)[:, ~moves]
+        wins = others.min(axis=0) < least
+        if wins.any():
+            now[:, wins], others[:, wins] = others[:, wins], np.inf
+            self.attempts += wins
+
+    def _rebase(self):
+        """Count costs from the least of the last sample on."""
+        row = self._last_row()
+        least = row.min(axis=0)
+        for states in (self._states, self._others):
+            self._inside(states, self.n_samples - 1)[:] -= least
+        self._passed += least
+        self._energy[:] = self._least_energy
 
     def _left(self, samples):
         return Bases(self.trellis, samples[:, np.newaxis]).by_group()[0]
@@ -206,20 +296,3 @@ class CausalTrellis:
         samples, moving = parts
         right = right_factor(moving[np.newaxis], self.trellis)[: high + 1, 0]
         return right @ self._left(samples)
-
-
-def causal_costs(trellis, moving, base):
-    """Yield, of every sample of a whole base, the `CausalTrellis.costs` of one stream: (Q,).
-
-    Parameters
-    ----------
-    trellis : Trellis
-        With ``running=True``.
-    moving : ndarray, shape (Q, n_features)
-    base : ndarray, shape (n_samples, n_features)
-    """
-    tile = Tile(Bases(trellis, base[np.newaxis]), right_factor(moving[np.newaxis], trellis))
-    states = tile.states(2)
-    for p in tile.advance(states):
-        row = states[p % 2, trellis.centre : trellis.centre + trellis.width + 1]
-        yield np.maximum(row, 0)

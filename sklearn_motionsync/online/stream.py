@@ -2,13 +2,13 @@
 
 import warnings
 from collections import deque
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import pandas as pd
 
 from ..inputs.numbers import LARGEST, SMALLEST, as_numbers, check_finite, check_names
-from ..matching.causal import CausalDerivative, CausalTrellis
+from ..matching.causal import CausalDerivative
 
 __all__ = ["LivePhase", "Session", "Streams", "check_observations", "check_times", "time_left"]
 
@@ -16,6 +16,8 @@ __all__ = ["LivePhase", "Session", "Streams", "check_observations", "check_times
 _WINDOW, _TOLERANCE = 0.1, 0.05
 # Probabilities below the bounds of an interval; half of its least width, as a share of the clock.
 _TAILS, _LEAST = np.array([[0.05], [0.95]], dtype=np.float32), 0.01
+# Below this share of the mean square of speeds a stream stands still.
+_STILL = 0.05
 # Log-weights of phases are this at least.
 _MIN_LOG_WEIGHT = -80.0
 # Costs above so many times the typical one are those of other movements. Chosen on people of
@@ -28,15 +30,26 @@ _LONGEST_GAP = 0.25
 # Times that pass by more training frames a frame, or less than the inverse, are of another unit:
 # seconds taken for frames do, at 25 frames a second and more. So many frames tell.
 _OTHER_UNIT, _FEW = 24, 4
+# A cycle may last so many mean durations.
+_PERIODS = 1 / 3, 3
 # After so many clocks without a frame a stream has forgotten what was before.
 _FORGETTING = 3
 
 
-class LivePhase(NamedTuple):
+class _Estimate(NamedTuple):
+    # Numbers of a frame, arrays of several.
+    phase: Any
+    rate: Any
+    confidence: Any
+    lower: Any = None
+    upper: Any = None
+
+
+class LivePhase(_Estimate):
     """The phase of a running performance, its rate, and how sure it is.
 
     All values have the shape of the phase: numbers of a frame, arrays of several frames or
-    performances.
+    performances. It is a tuple of the first five; ``cycle`` is an attribute.
 
     Parameters
     ----------
@@ -48,7 +61,11 @@ class LivePhase(NamedTuple):
         Probability, from 0 to 1, that the phase is right to a twentieth of the clock.
     lower, upper : float, or ndarray, default=None
         Frames of the pattern between which the phase lies with a probability of 90 %, from 0 to
-        P - 1; the estimated phase is between them. None: unknown.
+        P - 1; the estimated phase is between them. None: unknown. Of cycles they may be below 0, in
+        the cycle before, or above P - 1, in the next.
+    cycle : int, or ndarray of int, default=None
+        Number of the cycle, from 0, which is the one of the first frame. It rises when a cycle
+        begins. Without ``cyclic=True`` it counts attempts: it rises when the movement begins anew.
 
     See Also
     --------
@@ -62,12 +79,23 @@ class LivePhase(NamedTuple):
     (12.5, 6.0)
     """
 
-    # Numbers of a frame, arrays of several.
-    phase: Any
-    rate: Any
-    confidence: Any
-    lower: Any = None
-    upper: Any = None
+    cycle: Any = None
+
+    def __new__(
+        cls,
+        phase: Any,
+        rate: Any,
+        confidence: Any,
+        lower: Any = None,
+        upper: Any = None,
+        cycle: Any = None,
+    ) -> Self:
+        found = super().__new__(cls, phase, rate, confidence, lower, upper)
+        found.cycle = cycle
+        return found
+
+    def __repr__(self):
+        return f"{super().__repr__()[:-1]}, cycle={self.cycle!r})"
 
 
 class Session:
@@ -96,15 +124,16 @@ class Session:
         self._reference, self._shape = reference, frame.shape
         self._streams = Streams(reference, *frames.shape)
         self._resampler = Resampler(reference.step, reference.n_frames, frames, time)
-        # NaN: the stream begins with the next frame, as one of them does.
-        self._start, self._one_begins = np.full(len(frames), np.nan), True
+        self._course = Course(
+            reference.n_frames, reference.duration, reference.cyclic, self.n_streams
+        )
         self.history = deque(maxlen=_HISTORY_LENGTH)
 
     def restart(self, stream):
         """Begin another performance of one stream with the next frame."""
         self._streams.restart(stream)
         self._resampler.restart(stream)
-        self._start[stream], self._one_begins = np.nan, True
+        self._course.restart(stream)
 
     def step(self, frame, time):
         """Take a frame, and estimate the phases: a `LivePhase` of numbers, or of arrays."""
@@ -113,26 +142,70 @@ class Session:
                 f"The frames before had the shape {self._shape}, this one has {frame.shape}: give "
                 "the same performances in each, NaN for what is not seen, or call reset()."
             )
-        if self._one_begins:
-            self._start = np.where(np.isnan(self._start), time, self._start)
-            self._one_begins = False
         self.time = time
         for sample in self._resampler.add(np.atleast_2d(frame), time):
             self._streams.update(sample)
         found = self._streams.estimate(self._resampler.elapsed)
+        self._course.follow(time, found.phase, found.cycle)
         if frame.ndim == 1:
-            found = LivePhase(*(float(values[0]) for values in found))
+            found = each_value(found, lambda values: values[0].item())
         self.history.append(found)
         # The history has arrays of its own.
-        return found if frame.ndim == 1 else LivePhase(*map(np.copy, found))
+        return found if frame.ndim == 1 else each_value(found, np.copy)
 
     def time_left(self):
-        """Frames of the training performances until the end of each stream."""
-        begun = ~np.isnan(self._start)
-        elapsed = np.where(begun, self.time - self._start, 0)
-        share = np.where(begun, self.history[-1].phase, 0) / (self._reference.n_frames - 1)
-        left = time_left(share, elapsed, self._reference.duration)
+        """Frames of the training performances until the end of each stream, or of its cycle."""
+        left = self._course.time_left()
         return left if len(self._shape) == 2 else float(left[0])
+
+
+class Course:
+    """When streams began their cycles, or attempts, and when these will end.
+
+    Parameters
+    ----------
+    n_frames : int
+        P, the length of the clock.
+    duration : float
+        Mean duration of a performance, in the unit of times.
+    cyclic : bool
+    n_streams : int, default=1
+    """
+
+    def __init__(self, n_frames, duration, cyclic, n_streams=1):
+        self._last, self._duration, self._cyclic = n_frames - 1, duration, cyclic
+        # NaN: the stream begins with the next frame. The first cycle may begin anywhere.
+        self._begin, self._one_begins = np.full(n_streams, np.nan), True
+        self._time, self._share = np.nan, np.zeros(n_streams)
+        self._cycle = np.zeros(n_streams, dtype=np.intp)
+        self._period = np.full(n_streams, float(duration))
+
+    def restart(self, stream):
+        """Begin another performance of one stream with the next frame."""
+        self._begin[stream], self._one_begins = np.nan, True
+        self._share[stream], self._cycle[stream], self._period[stream] = 0, 0, self._duration
+
+    def follow(self, time, phase, cycle):
+        """Take the phases and cycles (n_streams,) at a time."""
+        self._time, self._share = time, phase / self._last
+        if self._one_begins or (cycle > self._cycle).any():
+            first, rises = np.isnan(self._begin), cycle > self._cycle
+            # At the mean pace the phase was 0.
+            begin = time - self._share * self._duration
+            # The cycle before was whole if its beginning was seen, too.
+            whole = rises & (self._cycle > 0) & (cycle - self._cycle == 1)
+            period = np.clip(begin - self._begin, *np.multiply(_PERIODS, self._duration))
+            self._period = np.where(whole, period, self._period)
+            self._begin = np.where(first, time, np.where(rises, begin, self._begin))
+            self._one_begins = False
+        self._cycle = cycle
+
+    def time_left(self):
+        """The time until each stream ends, or its cycle; (n_streams,)."""
+        if self._cyclic:
+            return (1 - self._share) * self._period
+        elapsed = np.where(np.isnan(self._begin), 0, self._time - self._begin)
+        return time_left(self._share, elapsed, self._duration)
 
 
 class Streams:
@@ -153,9 +226,11 @@ class Streams:
 
     def __init__(self, reference, n_streams, n_features):
         self.reference = reference
-        self.trellis = CausalTrellis(reference.trellis, reference.moving, n_streams)
-        self.mean_cost = np.zeros(n_streams)
-        self._derivative = CausalDerivative(reference.width, (n_streams, n_features))
+        self.trellis = reference.begin(n_streams)
+        self.mean_cost, self._cycles = np.zeros(n_streams), np.zeros(n_streams, dtype=np.intp)
+        self._derivative = CausalDerivative(
+            reference.width, (n_streams, n_features), from_rest=not reference.cyclic
+        )
         self._window = window_length(reference.n_frames)
         self._last, table = reference.n_frames - 1, reference.trellis.table
         self._tolerance = max(1.0, _TOLERANCE * self._last)
@@ -163,7 +238,7 @@ class Streams:
         self._whole = slice(None, None, table.subframes)
         self._max_rate = table.steps.max() / table.subframes
         # Positions after the end of the movement have its last phase.
-        positions = np.arange(len(reference.moving)) / table.subframes
+        positions = np.arange(len(reference.moving) - reference.cyclic) / table.subframes
         self._phase_of_position = np.minimum(positions, self._last)
         # The phases of the last samples, the last one last.
         self._phases = np.zeros((self._window + 1, n_streams))
@@ -181,6 +256,7 @@ class Streams:
         self.trellis.restart(stream)
         self._derivative.restart(stream)
         self._n_samples[stream] = self._path_cost[stream] = self.mean_cost[stream] = 0
+        self._cycles[stream] = 0
         self._feature_share[stream] = 1
         self._phases[:, stream] = 0
         self._cached = None
@@ -208,7 +284,7 @@ class Streams:
                 else:
                     part = part.compare(velocity[rows], postures[rows]), part.moving
                 parts[tuple(rows)] = part
-        self.trellis.advance(compared, parts)
+        self.trellis.advance(compared, parts, self._moves(velocity))
         self._update_window(observed)
 
     def estimate(self, elapsed):
@@ -217,15 +293,33 @@ class Streams:
             gains = gains_of(self.trellis.costs)
             excess = np.maximum(self.mean_cost / self.reference.typical_cost, 1)
             phases = np.concatenate([self._phases[-1:], self._bounds(gains, excess)])
-            self._cached = phases, self._rates(), self._confidences(gains, excess)
-        phases, rate, confidence = self._cached
-        phase, lower, upper = np.minimum(phases + rate * elapsed, self._last)
-        return LivePhase(phase, rate, confidence, lower, upper)
+            confidence, cycle = (
+                self._confidences(gains, excess),
+                self._cycles + self.trellis.attempts,
+            )
+            self._cached = phases, self._rates(), confidence, cycle
+        phases, rate, confidence, cycle = self._cached
+        phases = phases + rate * elapsed
+        phase, lower, upper = phases if self.reference.cyclic else np.minimum(phases, self._last)
+        return LivePhase(np.minimum(phase, self._last), rate, confidence, lower, upper, cycle)
+
+    def _moves(self, velocity):
+        """Whether streams move, by their velocities (n_streams, n_features), NaN where hidden."""
+        usual, hidden = self.reference.speed, np.isnan(velocity)
+        if hidden.any():
+            velocity, usual = np.where(hidden, 0, velocity), np.where(hidden, 0, usual)
+        return np.vecdot(velocity, velocity) > _STILL * usual.sum(axis=-1)
 
     def _update_window(self, observed):
         """Phases, costs and observed shares of the window, with a sample of this observed share."""
         ends, costs = self.trellis.best()
         now = self._phase_of_position[ends]
+        if self.reference.cyclic:
+            before = np.where(self._n_samples > 0, self._phases[-1], now)
+            now, turns = go_round(before, now, self._cycles, self._last, self._tolerance)
+            self._cycles = np.maximum(self._cycles + turns, 0)
+            # Phases of the window are those of this cycle, below 0 in the cycles before.
+            self._phases -= self._last * turns
         self._phases = np.concatenate([self._phases[1:], now[np.newaxis]])
         self._n_samples += 1
         weight, seen = 1 / np.minimum(self._n_samples, self._window), observed > 0
@@ -246,18 +340,22 @@ class Streams:
     def _confidences(self, gains, excess):
         probabilities = phase_probabilities(gains, self.reference.temperature)
         distances = np.abs(self._phase_of_position - self._phases[-1][:, np.newaxis])
+        if self.reference.cyclic:
+            distances = np.minimum(distances, self._last - distances)
         mass = np.vecdot(probabilities, distances <= self._tolerance)
-        # A stream without samples is at the beginning.
-        return np.where(self._n_samples > 0, self._observed_share * mass / excess**2, 1.0)
+        # A stream without samples is at the beginning, or anywhere in a cycle.
+        unseen = 1.0 - self.reference.cyclic
+        return np.where(self._n_samples > 0, self._observed_share * mass / excess**2, unseen)
 
     def _bounds(self, gains, excess):
         """Bounds of the phases of the last sample: (2, n_streams)."""
         # Noise raises all costs, and the differences between phases with them.
         temperature = self.reference.interval_temperature * excess
         temperature *= (np.maximum(excess / _UNUSUAL, 1) / self._feature_share) ** 2
-        found = phase_bounds(gains[:, self._whole], temperature, self._phases[-1], self._last)
-        # A stream without samples is at the beginning.
-        return found * (self._n_samples > 0)
+        bounds = cyclic_bounds if self.reference.cyclic else phase_bounds
+        found = bounds(gains[:, self._whole], temperature, self._phases[-1], self._last)
+        half = self._last / 2 * self.reference.cyclic
+        return np.where(self._n_samples > 0, found, [[-half], [half]])
 
 
 class Resampler:
@@ -333,11 +431,44 @@ def window_length(n_frames):
     return max(2, round(_WINDOW * n_frames))
 
 
+def go_round(before, now, cycles, last, tolerance):
+    """Go on from phases to the next ones by the shorter way round the cycle.
+
+    A phase that goes back over the beginning of a cycle by the tolerance at most stays there, so
+    that no cycle begins twice.
+
+    Parameters
+    ----------
+    before, now : ndarray, shape (n_streams,)
+        Phases from 0 to ``last``.
+    cycles : ndarray of int, shape (n_streams,)
+        Numbers of the cycles before.
+    last : int
+        P - 1.
+    tolerance : float
+
+    Returns
+    -------
+    phases : ndarray, shape (n_streams,)
+    turns : ndarray of int, shape (n_streams,)
+        1 where a cycle begins, -1 where one is taken back.
+    """
+    turns = np.round((before - now) / last).astype(np.intp)
+    stays = (turns < 0) & (now >= last - tolerance) & (cycles > 0)
+    return np.where(stays, 0, now), np.where(stays, 0, turns)
+
+
+def each_value(found, function):
+    """The `LivePhase` of a function of every value."""
+    return LivePhase(*map(function, found), cycle=function(found.cycle))
+
+
 def stack_phases(phases):
     """The `LivePhase` of each frame as one of arrays."""
     if not phases:
-        return LivePhase(*np.empty((5, 0)))
-    return LivePhase(*(np.array(values) for values in zip(*phases, strict=True)))
+        return LivePhase(*np.empty((5, 0)), cycle=np.empty(0, dtype=np.intp))
+    values = map(np.array, zip(*phases, strict=True))
+    return LivePhase(*values, cycle=np.array([found.cycle for found in phases]))
 
 
 def gains_of(costs):
@@ -369,14 +500,34 @@ def phase_bounds(gains, temperature, phase, last):
     -------
     ndarray, shape (2, n)
     """
+    bounds = _bounds_of(_weights(gains, temperature), 0, phase, last)
+    return np.clip(bounds, 0, last)
+
+
+def cyclic_bounds(gains, temperature, phase, last):
+    """The same of a cycle, with the gains of its frames but the last one.
+
+    They are half a cycle from the phase at most: below 0 in the cycle before, above P - 1 in the
+    next.
+    """
+    first = np.round(phase).astype(np.intp) - last // 2
+    frames = (first[:, np.newaxis] + np.arange(last)) % last
+    weights = np.take_along_axis(_weights(gains, temperature), frames, axis=1)
+    return _bounds_of(weights, first, phase, last)
+
+
+def _weights(gains, temperature):
     # Half the digits are enough, and nothing overflows.
     logs = np.maximum(gains / temperature[:, np.newaxis], _MIN_LOG_WEIGHT)
-    weights = np.exp(logs.astype(np.float32))
+    return np.exp(logs.astype(np.float32))
+
+
+def _bounds_of(weights, first, phase, last):
+    """Quantiles of the weights of frames, given the first frame; not too near to the phase."""
     mass = weights.cumsum(axis=1)
-    bounds = (mass >= (mass[:, -1] * _TAILS)[..., np.newaxis]).argmax(axis=-1)
+    bounds = first + (mass >= (mass[:, -1] * _TAILS)[..., np.newaxis]).argmax(axis=-1)
     least = max(1.0, _LEAST * last)
-    lower = np.maximum(np.minimum(bounds[0], phase - least), 0)
-    return np.array([lower, np.minimum(np.maximum(bounds[1], phase + least), last)])
+    return np.array([np.minimum(bounds[0], phase - least), np.maximum(bounds[1], phase + least)])
 
 
 def time_left(share, elapsed, duration):

@@ -17,7 +17,7 @@ from ..inputs.numbers import check_magnitude
 from ..inputs.types import Indexed, NumbersLike, PerformancesLike, SupportsArray, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
 from ..inputs.wording import counted
-from ..matching.causal import causal_costs, causal_velocity
+from ..matching.causal import CausalTrellis, causal_velocity
 from ..matching.costs import step_table
 from ..matching.filters import SMOOTHING
 from ..matching.matcher import cost_features
@@ -36,6 +36,7 @@ from .stream import (
     Session,
     check_observations,
     check_times,
+    cyclic_bounds,
     gains_of,
     phase_bounds,
     phase_probabilities,
@@ -55,7 +56,8 @@ class OnlineSynchronizer(
     The frames so far are the base of the trellis, and the mean of the synchronised training
     performances is the moving sequence (Eqs. 12-17). A performance begins with frame 0 of the
     pattern; its phase is the best cell of the last row. A frame costs one row of the trellis,
-    whatever came before it, and no phase depends on later frames.
+    whatever came before it, and no phase depends on later frames. With ``cyclic=True`` the mean is
+    one cycle of a movement that goes on, such as walking, and the row is a circle.
 
     Parameters
     ----------
@@ -71,13 +73,18 @@ class OnlineSynchronizer(
         Time constant of the causal filter of velocities, as a share of the clock.
     max_rate : float, default=3
         Largest rate, in units of the mean pace.
+    cyclic : bool, default=False
+        Whether the training performances are cycles of a movement that repeats, such as strides cut
+        by `CycleSegmenter`: each ends where it begins. The phase then begins anywhere in the cycle,
+        goes on with 0 after P - 1, and ``LivePhase.cycle`` counts cycles.
 
     Attributes
     ----------
     synchronizer_ : Synchronizer
         The fitted synchronizer.
     mean_ : ndarray, shape (P, n_features)
-        Mean of the training performances on the clock of the pattern.
+        Mean of the training performances on the clock of the pattern; of cycles the last frame is
+        the first one.
     duration_ : float
         Mean time from the first frame of a training performance to its last, in frames: the mean
         of ``n_frames - 1``.
@@ -102,7 +109,19 @@ class OnlineSynchronizer(
     from postures less the mean posture. The velocity filters delay both sequences alike. The phase
     may go back when later frames contradict it. No rest is needed before the beginning: a
     performer at rest there stays in the first frames of the clock. In the last posture the phase
-    is the end, P - 1: call ``reset`` for the next performance.
+    is the end, P - 1.
+
+    When the movement begins anew, before its end or after it, the phase goes back and
+    ``LivePhase.cycle`` rises: as soon as a path that began again, at a cost of 6 temperatures,
+    is cheaper than the one so far. While a performer stands still no such path gains on it, so a
+    pause is none. ``reset`` says for certain that the next frame is the first one.
+
+    A cyclic movement needs no ``reset``. Its first frame may show any phase: the phase is 0 with
+    confidence 0 until velocities are known, in the second frame. When the phase passes P - 1,
+    which is the same as 0, ``LivePhase.cycle`` rises; in cycles cut at foot strikes that is a
+    strike. Where it goes back over the beginning by a twentieth of the clock at most it stays at
+    0, so that no cycle begins twice; where it goes back farther, ``cycle`` falls. ``lower`` and
+    ``upper`` lie half a cycle from the phase at most, and may be below 0 or above P - 1.
 
     The confidence is the probability mass within a twentieth of the clock of the phase, divided by
     the square of the recent cost in units of the typical cost, where it is above that. The
@@ -110,7 +129,8 @@ class OnlineSynchronizer(
     matched to the mean of the others. From a single performance they cannot be learnt, and are
     the medians of 16 actions of people. Other actions cost more. A movement that is its own
     reverse, such as a bend, costs no more backwards, and standing still costs nothing where the
-    mean stands still.
+    mean stands still. The typical cost of a cycle is the geometric mean of that and the cost of
+    standing still, in the posture of the cycle where that costs least.
 
     Features that are NaN are not compared. During frames of NaN, or time without frames,
     the phase moves on at the mean pace. Between the frames that show it a feature is interpolated
@@ -141,6 +161,17 @@ class OnlineSynchronizer(
     ...     live_phase = live.step(frames[0])
     >>> live_phase.rate
     0.0
+
+    Strides of a walk are counted. It shows nine, the end of one before, and the beginning of one
+    after them:
+
+    >>> from sklearn_motionsync.datasets import make_gait
+    >>> strides, walk = make_gait(6, random_state=0), make_gait(7, 9, takes=True, random_state=0)
+    >>> live = OnlineSynchronizer(cyclic=True).fit(strides.data)
+    >>> for frame in walk.data[6]:
+    ...     live_phase = live.step(frame)
+    >>> live_phase.cycle, len(walk.data[6])
+    (10, 1026)
     """
 
     _parameter_constraints: dict = {
@@ -149,6 +180,7 @@ class OnlineSynchronizer(
         "smoothness": [Interval(Real, 0, None, closed="left")],
         "velocity_smoothing": [Interval(Real, 0, 1, closed="left")],
         "max_rate": [Interval(Real, 1, None, closed="left")],
+        "cyclic": ["boolean"],
     }
 
     def __init__(
@@ -158,12 +190,14 @@ class OnlineSynchronizer(
         smoothness: float = 0.1,
         velocity_smoothing: float = SMOOTHING,
         max_rate: float = 3,
+        cyclic: bool = False,
     ) -> None:
         self.synchronizer = synchronizer
         self.frame_rate = frame_rate
         self.smoothness = smoothness
         self.velocity_smoothing = velocity_smoothing
         self.max_rate = max_rate
+        self.cyclic = cyclic
 
     @atomic_fit
     @validated_with_nested
@@ -192,7 +226,8 @@ class OnlineSynchronizer(
         Raises
         ------
         ValueError
-            As from the ``fit`` of the synchronizer.
+            As from the ``fit`` of the synchronizer; or if ``cyclic=True`` and the performances do
+            not end where they begin.
         """
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
         performances = self._check_training_set(X)
@@ -203,15 +238,19 @@ class OnlineSynchronizer(
             match = sync.match(X, **given)
             warped = match.warp(performances)
             self.n_frames_ = sync.n_frames_
+            if self.cyclic:
+                check_cycles(sync.features_.unit(warped.mean(axis=0)))
+                performances, warped = list(map(closed, performances)), closed(warped)
             self.mean_ = warped.mean(axis=0)
             self.duration_ = float(np.mean([len(x) for x in performances]) - 1)
             settings = self.duration_, self.smoothness, self.velocity_smoothing, self.max_rate
 
             def reference_of(mean, *calibration):
-                return Reference(sync.features_, mean, *settings, *calibration)
+                return Reference(sync.features_, mean, *settings, *calibration, cyclic=self.cyclic)
 
             calibration = calibrate(reference_of, performances, warped, match.times, progress)
-            self._reference = reference_of(self.mean_, *calibration)
+            restart_cost = _RESTART * calibration[0]
+            self._reference = reference_of(self.mean_, *calibration, restart_cost)
             self._session = None
         return self
 
@@ -254,7 +293,7 @@ class OnlineSynchronizer(
         return session.step(frame, time)
 
     def reset(self, stream: int | Sequence[int] | np.ndarray | None = None) -> None:
-        """Begin another performance with the next frame.
+        """Begin another performance with the next frame, and count from 0 again.
 
         Parameters
         ----------
@@ -278,11 +317,12 @@ class OnlineSynchronizer(
             self._session.restart(int(n))
 
     def time_left(self) -> Any:
-        """Estimate the time until the performance ends.
+        """Estimate the time until the performance ends, or the cycle that runs.
 
-        A weighted mean of what is left of the mean duration after the elapsed time, and of what is
-        left of the phase at the mean pace; the phase, as a share of the clock, is the weight of the
-        second. docs/design.md has a table of its errors.
+        Of a cycle what is left of the phase, at the pace of the last cycle. Otherwise a weighted
+        mean of what is left of the mean duration after the elapsed time, and of what is left of the
+        phase at the mean pace; the phase, as a share of the clock, is the weight of the second.
+        docs/design.md has a table of its errors.
 
         Returns
         -------
@@ -396,6 +436,10 @@ class Reference:
         All features.
     moving : ndarray, shape (Q, n_compared)
         Those of the mean performance, with its last posture held.
+    postures : ndarray, shape (Q, n_features)
+        Its postures, in the unit of the features.
+    speed : ndarray, shape (n_features,)
+        The mean square of its velocity.
     trellis : Trellis
     """
 
@@ -410,8 +454,11 @@ class Reference:
         temperature=1.0,
         typical_cost=np.inf,
         interval_temperature=1.0,
+        restart_cost=np.inf,
+        cyclic=False,
     ):
         last = len(mean) - 1
+        self.cyclic, self.restart_cost = cyclic, restart_cost
         self.cost, self.metric, self.unit = features.cost, features.metric, features.unit
         self.n_frames, self.width, self.step = len(mean), velocity_smoothing * last, duration / last
         self.duration = self.step * last
@@ -419,16 +466,21 @@ class Reference:
         self.interval_temperature = interval_temperature
         postures = self.unit(normalise([mean.astype(np.float64)], len(mean), _SUBFRAMES)[0])
         self.centre, self._n_positions = postures.mean(axis=0), len(postures)
-        rest = max(1, math.ceil(_REST * self.width))
+        rest = 0 if cyclic else max(1, math.ceil(_REST * self.width))
         held = np.repeat(postures[-1:], rest * _SUBFRAMES, axis=0)
-        self._postures = np.concatenate([postures, held])
-        self._velocity = causal_velocity(self._postures, _SUBFRAMES, self.width)
+        self.postures = np.concatenate([postures, held])
+        self._velocity = causal_velocity(self.postures, _SUBFRAMES, self.width, cyclic)
+        self.speed = np.square(self._velocity[: self._n_positions]).mean(axis=0)
         self.features, self._cached = self._subset(np.arange(mean.shape[1])), {}
         self.moving = self.features.moving
         mu = smoothness * float(np.square(self.moving).sum(axis=1).mean())
         # No step is longer than the pattern.
         table = step_table(self.cost, min(max_rate, last), _SUBFRAMES)
         self.trellis = Trellis(table, mu, last + rest, running=True)
+
+    def begin(self, n_streams=1):
+        """The `CausalTrellis` of so many streams."""
+        return CausalTrellis(self.trellis, self.moving, n_streams, self.cyclic, self.restart_cost)
 
     def subset(self, columns):
         """The `FeatureSubset` of some columns, a tuple; None if none of them is compared."""
@@ -455,7 +507,7 @@ class Reference:
             columns = columns if energy > 0 else columns[:0]
         if not len(columns):
             return None
-        return FeatureSubset(self, columns, metric, self._velocity, self._postures)
+        return FeatureSubset(self, columns, metric, self._velocity, self.postures)
 
 
 class FeatureSubset:
@@ -485,14 +537,24 @@ class FeatureSubset:
 
 # Performances, and moments of each, that calibration uses at most.
 _MAX_PERFORMANCES, _MAX_MOMENTS = 24, 120
+# Largest distance of the ends of a cycle, in root mean square deviations. Measured: 0.01 to 0.8 for
+# strides, 1.7 to 2.5 for sitting down, standing up, picking up, throwing.
+_APART = 1.5
+# A cycle is repeated so many times, of which all but the first count.
+_REPEATED = 3
+# Postures of a cycle in which a stream may stand still. That cost, in typical costs, is at least so
+# much: the confidence is then below one half.
+_POSTURES, _STANDING = 16, 1.5
 # Temperatures that are tried, in mean squared features of a sample; the smallest probability.
 _TEMPERATURES = np.geomspace(0.01, 1e3, 41)
 _MIN_PROBABILITY = 1e-12
 # For a single training performance: medians of 16 actions of people, in mean squared features.
 _DEFAULT_TEMPERATURE, _DEFAULT_COST = 0.7, 0.5
 # Share of the training phases inside the intervals. Other training performances are partly of the
-# same person. For new people temperatures are raised: docs/design.md.
-_COVERAGE, _NEW_PEOPLE = 0.9, 1.5
+# same person. For new people temperatures are raised, of actions and of cycles: docs/design.md.
+_COVERAGE, _NEW_PEOPLE = 0.9, (1.5, 6.0)
+# The cost of beginning anew, in temperatures.
+_RESTART = 6.0
 # Of intervals, for a single training performance: by pairs of people of HDM05.
 _DEFAULT_INTERVAL = 8.0
 
@@ -523,9 +585,14 @@ def calibrate(reference_of, performances, warped, times, progress):
     chosen = np.unique(np.linspace(0, n - 1, _MAX_PERFORMANCES).round().astype(np.intp))
     scores, shares, largest = *np.zeros((2, len(_TEMPERATURES))), []
     # Of a constant mean all costs are 0, in any unit.
-    energy = float(np.square(reference_of(total / n).moving).sum(axis=1).mean()) or 1.0
+    whole = reference_of(total / n)
+    energy = float(np.square(whole.moving).sum(axis=1).mean()) or 1.0
+    # Copies of one performance have no costs but rounding, and nor has a mean that stands still.
+    least = _MIN_PROBABILITY * energy
+    standing = max(cost_of_standing(whole), least) if whole.cyclic else np.inf
     if n == 1:
-        return tuple(energy * x for x in (_DEFAULT_TEMPERATURE, _DEFAULT_COST, _DEFAULT_INTERVAL))
+        typical_cost = min(energy * _DEFAULT_COST, standing / _STANDING)
+        return energy * _DEFAULT_TEMPERATURE, typical_cost, energy * _DEFAULT_INTERVAL
     step = progress.stage("calibrating", len(chosen))
     for i in chosen:
         reference = reference_of((total - warped[i]) / (n - 1))
@@ -533,45 +600,99 @@ def calibrate(reference_of, performances, warped, times, progress):
         largest.append(largest_cost)
         subframes, last = reference.trellis.table.subframes, reference.n_frames - 1
         phases, right_phases = np.minimum(costs.argmin(axis=1) / subframes, last), truth / subframes
-        gains = gains_of(costs)
+        gains, bounds = gains_of(costs), phase_bounds
+        if reference.cyclic:
+            # By the shorter way from the phases.
+            right_phases = right_phases + last * np.round((phases - right_phases) / last)
+            bounds = cyclic_bounds
         for k, temperature in enumerate((energy * _TEMPERATURES).tolist()):
             right = phase_probabilities(gains, temperature)[np.arange(len(costs)), truth]
             scores[k] += np.log(np.maximum(right, _MIN_PROBABILITY)).mean()
             every = np.full(len(gains), temperature)
-            lower, upper = phase_bounds(gains[:, ::subframes], every, phases, last)
+            lower, upper = bounds(gains[:, ::subframes], every, phases, last)
             shares[k] += np.mean((lower <= right_phases) & (right_phases <= upper)) / len(chosen)
         step()
-    # Copies of one performance have no costs but rounding.
-    typical_cost = max(np.median(largest), _MIN_PROBABILITY * energy)
+    typical_cost = max(np.median(largest), least)
+    if whole.cyclic:
+        # Cycles of new people cost more than those of the training set, less than standing still.
+        typical_cost = min(np.sqrt(typical_cost * standing), standing / _STANDING)
     temperature = float(energy * _TEMPERATURES[scores.argmax()])
     enough = np.append(np.flatnonzero(shares >= _COVERAGE), len(shares) - 1)[0]
-    interval_temperature = _NEW_PEOPLE * energy * _TEMPERATURES[enough]
+    interval_temperature = _NEW_PEOPLE[whole.cyclic] * energy * _TEMPERATURES[enough]
     return temperature, float(typical_cost), float(interval_temperature)
+
+
+def cost_of_standing(reference):
+    """The mean cost of a sample while standing still, in the posture of a cycle that costs least.
+
+    The first half of a cycle is left out.
+    """
+    postures = reference.postures[:: max(1, len(reference.postures) // _POSTURES)]
+    samples = reference.features.compare(np.zeros_like(postures), postures)
+    live, costs = reference.begin(len(samples)), []
+    for _ in range(reference.n_frames):
+        live.advance(samples)
+        costs.append(live.best()[1])
+    half = reference.n_frames // 2
+    return float((costs[-1] - costs[-1 - half]).min() / half)
 
 
 def _match_live(reference, performance, times):
     """Path costs at even moments, the true positions there, and the largest mean cost.
 
-    The costs are above the least of their moment, in single precision.
+    The costs are above the least of their moment, in single precision. A cycle is repeated, and
+    the first time is left out.
     """
-    duration, last = len(performance) - 1, reference.n_frames - 1
-    moments = np.arange(0, duration * (1 + 1e-9), reference.step) / duration
-    samples = sample_at([performance], moments[np.newaxis] * last, last + 1)[0]
+    duration, last, first, stop = len(performance) - 1, reference.n_frames - 1, 0, 1
+    if reference.cyclic:
+        first, stop = 1, _REPEATED
+        performance = np.concatenate([performance[:-1]] * (stop - 1) + [performance])
+    moments = np.arange(0, stop * duration * (1 + 1e-9), reference.step) / duration
+    samples = sample_at([performance], moments[np.newaxis] * last, stop * last + 1)[0]
     postures = reference.unit(samples)
     base = reference.features.compare(causal_velocity(postures, 1, reference.width), postures)
-    costs, every = [], -(-len(moments) // _MAX_MOMENTS)
-    before = mean_cost = largest = 0.0
-    window = window_length(reference.n_frames)
-    for k, row in enumerate(causal_costs(reference.trellis, reference.moving, base)):
-        least = float(row.min())
-        mean_cost += (least - before - mean_cost) / min(k + 1, window)
-        before, largest = least, max(largest, mean_cost)
-        if k % every == 0:
-            costs.append(row - least)
+    live, costs, total = reference.begin(), [], 0.0
+    mean_cost = largest = 0.0
+    counted = np.flatnonzero(moments >= first)
+    every, window = -(-len(counted) // _MAX_MOMENTS), window_length(reference.n_frames)
+    for k, sample in enumerate(base):
+        live.advance(sample[np.newaxis])
+        now = float(live.best()[1][0])
+        mean_cost, total = mean_cost + (now - total - mean_cost) / min(k + 1, window), now
+        if k < counted[0]:
+            continue
+        largest = max(largest, mean_cost)
+        if (k - counted[0]) % every == 0:
+            row = live.costs[0]
+            costs.append(row - row.min())
     # Where tau is constant, any phase of that interval is right.
     rising = times + 1e-9 * np.arange(len(times))
-    phases = np.interp(moments * last, rising, np.arange(len(times)))
+    shares = moments[counted[::every]]
+    shares -= np.minimum(np.floor(shares), stop - 1)
+    phases = np.interp(shares * last, rising, np.arange(len(times)))
     truth = np.round(phases * reference.trellis.table.subframes).astype(np.intp)
     # What overflows has no probability.
     with np.errstate(over="ignore"):
-        return np.array(costs, dtype=np.float32), truth[::every], largest
+        return np.array(costs, dtype=np.float32), truth % len(costs[0]), largest
+
+
+def closed(cycles):
+    """Cycles (..., n_frames, n_features) whose last frame is the first, by what drifts evenly."""
+    drift = cycles[..., -1:, :] - cycles[..., :1, :]
+    out = cycles - np.linspace(-0.5, 0.5, cycles.shape[-2])[:, np.newaxis] * drift
+    # Rounding leaves no difference.
+    out[..., -1, :] = out[..., 0, :]
+    return out.astype(cycles.dtype, copy=False)
+
+
+def check_cycles(mean):
+    """Refuse a mean performance (P, n_features) that does not end where it begins."""
+    size = np.sqrt(np.square(mean - mean.mean(axis=0)).sum(axis=1).mean())
+    apart = np.linalg.norm(mean[-1] - mean[0])
+    if apart > _APART * size:
+        raise ValueError(
+            f"With cyclic=True performances are cycles, each ends where it begins; but the mean of "
+            f"these ends {apart / size:.1f} times its root mean square deviation away from its "
+            f"first frame, and {_APART:g} is the limit. Cut takes with CycleSegmenter, or set "
+            "cyclic=False for a movement that is done once."
+        )

@@ -11,7 +11,7 @@ from sklearn_motionsync import (
     LivePhase,
     OnlineSynchronizer,
 )
-from sklearn_motionsync.datasets import make_bending
+from sklearn_motionsync.datasets import make_bending, make_gait
 from sklearn_motionsync.display import PhaseDisplay
 
 BUNCH = make_bending(8, n_frames=60, n_actors=2, random_state=0)
@@ -175,6 +175,49 @@ def test_titles_and_predictions_fit_into_the_figure(live):
     assert row.interval.get_paths() == []
     two = LivePhase(*np.ones((3, 9, 2)))
     assert len(PhaseDisplay.from_predictions(two, 51).rows_) == 2
+
+
+def test_cycles_are_drawn_round_by_round():
+    strides, walk = make_gait(4, random_state=0), make_gait(5, 8, takes=True, random_state=0)
+    live = OnlineSynchronizer(LinearSynchronizer(50), frame_rate=100, cyclic=True)
+    live.fit(strides.data)
+    x, frame = walk.data[4], 700
+    (found,) = live.track([x])
+    display = PhaseDisplay.from_estimator(live, x, features=1, frame=frame)
+    (row,) = display.rows_
+    times, phase, past = np.arange(len(x)) / 100, 100 * found.phase / 49, slice(frame + 1)
+    # A line and a band for each cycle.
+    ys = row.phase.get_ydata()
+    assert np.isnan(ys).sum() == found.cycle[frame] == len(row.interval.get_paths()) - 1
+    np.testing.assert_allclose(ys[~np.isnan(ys)], phase[past])
+    assert row.afterwards is None
+    assert row.dial.state.get_text().startswith(f"cycle {found.cycle[frame]}, rate ")
+    # Beyond the end of the cycle the arc goes on.
+    near_end = int(np.flatnonzero((found.phase > 47) & (times > 3))[0])
+    display.plot(display.axes_, frame=near_end)
+    (row,) = display.rows_
+    share, rate = found.phase[near_end] / 49, found.rate[near_end]
+    assert row.dial.ahead.theta1 == pytest.approx(90 - 360 * (share + rate / 10))
+    assert share + rate / 10 > 1
+    for one in x[: near_end + 1]:
+        live.step(one)
+    rest = row.rest.get_xdata()
+    assert rest[-1] - rest[0] == pytest.approx(live.time_left())
+    assert row.rest.get_ydata()[-1] == 100
+    # The axis shows the last cycles.
+    stop = times[near_end] + live.duration_ / 100
+    for axis in row.axes[1:]:
+        assert axis.get_xlim() == pytest.approx((max(0, stop - 5 * live.duration_ / 100), stop))
+    (other,) = PhaseDisplay.from_predictions(found, 50, frame=frame, cyclic=True).rows_
+    np.testing.assert_array_equal(other.phase.get_ydata(), ys)
+
+
+def test_a_second_attempt_is_another_line(live):
+    x = np.concatenate([X[6][:30], X[6]])
+    (found,) = live.track([x])
+    (row,) = PhaseDisplay.from_estimator(live, x).rows_
+    assert found.cycle[-1] == np.isnan(row.phase.get_ydata()).sum() == 1
+    assert "cycle" not in row.dial.state.get_text()
 
 
 def test_from_estimator_refuses(live):

@@ -7,7 +7,6 @@ import pytest
 from sklearn_motionsync.matching.causal import (
     CausalDerivative,
     CausalTrellis,
-    causal_costs,
     causal_velocity,
 )
 from sklearn_motionsync.matching.costs import step_table
@@ -55,12 +54,9 @@ def test_running_trellis_equals_offline_trellis_bitwise(n_streams):
     bases, moving = rng.standard_normal((n_streams, 90, 7)), rng.standard_normal((201, 7))
     trellis = Trellis(step_table("velocity", 3, 4), 0.7, 50, running=True)
     live = CausalTrellis(trellis, moving, n_streams)
-    rows = causal_costs(trellis, moving, bases[0])
     for p in range(90):
         live.advance(bases[:, p])
-        np.testing.assert_allclose(next(rows), live.costs[0], atol=1e-9)
     assert live.n_samples == 90
-    assert list(rows) == []
     np.testing.assert_array_equal(live.costs, trellis.ends(bases, moving[np.newaxis])[:, 0])
     paths = trellis.paths(bases, moving[np.newaxis])[:, 0]
     np.testing.assert_array_equal(live.best()[0], paths[:, -1])
@@ -177,3 +173,141 @@ def test_restart_forgets_one_stream_only():
     found = np.array([derivative.step(sample) for sample in x[10:]])
     np.testing.assert_array_equal(found[:, 1], run(x[10:, 1:], 2.0)[:, 0])
     np.testing.assert_array_equal(found[:, 0], run(x[:, :1], 2.0)[10:, 0])
+
+
+# -- cycles, and attempts that begin anew ---------------------------------------------------
+
+
+def test_path_around_a_cycle_equals_all_paths():
+    """The path goes on round the cycle, from any position on; the last position is the first."""
+    rng, costs = np.random.default_rng(4), step_costs("velocity", 2, SUBFRAMES)
+    base, cycle = rng.standard_normal((6, 2)), rng.standard_normal((6, 2))
+    moving = np.concatenate([cycle, cycle[:1]])
+    trellis = Trellis(step_table("velocity", 2, SUBFRAMES), MU, 3, running=True)
+    live = CausalTrellis(trellis, moving, cyclic=True)
+    repeated = np.tile(cycle, (6, 1))
+    for p in range(6):
+        live.advance(base[p : p + 1])
+        best = np.full(6, np.inf)
+        for first, *taken in itertools.product(range(6), *[sorted(costs)] * p):
+            path = first + np.concatenate([[0], np.cumsum(taken)]).astype(int)
+            total = path_cost(base[: p + 1], repeated, path, costs, MU, SUBFRAMES)
+            best[path[-1] % 6] = min(best[path[-1] % 6], total)
+        np.testing.assert_allclose(live.costs[0], best, atol=1e-12)
+        assert live.best()[0][0] == best.argmin()
+        np.testing.assert_allclose(live.best()[1][0], best.min(), atol=1e-12)
+
+
+def rows_with_attempts(base, moving, costs, restart_cost, moves):
+    """Costs of every row, and the attempt in which it is, cell by cell."""
+    n, (unit, _, _) = len(moving), (SUBFRAMES, 0, 0)
+
+    def local(x, q, step):
+        b, g, phi = costs[step]
+        return x @ x + b * (moving[q] @ moving[q]) - g * (x @ moving[q]) + MU * phi
+
+    now, other, attempt = np.full(n, np.inf), np.full(n, np.inf), 0
+    now[0] = local(base[0], 0, unit)
+    yield now, attempt
+    for x, moved in zip(base[1:], moves[1:], strict=True):
+        # Where an attempt begins, the position before the first one has the least cost so far.
+        before = {q: now[q] for q in range(n)}, {q: other[q] for q in range(n)}
+        before[1][-unit] = now.min() + restart_cost
+        rows = [
+            np.array(
+                [
+                    min(costs_before.get(q - s, np.inf) + local(x, q, s) for s in costs)
+                    for q in range(n)
+                ]
+            )
+            for costs_before in before
+        ]
+        if not moved:
+            rows[1] = other + rows[0].min() - now.min()
+        now, other = rows
+        if other.min() < now.min():
+            now, other, attempt = other, np.full(n, np.inf), attempt + 1
+        yield now, attempt
+
+
+@pytest.mark.parametrize("still", [False, True])
+def test_attempts_equal_a_slow_version(still):
+    rng, costs = np.random.default_rng(5), step_costs("velocity", 2, SUBFRAMES)
+    moving = np.cumsum(rng.standard_normal((13, 3)), axis=0)
+    # Twice the first half, whole frame by whole frame, and all of it.
+    base = np.concatenate([moving[[0, 2, 4, 6]], moving[[0, 2, 4, 6]], moving[::2]])
+    base = base + 0.1 * rng.standard_normal(base.shape)
+    moves = np.ones((2, len(base)), dtype=bool)
+    if still:
+        moves[0, 3:6] = False
+    trellis = Trellis(step_table("velocity", 2, SUBFRAMES), MU, 6, running=True)
+    live = CausalTrellis(trellis, moving, 2, restart_cost=2.0)
+    # The second stream begins nothing anew, and is not changed by the first.
+    steady = np.concatenate([moving[::2], np.repeat(moving[-1:], len(base) - 7, axis=0)])
+    never = rows_with_attempts(steady, moving, costs, np.inf, moves[1])
+    attempts = []
+    expected = rows_with_attempts(base, moving, costs, 2.0, moves[0])
+    for p, ((row, attempt), (other, _)) in enumerate(zip(expected, never, strict=True)):
+        live.advance(np.stack([base[p], steady[p]]), moves=moves[:, p])
+        np.testing.assert_allclose(live.costs, [row, other], atol=1e-9)
+        assert live.attempts.tolist() == [attempt, 0]
+        attempts.append(attempt)
+    assert attempts[-1] == (1 if still else 2)
+
+
+@pytest.mark.parametrize("kind", [{"cyclic": True}, {"restart_cost": 3.0}])
+def test_long_streams_keep_their_costs_small_and_their_paths(kind, monkeypatch):
+    rng = np.random.default_rng(6)
+    moving = np.cumsum(rng.standard_normal((17, 3)), axis=0)
+    moving[-1] = moving[0]
+    base = np.tile(moving[:-1:2], (6, 1)) + 0.3 * rng.standard_normal((48, 3))
+    trellis = Trellis(step_table("velocity", 2, 2), 0.5, 8, running=True)
+    whole = CausalTrellis(trellis, moving, **kind)
+    monkeypatch.setattr("sklearn_motionsync.matching.causal.REBASED", 5)
+    often = CausalTrellis(trellis, moving, **kind)
+    for p, sample in enumerate(base):
+        monkeypatch.setattr("sklearn_motionsync.matching.causal.REBASED", 4096)
+        whole.advance(sample[np.newaxis])
+        monkeypatch.setattr("sklearn_motionsync.matching.causal.REBASED", 5)
+        often.advance(sample[np.newaxis])
+        (end, cost), (expected, total) = often.best(), whole.best()
+        assert end == expected
+        np.testing.assert_allclose(cost, total)
+        assert often.attempts == whole.attempts
+        if p % 5 == 4:
+            assert often.costs.min() == 0
+    assert whole.costs.min() > 10
+
+
+def test_velocity_of_a_cycle_is_that_after_many_cycles():
+    cycle = np.random.default_rng(7).standard_normal((40, 2))
+    positions = np.concatenate([cycle, cycle[:1]])
+    repeated = np.concatenate([cycle] * 30 + [cycle[:1]])
+    found = causal_velocity(positions, 2, 3.0, cyclic=True)
+    np.testing.assert_allclose(found, causal_velocity(repeated, 2, 3.0)[-41:], atol=1e-12)
+    np.testing.assert_allclose(found[0], found[-1], atol=1e-12)
+
+
+def test_velocity_is_unknown_at_the_first_sample_unless_from_rest():
+    samples = np.random.default_rng(8).standard_normal((30, 1, 2))
+    samples[0, 0, 1] = np.nan
+    derivative = CausalDerivative(2.0, (1, 2), from_rest=False)
+    found = np.array([derivative.step(sample) for sample in samples])[:, 0]
+    assert np.isnan(found[0]).all()
+    assert np.isnan(found[1]).tolist() == [False, True]
+    keep = np.exp(-0.5)
+    for column, first in enumerate((0, 1)):
+        x = samples[first:, 0, column]
+        # Of all differences since the first sample, weighted by their age, twice.
+        velocity = np.diff(x)
+        for _ in range(2):
+            weights = [keep ** np.arange(k, -1, -1.0) for k in range(len(velocity))]
+            velocity = [w @ velocity[: len(w)] / w.sum() for w in weights]
+        np.testing.assert_allclose(found[first + 1 :, column], velocity)
+    # After a long gap as at the beginning.
+    for _ in range(20):
+        assert np.isnan(derivative.step(np.full((1, 2), np.nan))).all()
+    assert np.isnan(derivative.step(samples[5])).all()
+    np.testing.assert_allclose(derivative.step(samples[6]), samples[6] - samples[5])
+    derivative.restart(0)
+    assert np.isnan(derivative.step(samples[5])).all()
