@@ -13,6 +13,7 @@ from ..inputs.collections import check_members
 from ..inputs.numbers import as_numbers
 from ..inputs.recorded import frame_rate_of_rows, start_of_rows
 from ..inputs.types import Path, PerformanceLike, Table
+from ..inputs.wording import counted
 from .motion import read_motion
 from .rig import Rig, make_rig, solve_rig
 
@@ -130,7 +131,8 @@ def _read_positions(X, skeleton, path):
         names, parents, up = list(skeleton.joints), skeleton.parents, skeleton.up
     if x.shape[1] != 3 * len(names):
         raise ValueError(
-            f"{path}: X has {x.shape[1]} columns, and {len(names)} joints need {3 * len(names)}."
+            f"{path}: X has {counted(x.shape[1], 'column')}, and {counted(len(names), 'joint')} need "
+            f"{3 * len(names)}."
         )
     points = x.astype(np.float64).reshape(len(x), -1, 3)
     return names, list(parents), points, up
