@@ -131,8 +131,8 @@ def _read_positions(X, skeleton, path):
         names, parents, up = list(skeleton.joints), skeleton.parents, skeleton.up
     if x.shape[1] != 3 * len(names):
         raise ValueError(
-            f"{path}: X has {counted(x.shape[1], 'column')}, and {counted(len(names), 'joint')} need "
-            f"{3 * len(names)}."
+            f"{path}: X has {counted(x.shape[1], 'column')}, and "
+            f"{counted(len(names), 'joint')} need {3 * len(names)}."
         )
     points = x.astype(np.float64).reshape(len(x), -1, 3)
     return names, list(parents), points, up
