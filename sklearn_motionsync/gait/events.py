@@ -94,8 +94,8 @@ def gait_events(
     Raises
     ------
     ValueError
-        If the frame rate is not known, no heel and no ankle is seen, or there is no pelvis above
-        the feet.
+        If the frame rate is not known, a recording is shorter than 0.25 s, no heel and no ankle is
+        seen, or there is no pelvis above the feet.
 
     See Also
     --------

@@ -9,6 +9,7 @@ from ..body.axes import to_y_up
 from ..body.formats import SIDES
 from ..body.landmarks import as_tuple, guess_feet
 from ..inputs.numbers import nanmean
+from ..inputs.wording import counted
 from ..matching.filters import smooth
 
 __all__ = ["ENDS_OF_FEET", "Walk", "horizontal", "joints_of_feet", "pieces"]
@@ -16,8 +17,9 @@ __all__ = ["ENDS_OF_FEET", "Walk", "horizontal", "joints_of_feet", "pieces"]
 ENDS_OF_FEET = [f"{side}_{part}" for side in SIDES for part in ("heel", "toe")]
 # Positions are interpolated to at least so many samples a second.
 _LEAST_RATE = 240
-# Gaps up to this length, in seconds, are filled in. Shorter pieces between gaps are left out.
-_LONGEST_GAP, _SHORTEST_PIECE = 0.2, 0.25
+# Gaps up to this length, in seconds, are filled in. Pieces between gaps that are shorter than the
+# second number, or have fewer frames than the third, are left out.
+_LONGEST_GAP, _SHORTEST_PIECE, _FEWEST = 0.2, 0.25, 4
 # Standard deviations, in seconds, of the Gaussians for the direction of walking, and for the speed
 # of feet that swing.
 _HEADING, _SWING = 0.2, 0.03
@@ -98,6 +100,11 @@ class Walk:
         self._points = to_y_up(
             positions.astype(np.float64).reshape(len(positions), -1, skeleton.n_dims), skeleton
         )
+        if len(positions) < max(_FEWEST, _SHORTEST_PIECE * frame_rate):
+            raise ValueError(
+                f"{called} has {counted(len(positions), 'frame')} at {frame_rate:g} a second; "
+                f"{_SHORTEST_PIECE:g} s and {_FEWEST} frames are the least. Leave it out."
+            )
         self.per_frame = max(1, math.ceil(_LEAST_RATE / frame_rate))
         self.rate, self._frame_rate = frame_rate * self.per_frame, frame_rate
         self.n_samples = (len(positions) - 1) * self.per_frame + 1
@@ -173,7 +180,7 @@ class Walk:
         x = _fill_short_gaps(x, _LONGEST_GAP * self._frame_rate)
         out = np.full((self.n_samples, x.shape[1]), np.nan)
         for piece in pieces(x):
-            if piece.stop - piece.start < max(4, _SHORTEST_PIECE * self._frame_rate):
+            if piece.stop - piece.start < max(_FEWEST, _SHORTEST_PIECE * self._frame_rate):
                 continue
             samples = np.arange(piece.start * self.per_frame, (piece.stop - 1) * self.per_frame + 1)
             spline = CubicSpline(frames[piece], x[piece])

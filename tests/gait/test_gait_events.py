@@ -278,6 +278,7 @@ def test_rate_and_noise_hardly_matter_on_people(ruler, real_data):
         ({"skeleton": None}, "Arrays do not name their joints: give a skeleton"),
         ({"feet": {"heel": "left_heel"}}, "feet: 'heel' is none of left_heel, left_toe"),
         ({"feet": {"left_heel": "LHEE"}}, "feet: 'left_heel' is at 'LHEE', which is no joint"),
+        ({"X": [np.zeros((20, 57))]}, "Performance 0 has 20 frames at 100 a second; 0.25 s and 4"),
         ({"X": [np.zeros((50, 6))]}, "Performance 0 has 6 features a frame, but the skeleton's 19"),
     ],
 )
