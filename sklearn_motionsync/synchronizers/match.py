@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import reprlib
 from collections.abc import Iterator, Mapping
 from numbers import Real
@@ -48,6 +49,8 @@ STANDARD = 0.6827
 UNITS = {"frames": "frames", "percent": "%", "seconds": "s"}
 # Times may decrease by rounding errors, by this share of the clock.
 _ROUNDING = 1e-9
+# Performances in the table for notebooks.
+_SHOWN = 10
 # The smallest rate, so that logarithms are finite.
 _SLOWEST = 0.01
 
@@ -547,12 +550,41 @@ class Match:
             modes = f", several ways of doing it: {', '.join(parts)}"
         return f"Match({counted(n_sequences, 'performance')} on {n_frames} frames{modes})"
 
+    def _repr_html_(self):
+        """A table for notebooks: how late each of the first performances is, and when."""
+        percent = 100 * self.offsets / (self.times.shape[1] - 1)
+        largest = max(np.abs(percent).max(initial=0), 1e-9)
+        rows = []
+        for i, own in enumerate(percent[:_SHOWN]):
+            at = int(np.abs(own).argmax())
+            word = "late" if own[at] > 0 else "early"
+            when = f"{abs(own[at]):.1f} % {word}, at {100 * at / (len(own) - 1):.0f} %"
+            rows.append(f"<tr><td>{i}</td><td>{when}</td><td>{_sparkline(own, largest)}</td></tr>")
+        more = len(percent) - len(rows)
+        tail = f"<p>and {counted(more, 'performance')} more</p>" if more else ""
+        return (
+            f"<p>{html.escape(repr(self))}; offsets of at most {largest:.1f} % of the pattern</p>"
+            "<table><thead><tr><th></th><th>largest offset</th><th>offset, late is up</th></tr>"
+            f"</thead><tbody>{''.join(rows)}</tbody></table>{tail}"
+        )
+
     def _check_count(self, given, noun):
         if len(given) != len(self.times):
             raise ValueError(
                 f"{counted(len(self.times), 'matched performance')}, but "
                 f"{counted(len(given), noun)}: give one for each, in the same order."
             )
+
+
+def _sparkline(values, largest):
+    """A curve as a small picture (SVG), from ``-largest`` to ``largest``."""
+    xs, ys = np.linspace(0, 120, len(values)), 12 - 11 * values / largest
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(xs, ys, strict=True))
+    return (
+        '<svg width="120" height="24" viewBox="0 0 120 24" role="img">'
+        '<line x1="0" y1="12" x2="120" y2="12" stroke="currentColor" stroke-opacity="0.3"/>'
+        f'<polyline points="{points}" fill="none" stroke="#0072B2" stroke-width="1.5"/></svg>'
+    )
 
 
 def check_coverage(coverage):
