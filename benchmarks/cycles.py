@@ -239,9 +239,9 @@ def lengths(triples):
     return shares, counts.ravel().tolist()
 
 
-def warnings_of_lengths(folder):
+def warnings_of_lengths(folder, seeds=8, sizes=SHALLOW):
     """Names of sets of takes, and what `lengths` gives."""
-    gait = [make_gait(6, n_cycles=6, takes=True, random_state=seed) for seed in range(8)]
+    gait = [make_gait(6, n_cycles=6, takes=True, random_state=seed) for seed in range(seeds)]
     takes = [(x, np.linspace(0, len(x), 7)) for bunch in gait for x in bunch.data]
     yield "make_gait", lengths((x, begins, CycleSegmenter(start=0)) for x, begins in takes)
     for names in CYCLIC.items():
@@ -257,7 +257,7 @@ def warnings_of_lengths(folder):
                 )
             ),
         )
-    for size in SHALLOW:
+    for size in sizes:
         pairs = shallow_chains(folder, size)
         name = "exercises" if size == 1 else f"exercises, {N_SHALLOW} of size {size}"
         yield name, lengths((x, begins, CycleSegmenter()) for x, begins in pairs)

@@ -154,13 +154,14 @@ def labelled(files):
             report(f"{what}, {name_of(setting)}", triples)
 
 
-def refused(folder):
+def refused(folder, every=1):
     """People that stand, and exercises on the spot: sit to stand, shoulders up and turned."""
     bunch = load_performances(folder / "uiprmd" / "uiprmd_odd_positions.npz")
     skeleton = Skeleton(bunch.joints, bunch.skeleton.parents, LANDMARKS, up="z")
     rng = np.random.default_rng(0)
     counts = {"standing": []} | {name: [] for name in np.unique(bunch.target)}
-    for x, label, rate in zip(bunch.data, bunch.target, bunch.frame_rate, strict=True):
+    recordings = list(zip(bunch.data, bunch.target, bunch.frame_rate, strict=True))
+    for x, label, rate in recordings[::every]:
         counts[label].append(len(find(np.asarray(x, dtype=float), rate, skeleton)))
         sway = 20 * gaussian_filter1d(rng.normal(size=(250, 1, 3)), 25, axis=0)
         still = x[0].reshape(1, -1, 3) + sway + rng.normal(0, 1, (250, x.shape[1] // 3, 3))

@@ -243,7 +243,7 @@ def test_labels_of_recordings(walk):
 
 def test_nothing_of_people_that_stand(ruler, real_data, capsys):
     """Standing, sitting down and squatting have no strikes; only a lunge has steps."""
-    ruler.refused(real_data)
+    ruler.refused(real_data, every=7)
     lines = dict(line.split(": events in ") for line in capsys.readouterr().out.splitlines())
     assert len(lines) == 6
     for name, found in lines.items():
