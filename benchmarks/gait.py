@@ -7,7 +7,8 @@ is found in excess. Made walks have known events. HDM05's jogs and CMU's walks h
 geometry a foot is on the ground while its ankle or its toe moves by less than a third of the mean
 speed of the pelvis. At lower frame rates, and with noise, events are also held against those of
 the recording as it is. C3D files are those whose events name strikes and foot-offs, such as those
-of force plates. Their heels are left out once, and once their toes, too.
+of force plates. Their heels are left out once, and once their toes, too; and the rule of Zeni and
+others is run beside.
 
 What is refused: people that stand, and most that exercise on the spot, have no events.
 """
@@ -20,6 +21,7 @@ import numpy as np
 import pandas as pd
 from exercises import LANDMARKS
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import find_peaks
 from sklearn_motionsync import Skeleton, gait_events
 from sklearn_motionsync.datasets import load_performances, make_walk
 from sklearn_motionsync.gait.feet import joints_of_feet
@@ -32,6 +34,8 @@ NEAR = 0.15
 SETTINGS = [(None, 0.0), (60, 0.0), (30, 0.0), (25, 0.0), (None, 0.01), (30, 0.01)]
 # A foot that moves by less than this share of the speed of the pelvis stands; seconds of smoothing.
 SLOW, SMOOTHING = 1 / 3, 0.02
+# A foot swings by at least this share of its whole way, by the rule of Zeni and others.
+SWING = 0.3
 
 
 def thinned(x, rate, wanted):
@@ -85,6 +89,27 @@ def by_geometry(x, rate, skeleton):
     return events
 
 
+def by_extremes(x, rate, skeleton):
+    """The rule of Zeni and others: the heel farthest ahead of the pelvis, the toe farthest behind.
+
+    Ahead is where the pelvis goes.
+    """
+    ground = [k for k, axis in enumerate("xyz") if axis != skeleton.up[-1]]
+    points = x.reshape(len(x), -1, 3)[..., ground]
+    pelvis = np.nanmean(points[:, list(skeleton.indices_of("pelvis"))], axis=1)
+    way = np.nanmean(np.diff(pelvis, axis=0), axis=0)
+    ends, events = joints_of_feet(skeleton), []
+    for side in ("left", "right"):
+        for label, end, sign in zip(LABELS, ("heel", "toe"), (1, -1), strict=True):
+            foot = np.nanmean(points[:, list(ends[f"{side}_{end}"])], axis=1)
+            ahead = pd.Series(sign * (foot - pelvis) @ way / np.linalg.norm(way)).interpolate()
+            least = SWING * (ahead.max() - ahead.min())
+            events += [
+                (label, side.capitalize(), k / rate) for k in find_peaks(ahead, prominence=least)[0]
+            ]
+    return events
+
+
 def report(name, triples):
     """Print mean and absolute errors of many recordings."""
     for label in LABELS:
@@ -133,6 +158,16 @@ def people(folder):
                 report(name_of(setting), triples)
 
 
+def marked(df):
+    """The events that a file names, as (label, context, seconds)."""
+    rate = df.attrs["frame_rate"]
+    return [
+        (e["label"], e["context"], e["frame"] / rate)
+        for e in df.attrs["events"]
+        if e["label"] in LABELS
+    ]
+
+
 def labelled(files):
     print(f"{len(files)} labelled files")
     marks = ("HEE", "TOE")
@@ -142,16 +177,19 @@ def labelled(files):
             for path in files:
                 df = read_motion(path)
                 names = [c for c in df if not any(c[:-2].endswith(mark) for mark in left_out)]
-                true = [
-                    (e["label"], e["context"], e["frame"] / df.attrs["frame_rate"])
-                    for e in df.attrs["events"] if e["label"] in LABELS
-                ]  # fmt: skip
                 skeleton = Skeleton.from_frame(df[names])
                 x, rate = df[names].to_numpy(dtype=float), df.attrs["frame_rate"]
                 x = x + np.random.default_rng(0).normal(0, 1000 * setting[1], x.shape)
                 x, rate = thinned(x, rate, setting[0])
-                triples.append(compare(find(x, rate, skeleton), true))
+                triples.append(compare(find(x, rate, skeleton), marked(df)))
             report(f"{what}, {name_of(setting)}", triples)
+    triples = []
+    for path in files:
+        df = read_motion(path)
+        rate, skeleton = df.attrs["frame_rate"], Skeleton.from_frame(df)
+        found = by_extremes(df.to_numpy(dtype=float), rate, skeleton)
+        triples.append(compare(found, marked(df)))
+    report("farthest ahead, behind", triples)
 
 
 def refused(folder, every=1):

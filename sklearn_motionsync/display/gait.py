@@ -10,7 +10,7 @@ import pandas as pd
 
 from ..body.formats import SIDES
 from ..body.skeleton import Skeleton
-from ..gait.events import find_events
+from ..gait.events import events_of, tabulate_events
 from ..gait.recordings import CONTEXTS, FOOT_OFF, FOOT_STRIKE, Recordings
 from ..inputs.types import NumbersLike, PerformancesLike, Table, ValuesLike
 from ..inputs.wording import counted
@@ -120,12 +120,7 @@ class GaitDisplay:
         recordings = Recordings(X, skeleton, feet, frame_rate)
         i = as_index(recording, len(recordings), "recording")
         walk = recordings.walk(i)
-        found = find_events(walk)
-        if events is not None:
-            found = [
-                (label, side, row * walk.per_frame)
-                for label, side, row in recordings.split_events(events)[i]
-            ]
+        found = events_of(walk, recordings.split_events(events)[i])
         rows = np.arange(0, walk.n_samples, walk.per_frame)
         scale, unit = recordings.length_of_leg(i, walk)
         ends = {"heel": walk.heels, "toe": walk.toes}
@@ -138,13 +133,7 @@ class GaitDisplay:
         floor = min(np.nanmin(values) for values in heights.values())
         heights = {name: values - floor for name, values in heights.items()}
         times = recordings.times_at(i, np.arange(len(rows)))
-        table = pd.DataFrame(
-            {
-                "label": [label for label, *_ in found],
-                "context": [CONTEXTS[side] for _, side, _ in found],
-                "time": recordings.times_at(i, [k / walk.per_frame for *_, k in found]),
-            }
-        )
+        table = tabulate_events(recordings, i, walk, found)
         return cls(times, heights, table, unit=unit).plot(ax)
 
     def plot(self, ax: AxesLike | None = None) -> Self:

@@ -15,7 +15,7 @@ from ..inputs.types import PerformancesLike, ValuesLike
 from .feet import Walk, horizontal, pieces
 from .recordings import CONTEXTS, FOOT_OFF, FOOT_STRIKE, Recordings
 
-__all__ = ["find_events", "gait_events"]
+__all__ = ["events_of", "gait_events", "tabulate_events"]
 
 # Standard deviations, in seconds, of the Gaussians for positions and for accelerations.
 _POSITION, _ACCELERATION = 0.03, 0.0175
@@ -141,22 +141,40 @@ def gait_events(
     tables = []
     for i in range(len(recordings)):
         walk = recordings.walk(i)
-        events = find_events(walk)
-        frames = [k / walk.per_frame for *_, k in events]
-        table = pd.DataFrame(
-            {
-                "label": [label for label, *_ in events],
-                "context": [CONTEXTS[side] for _, side, _ in events],
-                "frame": recordings.frames_at(i, frames),
-                "time": recordings.times_at(i, frames),
-            }
-        )
-        tables.append(table)
+        tables.append(tabulate_events(recordings, i, walk, events_of(walk)))
     return recordings.stack(tables)
 
 
-def find_events(walk: Walk):
-    """The events of a recording by time: label, side, and sample, with a fraction."""
+def events_of(walk, given=None):
+    """The events of a recording by time: label, side, and sample, with a fraction.
+
+    Parameters
+    ----------
+    walk : Walk
+    given : list of (str, str, float), default=None
+        Events known already, with rows, as from `Recordings.split_events`. By default they are
+        found.
+    """
+    if given is None:
+        return _find_events(walk)
+    return [(label, side, row * walk.per_frame) for label, side, row in given]
+
+
+def tabulate_events(recordings, i, walk, events):
+    """The table of the events of a recording: label, context, frame and time."""
+    rows = [k / walk.per_frame for *_, k in events]
+    return pd.DataFrame(
+        {
+            "label": [label for label, *_ in events],
+            "context": [CONTEXTS[side] for _, side, _ in events],
+            "frame": recordings.frames_at(i, rows),
+            "time": recordings.times_at(i, rows),
+        }
+    )
+
+
+def _find_events(walk: Walk):
+    """The events of a recording by time, from the positions of the feet."""
     strikes = {side: _strikes(walk, side) for side in walk.heels}
     behind = {
         side: [(k, is_end) for k, is_end in _farthest(walk, side, points, -1) if not is_end]

@@ -11,7 +11,7 @@ import pandas as pd
 from ..body.formats import SIDES
 from ..body.skeleton import Skeleton
 from ..inputs.types import PerformancesLike, Table, ValuesLike
-from .events import find_events
+from .events import events_of
 from .feet import horizontal
 from .recordings import FOOT_OFF, FOOT_STRIKE, Recordings
 
@@ -46,8 +46,8 @@ def gait_parameters(
         As for `gait_events`.
     events : DataFrame, default=None
         One row an event with ``label``, ``context``, and ``frame`` or ``time``, as `gait_events`
-        returns it, and the labels of recordings if there are several. By default those that
-        `gait_events` finds.
+        returns it, and the labels of recordings if there are several. A row whose time is NaN is
+        left out. By default events are those that `gait_events` finds.
     feet : mapping of str to str or tuple of str, default=None
         As for `gait_events`.
     frame_rate : float, or array-like of shape (n_recordings,), default=None
@@ -79,8 +79,8 @@ def gait_parameters(
     Raises
     ------
     ValueError
-        As from `gait_events`; or if ``events`` lacks a column, or names a recording that is not in
-        X.
+        As from `gait_events`; or if ``events`` lacks a column, names a recording that is not in X,
+        or has an event outside of its recording.
 
     See Also
     --------
@@ -106,13 +106,10 @@ def gait_parameters(
     stride length               1.44
     """
     recordings = Recordings(X, skeleton, feet, frame_rate)
-    given = None if events is None else recordings.split_events(events)
     tables = []
-    for i in range(len(recordings)):
+    for i, given in enumerate(recordings.split_events(events)):
         walk = recordings.walk(i)
-        found = find_events(walk)
-        if given is not None:
-            found = [(label, side, row * walk.per_frame) for label, side, row in given[i]]
+        found = events_of(walk, given)
         tables.append(_parameters(walk, found, *recordings.length_of_leg(i, walk)))
     stacked = recordings.stack(tables)
     return stacked.set_index([*recordings.levels, "parameter"])

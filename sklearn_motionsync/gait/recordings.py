@@ -5,7 +5,7 @@ import pandas as pd
 
 from ..body.skeleton import Skeleton, check_columns
 from ..inputs.collections import as_collection, check_members
-from ..inputs.recorded import frame_rate_of_rows, recorded_frames, start_of_rows
+from ..inputs.recorded import frame_rate_of_rows, frames_of_rows, start_of_rows
 from ..inputs.resampling import as_frame_rates
 from ..inputs.tables import as_pandas, index_of, labels_of
 from ..inputs.wording import counted, within
@@ -13,6 +13,8 @@ from .feet import Walk, joints_of_feet
 
 __all__ = ["CONTEXTS", "FOOT_OFF", "FOOT_STRIKE", "Recordings"]
 
+# Frames beyond an end that are rounding.
+_MARGIN = 0.5
 # Metres of the units of positions.
 _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 # Labels of events, and contexts, as C3D files have them.
@@ -80,19 +82,14 @@ class Recordings:
 
     def frames_at(self, i, rows):
         """The frames of rows of a recording, with fractions, as its index counts."""
-        x = self._given[i]
-        frames = recorded_frames(x) if isinstance(x, pd.DataFrame) else None
-        if frames is None or (np.diff(frames) <= 0).any():
-            return np.asarray(rows, dtype=np.float64)
+        frames = frames_of_rows(self._given[i])
         return np.interp(rows, np.arange(len(frames)), frames)
 
-    def rows_at(self, i, frames):
-        """The inverse of `frames_at`."""
-        x = self._given[i]
-        known = recorded_frames(x) if isinstance(x, pd.DataFrame) else None
-        if known is None or (np.diff(known) <= 0).any():
-            return np.asarray(frames, dtype=np.float64)
-        return np.interp(frames, known, np.arange(len(known)))
+    def row_of_frame(self, i, frame):
+        """The inverse of `frames_at`; beyond the ends, frames are single steps."""
+        known = frames_of_rows(self._given[i])
+        row = np.interp(frame, known, np.arange(len(known)))
+        return row + frame - np.clip(frame, known[0], known[-1])
 
     def times_at(self, i, rows):
         """Seconds at rows of a recording."""
@@ -103,13 +100,15 @@ class Recordings:
         return (time - start_of_rows(self._given[i])) * self._rates[i]
 
     def split_events(self, events):
-        """The events of a table, by recording: label, side and row.
+        """The events of a table, by recording: label, side and row; None of each without a table.
 
         Parameters
         ----------
-        events : DataFrame
+        events : DataFrame or None
             As `gait_events` returns it.
         """
+        if events is None:
+            return [None] * len(self)
         table = as_pandas(events)
         columns = list(getattr(table, "columns", ()))
         time = next((name for name in ("frame", "time") if name in columns), None)
@@ -135,9 +134,15 @@ class Recordings:
                     f"events: recording {key!r} is not in X, whose labels are {self._labels[:6]}."
                 )
             i, side = places[key], sides.get(str(context).strip().casefold())
-            if side is None or label not in (FOOT_STRIKE, FOOT_OFF):
+            if side is None or label not in (FOOT_STRIKE, FOOT_OFF) or pd.isna(value):
                 continue
-            at = self.rows_at(i, value) if time == "frame" else self.row_of_time(i, value)
+            at = self.row_of_frame(i, value) if time == "frame" else self.row_of_time(i, value)
+            if not -_MARGIN <= at <= len(self._given[i]) - 1 + _MARGIN:
+                raise ValueError(
+                    f"events: {label} {context} at {time} {value:.6g} is outside of "
+                    f"{within(self.called(i))}. Leave its row out, or give the events of these "
+                    "recordings."
+                )
             found[i].append((label, side, float(at)))
         return [sorted(own, key=lambda event: event[2]) for own in found]
 

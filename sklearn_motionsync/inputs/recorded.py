@@ -21,6 +21,7 @@ __all__ = [
     "SAME_RATE",
     "Recorded",
     "frame_rate_of_rows",
+    "frames_of_rows",
     "is_thinned",
     "names_seconds",
     "recorded_frames",
@@ -84,6 +85,24 @@ def recorded_frames(df):
     if (np.abs(values - frames) > slack).any() or frames.min(initial=0) < 0:
         return None
     return frames.astype(np.int64)
+
+
+def frames_of_rows(x):
+    """The frames of the rows of a performance, which increase; without an index of frames, from 0.
+
+    Parameters
+    ----------
+    x : DataFrame, or array of frames
+        One performance.
+
+    Returns
+    -------
+    ndarray of int, shape (n_rows,)
+    """
+    frames = recorded_frames(x) if isinstance(x, pd.DataFrame) else None
+    if frames is None or (np.diff(frames) <= 0).any():
+        return np.arange(len(x))
+    return frames
 
 
 def frame_rate_of_rows(x):

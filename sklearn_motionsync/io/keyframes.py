@@ -14,8 +14,8 @@ from ..inputs.collections import as_collection
 from ..inputs.numbers import as_numbers
 from ..inputs.recorded import (
     frame_rate_of_rows,
+    frames_of_rows,
     names_seconds,
-    recorded_frames,
     refuse_moved_events,
     start_of_rows,
 )
@@ -128,10 +128,10 @@ def keyframes_from_events(
     trials = [name_performance(i, label) for i, label in enumerate(labels)]
     if events is None:
         listed = [_events_of(x, trial) for x, trial in zip(sequences, trials, strict=True)]
-        clocks = [_frames_of(x) for x in sequences]
+        clocks = [frames_of_rows(x) for x in sequences]
     else:
         listed, in_seconds = _events_in(events, labels, levels[:-1], by)
-        clocks = [_frames_of(x) for x in sequences]
+        clocks = [frames_of_rows(x) for x in sequences]
         if in_seconds:
             rates = _rates_of(sequences, trials, frame_rate)
             clocks = [
@@ -238,14 +238,6 @@ def _as_text(label):
 
 
 # -- where they are in their trial ----------------------------------------------------------
-
-
-def _frames_of(x):
-    """The frames of the rows of a trial: by its index if that has them, else from 0."""
-    frames = recorded_frames(x) if isinstance(x, pd.DataFrame) else None
-    if frames is None or (np.diff(frames) <= 0).any():
-        return np.arange(len(x))
-    return frames
 
 
 def _rates_of(sequences, trials, frame_rate):

@@ -54,10 +54,6 @@ class Rig(NamedTuple):
         known = attrs.get("rig")
         return None if known is None else cls(attrs["joints"], attrs["parents"], **known)
 
-    def as_attrs(self):
-        """What ``attrs["rig"]`` holds beside joints and parents."""
-        return {"offsets": self.offsets, "channels": self.channels}
-
 
 def make_rig(joints, parents, points):
     """A rig of a body that has none: at rest it is as in its first frame.

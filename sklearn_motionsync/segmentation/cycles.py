@@ -17,7 +17,7 @@ from ..body.direction_cosines import DirectionCosines
 from ..body.formats import SIDES
 from ..body.joint_positions import JointPositions
 from ..body.skeleton import Skeleton
-from ..gait.events import find_events
+from ..gait.events import events_of
 from ..gait.recordings import FOOT_STRIKE, Recordings
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS
@@ -590,7 +590,7 @@ def strikes_of(segmenter, X):
     for i in range(len(recordings)):
         walk = recordings.walk(i)
         wanted = FOOT_STRIKE, side
-        found.append(np.array([k for *what, k in find_events(walk) if tuple(what) == wanted]))
+        found.append(np.array([k for *what, k in events_of(walk) if tuple(what) == wanted]))
         found[-1] = found[-1] / walk.per_frame
     return found
 

@@ -77,6 +77,14 @@ def test_given_events_count():
             walk.data, walk.skeleton, events=events[["performance", *columns]], frame_rate=100
         )
         pd.testing.assert_frame_equal(found, expected)
+    unknown = pd.DataFrame(
+        {"performance": [0], "label": ["Foot Off"], "context": ["Left"], "time": [np.nan]}
+    )
+    found = gait_parameters(
+        walk.data, walk.skeleton, events=pd.concat([events, unknown]).drop(columns="frame"),
+        frame_rate=100,
+    )  # fmt: skip
+    pd.testing.assert_frame_equal(found, expected)
     # A strike that is missing leaves its strides out; it does not make long ones.
     strikes = events.index[(events["label"] == "Foot Strike") & (events["context"] == "Left")]
     fewer = events.drop(strikes[2])
@@ -117,6 +125,14 @@ def test_no_strides():
                 {"performance": [7], "label": ["Foot Off"], "context": ["Left"], "time": [1]}
             ),
             "events: recording 7 is not in X, whose labels are",
+        ),
+        (
+            pd.DataFrame({"label": ["Foot Off"], "context": ["Left"], "frame": [9999]}),
+            "events: Foot Off Left at frame 9999 is outside of performance 0",
+        ),
+        (
+            pd.DataFrame({"label": ["Foot Off"], "context": ["Left"], "time": [-1.5]}),
+            "events: Foot Off Left at time -1.5 is outside of performance 0",
         ),
     ],
 )
