@@ -6,17 +6,19 @@ import numpy as np
 
 from .axes import from_y_up, heading_axes, project_on_axes, to_y_up
 from .formats import LANDMARKS, SIDES
-from .landmarks import as_tuple
+from .landmarks import as_tuple, guess_feet
 from .limbs import (
     LATERAL_LIMBS,
     LIMBS,
     body_size,
+    complete_legs,
     landmark_positions,
     limb_vectors,
     unit_vectors,
 )
 from .skeleton import loose_joints
 from .sphere import mean_direction, mean_length, mean_vector
+from .stances import Leg, find_stances, hold_feet
 
 __all__ = ["at_frames", "blend_bodies", "blend_numbers", "blend_postures"]
 
@@ -66,7 +68,7 @@ def blend_postures(arrays, frames, weights, first, n_dims):
 
 
 def blend_bodies(arrays, frames, weights, skeleton, owner=None):
-    """Blends of joint positions.
+    """Blends of joint positions, in space with feet that stand.
 
     Parameters
     ----------
@@ -96,7 +98,10 @@ def blend_bodies(arrays, frames, weights, skeleton, owner=None):
     angle, place = _blend_path(figures, frames, weights, size)
     place[:, 1] = _blend_heights([x.place[:, 1] for x in figures], figures, frames, weights, size)
     foot = _blend_heights([x.foot for x in figures], figures, frames, weights, size)
-    blend = structure.compose(links, place, angle, foot)
+    points = structure.compose(links, place, angle, foot)
+    if structure.legs:
+        points = _hold_feet(points, structure, arrays, figures, angle, frames, weights, size)
+    blend = structure.joints_of(points)
     for j in loose_joints(skeleton):
         columns = slice(skeleton.n_dims * j, skeleton.n_dims * (j + 1))
         own = [x[:, columns] for x in arrays]
@@ -141,18 +146,52 @@ def _blend_path(figures, frames, weights, size):
     angles = np.stack([at_frames(x.angle, f) for x, f in zip(figures, frames, strict=True)])
     first = np.stack([np.cos(angles[:, 0]), np.sin(angles[:, 0])], axis=1)
     start = mean_direction(first, weights[:, 0])
-    between = (weights[:, 1:] + weights[:, :-1]) / 2
+    between = _between(weights)
     rotation = (between * np.diff(angles, axis=1)).sum(axis=0)
     angle = np.arctan2(start[1], start[0]) + np.concatenate([[0], np.cumsum(rotation)])
     steps = 0
     for x, f, own, w in zip(figures, frames, angles, between, strict=True):
         step = np.diff(at_frames(x.place, f), axis=0)[:, np.newaxis] / x.size
-        step = _rotate(step, (own[1:] + own[:-1]) / 2, inverse=True)[:, 0]
+        step = _rotate(step, _between(own), inverse=True)[:, 0]
         steps = steps + w[:, np.newaxis] * step
-    steps = steps * ((size[1:] + size[:-1]) / 2)[:, np.newaxis]
-    steps = _rotate(steps[:, np.newaxis], (angle[1:] + angle[:-1]) / 2)[:, 0]
+    steps = steps * _between(size)[:, np.newaxis]
+    steps = _rotate(steps[:, np.newaxis], _between(angle))[:, 0]
     begin = blend_numbers([x.place for x in figures], frames[:, :1], weights[:, :1])
     return angle, np.concatenate([begin, begin + np.cumsum(steps, axis=0)])
+
+
+def _hold_feet(points, structure, arrays, figures, angle, frames, weights, size):
+    """Points of a blend whose feet stand where those of the performances do.
+
+    Soles go along the floor as those of the performances with positive weights do, each along the
+    heading of its own body. Negative weights do not make feet slip that stand.
+    """
+    floor = weights[:, 0] @ [x.foot.min() for x in figures]
+    weights = np.maximum(weights, 0)
+    weights = weights / weights.sum(axis=0)
+    soles = [p for leg in structure.legs for p in leg.soles]
+    stands, steps, heights, lowest = 0, 0, floor, floor
+    for x, figure, f, w in zip(arrays, figures, frames, weights, strict=True):
+        own, between = structure.points_of(x), _between(w)
+        middle = np.clip(_between(f) - 0.5, 0, len(x) - 2)
+        found = find_stances(own, structure.legs, figure.size)
+        found = np.stack([np.interp(middle, np.arange(len(x) - 1), one) for one in found])
+        stands = stands + between * found
+        track, facing = at_frames(own[:, soles], f), at_frames(figure.angle, f)
+        step = _rotate(np.diff(track, axis=0), _between(facing), inverse=True)
+        step = _rotate(step, _between(angle))[..., [0, 2]].transpose(1, 0, 2) / figure.size
+        steps = steps + (between * _between(size))[:, np.newaxis] * step
+        level = (track[..., 1].T - figure.foot.min()) / figure.size
+        heights = heights + w * size * level
+        least = (own[:, soles, 1].min(axis=0) - figure.foot.min()) / figure.size
+        lowest = lowest + w * size * least[:, np.newaxis]
+    forward = np.stack([-np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+    return hold_feet(points, structure.legs, stands, steps, heights, lowest, forward, size)
+
+
+def _between(x):
+    """Means of neighbouring frames, along the last axis."""
+    return (x[..., 1:] + x[..., :-1]) / 2
 
 
 def _blend_heights(tracks, figures, frames, weights, size):
@@ -222,10 +261,11 @@ class LinkStructure:
         choices = ("pelvis", "hip", "neck", "shoulder", *LANDMARKS)
         self._origin = next(self._points[name] for name in choices if name in self._points)
         self.links, self.rigid = self._find_links()
+        self.legs = self._find_legs() if skeleton.n_dims == 3 else []
 
     def decompose(self, positions):
         """The `Figure` of positions (n_frames, n_dims * n_joints)."""
-        points = self._points_of(positions)
+        points = self.points_of(positions)
         ends = np.array(self.links, dtype=int).reshape(-1, 2)
         angle = self._heading(points)
         links = _rotate(points[:, ends[:, 1]] - points[:, ends[:, 0]], angle, inverse=True)
@@ -233,7 +273,7 @@ class LinkStructure:
         return Figure(links, place, angle, self._size(positions), foot)
 
     def compose(self, links, place, angle, foot):
-        """Positions (n_frames, n_dims * n_joints) of a figure.
+        """Points (n_frames, n_points, n_dims) of a figure, y up.
 
         They are moved up or down by one distance, so that the median difference between their
         lower ankle and the given height of the foot (n_frames,) is 0.
@@ -244,6 +284,10 @@ class LinkStructure:
         for k, (near, far) in enumerate(self.links):
             points[:, far] = points[:, near] + links[:, k]
         points[..., 1] += np.median(foot - self._foot(points))
+        return points
+
+    def joints_of(self, points):
+        """Positions (n_frames, n_dims * n_joints) of points, y up."""
         joints = from_y_up(points[:, : len(self.skeleton.joints)], self.skeleton)
         return joints.reshape(len(joints), -1)
 
@@ -256,7 +300,7 @@ class LinkStructure:
         """The number of points: the joints, means of joints, and midpoints."""
         return 1 + max([len(self.skeleton.joints) - 1, *self._points.values()])
 
-    def _points_of(self, positions):
+    def points_of(self, positions):
         """Points (n_frames, n_points, n_dims), y up."""
         skeleton = self.skeleton
         joints = to_y_up(positions.reshape(len(positions), -1, skeleton.n_dims), skeleton)
@@ -288,9 +332,45 @@ class LinkStructure:
         backwards = [(b, a) for a, b in pairs]
         links = _extend([], self._origin, pairs + backwards, points.values())
         links = _extend(links, self._origin, means, ())
-        links = _extend(links, self._origin, self.skeleton.bones, range(len(joints)))
+        links = _extend(links, self._origin, self.skeleton.bones, ())
+        feet = [
+            (points[f"{side}_ankle"], joint)
+            for side, own in self._find_feet().items()
+            if f"{side}_ankle" in points
+            for joint in own
+        ]
+        links = _extend(links, self._origin, [*self.skeleton.bones, *feet], range(len(joints)))
         rigid = {*pairs[n_midpoints:], *backwards[n_midpoints:], *self.skeleton.bones}
         return links, np.array([link in rigid for link in links], dtype=bool)
+
+    def _find_legs(self):
+        feet = self._find_feet()
+        legs = []
+        for side in complete_legs(self.skeleton.limbs):
+            hip, knee, ankle = (self._points[f"{side}_{part}"] for part in ("hip", "knee", "ankle"))
+            # A leg that hangs on its foot cannot be moved from the hip.
+            if {(hip, knee), (knee, ankle)} <= set(self.links):
+                foot = self._carried_by(ankle)
+                soles = [p for p in feet[side] if p in foot]
+                rest = [p for p in self._carried_by(knee) if p not in foot]
+                legs.append(Leg(hip, knee, ankle, [ankle, *soles], rest, foot))
+        return legs
+
+    def _find_feet(self):
+        joints, skeleton = self.skeleton.joints, self.skeleton
+        found = guess_feet(joints, skeleton.landmarks)
+        return {
+            side: [joints.index(j) for name, j in found.items() if name.startswith(side)]
+            for side in SIDES
+        }
+
+    def _carried_by(self, point):
+        """A point, and those that links join to it."""
+        found = [point]
+        for near, far in self.links:
+            if near in found:
+                found.append(far)
+        return found
 
     def _heading(self, points):
         lateral = next((name for name in LATERAL_LIMBS if name in self.skeleton.limbs), None)

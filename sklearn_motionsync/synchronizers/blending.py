@@ -58,9 +58,9 @@ def blend_performances(
     Joint positions are blended as bodies. Directions of limbs and bones, along axes that turn with
     each body, have the mean on the sphere with the smallest sum of squared angles, so that no limb
     becomes shorter. Lengths of limbs are averaged, or those of one performance. Headings have a
-    circular mean, and steps of the path are averaged along each body's heading. Heights of the
-    pelvis are averaged; then the body is shifted vertically so that the lower ankle has, half of
-    the time, its mean height.
+    circular mean, and steps of the path are averaged along each body's heading. So are heights of
+    the pelvis. Feet that stand in the performances stand in the blend: the body follows them, and
+    hips and knees bend by the rest.
 
     Parameters
     ----------
@@ -123,7 +123,14 @@ def blend_performances(
     that lies on its side from the first to the last frame has no heading, and is blended along the
     axes of the recording.
 
-    Feet are not fixed to the floor: they slide in blends of performances that step differently.
+    A foot stands while its ankle, heel or toe is slow, against the fastest joint of the body, and
+    as low as the other foot. It then moves along the floor, and is as high, as on average in the
+    performances with positive weights. So negative weights exaggerate steps, but not how feet slip.
+    Feet that slip in a recording, or go with a treadmill, do so in its blends. Where a foot stands
+    in one performance and steps in another of positive weight, it slides. The correction changes
+    evenly while feet swing, and moves a foot by less than a quarter of the leg. No sole sinks below
+    its lowest height in the performances. Bodies in a picture, and legs without hip, knee and
+    ankle, are left as they are.
 
     Examples
     --------

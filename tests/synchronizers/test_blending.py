@@ -142,12 +142,16 @@ def test_postures_are_blended_as_bodies(bending, pipe, reference):
     postures, match = cosines.transform(X), Match.from_estimator(pipe, X)
     found = blend_performances(match, postures, {3: 1}, skeleton=cosines)
     np.testing.assert_allclose(found, postures[3], atol=1e-12)
-    # In between they are those of the blended bodies, except the height.
+    # In between they are those of the blended bodies, except the height, and legs that stand.
     weights = {3: 0.3, 7: 0.7}
     found = blend_performances(match, postures, weights, skeleton=cosines)
     if reference == "heading":
-        body = blend_performances(pipe, X, weights)
-        np.testing.assert_allclose(found[:, 1:], cosines.transform(body)[:, 1:], atol=1e-9)
+        body = cosines.transform(blend_performances(pipe, X, weights))
+        names = cosines.get_feature_names_out()
+        legs = np.array([name.rpartition("_")[0].endswith(("thigh", "leg")) for name in names])
+        legs[0] = True
+        np.testing.assert_allclose(found[:, ~legs], body[:, ~legs], atol=1e-9)
+        np.testing.assert_allclose(found[:, 1:], body[:, 1:], atol=0.05)
     norms = np.linalg.norm(found[:, 1:].reshape(len(found), -1, 3), axis=2)
     np.testing.assert_allclose(norms, 1, atol=1e-12)
 
@@ -234,7 +238,8 @@ def test_turning_and_standing_bodies_give_half_the_turn():
     around = np.stack([turned(f, d) for f, d in zip(standing(61), degrees, strict=True)])
     found = blend_performances(even(x, x), [around, standing(61)], [0.5, 0.5], skeleton=PAPER)
     half = np.stack([turned(f, d / 2) for f, d in zip(standing(61), degrees, strict=True)])
-    np.testing.assert_allclose(found, half, atol=1e-9)
+    # Feet of the second stand, and their chords are shorter than their arcs.
+    np.testing.assert_allclose(found, half, atol=1e-4)
 
 
 def cartwheel(lean, n=61):
