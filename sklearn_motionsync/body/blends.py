@@ -26,6 +26,8 @@ __all__ = ["at_frames", "blend_bodies", "blend_numbers", "blend_postures"]
 _LEAST_NORM = 1e-6
 # A shorter link, in sizes of the body, has no direction.
 _LEAST_LENGTH = 1e-6
+# A link whose length changes by a smaller share is rigid.
+_SAME_LENGTH = 0.01
 # Hips whose horizontal part is smaller, as a share of their length, show no heading: within 17
 # degrees of the vertical it jumps by half a turn. The smallest of 343 real performances is 0.33.
 _LEAST_HORIZONTAL = 0.3
@@ -292,9 +294,14 @@ class LinkStructure:
         return joints.reshape(len(joints), -1)
 
     def directed_links(self, figures):
-        """The rigid links that have a direction in every frame of all figures: (n_links,)."""
-        norms = np.concatenate([np.linalg.norm(x.links, axis=2) / x.size for x in figures])
-        return self.rigid & (norms > _LEAST_LENGTH).all(axis=0)
+        """The rigid links that have a direction in every frame of all figures: (n_links,).
+
+        Limbs and bones are rigid, and what keeps its length in every figure.
+        """
+        norms = [np.linalg.norm(x.links, axis=2) / x.size for x in figures]
+        shown = np.all([(x > _LEAST_LENGTH).all(axis=0) for x in norms], axis=0)
+        kept = np.all([np.ptp(x, axis=0) < _SAME_LENGTH * x.max(axis=0) for x in norms], axis=0)
+        return shown & (self.rigid | kept)
 
     def _count(self):
         """The number of points: the joints, means of joints, and midpoints."""

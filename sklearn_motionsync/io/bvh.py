@@ -96,10 +96,10 @@ def _read_hierarchy(text):
 
 
 def _read_declaration(text, key, joints, stack):
-    """A new joint, up to and with its opening brace."""
+    """A new joint, up to and with its opening brace; its name may be a key-word, as "root"."""
     words = []
     while (word := text.word("{")) != b"{":
-        if word.upper() in _KEYWORDS:
+        if word == b"}" or (word.upper() in _KEYWORDS and (words or key == b"END")):
             raise text.error(f"expected a joint's name and {{, got {quote([word])}.")
         words.append(word)
     parent = stack[-1] if stack else -1

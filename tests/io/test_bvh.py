@@ -57,6 +57,14 @@ def test_repeated_names_are_numbered(tmp_path):
     assert df.columns.is_unique
 
 
+@pytest.mark.parametrize("name", ["root", "Joint", "end", "Motion", "OFFSET"])
+def test_joints_may_be_called_as_key_words(tmp_path, name):
+    text = body().replace("ROOT hips", f"ROOT {name}").replace("JOINT leg", f"JOINT {name}")
+    df = read_motion(put(tmp_path, text))
+    assert df.attrs["joints"] == [name, "spine", "neck", "neck_end", f"{name}_2", "foot"]
+    np.testing.assert_array_equal(df, read_motion(put(tmp_path, body())))
+
+
 @pytest.mark.parametrize(("deep", "n"), [(True, 6000), (False, 40000)])
 def test_many_joints_deep_and_wide(tmp_path, deep, n):
     head = "HIERARCHY\nROOT a { OFFSET 0 0 0 CHANNELS 1 Xposition\n"
