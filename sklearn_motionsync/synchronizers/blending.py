@@ -114,7 +114,8 @@ def blend_performances(
     least half the smallest one of the performances.
 
     Links that are neither limbs nor bones, such as from the pelvis to the middle of the hips or to
-    a marker, are averaged as vectors along the axes of the body. Joints between two landmarks, such
+    a marker, are averaged as vectors along the axes of the body, unless they keep their length in
+    every performance. Joints between two landmarks, such
     as of the spine, follow the bones from the pelvis. Bones that close a ring with limbs, such as
     the last one to the head, collar bones, and those from the pelvis to the hips, may change their
     length. Bodies in a picture (``n_dims=2``) are not rotated.
