@@ -191,6 +191,9 @@ def walks(folder):
         ("hdm05", "sneak2StepsLStart", 120, 100, ("lfoot", "rfoot")),
         ("hdm05", "jogLeftCircle4StepsRstart", 120, 100, ("lfoot", "rfoot")),
         ("hdm05", "depositFloorR", 120, 100, ("lfoot", "rfoot")),
+        ("hdm05", "grabHighR", 120, 100, ("lfoot", "rfoot")),
+        ("hdm05", "hopBothLegs1hops", 120, 100, ("lfoot", "rfoot")),
+        ("hdm05", "elbowToKnee1RepsLelbowStart", 120, 100, ("lfoot", "rfoot")),
         # Its frame rate is not known; about 10 frames a second differ.
         ("utkinect", "walk", 10, 100, ("FootLeft", "FootRight")),
     ):

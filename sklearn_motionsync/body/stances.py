@@ -18,9 +18,10 @@ _LOW, _HIGH = 0.1, 0.2
 # It stands for as long as the body would go twice this far at its pace: feet on a treadmill stop
 # for a moment before they strike.
 _BRIEF = 0.4
-# Weights of least squares, beside 1 of a sole that stands: of a change from frame to frame; of a
-# change while no sole stands; and of values about 0 that nothing else determines.
-_EVEN, _FREE, _CENTRE = 0.3, 1e-3, 1e-6
+# Weights of least squares, beside 1 of a sole that stands: of changes from frame to frame; of steps
+# of the body, so that it goes its own way in flight; of steps of a foot that does not stand; and of
+# values about 0 that nothing else determines.
+_EVEN, _FLIGHT, _SWING, _CENTRE = 0.3, 0.03, 1e-3, 1e-6
 # A leg is stretched to this share of its length, or as far as it was.
 _STRETCHED = 0.99
 # A foot is moved by less than this, in sizes of the body.
@@ -114,7 +115,7 @@ def hold_feet(points, legs, stands, steps, heights, lowest, forward, size):
     heights = heights - points[:, soles, 1].T
     there = np.pad(stands, [(0, 0), (1, 1)], mode="edge")
     there = (there[:, 1:] + there[:, :-1]) / 2
-    way, rise = _even(steps, stands, _FREE), _even(heights, there, _CENTRE)
+    way, rise = _even(steps, stands, _FLIGHT), _even(heights, there, _CENTRE)
     points[1:, :, [0, 2]] += np.cumsum(way, axis=0)[:, np.newaxis]
     points[:, :, 1] += rise[:, np.newaxis]
     steps, heights, first = steps - way, heights - rise, 0
@@ -147,7 +148,7 @@ def _even(values, weights, centre):
 
 def _centred(steps, weights):
     """Displacements (n_frames, 2) about 0 with the mean of steps (n_soles, n_frames - 1, 2)."""
-    pull = weights.sum(axis=0) + _FREE
+    pull = weights.sum(axis=0) + _SWING
     force = (weights[..., np.newaxis] * steps).sum(axis=0)
     rest = np.full(len(pull) + 1, _CENTRE)
     return _solve(rest, pull, -np.diff(force, axis=0, prepend=0, append=0))
@@ -174,7 +175,7 @@ def _move_foot(points, leg, moved, forward):
     hip, knee, ankle = (points[:, p] for p in leg[:3])
     thigh, reach = knee - hip, ankle - hip
     upper, lower, far = (np.linalg.norm(x, axis=1) for x in (thigh, ankle - knee, reach))
-    moved = moved * (np.abs(moved).max(axis=1) > _ROUNDING * (upper + lower))[:, np.newaxis]
+    goes = (np.abs(moved).max(axis=1) > _ROUNDING * (upper + lower))[:, np.newaxis]
     target, longest = reach + moved, np.maximum(far, _STRETCHED * (upper + lower))
     across = np.linalg.norm(target[:, [0, 2]], axis=1)
     target[:, [0, 2]] *= np.minimum(1, longest / np.maximum(across, _TINY))[:, np.newaxis]
@@ -183,17 +184,14 @@ def _move_foot(points, leg, moved, forward):
     shortest = np.minimum(far, np.abs(upper - lower) + (1 - _STRETCHED) * (upper + lower))
     new = np.maximum(np.linalg.norm(target, axis=1), np.maximum(shortest, _TINY))
     start, axis = unit_vectors(reach), unit_vectors(target)
-    along = (thigh * start).sum(axis=1)
-    bend = thigh - along[:, np.newaxis] * start
-    # By the law of cosines, as a change: where nothing moves, nothing is rounded.
-    before, after = ((upper**2 - lower**2 + x**2) / (2 * np.maximum(x, _TINY)) for x in (far, new))
-    size = (bend**2).sum(axis=1) + (before - after) * (before + after)
-    along = along + after - before
-    wanted = np.sqrt(np.maximum(size, 0))
+    bend = thigh - (thigh * start).sum(axis=1, keepdims=True) * start
+    along = (upper**2 + new**2 - lower**2) / (2 * new)
+    wanted = np.sqrt(np.maximum(upper**2 - along**2, 0))
     bend = _bent(_turned(bend, start, axis), wanted, axis, forward, _STRAIGHT * upper)
     at = hip + along[:, np.newaxis] * axis + bend
-    points[:, leg.shank] += (at - knee)[:, np.newaxis]
-    points[:, leg.foot] += (hip + new[:, np.newaxis] * axis - ankle)[:, np.newaxis]
+    points[:, leg.shank] += np.where(goes, at - knee, 0)[:, np.newaxis]
+    moved = hip + new[:, np.newaxis] * axis - ankle
+    points[:, leg.foot] += np.where(goes, moved, 0)[:, np.newaxis]
 
 
 def _bent(bend, wanted, axis, forward, least):

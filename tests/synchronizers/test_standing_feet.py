@@ -81,6 +81,14 @@ def test_feet_that_stand_in_all_stand_in_the_blend(weights):
     np.testing.assert_allclose(limbs(found), 0.5, atol=1e-9)
 
 
+def test_a_nearly_straight_knee_comes_back_as_it_is():
+    x = np.repeat(standing(), 60, axis=0)
+    x[:, 3 * PAPER.index_of("left_knee") + 2] += 1e-8
+    X = [x, squat(0.3, 0.2, 0.3)]
+    found = blend_performances(even(2), X, {0: 1}, skeleton=PAPER)
+    np.testing.assert_allclose(found, x, atol=1e-15, rtol=0)
+
+
 @pytest.mark.parametrize("i", [0, 1])
 def test_nothing_moves_at_a_weight_of_one_or_near_it(i):
     X = [squat(0.4, 0.3, 0.2), squat(0.15, 0.0, 0.5, ahead=0.2)]
