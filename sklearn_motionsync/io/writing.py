@@ -112,7 +112,10 @@ def write_motion(
 
 def _read_positions(X, skeleton, path):
     """Joints, parents, positions (n_frames, n_joints, 3), and the vertical axis."""
-    (x,) = check_members([X], finite="allow-nan")
+    # A single frame is no performance, but a pose that a file may hold: it is checked as two.
+    is_pose = isinstance(X, (np.ndarray, pd.DataFrame)) and len(X) == 1
+    (x,) = check_members([np.repeat(X, 2, axis=0) if is_pose else X], finite="allow-nan")
+    x = x[:1] if is_pose else x
     if skeleton is None:
         if not isinstance(X, pd.DataFrame):
             raise ValueError(f"{path}: an array does not name its joints: give a skeleton.")

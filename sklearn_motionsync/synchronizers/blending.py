@@ -115,10 +115,10 @@ def blend_performances(
 
     Links that are neither limbs nor bones, such as from the pelvis to the middle of the hips or to
     a marker, are averaged as vectors along the axes of the body, unless they keep their length in
-    every performance. Joints between two landmarks, such
-    as of the spine, follow the bones from the pelvis. Bones that close a ring with limbs, such as
-    the last one to the head, collar bones, and those from the pelvis to the hips, may change their
-    length. Bodies in a picture (``n_dims=2``) are not rotated.
+    every performance. Joints between two landmarks, such as of the spine, follow the bones from the
+    pelvis. Bones that close a ring with limbs, such as the last one to the head, collar bones, and
+    those from the pelvis to the hips, may change their length. Bodies in a picture (``n_dims=2``)
+    are not rotated.
 
     The heading is interpolated where the hips are within 17 degrees of the vertical. A performance
     that lies on its side from the first to the last frame has no heading, and is blended along the
@@ -130,8 +130,8 @@ def blend_performances(
     Feet that slip in a recording, or go with a treadmill, do so in its blends. Where a foot stands
     in one performance and steps in another of positive weight, it slides. The correction changes
     evenly while feet swing, and moves a foot by less than a quarter of the leg. No sole sinks below
-    its lowest height in the performances. Bodies in a picture, and legs without hip, knee and
-    ankle, are left as they are.
+    the mean of its lowest heights. Bodies in a picture, and legs without hip, knee and ankle, are
+    left as they are.
 
     Examples
     --------

@@ -131,6 +131,16 @@ def test_axes_and_place(tmp_path):
     np.testing.assert_allclose(still["pelvis_y"], df["pelvis_y"], atol=1e-5)
 
 
+@pytest.mark.parametrize("ending", [".bvh", ".trc"])
+def test_a_single_frame_is_a_pose(tmp_path, ending):
+    pose = pd.DataFrame(BENDING.data[0][:1], columns=BENDING.skeleton.column_names)
+    found = written(tmp_path, pose, BENDING.skeleton, frame_rate=30, name=f"pose{ending}")
+    np.testing.assert_allclose(found[list(pose)], pose, atol=0.01)
+    again = written(tmp_path, found, name=f"again{ending}")
+    np.testing.assert_allclose(again, found, atol=1e-5)
+    assert again.columns.equals(found.columns)
+
+
 def test_trc_is_read_back(tmp_path):
     """Gaps stay gaps; times, units and names too."""
     x = pd.DataFrame(BENDING.data[0], columns=BENDING.skeleton.column_names)

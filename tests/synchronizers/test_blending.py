@@ -194,6 +194,20 @@ def test_tilted_hips_and_shoulders_keep_their_width(parents):
         np.testing.assert_allclose((left + right) / 2, found[:, PAPER.index_of(middle)])
 
 
+def test_links_that_keep_their_length_do_in_the_blend():
+    """A pelvis above the hips, of trunks that bend to both sides; the mean of places is nearer."""
+    X = []
+    for degrees in (40, -40):
+        turn = Rotation.from_euler("x", degrees, degrees=True).as_matrix()
+        body = standing(9).reshape(9, -1, 3)
+        body[:, PAPER.index_of("pelvis")] += turn @ [0, 0.1, 0]
+        X.append(body.reshape(9, -1))
+    found = blend_performances(even(*X), X, [0.5, 0.5], skeleton=PAPER).reshape(9, -1, 3)
+    hips = [found[:, PAPER.index_of(f"{side}_hip")] for side in ("left", "right")]
+    apart = found[:, PAPER.index_of("pelvis")] - np.mean(hips, axis=0)
+    np.testing.assert_allclose(np.linalg.norm(apart, axis=1), 0.1)
+
+
 def test_lengths_of_chooses_the_limbs_of_one_performance():
     X = [walker(60), walker(80, size=1.3, seed=1)]
     found = blend_performances(even(*X), X, [1, 0], skeleton=PAPER, lengths_of=1)
