@@ -142,7 +142,10 @@ class Fold:
         self._learn_peers()
         self.peers["known phase + Matern"] = [self._about_the_path(warped)] * 2
         paces = np.log([(P - 1) / (len(x) - 1) for x in self.train])
-        self.particles = trackers.PostureParticles(warped, self.train, paces, NOISE)
+        self.particles, self.pruned = (
+            trackers.PostureParticles(warped, self.train, paces, NOISE, prunes=prunes)
+            for prunes in (False, True)
+        )
 
     def _learn_peers(self):
         people = [
@@ -177,3 +180,4 @@ class Fold:
             yield name, [e.means for e in found], [np.sqrt(e.variances) for e in found]
             yield name + SMOOTHER, [e.smoothed for e in smoothed], None
         yield "particles over postures", self.particles.run(seen, rng), None
+        yield "the same, pruned", self.pruned.run(seen, rng), None

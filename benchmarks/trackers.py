@@ -42,9 +42,15 @@ class Estimates(NamedTuple):
     smoothed: np.ndarray | None
 
 
-def kalman(model, y, noise, smooth=False):
-    """Filter a take ``y`` (n_frames, d), NaN where hidden; smooth it by the pass of Rauch."""
-    F, d = model.transition, y.shape[1]
+def kalman(model, y, noise, smooth=False, shows=None):
+    """Filter a take ``y`` (n_frames, d), NaN where hidden; smooth it by the pass of Rauch.
+
+    ``noise`` is a standard deviation or a covariance; ``shows`` are rows of a matrix by which a
+    posture is seen, if it is not seen as it is.
+    """
+    F, n = model.transition, y.shape[1]
+    shows = np.eye(n) if shows is None else shows
+    d, R = shows.shape[1], noise if np.ndim(noise) else noise**2 * np.eye(n)
     before, after = [], []
     x, P = model.start, model.spread
     for t, row in enumerate(y):
@@ -52,8 +58,11 @@ def kalman(model, y, noise, smooth=False):
             x, P = F @ x, F @ (F @ P).T + model.drive
         before.append((x, P))
         seen = np.flatnonzero(~np.isnan(row))
-        gain = _gain(P, seen, noise)
-        x, P = x + (row[seen] - x[seen]) @ gain, _symmetric(P - P[:, seen] @ gain)
+        if len(seen):
+            rows = shows[seen]
+            across = P[:, :d] @ rows.T
+            gain = _solved(rows @ across[:d] + R[np.ix_(seen, seen)], across.T)
+            x, P = x + (row[seen] - rows @ x[:d]) @ gain, _symmetric(P - across @ gain)
         after.append((x, P))
     means = np.stack([x[:d] for x, _ in after])
     variances = np.stack([np.diag(P)[:d] for _, P in after])
@@ -114,11 +123,13 @@ class Peer(NamedTuple):
     mean: np.ndarray
     model: Linear
 
-    def run(self, takes, noise, paths=None, smooth=True):
+    def run(self, takes, noise, paths=None, smooth=True, shows=None):
         """Estimates of takes; ``paths``: a mean of its own at every frame of each."""
-        about = paths or [np.broadcast_to(self.mean, x.shape) for x in takes]
-        pairs = zip(takes, about, strict=True)
-        found = [(m, kalman(self.model, x - m, noise, smooth)) for x, m in pairs]
+        about = paths or [np.broadcast_to(self.mean, (len(x), len(self.mean))) for x in takes]
+        found = []
+        for x, m in zip(takes, about, strict=True):
+            off = x - (m if shows is None else m @ shows.T)
+            found.append((m, kalman(self.model, off, noise, smooth, shows)))
         return [
             Estimates(m + e.means, e.variances, m + e.smoothed if smooth else None)
             for m, e in found
@@ -224,10 +235,12 @@ class PostureParticles:
     Phase goes on at a rate that does a random walk; the posture, a point of the space of 95 % of
     the variance, deviates from the mean at its phase by an autoregression with the variance that
     people show there, three standard deviations at most; weights are likelihoods of what is seen.
+    With ``prunes`` the posture goes on by the step of the mean and by chance, and a hypothesis that
+    leaves the envelope is rejected, as the paper proposes it.
     """
 
-    def __init__(self, warped, takes, paces, noise, n_particles=500):
-        self.noise, self.n = noise, n_particles
+    def __init__(self, warped, takes, paces, noise, n_particles=500, prunes=False):
+        self.noise, self.n, self.prunes = noise, n_particles, prunes
         self.centre, C = moments_of(takes)
         values, axes = np.linalg.eigh(C)
         values, axes = values[::-1], axes[:, ::-1]
@@ -257,6 +270,8 @@ class PostureParticles:
                 state = self._go_on(*state, rng)
             x = state[0]
             log_weights = log_weights + self._log_likelihood(x, y[:, t])
+            if self.prunes:
+                log_weights = self._pruned(log_weights, *state[:3])
             weights = np.exp(log_weights - log_weights.max(axis=1, keepdims=True))
             weights /= weights.sum(axis=1, keepdims=True)
             out.append((weights[..., None] * x).sum(axis=1) @ self.axes + self.centre)
@@ -281,8 +296,17 @@ class PostureParticles:
         phases = np.minimum(phases + np.exp(log_rates), len(self.mean) - 1)
         at = np.rint(phases).astype(int)
         std, fresh = self.std[at], np.sqrt(1 - self.kept**2) * rng.standard_normal(x.shape)
+        if self.prunes:
+            return self.mean[at] + x - about + std * fresh, self.mean[at], phases, log_rates
         deviations = np.clip(self.kept * (x - about) + std * fresh, -3 * std, 3 * std)
         return self.mean[at] + deviations, self.mean[at], phases, log_rates
+
+    def _pruned(self, log_weights, x, about, phases):
+        """None of a take's hypotheses is left outside of the envelope, if there are others."""
+        std = self.std[np.rint(phases).astype(int)]
+        inside = (np.abs(x - about) <= 3 * std).all(axis=2)
+        inside |= ~inside.any(axis=1, keepdims=True)
+        return np.where(inside, log_weights, -np.inf)
 
     def _log_likelihood(self, x, y):
         """|y - x axes|^2 of what is seen, in units of noise and what the space leaves out."""

@@ -14,6 +14,7 @@
 
 from . import datasets, display, io, metrics
 from .body.direction_cosines import DirectionCosines
+from .body.joint_noise import JointNoise
 from .body.joint_positions import JointPositions
 from .body.mirror import mirror
 from .body.skeleton import Skeleton
@@ -26,7 +27,7 @@ from .inputs.long_tables import to_frame, to_sequences
 from .model.action_model import ActionModel
 from .model.departures import find_departures
 from .model.detector import ActionDetector
-from .online.particle_filter import Track
+from .online.members import Track
 from .online.stream import LivePhase
 from .online.synchronizer import OnlineSynchronizer
 from .online.tracker import MotionTracker
@@ -58,6 +59,7 @@ __all__ = [
     "DirectionCosines",
     "FrameWise",
     "GroupComparison",
+    "JointNoise",
     "JointPositions",
     "KeyframeSynchronizer",
     "Lags",

@@ -20,7 +20,7 @@ from ..inputs.types import (
     ValuesLike,
 )
 from ..inputs.wording import counted
-from ..online.particle_filter import Track
+from ..online.members import Track
 from ..online.tracker import MotionTracker
 from .arguments import (
     TIME_LABELS,

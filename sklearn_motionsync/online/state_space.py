@@ -1,33 +1,30 @@
-"""The state-space model of a tracker: deviations from the mean, the rate, and the Kalman update."""
+"""The state-space model of a tracker: the mean, deviations from it, the rate, and limits."""
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dtrtri
 
 from ..utils.groups import mean_of_others
+from .kalman import DeviationFilter, squared_norms, whitening
 
 __all__ = [
     "CausalSlopes",
     "Clock",
-    "KalmanUpdate",
     "MaternProcess",
     "RateProcess",
     "TrackerModel",
     "exponential_average",
-    "kalman_update",
-    "squared_norms",
-    "whitening",
 ]
 
 # Window of causal velocities, as a share of the mean duration: that of the synchronizers' filter.
 _WINDOW = 0.03
 # Time constant of the averages of the NIS, in windows.
 _MEMORY = 3.0
-# The limit of the NIS is so many times farther from 1 than the largest of the training set.
-_EXCESS = 2.0
-# And at least so many standard deviations of the average of a NIS.
-_CHANCE = 4.0
+# The limits of the NIS of velocities and postures are so many times farther from 1 than the largest
+# of the training set.
+_EXCESS = 4.0, 2.0
+# And that of velocities at least so many standard deviations of the average of a NIS.
+_CHANCE = 8.0
 # The limit of the NIS of postures is at least three standard deviations squared.
 _MIN_POSTURE_LIMIT = 9.0
 # The gate of single observations: a NIS, or so many times the largest of the training set.
@@ -44,6 +41,10 @@ class TrackerModel(NamedTuple):
     mean : ndarray, shape (P, n_features)
     process : MaternProcess
         Of deviations from the mean.
+    pooled_mean : ndarray, shape (n_features,)
+        Of all phases.
+    pooled : MaternProcess
+        Of deviations from that, whatever the phase.
     rates : RateProcess
     clock : Clock
     velocities : ndarray, shape (n_features, n_features)
@@ -53,18 +54,22 @@ class TrackerModel(NamedTuple):
         which the phase is lost; 1 is expected.
     gate : float
         The NIS of a single frame beyond which it is ignored.
-    noise, tempering : float
+    noise : ndarray, shape (n_features, n_features)
+        Covariance of the noise of a whole observed posture.
+    tempering : float
     n_particles : int
     """
 
     mean: np.ndarray
     process: "MaternProcess"
+    pooled_mean: np.ndarray
+    pooled: "MaternProcess"
     rates: "RateProcess"
     clock: "Clock"
     velocities: np.ndarray
     nis_limits: np.ndarray
     gate: float
-    noise: float
+    noise: np.ndarray
     tempering: float
     n_particles: int
 
@@ -81,25 +86,41 @@ class TrackerModel(NamedTuple):
         groups : ndarray of int, shape (n,)
             At least two groups, counted from 0.
         clock : Clock
-        noise, tempering, n_particles :
+        noise : ndarray, shape (n_features, n_features)
+        tempering, n_particles :
             As of the tracker.
         """
         deviations, step = warped - mean_of_others(warped, groups), 1 / clock.speed
-        process, rates = MaternProcess.learn(deviations, step), RateProcess.learn(rates, step)
+        process = MaternProcess.learn(deviations, _SHRINKAGE, step)
+        pooled_mean = warped.mean(axis=(0, 1))
+        pooled = MaternProcess.learn(warped - pooled_mean, _POOLED_SHRINKAGE, step)
+        rates = RateProcess.learn(rates, step)
         slopes, unit_noise = _causal_slopes(deviations, step, clock.window)
-        velocities = shrunk_covariance(slopes)
-        by_velocity = _largest_nis(slopes, unit_noise * noise**2, velocities, step, clock.memory)
-        noises = np.full(deviations.shape[1], noise**2)
-        by_posture = _largest_nis(deviations, noises, process.covariance, step, clock.memory)
+        velocities = _shrunk(_moments(slopes), _SHRINKAGE)
+        by_velocity = _largest_nis(slopes, unit_noise, noise, velocities, step, clock.memory)
+        once = np.ones(deviations.shape[1])
+        by_posture = _largest_nis(deviations, once, noise, process.covariance, step, clock.memory)
         # Velocities of different windows are independent.
         chance = _CHANCE * np.sqrt(2 / (warped.shape[2] * _MEMORY))
         excess = (
-            max(_EXCESS * (by_velocity - 1), chance),
-            max(_EXCESS * (by_posture - 1), _MIN_POSTURE_LIMIT - 1),
+            max(_EXCESS[0] * (by_velocity - 1), chance),
+            max(_EXCESS[1] * (by_posture - 1), _MIN_POSTURE_LIMIT - 1),
         )
         gate = max(_MIN_GATE, _GATE_FACTOR * _largest_innovation(deviations, process, step, noise))
-        learnt = warped.mean(axis=0), process, rates, clock, velocities, 1 + np.array(excess), gate
-        return cls(*learnt, noise, tempering, n_particles)
+        return cls(
+            warped.mean(axis=0),
+            process,
+            pooled_mean,
+            pooled,
+            rates,
+            clock,
+            velocities,
+            1 + np.array(excess),
+            gate,
+            noise,
+            tempering,
+            n_particles,
+        )
 
 
 class Clock(NamedTuple):
@@ -138,8 +159,11 @@ class Clock(NamedTuple):
 
 # -- processes: deviations from the mean, and rates --------------------------------------
 
-# Weight of the diagonal in a shrunk covariance.
-_SHRINKAGE = 0.5
+# Weights of the diagonal in the covariance of deviations from the mean, and from that of all
+# phases, of which more frames differ.
+_SHRINKAGE, _POOLED_SHRINKAGE = 0.5, 0.15
+# The longest length scale, as a share of the mean duration.
+_LONGEST = 0.4
 # Smallest variance of a feature, as a share of the largest: that of constant features.
 _MIN_VARIANCE = 1e-9
 # Where the Matern-3/2 correlation (1 + x) exp(-x) is a half.
@@ -166,12 +190,16 @@ class MaternProcess(NamedTuple):
     decay: float
 
     @classmethod
-    def learn(cls, deviations, step):
-        """Learn from deviations (n, P, n_features), whose frames are a step apart."""
-        covariance = shrunk_covariance(deviations)
+    def learn(cls, deviations, shrinkage, step):
+        """Learn from deviations (n, P, n_features), whose frames are a step apart.
+
+        The shrinkage is the weight of the diagonal of the covariance.
+        """
+        covariance = _shrunk(_moments(deviations), shrinkage)
         # Each feature is scaled by its standard deviation, so that units do not matter.
         lag = _correlation_lag(deviations / np.sqrt(np.diag(covariance)), 0.5)
-        return cls(covariance, _HALF / (lag * step))
+        longest = _LONGEST * _HALF / np.sqrt(3) * deviations.shape[1]
+        return cls(covariance, _HALF / (min(lag, longest) * step))
 
     @property
     def stationary(self):
@@ -228,15 +256,19 @@ class RateProcess(NamedTuple):
         return kept * log_rates, self.spread * np.sqrt(1 - kept**2)
 
 
-def shrunk_covariance(deviations):
-    """Second moments of deviations about 0, shrunk half-way to their diagonal."""
+def _moments(deviations):
+    """Second moments of deviations (..., n_features) about 0."""
     flat = deviations.reshape(-1, deviations.shape[-1])
-    moments = flat.T @ flat / len(flat)
-    variances = np.diag(moments).copy()
+    return flat.T @ flat / len(flat)
+
+
+def _shrunk(moments, shrinkage):
+    """A covariance shrunk towards its diagonal, whose variances are not 0."""
+    variances = np.diag(moments)
     largest = variances.max() if variances.max() > 0 else 1.0
-    moments *= 1 - _SHRINKAGE
-    np.fill_diagonal(moments, np.maximum(variances, _MIN_VARIANCE * largest))
-    return moments
+    shrunk = (1 - shrinkage) * moments
+    np.fill_diagonal(shrunk, np.maximum(variances, _MIN_VARIANCE * largest))
+    return shrunk
 
 
 def _correlation_lag(series, level):
@@ -269,13 +301,17 @@ def _causal_slopes(deviations, step, window):
     return np.stack(values, axis=1), np.array([a[0] for a in noise])
 
 
-def _largest_nis(departures, noise, covariance, step, memory):
-    """The largest average NIS of takes (n, n_frames, n_features) at their own phase, at least 1."""
+def _largest_nis(departures, shares, noise, covariance, step, memory):
+    """The largest average NIS of takes (n, n_frames, n_features) at their own phase, at least 1.
+
+    ``shares`` (n_frames,) of the covariance of the noise are theirs at each frame.
+    """
     nis, largest, width = 1.0, 1.0, departures.shape[-1]
-    for p, variance in enumerate(noise):
-        whiten = whitening(covariance + variance * np.eye(width))
+    for p, share in enumerate(shares):
+        whiten = whitening(covariance + share * noise)
         # The expected effect of the noise: a fit draws no samples.
-        now = squared_norms(departures[:, p] @ whiten.T) + variance * np.square(whiten).sum()
+        now = squared_norms(departures[:, p] @ whiten.T)
+        now += share * np.einsum("ij,jk,ik->", whiten, noise, whiten, optimize=True)
         nis = exponential_average(nis, now / width, step, memory)
         largest = np.maximum(largest, nis)
     return float(np.max(largest))
@@ -284,13 +320,11 @@ def _largest_nis(departures, noise, covariance, step, memory):
 def _largest_innovation(deviations, process, step, noise):
     """The largest NIS of a frame, of a Kalman filter of each take at its own phase."""
     n, n_frames, width = deviations.shape
-    means, covariance, largest = np.zeros((2, n, width)), process.stationary, 0.0
+    running, rows, largest = DeviationFilter(process, n), np.eye(width), 0.0
     for p in range(n_frames):
         if p:
-            means, covariance = process.predict(means, covariance, step)
-        innovations = deviations[:, p] - means[0]
-        covariance, update = kalman_update(covariance, np.eye(width), innovations, noise)
-        means = means + update.corrections
+            running.predict(step)
+        update = running.correct(deviations[:, p], rows, noise)
         largest = max(largest, float(update.nis.max()))
     return largest
 
@@ -299,83 +333,6 @@ def exponential_average(before, now, dt, memory):
     """An exponential moving average after a time, by the one before and a new value."""
     left = np.exp(-dt / memory)
     return left * before + (1 - left) * now
-
-
-# -- the Kalman update of many hypotheses that share one covariance, and so one gain ------
-
-# The innovation covariance is larger by this share, so that rounding leaves the updated covariance
-# positive, however small the noise.
-_MARGIN = 1e-13
-
-
-class KalmanUpdate(NamedTuple):
-    """The update of states by an observation; ``W' W = S^-1`` for the innovation covariance S.
-
-    Parameters
-    ----------
-    whitened : ndarray, shape (n, n_seen)
-        Whitened innovations ``W v`` of each hypothesis.
-    gain_rows : ndarray, shape (n_seen, 2 n_features)
-        ``gain_rows' W v = K v``, with the Kalman gain ``K``.
-    obs_rows : ndarray, shape (n_seen, n_features)
-        ``W H``, the whitened observation matrix.
-    """
-
-    whitened: np.ndarray
-    gain_rows: np.ndarray
-    obs_rows: np.ndarray
-
-    @property
-    def nis(self):
-        """Normalised innovation squared per observed number: (n,)."""
-        return squared_norms(self.whitened) / self.whitened.shape[1]
-
-    @property
-    def corrections(self):
-        """``K v``: (2, n, n_features)."""
-        n_seen, n_features = self.obs_rows.shape
-        return self.whitened @ self.gain_rows.reshape(n_seen, 2, n_features).swapaxes(0, 1)
-
-
-def kalman_update(covariance, matrix, innovations, noise):
-    """The Kalman update.
-
-    Parameters
-    ----------
-    covariance : ndarray, shape (2 n_features, 2 n_features)
-        Of the values, then derivatives, before the observation.
-    matrix : ndarray, shape (n_seen, n_features)
-        ``H``, without rows of missing numbers.
-    innovations : ndarray, shape (n, n_seen)
-        ``v`` of every hypothesis.
-    noise : float
-        Standard deviation of the observation.
-
-    Returns
-    -------
-    covariance : ndarray, shape (2 n_features, 2 n_features)
-        After it: symmetric.
-    KalmanUpdate
-    """
-    n_seen, n_features = matrix.shape
-    cross_covariance = covariance[:, :n_features] @ matrix.T
-    innovation_covariance = matrix @ cross_covariance[:n_features]
-    diagonal = np.diag_indices(n_seen)
-    innovation_covariance[diagonal] = (innovation_covariance[diagonal] + noise**2) * (1 + _MARGIN)
-    whiten = whitening(innovation_covariance)
-    gain_rows = whiten @ cross_covariance.T
-    update = KalmanUpdate(innovations @ whiten.T, gain_rows, whiten @ matrix)
-    return covariance - gain_rows.T @ gain_rows, update
-
-
-def whitening(covariance):
-    """The inverse of the Cholesky factor of a covariance."""
-    return dtrtri(np.linalg.cholesky(covariance), lower=1)[0]
-
-
-def squared_norms(vectors):
-    """Of vectors (n, n_dims): (n,)."""
-    return np.einsum("ij,ij->i", vectors, vectors)
 
 
 # -- causal velocities: slopes of weighted regression lines ------------------------------

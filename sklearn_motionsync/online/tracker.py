@@ -1,4 +1,4 @@
-"""MotionTracker: a body that is partly hidden, by a state-space model of its action."""
+"""MotionTracker: a body that is partly hidden, by state-space models of its action."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import HasMethods, Interval
 from sklearn.utils.validation import check_is_fitted
 
+from ..body.joint_noise import JointNoise
 from ..inputs.collections import as_collection
 from ..inputs.facts import TIMELESS, check_facts, facts_of
-from ..inputs.numbers import LARGEST, as_numbers, check_finite, check_magnitude
+from ..inputs.numbers import LARGEST, as_numbers
 from ..inputs.recorded import warn_of_rows
 from ..inputs.tables import as_pandas, labels_of, name_performance
 from ..inputs.types import Indexed, Labels, NumbersLike, PerformancesLike, RandomState, ValuesLike
@@ -26,7 +27,8 @@ from ..utils.groups import encode_groups
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
 from ..utils.threads import on_one_thread
-from .particle_filter import ParticleFilter, Track, filter_take, smooth_take, stack_frames
+from .members import RunningTake, Track, filter_take, smooth_take, stack_frames
+from .observations import Observer, check_projection
 from .state_space import Clock, TrackerModel
 from .stream import check_observations, check_times, times_of_each
 
@@ -51,9 +53,13 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
        path of the particle. The style of a person persists, so frames are not independent:
        log-likelihoods of postures are not used, and those of velocities are divided by
        ``tempering``.
-    5. If the average normalised innovation squared (NIS) of velocities, or of postures, exceeds
-       its limit, the phase is lost: particles are spread over the whole clock, until they agree
-       with the observations. At the end of a movement restart times are exponential.
+    5. A second Kalman filter knows no phase: deviations are those from the mean of all frames. Both
+       estimates are multiplied as densities, each to the power of its weight. The weights are 3 to
+       1, divided by the mean variance of each estimate. The covariance of either is larger by its
+       evidence, the average normalised innovation squared (NIS), where that is above 1.
+    6. If the average NIS of velocities, or of postures about the mean, exceeds its limit, the phase
+       is lost: particles are spread over the whole clock, until they agree with the observations.
+       At the end of a movement restart times are exponential.
 
     Parameters
     ----------
@@ -62,9 +68,11 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         `DenseSynchronizer()`.
     n_particles : int, default=500
         Particles of phase and rate.
-    noise : float, default=0.05
+    noise : float or JointNoise, default=0.05
         Standard deviation of observations, in the unit of the features, up to 1e9; the default is
-        one of direction cosines.
+        one of direction cosines. ``JointNoise(0.02, cosines)`` is that of joint positions, 2 cm
+        for metres, which shows more in short limbs; with a ``projection`` it is 0.02 for each
+        number.
     tempering : float, default=10.0
         Divides the log-likelihood of the velocities of every hundredth of the mean duration.
     frame_rate : float, default=None
@@ -94,7 +102,8 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
     rate_memory_ : float
         Frames of the training performances after which its correlation is 1/e.
     surprise_limit_ : float
-        Limit of the NIS of velocities, averaged over 9 % of the mean duration; 1 is expected.
+        Limit of the NIS of velocities, averaged over 9 % of the mean duration; 1 is expected. It is
+        four times as far from 1 as the largest of the training performances.
     departure_limit_ : float
         Limit of the NIS of postures about the mean: at least 9, three standard deviations.
     n_features_in_ : int
@@ -105,6 +114,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
     See Also
     --------
     DirectionCosines : Makes postures of joint positions, which all people share.
+    JointNoise : Noise of joint positions, as it shows in them.
     DenseSynchronizer : Puts the training performances on one clock.
 
     Notes
@@ -116,8 +126,9 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
     at the end, or have restarted.
 
     Standing still in a posture of the action, or doing it backwards, is not called lost: the
-    postures are possible, and the velocities not improbable enough. Of few people the limit of
-    velocities is tight.
+    postures are possible, and the velocities not improbable enough. The take of another action is
+    tracked by the filter that knows no phase, and not well: its postures are drawn to those of this
+    action.
 
     Examples
     --------
@@ -150,7 +161,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
     _parameter_constraints: dict = {
         "synchronizer": [HasMethods(["fit", "match"]), None],
         "n_particles": [Interval(Integral, 1, None, closed="left")],
-        "noise": [Interval(Real, 0, LARGEST, closed="right")],
+        "noise": [Interval(Real, 0, LARGEST, closed="right"), JointNoise],
         "tempering": [Interval(Real, 0, None, closed="neither")],
         "frame_rate": [Interval(Real, 0, None, closed="neither"), None],
         "random_state": ["random_state"],
@@ -160,7 +171,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         self,
         synchronizer: BaseEstimator | None = None,
         n_particles: int = 500,
-        noise: float = 0.05,
+        noise: float | JointNoise = 0.05,
         tempering: float = 10.0,
         frame_rate: float | None = None,
         random_state: RandomState = 0,
@@ -216,8 +227,10 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
             self.n_frames_, self.duration_ = int(sync.n_frames_), float(durations.mean())
             clock = Clock(self.n_frames_ - 1.0, self.duration_)
             rates = clock.duration / durations[:, np.newaxis] / match.rates
-            settings = self.noise, self.tempering, self.n_particles
-            given = warped.astype(np.float64), rates, codes, clock
+            warped = warped.astype(np.float64)
+            noise = self._noise_of(warped.mean(axis=0))
+            settings = noise, self.tempering, self.n_particles
+            given = warped, rates, codes, clock
             learnt = progress.stage("learning how people vary", 1)
             self._model = on_one_thread(TrackerModel.learn, *given, *settings)
             learnt()
@@ -274,7 +287,8 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
 
         20 paths of phases are drawn by forward filtering and backward simulation, and a
         Rauch-Tung-Striebel smoother in the form of Bryson and Frazier estimates the deviations
-        along each. It needs about 0.04 MB a frame of 37 features.
+        along each, and those of the filter that knows no phase. It needs about 0.06 MB a frame of
+        37 features.
 
         Parameters
         ----------
@@ -332,14 +346,14 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         """
         check_is_fitted(self)
         names = names_of_input(self) if projection is None else None
-        matrix, offset = check_projection(projection, self._model.mean.shape[1])
+        observer, offset = self._observer(projection)
         what = "The observation"
-        values = check_observations(observation, what, names, len(matrix))
+        values = check_observations(observation, what, names, len(offset))
         last = None if self._running is None else self._running.time
         time = float(check_times(time, 1, self.frame_rate, what, last)[0])
         if self._running is None:
-            self._running = ParticleFilter(self._model, self._seed, time, len(matrix))
-        frame = on_one_thread(self._running.step, values - offset, time, matrix)
+            self._running = RunningTake(self._model, self._seed, time, len(offset))
+        frame = on_one_thread(self._running.step, values - offset, time, observer)
         return Track(*(part[0] for part in stack_frames([frame], self.mean_.dtype)))
 
     def __sklearn_tags__(self):
@@ -347,10 +361,25 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         tags.input_tags.three_d_array = True
         return tags
 
+    def _noise_of(self, mean):
+        """The covariance of the noise of a whole posture of the mean performance."""
+        if isinstance(self.noise, JointNoise):
+            return self.noise.covariance(mean)
+        return self.noise**2 * np.eye(mean.shape[1])
+
+    def _observer(self, projection):
+        """The `Observer` of a projection, and the offset of what it observes."""
+        model = self._model
+        matrix, offset = check_projection(projection, model.mean.shape[1])
+        if projection is None:
+            return Observer(matrix, model.noise), offset
+        deviation = self.noise.sd if isinstance(self.noise, JointNoise) else self.noise
+        return Observer(matrix, deviation**2 * np.eye(len(matrix))), offset
+
     def _estimate(self, method, X, times, projection):
         check_is_fitted(self)
         names = names_of_input(self) if projection is None else None
-        matrix, offset = check_projection(projection, self._model.mean.shape[1])
+        observer, offset = self._observer(projection)
         sequences = as_collection(X)
         single = sequences is None and not self._fitted_on_rows
         if sequences is None:
@@ -373,46 +402,10 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         times = [times] if single else times_of_each(times, len(sequences))
         tracks = []
         for what, x, t in zip(labels, sequences, times, strict=True):
-            values = check_observations(x, what, names, len(matrix), (2,))
+            values = check_observations(x, what, names, len(offset), (2,))
             t = check_times(t, len(values), self.frame_rate, what)
             # The matrices are small: several threads would wait for each other.
-            take = values - offset, t, matrix
+            take = values - offset, t, observer
             frames = on_one_thread(method, self._model, self._seed, *take)
             tracks.append(stack_frames(frames, self.mean_.dtype))
         return tracks[0] if single else tracks
-
-
-def check_projection(projection, n_features):
-    """The observation matrix (n_observed, n_features) and its offset (n_observed,), checked.
-
-    Parameters
-    ----------
-    projection : array-like, pair of two of them, or None
-        A matrix; or it and the offset; None is the identity.
-    n_features : int
-
-    Returns
-    -------
-    matrix, offset : ndarray
-
-    Raises
-    ------
-    ValueError
-        If the matrix is not of this width, or anything is not finite or above 1e9, or there is not
-        one offset for each of its rows.
-    """
-    if projection is None:
-        return np.eye(n_features), np.zeros(n_features)
-    pair = projection if isinstance(projection, tuple) else (projection,)
-    pair = [as_numbers(part, "The projection", dtype=np.float64) for part in pair]
-    shapes, n = [part.shape for part in pair], len(np.atleast_1d(pair[0]))
-    if n == 0 or shapes not in ([(n, n_features)], [(n, n_features), (n,)]):
-        raise ValueError(
-            f"projection must be a matrix (n_observed, {n_features}), or the pair (matrix, offset) "
-            f"with an offset (n_observed,); got the shapes {shapes}."
-        )
-    matrix, offset = pair if len(pair) == 2 else (pair[0], np.zeros(n))
-    both = np.column_stack([matrix, offset])
-    check_finite(both, "The projection, row")
-    check_magnitude(float(np.abs(both).max()), "The projection", training=False)
-    return matrix, offset

@@ -1,10 +1,16 @@
 """The tracker's filter and smoother against formulas of Gaussian processes, and their parts."""
 
+from copy import deepcopy
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 from sklearn_motionsync import LinearSynchronizer, MotionTracker
+from sklearn_motionsync.online import members
+from sklearn_motionsync.online.members import RunningTake, pool
+from sklearn_motionsync.online.observations import Observer
 from sklearn_motionsync.online.particle_filter import (
     ParticleFilter,
     Particles,
@@ -20,16 +26,34 @@ from sklearn_motionsync.online.state_space import (
 )
 
 
+def noise_of(deviation, n=3):
+    return deviation**2 * np.eye(n)
+
+
 def make_training(n, seed=0):
     rng = np.random.default_rng(seed)
     t = np.linspace(0, 1, 25)[:, np.newaxis]
     return [np.sin(4 * t + rng.uniform(0, 1, 3)) * rng.uniform(0.7, 1.3, 3) for _ in range(n)]
 
 
+@pytest.fixture(autouse=True)
+def phases_alone(monkeypatch):
+    """What the member tells that knows phases."""
+    monkeypatch.setattr(members, "pool", lambda estimates, evidence, model: estimates[0])
+
+
 @pytest.fixture(scope="module")
 def fitted():
     """With one particle, whose phases are those of the track."""
     return MotionTracker(LinearSynchronizer(), 1, noise=0.1, random_state=1).fit(make_training(6))
+
+
+@pytest.fixture(scope="module")
+def model(fitted):
+    """What it has learnt, of one particle."""
+    warped, clock = np.stack(fitted.synchronizer_.transform(make_training(6))), Clock(24.0, 24.0)
+    assert (fitted.n_frames_, fitted.duration_) == (25, 24)
+    return TrackerModel.learn(warped, np.ones((6, 25)), np.arange(6), clock, noise_of(0.1), 10.0, 1)
 
 
 def sample_body(tracker, times, rng):
@@ -93,6 +117,35 @@ def test_postures_equal_gaussian_process_posterior(fitted, seen, method, project
         upto = i if method == "track" else len(times) - 1
         given = fitted, track.phases, values, times, matrix, offset
         mean, covariance = posterior(*given, i, upto)
+        np.testing.assert_allclose(track.postures[i], mean, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(track.covariances[i], covariance, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("projection", [None, PROJECTION])
+@pytest.mark.parametrize("method", ["track", "smooth"])
+def test_pooled_member_equals_gaussian_process_posterior(
+    fitted, model, seen, method, projection, monkeypatch
+):
+    """About the mean of all frames, whatever the phase."""
+    monkeypatch.setattr(members, "pool", lambda estimates, evidence, model: estimates[1])
+    warped = fitted.synchronizer_.transform(make_training(6))
+    off = (warped - warped.mean(axis=(0, 1))).reshape(-1, 3)
+    pooled, moments = model.pooled, off.T @ off / len(off)
+    expected = 0.85 * moments + 0.15 * np.diag(np.diag(moments))
+    np.testing.assert_allclose(pooled.covariance, expected, rtol=1e-9)
+    level = SimpleNamespace(
+        mean_=np.tile(fitted.mean_.mean(axis=0), (25, 1)),
+        length_scale_=np.sqrt(3) / pooled.decay,
+        covariance_=pooled.covariance,
+        noise=fitted.noise,
+    )
+    values, times = seen
+    matrix, offset = (np.eye(3), np.zeros(3)) if projection is None else projection
+    values = with_gaps(values @ matrix.T + offset)
+    track = getattr(fitted, method)(values, times=times, projection=projection)
+    for i in range(len(times)):
+        upto = i if method == "track" else len(times) - 1
+        mean, covariance = posterior(level, 0 * times, values, times, matrix, offset, i, upto)
         np.testing.assert_allclose(track.postures[i], mean, rtol=0, atol=1e-9)
         np.testing.assert_allclose(track.covariances[i], covariance, rtol=0, atol=1e-9)
 
@@ -218,8 +271,8 @@ def test_limits_of_the_nis_equal_their_definition(outlier, duration):
     warped, noise, width = np.stack(make_training(6)), 0.05, 3
     if outlier:
         warped[2, 10:16] += [5, 0, -5]
-    clock, step = Clock(24.0, duration), duration / 24
-    model = TrackerModel.learn(warped, np.ones((6, 25)), np.arange(6), clock, noise, 10.0, 50)
+    clock, step, R = Clock(24.0, duration), duration / 24, noise_of(noise)
+    model = TrackerModel.learn(warped, np.ones((6, 25)), np.arange(6), clock, R, 10.0, 50)
     deviations = (warped - warped.mean(axis=0)) * 6 / 5
     window, times = max(0.03 * duration, 1.0), step * np.arange(25)
     slopes, noises = np.empty((6, 24, width)), []
@@ -242,7 +295,7 @@ def test_limits_of_the_nis_equal_their_definition(outlier, duration):
             most = max(most, nis.max())
         return most
 
-    velocity = max(2 * (largest(slopes, noises) - 1), 4 * np.sqrt(2 / (3 * width)))
+    velocity = max(4 * (largest(slopes, noises) - 1), 8 * np.sqrt(2 / (3 * width)))
     posture = max(2 * (largest(deviations, [noise**2] * 25) - 1), 8.0)
     np.testing.assert_allclose(model.nis_limits, [1 + velocity, 1 + posture], rtol=1e-9)
     np.testing.assert_allclose(model.velocities, shrunk(slopes), rtol=1e-9)
@@ -269,24 +322,66 @@ def test_estimates_are_those_of_the_weighted_particles():
         np.exp(0.2 * np.random.default_rng(1).standard_normal((6, 25))),
     )
     given = np.stack(make_training(6)), rates, np.arange(6), clock
-    model = TrackerModel.learn(*given, 0.1, 1.0, 60)
-    running, mean = ParticleFilter(model, 3, 0.0, 3), given[0].mean(axis=0)
+    model = TrackerModel.learn(*given, noise_of(0.1), 1.0, 60)
+    running, mean = RunningTake(model, 3, 0.0, 3), given[0].mean(axis=0)
     for p in range(25):
-        track = running.step(given[0][2, p], float(p), np.eye(3))
-        particles = running.particles
+        track = running.step(given[0][2, p], float(p), Observer(np.eye(3), noise_of(0.1)))
+        particles, deviations = running.phases.particles, running.phases.deviations
         weights = np.exp(particles.log_weights)
         assert weights.sum() == pytest.approx(1)
         postures = np.column_stack([np.interp(particles.phases, np.arange(25), m) for m in mean.T])
-        postures += running.means[0]
+        postures += deviations.means[0]
         np.testing.assert_allclose(track.postures, weights @ postures)
         between = np.cov(postures.T, aweights=weights, ddof=0)
-        np.testing.assert_allclose(track.covariances, running.covariance[:3, :3] + between)
+        np.testing.assert_allclose(track.covariances, deviations.covariance[:3, :3] + between)
         assert track.effective_sizes == pytest.approx(1 / np.square(weights).sum())
         paces = np.where(particles.phases < 24, np.exp(particles.log_rates), 0)
         for found, values in ((track.phases, particles.phases), (track.rates, paces)):
             assert weights[values < found].sum() <= 0.5 + 1e-9
             assert weights[values > found].sum() <= 0.5 + 1e-9
     assert np.ptp(weights) > 1e-4
+
+
+def test_pool_multiplies_densities_by_their_weights(model):
+    """The density of the pool is the product of Gaussian densities, each to its weight."""
+    rng, scale = np.random.default_rng(7), np.diag(model.pooled.covariance)
+    roots = rng.standard_normal((2, 3, 3)) * np.sqrt(scale) * np.array([0.2, 0.6])[:, None, None]
+    estimates = [(rng.standard_normal(3), 0.1 * np.diag(scale) + a.T @ a) for a in roots]
+    for evidence in ([0.5, 0.9], [1.0, 3.0], [40.0, 2.0]):
+        excess = np.maximum(evidence, 1)
+        sizes = excess * [np.mean(np.diag(C) / scale) for _, C in estimates]
+        weights = np.array([3, 1]) / sizes / np.sum(np.array([3, 1]) / sizes)
+        mean, covariance = pool(estimates, np.array(evidence), model)
+        points = mean + rng.standard_normal((8, 3))
+        logs = sum(
+            w * multivariate_normal(m, e * C).logpdf(points)
+            for w, e, (m, C) in zip(weights, excess, estimates, strict=True)
+        )
+        logs = logs - multivariate_normal(mean, covariance).logpdf(points)
+        assert np.ptp(logs) < 1e-6 * np.abs(logs).max()
+
+
+def test_evidence_is_the_average_nis_of_innovations(model, seen):
+    """Of both members, by their distribution before each observation."""
+    values, times = seen
+    rows, noise = np.eye(3), noise_of(0.1)
+    running = RunningTake(model, 1, times[0], 3)
+    evidence, before = np.ones(2), times[0]
+    for y, time in zip(values, times, strict=True):
+        running.phases.rng, again = np.random.default_rng(0), np.random.default_rng(0)
+        other = deepcopy(running)
+        other.phases.rng = again
+        other.update(np.full(3, np.nan), time, Observer(rows, noise))
+        left = np.exp(-(time - before) / model.clock.memory)
+        for k, member in enumerate((other.phases, other.pooled)):
+            mean, covariance = member.estimate
+            off = y - mean
+            nis = off @ np.linalg.solve(covariance + noise, off) / 3
+            evidence[k] = left * evidence[k] + (1 - left) * nis
+        running.update(y, time, Observer(rows, noise))
+        np.testing.assert_allclose(running.evidence, evidence, rtol=1e-6)
+        before = time
+    assert (evidence != 1).all()
 
 
 @pytest.mark.parametrize("rows", [[0, 2], [0, 1, 2], [0, 1, 2, 0, 1]])
@@ -297,14 +392,14 @@ def test_weights_and_nis_equal_their_definitions(rows):
         np.exp(0.2 * np.random.default_rng(1).standard_normal((6, 25))),
     )
     given = np.stack(make_training(6)), rates, np.arange(6), clock
-    model, matrix = TrackerModel.learn(*given, 0.1, 2.0, 60), np.eye(3)[rows]
+    model, matrix = TrackerModel.learn(*given, noise_of(0.1), 2.0, 60), np.eye(3)[rows]
     running, all_seen = ParticleFilter(model, 3, 0.0, len(rows)), np.ones(len(rows), dtype=bool)
     nis, n, share = np.ones(2), len(rows), min(np.sqrt(len(rows) / 3), 1)
     noise, frames = 0.01 * np.eye(n), np.arange(25)
     for p in range(25):
         before, dt = running.particles, 2.0 if p else 0.0
         y = matrix @ given[0][2, p] + 0.02 * np.cos(np.arange(n) + p)
-        running.update(y, 2.0 * p, matrix)
+        running.update(y, 2.0 * p, Observer(matrix, noise))
         now = running.particles
         if p:
             slopes, variances = running.slopes.fit(all_seen)
@@ -403,7 +498,7 @@ def test_matern_process_recovers_length_scale_and_covariance():
     root = np.linalg.cholesky((1 + scaled) * np.exp(-scaled) + 1e-9 * np.eye(120))
     mixing = np.array([[1.0, 0.0], [0.8, 0.6]])
     drawn = root @ rng.standard_normal((60, 120, 2)) @ mixing.T
-    process = MaternProcess.learn(drawn, 0.5)
+    process = MaternProcess.learn(drawn, 0.5, 0.5)
     assert abs(np.sqrt(3) / process.decay - 8) < 1.5
     flat = drawn.reshape(-1, 2)
     moments = flat.T @ flat / len(flat)

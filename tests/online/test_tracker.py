@@ -10,6 +10,7 @@ from sklearn.exceptions import NotFittedError
 from sklearn_motionsync import (
     DenseSynchronizer,
     DirectionCosines,
+    JointNoise,
     LinearSynchronizer,
     MotionTracker,
     Track,
@@ -435,6 +436,57 @@ def test_errors_of_a_new_person_are_smaller_than_of_the_mean(bends):
     assert np.median(np.concatenate(phases)) < 4
     assert filtered < 0.8 * mean
     assert smoothed < 0.9 * filtered
+
+
+def test_moved_joints_of_a_new_person(bends):
+    """By 1 and 5 cm: not lost, and nearer to the truth than with equal noise in every cosine."""
+    X = [x[::4] for x in bends.data]
+    held = bends.actor == bends.actor[-1]
+    training = [x for x, of in zip(X, held, strict=True) if not of]
+    cosines = DirectionCosines(bends.skeleton).fit(training)
+    postures, sync = cosines.transform(training), DenseSynchronizer(metric=None, refine=False)
+    rng, new = np.random.default_rng(0), [X[i] for i in np.flatnonzero(held)[:2]]
+    for sd in (0.01, 0.05):
+        errors = []
+        seen = cosines.transform([x + sd * rng.standard_normal(x.shape) for x in new])
+        for noise in (JointNoise(sd, cosines), 0.05):
+            tracker = MotionTracker(sync, 100, noise=noise)
+            tracks = tracker.fit(postures, groups=bends.actor[~held]).track(seen)
+            off = [t.postures - x for t, x in zip(tracks, cosines.transform(new), strict=True)]
+            errors.append(np.sqrt(np.mean(np.square(np.concatenate(off)))))
+            if noise != 0.05:
+                assert np.mean([t.lost.mean() for t in tracks]) <= 0.02
+    assert errors[0] < 0.75 * errors[1]
+
+
+def test_bands_of_another_action_are_wider_and_hold_as_often(real_data, bends):
+    """Of hidden arms, as evidence makes them wider; people held out, and jogs under bends."""
+    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    jogs = np.flatnonzero(bunch.target == "jogLeftCircle4StepsRstart")[:2]
+    cosines = DirectionCosines(bunch.skeleton)
+    held = bends.actor == bends.actor[-1]
+    X = [x[::4] for x in cosines.fit_transform(bends.data)]
+    training = [x for x, of in zip(X, held, strict=True) if not of]
+    sync = DenseSynchronizer(metric=None, refine=False)
+    tracker = MotionTracker(sync, 100).fit(training, groups=bends.actor[~held])
+    own = [X[i] for i in np.flatnonzero(held)[:3]]
+    others = [x[::4] for x in cosines.transform([bunch.data[i] for i in jogs])]
+    inside, widths = [], []
+    for takes in (own, others):
+        seen = [x + 0.05 * np.random.default_rng(0).standard_normal(x.shape) for x in takes]
+        for x in seen:
+            x[:, LIMBS[8:10].ravel()] = np.nan
+        tracks = tracker.track(seen)
+        std = [np.sqrt(np.diagonal(t.covariances, axis1=1, axis2=2)) for t in tracks]
+        hidden = LIMBS[8:10].ravel()
+        near = [
+            (np.abs(t.postures - x) <= 1.645 * s)[:, hidden]
+            for t, x, s in zip(tracks, takes, std, strict=True)
+        ]
+        inside.append(np.concatenate(near).mean())
+        widths.append(np.concatenate(std)[:, hidden].mean())
+    assert widths[1] > 1.3 * widths[0]
+    assert inside[1] > inside[0] - 0.05
 
 
 def test_jogging_is_lost_under_a_model_of_bends(real_data, bends):

@@ -1,0 +1,276 @@
+"""The two members of a tracker, with and without a phase, and the pool of what they tell."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..inputs.wording import counted
+from ..matching.warps import at_times
+from .kalman import DeviationFilter
+from .particle_filter import ParticleFilter, weighted_median
+from .smoother import HistoryFrame, PathFrame, simulate_backwards, smooth_deviations
+from .state_space import exponential_average
+
+__all__ = ["RunningTake", "Track", "filter_take", "smooth_take", "stack_frames"]
+
+# Weights before anything is observed: of the member that knows phases, and of the other one.
+_PRIOR = np.array([0.75, 0.25])
+# Covariances are larger by this share of the pooled variances, so that they can be inverted.
+_MARGIN = 1e-9
+
+
+class Track(NamedTuple):
+    """The body at every frame of a take; of a single frame, without the axis of frames.
+
+    Parameters
+    ----------
+    postures : ndarray, shape (n_frames, n_features)
+        Expected postures, given the observations.
+    covariances : ndarray, shape (n_frames, n_features, n_features)
+        Of the postures, over all possible phases; without the noise of observations.
+    phases : ndarray, shape (n_frames,)
+        Weighted medians of the particles, in frames of the clock, 0 to P - 1.
+    rates : ndarray, shape (n_frames,)
+        Weighted medians of the pace: 1 is the mean of the training performances, 2 twice as fast,
+        0 at the end of the movement.
+    effective_sizes : ndarray, shape (n_frames,)
+        Effective sample sizes of the particles, ``1 / sum w^2``. Of a smoothed take: the number of
+        different particles on its paths.
+    lost : ndarray of bool, shape (n_frames,)
+        Whether velocities or postures are improbable at all phases.
+
+    See Also
+    --------
+    MotionTracker : Estimates it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn_motionsync import LinearSynchronizer, MotionTracker
+    >>> X = [size * np.sin(np.linspace(0, 3, 40))[:, np.newaxis] for size in (0.9, 1.0, 1.1)]
+    >>> track = MotionTracker(LinearSynchronizer()).fit(X).track(X[0])
+    >>> track
+    Track(40 frames of 1 feature, 0 of them lost)
+    >>> track.covariances.shape
+    (40, 1, 1)
+    """
+
+    postures: np.ndarray
+    covariances: np.ndarray
+    phases: np.ndarray
+    rates: np.ndarray
+    effective_sizes: np.ndarray
+    lost: np.ndarray
+
+    def __repr__(self):
+        n_frames, n_features = np.size(self.lost), self.postures.shape[-1]
+        n_lost = np.count_nonzero(self.lost)
+        return (
+            f"Track({n_frames} frames of {counted(n_features, 'feature')}, {n_lost} of them lost)"
+        )
+
+
+class PooledFilter:
+    """A Kalman filter of deviations from the mean of all phases: it knows no phase.
+
+    Parameters
+    ----------
+    model : TrackerModel
+
+    Attributes
+    ----------
+    accepted : ndarray of bool, shape (n_observed,)
+        The observations of the last frame that were used.
+    innovation : float or None
+        Their NIS; None without any.
+    """
+
+    def __init__(self, model):
+        self.model, self.deviations = model, DeviationFilter(model.pooled, 1)
+
+    @property
+    def estimate(self):
+        """The expected posture, and its covariance."""
+        mean = self.model.pooled_mean + self.deviations.means[0, 0]
+        return mean, self.deviations.posture_covariance
+
+    def update(self, values, dt, observer):
+        """Take an observation, a time after the one before."""
+        if dt > 0:
+            self.deviations.predict(dt)
+        seen = ~np.isnan(values)
+        self.accepted, self.innovation = np.zeros_like(seen), None
+        if not seen.any():
+            return
+        rows, noise = observer.of(seen)
+        residuals = (values[seen] - rows @ self.model.pooled_mean)[np.newaxis]
+        update = self.deviations.correct(residuals, rows, noise, self.model.gate)
+        if update is not None:
+            self.accepted, self.innovation = seen, float(update.nis[0])
+
+
+class RunningTake:
+    """A take that is tracked frame by frame, by both members.
+
+    Parameters
+    ----------
+    model : TrackerModel
+    seed : int
+    time : float
+        Of the first frame, which ``step`` still has to take.
+    n_observed : int
+        Its numbers.
+
+    Attributes
+    ----------
+    phases : ParticleFilter
+    pooled : PooledFilter
+    evidence : ndarray, shape (2,)
+        Averages of the NIS of innovations of both: 1 is expected.
+    """
+
+    def __init__(self, model, seed, time, n_observed):
+        self.model = model
+        self.phases = ParticleFilter(model, seed, time, n_observed)
+        self.pooled = PooledFilter(model)
+        self.evidence = np.ones(2)
+
+    @property
+    def time(self):
+        """Of the last frame."""
+        return self.phases.time
+
+    def update(self, values, time, observer):
+        """Take an observation; parameters as of `ParticleFilter.update`."""
+        dt = time - self.time
+        self.phases.update(values, time, observer)
+        self.pooled.update(values, dt, observer)
+        for k, member in enumerate((self.phases, self.pooled)):
+            if member.innovation is not None:
+                memory = self.model.clock.memory
+                now = exponential_average(self.evidence[k], member.innovation, dt, memory)
+                self.evidence[k] = now
+
+    def step(self, values, time, observer):
+        """Take an observation; the `Track` of its frame."""
+        self.update(values, time, observer)
+        particles = self.phases.particles
+        return Track(
+            *pool((self.phases.estimate, self.pooled.estimate), self.evidence, self.model),
+            weighted_median(particles.phases, particles.weights),
+            weighted_median(particles.rates(self.model.clock), particles.weights),
+            particles.effective_size,
+            self.phases.lost,
+        )
+
+
+def pool(estimates, evidence, model):
+    """The logarithmic opinion pool of Gaussian estimates: ``C^-1 = sum_m w_m C_m^-1``, sum of w 1.
+
+    Covariances are larger by the evidence: by the average NIS where that is above 1. The weights
+    are those before, divided by the mean variance in units of the pooled variances.
+
+    Parameters
+    ----------
+    estimates : tuple of tuple
+        Mean (n_features,) and covariance of each member.
+    evidence : ndarray, shape (n_members,)
+    model : TrackerModel
+
+    Returns
+    -------
+    mean : ndarray, shape (n_features,)
+    covariance : ndarray, shape (n_features, n_features)
+    """
+    scale = np.diag(model.pooled.covariance)
+    excess = np.maximum(evidence, 1.0)
+    sizes = [np.mean(np.diag(C) / scale) * e for (_, C), e in zip(estimates, excess, strict=True)]
+    weights = _PRIOR / np.maximum(sizes, _MARGIN)
+    weights /= weights.sum()
+    total, moment = 0.0, 0.0
+    for (mean, covariance), share, e in zip(estimates, weights, excess, strict=True):
+        precision = (share / e) * np.linalg.inv(covariance + _MARGIN * np.diag(scale))
+        total, moment = total + precision, moment + precision @ mean
+    covariance = np.linalg.inv(total)
+    return covariance @ moment, covariance
+
+
+def stack_frames(frames, dtype):
+    """The `Track` of each frame as one, postures in this precision."""
+    postures, covariances, *numbers = map(np.array, zip(*frames, strict=True))
+    return Track(*(x.astype(dtype, copy=False) for x in (postures, covariances)), *numbers)
+
+
+def filter_take(model, seed, values, times, observer):
+    """The filtered frames of a take, each given the observations up to it.
+
+    Parameters and returns are those of `smooth_take`.
+    """
+    running = RunningTake(model, seed, times[0], len(observer.matrix))
+    return [running.step(*frame, observer) for frame in zip(values, times, strict=True)]
+
+
+def smooth_take(model, seed, values, times, observer):
+    """The smoothed frames of a take, each given all observations.
+
+    Paths of phases are drawn by backward simulation from the particles of the filter. Along each
+    path the deviations are smoothed; the paths have equal weights. So are those of the member that
+    knows no phase.
+
+    Parameters
+    ----------
+    model : TrackerModel
+    seed : int
+    values : ndarray, shape (n_frames, n_observed)
+    times : ndarray, shape (n_frames,)
+    observer : Observer
+
+    Returns
+    -------
+    list of Track
+        One a frame.
+    """
+    running = RunningTake(model, seed, times[0], values.shape[1])
+    history, accepted, evidence = [], [], []
+    for now, time in zip(values, times, strict=True):
+        dt = time - running.time
+        running.update(now, time, observer)
+        phases = running.phases
+        history.append(HistoryFrame(dt, phases.particles, phases.initial, phases.lost))
+        accepted.append([np.where(m.accepted, now, np.nan) for m in (phases, running.pooled)])
+        evidence.append(running.evidence.copy())
+    paths = simulate_backwards(model, history, running.phases.rng)
+    jump = model.mean[-1] - model.mean[0]
+    on_paths, without = [], []
+    for past, path, (by_phase, by_pool) in zip(history, paths, accepted, strict=True):
+        expected = at_times(model.mean, past.particles.phases[path])
+        jumps = np.outer(past.particles.restarted[path], jump)
+        on_paths.append(PathFrame(past.dt, past.initial, expected, jumps, by_phase))
+        first = not without
+        without.append(PathFrame(past.dt, first, model.pooled_mean[np.newaxis], None, by_pool))
+    smoothed = zip(
+        history,
+        paths,
+        evidence,
+        smooth_deviations(model.process, on_paths, observer),
+        smooth_deviations(model.pooled, without, observer),
+        strict=True,
+    )
+    return [_smooth_frame(model, *frame) for frame in smoothed]
+
+
+def _smooth_frame(model, past, path, evidence, on_paths, without):
+    """The `Track` of a frame from the postures and covariances of both members."""
+    postures, covariance = on_paths
+    off = postures - postures.mean(axis=0)
+    estimates = (
+        (postures.mean(axis=0), covariance + off.T @ off / len(off)),
+        (without[0][0], without[1]),
+    )
+    return Track(
+        *pool(estimates, evidence, model),
+        np.median(past.particles.phases[path]),
+        np.median(past.particles.rates(model.clock)[path]),
+        float(len(np.unique(path))),
+        past.lost,
+    )

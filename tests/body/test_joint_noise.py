@@ -1,0 +1,101 @@
+"""JointNoise against first-order formulas, and against moved recordings."""
+
+import numpy as np
+import pytest
+from sklearn import clone
+from sklearn.exceptions import NotFittedError
+from sklearn_motionsync import (
+    DirectionCosines,
+    JointNoise,
+    JointPositions,
+    LinearSynchronizer,
+    MotionTracker,
+    Skeleton,
+)
+from sklearn_motionsync.datasets import make_bending
+
+BENDING = make_bending(4, frame_rate=30, random_state=0)
+
+
+def fitted(reference="heading", skeleton=BENDING.skeleton):
+    return DirectionCosines(skeleton, reference).fit(BENDING.data)
+
+
+def columns(cosines, limb):
+    names = list(cosines.get_feature_names_out())
+    return [names.index(f"{limb}_{axis}") for axis in "xyz"]
+
+
+def test_covariance_of_limbs_along_axes_of_the_room():
+    """A direction u of length L moves by (I - u u') e / L, where e is the error of its ends."""
+    cosines = fitted("world")
+    (posture,) = cosines.transform(BENDING.data[:1])
+    posture = np.repeat(posture[40:41], 1000, axis=0)
+    found = JointNoise(1e-4, cosines).covariance(posture)
+    lengths = dict(zip(cosines.skeleton.limbs, cosines.limb_lengths_, strict=True))
+    thigh, shank, arm = (columns(cosines, x) for x in ("left_thigh", "left_leg", "right_arm"))
+    across = {}
+    for limb, own in (("left_thigh", thigh), ("left_leg", shank)):
+        u = posture[0, own]
+        across[limb] = (np.eye(3) - np.outer(u, u)) / lengths[limb]
+        expected = 2e-8 * across[limb] @ across[limb]
+        np.testing.assert_allclose(found[np.ix_(own, own)], expected, atol=0.1 * expected.max())
+    # The knee ends the one and begins the other.
+    shared = -1e-8 * across["left_thigh"] @ across["left_leg"]
+    scale = 0.1 * np.abs(shared).max()
+    np.testing.assert_allclose(found[np.ix_(thigh, shank)], shared, atol=scale)
+    assert np.abs(found[np.ix_(thigh, arm)]).max() < scale
+
+
+@pytest.mark.parametrize("reference", ["heading", "parent", "world"])
+@pytest.mark.parametrize("sd", [0.01, 0.05])
+def test_covariance_is_that_of_moved_recordings(reference, sd):
+    """Of a body of these proportions, moved by other draws."""
+    cosines = fitted(reference)
+    (body,) = cosines.inverse_transform(cosines.transform(BENDING.data[:1]))
+    (exact,) = cosines.transform([body])
+    rng = np.random.default_rng(9)
+    moved = cosines.transform([body + sd * rng.standard_normal(body.shape) for _ in range(30)])
+    off = np.concatenate(moved) - np.tile(exact, (30, 1))
+    expected = off.T @ off / len(off)
+    found = JointNoise(sd, cosines).covariance(exact)
+    np.testing.assert_allclose(found, found.T, atol=1e-15)
+    scales = [np.sqrt(np.diag(x)) for x in (found, expected)]
+    moves = scales[1] > 1e-9  # all but the hips, forward
+    np.testing.assert_allclose(*(x[moves] for x in scales), rtol=0.2)
+    pairs = zip((found, expected), scales, strict=True)
+    correlations = [x[np.ix_(moves, moves)] / np.outer(s[moves], s[moves]) for x, s in pairs]
+    np.testing.assert_allclose(*correlations, atol=0.2)
+
+
+def test_mean_of_markers_has_less_noise():
+    """Each landmark the mean of four markers: half the noise, a quarter of the covariance."""
+    names = [f"{joint}{k}" for joint in BENDING.skeleton.joints for k in range(4)]
+    landmarks = {joint: tuple(f"{joint}{k}" for k in range(4)) for joint in BENDING.skeleton.joints}
+    markers = Skeleton(names, [-1] * len(names), landmarks=landmarks)
+    data = [np.repeat(x.reshape(len(x), -1, 3), 4, axis=1) for x in BENDING.data]
+    many = DirectionCosines(markers).fit([x.reshape(len(x), -1) for x in data])
+    (posture,) = fitted().transform(BENDING.data[:1])
+    one, four = (JointNoise(0.005, c).covariance(posture) for c in (fitted(), many))
+    # After the height and the hips, whose errors are of second order along the heading.
+    np.testing.assert_allclose(np.diag(four)[4:] / np.diag(one)[4:], 0.25, atol=0.04)
+
+
+def test_stays_fitted_in_clones():
+    noise = JointNoise(0.02, fitted())
+    tracker = clone(MotionTracker(LinearSynchronizer(), 10, noise=noise))
+    tracker.fit(noise.cosines.transform(BENDING.data))
+    assert tracker.get_params()["noise"].sd == 0.02
+
+
+def test_refusals():
+    with pytest.raises(TypeError, match=r"needs the fitted DirectionCosines .* got JointPositions"):
+        JointNoise(0.02, JointPositions(BENDING.skeleton))
+    with pytest.raises(NotFittedError):
+        JointNoise(0.02, DirectionCosines(BENDING.skeleton))
+    for sd in (0, -1, np.inf, np.nan):
+        with pytest.raises(ValueError, match=r"sd must be a number above 0, .* got"):
+            JointNoise(sd, fitted())
+    tracker = MotionTracker(LinearSynchronizer(), 10, noise=JointNoise(0.02, fitted()))
+    with pytest.raises(ValueError, match=r"make 37 features a frame, .* shape \(\d+, 36\)"):
+        tracker.fit([x[:, 1:] for x in fitted().transform(BENDING.data)])
