@@ -106,8 +106,8 @@ class SkeletonDisplay:
         The heads, one line a panel; without a skeleton, or without bones, all joints.
     behind_ : list of LineCollection
         The shadows, one collection a panel; empty without them.
-    moments_ : list of Text
-        The time of each panel in per cent of the longest performance; empty if nothing moves.
+    moments_ : list of Line2D
+        The share of the time that is over, a line at the top of each panel in which bodies move.
     heading_ : Text or None
         The heading.
 
@@ -563,8 +563,11 @@ class SkeletonDisplay:
         self.bones_, self.heads_, self.behind_, self.moments_ = [], [], [], []
         for axis, title, scene in zip(self.axes_, self.titles, drawn, strict=True):
             self._prepare(axis, len(scene))
+            if at > 0:
+                title = f"{title}, at {100 * at:.0f} % of the time"
             stage(axis, title, low, high)
-            self.moments_.append(axis.set_title("", loc="right", fontsize="small", color="0.35"))
+            if max(map(len, scene), default=0) > 1:
+                self.moments_.append(_time_line(axis))
             if places is not None:
                 axis.set_xticks(places, self.labels)
         self._show(at)
@@ -635,9 +638,8 @@ class SkeletonDisplay:
         if durations is None:
             durations = [[len(x) - 1 for x in scene] for scene in self._drawn]
         longest = max(max(of_scene, default=0) for of_scene in durations)
-        # A text of its own: long titles would take longer to draw than all bodies.
-        for text in self.moments_ if longest > 0 else ():
-            text.set_text(f"t = {100 * at:.0f} %")
+        for line in self.moments_:
+            line.set_xdata([0, at])
         for i, (scene, of_scene) in enumerate(zip(self._drawn, durations, strict=True)):
             shares = [min(1.0, at * longest / d) if d > 0 else 0.0 for d in of_scene]
             bodies = [
@@ -660,6 +662,14 @@ class SkeletonDisplay:
         if "head" not in skeleton.landmarks:
             return body[:0]
         return landmark_track(body[np.newaxis], skeleton, "head")
+
+
+def _time_line(axis):
+    """A line at the top that tells the time: a text would take longer to draw than all bodies."""
+    style = {"linewidth": 2, "transform": axis.transAxes, "solid_capstyle": "butt", "zorder": 0}
+    axis.plot([0, 1], [0.99, 0.99], color=COLORS["shadow"], **style)
+    (line,) = axis.plot([0, 0], [0.99, 0.99], color=COLORS["middle"], **style)
+    return line
 
 
 def postures_at(frames, *performances):
