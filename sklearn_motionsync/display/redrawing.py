@@ -183,7 +183,7 @@ class Noted:
 
     Parameters
     ----------
-    units : list of Unit
+    units : list of DrawnArtist
         In the order in which they were drawn.
     axes : list of (Axes, tuple)
         The axes of which the artists are units, with their state.
@@ -194,7 +194,7 @@ class Noted:
 
     def __init__(self, units, axes, containers, figure):
         self.units, self._axes, self._containers, self._figure = units, axes, containers, figure
-        self._parts = [(part, unit) for unit in units for part in unit.parts]
+        self.parts = [(part, unit) for unit in units for part in unit.parts]
         self.reaches = self._steps = self._ground = self._scratch = None
 
     @classmethod
@@ -219,9 +219,9 @@ class Noted:
         units = []
         for artist, calls in log.drawn:
             bottom = _bottom_of(artist, renderer) if id(artist) in titles else None
-            units.append(Unit(artist, calls, artist.get_zorder(), artist.findobj(), bottom))
+            units.append(DrawnArtist(artist, calls, artist.get_zorder(), artist.findobj(), bottom))
         noted = cls(units, [(axis, _state_of(axis)) for axis in axes], containers, figure)
-        for part, _ in noted._parts:
+        for part, _ in noted.parts:
             part.stale = False
         return noted
 
@@ -240,7 +240,7 @@ class Noted:
     def changed(self):
         """The units that are stale."""
         found = {}
-        for part, unit in self._parts:
+        for part, unit in self.parts:
             if part.stale:
                 part.stale = False
                 found[id(unit)] = unit
@@ -300,7 +300,7 @@ class Noted:
         return call.ink or None
 
 
-class Unit(NamedTuple):
+class DrawnArtist(NamedTuple):
     """An artist that is drawn as a whole.
 
     Attributes
