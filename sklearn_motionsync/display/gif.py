@@ -94,15 +94,20 @@ def indexed(pictures):
     tree = KDTree(colors)
     # Pages of it that no colour needs take no memory.
     number_of = np.full(int(_RGB) + 1, -1, dtype=np.int16)
-    out = []
+    out, before = [], None
     for picture in pictures:
-        numbers = number_of[picture]
-        unknown = numbers < 0
-        if unknown.any():
-            new = np.unique(picture[unknown])
+        # Few pixels are not as in the picture before.
+        changed = slice(None) if before is None else np.flatnonzero(picture != before)
+        own = picture[changed]
+        known = number_of[own]
+        if known.size and known.min() < 0:
+            new = np.unique(own[known < 0])
             number_of[new] = tree.query(_as_rgb(new))[1]
-            numbers = number_of[picture]
-        out.append(numbers.astype(np.uint8))
+            known = number_of[own]
+        numbers = np.zeros(len(picture), dtype=np.uint8) if before is None else out[-1].copy()
+        numbers[changed] = known
+        out.append(numbers)
+        before = picture
     return colors, out
 
 
