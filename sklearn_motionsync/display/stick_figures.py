@@ -101,7 +101,7 @@ class SkeletonDisplay:
         The panels.
     bones_ : list of dict
         For each panel the LineCollections of the ``"left"``, ``"middle"`` and ``"right"`` bones,
-        and of the ``"departing"`` ones if bones are marked.
+        and of the ``"departing"`` ones if bones are marked. Each body is one line with gaps.
     heads_ : list of Line2D
         The heads, one line a panel; without a skeleton, or without bones, all joints.
     behind_ : list of LineCollection
@@ -590,7 +590,7 @@ class SkeletonDisplay:
         seconds : float, default=5.0
             The time until the longest performance ends.
         fps : int, default=15
-            Pictures a second; each takes some 70 kB of a notebook.
+            Pictures a second; each takes 10 to 50 kB of a notebook.
         azimuth : float, default=-60
             The direction of the viewer in degrees, as in `plot`.
 
