@@ -195,7 +195,8 @@ class Noted:
     def __init__(self, units, axes, containers, figure):
         self.units, self._axes, self._containers, self._figure = units, axes, containers, figure
         self.parts = [(part, unit) for unit in units for part in unit.parts]
-        self.reaches = self._steps = self._ground = self._scratch = None
+        self.reaches = self._steps = self._below = self._ground = self._scratch = None
+        self._inks = {}
 
     @classmethod
     def draw(cls, figure, renderer, whole):
@@ -260,23 +261,30 @@ class Noted:
         ):
             return
         wider = {key: _union(box, known.get(key)) for key, box in boxes.items()}
-        self.reaches, self._steps, covers = known | wider, [], []
-        renderer.clear()
+        self.reaches, self._steps, covers, below = known | wider, [], [], []
         for unit in self.units:
             if id(unit.artist) in self.reaches:
                 self._steps.append(unit.artist.draw)
                 covers.append(self.reaches[id(unit.artist)])
                 continue
+            ink = self._ink(unit.calls, renderer) if covers and unit.calls else None
+            if not any(_meet(ink, box) for box in covers):
+                below += unit.calls
+                continue
             for call in unit.calls:
-                ink = self._ink(call, renderer) if covers else None
-                if covers and ink is None:
-                    continue
+                ink = self._ink([call], renderer)
                 if any(_meet(ink, box) for box in covers):
                     self._steps.append(call.repeat)
                     covers.append(ink)
                 else:
-                    call.repeat(renderer)
-        self._ground = renderer.copy_from_bbox(self._figure.bbox)
+                    below.append(call)
+        # Mostly a text has grown over nothing else.
+        if below != self._below:
+            self._below = below
+            renderer.clear()
+            for call in below:
+                call.repeat(renderer)
+            self._ground = renderer.copy_from_bbox(self._figure.bbox)
 
     def draw_again(self, renderer):
         """Draw the figure as it is now."""
@@ -284,20 +292,23 @@ class Noted:
         for step in self._steps:
             step(renderer)
 
-    def _ink(self, call, renderer):
-        """The box that a call draws in; None if it draws nothing."""
-        if call.ink is None:
+    def _ink(self, calls, renderer):
+        """The box that calls draw in; None if they draw nothing."""
+        key = tuple(map(id, calls))
+        if key not in self._inks:
             if self._scratch is None:
                 self._scratch = type(renderer)(renderer.width, renderer.height, renderer.dpi)
             self._scratch.clear()
-            call.repeat(self._scratch)
+            for call in calls:
+                call.repeat(self._scratch)
             drawn = np.asarray(self._scratch.buffer_rgba())[..., 3] > 0
             rows, columns = (np.flatnonzero(drawn.any(axis=axis)) for axis in (1, 0))
-            call.ink = ()
+            box = None
             if len(rows):
                 top, bottom = (len(drawn) - k for k in (rows[0], rows[-1] + 1))
-                call.ink = float(columns[0]), float(bottom), columns[-1] + 1.0, float(top)
-        return call.ink or None
+                box = float(columns[0]), float(bottom), columns[-1] + 1.0, float(top)
+            self._inks[key] = box
+        return self._inks[key]
 
 
 class DrawnArtist(NamedTuple):
@@ -354,7 +365,7 @@ class Call:
                 return copy
             return value.frozen() if isinstance(value, TransformNode) else value
 
-        self._name, self.ink = name, None
+        self._name = name
         self._args = [keep(value) for value in args]
         self._kwargs = {key: keep(value) for key, value in kwargs.items()}
 
