@@ -148,15 +148,18 @@ def test_texts_that_change():
 
 
 def test_titles_that_are_moved_up():
-    figure, axes = plt.subplots(1, 2, figsize=(4, 2))
+    figure, axes = plt.subplots(1, 3, figsize=(5, 2))
     axes[0].xaxis.tick_top()
+    deep = r"$\frac{\frac{\frac{a}{b}}{c}}{\frac{c}{\frac{c}{d}}}$"
     axes[1].set_title("fixed", y=0.8)
 
     def show(k, last):
-        axes[0].title.set_text(f"$x^{k}$\n" + "y" * (k % 2))
+        axes[0].title.set_text(deep if k % 2 else f"{k}")
         axes[1].title.set_text(f"{k}")
+        # The first of these reaches into the axes, but for moving it up.
+        axes[2].title.set_text(deep if k in (4, 5, 9) else f"{k}")
 
-    check(animation_of(figure, show, 8), figure)
+    assert check(animation_of(figure, show, 12), figure) < 12
 
 
 def test_axes_that_change_and_axes_in_space():
