@@ -32,6 +32,7 @@ from .online.stream import LivePhase
 from .online.synchronizer import OnlineSynchronizer
 from .online.tracker import MotionTracker
 from .recognition import ActionClassifier, synchronization_distances
+from .report.player import write_player
 from .report.report import write_report
 from .segmentation.cycles import CycleSegmenter
 from .segmentation.search import find_performances
@@ -92,6 +93,7 @@ __all__ = [
     "synchronization_distances",
     "to_frame",
     "to_sequences",
+    "write_player",
     "write_report",
 ]
 

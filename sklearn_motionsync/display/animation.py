@@ -1,13 +1,20 @@
 """Animations of displays, played in a notebook without a network connection."""
 
+import logging
+import pathlib
 import re
+from contextlib import nullcontext
+from inspect import signature
 
 import numpy as np
 
 from .drawing import pyplot
+from .gif import gif_writer
+from .redrawing import Redrawing
 
 __all__ = ["animate"]
 
+_LOG = logging.getLogger(__name__)
 # Resolution of the pictures: the notebook stores all of them.
 _DPI = 64
 # The largest number of pictures: about half an hour at 15 a second.
@@ -61,6 +68,10 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
         """An animation that computes the layout once and needs no network."""
 
         def save(self, *args, **kwargs):
+            given = signature(super().save).bind(*args, **kwargs).arguments
+            _choose_writer(given, fps)
+            # What other animations change is not known.
+            redrawing = nullcontext() if given.get("extra_anim") else Redrawing(figure)
             # The layout takes longer than the drawing, and each picture would repeat it.
             layout = figure.get_layout_engine()
             figure.draw_without_rendering()
@@ -68,7 +79,8 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
             # Saving a picture draws it; drawing it on the canvas before would double the time.
             figure.canvas.draw_idle = _do_nothing
             try:
-                super().save(*args, **kwargs)
+                with redrawing:
+                    super().save(**given)
             finally:
                 del figure.canvas.draw_idle, figure.get_layout_engine
                 figure.set_layout_engine(layout)
@@ -91,6 +103,32 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
     return NotebookAnimation(
         figure, lambda k: show(k, count - 1), frames=count, interval=1000 / fps, blit=False
     )
+
+
+def _choose_writer(given, fps):
+    """Take the writer with one palette where matplotlib would take Pillow for a GIF.
+
+    Parameters
+    ----------
+    given : dict
+        The arguments of ``save``, which are changed.
+    fps : float
+        The default.
+    """
+    from matplotlib import rcParams
+    from matplotlib.animation import writers
+
+    name = given.get("writer") or rcParams["animation.writer"]
+    is_gif = pathlib.Path(given["filename"]).suffix.lower() == ".gif"
+    if not is_gif or not isinstance(name, str):
+        return
+    if name != "pillow":
+        if writers.is_available(name):
+            return
+        _LOG.warning("The writer %s of movies is not there; Pillow is used instead.", name)
+    options = ("codec", "bitrate", "extra_args", "metadata")
+    options = {key: given.pop(key) for key in options if given.get(key) is not None}
+    given["writer"] = gif_writer(given.pop("fps", None) or fps, **options)
 
 
 def _do_nothing(*args, **kwargs):

@@ -49,7 +49,13 @@ class PhaseDial:
         self.ahead = ring(COLORS["mean"], _ARC, 3)
         style = {"color": COLORS["pattern"], "solid_capstyle": "round", "zorder": 4}
         (self.hand,) = axis.plot([], [], **style)
-        style = {"ha": "center", "va": "center", "color": "0.35", "fontsize": "x-small"}
+        style = {
+            "ha": "center",
+            "va": "center",
+            "color": "0.35",
+            "fontsize": "x-small",
+            "zorder": 1,
+        }
         for quarter, text in enumerate(("0 %", "25", "50", "75")):
             x, y = _on_circle(quarter / 4, _NUMBERS + 0.02 * (quarter % 2))
             axis.text(x, y, text, **style)

@@ -589,6 +589,8 @@ class PerformanceRow:
         axis.set_xlim(0, end)
         axis.set_ylim(0, 105)
         axis.set_ylabel("phase (%)")
+        # Ticks need not be drawn again with the areas over them.
+        axis.set_axisbelow(True)
 
     def show(self, time):
         """Move to a time."""

@@ -1,8 +1,10 @@
-"""The page of a report: sections, tables with their files, figures, and what scripts read."""
+"""A page in one file: sections, tables with their files, figures, and what scripts read."""
 
 import base64
 import datetime
 import json
+import pathlib
+import uuid
 from html import escape
 from importlib.resources import files
 from io import BytesIO
@@ -12,7 +14,16 @@ import numpy as np
 
 from ..display.drawing import pyplot
 
-__all__ = ["Page", "list_of", "number", "paragraph", "picture", "read_part", "table_of"]
+__all__ = [
+    "Page",
+    "check_path",
+    "list_of",
+    "number",
+    "paragraph",
+    "picture",
+    "read_part",
+    "table_of",
+]
 
 # Pixels an inch of the figures.
 _DPI = 180
@@ -44,6 +55,20 @@ class Page:
             buttons.append(f'<button type="button" data-file="{file}">Save {file}</button>')
         return f"<p>{''.join(buttons)}</p>"
 
+    def write(self, path, title):
+        """Write the page as a whole or not at all."""
+        # The version is known once the package is imported.
+        from .. import __version__
+
+        text = self.render(str(title), __version__)
+        beside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+        try:
+            beside.write_text(text, encoding="utf-8", newline="\n")
+            beside.replace(path)
+        finally:
+            beside.unlink(missing_ok=True)
+        return path
+
     def render(self, title, version):
         """The page as text."""
         data = json.dumps({"files": self._files, "player": self.player}, ensure_ascii=False)
@@ -57,17 +82,41 @@ class Page:
             f'<li><a href="#{name}">{escape(heading)}</a></li>'
             for name, (heading, _) in zip(names, self._sections, strict=True)
         ]
+        nav = '<nav aria-label="Sections">\n<ul>\n' + "\n".join(links) + "\n</ul>\n</nav>"
         return Template(read_part("page.html")).substitute(
             title=escape(title),
             style=read_part("page.css"),
-            links="\n".join(links),
+            links=nav if len(links) > 1 else "",
             sections="\n".join(sections),
             date=datetime.date.today().isoformat(),
             version=escape(version),
             # Within a script element nothing but "<" could end it.
             data=data.replace("<", "\\u003c"),
-            script=read_part("page.js"),
+            script=read_part("page.js") + (read_part("player.js") if self.player else ""),
         )
+
+
+def check_path(path, what):
+    """A path at which a file can be written.
+
+    Parameters
+    ----------
+    path : str or path
+    what : str
+        What is written, for messages.
+    """
+    path = pathlib.Path(path)
+    if path.exists() and not path.is_file():
+        raise ValueError(
+            f"path must be that of a file, such as '{what}.html'; {str(path)!r} is a folder or a "
+            "device."
+        )
+    if not path.parent.is_dir():
+        raise FileNotFoundError(
+            f"There is no folder {str(path.parent)!r} for the {what} {path.name!r}: make it by "
+            "Path.mkdir(parents=True), or give the path of another file."
+        )
+    return path
 
 
 def read_part(name):

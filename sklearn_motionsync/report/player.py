@@ -1,12 +1,17 @@
-"""The data of the player of a report: stick figures of trials, as recorded, and their warps."""
+"""write_player: stick figures of several trials side by side in one HTML file, and its data."""
+
+from __future__ import annotations
 
 import base64
+import pathlib
 
 import numpy as np
+from sklearn.base import BaseEstimator
 from sklearn.pipeline import make_pipeline
 
 from ..body.base import PositionsTransformer
-from ..display.arguments import as_performances
+from ..body.skeleton import Skeleton
+from ..display.arguments import as_names, as_performances, labels_as_text
 from ..display.bodies import (
     bones_by_side,
     landmark_track,
@@ -15,19 +20,165 @@ from ..display.bodies import (
     read_positions,
 )
 from ..display.drawing import COLORS
+from ..display.keyframes import check_own_keyframes
+from ..inputs.resampling import as_frame_rates
+from ..inputs.types import NamesLike, NumbersLike, Path, PerformancesLike, Table, ValuesLike
 from ..inputs.wording import counted
-from ..synchronizers.match import match_of_times
+from ..synchronizers.match import Match, match_of_times, rates_of
 from ..utils.pipelines import find_synchronizer, flat_steps, transform_through, union_transformers
+from .page import Page, check_path, paragraph, read_part
 
-__all__ = ["bodies_of", "player_of"]
+__all__ = ["add_player", "bodies_of", "data_of_bodies", "player_of", "write_player"]
 
 # Coordinates that a report holds, at most, of two bytes each: 4 MB of text. And frames a trial that
 # a movement needs at least; where these are too many, there are fewer trials.
 MOST_COORDINATES, _FEWEST_FRAMES = 1_500_000, 25
 # The largest number, and what stands for a joint that was not seen.
 _LARGEST, _MISSING = 32767, -32768
+# Trials that are side by side, at most.
+MOST_SHOWN = 24
+# Okabe and Ito's lighter colours, for a dark page.
+_ON_DARK = {"left": "#56B4E9", "middle": "#B8B8B8", "right": "#E69F00"}
 # Seconds of the median trial if no frame rate is known.
 _UNKNOWN = 4.0
+
+
+def write_player(
+    path: Path,
+    X: PerformancesLike,
+    skeleton: Skeleton | None,
+    *,
+    match: Match | BaseEstimator | None = None,
+    names: NamesLike | None = None,
+    keyframes: NumbersLike | Table | None = None,
+    frame_rate: float | ValuesLike | None = None,
+    title: str | None = None,
+) -> pathlib.Path:
+    """Write a player of performances side by side: one HTML file that opens without a network.
+
+    It plays, pauses, repeats and slows down, and moves frame by frame. Bodies are seen from any
+    side. With ``match`` they move on one clock, or each at its own pace; without it only the
+    latter. All have one scale, and the grid wraps on a phone.
+
+    Parameters
+    ----------
+    path : str or path
+        Of the file, such as ``"squats.html"``. Its folder must exist. A file that is there already
+        is replaced once the new one is complete.
+    X : list of arrays (n_frames_i, n_dims * n_joints)
+        Joint positions of 1 to 24 performances, of two frames or more. NaN where a joint was not
+        seen.
+    skeleton : Skeleton or None
+        None shows the joints as points without bones, y up.
+    match : Match, synchronizer or Pipeline with one, default=None
+        The warps of X to one clock; of a fitted estimator those that it finds in X.
+    names : list of str, default=None
+        The names under the performances; by default their labels in X, or numbers.
+    keyframes : array-like or DataFrame, shape (n_sequences, n_keyframes), default=None
+        Frames of each performance, NaN where one is not known. They are marked below the slider,
+        and a button for each leads there. Columns of a table are their names. On one clock a mark
+        is at the median of the performances.
+    frame_rate : float, or array-like of shape (n_sequences,), default=None
+        Frames a second of X; by default what tables tell, as in `Match.offsets_in`. If it is not
+        known, the median performance takes four seconds.
+    title : str, default=None
+        Of the page; by default "Side by side".
+
+    Returns
+    -------
+    Path
+        Of the file.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such folder.
+    ValueError
+        If there are more than 24 performances, one has a single frame, or names, keyframes or
+        match do not have one entry for each; or if the path is that of a folder.
+
+    See Also
+    --------
+    write_report : A report about aligned trials, with the same player.
+    sklearn_motionsync.display.SkeletonDisplay : Stick figures in a notebook, as pictures or video.
+
+    Notes
+    -----
+    Positions have a precision of a 30 000th of the largest, and take 4 MB of the file at most: of
+    more, longer performances have fewer frames. The page names it. The names are in the file.
+
+    Examples
+    --------
+    >>> from sklearn_motionsync import write_player
+    >>> from sklearn_motionsync.datasets import make_bending
+    >>> bends = make_bending(5, random_state=0)
+    >>> path = write_player("bends.html", bends.data, bends.skeleton, frame_rate=50)
+    >>> path.read_text(encoding="utf-8")[:15]
+    '<!DOCTYPE html>'
+    """
+    path = check_path(path, "player")
+    given, X = X, as_performances(X)
+    n = len(X)
+    if n > MOST_SHOWN:
+        raise ValueError(
+            f"X has {n} performances, and a player shows {MOST_SHOWN} side by side at most: choose "
+            f"some of them, such as X[:{MOST_SHOWN}]."
+        )
+    names = as_names(labels_as_text(X) if names is None else names, n, "names", "performances")
+    bodies = [_points(x, skeleton, i) for i, x in enumerate(X)]
+    for i, (points, _, _) in enumerate(bodies):
+        if len(points) < 2:
+            raise ValueError(
+                f"Performance {i} has 1 frame; a player needs 2 or more: leave it out."
+            )
+        if points.shape[1:] != bodies[0][0].shape[1:]:
+            raise ValueError(
+                f"Performance {i} has {points.shape[1:]} points and axes, and performance 0 "
+                f"{bodies[0][0].shape[1:]}; all must have the same."
+            )
+    lengths, rates = np.array([len(points) for points, _, _ in bodies]), rates_of(given, frame_rate)
+    seconds = None if rates is None else (lengths - 1) / np.ravel(as_frame_rates(rates, n))
+    if match is not None and not isinstance(match, Match):
+        match = Match.from_estimator(match, given)
+    if match is not None and len(match.times) != n:
+        raise ValueError(
+            f"match must be of the {counted(n, 'performance')} of X, got one of "
+            f"{len(match.times)}: give Match.from_estimator(estimator, X)."
+        )
+    times = None if match is None else match.times
+    marks = [] if keyframes is None else _marks(keyframes, lengths, times)
+    data, note = data_of_bodies(bodies, names, seconds, times, marks)
+    data["alone"] = True
+    page = Page()
+    add_player(page, data, note)
+    return page.write(path, "Side by side" if title is None else title)
+
+
+def _marks(keyframes, lengths, times):
+    """Key-frames by name, as shares of each performance and of the clock; None if not known."""
+    names = [str(name) for name in getattr(keyframes, "columns", ())]
+    frames = check_own_keyframes(keyframes, len(lengths))
+    shares, out = frames / (lengths[:, np.newaxis] - 1), []
+    outside = np.argwhere((shares < 0) | (shares > 1))
+    if len(outside):
+        i, k = outside[0]
+        raise ValueError(
+            f"Key-frame {k} of performance {i} is {frames[i, k]:g}, and its frames are from 0 to "
+            f"{lengths[i] - 1}: give frames of each performance."
+        )
+    for k, own in enumerate(shares.T):
+        clock = None
+        if times is not None and np.isfinite(own).any():
+            last = times.shape[1] - 1
+            places = [
+                np.interp(x * last, tau, np.arange(last + 1))
+                for x, tau in zip(own, times, strict=True)
+            ]
+            clock = float(np.nanmedian(places)) / last
+        known = [None if np.isnan(x) else float(x) for x in own]
+        name = names[k] if names else f"key-frame {k}"
+        out.append({"name": name, "own": known, "clock": clock})
+    return out
 
 
 def bodies_of(estimator, X, params):
@@ -54,7 +205,7 @@ def bodies_of(estimator, X, params):
 
 
 def player_of(trials, X, skeleton):
-    """What the script of the player reads, and sentences on colours and on what was left out.
+    """The data of the player of a report, and sentences on what it shows.
 
     Parameters
     ----------
@@ -66,71 +217,108 @@ def player_of(trials, X, skeleton):
     n, template = len(trials.names), trials.template
     X = as_performances(X)
     first = 0 if template is None else template
-    points, bones, dots = _points(X[first], skeleton, first)
-    width = points.shape[1] * points.shape[2]
+    width = int(np.prod(_points(X[first], skeleton, first)[0].shape[1:]))
     most = max(MOST_COORDINATES // (width * _FEWEST_FRAMES), 2)
     chosen = sorted(sorted(range(n), key=lambda i: i != first)[:most])
-    longest = _longest([trials.frames[i] for i in chosen], MOST_COORDINATES // width)
-    bodies = []
-    for i in chosen:
-        x = _points(X[i], skeleton, i)[0]
-        if len(x) > longest:
-            even = match_of_times([np.arange(float(longest))], 1)
-            x = even.warp([x.reshape(len(x), -1)])[0].reshape(longest, *x.shape[1:])
-        bodies.append(x)
-    durations = (trials.frames - 1.0 if trials.seconds is None else trials.seconds)[chosen]
-    times = trials.aligned.match.times[chosen]
-    every = np.concatenate(bodies)
-    scale = np.nanmax(np.abs(every)) / _LARGEST
     right = chosen.index(first)
+    data, note = data_of_bodies(
+        [_points(X[i], skeleton, i) for i in chosen],
+        [trials.names[i] + " (template)" * (i == template) for i in chosen],
+        None if trials.seconds is None else trials.seconds[chosen],
+        trials.aligned.match.times[chosen],
+    )
+    # One beside the template.
+    data["shown"] = sorted({1 if right == 0 and len(chosen) > 1 else 0, right})
+    if len(chosen) < n:
+        note = f"{note} The player holds {counted(len(chosen), 'trial')} of {n}."
+    return data, note
+
+
+def data_of_bodies(bodies, names, seconds=None, times=None, keyframes=()):
+    """What the script of the player reads, and sentences on colours and on what was left out.
+
+    Parameters
+    ----------
+    bodies : list of (points, bones, dots)
+        As `_points` gives them.
+    names : list of str
+    seconds : ndarray, shape (n_sequences,), default=None
+        Durations, if they are known.
+    times : ndarray, shape (n_sequences, P), default=None
+        The warps to a common clock.
+    keyframes : list of dict, default=()
+        The ``name``, the shares ``own`` of each trial and the share ``clock`` of the clock.
+    """
+    bones, dots = bodies[0][1:]
+    lengths = np.array([len(points) for points, _, _ in bodies])
+    width = int(np.prod(bodies[0][0].shape[1:]))
+    longest, kept = _longest(lengths, max(MOST_COORDINATES // width, 2 * len(bodies))), []
+    for points, _, _ in bodies:
+        if len(points) > longest:
+            even = match_of_times([np.arange(float(longest))], 1)
+            flat = points.reshape(len(points), -1)
+            points = even.warp([flat])[0].reshape(longest, *points.shape[1:])
+        kept.append(points)
+    every = np.concatenate(kept)
+    scale = np.nanmax(np.abs(every)) / _LARGEST or 1.0
+    durations = lengths - 1.0 if seconds is None else seconds
+    middle = float(np.median(durations))
     data = {
-        "names": [trials.names[i] + " (template)" * (i == template) for i in chosen],
-        "left": 1 if right == 0 and len(chosen) > 1 else 0,
-        "right": right,
-        "seconds": trials.seconds is not None,
+        "names": names,
+        "shown": list(range(len(names))),
+        "most": MOST_SHOWN,
+        "alone": False,
+        "seconds": seconds is not None,
         "durations": durations.tolist(),
-        "median": float(np.median(durations)),
-        "pace": 1.0 if trials.seconds is not None else _UNKNOWN / float(np.median(durations)),
-        "counts": [len(x) for x in bodies],
+        "lengths": lengths.tolist(),
+        "median": middle,
+        "pace": 1.0 if seconds is not None else _UNKNOWN / middle,
+        "counts": [len(x) for x in kept],
         "points": every.shape[1],
         "dims": every.shape[2],
         "positions": _packed(np.where(np.isnan(every), _MISSING, every / scale), "<i2"),
         "scale": float(scale),
-        "frames": times.shape[1],
-        "warps": _packed(times / (times.shape[1] - 1) * 65535, "<u2"),
+        "frames": 0 if times is None else times.shape[1],
+        "warps": None if times is None else _packed(times / (times.shape[1] - 1) * 65535, "<u2"),
+        "keyframes": list(keyframes),
         "bones": bones,
         "dots": dots,
-        "dotColor": COLORS["middle"],
+        "colors": {"light": {side: COLORS[side] for side in _ON_DARK}, "dark": _ON_DARK},
     }
     note = ["Left limbs are blue, right ones orange."] if bones else []
-    if len(chosen) < n:
-        note.append(f"The player holds {counted(len(chosen), 'trial')} of {n}.")
-    if max(trials.frames[chosen]) > longest:
+    if lengths.max() > longest:
         note.append(f"To keep this file small, it holds {longest} frames of longer trials.")
     return data, " ".join(note)
+
+
+def add_player(page, data, note):
+    """Add the player to a page, as the last section."""
+    page.player = data
+    page.add("Stick figures", read_part("player.html"), paragraph(note))
 
 
 def _points(x, skeleton, i):
     """The points of a trial that are drawn, (n_frames, n_points, n_dims), its bones and its dots.
 
-    Bones are pairs of a colour and indices of two points.
+    Bones are pairs of a side and indices of two points.
     """
     body = place_on_floor(read_positions(x, skeleton, i), skeleton)
-    views = [project(body, skeleton, azimuth) for azimuth in (0, -90)[: skeleton.n_dims - 1]]
+    views = [project(body, skeleton, azimuth) for azimuth in (0, -90)[: body.shape[2] - 1]]
     # Seen from the front, and from the side.
     points = np.concatenate([views[0], *(view[..., :1] for view in views[1:])], axis=2)
     by_side = bones_by_side(skeleton)
     # As in `SkeletonDisplay`, the joints are dots if no bones join them; otherwise the head is one.
-    dots = [] if skeleton.bones else list(range(len(skeleton.joints)))
+    joined = skeleton is not None and skeleton.bones
+    dots = [] if joined else list(range(body.shape[1]))
     used = sorted({k for of_side in by_side.values() for bone in of_side for k in bone} | {*dots})
     number = {point: k for k, point in enumerate(used)}
     bones = [
-        [COLORS[side], [[number[a], number[b]] for a, b in of_side]]
+        [side, [[number[a], number[b]] for a, b in of_side]]
         for side, of_side in by_side.items()
         if of_side
     ]
     points, dots = points[:, used], [number[k] for k in dots]
-    if not dots and "head" in skeleton.landmarks:
+    if joined and "head" in skeleton.landmarks:
         dots = [len(used)]
         head = landmark_track(body, skeleton, "head")[:, np.newaxis]
         points = np.concatenate([points, head], axis=1)

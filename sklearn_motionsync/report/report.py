@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pathlib
 import re
-import uuid
 from collections.abc import Mapping
 from typing import Any
 
@@ -30,8 +29,8 @@ from ..inputs.wording import counted
 from ..synchronizers.match import UNITS
 from ..utils.pipelines import flat_steps
 from .figures import draw_offsets, draw_signals, own_figures
-from .page import Page, list_of, number, paragraph, picture, read_part, table_of
-from .player import bodies_of, player_of
+from .page import Page, check_path, list_of, number, paragraph, picture, table_of
+from .player import add_player, bodies_of, player_of
 from .tables import TrialSet, as_text
 
 __all__ = ["write_report"]
@@ -65,7 +64,7 @@ def write_report(
 
     It has the set, the signals before and after alignment, the timing of every trial, the test of
     groups, and doubtful trials. Its tables can be saved as CSV. Where there are bodies, a player
-    shows two of them on one clock, or each at its own pace.
+    shows them side by side on one clock, or each at its own pace: at first two, others by choice.
 
     Parameters
     ----------
@@ -125,6 +124,7 @@ def write_report(
     See Also
     --------
     compare_groups : The test, with more arguments.
+    write_player : The player by itself.
     sklearn_motionsync.display.GroupDisplay : The figure of groups, with more arguments.
 
     Notes
@@ -145,7 +145,7 @@ def write_report(
     >>> path.read_text(encoding="utf-8")[:15]
     '<!DOCTYPE html>'
     """
-    path = _check_path(path)
+    path = check_path(path, "report")
     if left_out is not None and not isinstance(left_out, Mapping):
         raise ValueError(
             "left_out must be a mapping of labels of trials to reasons, such as "
@@ -172,13 +172,8 @@ def write_report(
         if skeleton is None:
             bodies, skeleton = bodies_of(estimator, X, params)
         if skeleton is not None:
-            page.player, note = player_of(trials, bodies, skeleton)
-            page.add("Stick figures", read_part("player.html"), paragraph(note))
-    # The version is known once the package is imported.
-    from .. import __version__
-
-    _write(path, page.render("Aligned trials" if title is None else str(title), __version__))
-    return path
+            add_player(page, *player_of(trials, bodies, skeleton))
+    return page.write(path, "Aligned trials" if title is None else title)
 
 
 # -- the sections --------------------------------------------------------------------------
@@ -333,31 +328,3 @@ def _add_doubtful(page, trials):
         table_of(table, f"Look at {counted(len(rows), 'trial')} before using the warps"),
         page.offer(doubtful=table) if rows else "",
     )
-
-
-# -- the file ------------------------------------------------------------------------------
-
-
-def _check_path(path):
-    path = pathlib.Path(path)
-    if path.exists() and not path.is_file():
-        raise ValueError(
-            f"path must be that of a file, such as 'report.html'; {str(path)!r} is a folder or a "
-            "device."
-        )
-    if not path.parent.is_dir():
-        raise FileNotFoundError(
-            f"There is no folder {str(path.parent)!r} for the report {path.name!r}: make it by "
-            "Path.mkdir(parents=True), or give the path of another file."
-        )
-    return path
-
-
-def _write(path, text):
-    """Write a file as a whole or not at all."""
-    beside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-    try:
-        beside.write_text(text, encoding="utf-8", newline="\n")
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)

@@ -21,5 +21,10 @@ def texts(axis):
 def bones_drawn(display, panel, side=None):
     """The ends (n_bones, 2, 2) of bones of stick figures, of one side or all."""
     sides = [side] if side else list(display.bones_[panel])
-    ends = [xy for s in sides for xy in segments(display.bones_[panel][s])]
-    return np.array(ends).reshape(-1, 2, 2)
+    return np.concatenate([ends_of_bones(display.bones_[panel][s]) for s in sides])
+
+
+def ends_of_bones(collection):
+    """The ends (n_bones, 2, 2) of the bones of bodies, each of which is a line with gaps."""
+    ends = [xy.reshape(-1, 3, 2)[:, :2] for xy in segments(collection)]
+    return np.concatenate([np.empty((0, 2, 2)), *ends])

@@ -41,16 +41,3 @@ def test_closing_the_figure_prevents_the_warning(bending):
             del animation
             gc.collect()
             assert len(caught) == 1, closes
-
-
-@pytest.mark.parametrize("ending", ["html", "gif"])
-def test_every_picture_is_drawn_once_and_the_layout_remains(bending, ending, tmp_path):
-    display = SkeletonDisplay.from_positions(bending.data[0], bending.skeleton)
-    layout, axis = display.figure_.get_layout_engine(), display.axes_[0]
-    drawn = []
-    axis.draw = lambda renderer: drawn.append(type(axis).draw(axis, renderer))
-    animation = display.animate(seconds=0.3, fps=10)
-    animation.to_jshtml() if ending == "html" else animation.save(tmp_path / "x.gif", "pillow")
-    # The first time for the layout.
-    assert len(drawn) == 1 + 3
-    assert display.figure_.get_layout_engine() is layout

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from artists import bones_drawn
+from artists import bones_drawn, ends_of_bones
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
     ActionModel,
@@ -175,7 +175,7 @@ def test_without_bones_joints_are_points_and_limbs_join_landmarks():
         assert len(display.heads_[panel].get_xdata()) == 16
     shown = SkeletonDisplay([[np.zeros((2, 16, 3)) + np.arange(3)]], bare, ["a"],
                             behind=[[np.zeros((2, 16, 3))]]).plot()  # fmt: skip
-    assert len(shown.behind_[0].get_paths()) == 14
+    assert len(ends_of_bones(shown.behind_[0])) == 14
 
 
 def test_points_without_a_skeleton_have_two_or_three_axes():

@@ -4,6 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from artists import ends_of_bones
 from sklearn import clone, config_context
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
@@ -226,7 +227,7 @@ def test_a_pipeline_without_aspace_on_axes_of_the_user(bunch):
     assert display.heading_ is None
     assert display.marked[0] == []
     assert marked_joints(display, 1) == {"left_elbow", "left_wrist"}
-    assert len(display.bones_[1]["departing"].get_paths()) == 2
+    assert len(ends_of_bones(display.bones_[1]["departing"])) == 2
     assert display.axes_[1].get_title().startswith("frame 15\nleft arm ")
 
 

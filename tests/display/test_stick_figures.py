@@ -4,7 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from artists import bones_drawn
+from artists import bones_drawn, ends_of_bones
 from IPython.core.formatters import HTMLFormatter
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import (
@@ -106,14 +106,14 @@ def test_shadows_are_behind_and_move_along():
     assert display.plot(at=1).heading_.get_text() == "all of it"
     (shadow,) = display.behind_
     assert shadow.get_zorder() < min(lines.get_zorder() for lines in display.bones_[0].values())
-    drawn = sorted(path.vertices.tolist() for path in shadow.get_paths())
+    drawn = sorted(ends_of_bones(shadow).tolist())
     assert drawn == sorted(bones_drawn(display, 0).tolist())
     # The same side by side; a figure of the user has no heading.
     scenes = {"scenes": [[moving, moving]], "behind": [[moving, moving]]}
     display = SkeletonDisplay(**scenes, skeleton=skeleton, titles=["one"], labels=["a", "b"])
     display.plot(plt.subplots()[1], at=0.5)
     assert display.heading_ is None
-    drawn = sorted(path.vertices.tolist() for path in display.behind_[0].get_paths())
+    drawn = sorted(ends_of_bones(display.behind_[0]).tolist())
     assert drawn == sorted(bones_drawn(display, 0).tolist())
 
 
@@ -185,6 +185,7 @@ def test_bodies_move_together_after_synchronisation(bunch, pipe):
         assert len(bones_drawn(display, 0)) == 6 * 14
         times = [axis.get_title().split(", ")[1] for axis in display.axes_]
         assert times == [f"at {100 * at:.0f} % of the time"] * 2
+        assert [line.get_xdata()[-1] for line in display.moments_] == [at] * 2
     apart = {name: np.ptp(np.array(h), axis=1).mean() for name, h in heights.items()}
     assert apart["synchronised"] < 0.02 < 0.2 < apart["raw"]
 

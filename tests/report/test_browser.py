@@ -1,4 +1,4 @@
-"""The page of a report in a browser: its player, its files, its widths, and that nothing fails."""
+"""Reports and players in a browser: what is drawn, files, widths, and that nothing fails."""
 
 import json
 import re
@@ -9,7 +9,13 @@ from urllib.parse import unquote
 import pandas as pd
 import pytest
 from sklearn.pipeline import make_pipeline
-from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines, write_report
+from sklearn_motionsync import (
+    ASpace,
+    DenseSynchronizer,
+    DirectionCosines,
+    write_player,
+    write_report,
+)
 from sklearn_motionsync.datasets import make_bending, make_gait
 
 NAMES = "chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"
@@ -59,33 +65,66 @@ async function visit(width) {
   };
   there.querySelectorAll("button[data-file]").forEach((button) => button.click());
 
+  // Without a screen a browser draws when it likes.
+  own.requestAnimationFrame = (f) => own.setTimeout(() => f(own.performance.now()), 16);
   if (find("stage")) {
-    const picture = () => find("stage").toDataURL();
+    const canvases = () => [...find("stage").querySelectorAll("canvas")];
+    const picture = () => canvases().map((one) => one.toDataURL()).join();
     const change = (id, value, kind) => {
       find(id).value = value;
       find(id).dispatchEvent(new own.Event(kind));
       return [picture(), find("moment").textContent];
     };
-    const pen = find("stage").getContext("2d");
-    const pixels = pen.getImageData(0, 0, find("stage").width, find("stage").height).data;
+    const first = canvases()[0];
+    const pixels = first.getContext("2d").getImageData(0, 0, first.width, first.height).data;
     out.colors = new Set(new Uint32Array(pixels.buffer)).size;
+    out.count = canvases().length;
+    out.columns = own.getComputedStyle(find("stage")).gridTemplateColumns.split(" ").length;
+    out.rows = new Set(canvases().map((one) => one.getBoundingClientRect().top)).size;
     out.start = [picture(), find("moment").textContent];
-    out.moved = change("time", 500, "input");
-    out.turned = change("turn", 90, "input");
-    out.other = change("left", 4, "change");
+    out.frames = Number(find("time").max) + 1;
+    out.moved = change("time", (out.frames - 1) / 2, "input");
+    out.turned = change("turn", 45, "input");
+    out.seen = change("from", 90, "change");
+    const boxes = [...find("choice").querySelectorAll("input")];
+    boxes.find((box) => !box.checked)?.click();
+    out.other = [picture(), find("moment").textContent, canvases().length];
+    out.shown = find("shown").textContent;
     const recorded = there.querySelector("input[value=recorded]");
-    recorded.click();
+    if (!find("paces").hidden) recorded.click();
     out.recorded = [picture(), find("moment").textContent];
+    const place = (mark) => Number(mark.style.getPropertyValue("--at"));
+    out.marks = [...find("marks").children].map(place);
+    out.jumped = [...find("jumps").querySelectorAll("button")].map((jump) => {
+      jump.click();
+      return find("time").value / find("time").max;
+    });
     const key = (name) =>
       find("stage").dispatchEvent(new own.KeyboardEvent("keydown", { key: name }));
     key("ArrowRight");
     out.key = [picture(), find("moment").textContent];
+    out.at = Number(find("time").value);
     find("play").click();
     out.playing = find("play").textContent;
     for (let k = 0; k < 100 && picture() === out.key[0]; k++) await wait(50);
     key(" ");
     out.paused = find("play").textContent;
     out.played = [picture(), find("moment").textContent];
+    // Without repetition it stops at the end.
+    find("loop").click();
+    key("End");
+    out.end = Number(find("time").value);
+    key("ArrowLeft");
+    key(" ");
+    for (let k = 0; k < 100 && find("play").textContent === "Pause"; k++) await wait(50);
+    out.stopped = [find("play").textContent, Number(find("time").value)];
+    key("Home");
+    out.home = Number(find("time").value);
+    const controls = "#stage, .controls input, .controls select, canvas";
+    out.turns = !find("view").hidden;
+    out.labels = [...there.querySelectorAll(controls)].map(
+      (one) => one.ariaLabel || one.closest("label")?.textContent.trim() || "",
+    );
   }
   await wait(100);
   out.problems = own.problems;
@@ -136,7 +175,7 @@ def visit(path, folder):
 def bending(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bending")
     bunch = make_bending(6, n_frames=40, random_state=0)
-    pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(), DenseSynchronizer(30))
+    pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(), DenseSynchronizer(31))
     path = write_report(folder / "report.html", pipe.fit(bunch.data), bunch.data, frame_rate=20)
     return visit(path, folder)
 
@@ -182,14 +221,66 @@ def test_buttons_save_tables(gait, bending):
     assert "trials.csv" in bending[0]["files"]
 
 
+@pytest.fixture(scope="module")
+def players(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("players")
+    path = folder / "player.html"
+    found = {}
+    bunch = make_bending(5, n_frames=40, random_state=0)
+    pipe = make_pipeline(DirectionCosines(bunch.skeleton), DenseSynchronizer(31)).fit(bunch.data)
+    keyframes = pd.DataFrame({"down": [[10, 12, 9, None, 11]][0], "up": [30] * 5})
+    given = {"match": pipe, "keyframes": keyframes, "frame_rate": 20}
+    found["aligned"] = visit(write_player(path, bunch.data, bunch.skeleton, **given), folder)
+    names = [f"joint{k}_{axis}" for k in range(15) for axis in "xy"]
+    flat = [x.reshape(len(x), -1, 3)[..., :2].reshape(len(x), -1) for x in bunch.data[:2]]
+    flat = [pd.DataFrame(x, columns=names) for x in flat]
+    found["plane"] = visit(write_player(path, flat, None), folder)
+    return found
+
+
+def check_steps(found, steps):
+    assert found["problems"] == []
+    assert found["scroll"] <= found["inner"]
+    assert found["colors"] > 2
+    pictures = [found[step][0] for step in steps]
+    assert len(set(pictures)) == len(steps)
+    assert (found["playing"], found["paused"]) == ("Pause", "Play")
+    assert found["stopped"] == ["Play", found["end"]]
+    assert found["end"] > 0 == found["home"]
+    assert all(found["labels"])
+
+
 def test_the_player_draws_and_its_controls_work(bending):
     for found in bending:
-        assert found["colors"] > 4
-        steps = ["start", "moved", "turned", "other", "recorded", "key", "played"]
-        pictures = [found[step][0] for step in steps]
-        assert len(set(pictures)) == len(steps)
+        check_steps(
+            found, ["start", "moved", "turned", "seen", "other", "recorded", "key", "played"]
+        )
         assert found["start"][1].startswith("At 0 % of the template, trial ")
         assert found["moved"][1].startswith("At 50 % of the template, trial ")
+        assert (found["count"], found["other"][2], found["shown"]) == (2, 3, "Trials: 3 of 6")
         assert found["recorded"][1].startswith("After ")
-        assert " s, trial 4 is at " in found["recorded"][1]
-        assert (found["playing"], found["paused"]) == ("Pause", "Play")
+        assert " s, trial 0 is at " in found["recorded"][1]
+
+
+def test_a_player_by_itself(players):
+    for found in players["aligned"]:
+        check_steps(found, ["start", "moved", "turned", "seen", "recorded", "key", "played"])
+        assert (found["count"], found["frames"]) == (5, 31)
+        assert found["moved"][1] == "At 50 % of the template."
+        # Each at its own pace; one does not have the first key-frame.
+        assert len(found["marks"]) == 4 + 5
+        assert found["jumped"] == pytest.approx(sorted(found["jumped"]))
+        assert all(min(abs(jump - at) for at in found["marks"]) < 0.03 for jump in found["jumped"])
+    wide, phone = players["aligned"]
+    assert (wide["columns"], wide["rows"]) in [(5, 1), (3, 2)]
+    assert phone["columns"] <= 3
+    assert phone["rows"] > 1
+
+
+def test_points_in_a_plane_without_a_match(players):
+    for found in players["plane"]:
+        check_steps(found, ["start", "moved", "key", "played"])
+        # There is no other side, and no other pace.
+        assert not found["turns"]
+        assert found["start"][1].startswith("At frame 0, trial 0 is at 0 %, and trial 1")
+        assert found["marks"] == found["jumped"] == []

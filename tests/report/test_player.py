@@ -1,0 +1,226 @@
+"""write_player: positions, warps and marks in the page, decoded by other means; what is refused."""
+
+import base64
+import json
+import re
+import struct
+from html.parser import HTMLParser
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    DenseSynchronizer,
+    DirectionCosines,
+    Match,
+    Skeleton,
+    write_player,
+    write_report,
+)
+from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.report import player
+
+BENDS = make_bending(5, n_frames=40, random_state=0)
+PIPE = make_pipeline(DirectionCosines(BENDS.skeleton), DenseSynchronizer(31)).fit(BENDS.data)
+# Elements without an end.
+VOID = {"meta", "input", "link", "img", "br", "hr"}
+
+
+class Elements(HTMLParser):
+    """The elements of a page, each of which must end within the one that it began in."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.page, self.tags, self.ids, self._open = path.read_text(encoding="utf-8"), [], [], []
+        self.feed(self.page)
+        self.close()
+        assert self._open == []
+        self.data = json.loads(re.search(r'id="data">(.*?)</script>', self.page, re.DOTALL)[1])
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        self.ids += [value for name, value in attributes if name == "id"]
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self._open.pop() == tag
+
+
+def whole_numbers(text, code):
+    """Numbers of two bytes."""
+    data = base64.b64decode(text)
+    return [number for (number,) in struct.iter_unpack(code, data)]
+
+
+def positions_of(data):
+    """The points (n_frames_i, n_points, n_dims) of each trial."""
+    numbers = np.array(whole_numbers(data["positions"], "<h"), dtype=float)
+    numbers[numbers == -32768] = np.nan
+    points = (numbers * data["scale"]).reshape(-1, data["points"], data["dims"])
+    return np.split(points, np.cumsum(data["counts"])[:-1])
+
+
+def write(tmp_path, X=BENDS.data, skeleton=BENDS.skeleton, **given):
+    return Elements(write_player(tmp_path / "a.html", X, skeleton, **given))
+
+
+# -- what the page holds ----------------------------------------------------------------------
+
+
+def test_positions_are_those_given(tmp_path):
+    page = write(tmp_path, match=PIPE, frame_rate=50, names=list("abcde"), title="Bends & more")
+    data, skeleton = page.data["player"], BENDS.skeleton
+    assert data["names"] == list("abcde")
+    assert data["shown"] == [0, 1, 2, 3, 4]
+    assert "<title>Bends &amp; more</title>" in page.page
+    places = {name: skeleton.indices_of(name)[0] for name in ("left_knee", "left_ankle")}
+    for x, points in zip(BENDS.data, positions_of(data), strict=True):
+        x = x.reshape(len(x), -1, 3)
+        assert len(points) == len(x)
+        # Turned about the vertical and moved: heights, and distances between joints, remain.
+        heights = x[..., 1] - x[..., 1].min()
+        shank = np.linalg.norm(x[:, places["left_knee"]] - x[:, places["left_ankle"]], axis=1)
+        near = np.abs(points[..., 1][:, :, None] - heights[:, None]).max(axis=0)
+        knee, ankle = (near[:, joint].argmin() for joint in places.values())
+        assert max(near[knee, places["left_knee"]], near[ankle, places["left_ankle"]]) < 1e-3
+        drawn = np.linalg.norm(points[:, knee] - points[:, ankle], axis=1)
+        np.testing.assert_allclose(drawn, shank, atol=1e-3)
+    assert data["durations"] == [(len(x) - 1) / 50 for x in BENDS.data]
+    assert (data["seconds"], data["pace"]) == (True, 1)
+    tau = np.array(whole_numbers(data["warps"], "<H")).reshape(5, 31) / 65535
+    times = Match.from_estimator(PIPE, BENDS.data).times
+    np.testing.assert_allclose(tau, times / 30, atol=2e-5)
+
+
+def test_the_page_is_one_file_that_needs_nothing(tmp_path):
+    for page in (write(tmp_path), write(tmp_path, match=PIPE, keyframes=[[3]] * 5)):
+        assert "://" not in page.page
+        assert len(set(page.ids)) == len(page.ids)
+        used = set(re.findall(r'find\("(\w+)"\)', page.page))
+        assert used <= set(page.ids)
+        for tag, attributes in page.tags:
+            assert tag not in ("link", "iframe", "img", "object", "embed")
+            assert not {"src", "href"} & set(attributes)
+        policy = [a["content"] for _, a in page.tags if a.get("http-equiv")]
+        assert "default-src 'none'" in policy[0]
+        assert "prefers-color-scheme: dark" in page.page
+        assert "<nav" not in page.page
+
+
+def test_without_a_frame_rate_or_a_match(tmp_path):
+    data = write(tmp_path).data["player"]
+    assert (data["seconds"], data["warps"], data["frames"]) == (False, None, 0)
+    assert data["pace"] * data["median"] == pytest.approx(4)
+    tables = [pd.DataFrame(x) for x in BENDS.data]
+    for k, x in enumerate(tables):
+        x.attrs |= {"frame_rate": 20.0 + k, "performance": f"bend {k}"}
+    data = write(tmp_path, tables).data["player"]
+    assert data["names"][3] == "bend 3"
+    assert data["durations"][3] == pytest.approx((len(tables[3]) - 1) / 23)
+
+
+def test_keyframes_are_marked_on_both_axes_of_time(tmp_path):
+    frames = np.array([[9, np.nan], [10, np.nan], [12, np.nan], [8, 20], [np.nan, 30]])
+    table = pd.DataFrame(frames, columns=["down", "up"])
+    match = Match.from_estimator(PIPE, BENDS.data)
+    down, up = write(tmp_path, match=match, keyframes=table).data["player"]["keyframes"]
+    assert (down["name"], up["name"]) == ("down", "up")
+    last = np.array([len(x) - 1 for x in BENDS.data])
+    assert down["own"] == [9 / last[0], 10 / last[1], 12 / last[2], 8 / last[3], None]
+    # Warped to the clock, the frame of most trials is the key-frame of theirs.
+    at = [np.interp(down["clock"] * 30, np.arange(31), tau) / 30 * n
+          for tau, n in zip(match.times, last, strict=True)]  # fmt: skip
+    early = [a < frame for a, frame in zip(at[:4], frames[:4, 0], strict=True)]
+    assert sum(early) == 2
+    (only,) = write(tmp_path, keyframes=frames[:, :1]).data["player"]["keyframes"]
+    assert (only["name"], only["clock"]) == ("key-frame 0", None)
+
+
+def test_points_without_bones_gaps_and_one_performance(tmp_path):
+    x = BENDS.data[0].copy()
+    x[5:9, :3] = np.nan
+    data = write(tmp_path, x, None).data["player"]
+    assert (data["bones"], len(data["dots"]), data["counts"]) == ([], 15, [len(x)])
+    (points,) = positions_of(data)
+    assert np.isnan(points).any(axis=(1, 2)).sum() == 4
+    bare = Skeleton(BENDS.skeleton.joints, [-1] * 15)
+    assert write(tmp_path, skeleton=bare).data["player"]["dots"] == list(range(15))
+
+
+def test_long_performances_have_fewer_frames_and_the_page_names_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(player, "MOST_COORDINATES", 5 * 20 * 14 * 3)
+    page = write(tmp_path)
+    data = page.data["player"]
+    assert sum(data["counts"]) * data["points"] * 3 <= 5 * 20 * 14 * 3
+    assert f"holds {max(data['counts'])} frames of longer trials" in page.page
+    assert data["lengths"] == [len(x) for x in BENDS.data]
+    ends = positions_of(data)[0][[0, -1], :, 1]
+    monkeypatch.undo()
+    whole = positions_of(write(tmp_path).data["player"])[0]
+    np.testing.assert_allclose(ends, whole[[0, -1], :, 1], atol=2e-4)
+
+
+def test_names_are_text_and_no_markup(tmp_path):
+    evil = '</script><script>alert("x")</script>'
+    page = write(tmp_path, names=[evil] * 5, title=evil)
+    scripts = [attributes for tag, attributes in page.tags if tag == "script"]
+    assert scripts == [{"type": "application/json", "id": "data"}, {}]
+    assert page.data["player"]["names"] == [evil] * 5
+
+
+def test_a_report_has_the_same_player(tmp_path):
+    report = Elements(write_report(tmp_path / "b.html", PIPE, BENDS.data))
+    alone = write(tmp_path, match=PIPE)
+    for key in ("positions", "warps", "bones", "dots", "colors"):
+        assert report.data["player"][key] == alone.data["player"][key]
+    part = player.read_part("player.html")
+    assert part in report.page
+    assert part in alone.page
+
+
+def test_people_side_by_side(tmp_path, real_data):
+    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    X = [bunch.data[i] for i in np.flatnonzero(np.asarray(bunch.target) == "grabHighR")[:5]]
+    path = write_player(tmp_path / "a.html", X, bunch.skeleton, frame_rate=120)
+    assert path.stat().st_size < 2e6
+    for x, points in zip(X, positions_of(Elements(path).data["player"]), strict=True):
+        up = x.reshape(len(x), -1, 3)[..., 1]
+        # Of the joints that bones join.
+        assert np.ptp(points[..., 1]) == pytest.approx(np.ptp(up), rel=0.05)
+
+
+# -- what is refused --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "message"),
+    [
+        ({"X": BENDS.data * 5}, ValueError, r"X has 25 performances, .* 24 .* such as X\[:24\]"),
+        ({"X": [BENDS.data[0], BENDS.data[1][:1]]}, ValueError, "Performance 1 has 1 frame"),
+        ({"names": ["a"]}, ValueError, "names must be a list of text, one for each of the 5"),
+        ({"match": Match([[0, 1, 2]])}, ValueError, "match must be of the 5 performances of X"),
+        ({"match": DenseSynchronizer()}, ValueError, "not fitted"),
+        ({"keyframes": [[3]]}, ValueError, "one row a performance"),
+        ({"keyframes": [[3]] * 4 + [[99]]}, ValueError, "Key-frame 0 of performance 4 is 99"),
+        ({"skeleton": "acclaim"}, ValueError, "skeleton must be a Skeleton"),
+        ({"frame_rate": 0}, ValueError, "frame_rate"),
+        ({"X": []}, ValueError, "0 performances"),
+    ],
+)
+def test_refused_arguments_leave_the_file_as_it_was(tmp_path, given, error, message):
+    path = tmp_path / "a.html"
+    path.write_text("before")
+    given = {"X": BENDS.data, "skeleton": BENDS.skeleton} | given
+    with pytest.raises(error, match=message):
+        write_player(path, **given)
+    assert path.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_refused_paths(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"There is no folder '.*none' for the player"):
+        write_player(tmp_path / "none" / "a.html", BENDS.data, BENDS.skeleton)
+    with pytest.raises(ValueError, match=r"such as 'player.html'.* is a folder or"):
+        write_player(tmp_path, BENDS.data, BENDS.skeleton)
