@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-__all__ = ["Rig", "make_rig", "solve_rig"]
+__all__ = ["Rig", "add_middles", "make_rig", "solve_rig"]
 
 # Bones of a body whose median lengths differ from those of the rig by more than this share are as
 # long as in the body.
@@ -53,6 +53,45 @@ class Rig(NamedTuple):
         """The rig in the ``attrs`` of a table; None without one."""
         known = attrs.get("rig")
         return None if known is None else cls(attrs["joints"], attrs["parents"], **known)
+
+
+def add_middles(joints, parents, points):
+    """A body with a joint in the middle of two that keep their distance, but not from the parent.
+
+    So are hips that were moved from the pelvis by one height, whatever way it turns. The middle,
+    ``<parent>_middle``, keeps its distance from the parent, and both joints that from the middle.
+
+    Parameters
+    ----------
+    joints : list of str
+    parents : list of int
+    points : ndarray, shape (n_frames, n_joints, 3)
+
+    Returns
+    -------
+    joints, parents, points :
+        The same with more joints at the end.
+    """
+    joints, parents = list(joints), list(parents)
+
+    def varies(start, end):
+        lengths = np.linalg.norm(end - start, axis=1)
+        return np.ptp(lengths) > _SAME_LENGTH * lengths.max()
+
+    for parent in range(len(joints)):
+        children = [j for j, above in enumerate(parents) if above == parent]
+        at = points[:, parent]
+        loose = [j for j in children if varies(at, points[:, j])]
+        if len(loose) == 2:
+            pair = points[:, loose]
+            middle = pair.mean(axis=1)
+            if not varies(*pair.swapaxes(0, 1)) and not varies(at, middle):
+                for j in loose:
+                    parents[j] = len(joints)
+                joints.append(f"{joints[parent]}_middle")
+                parents.append(parent)
+                points = np.concatenate([points, middle[:, np.newaxis]], axis=1)
+    return joints, parents, points
 
 
 def make_rig(joints, parents, points):

@@ -15,7 +15,7 @@ from ..inputs.recorded import frame_rate_of_rows, start_of_rows
 from ..inputs.types import Path, PerformanceLike, Table
 from ..inputs.wording import counted
 from .motion import read_motion
-from .rig import Rig, make_rig, solve_rig
+from .rig import Rig, add_middles, make_rig, solve_rig
 
 __all__ = ["write_motion"]
 
@@ -167,7 +167,9 @@ def _rig_like(like, X, path):
 
 def _write_bvh(joints, parents, points, up, rate, rig, path):
     points = np.stack([s * points[..., a] for a, s in UP_AXES[3][up]], axis=-1)
-    rig = make_rig(joints, parents, points) if rig is None else rig
+    if rig is None:
+        joints, parents, points = add_middles(joints, parents, points)
+        rig = make_rig(joints, parents, points)
     if rig.parents.count(-1) != 1:
         raise ValueError(
             f"{path}: a BVH file has one root, got {rig.parents.count(-1)}: give a skeleton with "
