@@ -27,7 +27,8 @@ class Track(NamedTuple):
     postures : ndarray, shape (n_frames, n_features)
         Expected postures, given the observations.
     covariances : ndarray, shape (n_frames, n_features, n_features)
-        Of the postures, over all possible phases; without the noise of observations.
+        Of the postures, over all possible phases, and larger where what is seen is improbable;
+        without the noise of observations.
     phases : ndarray, shape (n_frames,)
         Weighted medians of the particles, in frames of the clock, 0 to P - 1.
     rates : ndarray, shape (n_frames,)
