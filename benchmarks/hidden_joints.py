@@ -17,7 +17,8 @@ of these. The tracker has `JointNoise`.
 1. Mean error of the joints that are hidden (or moved), mean over takes, then over actions.
 2. Its ratio to the best of the filters that know no phase, the mean of actions; *before* is that of
    `MotionTracker(noise=0.05)`.
-3. Frames called lost, in %, with joints moved by 1, 3 and 5 cm: of right takes, and of other
+3. The same of other actions under the model, and shares of hidden cosines within bands of 90 %.
+4. Frames called lost, in %, with joints moved by 1, 3 and 5 cm: of right takes, and of other
    actions under the same model.
 """
 
@@ -203,12 +204,40 @@ def show(errors):
                 print(f"   {name + ', ' + label:32}" + "".join(f"{x:7.3f} " for x in row))
 
 
+def other_of(folds, k):
+    """A fold of another action."""
+    others = [fold for fold in folds if fold.action != folds[k].action]
+    return others[(3 * k) % len(others)]
+
+
+def show_bands(folds, n_takes):
+    """Bands of 90 % live, right takes and other actions; and errors, beside the pooled process."""
+    for name in ("right", "other"):
+        for kind in ("arm", "legs", "gap"):
+            inside, errors = [], []
+            for k, fold in enumerate(folds):
+                of = fold if name == "right" else other_of(folds, k)
+                for i, x in enumerate(of.test[:n_takes]):
+                    rng = np.random.default_rng([k, i, KINDS.index(kind)])
+                    seen, _, counts = of.case(x, kind, rng)
+                    track = fold.tracker(JointNoise(SMALL, fold.cosines)).track(seen)
+                    (peer,) = fold.peers["pooled Matern"][0].run([seen], fold.covariance(SMALL))
+                    wide = 1.645 * np.sqrt(np.diagonal(track.covariances, axis1=1, axis2=2))
+                    off = np.abs(track.postures - of.cosines.transform([x])[0])
+                    inside.append((off <= wide)[np.isnan(seen)].mean())
+                    errors.append([of.error(y, x, counts) for y in (track.postures, peer.means)])
+            own, pooled = np.mean(errors, axis=0)
+            text = (
+                f"{100 * np.mean(inside):.0f} % in bands, {own:.1f} cm, pooled Matern {pooled:.1f}"
+            )
+            print(f"   {name}, {kind} hidden: {text}", flush=True)
+
+
 def show_lost(folds, n_takes):
     for sd in (0.01, 0.03, 0.05):
         lost = defaultdict(list)
         for k, fold in enumerate(folds):
-            others = [f for f in folds if f.action != fold.action]
-            wrong = others[(3 * k) % len(others)]
+            wrong = other_of(folds, k)
             given = [("right", fold, x) for x in fold.test[:n_takes]]
             for name, of, x in [*given, ("other", wrong, wrong.test[0])]:
                 moved = x + sd * np.random.default_rng(k).standard_normal(x.shape)
@@ -229,6 +258,7 @@ def main():
         folds = list(folds_of(args.folder, name))
         print(f"{name}: {len(folds)} folds of {len({f.action for f in folds})} actions", flush=True)
         show(measure(folds, args.takes))
+        show_bands(folds, args.takes)
         show_lost(folds, args.takes)
 
 

@@ -69,9 +69,10 @@ def write_motion(
     -----
     In a BVH every joint turns as little as it must for its child to lie in its direction; with
     several children, by least squares. Lengths of bones are those of the rig; where the median of X
-    differs by more than a thousandth, those of X. The vertical axis becomes y. A joint that has
-    position channels beside the root keeps moving in its parent. The turn of a bone about itself
-    shows in positions only as far as it has more than one child.
+    differs by more than a thousandth, those of X. Hips that keep their distance, but not that from
+    the pelvis, hang on their middle, ``pelvis_middle``. The vertical axis becomes y. A joint that
+    has position channels beside the root keeps moving in its parent. The turn of a bone about
+    itself shows in positions only as far as it has more than one child.
 
     Examples
     --------

@@ -111,16 +111,7 @@ class PooledFilter:
 
 
 class RunningTake:
-    """A take that is tracked frame by frame, by both members.
-
-    Parameters
-    ----------
-    model : TrackerModel
-    seed : int
-    time : float
-        Of the first frame, which ``step`` still has to take.
-    n_observed : int
-        Its numbers.
+    """A take that is tracked frame by frame, by both members. Parameters as of `ParticleFilter`.
 
     Attributes
     ----------
@@ -245,7 +236,8 @@ def smooth_take(model, seed, values, times, observer):
     on_paths, without = [], []
     for past, path, (by_phase, by_pool) in zip(history, paths, accepted, strict=True):
         expected = at_times(model.mean, past.particles.phases[path])
-        jumps = np.outer(past.particles.restarted[path], jump)
+        restarted = past.particles.restarted[path]
+        jumps = np.outer(restarted, jump) if restarted.any() else None
         on_paths.append(PathFrame(past.dt, past.initial, expected, jumps, by_phase))
         first = not without
         without.append(PathFrame(past.dt, first, model.pooled_mean[np.newaxis], None, by_pool))

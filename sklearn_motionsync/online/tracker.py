@@ -126,9 +126,9 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
     at the end, or have restarted.
 
     Standing still in a posture of the action, or doing it backwards, is not called lost: the
-    postures are possible, and the velocities not improbable enough. The take of another action is
-    tracked by the filter that knows no phase, and not well: its postures are drawn to those of this
-    action.
+    postures are possible, and the velocities not improbable enough. Takes of another action are
+    drawn to postures of this one, with wider bands. Part of their frames is called lost: of people
+    14 to 74 %, the less the noisier the joints.
 
     Examples
     --------
