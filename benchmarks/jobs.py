@@ -1,0 +1,605 @@
+"""The jobs that `compare.py` times, and the process that runs them for one version of the package.
+
+    python benchmarks/compare.py BASE
+
+Every job goes by the public names of this checkout. `JOBS` has a function for each, which takes the
+`Data` and makes everything ready; the `Work` that it returns is what is timed. As a process, this
+file reads requests from its standard input, a line each, and answers each with a line of JSON:
+``list`` gives the names of the jobs and where the package is, ``prepare NAME`` makes one job ready
+and runs it once, and ``run`` runs it and gives the milliseconds of the processor.
+
+    python benchmarks/jobs.py [--data ../shared/data]
+"""
+
+import os
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ[_name] = "1"
+os.environ["MPLBACKEND"] = "Agg"
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable
+from functools import cached_property, partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import sklearn_motionsync
+from sklearn.base import clone
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionClassifier,
+    ActionDetector,
+    ActionModel,
+    ASpace,
+    CycleSegmenter,
+    DenseSynchronizer,
+    DirectionCosines,
+    KeyframeSynchronizer,
+    LinearSynchronizer,
+    MotionTracker,
+    OnlineSynchronizer,
+    PartSynchronizer,
+    blend_performances,
+    compare_groups,
+    compare_to_norm,
+    find_departures,
+    find_performances,
+    synchronization_distances,
+    write_report,
+)
+from sklearn_motionsync.datasets import load_performances, make_bending
+from sklearn_motionsync.display import (
+    ActionModelDisplay,
+    SkeletonDisplay,
+    SynchronizationDisplay,
+)
+from sklearn_motionsync.io import read_motion
+
+ROOT = Path(__file__).resolve().parents[1]
+DATA = ROOT.parent / "shared" / "data"
+P = 100
+
+# -- made data --------------------------------------------------------------------------
+
+
+def random_walks(n=40, n_frames=P, n_features=16, seed=0):
+    """Random walks about a common mean: (n, n_frames, n_features)."""
+    rng = np.random.default_rng(seed)
+    X = np.cumsum(rng.standard_normal((n, n_frames, n_features)), axis=1)
+    return X - X.mean(axis=(0, 1))
+
+
+def warped_copies(n=40, n_features=16, noise=0.02, seed=1000):
+    """Copies of one smooth movement under strong warps, of 85 to 115 frames, with gain and noise.
+
+    No copy is further than 24 of 100 frames from the first.
+    """
+    rng, grid = np.random.default_rng(seed), np.linspace(0, 1, 2001)
+    frequency = rng.uniform(0.5, 4.0, size=(5, n_features))
+    phase = rng.uniform(0, 2 * np.pi, size=(5, n_features))
+    size = rng.uniform(0.3, 1.0, size=(5, n_features))
+
+    def movement(at):
+        return (size * np.sin(2 * np.pi * frequency * at[:, None, None] + phase)).sum(axis=1)
+
+    warps = []
+    while len(warps) < n:
+        warp = _strong_warp(rng, grid)
+        if warps:
+            on_first = np.interp(np.interp(grid, grid, warps[0]), warp, grid)
+            if np.abs(on_first - grid).max() * (P - 1) > 24:
+                continue
+        warps.append(warp)
+    lengths, spread, copies = rng.integers(85, 116, size=n), movement(grid).std(axis=0), []
+    for warp, length in zip(warps, lengths, strict=True):
+        x = movement(np.interp(np.linspace(0, 1, length), grid, warp))
+        x = x * (1 + 0.05 * rng.standard_normal(n_features))
+        copies.append(x + noise * spread * rng.standard_normal(x.shape))
+    return copies
+
+
+def _strong_warp(rng, grid):
+    """A warp of [0, 1] on a grid, with rates between a half and two."""
+    while True:
+        log_rate = sum(
+            0.6 * rng.standard_normal() / k * np.cos(np.pi * k * grid + rng.uniform(0, 2 * np.pi))
+            for k in (1, 2, 3)
+        )
+        rate = np.exp(log_rate)
+        warp = np.concatenate([[0], np.cumsum((rate[1:] + rate[:-1]) / 2)])
+        rate *= (len(grid) - 1) / warp[-1]
+        if rate.min() >= 0.5 and rate.max() <= 2:
+            return warp / warp[-1]
+
+
+def warped_sines(n, seed=0, movement=0, n_features=16):
+    """Sums of eight sines, of sizes that vary by trial, weakly warped: (n, P, n_features).
+
+    Sets of the same ``movement`` show the same one.
+    """
+    sizes = np.random.default_rng(movement).standard_normal((8, n_features))
+    rng, out, phase = (
+        np.random.default_rng(seed),
+        np.empty((n, P, n_features)),
+        np.linspace(0, 1, P),
+    )
+    for x in out:
+        shifts = 0.08 * rng.standard_normal(3)
+        waves = sum(a * np.sin(np.pi * k * phase) / k for k, a in enumerate(shifts, start=1))
+        sines = np.sin(np.pi * np.outer(phase + waves, np.arange(1, 9)))
+        x[:] = sines @ (sizes * (1 + 0.15 * rng.standard_normal((8, n_features))))
+        x += 0.03 * rng.standard_normal(x.shape)
+    return out
+
+
+def three_actions(n_each, seed):
+    """Trials of three actions, one after the other, and their actions."""
+    X = [warped_sines(n_each, seed=seed + k, movement=k) for k in range(3)]
+    return np.concatenate(X), np.repeat(np.arange(3), n_each)
+
+
+def long_take(n=20_000):
+    """A random walk from 0 to 0 that shows a performance of 100 frames every 1000 frames."""
+    x = np.cumsum(0.1 * np.random.default_rng(0).standard_normal((n, 16)), axis=0)
+    x -= np.linspace(0, 1, n)[:, np.newaxis] * x[-1]
+    for start in range(500, n - 200, 1000):
+        x[start : start + P] = warped_sines(1, seed=start)[0]
+    return x
+
+
+def long_walk(n=5000):
+    """Eight harmonics of steps of about 110 frames, whose pace changes every 200 frames."""
+    rng, knots = np.random.default_rng(0), np.arange(0, n + 200, 200)
+    pace = 1 + 0.02 * np.interp(np.arange(n), knots, rng.standard_normal(len(knots)))
+    phase = np.cumsum(2 * np.pi / 110 * pace)
+    harmonics = np.column_stack([np.sin(k * phase + k) / k for k in range(1, 9)])
+    return harmonics + 0.05 * rng.standard_normal((n, 8))
+
+
+class Data:
+    """Performances by their names; each is read, or made, when it is first asked for."""
+
+    def __init__(self, folder):
+        self.folder = Path(folder)
+
+    @cached_property
+    def hdm05(self):
+        """The archive of real motion capture."""
+        return load_performances(self.folder / "hdm05" / "hdm05_positions.npz")
+
+    def positions(self, action):
+        """Joint positions of an action."""
+        pairs = zip(self.hdm05.data, self.hdm05.target, strict=True)
+        return [x for x, target in pairs if target == action]
+
+    def _points(self, action):
+        postures = DirectionCosines(self.hdm05.skeleton).fit_transform(self.positions(action))
+        points = ASpace(0.95).fit_transform(postures)
+        return [np.ascontiguousarray(x, dtype=float) for x in points]
+
+    @cached_property
+    def hop_positions(self):
+        """33 hops of four people: joint positions."""
+        return self.positions("hopBothLegs1hops")
+
+    @cached_property
+    def hops(self):
+        """The hops as points of their aSpace."""
+        return self._points("hopBothLegs1hops")
+
+    @cached_property
+    def hops_on_clock(self):
+        """The same on 100 frames."""
+        return list(LinearSynchronizer(P).fit_transform(self.hops))
+
+    @cached_property
+    def hop_feature(self):
+        """The first feature of these."""
+        return [x[:, :1] for x in self.hops_on_clock]
+
+    @cached_property
+    def bends(self):
+        """24 bends of four people as points of their aSpace."""
+        return self._points("depositFloorR")
+
+    @cached_property
+    def many_hops(self):
+        """100 performances: hops again and again, each with a random walk of its own."""
+        rng, X = np.random.default_rng(3), []
+        for i in range(100):
+            x = self.hops[i % len(self.hops)]
+            X.append(x + 0.02 * rng.standard_normal(x.shape).cumsum(axis=0) / np.sqrt(50))
+        return X
+
+    @cached_property
+    def simulated(self):
+        """40 bends of the embedded action."""
+        return make_bending(40, random_state=0)
+
+    @cached_property
+    def simulated_points(self):
+        """The same as points of their aSpace."""
+        postures = DirectionCosines(self.simulated.skeleton).fit_transform(self.simulated.data)
+        return [np.ascontiguousarray(x) for x in ASpace(16).fit_transform(postures)]
+
+    @cached_property
+    def copies(self):
+        """40 warped copies of a single source."""
+        return warped_copies()
+
+    @cached_property
+    def walks(self):
+        """40 random walks."""
+        return list(random_walks())
+
+    def recorded(self, name):
+        """The path of a file as it was recorded."""
+        return str(self.folder / "original_files" / name)
+
+
+# -- what jobs are made of --------------------------------------------------------------
+
+
+class Work(NamedTuple):
+    """What is timed, and the number of equal parts that it has: times are those of one part."""
+
+    run: Callable[[], object]
+    parts: int = 1
+
+
+def dense():
+    """The synchronizer of most jobs."""
+    return DenseSynchronizer(n_frames=P)
+
+
+def paper():
+    """The one with the settings of the paper."""
+    return DenseSynchronizer.paper(n_frames=P)
+
+
+def fit(make, *training):
+    """A fit of a new estimator."""
+    return Work(lambda: make().fit(*training))
+
+
+def each(method, X, count=10):
+    """A method of one performance at a time, so many times."""
+
+    def run():
+        for i in range(count):
+            method(X[i : i + 1])
+
+    return Work(run, count)
+
+
+def single(X):
+    """In single precision."""
+    return [x.astype(np.float32) for x in X]
+
+
+def with_model():
+    """A synchronizer and a model."""
+    return make_pipeline(dense(), ActionModel())
+
+
+def on_model(data, method):
+    """A method of the fitted pipeline of synchronizer and model."""
+    pipe = with_model().fit(data.hops_on_clock)
+    return Work(partial(method, pipe))
+
+
+def detector_of_positions(data):
+    """A detector that is given joint positions."""
+    cosines = DirectionCosines(data.hdm05.skeleton)
+    return ActionDetector(make_pipeline(cosines, ASpace(0.95), dense(), ActionModel()))
+
+
+def online(data):
+    """A fitted synchronizer of running movements."""
+    return OnlineSynchronizer(dense(), frame_rate=120).fit(data.hops)
+
+
+def tracker(data):
+    """A fitted tracker."""
+    return MotionTracker(dense(), frame_rate=120, random_state=0).fit(data.hops)
+
+
+def steps(estimator, frames):
+    """A whole performance, frame by frame."""
+
+    def run():
+        estimator.reset()
+        for frame in frames:
+            estimator.step(frame)
+
+    return Work(run, len(frames))
+
+
+def drawn(draw):
+    """A figure, drawn and closed."""
+    import matplotlib.pyplot as plt
+
+    def run():
+        draw()
+        plt.close("all")
+
+    return Work(run)
+
+
+# -- jobs of more than one line ---------------------------------------------------------
+
+
+def part_sync(data):
+    n_features = data.hops_on_clock[0].shape[1]
+    halves = {"a": range(n_features // 2), "b": range(n_features // 2, n_features)}
+    parts = {name: list(columns) for name, columns in halves.items()}
+    return fit(lambda: PartSynchronizer(parts=parts), data.hops_on_clock)
+
+
+def keyframe_ft(data):
+    X = data.hops_on_clock
+    keyframes = np.full((len(X), 1), 50.0)
+    return Work(lambda: KeyframeSynchronizer(n_frames=P).fit_transform(X, keyframes=keyframes))
+
+
+def model_only_score(data):
+    aligned = dense().fit_transform(data.hops_on_clock)
+    model = ActionModel().fit(aligned)
+    return Work(lambda: model.score_samples(aligned))
+
+
+def classified(classifier):
+    """The actions of 30 trials, by a classifier of 60 others."""
+    X, actions = three_actions(20, 0)
+    classifier.fit(X, actions)
+    return Work(partial(classifier.predict, three_actions(10, 50)[0]))
+
+
+def clf_lone(data):
+    X, actions = three_actions(20, 0)
+    classifier = ActionClassifier().fit(X, actions)
+    return each(classifier.predict, warped_sines(5, seed=9), 5)
+
+
+def searched(make_query):
+    """The search for a performance in a long take."""
+    query, take = make_query(), long_take()
+    return Work(lambda: find_performances(query, take))
+
+
+def cosines_1e5(data):
+    postures = data.simulated.data
+    take = [np.resize(postures[0], (100_000, *postures[0].shape[1:]))]
+    cosines = DirectionCosines(data.simulated.skeleton).fit(postures)
+    return Work(lambda: cosines.transform(take))
+
+
+def aspace_fit(data):
+    postures = DirectionCosines(data.hdm05.skeleton).fit_transform(data.hop_positions)
+    return Work(lambda: ASpace(0.95).fit_transform(postures))
+
+
+def read_c3d(data):
+    paths = [data.recorded(f"c3d/Eb015{take}.c3d") for take in ("pi", "pr", "si")]
+    return Work(lambda: [read_motion(path) for path in paths])
+
+
+def read_amc(data):
+    path, skeleton = data.recorded("asf_amc/02_01.amc"), data.recorded("asf_amc/02.asf")
+    return Work(lambda: read_motion(path, asf=skeleton))
+
+
+def cycles_segment(data):
+    segmenter = CycleSegmenter(start=0).fit([long_walk(3000)])
+    take = long_walk()
+    return Work(lambda: segmenter.segment([take]))
+
+
+def disp_sync(data):
+    sync = dense().fit(data.hops_on_clock)
+    return drawn(lambda: SynchronizationDisplay.from_estimator(sync, data.hops_on_clock))
+
+
+def disp_model(data):
+    pipe = with_model().fit(data.hops_on_clock)
+    return drawn(lambda: ActionModelDisplay.from_estimator(pipe, data.hops_on_clock))
+
+
+def disp_skeleton(data):
+    bunch = data.simulated
+    return drawn(lambda: SkeletonDisplay.from_positions(bunch.data[0], skeleton=bunch.skeleton))
+
+
+def of_match(data, method):
+    """A method of the match of the hops."""
+    match = dense().fit(data.hops_on_clock).match(data.hops_on_clock)
+    return Work(getattr(match, method))
+
+
+def blend(data):
+    bunch = data.simulated
+    pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(16), dense()).fit(bunch.data)
+    pair = bunch.data[:2]
+    return Work(lambda: blend_performances(pipe, pair, [0.5, 0.5], skeleton=bunch.skeleton))
+
+
+def clone_params(data):
+    return Work(lambda: [clone(DenseSynchronizer()) for _ in range(50)], 50)
+
+
+def compare_groups40(data):
+    X, groups = warped_sines(40), np.repeat([0, 1], 20)
+    sync = dense().fit(X)
+    return Work(lambda: compare_groups(sync, X, groups))
+
+
+def compare_norm(data):
+    X, groups = warped_sines(40), ["n"] * 30 + list("abcdefghij")
+    sync = dense().fit(X[:30])
+    return Work(lambda: compare_to_norm(sync, X, groups, norm="n"))
+
+
+def report40(data):
+    X, folder = warped_sines(40), tempfile.TemporaryDirectory()
+    sync = dense().fit(X)
+    return Work(lambda: write_report(Path(folder.name) / "report.html", sync, X))
+
+
+# -- all jobs ---------------------------------------------------------------------------
+
+JOBS = {
+    "fit_source40": lambda data: fit(dense, data.copies),
+    "fit_walks40": lambda data: fit(dense, data.walks),
+    "fit_hops33": lambda data: fit(dense, data.hops_on_clock),
+    "fit_bends24": lambda data: fit(dense, data.bends),
+    "fit_sim40": lambda data: fit(dense, data.simulated_points),
+    "fit_people100": lambda data: fit(dense, data.many_hops),
+    "fit_curves400": lambda data: fit(dense, warped_sines(400)),
+    "fit_n10": lambda data: fit(dense, data.hops_on_clock[:10]),
+    "fit_n2": lambda data: fit(dense, data.hops_on_clock[:2]),
+    "fit_1feature": lambda data: fit(dense, data.hop_feature),
+    "paper64_source": lambda data: fit(paper, data.copies),
+    "paper32_source": lambda data: fit(paper, single(data.copies)),
+    "paper64_walks": lambda data: fit(paper, data.walks),
+    "paper32_walks": lambda data: fit(paper, single(data.walks)),
+    "paper_fit_transform": lambda data: Work(lambda: paper().fit_transform(data.walks)),
+    "fit_transform_hops": lambda data: Work(lambda: dense().fit_transform(data.hops_on_clock)),
+    "lone_hops": lambda data: each(dense().fit(data.hops_on_clock).transform, data.hops_on_clock),
+    "lone_bends": lambda data: each(dense().fit(data.bends).transform, data.bends),
+    "lone_source": lambda data: each(dense().fit(data.copies).transform, data.copies),
+    "lone_walks": lambda data: each(dense().fit(data.walks).transform, data.walks),
+    "lone_paper": lambda data: each(paper().fit(data.walks).transform, data.walks),
+    "lone_1feature": lambda data: each(dense().fit(data.hop_feature).transform, data.hop_feature),
+    "all_hops33": lambda data: Work(
+        partial(dense().fit(data.hops_on_clock).transform, data.hops_on_clock)
+    ),
+    "all_source40": lambda data: Work(partial(dense().fit(data.copies).transform, data.copies)),
+    "all_paper40": lambda data: Work(partial(paper().fit(data.walks).transform, data.walks)),
+    "match_hops33": lambda data: Work(
+        partial(dense().fit(data.hops_on_clock).match, data.hops_on_clock)
+    ),
+    "part_sync": part_sync,
+    "linear_ft": lambda data: Work(
+        lambda: LinearSynchronizer(n_frames=P).fit_transform(data.hops_on_clock)
+    ),
+    "keyframe_ft": keyframe_ft,
+    "model_fit": lambda data: fit(with_model, data.hops_on_clock),
+    "model_only_fit": lambda data: fit(ActionModel, dense().fit_transform(data.hops_on_clock)),
+    "model_predict": lambda data: on_model(data, lambda pipe: pipe.predict(data.hops_on_clock)),
+    "model_score_samples": lambda data: on_model(
+        data, lambda pipe: pipe.score_samples(data.hops_on_clock)
+    ),
+    "model_only_score": model_only_score,
+    "model_sample": lambda data: on_model(data, lambda pipe: pipe[-1].sample(20, random_state=0)),
+    "departures": lambda data: on_model(
+        data, lambda pipe: find_departures(pipe, data.hops_on_clock[:5])
+    ),
+    "detector_fit": lambda data: fit(lambda: ActionDetector(with_model()), data.hops_on_clock),
+    "detector_predict": lambda data: Work(
+        partial(ActionDetector(with_model()).fit(data.hops_on_clock).predict, data.hops_on_clock)
+    ),
+    "detector_lone": lambda data: each(
+        ActionDetector(with_model()).fit(data.hops_on_clock).predict, data.hops_on_clock
+    ),
+    "detectorpipe_fit": lambda data: fit(partial(detector_of_positions, data), data.hop_positions),
+    "detectorpipe_predict": lambda data: Work(
+        partial(detector_of_positions(data).fit(data.hop_positions).predict, data.hop_positions)
+    ),
+    "detectorpipe_lone": lambda data: each(
+        detector_of_positions(data).fit(data.hop_positions).predict, data.hop_positions
+    ),
+    "clf_fit60": lambda data: fit(ActionClassifier, *three_actions(20, 0)),
+    "clf_predict30": lambda data: classified(ActionClassifier()),
+    "clf_lone": clf_lone,
+    "clf_reject_fit60": lambda data: fit(
+        partial(ActionClassifier, reject_below="auto"), *three_actions(20, 0)
+    ),
+    "clf_reject_predict30": lambda data: classified(ActionClassifier(reject_below="auto")),
+    "search_20000": lambda data: searched(lambda: warped_sines(1)[0]),
+    "search_sync_20000": lambda data: searched(lambda: dense().fit(warped_sines(20))),
+    "live_step": lambda data: steps(online(data), data.hops[0]),
+    "live_fit": lambda data: fit(partial(OnlineSynchronizer, dense(), frame_rate=120), data.hops),
+    "live_step8": lambda data: steps(online(data), np.stack([data.hops[0]] * 8, axis=1)),
+    "tracker_fit": lambda data: fit(
+        partial(MotionTracker, dense(), frame_rate=120, random_state=0), data.hops
+    ),
+    "tracker_track": lambda data: Work(
+        partial(tracker(data).track, data.hops[:1]), len(data.hops[0])
+    ),
+    "tracker_smooth": lambda data: Work(
+        partial(tracker(data).smooth, data.hops[:1]), len(data.hops[0])
+    ),
+    "tracker_step": lambda data: steps(tracker(data), data.hops[0]),
+    "cosines_hops": lambda data: Work(
+        partial(
+            DirectionCosines(data.hdm05.skeleton).fit(data.hdm05.data).transform,
+            list(data.hdm05.data),
+        )
+    ),
+    "cosines_1e5": cosines_1e5,
+    "aspace_fit": aspace_fit,
+    "read_bvh": lambda data: Work(partial(read_motion, data.recorded("bvh/007_01.bvh"))),
+    "read_c3d": read_c3d,
+    "read_amc": read_amc,
+    "cycles_fit": lambda data: fit(partial(CycleSegmenter, start=0), [long_walk()]),
+    "cycles_segment": cycles_segment,
+    "pairwise_velocity": lambda data: Work(partial(synchronization_distances, data.hops_on_clock)),
+    "pairwise_posture": lambda data: Work(
+        partial(synchronization_distances, data.hops_on_clock, cost="posture")
+    ),
+    "disp_sync": disp_sync,
+    "disp_model": disp_model,
+    "disp_skeleton": disp_skeleton,
+    "to_frame_match": lambda data: of_match(data, "to_frame"),
+    "blend": blend,
+    "clone_params": clone_params,
+    "compare_groups40": compare_groups40,
+    "compare_norm": compare_norm,
+    "report40": report40,
+    "interval33": lambda data: of_match(data, "interval"),
+}
+
+# -- the process ------------------------------------------------------------------------
+
+
+def answer(request, data, work):
+    """The answer to a request, and the job that is ready then."""
+    match request.split():
+        case ["list"]:
+            return {"jobs": list(JOBS), "package": sklearn_motionsync.__file__}, work
+        case ["prepare", name]:
+            work = JOBS[name](data)
+            work.run()
+            return {}, work
+        case ["run"]:
+            start = time.process_time()
+            work.run()
+            return {"ms": 1e3 * (time.process_time() - start) / work.parts}, work
+    raise ValueError(f"{request!r} is no request; use list, prepare NAME or run.")
+
+
+def main():
+    """Answer the requests on the standard input."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("--data", type=Path, default=DATA)
+    data, work = Data(parser.parse_args().data), None
+    warnings.simplefilter("ignore")
+    # Answers alone go to the standard output; what a job prints goes to that of errors.
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    for request in sys.stdin:
+        try:
+            reply, work = answer(request, data, work)
+        except Exception as error:
+            reply = {"error": f"{type(error).__name__}: {error}"}
+        print(json.dumps(reply), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    main()
