@@ -38,28 +38,21 @@ from sklearn_motionsync.matching.filters import SMOOTHING, smooth
 from sklearn_motionsync.matching.matcher import cost_features
 from sklearn_motionsync.metrics import group_timing_error, keyframe_error, timing_error
 
-PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
 WITH_PEER = "moments with a peer"
 LINEAR, PLAIN, DEFAULTS = "linear normalisation", "`metric=None`", "`DenseSynchronizer()`"
 TIME_LINE, SPREAD = "one common time line", "spread there"
 OURS = {
     LINEAR: lambda **kw: LinearSynchronizer(P, **kw),
-    "the paper's method": lambda **kw: DenseSynchronizer(P, **PAPER, **kw),
+    "the paper's method": lambda **kw: DenseSynchronizer.paper(n_frames=P, **kw),
     DEFAULTS: lambda **kw: DenseSynchronizer(P, **kw),
     PLAIN: lambda **kw: DenseSynchronizer(P, metric=None, **kw),
     "`consensus=0`": lambda **kw: DenseSynchronizer(P, consensus=0, **kw),
     '`cost="elastic"`': lambda **kw: DenseSynchronizer(P, cost="elastic", **kw),
     '`cost="posture"`': lambda **kw: DenseSynchronizer(P, cost="posture", **kw),
     "`refine=True` (single source)": lambda **kw: DenseSynchronizer(P, refine=True, **kw),
-    "`warp_smoothing=0`": lambda **kw: DenseSynchronizer(P, warp_smoothing=0, **kw),
 }
 MAIN = [LINEAR, "the paper's method", PLAIN, DEFAULTS]
-UNREFINED = {
-    "`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw),
-    "`refine=False, sharpen=False`": lambda **kw: DenseSynchronizer(
-        P, refine=False, sharpen=False, **kw
-    ),
-}
+UNREFINED = {"`refine=False`": lambda **kw: DenseSynchronizer(P, refine=False, **kw)}
 
 # -- known warps ------------------------------------------------------------------------
 
@@ -332,14 +325,12 @@ def best_time_lines(people):
 
 
 def refinement_table(folder):
-    """What refine="auto" finds out, and what refining really does to the error."""
-    head = "| data | misfit | ratio | p | ratio to all | refines | error without | error with |"
-    print(f"\n{head}\n|---|---|---|---|---|---|---|---|")
+    """What refine="auto" goes by, and what refining really does to the error."""
+    head = "| data | unexplained variance | refines | error without | error with |"
+    print(f"\n{head}\n|---|---|---|---|---|")
     for name, X, pattern, error in refinement_cases(folder):
         sync = DenseSynchronizer(P, pattern).fit(X)
-        found = [sync.misfit_, *(sync.refinement_[k] for k in ("ratio", "p_value", "ratio_to_all"))]
-        texts = [f"{value:.3f}" if np.isfinite(value) else "-" for value in found]
-        texts += ["yes" if sync.refines_ else "no"]
+        texts = [f"{sync.unexplained_variance_:.3f}", "yes" if sync.refines_ else "no"]
         for refine in (False, True):
             sync = DenseSynchronizer(P, sync.pattern_index_, refine=refine).fit(X)
             texts += [f"{error(sync.match(X).times, sync.pattern_index_):.2f}"]

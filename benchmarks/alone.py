@@ -20,7 +20,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import load_performances, make_bending
 
-PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
+PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0}
 SETTINGS = {
     "defaults": {},
     "paper": PAPER,
@@ -28,7 +28,6 @@ SETTINGS = {
     "elastic": {"cost": "elastic"},
     "refined": {"refine": True},
     "posture, voted on": {"cost": "posture"},
-    "half frames": {"subframes": 2, "max_rate": 3},
     "no vote": {"consensus": 0},
 }
 

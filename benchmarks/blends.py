@@ -207,9 +207,8 @@ def walks(folder):
             first = table.reset_index().groupby("take")["index"].first()
             sets.append(("cmu07_walk, a cycle of each", [np.asarray(cycles[i]) for i in first]))
         for title, takes in sets:
-            pipe = make_pipeline(
-                DirectionCosines(skeleton), ASpace(0.95), DenseSynchronizer(120, unsupported="warp")
-            ).fit(takes)
+            steps = DirectionCosines(skeleton), ASpace(0.95), DenseSynchronizer(120)
+            pipe = make_pipeline(*steps).fit(takes)
             yield title, takes, Match.from_estimator(pipe, takes), skeleton, rate, unit, toes
 
 

@@ -10,12 +10,13 @@ without knowing the moments. Prints Markdown.
 """
 
 import sys
+import warnings
 from itertools import pairwise
 
 import numpy as np
 from events import P
 from people import on_time_line, read_people
-from sklearn_motionsync import DenseSynchronizer
+from sklearn_motionsync import DenseSynchronizer, SynchronizationWarning
 
 SIZES, DRAWS = (4, 8, 12), 4
 EDGES = (0.0, 0.3, 0.5, 0.6, 0.7, 1.0, np.inf)
@@ -23,7 +24,7 @@ EDGES = (0.0, 0.3, 0.5, 0.6, 0.7, 1.0, np.inf)
 
 def judge(points, moments):
     """The evidence of a set, and its gain; NaN if no moment is shown by two clips."""
-    sync = DenseSynchronizer(P, unsupported="warp").fit(points)
+    sync = DenseSynchronizer(P).fit(points)
     times, logs = sync.match(points).times, []
     linear = np.tile(np.arange(float(P)), (len(points), 1))
     for at in moments.values():
@@ -31,7 +32,8 @@ def judge(points, moments):
             ours, without = (on_time_line(tau, at)[0].mean() for tau in (times, linear))
             logs.append(np.log((ours + 0.05) / (without + 0.05)))
     gain = np.exp(np.mean(logs)) if logs else np.nan
-    return sync.evidence_.remaining, sync.evidence_.inconsistency, gain
+    evidence = sync.evidence_
+    return evidence.remaining, evidence.inconsistency, evidence.weak, gain
 
 
 def subsets(people, rng):
@@ -54,13 +56,13 @@ def show(found):
 
 
 def main():
+    warnings.simplefilter("ignore", SynchronizationWarning)
     people = read_people(sys.argv[1])
-    print(
-        "| action | clips | remaining | inconsistency | error over linear |\n|---|---|---|---|---|"
-    )
+    print("| action | clips | remaining | inconsistency | weak | error over linear |")
+    print("|---" * 6 + "|")
     for one in people:
-        remaining, inconsistency, gain = judge(one.X, one.moments)
-        found = f"{remaining:.2f} | {inconsistency:.2f} | {gain:.2f}"
+        remaining, inconsistency, weak, gain = judge(one.X, one.moments)
+        found = f"{remaining:.2f} | {inconsistency:.2f} | {'yes' if weak else 'no'} | {gain:.2f}"
         print(f"| `{one.name}` | {len(one.X)} | {found} |", flush=True)
     rows = subsets(people, np.random.default_rng(0))
     found = np.array([(size, *judge(X, moments)) for size, X, moments in rows])
@@ -69,8 +71,11 @@ def main():
         print("|---" * (1 + len(SIZES)) + "|")
         for low, high in pairwise(EDGES):
             inside = (low <= found[:, column]) & (found[:, column] < high)
-            cells = [show(found[inside & (found[:, 0] == size), 3]) for size in SIZES]
+            cells = [show(found[inside & (found[:, 0] == size), 4]) for size in SIZES]
             print(f"| {low} to {high} | " + " | ".join(cells) + " |")
+    for weak, name in ((0, "not weak"), (1, "weak")):
+        cells = [show(found[(found[:, 3] == weak) & (found[:, 0] == size), 4]) for size in SIZES]
+        print(f"| {name} | " + " | ".join(cells) + " |")
 
 
 if __name__ == "__main__":

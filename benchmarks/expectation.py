@@ -25,7 +25,7 @@ from sklearn.impute import IterativeImputer, KNNImputer
 from sklearn_motionsync import ASpace, DirectionCosines
 from sklearn_motionsync.datasets import load_performances
 from sklearn_motionsync.io import fill_gaps
-from sklearn_motionsync.transformers import expectation
+from sklearn_motionsync.matching import gaps as filling
 
 # Rows a second of the Kinect, about.
 RATES = {"hdm05": 120, "utkinect": 15}
@@ -128,11 +128,11 @@ def examine(folder, name, action, kind, fill):
 
 def shrunk(gaps, postures, cosines, columns):
     """The ASpace with other shrinkages, and without time."""
-    kept = expectation.SHRINKAGE
+    before = filling.SHRINKAGE
     for share in (0.001, 0.01, 0.03, 0.1, 0.3):
-        expectation.SHRINKAGE = share
+        filling.SHRINKAGE = share
         yield f"{share:g}", expected(postures)
-    expectation.SHRINKAGE = kept
+    filling.SHRINKAGE = before
 
 
 def main(folder):

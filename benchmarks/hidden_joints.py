@@ -89,7 +89,7 @@ class Fold:
         self.of = np.repeat(np.arange(len(people)), [len(takes) for takes in people])
         self.cosines = DirectionCosines(skeleton, hidden="nan").fit(self.train)
         self.postures = self.cosines.transform(self.train)
-        self.sync = Fitted(n_frames=P, unsupported="warp").fit(self.postures)
+        self.sync = Fitted(n_frames=P).fit(self.postures)
         by_person = [self.cosines.transform(takes) for takes in people]
         self.peers = {
             name: [make(self.postures, *best) for best in choose(make, by_person[:4], settings)]

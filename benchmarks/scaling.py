@@ -76,15 +76,15 @@ SAMPLE = """
 start = time.process_time()
 sync = DenseSynchronizer(max_fit=500, **settings).fit(X)
 seconds = time.process_time() - start
-print(f"{seconds:.1f} s | {100 * sync.typical_share_:.1f} % | {sync.certified_} |")
+print(f"{seconds:.1f} s |")
 """
 MANY = """
 sync = DenseSynchronizer(max_fit=500, **settings).fit(X)
 forget_peak()
 before, start = peak(), time.process_time()
-atomic_fit = 1000 if mode == "maps" else n
-for first in range(0, n, atomic_fit):
-    sync.transform(X if atomic_fit == n else X[first : first + atomic_fit])
+at_once = 1000 if mode == "maps" else n
+for first in range(0, n, at_once):
+    sync.transform(X if at_once == n else X[first : first + at_once])
 seconds = time.process_time() - start
 print(f"{seconds:.0f} s | {1e3 * seconds / n:.2f} ms | {(peak() - before) / 2**20:.0f} MB |")
 """
@@ -169,8 +169,8 @@ def memory():
 
 def sample():
     """Fit of a sample of 500."""
-    print("| N | data | fit | typical share | certified |")
-    print("|---|---|---|---|---|")
+    print("| N | data | fit |")
+    print("|---|---|---|")
     for n in (1000, 5000, 20_000):
         for mode in ("memory", "map", "files"):
             print(f"| {n} | {mode} | {measure(SAMPLE, bends(), mode, n, {})}", flush=True)

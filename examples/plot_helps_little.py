@@ -173,11 +173,8 @@ _ = figure.suptitle("The warp of the throw looks like any other,\nits curve does
 # Where it fails
 # --------------
 # A large distance shows one odd trial. It does not show two ways of the same size, since half of
-# the set is then odd. Nor does ``modes_`` see these two ways: it asks for ways that are further
-# apart, as :doc:`/howto/modes` shows.
+# the set is then odd. So look at the trials themselves, such as in the first figure.
 
 for name, distances in (("two ways", match_of_ways.distances), ("one throw", match.distances)):
     print(f"{name}: largest distance over the median {distances.max() / np.median(distances):.1f}")
-modes = DenseSynchronizer(n_frames=101).fit(two_ways).modes_
-print(f"modes that are found in the two ways: {len(modes.shares)}")
 plt.show()

@@ -89,7 +89,7 @@ _ = axis.set_title(
 )
 
 # %%
-# On these few clean signals, the result without weights is better.
+# On the clean signals, too, the result with weights is better.
 #
 # Where it fails
 # --------------

@@ -6,16 +6,16 @@ import itertools
 import numpy as np
 
 # Of every cost of the package: b, g and phi of a step at the local rate rho, as in docs/method.md,
-# and the features at every position, given subframes and the width of the filter in positions.
+# and the features, given positions a frame and the width of the filter in positions.
 STEP_WEIGHTS = {
     "posture": lambda rho: (1.0, 2.0, abs(rho - 1)),
     "velocity": lambda rho: ((0.8 + 0.2 * rho) ** 2, 1.6 + 0.4 * rho, (rho - 1) ** 2),
     "elastic": lambda rho: (rho, 2 * rho**0.5, (rho - 1) ** 2),
 }
 FEATURES = {
-    "posture": lambda x, subframes, sigma: x,
-    "velocity": lambda x, subframes, sigma: subframes * slow_filter(x, sigma, 1),
-    "elastic": lambda x, subframes, sigma: slow_roots(subframes * slow_filter(x, sigma, 1)),
+    "posture": lambda x, pace, sigma: x,
+    "velocity": lambda x, pace, sigma: pace * slow_filter(x, sigma, 1),
+    "elastic": lambda x, pace, sigma: slow_roots(pace * slow_filter(x, sigma, 1)),
 }
 
 
@@ -97,6 +97,12 @@ def plain_loops(x, y, costs, mu, subframes, max_disparity):
                 new[q] = min(ways)
         row = new
     return row[last]
+
+
+def global_distances(X, costs, mu, subframes, max_disparity):
+    """The sum of the smallest costs of every trial, as the base, to all (Eq. 19)."""
+    settings = costs, mu, subframes, max_disparity
+    return np.array([sum(plain_loops(x, y, *settings) for y in X) for x in X])
 
 
 def slow_filter(x, sigma, order):

@@ -2,6 +2,7 @@
 
 import io
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 
 import joblib
 import numpy as np
@@ -215,6 +216,27 @@ def test_a_clone_and_a_refit_give_equal_results(estimator):
     expected = outputs(fitted, X)
     fitted = clone(fitted).fit(X[::-1])
     assert_same(outputs(fitted.fit(X), X), expected)
+
+
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_a_refit_leaves_nothing_of_an_earlier_fit(estimator):
+    """Of names least of all."""
+    X = data_for(estimator)
+    tables = [pd.DataFrame(x, columns=NAMES[: x.shape[1]]) for x in X]
+    fitted = clone(estimator).fit(tables)
+    assert fitted.feature_names_in_.tolist() == list(tables[0])
+    assert vars(fitted.fit(X)).keys() == vars(clone(estimator).fit(X)).keys()
+    assert not hasattr(fitted, "feature_names_in_")
+
+
+@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+def test_several_threads_may_use_one_fitted_estimator(estimator):
+    X = data_for(estimator)
+    fitted = clone(estimator).fit(X)
+    expected = outputs(fitted, X)
+    with ThreadPoolExecutor(4) as pool:
+        for answers in pool.map(lambda _: outputs(fitted, X), range(8)):
+            assert_same(answers, expected)
 
 
 def through_joblib(estimator):
@@ -527,6 +549,54 @@ def test_rows_are_univariate_sequences(estimator, performances):
     columns = [x[:, :1] for x in performances]
     expected = clone(estimator).fit(columns).transform(columns)[:, :, 0]
     np.testing.assert_array_equal(clone(estimator).fit(rows).transform(rows), expected)
+
+
+# -- fits that fail ---------------------------------------------------------------------
+
+
+def with_infinity(X):
+    return [*X[:-1], np.where(np.arange(len(X[-1]))[:, np.newaxis] == 3, np.inf, X[-1])]
+
+
+# By the name of the class: what has the form of its input, and tells it too little.
+TOO_LITTLE = {
+    **dict.fromkeys(
+        ["DirectionCosines", "JointPositions"], (lambda X: [0 * x for x in X], "has no length")
+    ),
+    "ASpace": (lambda X: X[0][:1], "at least 2 postures"),
+    "FrameWise": (lambda X: X[0][:1], "n_components=2 must be between"),
+    **dict.fromkeys(
+        ["ActionModel", "ActionDetector", "MotionTracker"], (lambda X: X[:1], "at least 2 perf")
+    ),
+    "ActionClassifier": (lambda X: X[:1], "at least 2 classes"),
+    "CycleSegmenter": (lambda X: [x[:40] for x in X], "Performance 0: "),
+}
+FAILURES = [
+    (estimator, *failure)
+    for name, estimators in INSTANCES.items()
+    for estimator in estimators
+    for failure in [(with_infinity, "infinity"), TOO_LITTLE.get(name)]
+    if failure is not None
+]
+
+
+@pytest.mark.parametrize(("estimator", "spoil", "message"), FAILURES, ids=by_name)
+def test_a_fit_that_fails_leaves_the_earlier_fit(estimator, spoil, message):
+    X = data_for(estimator)
+    fitted = clone(estimator).fit(X)
+    expected = outputs(fitted, X)
+    with pytest.raises(ValueError, match=message):
+        fitted.fit(spoil(X))
+    assert_same(outputs(fitted, X), expected)
+
+
+@pytest.mark.parametrize(("estimator", "spoil", "message"), FAILURES, ids=by_name)
+def test_an_estimator_whose_first_fit_fails_is_not_fitted(estimator, spoil, message):
+    X, unfitted = data_for(estimator), clone(estimator)
+    with pytest.raises(ValueError, match=message):
+        unfitted.fit(spoil(X))
+    with pytest.raises(NotFittedError):
+        outputs(unfitted, X)
 
 
 # -- those whose width their skeleton fixes: scikit-learn's demands, written out ------------

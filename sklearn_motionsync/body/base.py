@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import functools
 import warnings
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from sklearn.base import BaseEstimator, TransformerMixin
+from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.numbers import column_names
-from ..inputs.types import FitTransform, PerformancesLike, Transformed
-from ..inputs.validation import check_performances, names_of_input, restore
+from ..inputs.types import PerformancesLike, Transformed
+from ..inputs.validation import (
+    PerformanceTransformerMixin,
+    check_performances,
+    names_of_input,
+    restore,
+)
 from ..inputs.wording import counted
-from ..utils.atomic import snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from .axes import fill_heading, heading_axes, to_y_up
@@ -214,7 +218,9 @@ class Body:
             )
 
 
-class PositionsTransformer(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator):
+class PositionsTransformer(
+    DocumentedMixin, LongWorkMixin, PerformanceTransformerMixin, BaseEstimator
+):
     """Base of the transformers that compute features of joint positions, body by body.
 
     A subclass has a ``skeleton``; ``hidden``, which is "raise" or "nan"; a ``fit`` that calls
@@ -227,9 +233,6 @@ class PositionsTransformer(DocumentedMixin, LongWorkMixin, TransformerMixin, Bas
     # Lengths count in those of the body, so units do not matter.
     _facts = "frame_rate", "up"
 
-    fit_transform: ClassVar[FitTransform] = whole_fit_transform
-
-    @snapshot
     def transform(self, X: PerformancesLike) -> Transformed:
         """Features of joint positions.
 
@@ -251,7 +254,7 @@ class PositionsTransformer(DocumentedMixin, LongWorkMixin, TransformerMixin, Bas
             pelvis is below the ankles, and its head is below the pelvis on average. If the body
             has only one of the two segments, that one decides.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "limb_lengths_")
         performances = self._check(X, reset=False)
         bodies = (self._body(performances, i) for i in range(len(performances)))
         features = [body.features(self._features) for body in bodies]

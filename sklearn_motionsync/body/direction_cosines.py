@@ -13,7 +13,6 @@ from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers
 from ..inputs.types import NamesLike, PerformancesLike, Transformed, ValuesLike
 from ..inputs.validation import check_transformed, restore
-from ..utils.atomic import atomic_fit, snapshot
 from ..utils.parameters import validated
 from .axes import convert_to_parent_axes, project_on_axes
 from .base import PositionsTransformer, mask_hidden
@@ -144,7 +143,6 @@ class DirectionCosines(PositionsTransformer):
         self.reference = reference
         self.hidden = hidden
 
-    @atomic_fit
     @validated
     def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Learn the limb lengths.
@@ -169,7 +167,6 @@ class DirectionCosines(PositionsTransformer):
         self.limb_lengths_ = self._measure(X)
         return self
 
-    @snapshot
     def inverse_transform(
         self, X: PerformancesLike, limb_lengths: ValuesLike | None = None
     ) -> Transformed:
@@ -211,14 +208,13 @@ class DirectionCosines(PositionsTransformer):
             If the cosines of a limb are all 0, columns are not those of
             ``get_feature_names_out``, or ``limb_lengths`` are not numbers above 0, one a limb.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "limb_lengths_")
         lengths = self._as_lengths(limb_lengths)
         names = self.get_feature_names_out()
         performances = check_transformed(self, X, names, finite=self._finite)
         arrays = [self._positions(performances, i, lengths) for i in range(len(performances))]
         return restore(self, performances, arrays, columns=self.skeleton.body().column_names)
 
-    @snapshot
     def position_matrix(
         self, limb_lengths: ValuesLike | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -270,7 +266,7 @@ class DirectionCosines(PositionsTransformer):
         >>> picture.shape[1]
         26
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "limb_lengths_")
         if self.reference == "parent":
             raise ValueError(
                 "Positions are not linear in cosines along parent limbs, which turn with the "

@@ -9,7 +9,6 @@ from sklearn.utils._param_validation import StrOptions
 
 from ..inputs.features import check_input_features
 from ..inputs.types import NamesLike, PerformancesLike
-from ..utils.atomic import atomic_fit
 from ..utils.parameters import validated
 from .axes import project_on_axes
 from .base import PositionsTransformer
@@ -114,7 +113,6 @@ class JointPositions(PositionsTransformer):
         self.reference = reference
         self.hidden = hidden
 
-    @atomic_fit
     @validated
     def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Check the performances, and learn the limb lengths.

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..matching.counting import first_largest
 from .limbs import unit_vectors
 
 __all__ = ["exp_map", "log_map", "mean_direction", "mean_length", "mean_vector"]
@@ -56,7 +57,7 @@ def mean_direction(directions, weights):
     positive = (positive / positive.sum(axis=0))[..., np.newaxis]
     total = (positive * directions).sum(axis=0)
     shown = np.linalg.norm(total, axis=-1, keepdims=True) > _VANISHING
-    largest = positive.argmax(axis=0)[np.newaxis]
+    largest = first_largest(positive, axis=0)[np.newaxis]
     base = unit_vectors(np.where(shown, total, np.take_along_axis(directions, largest, axis=0)[0]))
     for _ in range(_MAX_ITER):
         step = np.where(shown, (positive * log_map(base, directions)).sum(axis=0), 0)

@@ -84,7 +84,7 @@ class AlignedCurves(NamedTuple):
         # As recorded: steps before the synchronizer may resample.
         lengths = [len(x) for x in as_collection(X) or reached.performances]
         rates = rates_of(X, frame_rate, unit)
-        names, units, given = _signals(X, reached, signals, features)
+        names, units, sequences = _signals(X, reached, signals, features)
         match, n = reached.match(), len(lengths)
         last = reached.synchronizer.n_frames_ - 1
         offsets = match.offsets_in(unit, lengths, rates)
@@ -93,8 +93,8 @@ class AlignedCurves(NamedTuple):
             clock *= 100 / last
         elif unit == "seconds":
             clock *= np.median((np.array(lengths) - 1) / rates) / last
-        even = match_of_times(np.tile(np.arange(last + 1.0), (n, 1)), n).warp(given)
-        return cls(names, units, match.warp(given), even, offsets, clock, unit, match, reached)
+        even = match_of_times(np.tile(np.arange(last + 1.0), (n, 1)), n).warp(sequences)
+        return cls(names, units, match.warp(sequences), even, offsets, clock, unit, match, reached)
 
     def offsets_of_others(self):
         """Offsets of matches in which some features are left out, each in turn: at most 8 parts.
@@ -106,45 +106,45 @@ class AlignedCurves(NamedTuple):
             `DenseSynchronizer`, or where the features that are left support no warps.
         """
         reached = self.reached
-        sync, given = reached.synchronizer, reached.performances
-        n = given[0].shape[1]
+        sync, performances = reached.synchronizer, reached.performances
+        n = performances[0].shape[1]
         if not isinstance(sync, DenseSynchronizer) or n < 2:
             return
         # Confidences belong to all features.
         params = {k: v for k, v in reached.params.items() if k in ("keyframes", "frame_rate")}
         for out in np.array_split(np.arange(n), min(n, _MOST_PARTS)):
-            others = [np.delete(x, out, axis=1) for x in given]
+            reduced = [np.delete(x, out, axis=1) for x in performances]
             one = clone(sync).set_params(pattern=np.delete(sync.pattern_, out, axis=1), verbose=0)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                offsets = one.fit(others, **params).match(others, **params).offsets
+                offsets = one.fit(reduced, **params).match(reduced, **params).offsets
             if offsets.any():
                 yield offsets
 
 
 def _signals(X, reached, signals, features):
     """Names and units of the chosen signals, and their arrays (n_frames_i, n_chosen)."""
-    given = reached.performances
-    n, width = len(given), given[0].shape[1]
+    sequences = reached.performances
+    n, width = len(sequences), sequences[0].shape[1]
     names = names_of_features(reached.before, reached.synchronizer, width)
     units = [""] * width
     if signals is None and as_collection(X) is not None:
-        arrays, own = read_collection(X)
-        if (own or [f"x{i}" for i in range(arrays[0].shape[1])]) == names:
+        arrays, columns = read_collection(X)
+        if (columns or [f"x{i}" for i in range(arrays[0].shape[1])]) == names:
             signals = X
     if signals is not None:
-        given, own = read_collection(signals)
-        if len(given) != n:
+        sequences, columns = read_collection(signals)
+        if len(sequences) != n:
             raise ValueError(
                 f"signals must have one sequence for each of {counted(n, 'performance')}, got "
-                f"{len(given)}."
+                f"{len(sequences)}."
             )
-        names = own or [f"x{i}" for i in range(given[0].shape[1])]
-        known = units_of_columns(as_collection(signals)[0])
-        units = [known.get(name, "") for name in names]
+        names = columns or [f"x{i}" for i in range(sequences[0].shape[1])]
+        unit_by_name = units_of_columns(as_collection(signals)[0])
+        units = [unit_by_name.get(name, "") for name in names]
     chosen = range(len(names)) if features is None else choose_features(features, names)
     names, units = [names[i] for i in chosen], [units[i] for i in chosen]
-    given = [x[:, chosen] for x in given]
-    for i, x in enumerate(given):
+    sequences = [x[:, chosen] for x in sequences]
+    for i, x in enumerate(sequences):
         check_finite(x, f"Performance {i}, frame", names)
-    return names, units, given
+    return names, units, sequences

@@ -11,6 +11,7 @@ from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
 from ..inputs.types import Features, Labels, PerformancesLike, RandomState, Unit, ValuesLike
+from ..matching.counting import first_largest
 from ..synchronizers.match import UNITS
 from ..utils.parallel import Progress
 from .curves import AlignedCurves
@@ -101,13 +102,13 @@ class GroupComparison:
         str
             What was compared, whether it differs, and three p-values.
         """
-        found = self.clusters["what"].unique().tolist()
+        aspects = self.clusters["what"].unique().tolist()
         none = "they differ, in shape or in timing" if self.p_joint <= self.level else ""
         answer = {
             (): none or "no difference is found",
             ("shape",): "they differ in shape",
             ("timing",): "they differ in timing",
-        }.get(tuple(sorted(found)), "they differ in shape and timing")
+        }.get(tuple(sorted(aspects)), "they differ in shape and timing")
         values = f"joint p = {self.p_joint:.3f}, shape {self.p_shape:.3f}"
         return f"{self.design}: {answer} ({values}, timing {self.p_timing:.3f})."
 
@@ -230,11 +231,28 @@ def compare_groups(
     [['timing', 'B later than A']]
     """
     check_test(level, n_permutations)
-    given = {"signals": signals, "features": features, "unit": unit, "frame_rate": frame_rate}
-    aligned = AlignedCurves.of(estimator, X, params, "compare_groups", **given)
-    design = {"covariate": covariate, "people": people, "paired": paired}
-    how = {"n_permutations": n_permutations, "random_state": random_state, "n_jobs": n_jobs}
-    return compare_aligned(aligned, groups, **design, level=level, **how, verbose=verbose)
+    aligned = AlignedCurves.of(
+        estimator,
+        X,
+        params,
+        "compare_groups",
+        signals=signals,
+        features=features,
+        unit=unit,
+        frame_rate=frame_rate,
+    )
+    return compare_aligned(
+        aligned,
+        groups,
+        covariate=covariate,
+        people=people,
+        paired=paired,
+        level=level,
+        n_permutations=n_permutations,
+        random_state=random_state,
+        n_jobs=n_jobs,
+        verbose=verbose,
+    )
 
 
 def compare_aligned(
@@ -299,10 +317,10 @@ def _clusters(what, family, values, names, units, study, least, level):
     for k, feature in enumerate(names):
         edges = np.flatnonzero(np.diff(p[:, k] <= level, prepend=False, append=False))
         for first, end in edges.reshape(-1, 2).tolist():
-            here = slice(first, end)
-            peak = first + int(np.abs(family.found[here, k]).argmax())
-            size = study.size(values[:, here, k].mean(axis=1), what)
-            yield [what, feature, first, end - 1, peak, p[here, k].min(), *size, units[k]]
+            stretch = slice(first, end)
+            peak = first + first_largest(np.abs(family.found[stretch, k]))
+            size = study.size(values[:, stretch, k].mean(axis=1), what)
+            yield [what, feature, first, end - 1, peak, p[stretch, k].min(), *size, units[k]]
 
 
 def _confirm(rows, aligned, study):
@@ -315,10 +333,10 @@ def _confirm(rows, aligned, study):
 
     def effects(offsets):
         units = study.units(offsets)
-        return [study.design.rows.T @ units[:, here].mean(axis=1) for here in stretches]
+        return [study.design.rows.T @ units[:, stretch].mean(axis=1) for stretch in stretches]
 
     whole = effects(aligned.match.offsets)
     for offsets in aligned.offsets_of_others():
-        for i, own, others in zip(timing, whole, effects(offsets), strict=True):
-            confirmed[i] &= others @ own >= _REMAINS * (own @ own)
+        for i, full, reduced in zip(timing, whole, effects(offsets), strict=True):
+            confirmed[i] &= reduced @ full >= _REMAINS * (full @ full)
     return confirmed

@@ -123,12 +123,12 @@ class NormComparison:
         row = self.verdicts.loc[[subject]].iloc[0]
         if not row["differs"]:
             return f"{subject} stays within {norm}, p = {row['p']:.2g}."
-        found = self.departures[self.departures["subject"] == subject].iloc[0]
-        where = "" if found["what"] == "timing" else f" in {found['feature']}"
-        size = f"{abs(found['size']):.3g} {found['unit']}".strip()
+        largest = self.departures[self.departures["subject"] == subject].iloc[0]
+        where = "" if largest["what"] == "timing" else f" in {largest['feature']}"
+        size = f"{abs(largest['size']):.3g} {largest['unit']}".strip()
         return (
-            f"{subject} differs from {norm}, p = {row['p']:.2g}: {size} {found['direction']}{where}"
-            f", at {found['peak']:.3g} {UNITS[self.unit]}."
+            f"{subject} differs from {norm}, p = {row['p']:.2g}: {size} {largest['direction']}"
+            f"{where}, at {largest['peak']:.3g} {UNITS[self.unit]}."
         )
 
 
@@ -224,24 +224,34 @@ def compare_to_norm(
     ['later']
     """
     check_level(level)
-    given = {"signals": signals, "features": features, "unit": unit, "frame_rate": frame_rate}
-    aligned = AlignedCurves.of(estimator, X, params, "compare_to_norm", **given)
+    aligned = AlignedCurves.of(
+        estimator,
+        X,
+        params,
+        "compare_to_norm",
+        signals=signals,
+        features=features,
+        unit=unit,
+        frame_rate=frame_rate,
+    )
     study = _Subjects.of(groups, norm, people, len(aligned.curves))
     timing = aligned.offsets[:, :, np.newaxis]
     values = np.concatenate([aligned.curves, timing], axis=2).astype(np.float64, copy=False)
     families = [slice(0, -1), slice(-1, None)]
-    of_norm = [values[own] for own in study.of_norm]
-    subjects = [values[own] for own in study.of_subjects]
+    of_norm = [values[trials] for trials in study.of_norm]
+    subjects = [values[trials] for trials in study.of_subjects]
     reference = NormReference.of(np.stack([x.mean(axis=0) for x in of_norm]))
     curves = np.stack([x.mean(axis=0) for x in subjects])
     z = reference.deviations(curves)
     counts = [len(x) for x in subjects]
-    chances = {k: [_LargestDeviation(of_norm, k, part) for part in families] for k in set(counts)}
+    chances = {
+        k: [_LargestDeviation(of_norm, k, columns) for columns in families] for k in set(counts)
+    }
     p, limits = np.empty((len(z), 2)), np.empty((len(z), z.shape[2]))
     for i, k in enumerate(counts):
-        for j, part in enumerate(families):
-            p[i, j] = chances[k][j].tail(np.abs(z[i][:, part]).max())
-            limits[i, part] = chances[k][j].limit(level / 2)
+        for j, columns in enumerate(families):
+            p[i, j] = chances[k][j].tail(np.abs(z[i][:, columns]).max())
+            limits[i, columns] = chances[k][j].limit(level / 2)
     joint = np.minimum(1, 2 * p.min(axis=1))
     verdicts = pd.DataFrame(
         {
@@ -304,12 +314,14 @@ class _LargestDeviation:
         means = np.stack([x[:, :, part].mean(axis=0) for x in of_people])
         logs, weights = [], []
         for i, x in enumerate(of_people):
-            others = NormReference.of(np.delete(means, i, axis=0))
+            reference = NormReference.of(np.delete(means, i, axis=0))
             # Means of k trials, of which each begins with another one.
             n = len(x)
             starts = range(n) if k < n else [0]
-            some = [x[(np.arange(min(k, n)) + start) % n, :, part].mean(axis=0) for start in starts]
-            z = np.abs(others.deviations(np.stack(some))).max(axis=(1, 2))
+            curves = [
+                x[(np.arange(min(k, n)) + start) % n, :, part].mean(axis=0) for start in starts
+            ]
+            z = np.abs(reference.deviations(np.stack(curves))).max(axis=(1, 2))
             logs.append(np.log(np.maximum(z, np.finfo(float).tiny)))
             weights.append(np.full(len(z), 1 / len(z)))
         logs, weights = np.concatenate(logs), np.concatenate(weights)
@@ -350,26 +362,26 @@ class _Subjects(NamedTuple):
             raise ValueError(f"norm={norm!r} is none of the groups {names[:6]}.")
         persons, labels = encode_groups(people, n, name="people", at_least=2)
         in_norm = codes == names.index(norm)
-        of_norm, of_subjects, of = [], [], []
+        of_norm, of_subjects, subjects, groups_of_subjects = [], [], [], []
         for person, label in enumerate(labels):
-            own = np.flatnonzero(persons == person)
-            if len(set(codes[own])) > 1:
-                several = [names[code] for code in sorted(set(codes[own]))]
+            trials = np.flatnonzero(persons == person)
+            if len(set(codes[trials])) > 1:
+                several = [names[code] for code in sorted(set(codes[trials]))]
                 raise ValueError(
                     f"people: {label!r} has trials in the groups {several}. Give people one name a "
                     f"group, such as '{label} {several[0]}'."
                 )
-            if in_norm[own[0]]:
-                of_norm.append(own)
+            if in_norm[trials[0]]:
+                of_norm.append(trials)
             else:
-                of_subjects.append(own)
-                of.append((label, names[codes[own[0]]]))
+                of_subjects.append(trials)
+                subjects.append(label)
+                groups_of_subjects.append(names[codes[trials[0]]])
         if len(of_norm) < _FEWEST:
             raise ValueError(
                 f"The norm needs at least {_FEWEST} people, got {len(of_norm)} in {norm!r}."
             )
-        labels, groups = map(list, zip(*of, strict=True))
-        return cls(of_norm, of_subjects, labels, groups)
+        return cls(of_norm, of_subjects, subjects, groups_of_subjects)
 
 
 def _departures(z, differences, limits, verdicts, names, units, aligned):
@@ -377,18 +389,18 @@ def _departures(z, differences, limits, verdicts, names, units, aligned):
     rows = []
     size = np.abs(z)
     for i, label in enumerate(verdicts.index):
-        own = []
+        departures = []
         # Stretches above a share of the limit, in which it is exceeded somewhere.
-        found = runs(z[i : i + 1] / limits[i], _BETWEEN)
+        stretches = runs(z[i : i + 1] / limits[i], _BETWEEN)
         for feature, first, last, peak in zip(
-            found.feature, found.first, found.last, found.peak, strict=True
+            stretches.feature, stretches.first, stretches.last, stretches.peak, strict=True
         ):
             beyond = first + np.flatnonzero(size[i, first : last + 1, feature] > limits[i, feature])
             if not len(beyond):
                 continue
             is_timing = feature == len(names) - 1
             above, below = ("later", "earlier") if is_timing else ("above", "below")
-            own.append(
+            departures.append(
                 {
                     "subject": label,
                     "what": "timing" if is_timing else "shape",
@@ -402,7 +414,7 @@ def _departures(z, differences, limits, verdicts, names, units, aligned):
                     "deviation": z[i, peak, feature],
                 }
             )
-        rows += sorted(own, key=lambda row: -abs(row["deviation"]))[:_MOST]
+        rows += sorted(departures, key=lambda row: -abs(row["deviation"]))[:_MOST]
     return pd.DataFrame(rows, columns=_COLUMNS)
 
 
@@ -411,13 +423,14 @@ def _profile(curves, of_norm, aligned, study, names, units, labels):
     means = np.stack([x.mean(axis=0) for x in of_norm])
     even = aligned.even.astype(np.float64, copy=False)
     of_even = [
-        [even[own].mean(axis=0) for own in some] for some in (study.of_norm, study.of_subjects)
+        [even[trials].mean(axis=0) for trials in people]
+        for people in (study.of_norm, study.of_subjects)
     ]
     linear = np.full((len(curves), len(names)), np.nan)
     linear[:, :-1] = _root_mean_squares(np.stack(of_even[1]) - np.mean(of_even[0], axis=0))
     n = len(means)
-    others = (means.sum(axis=0) - means) / (n - 1)
-    typical = np.median(_root_mean_squares(means - others), axis=0)
+    without_one = (means.sum(axis=0) - means) / (n - 1)
+    typical = np.median(_root_mean_squares(means - without_one), axis=0)
     index = pd.MultiIndex.from_product([labels, names], names=["subject", "feature"])
     return pd.DataFrame(
         {

@@ -86,11 +86,11 @@ def scaled(values, centred):
 
     What is not known (NaN) becomes the mean.
     """
-    known = ~np.isnan(values)
+    is_known = ~np.isnan(values)
     if centred:
-        counts = np.maximum(known.sum(axis=0), 1)
-        values = values - np.where(known, values, 0).sum(axis=0) / counts
-    values = np.where(known, values, 0)
+        counts = np.maximum(is_known.sum(axis=0), 1)
+        values = values - np.where(is_known, values, 0).sum(axis=0) / counts
+    values = np.where(is_known, values, 0)
     length = np.sqrt(np.square(values).sum(axis=0))
     varies = length > _VARIES * length.max(axis=0)
     return np.where(varies, values / np.where(varies, length, 1), 0)
@@ -106,8 +106,8 @@ def enhanced(deviates):
         return deviates
     n, n_frames, n_features = deviates.shape
     # A column for each curve and sign.
-    both = np.concatenate([deviates, -deviates]).astype(np.float32)
-    curves = both.transpose(1, 0, 2).reshape(n_frames, -1)
+    signed = np.concatenate([deviates, -deviates]).astype(np.float32)
+    curves = signed.transpose(1, 0, 2).reshape(n_frames, -1)
     total, columns, height = np.zeros_like(curves), np.arange(curves.shape[1]), 0.0
     while True:
         height += _STEP
@@ -118,10 +118,10 @@ def enhanced(deviates):
         above, extent = curves >= height, np.zeros_like(curves)
         # Frames since the last one below, and then the largest of each run.
         run = np.zeros(len(columns), dtype=np.float32)
-        for here, out in zip(above, extent, strict=True):
-            run = np.multiply(run + 1, here, out=out)
-        for here, out in zip(above[::-1], extent[::-1], strict=True):
-            run = np.multiply(np.maximum(run, out), here, out=out)
+        for is_above, out in zip(above, extent, strict=True):
+            run = np.multiply(run + 1, is_above, out=out)
+        for is_above, out in zip(above[::-1], extent[::-1], strict=True):
+            run = np.multiply(np.maximum(run, out), is_above, out=out)
         total[:, columns] += extent**_EXTENT * (height**_HEIGHT * _STEP)
     higher, lower = total.reshape(n_frames, 2, n, n_features).transpose(1, 2, 0, 3)
     return higher - lower
@@ -182,8 +182,8 @@ def families(design, curves, n_permutations, random_state, *, n_jobs=None, progr
     step = progress.stage("permutations", len(work))
     results = list(run(_enhanced_draws, work, n_jobs=n_jobs, prefer="threads", step=step))
     n = len(portions)
-    parts = [results[k : k + n] for k in range(0, len(results), n)]
-    return [Family(p[0][0], np.concatenate([largest for _, largest in p])) for p in parts]
+    by_curves = [results[k : k + n] for k in range(0, len(results), n)]
+    return [Family(p[0][0], np.concatenate([largest for _, largest in p])) for p in by_curves]
 
 
 def _enhanced_draws(design, rows, units):

@@ -10,6 +10,7 @@ from scipy.stats import t as student
 
 from ..inputs.numbers import as_numbers
 from ..inputs.wording import counted
+from ..matching.counting import first_largest, first_smallest
 from ..utils.groups import encode_groups
 from .permutation import Design
 
@@ -142,7 +143,7 @@ class Study:
             return self._interval(values.mean(), error, n - 1, what, self.labels)
         parts = [values[self.groups[known] == k] for k in range(len(self.labels))]
         means = [part.mean() for part in parts]
-        low, high = (0, 1) if len(means) == 2 else (int(np.argmin(means)), int(np.argmax(means)))
+        low, high = (0, 1) if len(means) == 2 else (first_smallest(means), first_largest(means))
         a, b = parts[low], parts[high]
         # Welch's test, for groups that vary differently.
         shares = np.array([x.var(ddof=1) / len(x) for x in (a, b)])

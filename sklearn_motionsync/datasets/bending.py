@@ -12,6 +12,7 @@ from sklearn.utils._param_validation import Interval
 from ..body.skeleton import Skeleton
 from ..inputs.types import RandomState
 from ..inputs.wording import counted
+from ..matching.counting import whole
 from ..utils.parameters import validated_function
 from .limits import LIMITS, check_size
 
@@ -134,15 +135,15 @@ def make_bending(
     >>> [x.shape[1] for x in bunch.data], bunch.keyframes.shape
     ([45, 45, 45], (3, 5))
     """
-    what = f"{counted(n_performances, 'performance')} of about {n_frames} frames"
+    amount = f"{counted(n_performances, 'performance')} of about {n_frames} frames"
     n_numbers = n_performances * n_frames * 45
-    check_size("make_bending", what, n_numbers, "n_performances or n_frames")
+    check_size("make_bending", amount, n_numbers, "n_performances or n_frames")
     random_state = check_random_state(random_state)
     actors = [_draw_actor(random_state, style) for _ in range(n_actors)]
     moments = np.array(list(_KEYFRAMES.values()))
     data, times, keyframes = [], [], []
     for i in range(n_performances):
-        length = round(n_frames * random_state.uniform(0.75, 1.25))
+        length = whole(n_frames * random_state.uniform(0.75, 1.25))
         phase = _draw_warp(random_state, length, warp)
         lengths, angles = actors[i % n_actors]
         positions = _animate(phase, lengths, _vary(random_state, 0.3 * style, angles))

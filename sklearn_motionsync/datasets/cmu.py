@@ -124,15 +124,15 @@ def fetch_cmu(
         raise ValueError("trials must be one number or several, got none.")
     folder = Path(get_data_home(data_home)) / "cmu_mocap" / subject
     names = [f"{subject}.asf", *(f"{subject}_{take}.amc" for take in takes)]
-    known = sha256 or {}
+    checksums = sha256 or {}
     new = []
     for name in dict.fromkeys(names):
-        if _is_valid(folder / name, known.get(name)):
+        if _is_valid(folder / name, checksums.get(name)):
             continue
         address = f"{url.rstrip('/')}/{subject}/{name}"
         if not download_if_missing:
             raise OSError(_describe_missing(folder / name, address, "download_if_missing is False"))
-        _download(address, folder / name, known.get(name), n_retries, delay)
+        _download(address, folder / name, checksums.get(name), n_retries, delay)
         new.append(folder / name)
     files = [folder / name for name in names]
     data = _read(files[0], files[1:], new)
@@ -181,9 +181,9 @@ def _download(address, path, sha256, n_retries, delay):
     with TemporaryDirectory(prefix="download_", dir=path.parent) as folder:
         fetched = _try(address, Path(folder) / path.name, path, n_retries, delay)
         if not _is_valid(fetched, sha256):
-            found = hashlib.sha256(fetched.read_bytes()).hexdigest()
+            checksum = hashlib.sha256(fetched.read_bytes()).hexdigest()
             raise OSError(
-                f"{path.name} from {address} has the checksum {found}, not {sha256}; it was not "
+                f"{path.name} from {address} has the checksum {checksum}, not {sha256}; it was not "
                 "kept. Correct sha256=, or give another url=."
             )
         fetched.replace(path)
@@ -196,7 +196,7 @@ def _try(address, fetched, path, n_retries, delay):
 
     from sklearn.datasets import fetch_file
 
-    for left in range(n_retries, -1, -1):
+    for n_left in range(n_retries, -1, -1):
         try:
             return fetch_file(address, fetched.parent, fetched.name, n_retries=0)
         except (OSError, HTTPException) as error:
@@ -208,7 +208,7 @@ def _try(address, fetched, path, n_retries, delay):
                         "or trial does not exist there. Look for its number on the site, or give "
                         "another url=."
                     ) from error
-            if not left:
+            if not n_left:
                 raise OSError(_describe_missing(path, address, error)) from error
         time.sleep(delay)
 

@@ -12,6 +12,7 @@ from sklearn.utils._param_validation import Interval
 
 from ..inputs.types import RandomState
 from ..inputs.wording import counted
+from ..matching.counting import whole
 from ..utils.parameters import validated_function
 from .limits import LIMITS, check_size
 
@@ -187,22 +188,21 @@ def make_gait(
     >>> later[[0, 30, 62, 100]].round(1).tolist()  # in per cent of the cycle
     [0.0, 0.8, 3.0, 0.0]
     """
-    what = f"{n_people} people with {counted(n_cycles, 'cycle')} of about {n_frames} frames"
+    amount = f"{n_people} people with {counted(n_cycles, 'cycle')} of about {n_frames} frames"
     n_numbers = n_people * n_cycles * n_frames * len(_CURVES)
-    check_size("make_gait", what, n_numbers, "n_people, n_cycles or n_frames")
+    check_size("make_gait", amount, n_numbers, "n_people, n_cycles or n_frames")
     # The same people walk, in cycles and in takes.
     seeds = check_random_state(random_state).randint(np.iinfo(np.int32).max, size=n_people)
     record = _record_take if takes else _record_cycles
     recorded = []
     for i, seed in enumerate(seeds):
-        own, in_b = check_random_state(seed), i % 2
-        walk = _draw_walk(own, n_cycles, amplitude * in_b, timing * in_b, style, warp)
-        recorded.append(record(own, walk, n_frames, noise))
-    made = _describe_takes(recorded, frame_rate) if takes else _describe_cycles(recorded)
-    people = np.arange(n_people).repeat(len(made["data"]) // n_people)
+        generator, in_b = check_random_state(seed), i % 2
+        walk = _draw_walk(generator, n_cycles, amplitude * in_b, timing * in_b, style, warp)
+        recorded.append(record(generator, walk, n_frames, noise))
+    gait = _describe_takes(recorded, frame_rate) if takes else _describe_cycles(recorded)
+    people = np.arange(n_people).repeat(len(gait.data) // n_people)
     moments = np.linspace(0, 1, _N_MOMENTS)
-    return Bunch(
-        **made,
+    gait.update(
         person=np.array([f"person{i}" for i in people]),
         group=np.array([_GROUPS[i % 2] for i in people]),
         feature_names=list(_CURVES),
@@ -212,6 +212,7 @@ def make_gait(
         group_curves=np.stack([_typical_curves(moments, a) for a in (0.0, amplitude)]),
         group_times=np.stack([_shift_times(moments, t) for t in (0.0, timing)]),
     )
+    return gait
 
 
 # -- the walk of a person: curves, cycle after cycle, and their pace --------------------
@@ -317,7 +318,7 @@ def _record_cycles(random_state, walk, n_frames, noise):
     """Of each cycle but the first and last: angles and force, times, and key-frames."""
     cycles = []
     for c in range(1, len(walk.durations) - 1):
-        length = round(n_frames * walk.durations[c])
+        length = whole(n_frames * walk.durations[c])
         times = walk.times_at(c, np.linspace(0, 1, length))
         keyframes = (length - 1) * walk.shares_at(c, _KEY_MOMENTS)
         cycles.append((_measure(random_state, walk, c + times, noise), times, keyframes))
@@ -332,10 +333,10 @@ def _record_take(random_state, walk, n_frames, noise):
     first = np.ceil(strikes[1] - random_state.uniform(0.1, 0.35) * (strikes[1] - strikes[0]))
     end = strikes[-2] + random_state.uniform(0.1, 0.35) * (strikes[-1] - strikes[-2])
     frames = np.arange(first, end)
-    parts = np.split(frames, np.searchsorted(frames, strikes[1:-1]))
+    frames_by_cycle = np.split(frames, np.searchsorted(frames, strikes[1:-1]))
     durations = np.diff(strikes)
     phases = np.concatenate(
-        [c + walk.times_at(c, (parts[c] - strikes[c]) / durations[c]) for c in range(n)]
+        [c + walk.times_at(c, (frames_by_cycle[c] - strikes[c]) / durations[c]) for c in range(n)]
     )
     shares = np.stack([walk.shares_at(c, _KEY_MOMENTS) for c in range(n)])
     keyframes = strikes[:-1, np.newaxis] + shares * durations[:, np.newaxis] - first
@@ -354,37 +355,39 @@ def _measure(random_state, walk, phases, noise):
 
 def _describe_cycles(people):
     data, times, keyframes = zip(*[cycle for cycles in people for cycle in cycles], strict=True)
-    return {
-        "data": list(data),
-        "times": list(times),
-        "keyframes": np.array(keyframes),
-        "keyframe_names": list(_KEYFRAMES),
-        "keyframe_times": _KEY_MOMENTS.copy(),
-        "cycle": np.tile(np.arange(1, len(people[0]) + 1), len(people)),
-    }
+    return Bunch(
+        data=list(data),
+        times=list(times),
+        keyframes=np.array(keyframes),
+        keyframe_names=list(_KEYFRAMES),
+        keyframe_times=_KEY_MOMENTS.copy(),
+        cycle=np.tile(np.arange(1, len(people[0]) + 1), len(people)),
+    )
 
 
 def _describe_takes(people, frame_rate):
-    data, times, strikes, keyframes = zip(*people, strict=True)
-    n_cycles, names = len(keyframes[0]), ["heel strike", *_KEYFRAMES]
+    n_cycles, names = len(people[0][-1]), ["heel strike", *_KEYFRAMES]
     moments = np.arange(n_cycles)[:, np.newaxis] + np.array([0, *_KEY_MOMENTS])
-    # Strike and key-frames of one cycle after the other, and the last strike.
-    all_keyframes = [
-        np.append(np.column_stack([own[:-1], others]), own[-1])
-        for own, others in zip(strikes, keyframes, strict=True)
-    ]
-    return {
-        "data": list(data),
-        "times": list(times),
-        "keyframes": np.array(all_keyframes),
-        "keyframe_names": [f"{name} {c + 1}" for c in range(n_cycles) for name in names]
+    data, times, all_keyframes, events = [], [], [], []
+    for signals, phases, strikes, keyframes in people:
+        data.append(signals)
+        times.append(phases)
+        # Strike and key-frames of one cycle after the other, and the last strike.
+        by_cycle = np.column_stack([strikes[:-1], keyframes])
+        all_keyframes.append(np.append(by_cycle, strikes[-1]))
+        events.append(_list_events(signals, strikes, keyframes, frame_rate))
+    return Bunch(
+        data=data,
+        times=times,
+        keyframes=np.array(all_keyframes),
+        keyframe_names=[f"{name} {c + 1}" for c in range(n_cycles) for name in names]
         + [f"heel strike {n_cycles + 1}"],
-        "keyframe_times": np.append(moments, n_cycles),
-        "events": [_list_events(*take, frame_rate) for take in people],
-    }
+        keyframe_times=np.append(moments, n_cycles),
+        events=events,
+    )
 
 
-def _list_events(data, _, strikes, keyframes, frame_rate):
+def _list_events(data, strikes, keyframes, frame_rate):
     """The events within a take, by time."""
     toe_offs = keyframes[:, list(_KEYFRAMES).index("toe-off")]
     marked = [("Foot Strike", f) for f in strikes] + [("Foot Off", f) for f in toe_offs]

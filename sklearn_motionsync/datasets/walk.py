@@ -133,17 +133,17 @@ def make_walk(
     >>> [(event["label"], event["context"]) for event in walk.events[0][:4]]
     [('Foot Strike', 'Right'), ('Foot Off', 'Left'), ('Foot Strike', 'Left'), ('Foot Off', 'Right')]
     """
-    what = f"{n_people} people with {counted(n_strides, 'stride')}"
-    check_size("make_walk", what, 57 * 2 * n_people * n_strides * frame_rate, "n_people")
+    amount = f"{n_people} people with {counted(n_strides, 'stride')}"
+    check_size("make_walk", amount, 57 * 2 * n_people * n_strides * frame_rate, "n_people")
     seeds = check_random_state(random_state).randint(np.iinfo(np.int32).max, size=n_people)
     data, events, gaits = [], [], []
     for seed in seeds:
-        own = check_random_state(seed)
-        gait = _draw(own, style, asymmetry)
-        positions, found = _record(own, gait, n_strides, style, treadmill, frame_rate)
-        positions += own.normal(0, noise, positions.shape) if noise > 0 else 0
+        generator = check_random_state(seed)
+        gait = _draw(generator, style, asymmetry)
+        positions, walk_events = _record(generator, gait, n_strides, style, treadmill, frame_rate)
+        positions += generator.normal(0, noise, positions.shape) if noise > 0 else 0
         data.append(positions)
-        events.append(found)
+        events.append(walk_events)
         gaits.append(gait)
     return Bunch(
         data=data,

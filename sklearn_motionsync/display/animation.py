@@ -8,6 +8,7 @@ from inspect import signature
 
 import numpy as np
 
+from ..matching.counting import whole
 from .drawing import pyplot
 from .gif import gif_writer
 from .redrawing import Redrawing
@@ -49,7 +50,7 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
             f"seconds={seconds!r} at fps={fps!r} are {seconds * fps:.3g} pictures, more than "
             f"{_MAX_PICTURES}; choose fewer."
         )
-    count = max(2, round(seconds * fps))
+    count = max(2, whole(seconds * fps))
     display.plot(getattr(display, "axes_", None) if ax is None else ax, azimuth=azimuth)
     figure = display.figure_.canvas.figure
     # Looked up here: nothing can be imported while Python shuts down.
@@ -60,18 +61,19 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
         if not exists(getattr(figure, "number", None)):
             return False
         before = current().number
-        found = numbered(figure.number) is figure
+        is_same = numbered(figure.number) is figure
         numbered(before)
-        return found
+        return is_same
 
     class NotebookAnimation(FuncAnimation):
         """An animation that computes the layout once and needs no network."""
 
         def save(self, *args, **kwargs):
-            given = signature(super().save).bind(*args, **kwargs).arguments
-            _choose_writer(given, fps)
+            bound = signature(super().save).bind(*args, **kwargs)
+            _choose_writer(bound.arguments, fps)
             # What other animations change is not known.
-            redrawing = nullcontext() if given.get("extra_anim") else Redrawing(figure)
+            has_others = bound.arguments.get("extra_anim")
+            redrawing = nullcontext() if has_others else Redrawing(figure)
             # The layout takes longer than the drawing, and each picture would repeat it.
             layout = figure.get_layout_engine()
             figure.draw_without_rendering()
@@ -80,7 +82,7 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
             figure.canvas.draw_idle = _do_nothing
             try:
                 with redrawing:
-                    super().save(**given)
+                    super().save(*bound.args, **bound.kwargs)
             finally:
                 del figure.canvas.draw_idle, figure.get_layout_engine
                 figure.set_layout_engine(layout)
@@ -105,12 +107,12 @@ def animate(display, show, ax, *, seconds, fps, azimuth):
     )
 
 
-def _choose_writer(given, fps):
+def _choose_writer(arguments, fps):
     """Take the writer with one palette where matplotlib would take Pillow for a GIF.
 
     Parameters
     ----------
-    given : dict
+    arguments : dict
         The arguments of ``save``, which are changed.
     fps : float
         The default.
@@ -118,8 +120,8 @@ def _choose_writer(given, fps):
     from matplotlib import rcParams
     from matplotlib.animation import writers
 
-    name = given.get("writer") or rcParams["animation.writer"]
-    is_gif = pathlib.Path(given["filename"]).suffix.lower() == ".gif"
+    name = arguments.get("writer") or rcParams["animation.writer"]
+    is_gif = pathlib.Path(arguments["filename"]).suffix.lower() == ".gif"
     if not is_gif or not isinstance(name, str):
         return
     if name != "pillow":
@@ -127,8 +129,8 @@ def _choose_writer(given, fps):
             return
         _LOG.warning("The writer %s of movies is not there; Pillow is used instead.", name)
     options = ("codec", "bitrate", "extra_args", "metadata")
-    options = {key: given.pop(key) for key in options if given.get(key) is not None}
-    given["writer"] = gif_writer(given.pop("fps", None) or fps, **options)
+    options = {key: arguments.pop(key) for key in options if arguments.get(key) is not None}
+    arguments["writer"] = gif_writer(arguments.pop("fps", None) or fps, **options)
 
 
 def _do_nothing(*args, **kwargs):

@@ -34,7 +34,6 @@ __all__ = [
     "as_performances",
     "labels_as_text",
     "labels_of_signals",
-    "named_groups",
     "one_each",
     "times_from_zero",
 ]
@@ -136,17 +135,17 @@ def labels_of_signals(names, known_units, ylabel=None, units=None):
     return out
 
 
-def _by_name(given, names, default, what):
-    if isinstance(given, str):
-        return [given] * len(names)
-    if given is not None and not isinstance(given, Mapping):
-        return as_names(given, len(names), what, "signals")
-    given = given or {}
-    for name in given:
+def _by_name(texts, names, default, what):
+    if isinstance(texts, str):
+        return [texts] * len(names)
+    if texts is not None and not isinstance(texts, Mapping):
+        return as_names(texts, len(names), what, "signals")
+    texts = texts or {}
+    for name in texts:
         if name not in default:
-            known = ", ".join(map(str, default))
-            raise ValueError(f"{what}: there is no signal {name!r}; there are {known}.")
-    return [str(given.get(name, default[name])) for name in names]
+            signals = ", ".join(map(str, default))
+            raise ValueError(f"{what}: there is no signal {name!r}; there are {signals}.")
+    return [str(texts.get(name, default[name])) for name in names]
 
 
 def one_each(values, count, what, each="performances"):
@@ -216,8 +215,7 @@ class Takes:
         times = [times] if self.is_single else times
         listed, rate = one_each(times, len(self.arrays), "times", each), self._estimator.frame_rate
         for i in indices:
-            what = f"Performance {self.labels[i]}"
-            check_times(listed[i], len(self.arrays[i]), rate, what)
+            check_times(listed[i], len(self.arrays[i]), rate, f"Performance {self.labels[i]}")
         return [listed[i] for i in indices]
 
 
@@ -226,15 +224,3 @@ def _as_list(values):
     if isinstance(values, (str, bytes, Set, Mapping)) or not isinstance(values, Iterable):
         return None
     return None if getattr(values, "ndim", 1) != 1 else list(values)
-
-
-def named_groups(groups, match):
-    """Groups as given; for ``"mode"`` the mode of each performance, by a function for their match.
-
-    Returns
-    -------
-    sequence of length n_sequences, or None
-    """
-    if isinstance(groups, str) and groups == "mode":
-        return [f"mode {mode}" for mode in match().mode]
-    return groups

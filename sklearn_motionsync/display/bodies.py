@@ -9,6 +9,7 @@ from ..body.direction_cosines import DirectionCosines
 from ..body.limbs import unit_vectors
 from ..body.skeleton import Skeleton, check_columns, loose_joints
 from ..inputs.numbers import as_numbers, check_finite, column_names, nanmean
+from ..matching.gaps import interpolate_gaps
 
 __all__ = [
     "bones_by_side",
@@ -117,13 +118,11 @@ def _heading_pair(skeleton):
 
 def _fill_gaps(track, what):
     """A track (n_frames, n_dims) with its gaps interpolated."""
-    seen = np.flatnonzero(np.isfinite(track).all(axis=1))
-    if len(seen) == 0:
+    if np.isnan(track).any(axis=1).all():
         raise ValueError(
             f"No frame shows the {what}, so the place and the heading of the body are unknown."
         )
-    frames = np.arange(len(track))
-    return np.column_stack([np.interp(frames, seen, column[seen]) for column in track.T])
+    return interpolate_gaps(track, held=True)
 
 
 def project(x, skeleton, azimuth):

@@ -152,31 +152,32 @@ class CycleDisplay:
             raise ValueError(f"Give a CycleSegmenter, got {type(estimator).__name__}.")
         fitted = hasattr(estimator, "template_")
         segmenter = CycleSegmenter(**estimator.get_params()).set_params(not_cyclic="skip")
-        given, takes = check_takes(segmenter, X, reset=True)
+        recordings, takes = check_takes(segmenter, X, reset=True)
         i = as_index(take, len(takes), "take")
-        (x,), (repeats,) = correlate_takes(segmenter, given[i : i + 1], takes[i : i + 1])
-        found = (as_learnt(estimator, x, repeats) if fitted else repeats).found
-        row = segmenter.report(given[i : i + 1]).iloc[0]
-        name, curve = _curve_of(segmenter, estimator if fitted else None, given[i], x, feature)
+        (x,), (repeats,) = correlate_takes(segmenter, recordings[i : i + 1], takes[i : i + 1])
+        longest = (as_learnt(estimator, x, repeats) if fitted else repeats).found
+        row = segmenter.report(recordings[i : i + 1]).iloc[0]
+        learnt = estimator if fitted else None
+        name, curve = _curve_of(segmenter, learnt, recordings[i], x, feature)
         cuts, n_cycles = np.array([], dtype=int), None
         if fitted and row["cyclic"]:
-            _, origin = estimator.segment(given[i : i + 1])
+            _, origin = estimator.segment(recordings[i : i + 1])
             whole = origin[origin["complete"]]
             cuts, n_cycles = np.unique([whole["start"], whole["stop"] - 1]), len(whole)
-        period = found.period if row["period"] > 0 else None
+        period = longest.period if row["period"] > 0 else None
         display = cls(
-            found.correlation,
-            found.peaks,
+            longest.correlation,
+            longest.peaks,
             curve,
             cuts,
             stretches=row["stretches"],
             n_cycles=n_cycles,
-            threshold=float(required_strength(np.inf, found.breadth, segmenter.threshold)),
+            threshold=float(required_strength(np.inf, longest.breadth, segmenter.threshold)),
             period=period,
             name=name,
             reason=row["reason"],
         )
-        return display.plot(ax, unit=unit, frame_rate=rates_of([given[i]], frame_rate, unit))
+        return display.plot(ax, unit=unit, frame_rate=rates_of([recordings[i]], frame_rate, unit))
 
     def plot(
         self, ax: AxesLike | None = None, *, unit: Unit = "frames", frame_rate: float | None = None
@@ -242,9 +243,9 @@ class CycleDisplay:
     def _describe(self):
         n = self.n_cycles
         cut = f"{n} whole cycle{'s' * (n != 1)}" if len(self.cuts) else ""
-        found = "" if self.period is None else f"period {self.period:.1f} frames"
+        period = "" if self.period is None else f"period {self.period:.1f} frames"
         several = f"{len(self.stretches)} stretches" if len(self.stretches) > 1 else ""
-        return ", ".join(filter(None, [self.reason, several, found, cut])) or "no period"
+        return ", ".join(filter(None, [self.reason, several, period, cut])) or "no period"
 
 
 def _curve_of(segmenter, fitted, take, x, feature):

@@ -41,24 +41,27 @@ class PhaseDial:
         axis.axis("off")
 
         def ring(color, radii, zorder, end=90):
-            style = {"width": radii[1] - radii[0], "facecolor": color, "linewidth": 0}
-            return axis.add_patch(Wedge((0, 0), radii[1], end, 90, zorder=zorder, **style))
+            wedge = Wedge(
+                (0, 0),
+                radii[1],
+                end,
+                90,
+                width=radii[1] - radii[0],
+                facecolor=color,
+                linewidth=0,
+                zorder=zorder,
+            )
+            return axis.add_patch(wedge)
 
         ring(COLORS["shadow"], _RING, 1, end=-270)
         self.passed = ring(COLORS["performance"], _RING, 2)
         self.ahead = ring(COLORS["mean"], _ARC, 3)
-        style = {"color": COLORS["pattern"], "solid_capstyle": "round", "zorder": 4}
-        (self.hand,) = axis.plot([], [], **style)
-        style = {
-            "ha": "center",
-            "va": "center",
-            "color": "0.35",
-            "fontsize": "x-small",
-            "zorder": 1,
-        }
+        (self.hand,) = axis.plot([], [], color=COLORS["pattern"], solid_capstyle="round", zorder=4)
         for quarter, text in enumerate(("0 %", "25", "50", "75")):
             x, y = _on_circle(quarter / 4, _NUMBERS + 0.02 * (quarter % 2))
-            axis.text(x, y, text, **style)
+            axis.text(
+                x, y, text, ha="center", va="center", color="0.35", fontsize="x-small", zorder=1
+            )
         self.share = axis.text(0, 0, "", ha="center", va="center", fontsize="large")
         self.state = axis.text(0, -1.62, "", ha="center", va="center", fontsize="small")
 

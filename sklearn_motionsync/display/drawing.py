@@ -210,10 +210,20 @@ def legend_above(top, handles, labels, title=None, below=None, n_cols=6):
 
 def _legend(axis, handles, labels, title, n_cols, room, size):
     """A legend with as many columns as fit, in a font size, and its extent."""
-    style = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
-    style |= {"fontsize": size, "title_fontsize": size, "alignment": "left"}
     for count in range(min(len(labels), n_cols), 0, -1):
-        legend = axis.legend(handles, labels, title=title, ncols=count, frameon=False, **style)
+        legend = axis.legend(
+            handles,
+            labels,
+            title=title,
+            ncols=count,
+            frameon=False,
+            loc="lower left",
+            bbox_to_anchor=(0, 1),
+            borderaxespad=0.2,
+            fontsize=size,
+            title_fontsize=size,
+            alignment="left",
+        )
         box = legend.get_window_extent()
         if box.width <= room:
             break
@@ -241,8 +251,7 @@ def bone_lines(axis, color, width, alpha=1.0, zorder=2):
     """An empty artist for the bones of stick figures."""
     from matplotlib.collections import LineCollection
 
-    style = {"colors": color, "linewidths": width, "alpha": alpha, "zorder": zorder}
-    lines = LineCollection([], **style)
+    lines = LineCollection([], colors=color, linewidths=width, alpha=alpha, zorder=zorder)
     lines.set_capstyle("round")
     return axis.add_collection(lines, autolim=False)
 
@@ -261,17 +270,18 @@ def parts_outside(ys, lower, upper):
     xs, ys : ndarray, shape (n_pieces, 2)
         Both ends of straight pieces, each at most one frame long.
     """
-    pieces = []
+    all_xs, all_ys = [], []
     for beyond in (ys - upper, lower - ys):
         out = beyond > 0
         curve, p = np.nonzero((out[:, :-1] | out[:, 1:]) & np.isfinite(np.diff(beyond)))
-        here, there = beyond[curve, p], beyond[curve, p + 1]
-        crossed = (here > 0) != (there > 0)
-        share = here / np.where(crossed, here - there, 1)
-        ends = np.stack([np.where(here > 0, 0, share), np.where(there > 0, 1, share)], axis=1)
+        first, last = beyond[curve, p], beyond[curve, p + 1]
+        crossed = (first > 0) != (last > 0)
+        share = first / np.where(crossed, first - last, 1)
+        ends = np.stack([np.where(first > 0, 0, share), np.where(last > 0, 1, share)], axis=1)
         start, step = ys[curve, p], ys[curve, p + 1] - ys[curve, p]
-        pieces.append((p[:, np.newaxis] + ends, start[:, np.newaxis] + ends * step[:, np.newaxis]))
-    return tuple(np.concatenate(of_both) for of_both in zip(*pieces, strict=True))
+        all_xs.append(p[:, np.newaxis] + ends)
+        all_ys.append(start[:, np.newaxis] + ends * step[:, np.newaxis])
+    return np.concatenate(all_xs), np.concatenate(all_ys)
 
 
 def group_styles(groups):

@@ -120,7 +120,7 @@ class GaitDisplay:
         recordings = Recordings(X, skeleton, feet, frame_rate)
         i = as_index(recording, len(recordings), "recording")
         walk = recordings.walk(i)
-        found = events_of(walk, recordings.split_events(events)[i])
+        events_of_walk = events_of(walk, recordings.split_events(events)[i])
         rows = np.arange(0, walk.n_samples, walk.per_frame)
         scale, unit = recordings.length_of_leg(i, walk)
         ends = {"heel": walk.heels, "toe": walk.toes}
@@ -133,7 +133,7 @@ class GaitDisplay:
         floor = min(np.nanmin(values) for values in heights.values())
         heights = {name: values - floor for name, values in heights.items()}
         times = recordings.times_at(i, np.arange(len(rows)))
-        table = tabulate_events(recordings, i, walk, found)
+        table = tabulate_events(recordings, i, walk, events_of_walk)
         return cls(times, heights, table, unit=unit).plot(ax)
 
     def plot(self, ax: AxesLike | None = None) -> Self:

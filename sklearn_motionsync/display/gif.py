@@ -14,7 +14,7 @@ _N_SAMPLED = 8
 _RGB = np.uint32(0xFFFFFF)
 
 
-def gif_writer(fps, **others):
+def gif_writer(fps, **options):
     """Matplotlib's writer of Pillow, with one palette for all pictures.
 
     Pillow chooses 256 colours for each picture, which takes longer than drawing. Here they are
@@ -24,7 +24,7 @@ def gif_writer(fps, **others):
     Parameters
     ----------
     fps : float
-    **others : dict
+    **options : dict
         Of the writer, such as ``metadata``.
 
     Returns
@@ -72,7 +72,7 @@ def gif_writer(fps, **others):
                 loop=0,
             )
 
-    return GifWriter(fps, **others)
+    return GifWriter(fps, **options)
 
 
 def indexed(pictures):
@@ -98,14 +98,14 @@ def indexed(pictures):
     for picture in pictures:
         # Few pixels are not as in the picture before.
         changed = slice(None) if before is None else np.flatnonzero(picture != before)
-        own = picture[changed]
-        known = number_of[own]
-        if known.size and known.min() < 0:
-            new = np.unique(own[known < 0])
+        pixels = picture[changed]
+        numbers_there = number_of[pixels]
+        if numbers_there.size and numbers_there.min() < 0:
+            new = np.unique(pixels[numbers_there < 0])
             number_of[new] = tree.query(_as_rgb(new))[1]
-            known = number_of[own]
+            numbers_there = number_of[pixels]
         numbers = np.zeros(len(picture), dtype=np.uint8) if before is None else out[-1].copy()
-        numbers[changed] = known
+        numbers[changed] = numbers_there
         out.append(numbers)
         before = picture
     return colors, out
@@ -118,16 +118,16 @@ def _palette(pictures):
     sampled = pictures[:: -(-len(pictures) // _N_SAMPLED)]
     ground = sampled[0][0]
     # Most pixels are of the ground.
-    others = np.concatenate([picture[picture != ground] for picture in sampled])
-    found, counts = np.unique(others, return_counts=True)
+    drawn = np.concatenate([picture[picture != ground] for picture in sampled])
+    colors, counts = np.unique(drawn, return_counts=True)
     order = np.argsort(-counts, kind="stable")
-    is_exact = order[: _N_COLORS - 1 if len(found) < _N_COLORS else _N_EXACT - 1]
-    exact = _as_rgb(np.concatenate([[ground], found[is_exact]]))
-    rest = np.delete(np.arange(len(found)), is_exact)
-    if len(rest) == 0:
+    is_exact = order[: _N_COLORS - 1 if len(colors) < _N_COLORS else _N_EXACT - 1]
+    exact = _as_rgb(np.concatenate([[ground], colors[is_exact]]))
+    mixed = np.delete(np.arange(len(colors)), is_exact)
+    if len(mixed) == 0:
         return exact
     # By their roots frequent colours count more, and rare ones still count.
-    repeated = np.repeat(found[rest], np.ceil(np.sqrt(counts[rest])).astype(int))
+    repeated = np.repeat(colors[mixed], np.ceil(np.sqrt(counts[mixed])).astype(int))
     chosen = Image.fromarray(_as_rgb(repeated)[np.newaxis]).quantize(
         _N_COLORS - _N_EXACT, method=Image.Quantize.MEDIANCUT
     )

@@ -22,6 +22,7 @@ from ..inputs.types import (
     Unit,
     ValuesLike,
 )
+from ..matching.counting import first_largest
 from ..synchronizers.match import check_coverage
 from .arguments import AxesLike, labels_of_signals
 from .drawing import curves, front_line, group_styles, legend_above, signal_panels
@@ -243,12 +244,31 @@ class GroupDisplay:
                 f"The comparison is in {comparison.unit}, and the figure in {unit}. Set "
                 f"unit={comparison.unit!r}."
             )
-        given = {"signals": signals, "features": features, "unit": unit, "frame_rate": frame_rate}
-        aligned = AlignedCurves.of(estimator, X, params, f"{cls.__name__}.from_estimator", **given)
-        how = {"statistic": statistic, "coverage": coverage, "trials": trials, "events": events}
-        labels = {"features": features, "ylabel": ylabel, "units": units}
-        given = display_of_groups(aligned, groups, people, comparison, params, **how, **labels)
-        return given.plot(ax)
+        aligned = AlignedCurves.of(
+            estimator,
+            X,
+            params,
+            f"{cls.__name__}.from_estimator",
+            signals=signals,
+            features=features,
+            unit=unit,
+            frame_rate=frame_rate,
+        )
+        display = display_of_groups(
+            aligned,
+            groups,
+            people,
+            comparison,
+            params,
+            features=features,
+            statistic=statistic,
+            coverage=coverage,
+            trials=trials,
+            events=events,
+            ylabel=ylabel,
+            units=units,
+        )
+        return display.plot(ax)
 
     def plot(self, ax: AxesLike | None = None) -> Self:
         """Draw.
@@ -298,9 +318,9 @@ class GroupDisplay:
 
     def _draw_trials(self, axis, i, styles):
         """Draw signal i of all trials."""
-        clock, style = self._axis.clock, {"linewidths": 0.5, "alpha": 0.35}
+        clock = self._axis.clock
         return [
-            curves(axis, [clock] * len(x), x[:, :, i], colors=color, **style)
+            curves(axis, [clock] * len(x), x[:, :, i], colors=color, linewidths=0.5, alpha=0.35)
             for x, (color, _) in zip(self.trials, styles, strict=True)
         ]
 
@@ -309,8 +329,9 @@ class GroupDisplay:
         clock, means, bands = self._axis.clock, [], []
         for values, (color, line) in zip(of_groups, styles, strict=True):
             mean, half = band_of_mean(values, self.statistic, self.coverage)
-            style = {"color": color, "alpha": 0.18, "linewidth": 0}
-            bands.append(axis.fill_between(clock, mean - half, mean + half, **style))
+            low, high = mean - half, mean + half
+            band = axis.fill_between(clock, low, high, color=color, alpha=0.18, linewidth=0)
+            bands.append(band)
             means.append(front_line(axis, clock, mean, color=color, linestyle=line))
         self.means_.append(means)
         self.bands_.append(bands)
@@ -324,8 +345,9 @@ class GroupDisplay:
                 axis.axvspan(middle - half, middle + half, color="0.5", alpha=0.12, linewidth=0)
             self.events_.append(draw_keyframes(axis, at))
         texts = [text_of_keyframe(name) for name in self.events.columns]
-        style = {"rotation": 20, "rotation_mode": "anchor", "ha": "left", "fontsize": "small"}
-        self.axes_[-1].secondary_xaxis("top").set_xticks(at, texts, **style)
+        self.axes_[-1].secondary_xaxis("top").set_xticks(
+            at, texts, rotation=20, rotation_mode="anchor", ha="left", fontsize="small"
+        )
 
     def _draw_dots(self, axis, styles):
         """Draw the offsets of people at the events, or where the timing differs most."""
@@ -339,36 +361,42 @@ class GroupDisplay:
             xs.append(np.broadcast_to(x, y.shape))
             ys.append(y)
         if self.pairs:
-            pairs = (np.reshape(values, (len(xs), -1)) for values in (xs, ys))
-            axis.plot(*pairs, color="0.6", linewidth=0.6, zorder=4)
+            shape = len(xs), -1
+            x, y = np.reshape(xs, shape), np.reshape(ys, shape)
+            axis.plot(x, y, color="0.6", linewidth=0.6, zorder=4)
         for x, y, (color, _) in zip(xs, ys, styles, strict=True):
-            style = {"s": 12, "color": color, "edgecolor": "white", "linewidth": 0.4, "zorder": 5}
-            self.dots_.append(axis.scatter(x.ravel(), y.ravel(), **style))
+            x, y = x.ravel(), y.ravel()
+            dots = axis.scatter(x, y, s=12, color=color, edgecolor="white", linewidth=0.4, zorder=5)
+            self.dots_.append(dots)
 
     def _moments(self):
         """The frames of the clock at which offsets are shown person by person."""
         if self.events is not None:
             return self.events.mean().to_numpy()
-        if self.clusters is not None and len(found := self._clusters_of("timing")):
-            clock = self._axis.clock
-            return found["peak"].to_numpy() * clock_rate(clock)
-        return np.array([np.concatenate(self.offsets).var(axis=0).argmax()], dtype=float)
+        if self.clusters is not None and len(timing := self._clusters_of("timing")):
+            return timing["peak"].to_numpy() * clock_rate(self._axis.clock)
+        return np.array([first_largest(np.concatenate(self.offsets).var(axis=0))], dtype=float)
 
     def _clusters_of(self, what, feature=None):
         """The clusters of the timing, or of a signal."""
-        found = self.clusters[self.clusters["what"] == what]
-        return found if feature is None else found[found["feature"] == feature]
+        clusters = self.clusters[self.clusters["what"] == what]
+        return clusters if feature is None else clusters[clusters["feature"] == feature]
 
     def _draw_clusters(self):
         """Draw the clusters of each panel as bars along its lower edge."""
         from matplotlib.collections import LineCollection
 
         for axis, name in zip(self.axes_, [*self.feature_names, None], strict=True):
-            found = self._clusters_of("timing" if name is None else "shape", name)
-            ends = found[["start", "end"]].to_numpy()
-            bars = np.stack([ends, np.full_like(ends, _BAR)], axis=2)
-            style = {"colors": "black", "linewidths": 3.5, "capstyle": "butt", "zorder": 6}
-            lines = LineCollection(bars, transform=axis.get_xaxis_transform(), **style)
+            clusters = self._clusters_of("timing" if name is None else "shape", name)
+            ends = clusters[["start", "end"]].to_numpy()
+            lines = LineCollection(
+                np.stack([ends, np.full_like(ends, _BAR)], axis=2),
+                colors="black",
+                linewidths=3.5,
+                capstyle="butt",
+                zorder=6,
+                transform=axis.get_xaxis_transform(),
+            )
             self.clusters_.append(axis.add_collection(lines, autolim=False))
         return [lines for lines in self.clusters_ if len(lines.get_segments())]
 
@@ -430,18 +458,18 @@ def display_of_groups(
 
 def _events_on_clock(events, params, aligned, of_people):
     """Where the events of people are on the clock, in frames: a table; None without events."""
-    given = params.get("keyframes") if events is None else events
-    if given is None:
+    rate, name = None, "events"
+    if events is None:
+        events, rate, name = params.get("keyframes"), params.get("frame_rate"), "keyframes"
+    if events is None:
         return None
     performances = aligned.reached.performances
-    rate = None if events is not None else params.get("frame_rate")
-    name = "keyframes" if events is None else "events"
-    shares = Keyframes(given, len(performances), rate, name=name).known(performances)
+    shares = Keyframes(events, len(performances), rate, name=name).known(performances)
     last = len(aligned.clock) - 1
     frames = np.arange(last + 1.0)
     places = np.array(
         [np.interp(s * last, t, frames) for s, t in zip(shares, aligned.match.times, strict=True)]
     )
-    names = given.columns if isinstance(given, pd.DataFrame) else range(places.shape[1])
+    names = events.columns if isinstance(events, pd.DataFrame) else range(places.shape[1])
     rows = of_people.means(places)
     return pd.DataFrame(np.concatenate(rows), columns=pd.Index(names, tupleize_cols=False))

@@ -18,49 +18,48 @@ __all__ = [
     "text_of_keyframe",
 ]
 
-_LINE = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2)), "zorder": 1.5}
 # The height of ticks, as a share of the panel.
 _TICK = 0.05
 
 
-def named_keyframes(synchronizer, given):
+def named_keyframes(synchronizer, keyframes):
     """The key-frames of a fitted synchronizer, with the names that a table of them has.
 
     Parameters
     ----------
     synchronizer : estimator
-    given : DataFrame with a column a key-frame, or anything, or None
+    keyframes : DataFrame with a column a key-frame, or anything, or None
 
     Returns
     -------
     Series, indexed by names, or None
         In frames of the clock, None without key-frames. Those without a name are numbered.
     """
-    found = getattr(synchronizer, "keyframes_", None)
-    if found is None:
+    frames = getattr(synchronizer, "keyframes_", None)
+    if frames is None:
         return None
-    named = isinstance(given, pd.DataFrame) and len(given.columns) == len(found)
-    return pd.Series(found, index=given.columns if named else None)
+    named = isinstance(keyframes, pd.DataFrame) and len(keyframes.columns) == len(frames)
+    return pd.Series(frames, index=keyframes.columns if named else None)
 
 
-def keyframes_of_estimator(estimator, n_frames, given):
+def keyframes_of_estimator(estimator, n_frames, keyframes):
     """The same of the synchronizer of a pipeline; None also without one on that many frames."""
     try:
         _, synchronizer = find_synchronizer(estimator)
     except ValueError:
         return None
     same = getattr(synchronizer, "n_frames_", None) == n_frames
-    return named_keyframes(synchronizer, given) if same else None
+    return named_keyframes(synchronizer, keyframes) if same else None
 
 
 def own_keyframes(synchronizer, performances, params):
     """Key-frames (n_sequences, n_keyframes) of performances, in their frames, None if not given."""
-    given, found = params.get("keyframes"), getattr(synchronizer, "keyframes_", None)
-    if given is None or found is None:
+    keyframes, on_clock = params.get("keyframes"), getattr(synchronizer, "keyframes_", None)
+    if keyframes is None or on_clock is None:
         return None
-    rows = Keyframes(given, len(performances), params.get("frame_rate"))
+    rows = Keyframes(keyframes, len(performances), params.get("frame_rate"))
     last = np.array([[len(x) - 1] for x in performances])
-    return rows.shares(performances, len(found)) * last
+    return rows.shares(performances, len(on_clock)) * last
 
 
 def check_own_keyframes(keyframes, n_sequences):
@@ -115,7 +114,11 @@ def draw_keyframes(axis, times, names=(), *, by_diagonal=False):
     -------
     list of Line2D
     """
-    lines = [axis.axvline(at, **_LINE) for at in times if np.isfinite(at)]
+    lines = [
+        axis.axvline(at, color="0.35", linewidth=0.9, linestyle=(0, (2, 2)), zorder=1.5)
+        for at in times
+        if np.isfinite(at)
+    ]
     middle = np.mean(axis.get_xlim())
     for at, name in zip(times, names, strict=False):
         if not (text := text_of_keyframe(name)) or not np.isfinite(at):
@@ -154,10 +157,11 @@ def draw_own_keyframes(axis, times, colors):
     """
     from matplotlib.collections import LineCollection
 
-    segments, own = [], []
+    segments, of_ticks = [], []
     for i, row in enumerate(times):
-        known = np.asarray(row)[np.isfinite(row)]
-        segments += [[(at, 0), (at, _TICK)] for at in known]
-        own += [colors if isinstance(colors, str) else colors[i]] * len(known)
-    ticks = LineCollection(segments, colors=own, linewidths=1, transform=axis.get_xaxis_transform())
+        places = np.asarray(row)[np.isfinite(row)]
+        segments += [[(at, 0), (at, _TICK)] for at in places]
+        of_ticks += [colors if isinstance(colors, str) else colors[i]] * len(places)
+    transform = axis.get_xaxis_transform()
+    ticks = LineCollection(segments, colors=of_ticks, linewidths=1, transform=transform)
     return axis.add_collection(ticks, autolim=False)

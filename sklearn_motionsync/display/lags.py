@@ -121,8 +121,13 @@ class LagDisplay:
         """
         caller = f"{cls.__name__}.from_estimator"
         reached = route_to_synchronizer(estimator, X, params, caller, kind=PartSynchronizer)
-        how = {"against": against, "unit": unit, "frame_rate": rates_of(X, frame_rate, unit)}
-        lags = reached.synchronizer.lags(reached.performances, groups, **how)
+        lags = reached.synchronizer.lags(
+            reached.performances,
+            groups,
+            against=against,
+            unit=unit,
+            frame_rate=rates_of(X, frame_rate, unit),
+        )
         return cls(lags).plot(ax, colorbar=colorbar)
 
     @classmethod
@@ -237,12 +242,14 @@ class LagDisplay:
         reach = 1.05 * max((np.abs(mean) + sd).max(), 1e-9)
         for i, ax in enumerate(self.axes_):
             ax.axhline(0, color="0.3", linewidth=0.8)
-            style = {"color": COLORS["envelope"], "alpha": 0.6, "linewidth": 0}
-            ends = columns["low"][i], columns["high"][i]
-            self.intervals_.append(ax.fill_between(axis.clock, *ends, **style))
-            ends = mean[i] - sd[i], mean[i] + sd[i]
-            style = {"colors": COLORS["pattern"], "linewidths": 0.9, "linestyles": "--"}
-            self.spreads_.append(curves(ax, [axis.clock] * 2, ends, **style))
+            low, high, grey = columns["low"][i], columns["high"][i], COLORS["envelope"]
+            interval = ax.fill_between(axis.clock, low, high, color=grey, alpha=0.6, linewidth=0)
+            self.intervals_.append(interval)
+            ends, black = (mean[i] - sd[i], mean[i] + sd[i]), COLORS["pattern"]
+            spread = curves(
+                ax, [axis.clock] * 2, ends, colors=black, linewidths=0.9, linestyles="--"
+            )
+            self.spreads_.append(spread)
             self.means_.append(front_line(ax, axis.clock, mean[i], color=COLORS["mean"]))
             ax.set_title(self.lags.parts[i], fontsize="small")
             ax.set_xlim(axis.clock[0], axis.clock[-1])
@@ -267,15 +274,15 @@ class LagDisplay:
         if self.lags.groups is None:
             return list(self.lags.parts)
         icc = self.lags.summary()["icc"]
-        return [f"{part}\nICC {x:.2f}" if x == x else part for part, x in icc.items()]
+        return [f"{name}\nICC {x:.2f}" if x == x else name for name, x in icc.items()]
 
     def _describe(self):
         n_sequences, n_parts = self.lags.values.shape[:2]
         behind = _REFERENCES.get(self.lags.against, f"the {self.lags.against}")
-        parts = f"{n_parts} parts" if n_parts > 1 else self.lags.parts[0]
+        lagging = f"{n_parts} parts" if n_parts > 1 else self.lags.parts[0]
         people = ""
         if self.lags.groups is not None:
             n_people = len(np.unique(self.lags.groups))
             people = " of 1 person" if n_people == 1 else f" of {n_people} people"
         count = counted(n_sequences, "trial")
-        return f"{parts} behind {behind}, {count}{people}"
+        return f"{lagging} behind {behind}, {count}{people}"

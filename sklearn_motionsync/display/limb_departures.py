@@ -122,7 +122,7 @@ def _bones_of_limb(limb, skeleton):
 
 
 def draw_departures(estimator, X, params, caller, *, performance, frames, limit, reference):
-    """What `SkeletonDisplay` draws of the departures of a performance, as its parameters.
+    """What `SkeletonDisplay` draws of the departures of a performance: values of its parameters.
 
     Parameters
     ----------
@@ -131,6 +131,10 @@ def draw_departures(estimator, X, params, caller, *, performance, frames, limit,
         As for `view_of`.
     performance, frames, limit, reference
         As for `SkeletonDisplay.from_departures`.
+
+    Returns
+    -------
+    scenes, skeleton, titles, marked, behind, heading
     """
     if X is None:
         raise ValueError(f"{caller} needs performances X, whose departures are drawn; got None.")
@@ -183,16 +187,13 @@ def draw_departures(estimator, X, params, caller, *, performance, frames, limit,
         note += "which leaves out how far some limbs depart"
     whose = "a new person" if reference is None else "this person"
     rare = [describe_departure(row) for row in rows if row.rare and row.limb is not None]
-    return {
-        "scenes": [[bodies[[frame]]] for frame in shown],
-        "skeleton": skeleton,
-        "titles": titles,
-        "marked": marked,
-        "behind": [[shadows[[frame]]] for frame in shown],
-        "heading": f"{name.replace('Performance', 'Trial', 1)} is {verdict}{note}.\n"
+    heading = (
+        f"{name.replace('Performance', 'Trial', 1)} is {verdict}{note}.\n"
         f"Rare: {', '.join(rare) if rare else 'nothing'}. Violet: limbs that depart at or around "
-        f"that frame. Pale: what is expected of {whose}.",
-    }
+        f"that frame. Pale: what is expected of {whose}."
+    )
+    scenes, behind = ([[x[[frame]]] for frame in shown] for x in (bodies, shadows))
+    return scenes, skeleton, titles, marked, behind, heading
 
 
 def split_at_synchronizer(estimator):
@@ -203,8 +204,8 @@ def split_at_synchronizer(estimator):
             "Stick figures need a pipeline that begins with DirectionCosines; for a synchronizer "
             "by itself use from_predictions with the joint positions."
         )
-    parts = [part for step in flat_steps(before) for part in union_transformers(step)]
-    views = [part for part in parts if isinstance(part, PositionsTransformer)]
+    transformers = [each for step in flat_steps(before) for each in union_transformers(step)]
+    views = [each for each in transformers if isinstance(each, PositionsTransformer)]
     if not views:
         # Raises an error that names the steps.
         find_step(before, DirectionCosines)
@@ -213,6 +214,6 @@ def split_at_synchronizer(estimator):
 
 def _departs_outside_aspace(view, i, columns):
     """Whether limbs depart beyond what is rare, but not in the aSpace of the model."""
-    kept = (view.synchronised[i] - view.model.mean_) / view.predicted
-    whole, kept = (np.abs(z[:, columns]).max() for z in (view.scores[i], kept))
-    return whole > view.model.simultaneous_factor() >= kept
+    in_aspace = (view.synchronised[i] - view.model.mean_) / view.predicted
+    largest, in_aspace = (np.abs(z[:, columns]).max() for z in (view.scores[i], in_aspace))
+    return largest > view.model.simultaneous_factor() >= in_aspace

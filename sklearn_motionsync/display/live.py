@@ -20,6 +20,7 @@ from ..inputs.types import (
     SupportsArray,
     ValuesLike,
 )
+from ..matching.counting import first_largest
 from ..online.stream import Course, LivePhase, each_value
 from ..online.synchronizer import OnlineSynchronizer
 from ..utils.pipelines import find_step
@@ -244,7 +245,7 @@ class PhaseDisplay:
         seen = [np.asarray(takes.arrays[i], dtype=np.float64) for i in chosen]
         feature_names = names_of_features(body, live, live.mean_.shape[1])
         if features is None:
-            features = [int(live.mean_.var(axis=0).argmax())]
+            features = [first_largest(live.mean_.var(axis=0))]
         shown = choose_features(features, feature_names)
         rate = 1.0 if live.frame_rate is None else live.frame_rate
         bodies, mean_body, skeleton = None, None, None

@@ -179,9 +179,9 @@ def _sort_and_sum(names, shares):
     names, shares = [names[i] for i in order], shares[order]
     if len(names) <= _MAX_ROWS:
         return names, shares
-    rest = len(names) - (_MAX_ROWS - 1)
-    names = [*names[:-rest], f"{rest} others"]
-    return names, np.vstack([shares[:-rest], shares[-rest:].sum(axis=0)])
+    n_summed = len(names) - (_MAX_ROWS - 1)
+    names = [*names[:-n_summed], f"{n_summed} others"]
+    return names, np.vstack([shares[:-n_summed], shares[-n_summed:].sum(axis=0)])
 
 
 def _explain_missing(synchronizer):

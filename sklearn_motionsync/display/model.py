@@ -13,9 +13,9 @@ from ..inputs.features import choose_features
 from ..inputs.types import Features, Labels, PerformanceLike, PerformancesLike, Unit, ValuesLike
 from ..inputs.wording import counted
 from ..model.views import view_of
-from ..synchronizers.match import Match, rates_of
+from ..synchronizers.match import rates_of
 from ..utils.groups import names_of_groups
-from .arguments import AxesLike, named_groups
+from .arguments import AxesLike
 from .drawing import (
     COLORS,
     WIDTH,
@@ -153,7 +153,7 @@ class ActionModelDisplay:
         features: Features | None = None,
         band: Literal["points", "performances", "mean"] | None = None,
         departures: bool = True,
-        groups: Labels | Literal["mode"] | None = None,
+        groups: Labels | None = None,
         people: Labels | None = None,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
@@ -190,12 +190,10 @@ class ActionModelDisplay:
         departures : bool, default=True
             Whether the parts of performances outside the band are violet; they never are with the
             band of the mean.
-        groups : sequence of length n_sequences or "mode", default=None
+        groups : sequence of length n_sequences, default=None
             The group of each performance of X. Mean and band are then those of a model of each
             group, fitted to its performances; all are on the clock of the same pattern. A group of
             one performance has no band, nor has a group of one subject, except ``"points"``.
-            ``"mode"`` takes ``Match.mode``, by the synchronizer of the pipeline: then no mean lies
-            between two ways of doing it.
         people : sequence of length n_sequences, default=None
             The subject of each performance of X, as in ``ActionModel.fit(groups=...)``: bands of
             performances and of means then estimate the differences between subjects. By default
@@ -245,7 +243,6 @@ class ActionModelDisplay:
                 f"{caller} takes people along with groups only: a fitted model has learnt its "
                 "people by fit(X, groups=people)."
             )
-        groups = named_groups(groups, lambda: Match.from_estimator(estimator, X, **params))
         view = view_of(estimator, X, params, caller, features=features)
         chosen = choose_features(features, view.names)
         shown = view.whole if band == "performances" else view.synchronised
@@ -299,12 +296,12 @@ class ActionModelDisplay:
         n_cols = 1 if count == 1 else 2
         n_rows = -(-count // n_cols)
         cells = [divmod(i, n_cols) for i in range(count)]
-        parts = self._parts()
-        height = max(3, 1.9 * n_rows + 1.4) + 0.2 * max(len(parts) - 3, 0)
+        groups = self._group_curves()
+        height = max(3, 1.9 * n_rows + 1.4) + 0.2 * max(len(groups) - 3, 0)
         self.figure_, self.axes_ = panels(ax, cells, n_rows, n_cols, (WIDTH, height))
         self.mean_, self.envelope_, self.performances_, self.departures_ = [], [], [], []
         for i, (axis, name) in enumerate(zip(self.axes_, self.feature_names, strict=True)):
-            self._draw_feature(axis, parts, i)
+            self._draw_feature(axis, groups, i)
             axis.set_ylabel(name)
             if i + n_cols >= count:
                 axis.set_xlabel(self._axis.label)
@@ -314,33 +311,35 @@ class ActionModelDisplay:
             for axis in self.axes_:
                 names = self.pattern_keyframes.index if axis is self.axes_[0] else ()
                 self.keyframes_.append(draw_keyframes(axis, times, names))
-        self._draw_legend(parts, n_cols)
+        self._draw_legend(groups, n_cols)
         return self
 
-    def _parts(self):
+    def _group_curves(self):
         """All performances, or those of each group, with their mean and band."""
         if self.groups is None:
             return [GroupCurves(self.mean, self.lower, self.upper, self.performances)]
         styles = group_styles(self.groups.labels).items()
         return [
-            GroupCurves(*bounds, self.performances[self.groups.members(name)], name, *style)
-            for *bounds, (name, style) in zip(
+            GroupCurves(
+                mean, lower, upper, self.performances[self.groups.members(name)], name, color, line
+            )
+            for mean, lower, upper, (name, (color, line)) in zip(
                 self.mean, self.lower, self.upper, styles, strict=True
             )
         ]
 
-    def _draw_feature(self, axis, parts, i):
+    def _draw_feature(self, axis, groups, i):
         """Draw the bands of a feature, then performances, departures, and means."""
         clock = self._axis.clock
-        banded = [part for part in parts if part.has_band]
-        self.envelope_ += [part.draw_band(axis, clock, i) for part in banded]
+        banded = [group for group in groups if group.has_band]
+        self.envelope_ += [group.draw_band(axis, clock, i) for group in banded]
         if self.performances is not None:
-            self.performances_ += [part.draw_performances(axis, clock, i) for part in parts]
+            self.performances_ += [group.draw_performances(axis, clock, i) for group in groups]
             if self.departures and self.band != "mean":
-                self.departures_ += [part.draw_departures(axis, self._axis, i) for part in banded]
-        self.mean_ += [part.draw_mean(axis, clock, i) for part in parts]
+                self.departures_ += [group.draw_departures(axis, self._axis, i) for group in banded]
+        self.mean_ += [group.draw_mean(axis, clock, i) for group in groups]
 
-    def _draw_legend(self, parts, n_cols):
+    def _draw_legend(self, groups, n_cols):
         """Draw a legend above the panels, with the meaning of the band as its title."""
         if self.groups is None:
             label = "where the mean may be"
@@ -354,11 +353,11 @@ class ActionModelDisplay:
         else:
             handles, labels = [], []
             bands = iter(self.envelope_)
-            for part, line in zip(parts, self.mean_, strict=False):
-                handles.append((next(bands), line) if part.has_band else line)
-                labels.append(self.groups.describe(part.group, part.has_band))
+            for group, line in zip(groups, self.mean_, strict=False):
+                handles.append((next(bands), line) if group.has_band else line)
+                labels.append(self.groups.describe(group.name, group.has_band))
         if self.departures_:
-            count = sum(part.count_outside() for part in parts if part.has_band)
+            count = sum(group.count_outside() for group in groups if group.has_band)
             handles.append(self.departures_[0])
             of_group = "" if self.groups is None else " of its group"
             labels.append(f"outside the band{of_group}: {count} of them")
@@ -398,7 +397,7 @@ class GroupCurves(NamedTuple):
     mean, lower, upper : ndarray, shape (P, n_shown)
         The bounds are NaN without a band.
     performances : ndarray (n, P, n_shown), or None
-    group : str or None
+    name : str or None
     color, line : str
         The colour and the line style of the mean.
     """
@@ -407,7 +406,7 @@ class GroupCurves(NamedTuple):
     lower: np.ndarray
     upper: np.ndarray
     performances: np.ndarray | None
-    group: str | None = None
+    name: str | None = None
     color: str = COLORS["mean"]
     line: str = "-"
 
@@ -417,9 +416,9 @@ class GroupCurves(NamedTuple):
 
     def outer_bounds(self):
         """The bounds with a margin for rounding."""
-        largest = [np.nanmax(np.abs(b), axis=0, initial=0) for b in (self.lower, self.upper)]
+        largest = np.nanmax(np.abs([self.lower, self.upper]), axis=(0, 1), initial=0)
         eps = np.finfo(np.result_type(self.mean, np.float32)).eps
-        margin = _ROUNDING * eps * np.maximum(*largest)
+        margin = _ROUNDING * eps * largest
         return self.lower - margin, self.upper + margin
 
     def count_outside(self):
@@ -432,7 +431,7 @@ class GroupCurves(NamedTuple):
         """Draw the band of feature i, in grey or in the pale colour of the group."""
         lower, upper = self.lower[:, i], self.upper[:, i]
         color, edge, alpha = COLORS["envelope"], COLORS["pattern"], 0.35
-        if self.group is not None:
+        if self.name is not None:
             color, edge, alpha = self.color, self.color, 0.16
         band = axis.fill_between(clock, lower, upper, color=color, alpha=alpha, linewidth=0)
         for bound in (lower, upper):
@@ -442,23 +441,25 @@ class GroupCurves(NamedTuple):
     def draw_performances(self, axis, clock, i):
         """Draw feature i of the performances."""
         behind = self.performances[:, :, i]
-        color = COLORS["performance"] if self.group is None else self.color
-        style = {"linewidths": 0.7, "linestyles": "dashed", "alpha": 0.55, "colors": color}
-        return curves(axis, [clock] * len(behind), behind, **style)
+        color = COLORS["performance"] if self.name is None else self.color
+        xs = [clock] * len(behind)
+        return curves(
+            axis, xs, behind, colors=color, linewidths=0.7, linestyles="dashed", alpha=0.55
+        )
 
     def draw_departures(self, axis, time_axis, i):
         """Draw the parts of feature i outside the band."""
-        bounds = (bound[:, i] for bound in self.outer_bounds())
-        xs, ys = parts_outside(self.performances[:, :, i], *bounds)
-        style = {"colors": COLORS["departure"], "linewidths": 1.4, "zorder": 3}
-        return curves(axis, time_axis.convert(xs), ys, **style)
+        lower, upper = self.outer_bounds()
+        xs, ys = parts_outside(self.performances[:, :, i], lower[:, i], upper[:, i])
+        xs, violet = time_axis.convert(xs), COLORS["departure"]
+        return curves(axis, xs, ys, colors=violet, linewidths=1.4, zorder=3)
 
     def draw_mean(self, axis, clock, i):
         """Draw the mean of feature i."""
-        style = {"color": self.color, "linewidth": 2, "linestyle": self.line}
-        if self.group is not None:
-            return front_line(axis, clock, self.mean[:, i], **style)
-        (line,) = axis.plot(clock, self.mean[:, i], **style)
+        mean, color, dashes = self.mean[:, i], self.color, self.line
+        if self.name is not None:
+            return front_line(axis, clock, mean, color=color, linewidth=2, linestyle=dashes)
+        (line,) = axis.plot(clock, mean, color=color, linewidth=2, linestyle=dashes)
         return line
 
 
@@ -528,15 +529,15 @@ def bands_of_groups(model, performances, groups, band):
     """
     means, bounds = [], []
     for name in groups.names:
-        some, people = performances[groups.members(name)], groups.people_of(name)
-        means.append(some.mean(axis=0))
-        known = len(some) if band == "points" else len(set(people))
-        if known < 2:
-            bounds.append(np.full((2, *some.shape[1:]), np.nan))
+        of_group, people = performances[groups.members(name)], groups.people_of(name)
+        means.append(of_group.mean(axis=0))
+        count = len(of_group) if band == "points" else len(set(people))
+        if count < 2:
+            bounds.append(np.full((2, *of_group.shape[1:]), np.nan))
             continue
-        own = clone(model).fit(some, groups=None if band == "points" else people)
+        group_model = clone(model).fit(of_group, groups=None if band == "points" else people)
         if band == "mean":
-            bounds.append(own.mean_envelope(random_state=0))
+            bounds.append(group_model.mean_envelope(random_state=0))
         else:
-            bounds.append(own.envelope(simultaneous=band == "performances"))
+            bounds.append(group_model.envelope(simultaneous=band == "performances"))
     return np.stack(means), *np.stack(bounds, axis=1)

@@ -155,15 +155,16 @@ class NormDisplay:
             raise ValueError(f"There is no subject {subject!r}; there are {subjects[:8]}.")
         i, signals = subjects.index(subject), comparison.features[:-1]
         if features is None:
-            found = comparison.departures
-            own = found[(found["subject"] == subject) & (found["what"] == "shape")]["feature"]
-            order = list(dict.fromkeys([*map(signals.index, own), *range(len(signals))]))
+            table = comparison.departures
+            is_shown = (table["subject"] == subject) & (table["what"] == "shape")
+            departing = map(signals.index, table[is_shown]["feature"])
+            order = list(dict.fromkeys([*departing, *range(len(signals))]))
             chosen = sorted(order[: len(choose_features(None, signals))])
         else:
             chosen = choose_features(features, signals)
         names = [signals[k] for k in chosen]
-        known = dict(zip(comparison.features, comparison.units, strict=True))
-        labels = labels_of_signals(names, known, ylabel, units)
+        known_units = dict(zip(comparison.features, comparison.units, strict=True))
+        labels = labels_of_signals(names, known_units, ylabel, units)
         shown = [*chosen, len(signals)]
         display = cls(
             comparison.curves[i][:, shown],
@@ -200,17 +201,21 @@ class NormDisplay:
         self.spread_, self.departures_ = [], []
         clock = self._axis.clock
         for i, (axis, label) in enumerate(zip(self.axes_, self.labels, strict=True)):
-            mean, std, own = self.mean[:, i], self.std[:, i], self.curve[:, i]
+            mean, std, curve = self.mean[:, i], self.std[:, i], self.curve[:, i]
             lower, upper = mean - self.limits[i] * std, mean + self.limits[i] * std
-            band = {"color": COLORS["envelope"], "linewidth": 0}
-            self.bands_.append(axis.fill_between(clock, lower, upper, alpha=0.3, **band))
-            self.spread_.append(axis.fill_between(clock, mean - std, mean + std, alpha=0.5, **band))
+            grey, violet = COLORS["envelope"], COLORS["departure"]
+            band = axis.fill_between(clock, lower, upper, color=grey, alpha=0.3, linewidth=0)
+            self.bands_.append(band)
+            low, high = mean - std, mean + std
+            spread = axis.fill_between(clock, low, high, color=grey, alpha=0.5, linewidth=0)
+            self.spread_.append(spread)
             self.mean_.extend(axis.plot(clock, mean, color="0.3", linewidth=1, linestyle="--"))
-            style = {"color": COLORS["performance"], "linewidth": 2.4}
-            self.subject_.append(front_line(axis, clock, own, **style))
-            xs, ys = parts_outside(own[np.newaxis], lower, upper)
-            style = {"colors": COLORS["departure"], "linewidths": 2.8, "zorder": 5}
-            self.departures_.append(curves(axis, self._axis.convert(xs), ys, **style))
+            line = front_line(axis, clock, curve, color=COLORS["performance"], linewidth=2.4)
+            self.subject_.append(line)
+            xs, ys = parts_outside(curve[np.newaxis], lower, upper)
+            xs = self._axis.convert(xs)
+            lines = curves(axis, xs, ys, colors=violet, linewidths=2.8, zorder=5)
+            self.departures_.append(lines)
             axis.set_ylabel(label)
             axis.set_xlim(clock[0], clock[-1])
         self.axes_[-1].set_xlabel(self._axis.label)

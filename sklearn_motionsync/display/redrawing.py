@@ -129,15 +129,14 @@ class Redrawing:
         from matplotlib.backends.backend_agg import RendererAgg
 
         figure = self._figure
-        given = (
-            style.get(name, rcParams[f"savefig.{name}"]) for name in ("facecolor", "edgecolor")
-        )
-        given = [color if isinstance(color, str) else tuple(color) for color in given]
-        key = dpi, *figure.get_size_inches(), *given
+        colors = {}
+        for name in ("facecolor", "edgecolor"):
+            color = style.get(name, rcParams[f"savefig.{name}"])
+            colors[name] = color if isinstance(color, str) else tuple(color)
+        key = dpi, *figure.get_size_inches(), *colors.values()
         if key == self._key:
             return
-        pairs = zip(("facecolor", "edgecolor"), given, strict=True)
-        colors = {name: color for name, color in pairs if color != "auto"}
+        colors = {name: color for name, color in colors.items() if color != "auto"}
         if self._before is None:
             self._before = {
                 "dpi": figure.dpi,
@@ -194,7 +193,7 @@ class Noted:
 
     def __init__(self, units, axes, containers, figure):
         self.units, self._axes, self._containers, self._figure = units, axes, containers, figure
-        self.parts = [(part, unit) for unit in units for part in unit.parts]
+        self.artists = [(artist, unit) for unit in units for artist in unit.artists]
         self.reaches = self._steps = self._below = self._ground = self._scratch = None
         self._inks = {}
 
@@ -222,8 +221,8 @@ class Noted:
             bottom = _bottom_of(artist, renderer) if id(artist) in titles else None
             units.append(DrawnArtist(artist, calls, artist.get_zorder(), artist.findobj(), bottom))
         noted = cls(units, [(axis, _state_of(axis)) for axis in axes], containers, figure)
-        for part, _ in noted.parts:
-            part.stale = False
+        for artist, _ in noted.artists:
+            artist.stale = False
         return noted
 
     def has_same_artists(self):
@@ -240,12 +239,12 @@ class Noted:
 
     def changed(self):
         """The units that are stale."""
-        found = {}
-        for part, unit in self.parts:
-            if part.stale:
-                part.stale = False
-                found[id(unit)] = unit
-        return list(found.values())
+        stale = {}
+        for artist, unit in self.artists:
+            if artist.stale:
+                artist.stale = False
+                stale[id(unit)] = unit
+        return list(stale.values())
 
     def separate(self, boxes, renderer):
         """Draw what stays beneath all that moves, and list what is drawn each time.
@@ -255,13 +254,13 @@ class Noted:
         boxes : dict
             Of each artist that has changed, by id, the box that it is within; None if it is empty.
         """
-        known = self.reaches or {}
+        reaches = self.reaches or {}
         if self.reaches is not None and all(
-            key in known and _is_within(box, known[key]) for key, box in boxes.items()
+            key in reaches and _is_within(box, reaches[key]) for key, box in boxes.items()
         ):
             return
-        wider = {key: _union(box, known.get(key)) for key, box in boxes.items()}
-        self.reaches, self._steps, covers, below = known | wider, [], [], []
+        wider = {key: _union(box, reaches.get(key)) for key, box in boxes.items()}
+        self.reaches, self._steps, covers, below = reaches | wider, [], [], []
         for unit in self.units:
             if id(unit.artist) in self.reaches:
                 self._steps.append(unit.artist.draw)
@@ -320,7 +319,7 @@ class DrawnArtist(NamedTuple):
     calls : list of Call
         What the renderer was told.
     zorder : float
-    parts : list of Artist
+    artists : list of Artist
         The artist and all within it.
     bottom : float or None
         Of a title, its lower edge; infinite if it is empty or not right above the axes.
@@ -329,7 +328,7 @@ class DrawnArtist(NamedTuple):
     artist: Any
     calls: list
     zorder: float
-    parts: list
+    artists: list
     bottom: float | None
 
     def place(self, renderer):
@@ -456,9 +455,9 @@ def _split(figure, whole):
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase
 
-    artists, axes, containers, left = [], [], [], [figure]
-    while left:
-        container = left.pop()
+    artists, axes, containers, waiting = [], [], [], [figure]
+    while waiting:
+        container = waiting.pop()
         children = container.get_children()
         containers.append((container, children))
         for child in children:
@@ -467,7 +466,7 @@ def _split(figure, whole):
             if plain:
                 axes.append(child)
             if plain or isinstance(child, FigureBase):
-                left.append(child)
+                waiting.append(child)
             else:
                 artists.append(child)
     return artists, axes, containers
@@ -477,8 +476,8 @@ def _titles(axis):
     """The titles on the left, in the middle and on the right."""
     from matplotlib.text import Text
 
-    own = set(map(id, axis.texts))
-    return [a for a in axis.get_children() if isinstance(a, Text) and id(a) not in own]
+    texts = set(map(id, axis.texts))
+    return [a for a in axis.get_children() if isinstance(a, Text) and id(a) not in texts]
 
 
 def _bottom_of(title, renderer):

@@ -15,6 +15,7 @@ from ..body.direction_cosines import DirectionCosines
 from ..body.skeleton import Skeleton
 from ..inputs.types import NumbersLike, PerformancesLike, RandomState
 from ..inputs.wording import counted
+from ..matching.counting import whole
 from ..model.action_model import ActionModel
 from ..synchronizers.match import match_of_times
 from ..utils.pipelines import (
@@ -148,7 +149,8 @@ class SkeletonDisplay:
         *,
         frames: int | Sequence[int] | np.ndarray = 6,
         ax: AxesLike | None = None,
-        **view: Any,
+        at: float = 0.0,
+        azimuth: float = -60,
     ) -> Self:
         """Draw postures of one performance, or of synchronised ones over each other.
 
@@ -163,7 +165,9 @@ class SkeletonDisplay:
             The number of frames, evenly spaced from the first to the last, or their indices.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        **view : at, azimuth
+        at : float in [0, 1], default=0.0
+            See `plot`.
+        azimuth : float, default=-60
             See `plot`.
 
         Returns
@@ -177,7 +181,8 @@ class SkeletonDisplay:
         ]
         frames = as_frames(frames, min(map(len, bodies)))
         titles = [f"frame {frame}" for frame in frames]
-        return cls(postures_at(frames, *bodies), skeleton, titles).plot(ax, **view)
+        display = cls(postures_at(frames, bodies), skeleton, titles)
+        return display.plot(ax, at=at, azimuth=azimuth)
 
     @classmethod
     def from_postures(
@@ -187,7 +192,8 @@ class SkeletonDisplay:
         *,
         frames: int | Sequence[int] | np.ndarray = 6,
         ax: AxesLike | None = None,
-        **view: Any,
+        at: float = 0.0,
+        azimuth: float = -60,
     ) -> Self:
         """Draw postures given by their direction cosines.
 
@@ -201,7 +207,9 @@ class SkeletonDisplay:
             The number of frames, evenly spaced from the first to the last, or their indices.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        **view : at, azimuth
+        at : float in [0, 1], default=0.0
+            See `plot`.
+        azimuth : float, default=-60
             See `plot`.
 
         Returns
@@ -218,7 +226,9 @@ class SkeletonDisplay:
         else:
             # Single postures are not accepted as a set of performances.
             X = [cosines.inverse_transform(x) for x in X]
-        return cls.from_positions(X, cosines.skeleton.body(), frames=frames, ax=ax, **view)
+        return cls.from_positions(
+            X, cosines.skeleton.body(), frames=frames, ax=ax, at=at, azimuth=azimuth
+        )
 
     @classmethod
     def from_performances(
@@ -228,7 +238,8 @@ class SkeletonDisplay:
         *,
         names: Sequence[str] | None = None,
         ax: AxesLike | None = None,
-        **view: Any,
+        at: float = 0.0,
+        azimuth: float = -60,
     ) -> Self:
         """Draw performances side by side, each at its own pace, such as two subjects and a blend.
 
@@ -242,7 +253,9 @@ class SkeletonDisplay:
             The names under the performances; by default their labels in X, or numbers.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        **view : at, azimuth
+        at : float in [0, 1], default=0.0
+            See `plot`.
+        azimuth : float, default=-60
             See `plot`.
 
         Returns
@@ -251,7 +264,8 @@ class SkeletonDisplay:
             The display, drawn at the beginning; see `animate`.
         """
         bodies, labels = _side_by_side(X, skeleton, names)
-        return cls([bodies], skeleton, ["each at its own pace"], labels=labels).plot(ax, **view)
+        display = cls([bodies], skeleton, ["each at its own pace"], labels=labels)
+        return display.plot(ax, at=at, azimuth=azimuth)
 
     @classmethod
     def from_predictions(
@@ -262,7 +276,8 @@ class SkeletonDisplay:
         *,
         names: Sequence[str] | None = None,
         ax: AxesLike | None = None,
-        **view: Any,
+        at: float = 0.0,
+        azimuth: float = -60,
     ) -> Self:
         """Draw performances as recorded above the same ones synchronised by known warps.
 
@@ -278,7 +293,9 @@ class SkeletonDisplay:
             The names under the performances; by default their labels in X, or numbers.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        **view : at, azimuth
+        at : float in [0, 1], default=0.0
+            See `plot`.
+        azimuth : float, default=-60
             See `plot`.
 
         Returns
@@ -296,7 +313,7 @@ class SkeletonDisplay:
             ["as recorded", "aligned"],
             durations=[durations, [float(np.median(durations))] * len(bodies)],
             labels=labels,
-        ).plot(ax, **view)
+        ).plot(ax, at=at, azimuth=azimuth)
 
     @classmethod
     def from_estimator(
@@ -362,7 +379,8 @@ class SkeletonDisplay:
         n_samples: int = 12,
         random_state: RandomState = None,
         ax: AxesLike | None = None,
-        **view: Any,
+        at: float = 0.0,
+        azimuth: float = -60,
     ) -> Self:
         """Draw mean postures of a model, and random postures that it accepts (Fig. 4).
 
@@ -379,7 +397,9 @@ class SkeletonDisplay:
             Determines the random postures; None draws others each time.
         ax : Axes or array-like of Axes, default=None
             See `plot`.
-        **view : at, azimuth
+        at : float in [0, 1], default=0.0
+            See `plot`.
+        azimuth : float, default=-60
             See `plot`.
 
         Returns
@@ -418,7 +438,7 @@ class SkeletonDisplay:
                 f"frame {frame}\nmean pose",
                 f"frame {frame}\n{counted(sum(accepted), 'sample')}",
             ]
-        return cls(scenes, skeleton, titles).plot(ax, **view)
+        return cls(scenes, skeleton, titles).plot(ax, at=at, azimuth=azimuth)
 
     @classmethod
     def from_departures(
@@ -490,7 +510,7 @@ class SkeletonDisplay:
         sklearn_motionsync.find_departures : The departures as a table.
         ActionModelDisplay : The curves of the performance, and the band that they leave.
         """
-        drawn = draw_departures(
+        scenes, skeleton, titles, marked, behind, heading = draw_departures(
             estimator,
             X,
             params,
@@ -500,7 +520,8 @@ class SkeletonDisplay:
             limit=limit,
             reference=reference,
         )
-        return cls(**drawn).plot(ax, at=at, azimuth=azimuth)
+        display = cls(scenes, skeleton, titles, marked=marked, behind=behind, heading=heading)
+        return display.plot(ax, at=at, azimuth=azimuth)
 
     def plot(self, ax: AxesLike | None = None, *, at: float = 0.0, azimuth: float = -60) -> Self:
         """Draw.
@@ -600,8 +621,14 @@ class SkeletonDisplay:
             A notebook plays it as the last value of a cell; ``to_jshtml()`` gives the HTML,
             ``save(path)`` a file.
         """
-        view = {"seconds": seconds, "fps": fps, "azimuth": azimuth}
-        return animate(self, lambda k, last: self._show(k / last), ax, **view)
+        return animate(
+            self,
+            lambda k, last: self._show(k / last),
+            ax,
+            seconds=seconds,
+            fps=fps,
+            azimuth=azimuth,
+        )
 
     def _bones_of_panels(self):
         """For each panel the bones of each side of the body, and the marked ones."""
@@ -629,8 +656,8 @@ class SkeletonDisplay:
             self.behind_.append(bone_lines(axis, COLORS["shadow"], 3 * width, zorder=1))
         joined = self.skeleton is not None and self.skeleton.bones
         size = 3 * width if joined else 1.5 * width
-        style = {"color": colors["middle"], "alpha": alpha, "markersize": size}
-        self.heads_ += axis.plot([], [], "o", **style)
+        color = colors["middle"]
+        self.heads_ += axis.plot([], [], "o", color=color, alpha=alpha, markersize=size)
 
     def _show(self, at):
         """Move all stick figures to a share of the time."""
@@ -643,14 +670,14 @@ class SkeletonDisplay:
         for i, (scene, of_scene) in enumerate(zip(self._drawn, durations, strict=True)):
             shares = [min(1.0, at * longest / d) if d > 0 else 0.0 for d in of_scene]
             bodies = [
-                x[round(share * (len(x) - 1))] for x, share in zip(scene, shares, strict=True)
+                x[whole(share * (len(x) - 1))] for x, share in zip(scene, shares, strict=True)
             ]
             for side, lines in self.bones_[i].items():
                 lines.set_segments(_segments(bodies, self._bones[i][side]))
             dots = [self._dots(body) for body in bodies]
             self.heads_[i].set_data(np.concatenate(dots).T if dots else ([], []))
         for lines, scene in zip(self.behind_, self._behind, strict=bool(self.behind_)):
-            bodies = [x[round(at * (len(x) - 1))] for x in scene]
+            bodies = [x[whole(at * (len(x) - 1))] for x in scene]
             bones = [b for of_side in bones_by_side(self.skeleton).values() for b in of_side]
             lines.set_segments(_segments(bodies, bones))
 
@@ -666,13 +693,20 @@ class SkeletonDisplay:
 
 def _time_line(axis):
     """A line at the top that tells the time: a text would take longer to draw than all bodies."""
-    style = {"linewidth": 2, "transform": axis.transAxes, "solid_capstyle": "butt", "zorder": 0}
-    axis.plot([0, 1], [0.99, 0.99], color=COLORS["shadow"], **style)
-    (line,) = axis.plot([0, 0], [0.99, 0.99], color=COLORS["middle"], **style)
+    for end, name in ((1, "shadow"), (0, "middle")):
+        (line,) = axis.plot(
+            [0, end],
+            [0.99, 0.99],
+            color=COLORS[name],
+            linewidth=2,
+            transform=axis.transAxes,
+            solid_capstyle="butt",
+            zorder=0,
+        )
     return line
 
 
-def postures_at(frames, *performances):
+def postures_at(frames, performances):
     """Scenes of single postures: for each frame a panel with those of all performances."""
     return [[x[[frame]] for x in performances] for frame in frames]
 
@@ -700,7 +734,6 @@ def _frames_of_model(frames, n_frames):
     listed = [frames] if isinstance(frames, Real) else frames
     if isinstance(listed, (list, tuple, np.ndarray)):
         listed = [
-            round(f * (n_frames - 1)) if isinstance(f, Real) and 0 < f < 1 else f for f in listed
+            whole(f * (n_frames - 1)) if isinstance(f, Real) and 0 < f < 1 else f for f in listed
         ]
-    what = "frames, those that are no shares between 0 and 1,"
-    return as_indices(listed, n_frames, what)
+    return as_indices(listed, n_frames, "frames, those that are no shares between 0 and 1,")

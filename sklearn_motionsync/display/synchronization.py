@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Sequence
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from sklearn.base import BaseEstimator
@@ -26,7 +26,7 @@ from ..inputs.wording import counted
 from ..synchronizers.match import check_coverage, match_of_times, rates_of
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern, route_to_synchronizer
-from .arguments import AxesLike, as_names, named_groups
+from .arguments import AxesLike, as_names
 from .drawing import (
     COLORS,
     WIDTH,
@@ -174,7 +174,7 @@ class SynchronizationDisplay:
         X: PerformancesLike,
         *,
         features: Features | None = None,
-        groups: Labels | Literal["mode"] | None = None,
+        groups: Labels | None = None,
         unit: Unit = "frames",
         frame_rate: float | ValuesLike | None = None,
         warps: bool = True,
@@ -194,10 +194,9 @@ class SynchronizationDisplay:
         features : int, str or list of them, default=None
             Features by index or name, as they reach the synchronizer, such as dimensions of the
             aSpace. By default the first four.
-        groups : sequence of length n_sequences or "mode", default=None
+        groups : sequence of length n_sequences, default=None
             The group of each performance, such as ``bunch.actor``. Groups have different colours,
-            and their means are drawn; all are on the clock of the same pattern. ``"mode"`` takes
-            ``Match.mode``.
+            and their means are drawn; all are on the clock of the same pattern.
         unit : {"frames", "percent", "seconds"}, default="frames"
             The unit of time: frames; per cent of a performance, and of the pattern; or seconds of
             the performances as recorded, and of the median performance on the clock.
@@ -232,7 +231,6 @@ class SynchronizationDisplay:
         names = names_of_features(before, synchronizer, performances[0].shape[1])
         chosen = choose_features(features, names)
         match, shown = reached.match(), [x[:, chosen] for x in performances]
-        groups = named_groups(groups, lambda: match)
         groups = None if groups is None else names_of_groups(groups, len(performances))
         tells = coverage is not None and match.intervals is not None
         display = cls(
@@ -396,19 +394,13 @@ class SynchronizationDisplay:
         n_all = n_rows + bool(warps) * min(n_rows, 2)
         size = (WIDTH, max(2.6, 1.6 * n_all + 0.8) + bool(warps) + 0.2 * n_lines)
         self.figure_, self.axes_ = panels(ax, cells, n_all, 2, size)
-        style = {"colors": colors, "linewidths": 0.9, "alpha": 0.35 if styles else 0.55}
-        if self._n_doubtful():
-            style["colors"] = colors if styles else [colors] * len(self.before)
-            style["linestyles"] = [_DOTTED if one else "-" for one in self.doubtful]
-            style["linewidths"] = np.where(self.doubtful, 1.5, style["linewidths"])
-            style["alpha"] = np.where(self.doubtful, _STRONG, style["alpha"])
-        clock, own = self._axis.clock, self._axis.performances()
+        clock, times = self._axis.clock, self._axis.performances()
         self.before_, self.after_, self.pattern_, self.group_means_ = [], [], [], []
         for row, name in enumerate(self.feature_names):
             left, right = self.axes_[2 * row : 2 * row + 2]
-            self.before_.append(curves(left, own, [x[:, row] for x in self.before], **style))
-            after = self.after[:, :, row]
-            self.after_.append(curves(right, [clock] * len(after), after, **style))
+            before, after = [x[:, row] for x in self.before], self.after[:, :, row]
+            self.before_.append(self._draw_trials(left, times, before, colors))
+            self.after_.append(self._draw_trials(right, [clock] * len(after), after, colors))
             self.group_means_.append(self._draw_means(right, clock, row, styles))
             self.pattern_.append(self._draw_pattern(right, clock, row))
             left.set_ylabel(name)
@@ -424,7 +416,7 @@ class SynchronizationDisplay:
         self.warps_ = self.intervals_ = None
         if warps:
             self.intervals_ = self._draw_intervals(self.axes_[-1], clock, colors)
-            self.warps_ = self._draw_warps(self.axes_[-1], clock, style)
+            self.warps_ = self._draw_warps(self.axes_[-1], clock, colors)
         self.keyframes_, self.own_keyframes_ = [], []
         if keyframe_lines:
             self._draw_keyframes(colors)
@@ -443,18 +435,37 @@ class SynchronizationDisplay:
             named = aligned if self.warps_ is None else [*aligned, self.axes_[-1]]
             for axis in named:
                 names = self.pattern_keyframes.index if axis is named[-1] else ()
-                style = {"by_diagonal": axis not in aligned}
-                self.keyframes_.append(draw_keyframes(axis, times, names, **style))
+                by_diagonal = axis not in aligned
+                lines = draw_keyframes(axis, times, names, by_diagonal=by_diagonal)
+                self.keyframes_.append(lines)
         if self.keyframes is not None:
-            own = self._axis.own(self.keyframes)
+            times = self._axis.own(self.keyframes)
             for axis in self.axes_[: 2 * len(self.feature_names) : 2]:
-                self.own_keyframes_.append(draw_own_keyframes(axis, own, colors))
+                self.own_keyframes_.append(draw_own_keyframes(axis, times, colors))
 
     def _describe_pattern(self):
         if self.pattern is None:
             return "black: their mean"
         which = "" if self.pattern_index is None else f", trial {self.pattern_index}"
         return f"black: the template{which}"
+
+    def _draw_trials(self, axis, xs, ys, colors):
+        """Draw a curve of each performance; those of doubtful ones are dotted."""
+        linestyles, linewidths, alpha = "-", 0.9, 0.35 if self.groups else 0.55
+        if self._n_doubtful():
+            colors = colors if self.groups else [colors] * len(self.before)
+            linestyles = [_DOTTED if one else "-" for one in self.doubtful]
+            linewidths = np.where(self.doubtful, 1.5, linewidths)
+            alpha = np.where(self.doubtful, _STRONG, alpha)
+        return curves(
+            axis,
+            xs,
+            ys,
+            colors=colors,
+            linestyles=linestyles,
+            linewidths=linewidths,
+            alpha=alpha,
+        )
 
     def _draw_means(self, axis, clock, row, styles):
         """Draw the mean of each group in front of its performances."""
@@ -469,13 +480,19 @@ class SynchronizationDisplay:
         curve = nanmean(self.after[:, :, row], axis=0)
         if self.pattern is not None:
             curve = self.pattern[:, row]
-        style = {"linestyle": "--", "linewidth": 1.2} if self.groups else {"linewidth": 1.6}
-        (line,) = axis.plot(clock, curve, color=COLORS["pattern"], zorder=5, **style)
+        (line,) = axis.plot(
+            clock,
+            curve,
+            color=COLORS["pattern"],
+            linestyle="--" if self.groups else None,
+            linewidth=1.2 if self.groups else 1.6,
+            zorder=5,
+        )
         return line
 
-    def _draw_warps(self, axis, clock, style):
+    def _draw_warps(self, axis, clock, colors):
         times = self._axis.convert(self.times)
-        lines = curves(axis, [clock] * len(times), times, **style)
+        lines = self._draw_trials(axis, [clock] * len(times), times, colors)
         axis.plot(clock, clock, "--", color=COLORS["pattern"], linewidth=1)
         bands = "" if self.intervals is None else "shaded: intervals"
         if bands and self.coverage is not None:
@@ -485,9 +502,13 @@ class SynchronizationDisplay:
         axis.set_title("\n".join(filter(None, ("warps; dashed: an even pace", second))))
         axis.set_xlabel(self._axis.label)
         axis.set_ylabel(_WARP_LABELS[self.unit])
-        place = {"transform": axis.transAxes, "fontsize": "small", "color": "0.3"}
-        axis.text(0.04, 0.96, "later than\nthe template", va="top", **place)
-        axis.text(0.96, 0.04, "earlier than\nthe template", ha="right", **place)
+        for x, y, text, ha, va in (
+            (0.04, 0.96, "later than\nthe template", "left", "top"),
+            (0.96, 0.04, "earlier than\nthe template", "right", "baseline"),
+        ):
+            axis.text(
+                x, y, text, ha=ha, va=va, transform=axis.transAxes, fontsize="small", color="0.3"
+            )
         return lines
 
     def _draw_intervals(self, axis, clock, colors):
@@ -506,8 +527,9 @@ class SynchronizationDisplay:
         faces[:, 3] = _opacity(n_sequences - n_doubtful)
         if n_doubtful:
             faces[self.doubtful, 3] = _opacity(n_doubtful)
-        style = {"facecolors": faces, "edgecolors": "none", "zorder": 1}
-        return axis.add_collection(PolyCollection([np.column_stack([xs, y]) for y in ys], **style))
+        outlines = [np.column_stack([xs, y]) for y in ys]
+        bands = PolyCollection(outlines, facecolors=faces, edgecolors="none", zorder=1)
+        return axis.add_collection(bands)
 
     def _n_doubtful(self):
         return 0 if self.doubtful is None else int(np.count_nonzero(self.doubtful))
@@ -547,10 +569,10 @@ def _check_doubtful(doubtful, n_sequences):
     """True or False (n_sequences,) for each performance; None if not given."""
     if doubtful is None:
         return None
-    found = np.asarray(doubtful)
-    if found.dtype != bool or found.shape != (n_sequences,):
+    flags = np.asarray(doubtful)
+    if flags.dtype != bool or flags.shape != (n_sequences,):
         raise ValueError(
             f"doubtful must be True or False for each of {counted(n_sequences, 'performance')}, as "
             f"match.doubtful is; got {reprlib.repr(doubtful)}."
         )
-    return found
+    return flags

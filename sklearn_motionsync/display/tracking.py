@@ -280,15 +280,32 @@ class TrackingDisplay:
         self._draw_progress(*self.axes_[-2:])
         any_hidden = self.hidden[:, shown].any(axis=1)
         masks = [*self.hidden[:, shown].T, any_hidden, any_hidden]
-        grey = {"color": COLORS["shadow"], "alpha": 0.7, "linewidth": 0, "zorder": 0}
-        hatched = {"facecolor": "none", "edgecolor": COLORS["departure"], "hatch": "///"}
-        hatched |= {"linewidth": 0, "alpha": 0.5, "zorder": 0.5}
+        grey, violet = COLORS["shadow"], COLORS["departure"]
         self.hidden_ = [
-            self._spans(axis, mask, label="hidden", **grey)
+            [
+                axis.axvspan(a, b, label="hidden", color=grey, alpha=0.7, linewidth=0, zorder=0)
+                for a, b in self._spans(mask)
+            ]
             for axis, mask in zip(self.axes_, masks, strict=True)
         ]
-        lost = np.asarray(self.track.lost, dtype=bool)
-        self.lost_ = [self._spans(axis, lost, label="lost", **hatched) for axis in self.axes_]
+        lost = self._spans(np.asarray(self.track.lost, dtype=bool))
+        self.lost_ = [
+            [
+                axis.axvspan(
+                    a,
+                    b,
+                    label="lost",
+                    facecolor="none",
+                    edgecolor=violet,
+                    hatch="///",
+                    linewidth=0,
+                    alpha=0.5,
+                    zorder=0.5,
+                )
+                for a, b in lost
+            ]
+            for axis in self.axes_
+        ]
         for axis in self.axes_:
             axis.set_xlim(0, self.times[-1] or 1.0)
             axis.tick_params(labelbottom=axis is self.axes_[-1])
@@ -305,7 +322,8 @@ class TrackingDisplay:
         *,
         frames: int | Sequence[int] | np.ndarray = 6,
         ax: AxesLike | None = None,
-        **view: Any,
+        at: float = 0.0,
+        azimuth: float = -60,
     ) -> SkeletonDisplay:
         """Draw estimated bodies at some frames, before the true ones; hidden limbs are violet.
 
@@ -317,7 +335,9 @@ class TrackingDisplay:
             The number of frames, evenly spaced from the first to the last, or their indices.
         ax : Axes or array-like of Axes, default=None
             As for `SkeletonDisplay.plot`.
-        **view : at, azimuth
+        at : float in [0, 1], default=0.0
+            As for `SkeletonDisplay.plot`.
+        azimuth : float, default=-60
             As for `SkeletonDisplay.plot`.
 
         Returns
@@ -333,15 +353,20 @@ class TrackingDisplay:
         if self.unit == "seconds":
             titles = [f"{self.times[k]:.1f} s" for k in shown]
         return SkeletonDisplay(
-            postures_at(shown, estimate),
+            postures_at(shown, [estimate]),
             skeleton,
             titles,
             marked=marked,
-            behind=None if truth is None else postures_at(shown, truth),
-        ).plot(ax, **view)
+            behind=None if truth is None else postures_at(shown, [truth]),
+        ).plot(ax, at=at, azimuth=azimuth)
 
     def side_by_side(
-        self, cosines: DirectionCosines, *, ax: AxesLike | None = None, **view: Any
+        self,
+        cosines: DirectionCosines,
+        *,
+        ax: AxesLike | None = None,
+        at: float = 0.0,
+        azimuth: float = -60,
     ) -> SkeletonDisplay:
         """Draw the observed, the estimated and the true body side by side.
 
@@ -351,7 +376,9 @@ class TrackingDisplay:
             The fitted transformer of the features.
         ax : Axes or array-like of Axes, default=None
             As for `SkeletonDisplay.plot`.
-        **view : at, azimuth
+        at : float in [0, 1], default=0.0
+            As for `SkeletonDisplay.plot`.
+        azimuth : float, default=-60
             As for `SkeletonDisplay.plot`.
 
         Returns
@@ -366,7 +393,7 @@ class TrackingDisplay:
         bodies = {name: x for name, x in bodies.items() if x is not None}
         title = ["what is known of a body"]
         display = SkeletonDisplay([list(bodies.values())], skeleton, title, labels=list(bodies))
-        return display.plot(ax, **view)
+        return display.plot(ax, at=at, azimuth=azimuth)
 
     def _most_varied(self):
         """The features of largest variance among those that were hidden."""
@@ -378,17 +405,20 @@ class TrackingDisplay:
     def _draw_feature(self, axis, k):
         estimate = self.track.postures[:, k]
         half_width = _BAND * np.sqrt(np.maximum(self.track.covariances[:, k, k], 0))
-        band, blue = (estimate - half_width, estimate + half_width), COLORS["performance"]
-        style = {"color": blue, "alpha": 0.25, "linewidth": 0, "label": "90 %"}
-        self.bands_.append(axis.fill_between(self.times, *band, **style))
+        low, high = estimate - half_width, estimate + half_width
+        blue, orange, black = (COLORS[key] for key in ("performance", "mean", "pattern"))
+        times = self.times
+        band = axis.fill_between(
+            times, low, high, color=blue, alpha=0.25, linewidth=0, label="90 %"
+        )
+        self.bands_.append(band)
         if self.truth is not None:
-            style = {"color": COLORS["mean"], "linewidth": 1.2, "label": "truth"}
-            self.truths_ += axis.plot(self.times, self.truth[:, k], **style)
-        style = {"color": blue, "linewidth": 1.8, "label": "estimate"}
-        self.estimates_ += axis.plot(self.times, estimate, **style)
+            truth = self.truth[:, k]
+            self.truths_ += axis.plot(times, truth, color=orange, linewidth=1.2, label="truth")
+        self.estimates_ += axis.plot(times, estimate, color=blue, linewidth=1.8, label="estimate")
         if self.observed is not None:
-            style = {"color": COLORS["pattern"], "markersize": 2.5, "label": "seen"}
-            self.observed_ += axis.plot(self.times, self.observed[:, k], ".", **style)
+            seen = self.observed[:, k]
+            self.observed_ += axis.plot(times, seen, ".", color=black, markersize=2.5, label="seen")
         axis.set_ylabel(fill(self.names[k], _LINE_LENGTH), fontsize="small")
 
     def _draw_progress(self, upper, lower):
@@ -405,12 +435,12 @@ class TrackingDisplay:
         lower.set_ylim(0, max(lower.get_ylim()[1], 1.1 * max(1, *self.track.rates)))
         lower.set_ylabel("rate", fontsize="small")
 
-    def _spans(self, axis, mask, **style):
-        """Shade the times of frames, up to the middle between frames."""
+    def _spans(self, mask):
+        """The times of frames, up to the middle between frames, as (start, stop)."""
         edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
         middles = (self.times[1:] + self.times[:-1]) / 2
         bounds = np.concatenate([self.times[:1], middles, self.times[-1:]])
-        return [axis.axvspan(bounds[a], bounds[b], **style) for a, b in edges.reshape(-1, 2)]
+        return bounds[edges.reshape(-1, 2)]
 
     def _bodies(self, cosines):
         """The skeleton, the estimated bodies, and the true ones or None."""

@@ -125,20 +125,28 @@ class TrellisDisplay:
         """
         caller = f"{cls.__name__}.from_estimator"
         reached = route_to_synchronizer(estimator, X, params, caller, kind=DenseSynchronizer)
-        _, synchronizer, performances, given = reached[:4]
-        space = synchronizer.disparity_space(performances, performance, **given)
-        if given:
+        synchronizer, performances = reached.synchronizer, reached.performances
+        space = synchronizer.disparity_space(performances, performance, **reached.params)
+        if reached.params:
             warp = reached.match().offsets[performance]
         else:
             warp = synchronizer.match(performances.take([performance])).offsets[0]
         index = index_of_pattern(synchronizer, performances)
         names = ("template" if index is None else f"template {index}", f"trial {performance}")
-        own = own_keyframes(synchronizer, performances, given)
-        if own is not None:
+        keyframes = own_keyframes(synchronizer, performances, reached.params)
+        if keyframes is not None:
             last = (synchronizer.n_frames_ - 1) / (len(performances[performance]) - 1)
             at = synchronizer.keyframes_
-            own = np.column_stack([at, own[performance] * last - at])
-        display = cls(**space, warp=warp, names=names, keyframes=own)
+            keyframes = np.column_stack([at, keyframes[performance] * last - at])
+        display = cls(
+            space.frames,
+            space.offsets,
+            space.costs,
+            space.path,
+            warp,
+            names=names,
+            keyframes=keyframes,
+        )
         return display.plot(ax, colorbar=colorbar, keyframe_points=keyframe_points)
 
     def plot(
@@ -199,11 +207,18 @@ class TrellisDisplay:
         self.ax_.set_ylabel(f"offset d of {self.names[1]} (frames)")
         outside = Patch(facecolor="0.85", edgecolor="0.6", label="no path can pass")
         handles, self.keyframes_ = [self.path_, self.warp_, outside], None
-        known = self.keyframes is not None and np.isfinite(self.keyframes).all(axis=1).any()
-        if keyframe_points and known:
-            style = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}
+        has_points = self.keyframes is not None and np.isfinite(self.keyframes).all(axis=1).any()
+        if keyframe_points and has_points:
             (self.keyframes_,) = self.ax_.plot(
-                *self.keyframes.T, "o", markersize=7, zorder=5, label="key-frame", **style
+                self.keyframes[:, 0],
+                self.keyframes[:, 1],
+                "o",
+                color="white",
+                markersize=7,
+                markeredgecolor="black",
+                linestyle="none",
+                zorder=5,
+                label="key-frame",
             )
             handles.append(self.keyframes_)
         legend_above([self.ax_], handles, [handle.get_label() for handle in handles])

@@ -12,6 +12,7 @@ from scipy.signal import find_peaks
 from ..body.skeleton import Skeleton
 from ..inputs.numbers import nanmean
 from ..inputs.types import PerformancesLike, ValuesLike
+from ..matching.counting import whole
 from .feet import Walk, horizontal, pieces
 from .recordings import CONTEXTS, FOOT_OFF, FOOT_STRIKE, Recordings
 
@@ -266,7 +267,7 @@ class _DelayedPeak:
         # The variance of a mean of so many positions in a second.
         self._variance = noise * noise * walk.per_frame / rate
         inner = [k for k, is_end in extremes if not is_end]
-        lags = np.arange(round(expected.first * rate), round(expected.last * rate) + 1)
+        lags = np.arange(whole(expected.first * rate), whole(expected.last * rate) + 1)
         mean, many = _mean_around(curve, inner, lags), max(len(inner), 1)
         height = np.sqrt(self._variance / many * _SECOND / _ACCELERATION**5)
         off = (lags / rate - expected.usual) / expected.spread
@@ -316,10 +317,10 @@ def _farthest(walk, side, points, sign):
         return []
     low, high = np.percentile(known, [3, 97])
     least = max(_LEAST_SWING * (high - low), _LEAST_SHARE_OF_LEG)
-    distance, out = max(1, int(_LEAST_STRIDE * walk.rate)), []
+    distance, out = max(1, whole(_LEAST_STRIDE * walk.rate, "down")), []
     others = [heel for other, heel in walk.heels.items() if other != side]
     apart = horizontal(points - (others[0] if others else walk.pelvis))
-    reach = int(_SWING * walk.rate)
+    reach = whole(_SWING * walk.rate, "down")
     for piece in pieces(curve[:, np.newaxis]):
         part = curve[piece]
         floor = part.min() - high + low
@@ -328,7 +329,7 @@ def _farthest(walk, side, points, sign):
         )
         for k in peaks - 1:
             # At the first samples it may have been farther before.
-            is_first = k <= _POSITION * walk.rate
+            is_first = k <= whole(_POSITION * walk.rate, "down")
             is_end = is_first or k >= len(part) - 3
             # A foot that is last seen on its way ahead has not been farthest.
             near = apart[max(0, piece.start + k - reach) : piece.start + k + reach]

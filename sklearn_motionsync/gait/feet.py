@@ -10,7 +10,9 @@ from ..body.formats import SIDES
 from ..body.landmarks import as_tuple, guess_feet
 from ..inputs.numbers import nanmean
 from ..inputs.wording import counted
+from ..matching.counting import whole
 from ..matching.filters import smooth
+from ..matching.gaps import interpolate_gaps
 
 __all__ = ["ENDS_OF_FEET", "Walk", "horizontal", "joints_of_feet", "pieces"]
 
@@ -100,12 +102,12 @@ class Walk:
         self._points = to_y_up(
             positions.astype(np.float64).reshape(len(positions), -1, skeleton.n_dims), skeleton
         )
-        if len(positions) < max(_FEWEST, _SHORTEST_PIECE * frame_rate):
+        if len(positions) < max(_FEWEST, whole(_SHORTEST_PIECE * frame_rate, "up")):
             raise ValueError(
                 f"{called} has {counted(len(positions), 'frame')} at {frame_rate:g} a second; "
                 f"{_SHORTEST_PIECE:g} s and {_FEWEST} frames are the least. Leave it out."
             )
-        self.per_frame = max(1, math.ceil(_LEAST_RATE / frame_rate))
+        self.per_frame = max(1, whole(_LEAST_RATE / frame_rate, "up"))
         self.rate, self._frame_rate = frame_rate * self.per_frame, frame_rate
         self.n_samples = (len(positions) - 1) * self.per_frame + 1
         self.heels, self.toes, self.has_heel, self.noise = {}, {}, {}, {}
@@ -176,11 +178,13 @@ class Walk:
 
     def _resample(self, joints):
         """Positions of the mean of some joints at the samples."""
-        x, frames = self._mean(joints), np.arange(len(self._points))
-        x = _fill_short_gaps(x, _LONGEST_GAP * self._frame_rate)
+        longest = whole(_LONGEST_GAP * self._frame_rate, "down")
+        x = interpolate_gaps(self._mean(joints), longest)
+        frames = np.arange(len(x))
+        fewest = max(_FEWEST, whole(_SHORTEST_PIECE * self._frame_rate, "up"))
         out = np.full((self.n_samples, x.shape[1]), np.nan)
         for piece in pieces(x):
-            if piece.stop - piece.start < max(_FEWEST, _SHORTEST_PIECE * self._frame_rate):
+            if piece.stop - piece.start < fewest:
                 continue
             samples = np.arange(piece.start * self.per_frame, (piece.stop - 1) * self.per_frame + 1)
             spline = CubicSpline(frames[piece], x[piece])
@@ -219,10 +223,7 @@ class Walk:
         return 1.0 if total >= 0 else -1.0
 
     def _unit(self, directions):
-        known, samples = ~np.isnan(directions).any(axis=1), np.arange(len(directions))
-        filled = np.stack(
-            [np.interp(samples, samples[known], x[known]) for x in directions.T], axis=1
-        )
+        filled = interpolate_gaps(directions, held=True)
         filled = smooth(filled[np.newaxis], _HEADING * self.rate)[0]
         size = np.linalg.norm(filled, axis=1, keepdims=True)
         return filled / np.where(size > 0, size, 1)
@@ -249,19 +250,6 @@ def pieces(x):
 def horizontal(points):
     """The components (n, n_dims - 1) of points, y up, that are not vertical."""
     return points[:, [0, 2]] if points.shape[1] == 3 else points[:, [0]]
-
-
-def _fill_short_gaps(x, longest):
-    """Straight lines across gaps of at most so many frames."""
-    x, known = x.copy(), ~np.isnan(x).any(axis=1)
-    frames = np.arange(len(x))
-    seen = frames[known]
-    steps = np.diff(seen)
-    for k in np.flatnonzero((steps > 1) & (steps <= longest + 1)):
-        before, step = seen[k], steps[k]
-        share = np.arange(1, step)[:, np.newaxis] / step
-        x[before + 1 : before + step] = (1 - share) * x[before] + share * x[before + step]
-    return x
 
 
 def _noise(heights):

@@ -103,8 +103,9 @@ class Performances(tuple):
 
     def replace(self, arrays):
         """Other arrays of the same performances."""
-        same = self.labels, self.frames, self.names, self.levels, self.numbers
-        out = Performances(arrays, self.kind, *same)
+        out = Performances(
+            arrays, self.kind, self.labels, self.frames, self.names, self.levels, self.numbers
+        )
         out.facts = self.facts
         return out
 
@@ -180,9 +181,9 @@ def check_members(
         return name_performance(numbers[i], labels[i])
 
     for i, x in enumerate(sequences):
-        own = column_names(x) if tables else None
-        if own != names and _are_same(own, names):
-            x, own = x[names], names
+        columns = column_names(x) if tables else None
+        if columns != names and _are_same(columns, names):
+            x, columns = x[names], names
         # For a plain array nothing but NumPy itself is called.
         plain = type(x) is np.ndarray and x.dtype in FLOATS
         array = x if plain else as_numbers(x, what(i))
@@ -192,10 +193,10 @@ def check_members(
                 "2 frames and 1 feature. Give a univariate performance as a column, "
                 "x[:, np.newaxis]; if all are (n_features, n_frames), give [x.T for x in X]."
             )
-        if own != names and fitted is not None and names is fitted:
+        if columns != names and fitted is not None and names is fitted:
             check_names(x, names, what(i))
-        elif own != names:
-            _refuse_columns(own, names, what(i), within(what(0)))
+        elif columns != names:
+            _refuse_columns(columns, names, what(i), within(what(0)))
         arrays.append(array)
         if array.shape[1] != arrays[0].shape[1]:
             turned = all(len(other) == len(arrays[0]) < min(other.shape[1:]) for other in arrays)
@@ -215,9 +216,9 @@ def check_members(
         high, low = array.max(), -array.min()
         peak = high if high > low else low
         if not peak <= LARGEST:
-            own = frames[i] if tables else None
-            how = {"allow_nan": finite == "allow-nan"} | ({"advice": advice} if advice else {})
-            check_finite(array, f"{what(i)}, frame", names, own, **how)
+            where, index = f"{what(i)}, frame", frames[i] if tables else None
+            allow_nan = finite == "allow-nan"
+            check_finite(array, where, names, index, allow_nan=allow_nan, advice=advice)
             peak = np.fmax.reduce(np.abs(array), axis=None, initial=0)
         if peak > largest:
             largest, holder = peak, i
@@ -236,18 +237,18 @@ def check_members(
     return performances
 
 
-def _are_same(own, names):
+def _are_same(columns, names):
     """Whether names of columns are the same in another order, each of them once."""
-    if not own or not names or len(own) != len(names):
+    if not columns or not names or len(columns) != len(names):
         return False
-    return len(set(own)) == len(own) and set(own) == set(names)
+    return len(set(columns)) == len(columns) and set(columns) == set(names)
 
 
-def _refuse_columns(own, names, what, first):
+def _refuse_columns(columns, names, what, first):
     """Say which columns a performance lacks, and which it has besides, by the first one."""
     raise ValueError(
-        f"{what} has the columns {listed(own)}, and {first} has {listed(names)}"
-        f"{difference(own, names)}. All need the same columns: select them by x[names]; of "
+        f"{what} has the columns {listed(columns)}, and {first} has {listed(names)}"
+        f"{difference(columns, names)}. All need the same columns: select them by x[names]; of "
         "files, read_motion(paths, columns='common') leaves out those that some lack."
     )
 
@@ -370,17 +371,17 @@ def _has_items(X):
 class _Source:
     """A sequence that gives performances by index, of which the first has been read."""
 
-    def __init__(self, given, first):
-        self._given, self._first = given, first
+    def __init__(self, collection, first):
+        self._collection, self._first = collection, first
 
     def __len__(self):
-        return len(self._given)
+        return len(self._collection)
 
     def __getitem__(self, i):
         if i == 0 and self._first is not None:
             first, self._first = self._first, None
             return first
-        return as_table(self._given[i])
+        return as_table(self._collection[i])
 
 
 def count_of(X):

@@ -35,13 +35,13 @@ def split_nested(df):
     for label, row in zip(labels, df.to_numpy(dtype=object), strict=True):
         frames = [getattr(cell, "index", None) for cell in row]
         first = frames[0] if isinstance(frames[0], pd.Index) else pd.RangeIndex(len(row[0]))
-        for name, cell, own in zip(df.columns, row, frames, strict=True):
+        for name, cell, index in zip(df.columns, row, frames, strict=True):
             if np.ndim(cell) != 1:
                 raise ValueError(
                     f"Column {name!r} of performance {label!r} holds {cell!r:.60}, and others "
                     f"hold a series: leave it out, as in df.drop(columns=[{name!r}])."
                 )
-            if len(cell) != len(first) or (isinstance(own, pd.Index) and not own.equals(first)):
+            if len(cell) != len(first) or (isinstance(index, pd.Index) and not index.equals(first)):
                 raise ValueError(
                     f"Column {name!r} of performance {label!r} has {len(cell)} frames, which are "
                     f"not the {len(first)} frames of column {df.columns[0]!r}: resample them to "
@@ -77,20 +77,20 @@ def as_table(x):
     columns = columns.set_names([None] * columns.nlevels)
     table = pd.DataFrame(x.values, index=rows, columns=columns)
     table.attrs = dict(x.attrs)
-    parts = {name: value.item() for name, value in x.coords.items() if value.ndim == 0}
+    levels = {name: value.item() for name, value in x.coords.items() if value.ndim == 0}
     # Of several levels there is a tuple beside its items.
-    parts = {name: value for name, value in parts.items() if not isinstance(value, tuple)}
-    if not parts:
+    levels = {name: value for name, value in levels.items() if not isinstance(value, tuple)}
+    if not levels:
         return table
-    label = tuple(parts.values()) if len(parts) > 1 else next(iter(parts.values()))
-    return labelled(table, label, (*parts, frames), table.attrs)
+    label = tuple(levels.values()) if len(levels) > 1 else next(iter(levels.values()))
+    return labelled(table, label, (*levels, frames), table.attrs)
 
 
 def check_dimensions(x):
     """Refuse a 3-D DataArray whose first dimension is that of the frames."""
     if is_labelled_array(x) and x.dims[0] in _TIMES:
-        time, *others = x.dims
+        time, second, third = x.dims
         raise ValueError(
             f"The dimensions of the DataArray are {x.dims}, and the first tells performances "
-            f"apart: give X.transpose({others[0]!r}, {time!r}, {others[1]!r})."
+            f"apart: give X.transpose({second!r}, {time!r}, {third!r})."
         )

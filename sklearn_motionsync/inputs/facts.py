@@ -75,16 +75,17 @@ def check_facts(estimator, facts, called, *, reset, which=None):
         As from `compare_facts`.
     """
     which = getattr(estimator, "_facts", None) if which is None else which
-    known = {} if reset else facts_in_fit(estimator)
-    sources = dict.fromkeys(known, "the training set has")
+    reference = {} if reset else facts_in_fit(estimator)
+    sources = dict.fromkeys(reference, "the training set has")
     if (rate := getattr(estimator, "frame_rate", None)) is not None:
-        known, sources = known | {"frame_rate": (rate,)}, sources | {"frame_rate": "frame_rate is"}
-    found = compare_facts(facts, called, which, known, sources)
+        reference = reference | {"frame_rate": (rate,)}
+        sources["frame_rate"] = "frame_rate is"
+    values = compare_facts(facts, called, which, reference, sources)
     if reset:
-        vars(estimator)[_FACTS] = found
+        vars(estimator)[_FACTS] = values
 
 
-def compare_facts(facts, called, which=None, known=None, sources=None):
+def compare_facts(facts, called, which=None, reference=None, sources=None):
     """The different values of the facts of performances, which must agree but for the frame rate.
 
     Parameters
@@ -95,7 +96,7 @@ def compare_facts(facts, called, which=None, known=None, sources=None):
         Gives the name of a performance by its index.
     which : sequence of str, default=None
         The facts to compare; by default all.
-    known : dict of str to tuple, default=None
+    reference : dict of str to tuple, default=None
         Values known before; the first performance that says something is the reference of others.
     sources : dict of str to str, default=None
         Where these are from, for messages.
@@ -115,12 +116,11 @@ def compare_facts(facts, called, which=None, known=None, sources=None):
     UserWarning
         If frame rates differ by more than 1 %.
     """
-    found = dict(known or {})
+    compared = dict(reference or {})
     for fact in (_WORDS if which is None else which) if any(facts) else ():
-        values, source = list(found.get(fact, ())), (sources or {}).get(fact)
+        values, source = list(compared.get(fact, ())), (sources or {}).get(fact)
         different = {}
-        for i, own in enumerate(facts):
-            value = own.get(fact)
+        for i, value in enumerate([performance.get(fact) for performance in facts]):
             if value is None or any(_equal(value, other) for other in values):
                 continue
             if values:
@@ -128,17 +128,17 @@ def compare_facts(facts, called, which=None, known=None, sources=None):
             else:
                 values, source = [value], f"{within(called(i))} has"
         if values:
-            found[fact] = tuple(dict.fromkeys([*values, *different.values()]))
+            compared[fact] = tuple(dict.fromkeys([*values, *different.values()]))
         if different:
             _report(fact, different, called, source, values[0])
-    return found
+    return compared
 
 
 def _report(fact, different, called, source, reference):
     """Say that performances differ: a warning of rates, an error of all else."""
     words, remedy = _WORDS[fact]
-    first, *others = different
-    more = f" {len(others)} more differ." if others else ""
+    first, n_more = next(iter(different)), len(different) - 1
+    more = f" {n_more} more differ." if n_more else ""
     message = (
         f"{called(first)} has {words.format(different[first])}, and {source} "
         f"{words.format(reference)}.{more} {remedy.format(reference)}"
@@ -161,21 +161,21 @@ def units_of_columns(x):
         units = units * len(x.columns)
     # pandas leaves attrs as they are where columns are selected or rearranged.
     names = names if isinstance(names, (list, tuple)) and len(names) == len(units) else x.columns
-    known = dict(zip(names, units, strict=True)) if len(names) == len(units) else {}
-    return {name: known[name] for name in x.columns if known.get(name)}
+    unit_by_name = dict(zip(names, units, strict=True)) if len(names) == len(units) else {}
+    return {name: unit_by_name[name] for name in x.columns if unit_by_name.get(name)}
 
 
 def _unit(x):
     """The unit of a table as one text, or those of its columns by their names; None without any."""
     units = _spelled_units(x)
-    if len(set(units)) > 1 and (known := units_of_columns(x)):
-        units = [known.get(name, "") for name in sorted(x.columns, key=str)]
+    if len(set(units)) > 1 and (unit_by_name := units_of_columns(x)):
+        units = [unit_by_name.get(name, "") for name in sorted(x.columns, key=str)]
     return " ".join(units[:1] if len(set(units)) == 1 else units) or None
 
 
 def _spelled_units(x):
     """The units that a table states, each spelled in one way."""
-    given = x.attrs.get("units")
-    given = given if isinstance(given, (list, tuple)) else [given]
-    units = [unit.strip() if isinstance(unit, str) else "" for unit in given]
+    units = x.attrs.get("units")
+    units = units if isinstance(units, (list, tuple)) else [units]
+    units = [unit.strip() if isinstance(unit, str) else "" for unit in units]
     return [_UNITS.get(unit.lower().removesuffix("s"), unit) for unit in units]

@@ -16,7 +16,7 @@ class Keyframes:
 
     Parameters
     ----------
-    given : list of arrays (n_keyframes,), 2-D array or DataFrame
+    keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame
         One row a performance; None for one of which nothing is known.
     n_sequences : int
         Performances in the set.
@@ -26,19 +26,19 @@ class Keyframes:
         The argument, for messages.
     """
 
-    def __init__(self, given, n_sequences, frame_rate=None, *, name="keyframes"):
+    def __init__(self, keyframes, n_sequences, frame_rate=None, *, name="keyframes"):
         self._labels, self._name = None, name
-        if isinstance(given, (pd.DataFrame, pd.Series)):
+        if isinstance(keyframes, (pd.DataFrame, pd.Series)):
             # One row a performance; iterating would give columns.
-            if not isinstance(given.index, pd.RangeIndex):
-                self._labels = given.index.to_list()
-            given = given.to_numpy()
-        if not hasattr(given, "__len__") or len(given) != n_sequences:
+            if not isinstance(keyframes.index, pd.RangeIndex):
+                self._labels = keyframes.index.to_list()
+            keyframes = keyframes.to_numpy()
+        if not hasattr(keyframes, "__len__") or len(keyframes) != n_sequences:
             raise ValueError(
                 f"{name} must be a list of {n_sequences} arrays (n_keyframes,), one a "
-                f"performance; got {given!r:.200}."
+                f"performance; got {keyframes!r:.200}."
             )
-        self._rows, self._rates = list(given), None
+        self._rows, self._rates = list(keyframes), None
         if frame_rate is not None:
             rates = as_frame_rates(frame_rate, n_sequences)
             self._rates = np.broadcast_to(rates, (n_sequences, 1))[:, 0]
@@ -55,15 +55,15 @@ class Keyframes:
         complete : bool, default=False
             Whether all have to be known.
         """
-        own = range(len(self._rows))
+        numbers = range(len(self._rows))
         if len(performances) < len(self._rows):
-            own = performances.numbers
-        self._check_labels([performances.labels[i] for i in range(len(performances))], own)
+            numbers = performances.numbers
+        self._check_labels([performances.labels[i] for i in range(len(performances))], numbers)
         if count is None:
             counts = [np.size(row) for row in self._rows if row is not None]
             count = counts[0] if counts else 0
         out = np.full((len(performances), count), np.nan)
-        for row, i, x in zip(out, own, performances, strict=True):
+        for row, i, x in zip(out, numbers, performances, strict=True):
             if self._rows[i] is not None:
                 row[:] = self._checked(i, len(x), count, complete)
             elif complete:
@@ -84,30 +84,30 @@ class Keyframes:
 
     def _checked(self, i, n_frames, count, complete):
         """The key-frames of one performance, as shares."""
-        given = self._rows[i]
-        frames = as_numbers(given, f"Performance {i}: {self._name}", dtype=np.float64)
-        known = frames[~np.isnan(frames)] if frames.shape == (count,) else frames.ravel()
+        row = self._rows[i]
+        frames = as_numbers(row, f"Performance {i}: {self._name}", dtype=np.float64)
+        known_frames = frames[~np.isnan(frames)] if frames.shape == (count,) else frames.ravel()
         if self._rates is not None:
-            frames, known = frames * self._rates[i], known * self._rates[i]
+            frames, known_frames = frames * self._rates[i], known_frames * self._rates[i]
         else:
-            refuse_seconds(known, n_frames, f"Performance {i}")
-        path = np.concatenate([[0], known, [n_frames - 1]])
-        is_whole = count > 0 and (len(known) == count or not complete)
+            refuse_seconds(known_frames, n_frames, f"Performance {i}")
+        path = np.concatenate([[0], known_frames, [n_frames - 1]])
+        is_whole = count > 0 and (len(known_frames) == count or not complete)
         if frames.shape != (count,) or not is_whole or not (np.diff(path) > 0).all():
             unit = "" if self._rates is None else f" times {self._rates[i]:g} frames per second"
             unknown = "" if complete else ", NaN where one is not known"
             raise ValueError(
                 f"Performance {i}: key-frames must be "
                 f"{counted(count, 'increasing frame') if count else 'some increasing frames'} "
-                f"between 0 and {n_frames - 1}, both excluded{unknown}, got {given}{unit}."
+                f"between 0 and {n_frames - 1}, both excluded{unknown}, got {row}{unit}."
             )
         return frames / (n_frames - 1)
 
-    def _check_labels(self, labels, own):
+    def _check_labels(self, labels, numbers):
         """Refuse rows of a table that are labelled otherwise than the performances."""
         if self._labels is None or labels == list(range(len(labels))):
             return
-        for place, (label, i) in enumerate(zip(labels, own, strict=True)):
+        for place, (label, i) in enumerate(zip(labels, numbers, strict=True)):
             if self._labels[i] != label:
                 raise ValueError(
                     f"Performance {place} is labelled {label!r}, and its row of {self._name} "

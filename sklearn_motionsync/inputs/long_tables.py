@@ -180,7 +180,7 @@ def to_sequences(
         index = pd.MultiIndex.from_frame(flat[keys])
     else:
         index = pd.Index(flat[keys[0]] if keys else np.zeros(len(flat), dtype=int))
-    labels, parts = rows_of_labels(index, names)
+    labels, rows_by_label = rows_of_labels(index, names)
     if keys and len(flat) == len(labels):
         raise ValueError(
             f"{keys} give {counted(len(flat), 'performance')} of one row each, and a performance "
@@ -190,12 +190,12 @@ def to_sequences(
     if not keys and own_label(df)[0] is not None:
         label, names = own_label(df)
         labels = [label]
-    _refuse_events(flat, keys, time, parts, max_gap_time)
+    _refuse_events(flat, keys, time, rows_by_label, max_gap_time)
     recording = Recorded(df)
     if time is None:
         level = ROW if FRAME in names else None
         sequences = []
-        for rows, label in zip(parts, labels, strict=True):
+        for rows, label in zip(rows_by_label, labels, strict=True):
             x = _rows(features, rows, pd.RangeIndex(len(rows), name=level))
             attrs = recording.attrs_of(rows)
             sequences.append(labelled(x, label, (*names, level or FRAME), attrs))
@@ -203,7 +203,10 @@ def to_sequences(
     clock = flat[time]
     if isinstance(clock.dtype, np.dtype) and clock.dtype.kind in "fiu":
         clock = clock.to_numpy(dtype=np.float64)
-    timed = [_in_order(clock, *part, time) for part in zip(parts, labels, strict=True)]
+    timed = [
+        _in_order(clock, rows, label, time)
+        for rows, label in zip(rows_by_label, labels, strict=True)
+    ]
     _check_gaps([times for times, _ in timed], labels, max_gap_time)
     sequences = []
     for (times, rows), label in zip(timed, labels, strict=True):
@@ -282,7 +285,7 @@ def to_frame(
             f"got {len(labels)} of which {len(set(labels))} differ."
         )
     for i, label in enumerate(labels):
-        if any(pd.isna(part) is True for part in (label if isinstance(label, tuple) else [label])):
+        if any(pd.isna(item) is True for item in (label if isinstance(label, tuple) else [label])):
             raise ValueError(f"Performance {i} has no label: performances[{i}] is {label!r}.")
     columns = names if columns is None else list(columns)
     if columns is not None and len(columns) != arrays[0].shape[1]:
@@ -307,15 +310,15 @@ def to_frame(
 
 def _at_rate(x, frame_rate):
     """A performance of a known frame rate at another one."""
-    own = frame_rate_of_rows(x)
-    if own is None:
+    rate = frame_rate_of_rows(x)
+    if rate is None:
         raise ValueError(
             f"frame_rate={frame_rate!r} needs time=, the column of the times, or a table whose "
             f"frame rate is known, by df.attrs['frame_rate'] or an index in seconds; "
             f"{counted(len(x), 'row')} with the index {x.index.name!r} have none."
         )
     time = next(name for name in ("time", "time_s", "seconds") if name not in x.columns)
-    timed = x.assign(**{time: np.arange(len(x)) / own})
+    timed = x.assign(**{time: np.arange(len(x)) / rate})
     return to_sequences(timed, time=time, frame_rate=frame_rate)[0]
 
 
@@ -337,15 +340,15 @@ def _levels_as_columns(df, keys, times):
     flat = df
     if levels:
         # All at once: inserting into a table of many columns makes pandas warn.
-        own = pd.DataFrame({name: df.index.get_level_values(name) for name in levels})
-        flat = pd.concat([own, df.reset_index(drop=True)], axis=1)
+        from_index = pd.DataFrame({name: df.index.get_level_values(name) for name in levels})
+        flat = pd.concat([from_index, df.reset_index(drop=True)], axis=1)
     columns = list(flat.columns)
     missing = [key for key in named if key not in columns]
     if missing or not named:
-        known = [name for name in df.index.names if name is not None]
+        level_names = [name for name in df.index.names if name is not None]
         raise ValueError(
             f"There is no column or index level {missing}; there are the columns "
-            f"{list(df.columns)[:20]} and the levels {known}. {SPLIT}"
+            f"{list(df.columns)[:20]} and the levels {level_names}. {SPLIT}"
         )
     if len(set(named)) < len(named) or any(columns.count(key) > 1 for key in named):
         raise ValueError(
@@ -357,30 +360,30 @@ def _levels_as_columns(df, keys, times):
     return flat
 
 
-def _refuse_events(flat, keys, time, parts, max_gap_time):
+def _refuse_events(flat, keys, time, rows_by_label, max_gap_time):
     """Refuse rows that are events, such as spikes: a time and whole numbers, but no signal.
 
     Where ``time`` is None, it may be left among the features.
     """
     features = flat.drop(columns=[*keys, *([] if time is None else [time])])
     ids = [name for name in features if pd.api.types.is_integer_dtype(features[name])]
-    others = [name for name in features if name not in ids]
+    not_whole = [name for name in features if name not in ids]
     if time is None:
         # A warp is a column of times that increase unevenly, too.
         words = "time|spike" if features.shape[1] > 1 else "spike"
         called = [name for name in features if re.search(words, str(name), re.IGNORECASE)]
-        if len(called) != 1 or set(others) - set(called):
+        if len(called) != 1 or set(not_whole) - set(called):
             return
         time, ids = called[0], [name for name in ids if name not in called]
         in_order = flat.groupby([*keys, *ids], observed=True)[time].is_monotonic_increasing
         if not in_order.all() or 2 * len(in_order) > len(flat):
             return
-    elif others or (ids and max_gap_time is not None):
+    elif not_whole or (ids and max_gap_time is not None):
         return
     if flat[time].dtype.kind not in "fiu":
         return
     clock = flat[time].to_numpy(dtype=np.float64)
-    if look_like_events([clock[rows] for rows in parts], with_signal=bool(ids)):
+    if look_like_events([clock[rows] for rows in rows_by_label], with_signal=bool(ids)):
         beside = f"whole numbers, {ids}," if ids else "labels"
         raise ValueError(
             f"Rows look like events, such as spikes: times in {time!r} are uneven or come twice, "
@@ -394,15 +397,15 @@ def _refuse_events(flat, keys, time, parts, max_gap_time):
 
 def _in_order(column, rows, label, name):
     """Times of a performance, increasing, and its rows in this order."""
-    what = f"The time of performance {label!r}"
+    called = f"The time of performance {label!r}"
     if isinstance(column, np.ndarray):
         times = column[rows]
     else:
-        times = times_as_numbers(column.iloc[rows], what)
+        times = times_as_numbers(column.iloc[rows], called)
     if not np.isfinite(times).all():
         row = rows[np.argmin(np.isfinite(times))]
         raise ValueError(
-            f"{what} is missing (NaN) or infinite in row {row}. Drop such rows: "
+            f"{called} is missing (NaN) or infinite in row {row}. Drop such rows: "
             f"df.dropna(subset=[{name!r}])."
         )
     order = np.argsort(times, kind="stable")

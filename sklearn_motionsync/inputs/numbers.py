@@ -209,7 +209,7 @@ def _not_numeric(values, what, reason):
     return f"{what} is not a numeric array: got {type(values).__name__}, {reason}."
 
 
-def check_finite(array, where, names=None, frames=None, *, allow_nan=False, advice=_ADVICE):
+def check_finite(array, where, names=None, frames=None, *, allow_nan=False, advice=None):
     """Refuse NaN and infinity in (n_frames, n_features), naming the first one.
 
     Parameters
@@ -221,8 +221,8 @@ def check_finite(array, where, names=None, frames=None, *, allow_nan=False, advi
         Names of the features, and labels of the frames.
     allow_nan : bool, default=False
         Refuse infinity only.
-    advice : str
-        What to do about NaN, instead of dropping the performance.
+    advice : str, default=None
+        What to do about NaN, instead of dropping the performance; by default to fill the gap.
     """
     # A sum is not finite if a term is not; no mask is made of a sound array.
     with np.errstate(over="ignore", invalid="ignore"):
@@ -235,7 +235,7 @@ def check_finite(array, where, names=None, frames=None, *, allow_nan=False, advi
     kind = "NaN" if np.isnan(array[frame, feature]) else "infinity"
     label = "" if frames is None or frames[frame] == frame else f" ({frames[frame]})"
     name = "" if names is None else f" ({names[feature]!r})"
-    advice = "Give NaN where nothing is known" if allow_nan else advice
+    advice = "Give NaN where nothing is known" if allow_nan else advice or _ADVICE
     raise ValueError(
         f"{where} {frame}{label}, feature {feature}{name} is {kind}; the input must be finite. "
         f"{advice}, or drop the performance. (Input X contains NaN or infinity.)"
@@ -304,11 +304,11 @@ def listed(names):
     """Names as a message lists them: a few of many, and of long ones their beginning."""
     if names is None:
         return "None"
-    shown, left = [], 36
+    shown, room = [], 36
     for name in map(repr, names):
-        if len(name) > left:
-            return f"[{', '.join([*shown, name[: max(left, 4)]])} ... {len(names)} in all]"
-        shown, left = [*shown, name], left - len(name) - 2
+        if len(name) > room:
+            return f"[{', '.join([*shown, name[: max(room, 4)]])} ... {len(names)} in all]"
+        shown, room = [*shown, name], room - len(name) - 2
     return f"[{', '.join(shown)}]"
 
 

@@ -231,8 +231,8 @@ def _trouble_of_rows(x):
     rate = x.attrs.get("frame_rate")
     # Whole numbers are numbers of frames; those of a recording at a frame rate tell its time.
     timed = index.dtype.kind in "fmM" or _is_rate(rate)
-    own = _rate_of_seconds(index)
-    is_uneven = own is None and (steps != steps[0]).any() and not is_even(times)
+    index_rate = _rate_of_seconds(index)
+    is_uneven = index_rate is None and (steps != steps[0]).any() and not is_even(times)
     if is_uneven and _look_split(steps):
         return (
             f"rows look split, as by cross-validation of rows, which puts every trial into train "
@@ -249,11 +249,11 @@ def _trouble_of_rows(x):
             f"{np.median(steps):.4g}. Frames count as evenly spaced: "
             f"to_sequences(df, time={name!r}) makes them so."
         )
-    known = own is not None and _is_rate(rate) and recorded_frames(x) is None
-    if known and not is_thinned(own, rate):
+    has_two_rates = index_rate is not None and _is_rate(rate) and recorded_frames(x) is None
+    if has_two_rates and not is_thinned(index_rate, rate):
         return (
-            f"its index has {own:g} frames a second, and x.attrs['frame_rate'] is {rate:g}. The "
-            "index is taken. Correct the wrong one."
+            f"its index has {index_rate:g} frames a second, and x.attrs['frame_rate'] is "
+            f"{rate:g}. The index is taken. Correct the wrong one."
         )
     return None
 
@@ -323,8 +323,9 @@ class Recorded:
         facts = {key: value for key, value in self._attrs.items() if key not in _OF_ROWS}
         rate = facts.get("frame_rate")
         if self.frames is None:
-            own = self._rate if grid is None and (np.diff(rows) == 1).all() else None
-            return facts if rate is None and own is None else facts | {"frame_rate": own}
+            index_rate = self._rate if grid is None and (np.diff(rows) == 1).all() else None
+            has_rate = rate is not None or index_rate is not None
+            return facts | {"frame_rate": index_rate} if has_rate else facts
         frames = self.frames[rows]
         first, all_rows = int(frames[0]), len(rows) == self._n_rows
         start, seconds, events = map(self._attrs.get, ("first_time", "times", "events"))
@@ -371,12 +372,12 @@ def _frame_of(event):
 
 def _move_event(event, frames, times, grid):
     """An event at its frame in the performance."""
-    frame, own = _frame_of(event), np.arange(len(frames))
+    frame, places = _frame_of(event), np.arange(len(frames))
     if frame is None:
         return event
-    place = _on_line(frame, frames, own)
+    place = _on_line(frame, frames, places)
     if grid is not None:
-        place = _on_line(_on_line(place, own, times), grid, np.arange(len(grid)))
+        place = _on_line(_on_line(place, places, times), grid, np.arange(len(grid)))
     return event | {"frame": round(float(place), 5)}
 
 

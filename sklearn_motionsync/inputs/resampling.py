@@ -5,6 +5,7 @@ import reprlib
 import numpy as np
 import pandas as pd
 
+from ..matching.counting import whole
 from .numbers import as_numbers
 from .wording import counted
 
@@ -84,8 +85,8 @@ def look_like_events(times, with_signal=True):
         Whether anything is recorded along with the times. If not, the first uneven step decides.
     """
     n_uneven = n_steps = n_alike = n_times = n_rows = 0
-    for part in times:
-        distinct, counts = np.unique(part[np.isfinite(part)], return_counts=True)
+    for clock in times:
+        distinct, counts = np.unique(clock[np.isfinite(clock)], return_counts=True)
         steps = np.diff(distinct)
         if len(steps) < 2:
             continue
@@ -121,10 +122,10 @@ def even_grid(times, frame_rate, what):
     if keeps_rate and is_even(times):
         return None
     if frame_rate is None:
-        n_steps = round(duration / float(np.median(np.diff(times))))
+        n_steps = whole(duration / np.median(np.diff(times)))
     else:
         # Rounding of the times is no reason to lose the last frame.
-        n_steps = int((duration + slack) * frame_rate)
+        n_steps = whole((duration + slack) * frame_rate, "down")
     if not 1 <= n_steps <= _MOST * len(times):
         setting = "max_gap_time" if frame_rate is None else f"frame_rate={frame_rate:g}"
         raise ValueError(

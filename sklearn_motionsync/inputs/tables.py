@@ -56,16 +56,16 @@ def split_table(df):
             f"An index of the levels {list(levels)} has the frame in its last level, and "
             f"{levels[0]!r} is its first. {SPLIT}"
         )
-    labels, parts = rows_of_labels(keys, list(levels[:-1]))
+    labels, rows_by_label = rows_of_labels(keys, list(levels[:-1]))
     sequences = []
-    for label, rows in zip(labels, parts, strict=True):
-        own = frames[rows]
-        if not own.is_monotonic_increasing or not own.is_unique:
+    for label, rows in zip(labels, rows_by_label, strict=True):
+        index = frames[rows]
+        if not index.is_monotonic_increasing or not index.is_unique:
             raise ValueError(
                 f"The frames of performance {label!r} do not increase. Drop the frames that come "
                 f"twice and sort the table by df.sort_index(), or by its time: {SPLIT}"
             )
-        sequences.append(labelled(df.iloc[rows].set_axis(own), label, levels, df.attrs))
+        sequences.append(labelled(df.iloc[rows].set_axis(index), label, levels, df.attrs))
     return sequences
 
 
@@ -128,9 +128,9 @@ def labels_of(sequences, numbers=None):
     """
     frames = {x.index.name if isinstance(x, pd.DataFrame) else None for x in sequences}
     frame = (frames.pop() if len(frames) == 1 else None) or FRAME
-    found = [own_label(x) for x in sequences]
-    labels = [label for label, _ in found]
-    names = {levels for _, levels in found}
+    carried = [own_label(x) for x in sequences]
+    labels = [label for label, _ in carried]
+    names = {levels for _, levels in carried}
     if len(names) == 1 and None not in names and len(set(labels)) == len(labels):
         return labels, (*names.pop(), frame)
     return list(range(len(sequences)) if numbers is None else numbers), (PERFORMANCE, frame)

@@ -14,7 +14,6 @@ import pandas as pd
 __all__ = [
     "Cost",
     "Features",
-    "FitTransform",
     "Indexed",
     "Labels",
     "NamesLike",
@@ -64,12 +63,6 @@ Table: TypeAlias = pd.DataFrame | SupportsArray
 # What ``transform`` returns: an array, a list of arrays where lengths differ, or a table. That
 # depends on the input and on ``set_output``, so no type can tell.
 Transformed: TypeAlias = Any
-
-
-class FitTransform(Protocol):
-    """The method that transformers have from scikit-learn, which is not annotated."""
-
-    def __call__(self, X: PerformancesLike, y: object = None, **fit_params: Any) -> Transformed: ...
 
 
 # As scikit-learn takes it.

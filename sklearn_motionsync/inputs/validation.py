@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 import warnings
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from sklearn.base import BaseEstimator
+from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils import get_tags
 from sklearn.utils._set_output import _get_output_config
 from sklearn.utils.validation import check_is_fitted, validate_data
@@ -24,10 +25,11 @@ from .numbers import (
     refuse_non_numeric,
 )
 from .tables import FRAME, INDEX_NAMES, PERFORMANCE, SPLIT, as_pandas, labels_of, stack_frame
-from .types import PerformancesLike
+from .types import PerformancesLike, Transformed
 from .wording import counted
 
 __all__ = [
+    "PerformanceTransformerMixin",
     "SequenceLevelMixin",
     "check_performances",
     "check_transformed",
@@ -96,7 +98,9 @@ class SequenceLevelMixin:
     def _read_rows_in_fit(self):
         """Whether it was fitted on 2-D input; an error if it was not fitted."""
         on_rows = vars(self).get("_fitted_on_rows")
-        if on_rows is None:
+        # After a fit that failed its input is known, and nothing else.
+        is_fitted = getattr(self, "__sklearn_is_fitted__", None)
+        if on_rows is None or (is_fitted is not None and not is_fitted()):
             check_is_fitted(self)
         return on_rows
 
@@ -108,6 +112,31 @@ class SequenceLevelMixin:
         if not self._fitted_on_rows:
             warn_of_clocks(performances, names_of_input(self))
         return performances
+
+
+class PerformanceTransformerMixin(TransformerMixin):
+    """scikit-learn's mixin of transformers, for those whose samples are performances."""
+
+    def fit_transform(
+        self, X: PerformancesLike, y: object = None, **fit_params: Any
+    ) -> Transformed:
+        """Fit to performances, then transform them.
+
+        Parameters
+        ----------
+        X : performances
+            As for ``fit``.
+        y : array-like, default=None
+            As for ``fit``.
+        **fit_params : dict
+            What ``fit`` takes besides.
+
+        Returns
+        -------
+        ndarray, list of ndarray or DataFrame
+            As from ``transform``.
+        """
+        return super().fit_transform(X, y, **fit_params)
 
 
 def check_performances(

@@ -52,11 +52,11 @@ class _Bone:
 
 def find_asf(path):
     """The skeleton of an AMC file, by the names of the files in its folder."""
-    found = sorted(p for p in path.parent.iterdir() if p.suffix.lower() == ".asf" and p.is_file())
-    named = [p for p in found if path.stem.lower().startswith(p.stem.lower())]
-    if named or len(found) == 1:
-        return max(named or found, key=lambda p: len(p.stem))
-    names = ", ".join(p.name for p in found[:5]) or "none"
+    paths = sorted(p for p in path.parent.iterdir() if p.suffix.lower() == ".asf" and p.is_file())
+    named = [p for p in paths if path.stem.lower().startswith(p.stem.lower())]
+    if named or len(paths) == 1:
+        return max(named or paths, key=lambda p: len(p.stem))
+    names = ", ".join(p.name for p in paths[:5]) or "none"
     raise ValueError(
         f"{path} needs the skeleton it was recorded with, and none of the .asf files in its folder "
         f"({names}) has a name that {path.name} begins with; give asf=."
@@ -125,7 +125,7 @@ def _read_bone(text, words, bone, bones):
             raise text.error(
                 f"bone {bone.name[:60]!r} needs a name of its own, a direction and a length."
             )
-        bone.offset = [bone.length * part for part in bone.direction]
+        bone.offset = [bone.length * component for component in bone.direction]
         bones[bone.name] = bone
         return None
     if key == b"name":
@@ -261,8 +261,8 @@ def _place_bones(bones, in_degrees, values, degrees):
     along the axes of space, from its offset, and the axes of its children are given in the axes
     that it has turned to.
     """
-    own = _own_axes(bones, in_degrees)
-    back = own.swapaxes(0, 1).copy()
+    bone_axes = _own_axes(bones, in_degrees)
+    back = bone_axes.swapaxes(0, 1).copy()
     back[:, :, 0] = np.eye(3)
     offsets = np.array([bone.offset for bone in bones]).T
     far_ends = rotate(back, offsets)
@@ -271,7 +271,7 @@ def _place_bones(bones, in_degrees, values, degrees):
     parents = [bone.parent for bone in bones]
     above = back[:, :, parents]
     above[:, :, 0] = np.eye(3)
-    at_rest = rotate(above[:, :, None], own)
+    at_rest = rotate(above[:, :, None], bone_axes)
     shifts = at_rest.copy()
     shifts[:, :, 0] = np.eye(3)
     channels = [[(kind, axis.upper()) for kind, axis in bone.dofs] for bone in bones]
@@ -298,8 +298,8 @@ def _own_axes(bones, in_degrees):
     for order in {bone.axis_order for bone in bones}:
         members = [j for j, bone in enumerate(bones) if bone.axis_order == order]
         angles = np.array([bones[j].axis for j in members]).T[::-1]
-        own = axes[:, :, members]
+        turned = axes[:, :, members]
         # Rotations about fixed axes are those about turning axes in the opposite order.
-        turn(own, order[::-1].upper(), np.radians(angles) if in_degrees else angles)
-        axes[:, :, members] = own
+        turn(turned, order[::-1].upper(), np.radians(angles) if in_degrees else angles)
+        axes[:, :, members] = turned
     return axes

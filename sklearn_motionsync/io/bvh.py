@@ -29,8 +29,11 @@ def read_bvh(path):
     offsets = np.array([joint.offset for joint in joints]).T[:, :, None]
     (axes, moved, columns), turning = split_channels(
         [
-            [("t" if name.endswith(b"POSITION") else "r", name[:1].decode()) for name in own]
-            for own in (joint.channels or () for joint in joints)
+            [
+                ("t" if name.endswith(b"POSITION") else "r", name[:1].decode())
+                for name in joint.channels or ()
+            ]
+            for joint in joints
         ]
     )
 

@@ -141,7 +141,7 @@ class _Parameters:
 
     def __init__(self, file):
         self._file = file
-        self._found = {}
+        self._values = {}
         groups, members = {}, []
         data, at = file.data, file.first_parameter
         n_blocks = data[at + 2]
@@ -171,7 +171,7 @@ class _Parameters:
                 break
             at = link + step
         for group, name, at, content in members:
-            self._found.setdefault((groups.get(group), name), self._read(at, content))
+            self._values.setdefault((groups.get(group), name), self._read(at, content))
 
     def _error(self, at, problem):
         return self._file.error(f"the parameter at byte {at} {problem}")
@@ -190,7 +190,7 @@ class _Parameters:
 
     def names(self, group):
         """Names of the parameters of a group, in the order of the file."""
-        return [name for found, name in self._found if found == group]
+        return [name for holder, name in self._values if holder == group]
 
     def numbers(self, group, name, kind="u"):
         """The numbers of a parameter and its continuations, integers of kind "u" or "i"."""
@@ -218,8 +218,8 @@ class _Parameters:
 
     def _continued(self, read, group, name):
         """The values of a parameter and of NAME2, NAME3, ..."""
-        result, number = read(*self._found.get((group, name), (0, [], b""))), 2
-        while more := read(*self._found.get((group, f"{name}{number}"), (0, [], b""))):
+        result, number = read(*self._values.get((group, name), (0, [], b""))), 2
+        while more := read(*self._values.get((group, f"{name}{number}"), (0, [], b""))):
             result += more
             number += 1
         return result
@@ -272,8 +272,8 @@ class _Frames:
         fitting = {n for n in n_stated if n >= 0 and n % per_frame == 0}
         if len(set(n_stated)) > 1:
             # The size decides. Data are padded to whole blocks.
-            left = {n: [n_bytes - k * self.frame_bytes(n) for k in stated] for n in fitting}
-            fitting = {n for n in fitting if any(0 <= rest < _BLOCK for rest in left[n])}
+            spare = {n: [n_bytes - k * self.frame_bytes(n) for k in stated] for n in fitting}
+            fitting = {n for n in fitting if any(0 <= size < _BLOCK for size in spare[n])}
         if len(fitting) != 1:
             raise file.error(
                 f"the header says {n_stated[0]} analog values a frame, {per_frame} of each "
@@ -414,9 +414,9 @@ def _read_events(file, parameters, rate, first_frame):
     """
     # Frame 1 of the trial is at 0 seconds. In files that count from 0 it is frame 0.
     start = max(first_frame - 1, 0)
-    found = _read_event_parameters(parameters)
-    if found is None:
-        found = _read_header_events(file, 0.0 if rate is None else start / rate)
+    entries = _read_event_parameters(parameters)
+    if entries is None:
+        entries = _read_header_events(file, 0.0 if rate is None else start / rate)
     events = [
         {
             "label": label,
@@ -425,10 +425,10 @@ def _read_events(file, parameters, rate, first_frame):
             "frame": None if rate is None else round(time * rate - start, 5),
         }
         # The file's numbers have 24 bits.
-        for label, context, time in ((*texts, round(time, 6)) for *texts, time in found)
+        for label, context, time in ((*texts, round(time, 6)) for *texts, time in entries)
         if math.isfinite(time)
     ]
-    return sorted(events, key=lambda event: event["time"]), len(found) - len(events)
+    return sorted(events, key=lambda event: event["time"]), len(entries) - len(events)
 
 
 def _read_event_parameters(parameters):
@@ -477,22 +477,22 @@ def _read_point_groups(parameters, labels):
     """
     names, marker_unit = parameters.names("POINT"), parameters.text("POINT", "UNITS")
     # Points in the unit of markers, such as centres of joints, are used like markers.
-    others = {
+    in_other_units = {
         f"{name.removesuffix('_UNITS')}S"
         for name in names
         if name.endswith("_UNITS") and parameters.text("POINT", name) != marker_unit
     } - {"LABELS", "DESCRIPTIONS", "MARKERS"}
-    left = dict.fromkeys(range(len(labels)))
+    markers = dict.fromkeys(range(len(labels)))
     groups = {}
-    for name in dict.fromkeys([*_COMPUTED, *sorted(others)]):
+    for name in dict.fromkeys([*_COMPUTED, *sorted(in_other_units)]):
         listed = {label.upper() for label in parameters.texts("POINT", name)}
-        points = [i for i in left if labels[i].upper() in listed]
+        points = [i for i in markers if labels[i].upper() in listed]
         if points:
             units = parameters.text("POINT", f"{name.removesuffix('S')}_UNITS")
             groups[name.lower()] = (points, units)
             for i in points:
-                del left[i]
-    return {"markers": (list(left), marker_unit)} | groups
+                del markers[i]
+    return {"markers": (list(markers), marker_unit)} | groups
 
 
 def _check_group(file, groups, group):
@@ -511,19 +511,19 @@ def _describe_others(parameters, groups, group, n_untimed):
     def plural(n, noun):
         return f"{n:g} {noun}" if n == 1 else f"{n:g} {noun}s"
 
-    parts = []
+    contents = []
     for name, facts in groups.items():
         if name == group or not facts["n"]:
             continue
         if name == "analog":
             rate = facts["frame_rate"]
             at = "" if rate is None else f" at {rate:g} Hz"
-            parts.append(f"{plural(facts['n'], 'analog channel')}{at}")
+            contents.append(f"{plural(facts['n'], 'analog channel')}{at}")
         else:
-            parts.append(plural(facts["n"], name.removesuffix("s")))
+            contents.append(plural(facts["n"], name.removesuffix("s")))
     plates = parameters.number("FORCE_PLATFORM", "USED", 0)
     if math.isfinite(plates) and plates > 0:
-        parts.append(f"the geometry of {plural(plates, 'force plate')}")
+        contents.append(f"the geometry of {plural(plates, 'force plate')}")
     if n_untimed:
-        parts.append(f"{plural(n_untimed, 'event')} without a time")
-    return ", ".join(parts)
+        contents.append(f"{plural(n_untimed, 'event')} without a time")
+    return ", ".join(contents)

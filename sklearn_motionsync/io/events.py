@@ -11,6 +11,7 @@ import pandas as pd
 
 from ..inputs.recorded import Recorded
 from ..inputs.tables import FRAME, label_of_part
+from ..matching.counting import whole
 
 _HELP = (
     "attrs['events'] must be a list of dicts with label, context and frame, as read_motion returns "
@@ -107,7 +108,7 @@ def cut_at_events(
             f"A recording must be a DataFrame, as read_motion returns it, got {type(df).__name__}."
         )
     name = name_recording(df)
-    if isinstance(known := df.attrs.get("events"), (list, tuple)) and not known:
+    if isinstance(events := df.attrs.get("events"), (list, tuple)) and not events:
         warnings.warn(
             f"{name} has no events, so no performance is cut out of it.", UserWarning, stacklevel=2
         )
@@ -116,18 +117,18 @@ def cut_at_events(
     starts = _select(events, start, "start", name)
     stops = starts if stop is None else _select(events, stop, "stop", name)
     recording = _Frames(df, name)
-    parts = []
+    cuts = []
     for begin, end in _pair(starts, stops, recording.place):
-        others = [event for event in events if event is not begin and event is not end]
+        other_events = [event for event in events if event is not begin and event is not end]
         rows = recording.rows_between(begin, end)
         if rows is not None:
-            parts.append(_cut(df, recording, rows, others))
-    whole = df.attrs.get("performance") if performance is None else performance
-    for i, part in enumerate(parts):
-        part.attrs |= {"performance": i, "levels": ("performance", FRAME)}
-        if whole is not None:
-            part.attrs |= label_of_part(whole, i, "part", df.attrs.get("levels", ()))
-    return parts
+            cuts.append(_cut(df, recording, rows, other_events))
+    label = df.attrs.get("performance") if performance is None else performance
+    for i, cut in enumerate(cuts):
+        cut.attrs |= {"performance": i, "levels": ("performance", FRAME)}
+        if label is not None:
+            cut.attrs |= label_of_part(label, i, "part", df.attrs.get("levels", ()))
+    return cuts
 
 
 def name_recording(df):
@@ -142,8 +143,8 @@ def read_events(df, name):
     if not isinstance(events, (list, tuple)):
         raise ValueError(f"{name} has no events; {_HELP}.")
     for event in events:
-        known = isinstance(event, dict) and isinstance(event.get("label"), str)
-        if not known or not isinstance(event.get("frame"), Real | None):
+        has_label = isinstance(event, dict) and isinstance(event.get("label"), str)
+        if not has_label or not isinstance(event.get("frame"), Real | None):
             raise ValueError(f"{name}: {_HELP}, got {repr(event)[:100]} among them.")
     placed = [e for e in events if e.get("frame") is not None and math.isfinite(e["frame"])]
     if not placed:
@@ -163,15 +164,15 @@ def _select(events, what, name, recording):
             f"{name} must be the label of an event, or a pair of label and context, got {what!r}."
         )
     wanted = [word.strip().casefold() for word in wanted]
-    found = [event for event in events if words_of(event)[: len(wanted)] == wanted]
-    if not found:
+    selected = [event for event in events if words_of(event)[: len(wanted)] == wanted]
+    if not selected:
         kinds = Counter((event["label"], event.get("context")) for event in events)
         listed = ", ".join(
             f"{(kind[0] if kind[1] is None else kind)!r} ({n})" for kind, n in kinds.items()
         )
         listed = listed if len(listed) <= 300 else f"{listed[:300]} ..."
         raise ValueError(f"{recording} has no event {what!r} for {name}; there are {listed}.")
-    return found
+    return selected
 
 
 def words_of(event):
@@ -203,7 +204,7 @@ class _Frames(Recorded):
     def place(self, event):
         """The frame next to an event: steps from the first row, where no row is missing."""
         start = self.frames[0] if len(self.frames) else 0
-        return math.floor((event["frame"] - start) / self.step + 0.5)
+        return whole((event["frame"] - start) / self.step)
 
     def rows_between(self, begin, end):
         """The rows from one event to another; None if one of them is outside of the recording."""
@@ -231,15 +232,15 @@ def _pair(starts, stops, place):
         stop = next((event for event in stops if place(event) > place(start)), None)
         if stop is None:
             continue
-        others = (event for event in starts[i + 1 :] if event is not stop)
+        other_starts = (event for event in starts[i + 1 :] if event is not stop)
         # Two starts in the same row are one: the last of them counts.
-        if not any(place(start) <= place(other) < place(stop) for other in others):
+        if not any(place(start) <= place(other) < place(stop) for other in other_starts):
             yield start, stop
 
 
 def _cut(df, recording, rows, events):
     """Some rows, with the ``attrs`` that belong to them."""
-    part = df.iloc[rows].set_axis(pd.RangeIndex(len(rows), name=FRAME))
+    performance = df.iloc[rows].set_axis(pd.RangeIndex(len(rows), name=FRAME))
     first, last = recording.frames[rows[[0, -1]]].tolist()
     attrs = recording.attrs_of(rows) | {"rows": [first, last]}
     attrs["events"] = [
@@ -248,9 +249,9 @@ def _cut(df, recording, rows, events):
         if first < event["frame"] < last
     ]
     if isinstance(number := df.attrs.get("first_frame"), int):
-        attrs["first_frame"] = number + math.floor(first / _rows_per_frame(attrs))
-    part.attrs = attrs
-    return part
+        attrs["first_frame"] = number + whole(first / _rows_per_frame(attrs), "down")
+    performance.attrs = attrs
+    return performance
 
 
 def _rows_per_frame(attrs):

@@ -11,6 +11,7 @@ from ..body.skeleton import parse_joint_columns
 from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import Recorded
 from ..inputs.wording import counted
+from ..matching.gaps import interpolate_gaps
 from .events import name_recording
 
 # Kinds of what joints are the names of; angles and forces have no positions.
@@ -156,18 +157,8 @@ def fill_gaps(
     check_ends(ends)
     _, n_dims, values = _read(df)
     missing = _missing(values, n_dims)
-    joint, first, last = _find(missing)
-    places = _places(df)
-    before, after = places[first - 1], places.take(last + 1, mode="clip")
-    short = (first > 0) & (last < len(df) - 1) & (after - before <= max_gap + 1)
-    # By the joint's index: names may be repeated.
-    for j in np.unique(joint[short]):
-        gaps = short & (joint == j)
-        frames = np.concatenate(list(map(np.arange, first[gaps], last[gaps] + 1)))
-        part = values[:, n_dims * j : n_dims * (j + 1)]
-        known = np.flatnonzero(~missing[:, j])
-        filled = _interpolate(places[known], part[known], places[frames])
-        part[frames] = np.where(np.isnan(part[frames]), filled, part[frames])
+    seen = np.where(np.repeat(missing, n_dims, axis=1), np.nan, values)
+    values = np.where(np.isnan(values), interpolate_gaps(seen, max_gap, _places(df)), values)
     result = pd.DataFrame(values, index=df.index, columns=df.columns)
     result.attrs = dict(df.attrs)
     return _trim(result, _missing(values, n_dims)) if ends == "trim" else result
@@ -299,13 +290,3 @@ def _places(df):
             "df.sort_index() before its gaps are filled."
         )
     return np.abs(recording.frames - recording.frames[:1]) / recording.step
-
-
-def _interpolate(known, values, at):
-    from scipy.interpolate import Akima1DInterpolator
-
-    if len(known) == 2:
-        # With two points SciPy 1.13 reads uninitialised memory.
-        share = ((at - known[0]) / (known[1] - known[0]))[:, None]
-        return (1 - share) * values[0] + share * values[1]
-    return Akima1DInterpolator(known, values)(at)

@@ -139,7 +139,10 @@ def keyframes_from_events(
                 for x, rate in zip(sequences, rates, strict=True)
             ]
     columns = _Columns(names)
-    rows = [_place(*own, columns) for own in zip(trials, listed, clocks, strict=True)]
+    rows = [
+        _place(trial, trial_events, clock, columns)
+        for trial, trial_events, clock in zip(trials, listed, clocks, strict=True)
+    ]
     values = pd.DataFrame(rows, columns=pd.Index(columns.names(rows), tupleize_cols=False))
     lengths = np.array([len(x) for x in sequences])
     if names is None:
@@ -159,8 +162,8 @@ def is_table_of_events(given):
 
 def _events_of(x, trial):
     """The events in ``attrs`` of a trial."""
-    known = x.attrs.get("events") if isinstance(x, pd.DataFrame) else None
-    if not known:
+    events = x.attrs.get("events") if isinstance(x, pd.DataFrame) else None
+    if not events:
         return []
     return [(e["label"], e.get("context"), e["frame"]) for e in read_events(x, trial)]
 
@@ -193,12 +196,13 @@ def _events_in(events, labels, levels, by):
     listed = [[] for _ in labels]
     rows = zip(table[keys].itertuples(index=False), table[label], contexts, times, strict=True)
     for key, event, context, at in rows:
-        own = key[0] if len(keys) == 1 else tuple(key)
-        place = places.get(_as_text(own))
+        trial = key[0] if len(keys) == 1 else tuple(key)
+        place = places.get(_as_text(trial))
         if place is None:
             raise ValueError(
-                f"events: trial {own!r} of event {event!r} is not in X, whose trials are labelled "
-                f"{labels[:6]}{' ...' * (len(labels) > 6)}. Leave its rows out, or rename it."
+                f"events: trial {trial!r} of event {event!r} is not in X, whose trials are "
+                f"labelled {labels[:6]}{' ...' * (len(labels) > 6)}. Leave its rows out, or rename "
+                "it."
             )
         if np.isfinite(at):
             listed[place].append((event, None if pd.isna(context) else context, at))
@@ -258,7 +262,7 @@ class _Columns:
     """The names of the columns, as chosen or as events have them."""
 
     def __init__(self, names):
-        self._found, self._chosen = {}, names
+        self._by_words, self._chosen = {}, names
         if names is not None:
             self._chosen = [name if isinstance(name, tuple) else (name,) for name in names]
             for name in self._chosen:
@@ -271,10 +275,10 @@ class _Columns:
     def name(self, label, context):
         """The column of an event; None if it is not chosen."""
         words = tuple(words_of({"label": label, "context": context}))
-        if words not in self._found:
-            self._found[words] = (label, context) if words[1] else label
+        if words not in self._by_words:
+            self._by_words[words] = (label, context) if words[1] else label
         if self._chosen is None:
-            return self._found[words]
+            return self._by_words[words]
         for name in self._chosen:
             wanted = tuple(word.strip().casefold() for word in name)
             if words[: len(wanted)] == wanted:
@@ -283,14 +287,14 @@ class _Columns:
 
     def names(self, rows):
         """Those that are known in some trial: all of the chosen ones."""
-        known = dict.fromkeys(name for row in rows for name in row)
+        placed = dict.fromkeys(name for row in rows for name in row)
         if self._chosen is None:
-            wanted = list(known) or ["any"]
+            wanted = list(placed) or ["any"]
         else:
             wanted = [name if len(name) > 1 else name[0] for name in self._chosen]
-        missing = [name for name in wanted if name not in known]
+        missing = [name for name in wanted if name not in placed]
         if missing:
-            there = list(self._found.values())
+            there = list(self._by_words.values())
             raise ValueError(
                 f"No trial has the event {missing[0]!r} inside, after its first frame and before "
                 f"its last; there are {there[:8]}."
@@ -331,11 +335,11 @@ def _place(trial, events, clock, columns):
 def _order(shares, names, trials):
     """Columns in an order that all trials have; where they leave it open, by mean time."""
     before = {}
-    for trial, own in zip(trials, shares, strict=True):
-        known = np.flatnonzero(np.isfinite(own))
-        in_time = known[np.argsort(own[known], kind="stable")].tolist()
+    for trial, row in zip(trials, shares, strict=True):
+        columns = np.flatnonzero(np.isfinite(row))
+        in_time = columns[np.argsort(row[columns], kind="stable")].tolist()
         for pair in pairwise(in_time):
-            if own[pair[0]] < own[pair[1]]:
+            if row[pair[0]] < row[pair[1]]:
                 before.setdefault(pair, trial)
     sorter = TopologicalSorter({k: [] for k in range(len(names))})
     for first, second in before:
@@ -363,13 +367,13 @@ def _order(shares, names, trials):
 
 def _check_order(values, trials):
     """Refuse a trial whose events do not follow each other."""
-    for trial, own in zip(trials, values.to_numpy(), strict=True):
-        known = np.flatnonzero(np.isfinite(own))
-        wrong = np.flatnonzero(np.diff(own[known]) <= 0)
+    for trial, row in zip(trials, values.to_numpy(), strict=True):
+        columns = np.flatnonzero(np.isfinite(row))
+        wrong = np.flatnonzero(np.diff(row[columns]) <= 0)
         if len(wrong):
-            a, b = known[wrong[0]], known[wrong[0] + 1]
+            a, b = columns[wrong[0]], columns[wrong[0] + 1]
             raise ValueError(
-                f"{trial}: event {values.columns[b]!r} in row {own[b]:.6g} is not after "
-                f"{values.columns[a]!r} in row {own[a]:.6g}. Key-frames have one order, and one "
+                f"{trial}: event {values.columns[b]!r} in row {row[b]:.6g} is not after "
+                f"{values.columns[a]!r} in row {row[a]:.6g}. Key-frames have one order, and one "
                 "each at a time: leave one out, or change the order, by names=[...]."
             )

@@ -31,9 +31,9 @@ def split_channels(channels):
         columns.
     """
     moving, turning, column = [], {}, 0
-    for j, own in enumerate(channels):
+    for j, joint_channels in enumerate(channels):
         axes, columns = "", []
-        for kind, axis in own:
+        for kind, axis in joint_channels:
             if kind == "t":
                 moving.append(("XYZ".index(axis), j, column))
             else:
@@ -71,11 +71,11 @@ def place_joints(parents, turning, values, translations, *, degrees=True, at_res
     positions = np.empty((len(values), len(parents), 3))
     step = max(1, min(_LEVEL * len(levels), _BLOCK) // len(parents))
     for first in range(0, len(values), step):
-        some = values[first : first + step]
-        angles = np.ascontiguousarray(some.T)
+        block = values[first : first + step]
+        angles = np.ascontiguousarray(block.T)
         if degrees:
             angles = np.radians(angles)
-        placed = _place(levels, angles, translations(some), at_rest, bones)
+        placed = _place(levels, angles, translations(block), at_rest, bones)
         positions[first : first + step] = placed.transpose(2, 1, 0)
     return positions
 
@@ -90,8 +90,8 @@ def _place(levels, angles, places, at_rest, bones):
         places[:, joints] = moved if parents is None else moved + places[:, parents]
         if at_rest is not None:
             axes = rotate(axes[:, :, None], at_rest[:, :, joints, None])
-        for names, part, columns in turns:
-            turn(axes[:, :, part], names, angles[columns])
+        for names, members, columns in turns:
+            turn(axes[:, :, members], names, angles[columns])
         if bones is not None:
             places[:, joints] += rotate(axes, bones[:, joints, None])
     return places

@@ -271,40 +271,40 @@ def _read_several(paths, options):
 def _keep_common(recordings):
     """Recordings with the columns that all of them have, in the order of the first."""
     shared = set.intersection(*(set(x.columns) for x in recordings))
-    kept = [name for name in recordings[0].columns if name in shared]
-    others = []
+    common = [name for name in recordings[0].columns if name in shared]
+    losses = []
     for x in recordings:
         lost = [name for name in x.columns if name not in shared]
         if lost:
             label = x.attrs["performance"][:40]
-            others.append(f"{len(lost)} of {label!r} {listed(lost)}")
-    what = "; ".join(others[:3]) + f"; and some of {len(others) - 3} more" * (len(others) > 3)
-    if not kept:
+            losses.append(f"{len(lost)} of {label!r} {listed(lost)}")
+    listing = "; ".join(losses[:3]) + f"; and some of {len(losses) - 3} more" * (len(losses) > 3)
+    if not common:
         raise ValueError(
-            f"No column is common to the {len(recordings)} files, there are {what}. Read those "
+            f"No column is common to the {len(recordings)} files, there are {listing}. Read those "
             "together that have the same joints, markers or channels."
         )
-    if others:
+    if losses:
         warnings.warn(
-            f"{len(recordings)} files have {counted(len(kept), 'column')} in common. Left out are "
-            f"{what}.",
+            f"{len(recordings)} files have {counted(len(common), 'column')} in common. Left out "
+            f"are {listing}.",
             UserWarning,
             stacklevel=3,
         )
     result = []
     for x in recordings:
-        places = x.columns.get_indexer(kept)
-        part = x[kept]
+        places = x.columns.get_indexer(common)
+        selected = x[common]
         for key in ("channels", "units"):
             if isinstance(values := x.attrs.get(key), list):
-                part.attrs[key] = [values[k] for k in places]
-        result.append(part)
+                selected.attrs[key] = [values[k] for k in places]
+        result.append(selected)
     return result
 
 
 def _join(endings):
-    *others, last = endings
-    return f"{', '.join(others)} and {last}" if others else last
+    *before, last = endings
+    return f"{', '.join(before)} and {last}" if before else last
 
 
 def _to_frame(motion, path):

@@ -151,13 +151,13 @@ def _split_poses(poses):
 
 def _arrange(array, what, dimensions):
     """A DataArray with these dimensions in their order, and its values."""
-    known = {*array.dims, *array.coords}
-    array = array.rename({old: new for old, new in _RENAMED.items() if old in known})
-    others = [dim for dim in array.dims if dim not in dimensions]
-    if others:
+    names = {*array.dims, *array.coords}
+    array = array.rename({old: new for old, new in _RENAMED.items() if old in names})
+    extra = [dim for dim in array.dims if dim not in dimensions]
+    if extra:
         raise ValueError(
-            f"The {what} of poses has the dimensions {list(dimensions)}, got also {others}; select "
-            f"one of each, as in ds.isel({others[0]}=0)."
+            f"The {what} of poses has the dimensions {list(dimensions)}, got also {extra}; select "
+            f"one of each, as in ds.isel({extra[0]}=0)."
         )
     missing = [dim for dim in dimensions if dim not in array.dims]
     for dim in {"time", "space"} & set(missing):

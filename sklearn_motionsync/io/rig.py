@@ -51,8 +51,10 @@ class Rig(NamedTuple):
     @classmethod
     def from_attrs(cls, attrs):
         """The rig in the ``attrs`` of a table; None without one."""
-        known = attrs.get("rig")
-        return None if known is None else cls(attrs["joints"], attrs["parents"], **known)
+        rig = attrs.get("rig")
+        if rig is None:
+            return None
+        return cls(attrs["joints"], attrs["parents"], rig["offsets"], rig["channels"])
 
 
 def add_middles(joints, parents, points):
@@ -159,20 +161,20 @@ def solve_rig(rig, points):
             moved[:, free] = np.einsum("tba,tb->ta", above, points[:, j] - start)[:, free]
         placed[:, j] = start + np.einsum("tab,tb->ta", above, moved)
         order, angles = rig.turns(j), np.zeros((n_frames, len(rig.turns(j))))
-        held = [(k, rest) for k, rest in _held_by(rig, offsets, j) if seen[k]]
+        held = [(k, place) for k, place in _held_by(rig, offsets, j) if seen[k]]
         if held and order:
-            rest = np.array([rest for _, rest in held])
+            at_rest = np.array([place for _, place in held])
             ways = points[:, [k for k, _ in held]] - placed[:, j, np.newaxis]
             ways = np.einsum("tba,tkb->tka", above, ways)
             if len(order) == 3:
-                turn = _rotation(rest, ways)
+                turn = _rotation(at_rest, ways)
                 if len(held) == 1:
                     turn = _reach_hinge(rig, offsets, points, held[0], placed[:, j], above, turn)
                 angles = _angles(order, turn)
             else:
-                angles = _few_angles(order, rest, ways)
+                angles = _few_angles(order, at_rest, ways)
         axes[j] = above @ _turn(order, angles)
-        values = {f"{axis}rotation": own for axis, own in zip(order, angles.T, strict=True)}
+        values = {f"{axis}rotation": angle for axis, angle in zip(order, angles.T, strict=True)}
         values |= dict(zip(("Xposition", "Yposition", "Zposition"), moved.T, strict=True))
         columns += [values[name] for name in rig.channels[j]]
     return np.stack(columns, axis=1), offsets
@@ -199,14 +201,14 @@ def _reach_hinge(rig, offsets, points, held, start, above, turn):
 
     A hinge keeps the angle between its axis and its child, which leaves two twists.
     """
-    k, rest = held
+    k, at_rest = held
     below = _held_by(rig, offsets, k)
     if len(rig.turns(k)) != 1 or not below or np.isnan(points[:, below[0][0]]).any():
         return turn
     child, at = below[0]
     hinge = np.eye(3)["XYZ".index(rig.turns(k))]
-    bone = turn @ (rest / np.linalg.norm(rest))
-    knee = start + np.einsum("tab,tb->ta", above, turn @ rest)
+    bone = turn @ (at_rest / np.linalg.norm(at_rest))
+    knee = start + np.einsum("tab,tb->ta", above, turn @ at_rest)
     way = np.einsum("tba,tb->ta", above, points[:, child] - knee)
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     axis = turn @ hinge
@@ -245,9 +247,9 @@ def _fit_lengths(rig, points):
             parent = rig.parents[parent]
         if parent < 0 or length == 0 or any(rig.free_axes(j)) or np.isnan(points[:, j]).any():
             continue
-        own = float(np.median(np.linalg.norm(points[:, j] - points[:, parent], axis=1)))
-        if abs(own - length) > _SAME_LENGTH * length:
-            offsets[j] *= own / length
+        measured = float(np.median(np.linalg.norm(points[:, j] - points[:, parent], axis=1)))
+        if abs(measured - length) > _SAME_LENGTH * length:
+            offsets[j] *= measured / length
     return offsets
 
 
@@ -288,24 +290,24 @@ def _angles(order, turn):
     return np.degrees(np.unwrap(angles, axis=0))
 
 
-def _few_angles(order, rest, ways):
+def _few_angles(order, at_rest, ways):
     """Degrees about one or two axes that bring vectors to others, by steps of Gauss and Newton.
 
     They begin at the best of some angles.
     """
     tries = np.stack(np.meshgrid(*[np.arange(0, 360, 30.0)] * len(order)), axis=-1)
     tries = tries.reshape(-1, len(order))
-    turned = np.einsum("nab,kb->nka", _turn(order, tries), rest)
+    turned = np.einsum("nab,kb->nka", _turn(order, tries), at_rest)
     angles = tries[np.einsum("tka,nka->tn", ways, turned).argmax(axis=1)]
     for _ in range(_STEPS):
-        moved = _turn(order, angles) @ rest.T
+        moved = _turn(order, angles) @ at_rest.T
         slopes = [
-            (_turn(order, angles + step) @ rest.T - moved).reshape(len(ways), -1) / _STEP
+            (_turn(order, angles + step) @ at_rest.T - moved).reshape(len(ways), -1) / _STEP
             for step in _STEP * np.eye(len(order))
         ]
-        left = (ways.transpose(0, 2, 1) - moved).reshape(len(ways), -1)
+        residuals = (ways.transpose(0, 2, 1) - moved).reshape(len(ways), -1)
         slopes = np.stack(slopes, axis=2)
-        angles = angles + np.einsum("tpm,tm->tp", np.linalg.pinv(slopes), left)
+        angles = angles + np.einsum("tpm,tm->tp", np.linalg.pinv(slopes), residuals)
     return np.degrees(np.unwrap(np.radians(angles), axis=0))
 
 

@@ -84,14 +84,14 @@ def _split_rows(text, n_labels, n_components):
         fields = row.split()
         if len(fields) != n:
             fields = split_fields(row, n)
-        parts = fields
+        values = fields
         if n_components:
-            parts = [part for x in fields[1:] for part in x.strip(b"~[]()").split(b",")]
-            parts = fields[:1] + parts
-        if len(fields) != n or len(parts) != 1 + n_labels * max(n_components, 1):
+            values = [value for x in fields[1:] for value in x.strip(b"~[]()").split(b",")]
+            values = fields[:1] + values
+        if len(fields) != n or len(values) != 1 + n_labels * max(n_components, 1):
             commas = f" of {n_components} numbers, with commas between them" * bool(n_components)
             raise text.error(
                 f"a row needs its time and {counted(n_labels, 'column')}{commas}, got "
                 f"{quote([row])}."
             )
-        yield parts
+        yield values

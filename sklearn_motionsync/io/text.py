@@ -142,8 +142,8 @@ class MotionText:
     def check_size(self, n_frames, n_joints):
         """Refuse positions out of all proportion to the file, before they are made."""
         n_bytes = 24 * n_frames * n_joints
-        what = f"{counted(n_frames, 'frame')} of {counted(n_joints, 'joint')}"
-        check_result_size(self.path, self.size, n_bytes, what)
+        shape = f"{counted(n_frames, 'frame')} of {counted(n_joints, 'joint')}"
+        check_result_size(self.path, self.size, n_bytes, shape)
 
     def error(self, message):
         return ValueError(f"{self.path}, line {self.line_number}: {message}")

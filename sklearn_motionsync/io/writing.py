@@ -127,10 +127,13 @@ def _read_positions(X, skeleton, path):
                 f"{path}: columns must be <joint>_x, <joint>_y, <joint>_z, joint by joint; got "
                 f"{[str(name) for name in X.columns][:6]}."
             )
-        known = X.attrs.get("joints"), X.attrs.get("parents")
-        same = known[0] is not None and list(known[0]) == names
-        up = X.attrs.get("up") or "y"
-        parents = list(known[1]) if same else Skeleton.from_frame(X).parents
+        joints, parents, up = (
+            X.attrs.get("joints"),
+            X.attrs.get("parents"),
+            X.attrs.get("up") or "y",
+        )
+        same = joints is not None and list(joints) == names
+        parents = list(parents) if same else Skeleton.from_frame(X).parents
     else:
         names, parents, up = list(skeleton.joints), skeleton.parents, skeleton.up
     if x.shape[1] != 3 * len(names):
@@ -176,8 +179,8 @@ def _write_bvh(joints, parents, points, up, rate, rig, path):
             f"{path}: a BVH file has one root, got {rig.parents.count(-1)}: give a skeleton with "
             "parents, or write a .trc file."
         )
-    known = {*joints, *(f"{joint}_pivot" for joint in joints)}
-    missing = [name for j, name in enumerate(rig.joints) if name not in known and not rig.is_end(j)]
+    named = {*joints, *(f"{joint}_pivot" for joint in joints)}
+    missing = [name for j, name in enumerate(rig.joints) if name not in named and not rig.is_end(j)]
     if missing:
         raise ValueError(
             f"{path}: X lacks the joints {missing[:6]} of the rig; it has {joints[:40]}."
@@ -207,8 +210,8 @@ def _hierarchy(rig, offsets, j, depth):
     # Where the root is, is in its channels.
     lines.append(f"{pad}  OFFSET " + " ".join(f"{v:.{_DIGITS}f}" for v in offsets[j]))
     if not rig.is_end(j):
-        own = rig.channels[j]
-        lines.append(" ".join([f"{pad}  CHANNELS {len(own)}", *own]))
+        channels = rig.channels[j]
+        lines.append(" ".join([f"{pad}  CHANNELS {len(channels)}", *channels]))
     for k, parent in enumerate(rig.parents):
         if parent == j:
             lines += _hierarchy(rig, offsets, k, depth + 1)

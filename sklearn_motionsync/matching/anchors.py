@@ -16,19 +16,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .counting import ROUNDING
+
 __all__ = ["Anchors", "KeyframeColumns", "add_ramps", "first_meeting", "pin"]
 
 # Most that a key-frame costs, in energies of a whole clip: a label with an error, of which some are
 # wrong, and one that is exact. docs/design.md.
 _LABEL, _EXACT = 0.05, 2.0
-# Both key-frames of a pair have errors.
-_OF_PAIR = math.sqrt(2)
-# Frames beside an exact key-frame at which its cost is near its most.
-_NEXT = 0.5
 # Reach of the last correction to an exact key-frame, as a share of the clip: docs/design.md.
 _REACH = 0.1
-# Distance of a key-frame from a whole frame that is rounding.
-_WHOLE = 1e-12
 # Steepest change of that correction, in frames a frame, before it reaches farther.
 _STEEPEST = 0.5
 
@@ -93,7 +89,8 @@ class Anchors(NamedTuple):
         """Costs of the positions of moving sequences: (n_moving, Q, count)."""
         ramps = self.columns.ramps(sequences)
         ramps = np.where(np.isnan(ramps), 0, ramps)
-        width = max(_OF_PAIR * self.columns.std, _NEXT / (self.n_frames - 1))
+        # Both key-frames of a pair have errors; exact ones cost near their most half a frame away.
+        width = max(math.sqrt(2) * self.columns.std, 0.5 / (self.n_frames - 1))
         return -self.most * np.expm1(-0.5 * np.square(ramps / width))
 
 
@@ -111,8 +108,8 @@ def add_ramps(arrays, keyframes):
     list of ndarray (n_frames_i, n_features + n_keyframes)
     """
     out = []
-    for x, own in zip(arrays, keyframes, strict=True):
-        ramps = np.linspace(0, 1, len(x))[:, np.newaxis] - own
+    for x, shares in zip(arrays, keyframes, strict=True):
+        ramps = np.linspace(0, 1, len(x))[:, np.newaxis] - shares
         out.append(np.concatenate([x, ramps.astype(x.dtype)], axis=1))
     return out
 
@@ -155,10 +152,10 @@ def pin(times, keyframes, own, reach=_REACH):
     """
     out, frames, last = times.copy(), np.arange(times.shape[1]), times.shape[1] - 1
     for tau, wanted in zip(out, own, strict=True):
-        known = np.isfinite(wanted)
-        if not known.any():
+        is_known = np.isfinite(wanted)
+        if not is_known.any():
             continue
-        at, wanted = keyframes[known], wanted[known]
+        at, wanted = keyframes[is_known], wanted[is_known]
         misses = wanted - np.interp(at, frames, tau)
         knots = np.concatenate([[0], at, [last]])
         for a, miss in enumerate(misses):
@@ -179,7 +176,7 @@ def pin(times, keyframes, own, reach=_REACH):
 def _meet(tau, at, wanted):
     """Move the frames beside every key-frame, so that the line between them goes through it."""
     # But for rounding, a whole frame is one.
-    at = np.where(np.abs(at - np.round(at)) < _WHOLE, np.round(at), at)
+    at = np.where(np.abs(at - np.round(at)) < ROUNDING, np.round(at), at)
     lowest, frames, above = 0.0, at.astype(np.intp), [*wanted[1:], len(tau) - 1.0]
     for k, first, moment, highest in zip(at, frames, wanted, above, strict=True):
         share = k - first
@@ -187,11 +184,11 @@ def _meet(tau, at, wanted):
             tau[first] = lowest = moment
         else:
             miss = moment - ((1 - share) * tau[first] + share * tau[first + 1])
-            left = max(tau[first] + miss, lowest)
-            right = (moment - (1 - share) * left) / share
-            if right > highest:
-                left, right = (moment - share * highest) / (1 - share), highest
-            tau[first], tau[first + 1] = left, right
-            lowest = right
+            earlier = max(tau[first] + miss, lowest)
+            later = (moment - (1 - share) * earlier) / share
+            if later > highest:
+                earlier, later = (moment - share * highest) / (1 - share), highest
+            tau[first], tau[first + 1] = earlier, later
+            lowest = later
         np.minimum(tau[:first], tau[first], out=tau[:first])
         np.maximum(tau[first + 1 :], lowest, out=tau[first + 1 :])

@@ -1,104 +1,83 @@
-"""Consensus: warps by way of other performances outvote a path that took a wrong valley."""
+"""Consensus: warps by way of other trials outvote a path that took a wrong valley."""
 
 import numpy as np
 
+from .counting import ROUNDING
 from .filters import smooth
 from .warps import evaluate_warps
 
-__all__ = ["choose_exemplars", "smooth_warps", "vote"]
-
-# Decay of the weight of a route with its length: exp(-1.5) for one of typical length beside
-# one without any distance. Measured in docs/design.md.
-_DECAY = 1.5
-# Share of the weight by which rounding may move a half.
-_ROUNDING = {np.dtype(np.float64): 2.0**-40, np.dtype(np.float32): 2.0**-18}
-# Comparisons that are made at once: they stay in the cache.
-_BATCH_SIZE = 200_000
+__all__ = ["choose_exemplars", "exemplars_of_each", "smooth_warps", "vote"]
 
 
-def choose_exemplars(global_distances, n_exemplars, patterns):
-    """Indices of exemplars for each of some patterns: evenly spread over the more typical half.
+def choose_exemplars(global_distances, n_exemplars, pattern=None):
+    """Indices of exemplars: evenly spread over the more typical half of the trials.
 
     Parameters
     ----------
-    global_distances : ndarray, shape (n_sequences,)
-        ``C_n`` of Eq. 19; typical performances have small ones.
+    global_distances : ndarray, shape (n_trials,)
+        ``C_n`` of Eq. 19; typical trials have small ones.
     n_exemplars : int
-    patterns : iterable of int or None
-        Indices of patterns. A pattern is never its own exemplar.
+    pattern : int, default=None
+        Index of the pattern, which is never its own exemplar.
 
     Returns
     -------
-    ndarray of int, shape (min(n_exemplars, n_sequences - 1 or n_sequences), n_patterns)
+    ndarray of int, shape (min(n_exemplars, n_trials - 1 or n_trials),)
     """
-    ranking, chosen = np.argsort(global_distances, kind="stable"), []
-    for pattern in patterns:
-        order = ranking[ranking != pattern]
-        half = order[: max(n_exemplars, len(order) // 2)]
-        count = min(n_exemplars, len(half))
-        spread = (np.arange(count) + 0.5) / max(count, 1) * len(half) - 0.5
-        chosen.append(half[np.round(spread).astype(np.intp)])
+    # Equal distances but for rounding are in the order of the trials.
+    shares = global_distances / (global_distances.max(initial=0) or 1)
+    order = np.argsort(np.round(shares / ROUNDING), kind="stable")
+    order = order[order != pattern]
+    half = order[: max(n_exemplars, len(order) // 2)]
+    count = min(n_exemplars, len(half))
+    evenly = (np.arange(count) + 0.5) / max(count, 1) * len(half) - 0.5
+    return half[np.round(evenly).astype(np.intp)]
+
+
+def exemplars_of_each(global_distances, n_exemplars):
+    """Exemplars of every trial, if it were the pattern: (n_exemplars, n_trials)."""
+    patterns = range(len(global_distances))
+    chosen = [choose_exemplars(global_distances, n_exemplars, n) for n in patterns]
     return np.stack(chosen, axis=1)
 
 
-def vote(direct, to_exemplars, from_exemplars, lengths):
-    """The weighted median over all routes from the pattern to each sequence.
+def vote(direct, to_exemplars, from_exemplars):
+    """The median over all routes from the pattern to each trial.
 
-    The time p of the pattern n reaches the sequence m directly, as ``tau_nm(p)``, or by way
-    of an exemplar k, as ``tau_km(tau_nk(p))``. A route along similar performances is right
-    more often than a long one, and has a larger weight. The median of non-decreasing warps with
-    pinned ends, with weights that are the same at all times, is one itself.
+    The time p of the pattern n reaches the trial m directly, as ``tau_nm(p)``, or by way of an
+    exemplar k, as ``tau_km(tau_nk(p))``. The median of non-decreasing warps with pinned ends is one
+    itself.
 
     Parameters
     ----------
-    direct : ndarray, shape (n_sequences, P)
+    direct : ndarray, shape (n_trials, P)
         ``tau_nm``.
-    to_exemplars : ndarray, shape (n_exemplars, n_sequences or 1, P)
-        ``tau_nk``, of every sequence or of all.
-    from_exemplars : ndarray, shape (n_exemplars, n_sequences, P)
+    to_exemplars : ndarray, shape (n_exemplars, n_trials or 1, P)
+        ``tau_nk``, of every trial or of all.
+    from_exemplars : ndarray, shape (n_exemplars, n_trials, P)
         ``tau_km``.
-    lengths : ndarray, shape (1 + n_exemplars, n_sequences)
-        ``D_{n,m}``, and ``D_{n,k} + D_{k,m}`` of every exemplar.
 
     Returns
     -------
-    ndarray, shape (n_sequences, P)
-        Between two values that halve the weight exactly it is their mean.
+    ndarray, shape (n_trials, P)
+        The mean of the two middle values if there are two.
     """
     indirect = evaluate_warps(from_exemplars, to_exemplars)
-    # Few values are compared with each other faster than sorted.
-    routes = np.ascontiguousarray(np.concatenate([direct[np.newaxis], indirect]).swapaxes(0, 1))
-    # The median of the lengths; np.median takes as long as all routes.
-    ranked, n = np.sort(lengths, axis=0), len(lengths)
-    typical = (ranked[(n - 1) // 2] + ranked[n // 2]) / 2
-    typical = np.where(typical > 0, typical, 1)
-    weights = np.exp(-_DECAY * lengths / typical).T[:, np.newaxis]
-    out, rounding = np.empty_like(direct), _ROUNDING[weights.dtype]
-    size = max(1, _BATCH_SIZE // (n**2 * out.shape[1]))
-    for start in range(0, len(out), size):
-        rows = slice(start, start + size)
-        values, own = routes[rows], weights[rows]
-        below = (values[:, :, np.newaxis] <= values[:, np.newaxis]).astype(own.dtype)
-        held = np.matmul(own, below.reshape(len(own), n, -1)).reshape(values.shape)
-        half = own.sum(axis=2, keepdims=True) / 2
-        # The smallest value up to which there is half of the weight, and up to which there is more.
-        low = np.where(held >= half * (1 - rounding), values, np.inf).min(axis=1)
-        high = np.where(held > half * (1 + rounding), values, np.inf).min(axis=1)
-        out[rows] = (low + high) / 2
-    return out
+    routes = np.sort(np.concatenate([direct[np.newaxis], indirect]), axis=0)
+    return (routes[(len(routes) - 1) // 2] + routes[len(routes) // 2]) / 2
 
 
 def smooth_warps(times, reach, width, about=0.0):
-    """Warps (n_sequences, P) with smoothed offsets in the band, pinned and non-decreasing.
+    """Warps (n_trials, P) with smoothed offsets in the band, pinned and non-decreasing.
 
     Parameters
     ----------
-    times : ndarray, shape (n_sequences, P)
+    times : ndarray, shape (n_trials, P)
     reach : int
         Largest offset.
     width : float
         Standard deviation of the Gaussian, as a share of the clip.
-    about : ndarray, shape (n_sequences, P), default=0.0
+    about : ndarray, shape (n_trials, P), default=0.0
         Offsets that are smooth already: only deviations from them are smoothed.
     """
     n_frames = times.shape[1]

@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .counting import whole
+
 __all__ = ["COSTS", "RATE_WEIGHT", "Cost", "StepGroup", "StepTable", "group_steps", "step_table"]
 
 # w of the velocity cost, from the measurement in docs/design.md.
@@ -23,14 +25,16 @@ class Cost(NamedTuple):
         None for the same.
     weights : callable
         ``weights(rates)``: ``b``, ``g`` and ``phi`` of `StepTable` at local rates.
-    degree : int
-        Power of the unit of the data in squares of the features.
     """
 
     of_velocity: bool
     transform: Callable | None
     weights: Callable
-    degree: int
+
+    @property
+    def degree(self):
+        """Power of the unit of the data in squares of the features: 1 of square roots."""
+        return 2 if self.transform is None else 1
 
 
 class StepTable(NamedTuple):
@@ -90,7 +94,7 @@ def step_table(cost="posture", max_rate=2, subframes=1):
     """
     if cost not in COSTS:
         raise ValueError(f"cost={cost!r} is unknown; use one of {', '.join(map(repr, COSTS))}.")
-    steps = np.arange(int(np.floor(max_rate * subframes)) + 1)
+    steps = np.arange(whole(max_rate * subframes, "down") + 1)
     steps = steps[np.argsort(np.abs(steps - subframes), kind="stable")]
     return StepTable(steps, *COSTS[cost].weights(steps / subframes), subframes)
 
@@ -145,7 +149,7 @@ def _elastic_weights(rates):
 
 
 COSTS = {
-    "velocity": Cost(True, None, _velocity_weights, 2),
-    "elastic": Cost(True, _square_root_velocity, _elastic_weights, 1),
-    "posture": Cost(False, None, _posture_weights, 2),
+    "velocity": Cost(True, None, _velocity_weights),
+    "elastic": Cost(True, _square_root_velocity, _elastic_weights),
+    "posture": Cost(False, None, _posture_weights),
 }

@@ -1,24 +1,30 @@
-"""Gaussian filters along time, derivatives under them, and the width that suits the noise."""
+"""Gaussian filters along time, derivatives under them, and the white noise of sequences."""
 
 import functools
+import math
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import correlate1d, gaussian_filter1d
 from sklearn import get_config
 
-__all__ = ["SMOOTHING", "choose_smoothing", "smooth"]
+from .counting import ROUNDING
+
+__all__ = ["FINE_SMOOTHING", "SMOOTHING", "noise_width", "smooth", "white_noise"]
 
 # Standard deviation of a Gaussian, as a share of the clip, that preserves human movement
-# and removes the noise of motion capture: docs/design.md.
-SMOOTHING = 0.03
+# and removes the noise of motion capture; and a finer one, for velocities under a metric, which
+# weights noise down, and for offsets after a vote: docs/design.md.
+SMOOTHING, FINE_SMOOTHING = 0.03, 0.02
 # Standard deviation, in samples, from which Fourier transforms are the faster filter.
 _WIDE = 10
 # Narrowest Gaussian that is one on a grid of frames.
 LEAST_SIGMA = 0.35
-# The noise is measured on at most so many sequences, for these shares of the clip.
-_NOISE_SAMPLE = 256
-_WIDTHS = (0.0, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04)
+# Order of the differences whose variance is taken for that of white noise: docs/design.md.
+_ORDER = 6
+# Share of white noise in the energy of velocities of one feature that is small, and the widest
+# smoothing for it, as a share of the clip.
+_NOISE, _WIDEST = 0.01, 0.04
 
 
 def smooth(on_clock, sigma, order=0):
@@ -41,7 +47,7 @@ def smooth(on_clock, sigma, order=0):
     """
     n_sequences = len(on_clock)
     out = np.empty_like(on_clock)
-    reach = min(int(np.ceil(4 * sigma)) + 1, on_clock.shape[1] - 1)
+    reach = min(math.ceil(4 * sigma - ROUNDING) + 1, on_clock.shape[1] - 1)
     # Below a third of a sample the derivative of a Gaussian is no derivative any more.
     sigma = float(max(sigma, 1 / 3))
     kernel = _kernel(sigma, order)
@@ -49,10 +55,10 @@ def smooth(on_clock, sigma, order=0):
     memory = get_config()["working_memory"] * 2**20 / 6
     size = max(1, int(memory * n_sequences / max(1, on_clock.nbytes)))
     for start in range(0, n_sequences, size):
-        some = on_clock[start : start + size]
-        before = 2 * some[:, :1] - some[:, reach:0:-1]
-        after = 2 * some[:, -1:] - some[:, -2 : -reach - 2 : -1]
-        continued = np.concatenate([before, some, after], axis=1)
+        batch = on_clock[start : start + size]
+        before = 2 * batch[:, :1] - batch[:, reach:0:-1]
+        after = 2 * batch[:, -1:] - batch[:, -2 : -reach - 2 : -1]
+        continued = np.concatenate([before, batch, after], axis=1)
         if sigma > _WIDE:
             filtered = _convolve(continued, kernel, reach)
         else:
@@ -90,28 +96,48 @@ def _convolve(sequences, kernel, reach):
     return out[:, reach:-reach]
 
 
-def choose_smoothing(on_clock):
-    """Width of the smoothing that suits the noise, by generalised cross-validation.
+def white_noise(arrays):
+    """Variance of the white noise of every feature, by differences of sixth order: (n_features,).
+
+    Movements hardly have any; of white noise they have the binomial coefficient of 12 and 6. NaN if
+    all arrays are too short.
 
     Parameters
     ----------
-    on_clock : ndarray, shape (n_sequences, P, n_features)
+    arrays : sequence of ndarray (n_frames_i, n_features)
+    """
+    long_enough = [x for x in arrays if len(x) > _ORDER]
+    if not long_enough:
+        return np.full(arrays[0].shape[1], np.nan)
+    differences = (np.diff(x.astype(np.float64), _ORDER, axis=0) for x in long_enough)
+    variances = [np.square(each).mean(axis=0) for each in differences]
+    return np.mean(variances, axis=0) / math.comb(2 * _ORDER, _ORDER)
+
+
+def noise_width(positions):
+    """Width of the Gaussian under which white noise has a small share in the energy of velocities.
+
+    The derivative of white noise of variance v under a Gaussian of width s has the variance ``v /
+    (4 sqrt(pi) s^3)``. Of one feature it may have 1 % of the energy, of more in the mean as much
+    times the root of their number: noise averages out.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (n_trials, P, n_features)
 
     Returns
     -------
     float
-        Standard deviation of a Gaussian, in frames; 0 for none.
+        In frames, at most 4 % of the clip; 0 if the noise is too small for any smoothing.
     """
-    n_frames = on_clock.shape[1]
-    on_clock = on_clock[:: -(-len(on_clock) // _NOISE_SAMPLE)]
-    best, chosen = np.inf, 0.0
-    for sigma in (share * (n_frames - 1) for share in _WIDTHS):
-        # Without any smoothing there is no residual: a little smoothing stands for none.
-        used = max(sigma, LEAST_SIGMA)
-        residual = np.square(on_clock - smooth(on_clock, used)).sum(dtype=np.float64)
-        grid = np.arange(-int(np.ceil(4 * used)), int(np.ceil(4 * used)) + 1)
-        weights = np.exp(-0.5 * (grid / used) ** 2)
-        score = residual / (1 - (weights / weights.sum()).max()) ** 2
-        if score < best:
-            best, chosen = score, sigma
-    return chosen
+    widest = _WIDEST * (positions.shape[1] - 1)
+    velocity = smooth(
+        positions, max(FINE_SMOOTHING * (positions.shape[1] - 1), LEAST_SIGMA), order=1
+    )
+    energy = np.square(velocity).mean(axis=(0, 1))
+    moves = energy > 0
+    if not moves.any():
+        return widest
+    share = (white_noise(positions)[moves] / energy[moves]).mean() / (4 * math.sqrt(math.pi))
+    width = np.cbrt(share / (_NOISE * math.sqrt(moves.sum())))
+    return float(min(width, widest)) if width > LEAST_SIGMA else 0.0

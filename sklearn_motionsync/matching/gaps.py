@@ -1,56 +1,167 @@
-"""Gaps: hidden features are filled by what is known, and weighed by how well that tells them.
+"""Gaps: what was hidden is filled by what was seen, and weighed by how well that tells it.
 
-A hidden feature is interpolated along time. It then follows the features that are seen: those show
-what they did besides their own interpolation over the same gap, and a regression tells what the
-hidden one did meanwhile. How much of its velocity remains unknown comes from the same regression.
-It is a share of the frame, and its complement the weight of the frame in the trellis. So a short
-gap counts nearly like none, and a frame of which nothing is known counts nothing.
+A short gap is interpolated over time. In a longer one hidden features are expected, given all that
+was seen of the performance: postures are taken to be normal, and correlated over time. So a hidden
+arm follows the other limbs, and joins smoothly what was seen before and after the gap. What remains
+unknown of a frame is a share of it, and its complement the weight of the frame in the trellis. So a
+short gap counts nearly like none, and a frame of which nothing is known counts nothing.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
+from scipy.linalg import solveh_banded
 
-from .filters import smooth
-from .warps import normalise
+from .filters import SMOOTHING
+from .sizes import BATCH, CONSTANT
 
-__all__ = ["UNSEEN", "Filler", "add_weights"]
+__all__ = [
+    "UNSEEN",
+    "Filler",
+    "add_weights",
+    "fill_with_mean",
+    "interpolate_gaps",
+    "is_gappy",
+    "moments_of_seen",
+]
 
 # Cost of a frame of which nothing was seen, in mean squared features: about that of two matched
 # ones. Without it a path would stay where nothing was seen. docs/design.md.
 UNSEEN = 0.3
+# Noise of the features by which others are predicted, as a share of their variance: few people have
+# shown them together (benchmarks/expectation.py).
+SHRINKAGE = 0.2
 
-# Frames of the clock on which covariances are learnt.
-_FRAMES = 101
-# Standard deviation of the Gaussian under the velocities whose covariances are learnt, as a share
-# of the clip, and the share of their mean variance that is added before anything is inverted.
-_SMOOTHING, _RIDGE = 0.02, 0.1
-# Most directions of a covariance.
-_DIRECTIONS = 64
-# Frames at each side of a gap that its interpolation uses.
-_BESIDE = 3
+
+def is_gappy(values):
+    """Whether anything in an array is NaN."""
+    # A sum is NaN if a term is; no mask is made of what is whole.
+    return bool(np.isnan(values.sum()))
+
+
+def interpolate_gaps(values, longest=np.inf, times=None, held=False, straight=False):
+    """Values whose gaps are interpolated over time, by Akima's piecewise cubic polynomials.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_frames, n_columns)
+        NaN where something is hidden. Each column is interpolated by itself.
+    longest : float, default=inf
+        The longest gap that is filled, in frames.
+    times : ndarray, shape (n_frames,), default=None
+        Of the frames, in frames, if they are not evenly spaced.
+    held : bool, default=False
+        Whether a column holds its first and last value in gaps that touch an end; otherwise these
+        stay NaN.
+    straight : bool, default=False
+        Whether gaps are bridged by straight lines, which are nearer where gaps are long.
+
+    Returns
+    -------
+    ndarray of float64, shape (n_frames, n_columns)
+        A column of which nothing was seen stays NaN.
+    """
+    out = values.astype(np.float64)
+    hidden = np.isnan(out)
+    gappy = np.flatnonzero(hidden.any(axis=0) & ~hidden.all(axis=0))
+    times = np.arange(len(out)) if times is None else times
+    masks, of_mask = np.unique(hidden[:, gappy], axis=1, return_inverse=True)
+    for k, mask in enumerate(masks.T):
+        columns, rows, seen = gappy[of_mask.ravel() == k], np.flatnonzero(mask), ~mask
+        at = np.flatnonzero(seen)
+        after = np.searchsorted(at, rows)
+        if held and times[at[0]] - times[0] <= longest:
+            out[np.ix_(rows[after == 0], columns)] = out[at[0], columns]
+        if held and times[-1] - times[at[-1]] <= longest:
+            out[np.ix_(rows[after == len(at)], columns)] = out[at[-1], columns]
+        inside = (after > 0) & (after < len(at))
+        rows, after = rows[inside], after[inside]
+        rows = rows[times[at[after]] - times[at[after - 1]] <= longest + 1]
+        if len(rows):
+            known = out[np.ix_(at, columns)]
+            out[np.ix_(rows, columns)] = _along(times[at], known, times[rows], straight)
+    return out
+
+
+def fill_with_mean(performances, mean):
+    """Performances on one clock whose gaps follow a mean performance.
+
+    Deviations from the mean go on in straight lines, and are held at the ends. They are 0 in
+    features that a performance never shows.
+
+    Parameters
+    ----------
+    performances : ndarray, shape (n, P, n_features)
+        With NaN in gaps.
+    mean : ndarray, shape (P, n_features)
+
+    Returns
+    -------
+    ndarray, shape (n, P, n_features)
+        The same array if there is no gap.
+    """
+    if not is_gappy(performances):
+        return performances
+    hidden, filled = np.isnan(performances), performances.copy()
+    for i in np.flatnonzero(hidden.any(axis=(1, 2))):
+        deviations = np.nan_to_num(
+            interpolate_gaps(performances[i] - mean, held=True, straight=True)
+        )
+        np.copyto(filled[i], mean + deviations, where=hidden[i], casting="same_kind")
+    return filled
+
+
+def moments_of_seen(arrays):
+    """Mean and covariance of postures with gaps, each of the postures that show it.
+
+    Parameters
+    ----------
+    arrays : sequence of ndarray (n_frames_i, n_features)
+        With NaN where something was not seen. Every feature was seen somewhere.
+
+    Returns
+    -------
+    mean : ndarray of float64, shape (n_features,)
+    covariance : ndarray of float64, shape (n_features, n_features)
+        Divided by the number of postures. Negative eigenvalues count by their size.
+    """
+    seen = [np.isfinite(x).astype(np.float64) for x in arrays]
+    counts = sum(s.sum(axis=0) for s in seen)
+    mean = sum(np.nansum(x, axis=0, dtype=np.float64) for x in arrays) / np.maximum(counts, 1)
+    squares, pairs = np.zeros((2, len(mean), len(mean)))
+    for x, s in zip(arrays, seen, strict=True):
+        centred = np.where(s > 0, x - mean, 0)
+        squares += centred.T @ centred
+        pairs += s.T @ s
+    values, vectors = np.linalg.eigh(squares / np.maximum(pairs, 1))
+    # Without negative ones, and none is lost that features have.
+    return mean, (vectors * np.abs(values)) @ vectors.T
 
 
 class Filler(NamedTuple):
     """Fills the gaps of performances.
 
+    Postures are normal. Over time all features are correlated alike: they forget their value with
+    one time constant, and their velocity with another, as an autoregression of second order does.
+
     Attributes
     ----------
-    mean : ndarray, shape (n_features,)
-    energy : ndarray, shape (n_features,)
-        Mean squared velocities, by the frame of the clock.
-    factors : dict of int to ndarray (n_features, n_directions)
-        ``W`` of the covariance ``W W'`` of velocities less their mean over as many frames of the
-        clock at both sides; 0: of velocities.
-    ridge : dict of int to float
-        Added to the variances of these.
+    mean, scale : ndarray, shape (n_features,)
+        Postures less the mean, divided by the scale, are in standard units.
+    precision : ndarray, shape (n_features, n_features)
+        The inverse of their covariance in these units, with the variance of a noise.
+    variance : ndarray, shape (n_features,)
+        Of the postures, in which velocities take part alike.
+    times : tuple of float
+        In which values and velocities are forgotten, in frames; 0 if frames have no order.
     """
 
     mean: np.ndarray
-    energy: np.ndarray
-    factors: dict
-    ridge: dict
+    scale: np.ndarray
+    precision: np.ndarray
+    variance: np.ndarray
+    times: tuple
 
     @classmethod
     def learn(cls, arrays):
@@ -58,18 +169,33 @@ class Filler(NamedTuple):
 
         Every feature is seen somewhere.
         """
-        mean = _mean(arrays)
-        on_clock = normalise([_without_gaps(x, mean) for x in arrays], _FRAMES)
-        velocity = smooth(on_clock, _SMOOTHING * (_FRAMES - 1), order=1)
-        factors, ridge, reach = {}, {}, 0
-        while 2 * reach < _FRAMES - 1:
-            part = velocity
-            if reach:
-                ahead, behind = on_clock[:, 2 * reach :], on_clock[:, : -2 * reach]
-                part = velocity[:, reach:-reach] - (ahead - behind) / (2 * reach)
-            factors[reach], ridge[reach] = _factor(part.reshape(-1, part.shape[2]))
-            reach = 2 * reach or 1
-        return cls(mean, np.square(velocity).mean(axis=(0, 1)), factors, ridge)
+        return cls.of(*moments_of_seen(arrays), arrays)
+
+    @classmethod
+    def of(cls, mean, covariance, arrays):
+        """The filler of postures with these moments.
+
+        Parameters
+        ----------
+        mean : ndarray, shape (n_features,)
+        covariance : ndarray, shape (n_features, n_features)
+        arrays : sequence of ndarray (n_frames_i, n_features)
+            Performances, with NaN where nothing was seen; empty if frames have no order.
+        """
+        mean, covariance = (np.asarray(a, dtype=np.float64) for a in (mean, covariance))
+        variance = np.diag(covariance)
+        varies = variance > CONSTANT * variance.max()
+        scale = np.sqrt(np.where(varies, variance, 1))
+        # Constant features have no unit, and predict nothing.
+        noise = np.where(varies, SHRINKAGE, 1)
+        precision = np.linalg.inv(covariance / np.outer(scale, scale) + np.diag(noise))
+        # Of many performances a few tell, evenly spread.
+        # So many tell how fast postures change.
+        arrays = arrays[:: -(-len(arrays) // BATCH) or 1]
+        standard = [(x - mean) / scale for x in arrays]
+        velocities = [np.diff(z, axis=0) for z in standard]
+        times = _correlation_time(standard), _correlation_time(velocities)
+        return cls(mean, scale, precision, variance, times)
 
     def __call__(self, array, confidence=1.0):
         """A performance without gaps, and the weight of each of its frames.
@@ -87,65 +213,54 @@ class Filler(NamedTuple):
         weights : ndarray, shape (n_frames,)
             From 0 to 1.
         """
-        seen = np.isfinite(array)
-        before = _without_gaps(array.astype(np.float64), self.mean)
-        filled, unknown = before.copy(), np.where(seen, 1 - confidence, 0) * self.energy
-        for (first, last), hidden in _gaps_of(~seen).items():
-            base, reach = self._base(before, first, last)
-            rows, columns = slice(first, last + 1), np.array(hidden)
-            others, kept = seen[rows], before[rows] - base
-            for mask in np.unique(others, axis=0):
-                own = (others == mask).all(axis=1)
-                slopes, left = self.regression(reach, mask, columns)
-                at = np.ix_(first + np.flatnonzero(own), columns)
-                filled[at] = base[np.ix_(own, columns)] + kept[np.ix_(own, mask)] @ slopes
-                unknown[at] = left
-        weights = 1 - unknown.sum(axis=1) / (self.energy.sum() or 1)
-        return filled.astype(array.dtype), np.clip(weights, 0, 1)
+        hidden = np.isnan(array)
+        unknown = np.where(hidden, 0, 1 - confidence)
+        bands = _time_precision(len(array), *self.times)
+        for (first, last), columns in _gaps_of(hidden).items():
+            unknown[first : last + 1, columns] = _unknown_step(bands, first, last)
+        for mask in np.unique(hidden[hidden.any(axis=1)], axis=0):
+            rows = (hidden == mask).all(axis=1)
+            left = np.linalg.inv(self.precision[np.ix_(mask, mask)]).diagonal() - SHRINKAGE
+            unknown[np.ix_(rows, mask)] *= np.clip(left, 0, 1)
+        weights = 1 - unknown @ self.variance / (self.variance.sum() or 1)
+        return self.expect(array).astype(array.dtype), np.clip(weights, 0, 1)
 
-    def _base(self, curves, first, last):
-        """All features from first to last by those beside, and the reach of their velocities."""
-        n, length = len(curves), last - first + 1
-        if length == n:
-            return np.broadcast_to(self.mean, curves.shape), 0
-        if first == 0 or last == n - 1:
-            held = curves[last + 1] if first == 0 else curves[first - 1]
-            return np.broadcast_to(held, (length, len(held))), 0
-        beside = np.r_[max(0, first - _BESIDE) : first, last + 1 : min(n, last + 1 + _BESIDE)]
-        rows = np.arange(first, last + 1)
-        reach = (length + 1) / 2 * (_FRAMES - 1) / (n - 1)
-        nearest = 2 ** int(np.clip(np.round(np.log2(reach)), 0, np.log2(max(self.factors))))
-        return _along(beside, curves[beside], rows), nearest
+    def expect(self, array, timed=True):
+        """A performance whose hidden values are expected, given all that was seen of it.
 
-    def regression(self, reach, seen, hidden):
-        """Slopes (n_seen, n_hidden) of hidden on seen features, and the variances that remain."""
-        factor, ridge = self.factors[reach], self.ridge[reach]
-        known, wanted = factor[seen], factor[hidden]
-        inner = known.T @ known
-        inner.flat[:: len(inner) + 1] += ridge
-        solved = np.linalg.solve(inner, wanted.T)
-        return known @ solved, ridge * np.einsum("hq,qh->h", wanted, solved)
+        Parameters
+        ----------
+        array : ndarray, shape (n_frames, n_features)
+            NaN where a feature is hidden.
+        timed : bool, default=True
+            Whether rows are the frames of one performance, in order.
 
-
-def _interpolated(array):
-    """A performance whose hidden features are interpolated, and held beyond what is seen.
-
-    A feature that is never seen stays NaN.
-    """
-    out, frames = array.astype(np.float64), np.arange(len(array))
-    for column in out.T:
-        seen = np.flatnonzero(np.isfinite(column))
-        if 0 < len(seen) < len(column):
-            hidden = np.isnan(column)
-            inside = np.clip(frames[hidden], seen[0], seen[-1])
-            column[hidden] = _along(seen, column[seen], inside)
-    return out
-
-
-def _runs(mask):
-    """First and last index of every run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
-    return edges[::2], edges[1::2] - 1
+        Returns
+        -------
+        ndarray of float64, shape (n_frames, n_features)
+        """
+        times = self.times if timed else (0, 0)
+        out = array.astype(np.float64)
+        # Other features tell less of gaps of one frame, and of those in which velocities last.
+        if timed and self.times[0] > 0:
+            out = interpolate_gaps(out, max(1, self.times[1]), held=True)
+        z = (out - self.mean) / self.scale
+        hidden = np.isnan(z)
+        z[hidden] = 0
+        bands = _time_precision(len(z), *times)
+        pulls = bands[0][:, np.newaxis] * z
+        for k in range(1, min(len(bands), len(z))):
+            pulls[k:] += bands[k, :-k, np.newaxis] * z[:-k]
+            pulls[:-k] += bands[k, :-k, np.newaxis] * z[k:]
+        pulls = -pulls @ self.precision
+        # Beyond so many frames that show all features nothing of a gap matters.
+        near = np.convolve(hidden.any(axis=1), np.ones(len(bands) - 1))[: len(z)] > 0
+        for first, last in zip(*_runs(near), strict=True):
+            rows = slice(first, last + 1)
+            z[rows][hidden[rows]] = _solve(
+                pulls[rows], hidden[rows], self.precision, bands[:, rows]
+            )
+        return np.where(hidden, z * self.scale + self.mean, out)
 
 
 def add_weights(arrays, weights):
@@ -167,25 +282,17 @@ def add_weights(arrays, weights):
     return [np.concatenate([x, w], axis=1) for x, w in zip(arrays, columns, strict=True)]
 
 
-def _along(frames, values, at):
-    """Values (n_frames, ...) of some frames at times between them, by Akima's polynomials."""
-    if len(frames) < 3:
-        return np.apply_along_axis(lambda y: np.interp(at, frames, y), 0, values)
-    return Akima1DInterpolator(frames, values)(at)
+def _along(times, values, at, straight):
+    """Values (n_times, n_columns) at times between them."""
+    if straight or len(times) < 3:
+        return np.column_stack([np.interp(at, times, y) for y in values.T])
+    return Akima1DInterpolator(times, values)(at)
 
 
-def _without_gaps(array, mean):
-    """The same as `_interpolated`, and the mean where a feature is never seen."""
-    if np.isfinite(array).all():
-        return array
-    out = _interpolated(array)
-    return np.where(np.isnan(out), mean, out)
-
-
-def _mean(arrays):
-    """Mean of every feature over all frames that show it."""
-    count = sum(np.isfinite(x).sum(axis=0) for x in arrays)
-    return sum(np.nansum(x, axis=0, dtype=np.float64) for x in arrays) / np.maximum(count, 1)
+def _runs(mask):
+    """First and last index of every run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
+    return edges[::2], edges[1::2] - 1
 
 
 def _gaps_of(hidden):
@@ -197,10 +304,80 @@ def _gaps_of(hidden):
     return gaps
 
 
-def _factor(frames):
-    """``W`` of the covariance ``W W'`` of centred frames, in few directions, and the ridge."""
-    covariance = (frames.T @ frames).astype(np.float64) / len(frames)
-    values, vectors = np.linalg.eigh(covariance)
-    values, vectors = values[::-1][:_DIRECTIONS], vectors[:, ::-1][:, :_DIRECTIONS]
-    ridge = _RIDGE * np.trace(covariance) / len(covariance)
-    return vectors * np.sqrt(np.maximum(values, 0)), ridge or 1.0
+def _correlation_time(arrays):
+    """Frames after which the correlation with later ones has fallen to 1 / e.
+
+    Of arrays (n_frames_i, n_features), in standard units, with NaN where nothing was seen.
+    """
+    seen, lag, before = [np.isfinite(z) for z in arrays], 1, 1.0
+    arrays = [np.where(s, z, 0) for z, s in zip(arrays, seen, strict=True)]
+    longest = max(map(len, arrays), default=0)
+    while lag < longest:
+        products = energy = 0.0
+        for z, s in zip(arrays, seen, strict=True):
+            early, late = z[:-lag], z[lag:]
+            products += np.vdot(early, late)
+            energy += np.square(early)[s[lag:]].sum() / 2 + np.square(late)[s[:-lag]].sum() / 2
+        now = products / energy if energy > CONSTANT else 1.0
+        if now < 1 / np.e:
+            if lag == 1:
+                # Hardly any correlation.
+                return float(-1 / np.log(max(now, 0.01)))
+            return float(lag - lag / 2 * (1 / np.e - now) / (before - now))
+        lag, before = 2 * lag, now
+    # Performances shorter than that.
+    return float(longest)
+
+
+def _time_precision(n_frames, value_time, velocity_time):
+    """The inverse of the correlations of frames: its diagonal, and the two below it, as rows.
+
+    It is ``L' L`` of the lower triangular L that takes from each frame what the two before it tell,
+    and divides by the standard deviation of the rest.
+    """
+    p, q = (np.exp(-1 / t) if t > 0 else 0.0 for t in (value_time, velocity_time))
+    rest = (1 - p**2) * (1 - q**2)
+    lower = np.empty((3, n_frames))
+    lower[:] = np.array([[1], [-(p + q)], [p * q]]) / np.sqrt(rest * (1 - p * q) / (1 + p * q))
+    lower[:, :1] = [[1], [0], [0]]
+    lower[:, 1:2] = np.array([[1 + p * q], [-(p + q)], [0]]) / np.sqrt(rest)
+    bands = np.zeros((3, n_frames))
+    for k in range(3):
+        for j in range(k, min(3, n_frames)):
+            bands[k, : n_frames - j] += lower[j, j:] * lower[j - k, j:]
+    return bands
+
+
+def _unknown_step(bands, first, last):
+    """The share that is unknown of the variance of a step in the middle of a gap.
+
+    It is as long as the trellis smooths velocities.
+    """
+    n_frames = bands.shape[1]
+    middle, reach = (first + last + 1) // 2, max(1, round(SMOOTHING * n_frames))
+    step = np.zeros(n_frames)
+    step[[max(0, middle - reach), min(n_frames - 1, middle + reach)]] = -1, 1
+    variances = []
+    for rows in (slice(first, last + 1), slice(None)):
+        part = bands[: len(step[rows]), rows]
+        variances.append(step[rows] @ solveh_banded(part, step[rows], lower=True))
+    return variances[0] / variances[1]
+
+
+def _solve(pulls, hidden, precision, bands):
+    """Hidden values of frames, in the order of the mask, given all that was seen.
+
+    The inverse covariance of all values is ``T x precision`` of frames and features, with a banded
+    T: only frames near each other are coupled, and the equations are banded.
+    """
+    frame, feature = np.nonzero(hidden)
+    before = np.concatenate([[0], np.cumsum(hidden.sum(axis=1))])
+    width = int((before[len(bands) :] - before[: -len(bands)]).max(initial=0)) or len(frame)
+    equations, n = np.zeros((width, len(frame))), len(frame)
+    for k in range(min(width, n)):
+        early, apart = frame[: n - k], frame[k:] - frame[: n - k]
+        weight = np.where(apart < len(bands), bands[np.minimum(apart, len(bands) - 1), early], 0)
+        equations[k, : n - k] = weight * precision[feature[k:], feature[: n - k]]
+    return solveh_banded(
+        equations, pulls[hidden], lower=True, overwrite_ab=True, check_finite=False
+    )

@@ -1,6 +1,7 @@
 """Metric: velocity and posture, weighted by how well they tell a moment of the action.
 
-Without a metric noisy directions of the features count as much as reliable ones. `learn_metric`
+Without a metric noisy directions of the features count as much as reliable ones.
+`metric_of_matches`
 estimates their reliability from the training set, `Metric` applies it. The distance of two
 moments stays that of two points, so the trellis is the same.
 """
@@ -11,9 +12,20 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from .costs import RATE_WEIGHT
+from .counting import ROUNDING
 from .warps import evaluate_warps, sample
 
-__all__ = ["Evidence", "Metric", "compressed", "energy_shares", "learn_metric", "without_mean"]
+__all__ = [
+    "LONGEST_LAG",
+    "RETAINED",
+    "RIDGE",
+    "Evidence",
+    "Metric",
+    "compressed",
+    "energy_shares",
+    "metric_of_matches",
+    "without_mean",
+]
 
 
 class Metric(NamedTuple):
@@ -45,7 +57,8 @@ class Metric(NamedTuple):
         velocity, positions : ndarray, shape (n_sequences, Q, n_features)
             In the unit.
         """
-        return self.of_parts(*self._parts(velocity, positions))
+        fast, postures = self._parts(velocity, positions)
+        return self.of_parts(fast, postures)
 
     def of_parts(self, velocity, postures):
         """The same of compressed velocities and centred postures (..., n_used)."""
@@ -57,11 +70,11 @@ class Metric(NamedTuple):
 
     def shares(self, velocity, positions):
         """The share of every feature in what is compared; that of noise is about 0."""
-        parts = self._parts(velocity, positions)
-        compared, shares = self.of_parts(*parts), np.zeros(positions.shape[2])
+        fast, poses = self._parts(velocity, positions)
+        compared, shares = self.of_parts(fast, poses), np.zeros(positions.shape[2])
         compared = compared.reshape(-1, compared.shape[2])
-        for part, weights in zip(parts, (self.velocity, self.posture), strict=True):
-            frames = part.reshape(-1, part.shape[2])
+        for curves, weights in ((fast, self.velocity), (poses, self.posture)):
+            frames = curves.reshape(-1, curves.shape[2])
             shares[self.features] += (frames.T @ compared * weights).sum(axis=1)
         return shares / shares.sum()
 
@@ -140,16 +153,16 @@ class Evidence(NamedTuple):
         n_others, n_frames = times.shape[1:]
         # Warps are smooth: a quarter of the frames tells as much.
         frames = np.arange(0, n_frames, 4)
-        some = times[:, :, frames]
-        offset = np.abs(some - frames).mean(dtype=np.float64)
+        coarse = times[:, :, frames]
+        offset = np.abs(coarse - frames).mean(dtype=np.float64)
         if n_others < 2 or offset < _LEAST_OFFSET * n_frames:
             return cls(np.nan, np.nan)
         distance, count = 0.0, 0
         # From every base by way of the i-th after it to all after that one.
         for i in range(n_others - 1):
             onwards = np.roll(times, -i - 1, axis=0)[:, : n_others - i - 1]
-            direct = some[:, i + 1 :]
-            by_way = evaluate_warps(onwards, some[:, i : i + 1])
+            direct = coarse[:, i + 1 :]
+            by_way = evaluate_warps(onwards, coarse[:, i : i + 1])
             distance += np.abs(by_way - direct).sum(dtype=np.float64)
             count += direct.size
         return cls(float(distance / count / offset), remaining)
@@ -158,28 +171,26 @@ class Evidence(NamedTuple):
 # Standard errors of the agreement between performances from which on a feature is reliable.
 _RELIABLE = 2.0
 # Share of a feature's mean variance that is added to all of them, before anything is inverted.
-_RIDGE = 0.03
+RIDGE = 0.03
 # Eigenvalues of a metric are raised to this power: half-way to equal weights of all directions,
 # the prior. Measured in docs/design.md.
 _SHRINKAGE = 0.6
-# Eigenvalues below this share of their sum are rounding.
-_LEAST_EIGENVALUE = 1e-6
 # Share of the variance of the features that principal axes retain.
-_RETAINED = 0.99
+RETAINED = 0.99
 # Warps whose mean offset is smaller, as a share of the clip, are no evidence.
 _LEAST_OFFSET = 0.01
 # Largest lag, as a share of the clip, of the autocorrelation of differences.
-_LONGEST_LAG = 0.3
+LONGEST_LAG = 0.3
 
 
-def learn_metric(match, positions, velocity):
+def metric_of_matches(match, positions, velocity):
     """Learn the metric of a training set, or of some of it.
 
     Parameters
     ----------
     match : callable
-        ``match(features, others)``: voted times (n_sequences, n_others, P) of all sequences as
-        bases, each with others of its own, by their indices (n_sequences, n_others).
+        ``match(features, partners)``: voted times (n_sequences, n_partners, P) of all sequences as
+        bases, each with partners of its own, by their indices (n_sequences, n_partners).
     positions, velocity : ndarray, shape (n_sequences, P, n_features)
         Postures on the clock and their velocities, in the unit.
 
@@ -192,29 +203,30 @@ def learn_metric(match, positions, velocity):
     if len(positions) < 2 or not moves.any():
         return None
     postures = without_mean(positions)
-    both = np.concatenate([postures, velocity], axis=2)
-    errors = _errors(both)
-    used = moves & _are_reliable(_agreement(both), errors)
+    block = np.concatenate([postures, velocity], axis=2)
+    errors = _errors(block)
+    used = moves & _are_reliable(_agreement(block), errors)
     used = used if used.any() else moves
     n, n_features = len(positions), len(moves)
     fast = compressed(velocity[:, :, used], _mean_square_speed(velocity[:, :, used]))
     first = _square_root(metric_matrix(fast, _unmatched_covariance(fast))).astype(fast.dtype)
     # Of any two sequences one is the base, both of those that are opposite in the circle: the two
     # directions carry nearly the same information.
-    others = (np.arange(n)[:, np.newaxis] + np.arange(1, n // 2 + 1)) % n
-    times = match(fast @ first if first.any() else fast, others)
-    # For every sequence its others at its times: (n_sequences, n_others, P, n_features).
+    partners = (np.arange(n)[:, np.newaxis] + np.arange(1, n // 2 + 1)) % n
+    times = match(fast @ first if first.any() else fast, partners)
+    # For every sequence its partners at its times: (n_sequences, n_partners, P, n_features).
     n_frames = times.shape[-1]
-    matched = sample(both[others.ravel()], times.reshape(-1, n_frames), n_frames)
+    matched = sample(block[partners.ravel()], times.reshape(-1, n_frames), n_frames)
     matched = matched.reshape(*times.shape, 2 * n_features)
     if not used[moves].all():
-        used |= moves & _are_reliable(_agreement(both, matched), errors)
+        used |= moves & _are_reliable(_agreement(block, matched), errors)
     energy = _mean_square_speed(velocity[:, :, used])
     postures, fast = postures[:, :, used], compressed(velocity[:, :, used], energy)
-    parts = matched[..., :n_features], matched[..., n_features:]
-    parts = parts if used.all() else [x[..., used] for x in parts]
-    of_postures, posture_length = _differences(postures, parts[0])
-    of_fast, fast_length = _differences(fast, _at_rates(parts[1], energy, times))
+    columns = slice(None) if used.all() else used
+    matched_postures = matched[..., :n_features][..., columns]
+    matched_velocity = matched[..., n_features:][..., columns]
+    of_postures, posture_length = _differences(postures, matched_postures)
+    of_fast, fast_length = _differences(fast, _at_rates(matched_velocity, energy, times))
     by_fast = _square_root(metric_matrix(fast, of_fast))
     # Differences of a longer correlation length are fewer independent observations.
     weight = np.sqrt(fast_length / posture_length)
@@ -223,12 +235,13 @@ def learn_metric(match, positions, velocity):
     if axes is None:
         return None
     n_used = len(by_fast)
-    maps = by_fast @ axes[:n_used], by_postures @ axes[n_used:]
-    metric = Metric(np.flatnonzero(used), energy, *maps)
+    metric = Metric(
+        np.flatnonzero(used), energy, by_fast @ axes[:n_used], by_postures @ axes[n_used:]
+    )
     roots = by_fast, by_postures
     before = _energy(roots, (_unmatched_covariance(fast), _unmatched_covariance(postures)))
-    left = _energy(roots, (of_fast, of_postures))
-    return metric, Evidence.of(times, left / before if before > 0 else np.nan)
+    after = _energy(roots, (of_fast, of_postures))
+    return metric, Evidence.of(times, after / before if before > 0 else np.nan)
 
 
 def _energy(roots, covariances):
@@ -255,16 +268,16 @@ def _agreement(block, matched=None):
     matched : ndarray, shape (n_sequences, n_others, P, n_features), default=None
         For every sequence, others at its times; None: all, at the same times.
     """
-    own = np.square(block).sum(axis=0).sum(axis=0)
+    energy = np.square(block).sum(axis=0).sum(axis=0)
     if matched is None:
-        norm = own * (len(block) - 1)
-        cross = np.square(block.sum(axis=0)).sum(axis=0) - own
+        norm = energy * (len(block) - 1)
+        cross = np.square(block.sum(axis=0)).sum(axis=0) - energy
     else:
         together, squares = np.zeros(block.shape[1:]), np.zeros(block.shape[1:])
         for base, moving in zip(block, matched, strict=True):
             together += base * moving.sum(axis=0)
             squares += np.square(moving).sum(axis=0)
-        norm = np.sqrt(own * matched.shape[1] * squares.sum(axis=0))
+        norm = np.sqrt(energy * matched.shape[1] * squares.sum(axis=0))
         cross = together.sum(axis=0)
     return cross / np.where(norm > 0, norm, 1)
 
@@ -300,14 +313,16 @@ def metric_matrix(block, covariance):
     ndarray, shape (n_features, n_features)
     """
     total = _second_moments(block)
-    a = _RIDGE * np.trace(total) / len(total)
+    a = RIDGE * np.trace(total) / len(total)
     if not a > 0:
         return np.zeros_like(total)
     ridge = a * np.eye(len(total))
     within = np.linalg.inv(covariance + ridge)
     difference = within - np.linalg.inv(2 * total + ridge)
     values, vectors = np.linalg.eigh((difference + difference.T) / 2)
-    values = np.where(values > _LEAST_EIGENVALUE * np.trace(within), values, 0)
+    # Covariances are in single precision.
+    rounding = 8 * np.finfo(np.float32).eps * np.trace(within)
+    values = np.where(values > rounding, values, 0)
     variances = np.einsum("ki,kl,li->i", vectors, total, vectors)
     shrunk = values**_SHRINKAGE
     shrunk *= (values @ variances) / ((shrunk @ variances) or 1)
@@ -337,9 +352,9 @@ def _unmatched_covariance(block):
 def _at_rates(matched, energy, times):
     """Yield matched velocities, compressed, with the weights of their rates."""
     weights = 1 + RATE_WEIGHT * (np.gradient(times, axis=2) - 1)
-    for velocity, own in zip(matched, weights, strict=True):
+    for velocity, weight in zip(matched, weights, strict=True):
         fast = compressed(velocity, energy)
-        fast *= own[:, :, np.newaxis]
+        fast *= weight[:, :, np.newaxis]
         yield fast
 
 
@@ -362,7 +377,7 @@ def _differences(block, matched):
         # Products of all frames with all: their diagonals are the autocovariances.
         series = differences.swapaxes(0, 1).reshape(n_frames, -1)
         lagged = lagged + series @ series.T
-    lags = range(1 + int(_LONGEST_LAG * n_frames))
+    lags = range(1 + int(LONGEST_LAG * n_frames))
     autocovariance = np.array([np.trace(lagged, k) for k in lags])
     if not autocovariance[0] > 0:
         return covariance / count, 1.0
@@ -383,5 +398,5 @@ def _principal_axes(compared):
     variance = np.cumsum(np.maximum(values[::-1], 0))
     if not variance[-1] > 0:
         return None
-    count = 1 + int(np.searchsorted(variance, _RETAINED * variance[-1]))
+    count = 1 + int(np.searchsorted(variance, RETAINED * (1 - ROUNDING) * variance[-1]))
     return vectors[:, ::-1][:, : min(count, max(compared.shape[2] // 2, 2))]

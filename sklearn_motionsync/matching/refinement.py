@@ -3,60 +3,101 @@
 Repeated trials of one source (a machine, a neuron, one trained athlete) have the same
 postures but for noise and gain, so postures can place a moment to a fraction of a frame.
 The postures of different people differ by style, and refining by them makes warps worse.
-``refinement_test`` decides which is the case.
+``unexplained_variance`` tells which is the case.
 
 Averages over features are weighted by their variance, and copies are discounted, so that neither
 constant features nor copies change a result.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
 
 from .filters import LEAST_SIGMA, SMOOTHING, smooth
-from .warps import evaluate_warps
+from .metric import LONGEST_LAG
+from .sizes import EQUAL
 
 __all__ = [
-    "MAX_STEPS",
+    "SAME_SOURCE",
+    "Refiner",
     "curvature",
     "refine_warps",
-    "slow_energy",
     "standard_errors",
     "typical_energy",
+    "unexplained_variance",
 ]
 
+# Largest share of the variance that matching leaves of copies of one source: docs/design.md.
+SAME_SOURCE = 0.025
 # Expected change of the rate over the whole clip, in units of the mean rate.
 _RATE_CHANGE = 2.0
 # Steps end when no frame moves by more than a hundredth of one.
 MAX_STEPS = 20
-_LONGEST_STEP = 1.5
 _SHORTEST_STEP = 0.01
-# Lags, as a share of the clip, up to which residuals are counted as dependent.
-_DEPENDENT = 0.2
 # Least share of the squared slopes that counts as movement, and least rate, in standard errors.
 _LEAST_SIGNAL, _SLOWEST = 0.05, 0.1
-# Gains are shrunk towards 1 by this share of the energy of a typical feature.
-_RIDGE = 0.003
 
 
-def slow_energy(base, moving, times):
-    """Energy of the residuals of matched postures at low frequencies: (n_sequences,).
+class Refiner(NamedTuple):
+    """Refines warps to a pattern by poses.
 
-    After fitting a gain and an offset to every feature, and smoothing, which removes most noise.
+    Attributes
+    ----------
+    pattern : ndarray, shape (P, n_features)
+        Its poses, smoothed.
+    noise_width : float
+        Width of the smoothing of poses, in frames; 0 for none.
+    """
+
+    pattern: np.ndarray
+    noise_width: float
+
+    @classmethod
+    def of(cls, pattern, noise_width):
+        """The refiner to a pattern (P, n_features)."""
+        return cls(_smoothed(pattern[np.newaxis], noise_width)[0], noise_width)
+
+    def __call__(self, poses, times, reach):
+        """Refined warps (n_trials, P) of poses (n_trials, P, n_features)."""
+        poses = _smoothed(poses, self.noise_width)
+        return refine_warps(self.pattern, poses, times, reach, self.noise_width)
+
+    def standard_errors(self, poses, times):
+        """Standard errors of refined warps, in frames: (n_trials, P)."""
+        poses = _smoothed(poses, self.noise_width)
+        return standard_errors(self.pattern, poses, times, self.noise_width)
+
+
+def _smoothed(poses, width):
+    return smooth(poses, width) if width > LEAST_SIGMA else poses
+
+
+def unexplained_variance(pattern, aligned, noise):
+    """The variance that is left after matching, less that of white noise, as a share of all.
+
+    It tells copies of one source, which differ in noise and gain, from people, whose styles differ.
 
     Parameters
     ----------
-    base : ndarray, shape (P, n_features)
-    moving : ndarray, shape (n_sequences, P, n_features)
-    times : ndarray, shape (n_sequences, P)
-        Their warps.
+    pattern : ndarray, shape (P, n_features)
+    aligned : ndarray, shape (n_trials, P, n_features)
+        Other trials, sampled at their warps.
+    noise : ndarray, shape (n_features,)
+        Variance of the white noise of trials as they are recorded.
+
+    Returns
+    -------
+    float
+        The median over trials.
     """
-    matched = evaluate_warps(moving.swapaxes(1, 2), times[:, np.newaxis]).swapaxes(1, 2)
-    residuals = base - _fit_gain(base[np.newaxis], matched)[0]
-    sigma = max(SMOOTHING * (len(base) - 1), LEAST_SIGMA)
-    return np.square(smooth(residuals, sigma)).sum(axis=(1, 2))
+    # Linear interpolation between frames leaves two thirds of white noise, in the mean over times.
+    remaining = np.square(aligned - pattern).mean(axis=1) - (1 + 2 / 3) * noise
+    moving = np.maximum(pattern.var(axis=0) - noise, 0).sum()
+    share = np.median(np.maximum(remaining, 0).sum(axis=1))
+    return float(share / moving) if moving > 0 else math.inf
 
 
 def refine_warps(base, moving, times, reach, noise_width=0.0, steps=MAX_STEPS):
@@ -103,13 +144,13 @@ def refine_warps(base, moving, times, reach, noise_width=0.0, steps=MAX_STEPS):
     refined = times.astype(np.float64)
     active, (band, border) = np.arange(len(moving)), curvature(n_frames)
     for _ in range(steps):
-        own = slice(None) if len(base) == 1 else active
+        chosen = slice(None) if len(base) == 1 else active
         values, tangents = _evaluate(splines, active, refined[active])
-        fitted, gain = _fit_gain(base[own], values)
-        slope, residual = gain * tangents, base[own] - fitted
+        fitted, gain = _fit_gain(base[chosen], values)
+        slope, residual = gain * tangents, base[chosen] - fitted
         noise = typical_energy(residual, independent) / n_frames
         pull = np.vecdot(slope, slope)[:, 1:-1]
-        going = (noise > rounding[own]) & pull.any(axis=1)
+        going = (noise > rounding[chosen]) & pull.any(axis=1)
         active, noise, pull = active[going], noise[going], pull[going]
         if len(active) == 0:
             break
@@ -122,7 +163,7 @@ def refine_warps(base, moving, times, reach, noise_width=0.0, steps=MAX_STEPS):
         target = pull * tau[:, 1:-1] + push - stiffness[:, np.newaxis] * border
         solved = solveh_banded(system.reshape(3, -1), target.ravel())
         step = solved.reshape(pull.shape) - tau[:, 1:-1]
-        tau[:, 1:-1] += np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
+        tau[:, 1:-1] += step
         refined[active] = np.maximum.accumulate(np.clip(tau, low, high), axis=1)
         active = active[np.abs(step).max(axis=1) >= _SHORTEST_STEP]
     return refined
@@ -150,9 +191,9 @@ def standard_errors(base, moving, times, noise_width=0.0):
         return errors
     frames, (band, _) = np.arange(n_frames), curvature(n_frames)
     independent = n_frames / max(1, np.sqrt(2 * np.pi) * noise_width)
-    lags = np.arange(1, math.ceil(_DEPENDENT * n_frames))
-    share = 1 - lags / (_DEPENDENT * n_frames)
-    own = CubicSpline(frames, base)(frames, 1)
+    lags = np.arange(1, math.ceil(LONGEST_LAG * n_frames))
+    share = 1 - lags / (LONGEST_LAG * n_frames)
+    base_slope = CubicSpline(frames, base)(frames, 1)
     width = max(SMOOTHING * (n_frames - 1), LEAST_SIGMA)
     for x, tau, row in zip(moving, times, errors, strict=True):
         spline = CubicSpline(frames, x)
@@ -164,8 +205,8 @@ def standard_errors(base, moving, times, noise_width=0.0):
             continue
         stiffness = max(noise * (n_frames / _RATE_CHANGE) ** 2, 1e-9 * pull[1:-1].mean())
         rates = np.maximum(np.gradient(tau), _SLOWEST)
-        both = np.stack([pull, np.vecdot(slope, own) / rates])[..., np.newaxis]
-        total, common = smooth(both, width)[:, 1:-1, 0]
+        pulls = np.stack([pull, np.vecdot(slope, base_slope) / rates])[..., np.newaxis]
+        total, common = smooth(pulls, width)[:, 1:-1, 0]
         pull = pull[1:-1]
         total = np.maximum(total, np.finfo(total.dtype).tiny)
         clean = pull * np.clip(common / total, _LEAST_SIGNAL, 1)
@@ -179,9 +220,9 @@ def standard_errors(base, moving, times, noise_width=0.0):
         dependent = max(dependent, 1, 2 * math.sqrt(math.pi) * noise_width)
         # What the warp, gains and offsets have taken away from the residuals.
         features = np.square(residual).sum() / (n_frames * noise)
-        taken = np.diagonal(inverse) @ clean + 2 * features
-        left = 1 - taken * dependent / (features * n_frames)
-        row[1:-1] = np.sqrt(noise / max(left, 0.5) * dependent * variance)
+        degrees = np.diagonal(inverse) @ clean + 2 * features
+        share_left = 1 - degrees * dependent / (features * n_frames)
+        row[1:-1] = np.sqrt(noise / max(share_left, 0.5) * dependent * variance)
     return errors
 
 
@@ -191,9 +232,9 @@ def _evaluate(splines, active, times):
     Their coefficients are (n_sequences, P - 1, 4, n_features), the highest power first.
     """
     pieces = splines.shape[1]
-    left = np.clip(times.astype(np.intp), 0, pieces - 1)
-    x = (times - left).astype(splines.dtype)[:, :, np.newaxis]
-    at = left + pieces * active[:, np.newaxis]
+    piece = np.clip(times.astype(np.intp), 0, pieces - 1)
+    x = (times - piece).astype(splines.dtype)[:, :, np.newaxis]
+    at = piece + pieces * active[:, np.newaxis]
     a, b, c, d = np.moveaxis(splines.reshape(-1, *splines.shape[2:]).take(at, axis=0), 2, 0)
     values = a * x
     values += b
@@ -222,15 +263,15 @@ def typical_energy(curves, independent=np.inf):
 
 
 def _fit_gain(base, matched):
-    """``g * matched + o``, and ``g``: ridge regression, gains shrunk towards 1.
+    """``g * matched + o``, and ``g``: by least squares.
 
     Base and ``matched`` are (n_sequences, P, n_features), ``g`` (n_sequences, 1, n_features).
     """
     middle = base.mean(axis=1, keepdims=True)
     x, y = base - middle, matched - matched.mean(axis=1, keepdims=True)
     energy = np.square(y).sum(axis=1, keepdims=True)
-    ridge = _RIDGE * typical_energy(y)[:, np.newaxis, np.newaxis]
-    # Constant postures fit with any gain.
+    # Constant features and constant postures fit with any gain: it is 1.
+    ridge = EQUAL[y.dtype] * typical_energy(y)[:, np.newaxis, np.newaxis]
     ridge[ridge == 0] = 1
     gain = ((x * y).sum(axis=1, keepdims=True) + ridge) / (energy + ridge)
     return gain * y + middle, gain

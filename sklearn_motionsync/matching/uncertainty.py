@@ -8,28 +8,23 @@ see docs/accuracy.md.
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtri
 
-from .factors import Bases, right_factor
-from .trellis import Tile, Trellis
+from .sizes import BATCH_NUMBERS, EQUAL
+from .tile import Bases, Tile, right_factor
+from .trellis import Trellis
 from .warps import even_slices
 
-__all__ = ["Uncertainty", "refined_uncertainty", "tail_factor", "uncertainty_of_paths"]
+__all__ = ["Uncertainty", "coverage_factor", "refined_uncertainty", "uncertainty_of_paths"]
 
 # Half-widths of 90 %, in mean distances of the paths: docs/design.md.
 _SCALE = 2.2
-# Half-widths grow with the coverage c as ln(1 / (1 - c)) to this power: for warps of people, and
-# for a normal distribution.
-_HEAVY, _NORMAL = 1.2, 0.7
-# Half-width of 90 % of a normal distribution, in standard errors.
-_STANDARD = 1.645
+# Half-widths grow with the coverage c as ln(1 / (1 - c)) to this power, for warps of people.
+_HEAVY = 1.2
 # Most frames of the clock on which paths are compared.
 _FRAMES = 81
 # A path counts by exp(-1) where it costs this share more than the best one.
 _TEMPERATURE = 0.1
-# Share of the energy by which rounding may change a cost.
-_ROUNDING = 2.0**-40
-# Cells of the rows that are kept at once.
-_BATCH_CELLS = 1 << 20
 
 
 class Uncertainty(NamedTuple):
@@ -39,8 +34,8 @@ class Uncertainty(NamedTuple):
     ----------
     half_widths : ndarray, shape (n_sequences, P)
         Of intervals that hold 90 %, in frames, where nothing pins a warp.
-    tails : ndarray, shape (n_sequences,)
-        Power by which half-widths grow with the coverage: see `tail_factor`.
+    is_normal : ndarray of bool, shape (n_sequences,)
+        Whether errors are normal, or have heavier tails: see `coverage_factor`.
     shares : ndarray, shape (n_sequences,)
         Distances of the direct paths as shares of the energy of both sequences: 1 is as far as
         standing still.
@@ -49,14 +44,15 @@ class Uncertainty(NamedTuple):
     """
 
     half_widths: np.ndarray
-    tails: np.ndarray
+    is_normal: np.ndarray
     shares: np.ndarray
     widest: np.ndarray
 
 
-def tail_factor(coverage, tails):
+def coverage_factor(coverage, is_normal):
     """Half-widths of a coverage, in those of 90 %."""
-    return (np.log1p(-coverage) / np.log(0.1)) ** tails
+    normal = ndtri((1 + coverage) / 2) / ndtri(0.95)
+    return np.where(is_normal, normal, (np.log1p(-coverage) / np.log(0.1)) ** _HEAVY)
 
 
 def uncertainty_of_paths(matcher, base, moving, times):
@@ -77,21 +73,21 @@ def uncertainty_of_paths(matcher, base, moving, times):
     Uncertainty
     """
     n_frames, trellis = times.shape[1], matcher.trellis
-    some = np.unique(np.round(np.linspace(0, n_frames - 1, _FRAMES)).astype(np.intp))
-    base, moving = base[:, some], moving[:, some * trellis.table.subframes]
-    trellis = _coarse(matcher, n_frames, len(some))
-    per_frame = (n_frames - 1) / (len(some) - 1)
-    spread, shares = _spread_of_paths(trellis, base, moving, times[:, some] / per_frame)
+    coarse = np.unique(np.round(np.linspace(0, n_frames - 1, _FRAMES)).astype(np.intp))
+    base, moving = base[:, coarse], moving[:, coarse * trellis.table.subframes]
+    trellis = _coarse(matcher, n_frames, len(coarse))
+    per_frame = (n_frames - 1) / (len(coarse) - 1)
+    spread, shares = _spread_of_paths(trellis, base, moving, times[:, coarse] / per_frame)
     frames, scale = np.arange(n_frames), _SCALE * per_frame
-    widths = np.array([np.interp(frames, some, scale * row) for row in spread])
+    widths = np.array([np.interp(frames, coarse, scale * row) for row in spread])
     widest = np.minimum(2 * widths.max(axis=1) / (n_frames - 1), 1)
-    return Uncertainty(widths, np.full(len(times), _HEAVY), shares, widest)
+    return Uncertainty(widths, np.zeros(len(times), bool), shares, widest)
 
 
 def refined_uncertainty(by_paths, errors):
     """The uncertainty of refined warps, by their standard errors in frames."""
-    normal = np.full(len(errors), _NORMAL)
-    return Uncertainty(_STANDARD * errors, normal, by_paths.shares, by_paths.widest)
+    is_normal = np.ones(len(errors), bool)
+    return Uncertainty(ndtri(0.95) * errors, is_normal, by_paths.shares, by_paths.widest)
 
 
 def _coarse(matcher, n_frames, count):
@@ -99,11 +95,15 @@ def _coarse(matcher, n_frames, count):
     trellis, table = matcher.trellis, matcher.trellis.table
     if count == n_frames and table.subframes == 1:
         return trellis
-    reach = {"max_offset": trellis.reach / n_frames, "unseen": trellis.unseen}
-    reach["max_rate"] = max(1, table.steps.max() / table.subframes)
-    if trellis.anchors is not None:
-        reach["anchors"] = trellis.anchors.at(count)
-    return Trellis.on_clock(matcher.features.cost, count, trellis.mu, **reach)
+    return Trellis.on_clock(
+        matcher.features.cost,
+        count,
+        trellis.mu,
+        max_offset=trellis.reach / n_frames,
+        max_rate=max(1, table.steps.max() / table.subframes),
+        unseen=trellis.unseen,
+        anchors=trellis.anchors and trellis.anchors.at(count),
+    )
 
 
 def _spread_of_paths(trellis, base, moving, times):
@@ -129,17 +129,17 @@ def _spread_of_paths(trellis, base, moving, times):
         Costs of the best paths, as shares of the energy of both sequences.
     """
     n_frames, width = base.shape[1], trellis.width
-    energies = np.square(trellis.features(moving)).sum(axis=(1, 2), dtype=np.float64)
-    energies += np.square(trellis.features(base)).sum()
+    energies = np.square(moving[..., trellis.plain]).sum(axis=(1, 2), dtype=np.float64)
+    energies += np.square(base[..., trellis.plain]).sum()
     energies = np.maximum(energies, np.finfo(np.float64).tiny)
     spread, shares = np.empty(times.shape), np.empty(len(times))
     offsets = np.arange(-width, width + 1)[:, np.newaxis]
-    for rows in even_slices(len(times), max(1, _BATCH_CELLS // (n_frames * len(offsets)))):
+    for rows in even_slices(len(times), max(1, BATCH_NUMBERS // (n_frames * len(offsets)))):
         totals = _rows(trellis, base, moving[rows])
         shares[rows] = np.maximum(totals[-1, width], 0) / energies[rows]
         totals += _rows(trellis, base[:, ::-1], moving[rows, ::-1])[::-1, ::-1]
         totals -= totals.min(axis=1, keepdims=True)
-        totals /= -np.maximum(_TEMPERATURE * shares[rows], _ROUNDING) * energies[rows]
+        totals /= -np.maximum(_TEMPERATURE * shares[rows], EQUAL[totals.dtype]) * energies[rows]
         weights = np.exp(totals, out=totals)
         sums = weights.sum(axis=1)
         weights *= np.abs(offsets - (times[rows] - np.arange(n_frames)).T[:, np.newaxis])

@@ -8,16 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
+from .sizes import BATCH_NUMBERS, CONSTANT
 from .warps import even_slices
 
 __all__ = ["Unit"]
 
-# A feature whose range is less than this share of its magnitude is constant, and features that
-# differ by less than this share of their energy are copies: the rest is rounding.
-_CONSTANT = 2.0**-44
+# Features that differ by less than this share of their energy are copies: the rest is rounding.
 _COPY = 2.0**-30
-# Numbers processed at a time: bounds the memory of intermediate arrays.
-BATCH_SIZE = 1 << 20
 
 
 class Unit(NamedTuple):
@@ -44,14 +41,14 @@ class Unit(NamedTuple):
     def of(cls, on_clock):
         """The unit of a training set on the clock: (n_sequences, P, n_features)."""
         low, high = on_clock.min(axis=(0, 1)), on_clock.max(axis=(0, 1))
-        batches = even_slices(len(on_clock), max(1, BATCH_SIZE // max(1, on_clock[0].size)))
+        batches = even_slices(len(on_clock), max(1, BATCH_NUMBERS // max(1, on_clock[0].size)))
         centre = on_clock[batches[0]].mean(axis=(0, 1))
         if len(batches) > 1:
             means = [centre, *(on_clock[rows].mean(axis=(0, 1)) for rows in batches[1:])]
             weights = [rows.stop - rows.start for rows in batches]
             centre = np.average(means, axis=0, weights=weights).astype(on_clock.dtype)
         spread, magnitude = np.maximum(high - centre, centre - low), np.maximum(high, -low)
-        rounding = max(_CONSTANT, 64 * float(np.finfo(on_clock.dtype).eps)) * magnitude
+        rounding = max(CONSTANT, 64 * float(np.finfo(on_clock.dtype).eps)) * magnitude
         varies = spread > rounding
         largest = spread[varies].max() if varies.any() else np.abs(magnitude).max()
         exponent = int(np.frexp(largest)[1])
@@ -109,7 +106,7 @@ def _find_copies(on_clock, batches, centre):
     energy = sum(np.square(frames).sum(axis=0, dtype=np.float64) for frames in centred())
     order = np.argsort(energy, kind="stable")
     alike = np.diff(energy[order]) <= _COPY * energy[order[1:]]
-    found = []
+    copies = []
     # Only columns of equal energy can be copies: they are neighbours in this order.
     for run in np.split(order, np.flatnonzero(~alike) + 1):
         if len(run) == 1 or energy[run[0]] == 0:
@@ -120,5 +117,5 @@ def _find_copies(on_clock, batches, centre):
         distances = energy[run][:, np.newaxis] + energy[run] - 2 * products
         count, group_of = connected_components(distances <= _COPY * energy[run[0]], directed=False)
         groups = [run[group_of == k] for k in range(count)]
-        found.extend(group for group in groups if len(group) > 1)
-    return found
+        copies.extend(group for group in groups if len(group) > 1)
+    return copies

@@ -5,10 +5,9 @@ import math
 
 import numpy as np
 
-__all__ = ["at_times", "evaluate_warps", "even_slices", "normalise", "sample"]
+from .sizes import BATCH
 
-# Sequences sampled together: bounds the memory of intermediate arrays.
-_BATCH = 64
+__all__ = ["at_times", "evaluate_warps", "even_slices", "normalise", "sample"]
 
 
 def normalise(arrays, n_frames, subframes=1):
@@ -52,28 +51,28 @@ def sample(arrays, times, n_frames):
     is_one = isinstance(arrays, np.ndarray)
     arrays = arrays if is_one else list(arrays)
     out = np.empty((len(arrays), times.shape[1], arrays[0].shape[1]), dtype=arrays[0].dtype)
-    for start in range(0, len(arrays), _BATCH):
-        rows = slice(start, start + _BATCH)
+    for start in range(0, len(arrays), BATCH):
+        rows = slice(start, start + BATCH)
         batch, target = arrays[rows], out[rows]
         last = np.array([len(x) for x in batch])[:, np.newaxis] - 1
         # In this order a whole number of frames stays whole.
         at = times[rows] * last / (n_frames - 1)
-        left = np.minimum(at.astype(np.intp), last - 1)
-        weight = (at - left).astype(out.dtype)[:, :, np.newaxis]
+        before = np.minimum(at.astype(np.intp), last - 1)
+        weight = (at - before).astype(out.dtype)[:, :, np.newaxis]
         frames = batch.reshape(-1, batch.shape[2]) if is_one else np.concatenate(batch)
-        left += np.cumsum(last + 1)[:, np.newaxis] - (last + 1)
+        before += np.cumsum(last + 1)[:, np.newaxis] - (last + 1)
         with np.errstate(over="ignore", invalid="ignore"):
             has_gaps = not np.isfinite(frames.sum())
             # Indices are valid; mode="clip" only spares NumPy a copy of the result.
-            frames.take(left, axis=0, out=target, mode="clip")
+            frames.take(before, axis=0, out=target, mode="clip")
             target *= 1 - weight
-            left += 1
-            following = frames.take(left, axis=0)
+            before += 1
+            following = frames.take(before, axis=0)
             following *= weight
             target += following
         if has_gaps:
             # Where a time is a whole frame, its neighbour must not count: 0 * inf is NaN.
-            for at, is_exact in ((left - 1, weight == 0), (left, weight == 1)):
+            for at, is_exact in ((before - 1, weight == 0), (before, weight == 1)):
                 np.copyto(target, frames.take(at, axis=0), where=is_exact)
     return out
 
@@ -90,11 +89,11 @@ def evaluate_warps(warps, times):
 
     Both have the same number of axes; all axes of the times but the last may be broadcast.
     """
-    *shape, n_frames = warps.shape
-    left = np.clip(times.astype(np.intp), 0, n_frames - 2)
-    weight = (times - left).astype(warps.dtype, copy=False)
+    *leading, n_frames = warps.shape
+    before = np.clip(times.astype(np.intp), 0, n_frames - 2)
+    weight = (times - before).astype(warps.dtype, copy=False)
     flat = np.ascontiguousarray(warps).reshape(-1)
-    at = left + n_frames * np.arange(math.prod(shape)).reshape(*shape, 1)
+    at = before + n_frames * np.arange(math.prod(leading)).reshape((*leading, 1))
     out = flat.take(at) * (1 - weight)
     at += 1
     out += flat.take(at) * weight
@@ -115,6 +114,6 @@ def at_times(sequence, times):
         In double precision.
     """
     times = np.clip(times, 0, len(sequence) - 1)
-    left = np.minimum(times.astype(np.intp), len(sequence) - 2)
-    weight = (times - left)[..., np.newaxis]
-    return sequence[left] * (1 - weight) + sequence[left + 1] * weight
+    before = np.minimum(times.astype(np.intp), len(sequence) - 2)
+    weight = (times - before)[..., np.newaxis]
+    return sequence[before] * (1 - weight) + sequence[before + 1] * weight

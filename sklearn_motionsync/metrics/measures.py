@@ -169,11 +169,11 @@ def keyframe_error(
     n_sequences, P = times.shape
     lengths = _as_lengths(n_frames, n_sequences)
     keyframes, pattern_keyframes = _as_keyframes(keyframes, pattern_keyframes, lengths, P)
-    own = (lengths[:, np.newaxis] - 1) / (P - 1)
+    frames_per_step = (lengths[:, np.newaxis] - 1) / (P - 1)
     matched = evaluate_warps(times, np.tile(pattern_keyframes, (n_sequences, 1)))
-    errors = np.abs(matched - keyframes / own)
+    errors = np.abs(matched - keyframes / frames_per_step)
     if frame_rate is not None:
-        errors = errors * own / as_frame_rates(frame_rate, n_sequences)
+        errors = errors * frames_per_step / as_frame_rates(frame_rate, n_sequences)
     return _summary(errors, quantile)
 
 
@@ -294,11 +294,11 @@ def _as_warps(times, what="times"):
     return np.clip(times, 0, last)
 
 
-def _as_warps_of_one_shape(times, others, what):
-    times, others = _as_warps(times), _as_warps(others, what)
-    if times.shape != others.shape:
-        raise ValueError(f"times {times.shape} and {what} {others.shape} differ in shape.")
-    return times, others
+def _as_warps_of_one_shape(times, reference, what):
+    times, reference = _as_warps(times), _as_warps(reference, what)
+    if times.shape != reference.shape:
+        raise ValueError(f"times {times.shape} and {what} {reference.shape} differ in shape.")
+    return times, reference
 
 
 def _as_moments(moments, n_sequences):

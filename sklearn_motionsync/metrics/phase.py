@@ -107,13 +107,13 @@ def amplitude_phase_variance(before: PerformancesLike, after: PerformancesLike) 
     """
     (x, tolerance), (y, _) = check_pair(before, after, allow_nan=False)
     total, energy = _variance(x), _energy(x)
-    left, energy_left = _variance(y), _energy(y)
+    total_left, energy_left = _variance(y), _energy(y)
     if energy == 0 < energy_left or energy_left == 0 < energy:
         raise ValueError(
             "One of before and after is zero everywhere, and the other is not. Give the same "
             "performances, normalised and synchronised."
         )
-    amplitude = energy * (left / energy_left) if energy_left > 0 else 0.0
+    amplitude = energy * (total_left / energy_left) if energy_left > 0 else 0.0
     differ = total > x.shape[2] * tolerance**2
     share = (total - amplitude) / total if differ else np.nan
     constant = energy / energy_left if energy_left > 0 else 1.0

@@ -297,11 +297,13 @@ class FeatureHoldoutScorer(_SynchronizerScorer):
         order = check_random_state(self.random_state).permutation(n_features)
         scores = []
         for held_out in np.array_split(order, self.n_folds):
-            others = np.setdiff1d(order, held_out)
+            shown = np.setdiff1d(order, held_out)
             refitted = clone(synchronizer).set_params(
                 n_frames=synchronizer.n_frames_, pattern="median"
             )
-            seen, hidden = ([x[:, part] for x in performances] for part in (others, held_out))
+            seen, hidden = (
+                [x[:, features] for x in performances] for features in (shown, held_out)
+            )
             match = refitted.fit(seen, **fit_params).match(seen, **match_params)
             before = normalise(hidden, synchronizer.n_frames_)
             scores.append(self._score(before, match.warp(hidden)))
@@ -315,11 +317,11 @@ def known_keyframes(performances, params):
     """
     if params.get("keyframes") is None:
         return params
-    given = Keyframes(params["keyframes"], len(performances), params.get("frame_rate"))
-    shares = given.shares(performances)
-    known = np.isfinite(shares).any(axis=0)
-    if known.all():
+    keyframes = Keyframes(params["keyframes"], len(performances), params.get("frame_rate"))
+    shares = keyframes.shares(performances)
+    is_known = np.isfinite(shares).any(axis=0)
+    if is_known.all():
         return params
-    others = {name: params[name] for name in params if name not in ("keyframes", "frame_rate")}
+    metadata = {name: params[name] for name in params if name not in ("keyframes", "frame_rate")}
     last = np.array([[len(x) - 1] for x in performances])
-    return others | ({"keyframes": (shares * last)[:, known]} if known.any() else {})
+    return metadata | ({"keyframes": (shares * last)[:, is_known]} if is_known.any() else {})

@@ -140,9 +140,9 @@ def pairwise_correlation(before: PerformancesLike, after: PerformancesLike) -> f
     >>> pairwise_correlation(x, x[[0, 0]])
     2.0
     """
-    pair = check_pair(before, after)
-    old, new = (_mean_correlation(*z) for z in pair)
-    tolerance = np.finfo(np.float64).eps * pair[0][0][0].size
+    (x, x_rounding), (y, y_rounding) = check_pair(before, after)
+    old, new = _mean_correlation(x, x_rounding), _mean_correlation(y, y_rounding)
+    tolerance = np.finfo(np.float64).eps * x[0].size
     if abs(old) <= tolerance:
         return _without_spread_before(abs(new) <= tolerance, "uncorrelated")
     return float(new / old)
@@ -160,7 +160,7 @@ def check_pair(before, after, *, allow_nan=True):
     -------
     pair : list of (ndarray of float64, shape (n_sequences, P, n_features), float)
     """
-    pair = [_on_clock(z, what) for z, what in ((before, "before"), (after, "after"))]
+    pair = [_on_clock(z, name) for z, name in ((before, "before"), (after, "after"))]
     shape = pair[0].shape
     is_valid = len(shape) == 3 and shape[0] >= 2 and shape[1] >= 2 and shape[2] >= 1
     if not is_valid or pair[1].shape != shape:
@@ -169,11 +169,11 @@ def check_pair(before, after, *, allow_nan=True):
             f"sequences, 2 frames and 1 feature; got {shape} and {pair[1].shape}. Give univariate "
             "ones as x[:, :, np.newaxis]."
         )
-    for z, what in zip(pair, ("before", "after"), strict=True):
+    for z, name in zip(pair, ("before", "after"), strict=True):
         for i, x in enumerate(z):
-            check_finite(x, f"{what}, performance {i}, frame", allow_nan=allow_nan)
+            check_finite(x, f"{name}, performance {i}, frame", allow_nan=allow_nan)
             if np.isnan(x).all():
-                raise ValueError(f"{what}, performance {i}: all is NaN. Leave it out.")
+                raise ValueError(f"{name}, performance {i}: all is NaN. Leave it out.")
     eps = [np.finfo(z.dtype).eps + len(z) * np.finfo(np.float64).eps for z in pair]
     return [
         (z.astype(np.float64), 4 * e * np.nanmax(np.abs(z))) for z, e in zip(pair, eps, strict=True)
@@ -212,9 +212,11 @@ def _from_others(z):
         # Relative to the first one, so that identical sequences differ by exactly 0.
         z = z - z[0]
         return (z - z.mean(axis=0)) * len(z) / (len(z) - 1)
-    others = (~hidden).sum(axis=0) - 1
-    differences = np.where(hidden, 0, z - nanmean(z, axis=0)) * (others + 1) / np.maximum(others, 1)
-    compared = (~hidden & (others > 0)).mean(axis=(1, 2), keepdims=True)
+    n_others = (~hidden).sum(axis=0) - 1
+    differences = (
+        np.where(hidden, 0, z - nanmean(z, axis=0)) * (n_others + 1) / np.maximum(n_others, 1)
+    )
+    compared = (~hidden & (n_others > 0)).mean(axis=(1, 2), keepdims=True)
     return differences / np.sqrt(np.where(compared > 0, compared, 1))
 
 

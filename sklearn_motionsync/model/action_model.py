@@ -18,13 +18,12 @@ from ..inputs.numbers import as_numbers, check_finite, check_names
 from ..inputs.types import Labels, PerformanceLike, PerformancesLike, RandomState, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..inputs.wording import counted
+from ..matching.gaps import fill_with_mean, is_gappy
 from ..synchronizers.match import STANDARD, Match
-from ..utils.atomic import atomic_fit, atomic_partial_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
-from ..utils.groups import encode_groups
+from ..utils.groups import encode_groups, group_counts
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
-from .hidden import fill_with_mean, group_counts, is_gappy
 from .personal import PersonalReference
 from .sampling import sample_performances, sample_postures
 from .similarity import LEAST, Neighbours, PerformanceStream, learn_weights, log_moments
@@ -143,7 +142,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
 
     # -- fitting ------------------------------------------------------------------------------
 
-    @atomic_fit
     @validated
     def fit(self, X: PerformancesLike, y: object = None, groups: Labels | None = None) -> Self:
         """Estimate the mean performance, the variances and the threshold.
@@ -178,15 +176,16 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             )
         encode_groups(groups, len(performances), at_least=2)
         with self._progress(fits=True):
-            self._update(PerformanceStream.starting_at(performances[0]), performances, groups)
-        if self._unseen:
-            raise ValueError(
-                f"{self._unseen}. Give more performances, leave out the feature, or fill gaps "
-                "before, as by fill_gaps of sklearn_motionsync.io."
-            )
+            stream = PerformanceStream.starting_at(performances[0])
+            learnt = self._learn(stream, performances, groups)
+            if learnt["_unseen"]:
+                raise ValueError(
+                    f"{learnt['_unseen']}. Give more performances, leave out the feature, or fill "
+                    "gaps before, as by fill_gaps of sklearn_motionsync.io."
+                )
+        vars(self).update(learnt)
         return self
 
-    @atomic_partial_fit
     @validated
     def partial_fit(
         self, X: PerformancesLike, y: object = None, groups: Labels | None = None
@@ -248,14 +247,13 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         else:
             performances = self._check_seen(_check_lengths(self._check_training_set(X)))
             stream = PerformanceStream.starting_at(performances[0])
-        self._update(stream, performances, groups)
+        vars(self).update(self._learn(stream, performances, groups))
         return self
 
     @property
-    @snapshot
     def deviations_(self) -> np.ndarray:
         """Training performances that are kept, less the mean: (n_kept, P, n_features)."""
-        check_is_fitted(self)
+        check_is_fitted(self, "mean_")
         return fill_with_mean(self._stream.kept, self.mean_) - self.mean_
 
     def check_performances(self, X: PerformancesLike) -> Performances:
@@ -281,7 +279,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
 
     # -- whole performances -------------------------------------------------------------------
 
-    @snapshot
     def score_samples(self, X: PerformancesLike) -> np.ndarray:
         """Log-density of performances: independent normal distributions at every posture.
 
@@ -318,7 +315,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             log_std[i], size[i] = np.log(std[seen]).sum(dtype=np.float64), seen.sum()
         return -0.5 * squares - log_std - 0.5 * size * np.log(2 * np.pi)
 
-    @snapshot
     def score(
         self,
         X: PerformancesLike,
@@ -351,7 +347,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             check_consistent_length(densities, sample_weight)
         return float(np.average(densities, weights=sample_weight))
 
-    @snapshot
     def dissimilarity(
         self, X: PerformancesLike, reference: PerformancesLike | None = None
     ) -> np.ndarray:
@@ -377,7 +372,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         performances = self.check_performances(X)
         return self._judge(reference).dissimilarity(performances)
 
-    @snapshot
     def threshold_at(self, coverage: float, reference: PerformancesLike | None = None) -> float:
         """The threshold of another coverage.
 
@@ -405,7 +399,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             return self._neighbours.limit(self._log_moments, coverage)
         return self._judge(reference).limit(coverage)
 
-    @snapshot
     def decision_function(
         self, X: PerformancesLike, reference: PerformancesLike | None = None
     ) -> np.ndarray:
@@ -427,7 +420,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         limit = self.threshold_ if reference is None else judge.limit(self.coverage)
         return np.log(limit / np.maximum(judge.dissimilarity(performances), LEAST))
 
-    @snapshot
     def predict(self, X: PerformancesLike, reference: PerformancesLike | None = None) -> np.ndarray:
         """Whether performances are the action.
 
@@ -445,7 +437,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         """
         return np.where(self.decision_function(X, reference) >= 0, 1, -1)
 
-    @snapshot
     def standard_scores(self, X: PerformancesLike) -> np.ndarray:
         """Deviations of performances from the mean, in predicted standard deviations.
 
@@ -468,7 +459,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
 
     # -- postures, bands and samples ----------------------------------------------------------
 
-    @snapshot
     def accepts(self, postures: PerformanceLike, frame: int) -> np.ndarray:
         """Whether postures lie inside the envelope at a frame.
 
@@ -503,7 +493,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         outside = (postures < mean - half_width) | (postures > mean + half_width)
         return ~outside.any(axis=1)
 
-    @snapshot
     def envelope(self, simultaneous: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """A band about the mean performance, for postures or for whole performances.
 
@@ -531,7 +520,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
             half_width = self.n_std * np.sqrt(self.variance_)
         return self.mean_ - half_width, self.mean_ + half_width
 
-    @snapshot
     def mean_envelope(
         self, random_state: RandomState = 0, match: Match | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -575,7 +563,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         half_width = half_width.astype(self.mean_.dtype)
         return self.mean_ - half_width, self.mean_ + half_width
 
-    @snapshot
     def simultaneous_factor(self) -> float:
         """How many predicted standard deviations the performances of new people stay within.
 
@@ -591,7 +578,6 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         kept = self._stream.kept.astype(np.float64)
         return simultaneous_factor(kept, self.groups_, self.coverage)
 
-    @snapshot
     def sample(
         self, n: int = 1, frame: int | None = None, random_state: RandomState = None
     ) -> np.ndarray:
@@ -645,35 +631,46 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         tags.input_tags.allow_nan = True
         return tags
 
-    def _update(self, before, performances, groups):
-        """Set what is learnt from more performances, after those of a stream."""
+    def _learn(self, before, performances, groups):
+        """The attributes that are known after more performances than those of a stream."""
         stream, codes, is_kept = before.extend(performances, groups)
-        dtype = stream.kept.dtype
-        self.n_samples_seen_, self.n_frames_ = stream.n, len(stream.origin)
-        self.mean_, self.variance_ = stream.mean.astype(dtype), stream.variance.astype(dtype)
+        dtype, unseen = stream.kept.dtype, self._describe_unseen(stream)
         spread = (stream.variance.mean(axis=0) + stream.mean.var(axis=0)).max()
         spread = float(spread.astype(dtype))
-        self._variance_floor = _VARIANCE_FLOOR * (spread if spread > 0 else 1.0)
-        self.groups_, self._stream = stream.groups, stream
-        self.missing_, self._unseen = stream.missing, self._describe_unseen(stream)
-        if stream.n_groups < 2 or self._unseen:
-            return
-        if stream.kept is not before.kept:
+        learnt = {
+            "n_samples_seen_": stream.n,
+            "n_frames_": len(stream.origin),
+            "mean_": stream.mean.astype(dtype),
+            "variance_": stream.variance.astype(dtype),
+            "missing_": stream.missing,
+            "groups_": stream.groups,
+            "_variance_floor": _VARIANCE_FLOOR * (spread if spread > 0 else 1.0),
+            "_stream": stream,
+            "_unseen": unseen,
+        }
+        if stream.n_groups < 2 or unseen:
+            return learnt
+        if stream.kept is before.kept:
+            neighbours, known = self._neighbours, self._kept_dissimilarities
+        else:
             kept = stream.kept.astype(np.float64)
             variance = predictive_variance(kept, stream.groups)
-            self.predictive_variance_ = variance.astype(dtype)
+            learnt["predictive_variance_"] = variance.astype(dtype)
             weights = learn_weights(fill_with_mean(kept, stream.mean), stream.groups)
-            self._neighbours = Neighbours(kept, stream.groups, mean=stream.mean, weights=weights)
-            known = self._neighbours.dissimilarity(before.kept, before.groups)
-        else:
-            known = self._kept_dissimilarities
-        self.dissimilarities_ = self._neighbours.dissimilarity(performances, codes)
-        compared = np.concatenate([known, self.dissimilarities_])
-        self._kept_dissimilarities = compared[is_kept]
-        self._log_moments = stream.dropped + log_moments(compared)
+            neighbours = Neighbours(kept, stream.groups, mean=stream.mean, weights=weights)
+            known = neighbours.dissimilarity(before.kept, before.groups)
+        dissimilarities = neighbours.dissimilarity(performances, codes)
+        compared = np.concatenate([known, dissimilarities])
+        moments = stream.dropped + log_moments(compared)
         dropped = stream.dropped + log_moments(compared[~is_kept])
-        self._stream = replace(stream, dropped=dropped)
-        self.threshold_ = self._neighbours.limit(self._log_moments, self.coverage)
+        return learnt | {
+            "dissimilarities_": dissimilarities,
+            "threshold_": neighbours.limit(moments, self.coverage),
+            "_neighbours": neighbours,
+            "_kept_dissimilarities": compared[is_kept],
+            "_log_moments": moments,
+            "_stream": replace(stream, dropped=dropped),
+        }
 
     def _judge(self, reference):
         """What dissimilarities are to: the training performances, or those of a person."""
@@ -728,7 +725,7 @@ class ActionModel(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEstima
         return performances
 
     def _check_groups_seen(self):
-        check_is_fitted(self)
+        check_is_fitted(self, "mean_")
         if self._unseen:
             raise NotFittedError(f"{self._unseen}. Give others to partial_fit.")
         if not hasattr(self, "threshold_"):

@@ -12,10 +12,11 @@ from sklearn.base import BaseEstimator
 from ..body.limbs import part_of_limb
 from ..inputs.features import choose_features
 from ..inputs.types import Features, PerformancesLike
+from ..matching.counting import ROUNDING, first_largest, whole
+from ..matching.gaps import fill_with_mean
 from ..synchronizers.linear import LinearSynchronizer
 from ..utils.pipelines import find_synchronizer, route_to_synchronizer
 from .faults import FaultFinder, Part, expected_performance
-from .hidden import fill_with_mean
 from .views import View, limbs_of, models_of_classes, view_of
 
 __all__ = ["Judged", "find_departures", "judge"]
@@ -245,12 +246,12 @@ class Judged(NamedTuple):
 
     def _row(self, i, fault):
         part, last_frame = self.space.parts[fault.part], self.scores.shape[1] - 1
-        first, last = round(fault.start * last_frame), round(fault.stop * last_frame)
+        first, last = whole(fault.start * last_frame), whole(fault.stop * last_frame)
         inside = np.abs(self.scores[i, first : last + 1, part.features])
         # Without a value there is no departure.
         if np.isnan(inside).all():
             return None
-        of, frame = np.unravel_index(np.nanargmax(inside), inside.shape)
+        of, frame = np.unravel_index(first_largest(inside), inside.shape)
         feature, peak = part.features[of], first + int(frame)
         deviation, kind, size = fault.deviation, fault.kind, fault.size
         is_limb = part.region is not None and len(part.columns) > 1
@@ -430,7 +431,7 @@ def with_residuals(performances, groups, variance):
 
 def around_peak(scores, peak):
     """First and last frame around a peak in which scores are at least half of it; gaps between."""
-    enough = scores * np.sign(scores[peak]) >= _OF_PEAK * abs(scores[peak])
+    enough = scores * np.sign(scores[peak]) >= (_OF_PEAK - ROUNDING) * abs(scores[peak])
     fits = enough | np.isnan(scores)
     first, last = peak, peak
     while first > 0 and fits[first - 1]:
@@ -514,9 +515,10 @@ def runs(scores, limit):
     of = np.repeat(np.arange(len(first)), lengths)
     frames = np.arange(len(of)) - np.repeat(np.cumsum(lengths) - lengths - first, lengths)
     inside = size[performance[0][of], feature[0][of], frames]
-    # By run, the largest first, among equal ones the first frame.
-    order = np.lexsort((frames, -inside, of))[np.cumsum(lengths) - lengths]
-    peak = frames[order]
+    # Of each run the first of the frames with the largest score.
+    largest = np.maximum.reduceat(inside, np.cumsum(lengths) - lengths) if len(of) else inside
+    high = np.flatnonzero(inside >= largest[of] * (1 - ROUNDING))
+    peak = frames[high[np.unique(of[high], return_index=True)[1]]]
     score = scores[performance[0], feature[0], peak]
     return Runs(performance[0], feature[0], first, last, peak, score)
 

@@ -20,9 +20,10 @@ from ..body.mirror import exchange_of_sides
 from ..inputs.tables import index_of
 from ..inputs.types import Labels, PerformancesLike
 from ..inputs.validation import labels_of_input
-from ..utils.atomic import atomic_fit, snapshot
+from ..matching.counting import first_largest
+from ..matching.gaps import fill_with_mean, is_gappy
 from ..utils.doc_links import DocumentedMixin
-from ..utils.groups import encode_groups
+from ..utils.groups import encode_groups, group_counts
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
 from ..utils.pipelines import (
@@ -35,7 +36,6 @@ from ..utils.pipelines import (
 )
 from .acceptance import Acceptance, Contrast, LogPredictionInterval, log_tails, standardised_logs
 from .action_model import ActionModel
-from .hidden import fill_with_mean, group_counts, is_gappy
 from .personal import PersonalReference
 from .similarity import PerformanceStream, movement_energies
 from .views import curves_of
@@ -186,7 +186,6 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         self.duration = duration
         self.sides = sides
 
-    @atomic_fit
     @validated_with_nested
     def fit(
         self, X: PerformancesLike, y: object = None, groups: Labels | None = None, **params: Any
@@ -218,25 +217,38 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
             If the pipeline does not end in an `ActionModel` or has no synchronizer, if ``sides``
             is True and there are no limbs with a left and a right, and as from its ``fit``.
         """
-        self.estimator_ = clone(self.estimator)
-        name = self._check_steps()
+        pipeline = clone(self.estimator)
+        name = _check_steps(pipeline)
         groups = params.pop(name, None) if groups is None else groups
-        given = {} if groups is None else {name: groups}
+        fit_params = params if groups is None else {**params, name: groups}
         with self._progress(fits=True) as progress:
-            with progress.fitting(self.estimator_, "fitting the pipeline"):
-                self.estimator_.fit(X, y, **given, **params)
+            with progress.fitting(pipeline, "fitting the pipeline"):
+                pipeline.fit(X, y, **fit_params)
             also = {name.rpartition("__")[2]: value for name, value in params.items()}
-            steps = flat_steps(self.estimator_)[:-1]
-            takers = [getattr(step, "match", step.transform) for step in steps]
+            takers = [getattr(step, "match", step.transform) for step in flat_steps(pipeline)[:-1]]
             taken = [accepted_params(taker, also) for taker in takers]
             also = {name: value for params in taken for name, value in params.items()}
-            self._learn(X, also, groups)
-        for name in ("n_features_in_", "feature_names_in_"):
-            if hasattr(self.estimator_, name):
-                setattr(self, name, getattr(self.estimator_, name))
+            tests = self._learn(pipeline, X, also, groups)
+        self.estimator_, self._tests = pipeline, tests
+        self.borders_ = {
+            "movement": (0.0, tests.aligned.threshold_),
+            "course": (0.0, tests.unaligned.threshold_),
+            **{name: (each.lower, each.upper) for name, each in tests.intervals.items()},
+        }
+        self.images_ = [name for name in _REASONS if name in tests.contrasts]
+        self.offset_ = -1.0
         return self
 
-    @snapshot
+    @property
+    def n_features_in_(self) -> int:
+        """Features of a frame (columns, for 2-D input)."""
+        return self.estimator_.n_features_in_
+
+    @property
+    def feature_names_in_(self) -> np.ndarray:
+        """Names of the features; only if the input had names."""
+        return self.estimator_.feature_names_in_
+
     def predict(
         self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
     ) -> np.ndarray:
@@ -259,7 +271,6 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         """
         return np.where(self._scores(X, reference, params, "predict") <= 1, 1, -1)
 
-    @snapshot
     def decision_function(
         self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
     ) -> np.ndarray:
@@ -282,7 +293,6 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         """
         return 1 - self._scores(X, reference, params, "decision_function")
 
-    @snapshot
     def score_samples(
         self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
     ) -> np.ndarray:
@@ -305,7 +315,6 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         """
         return -self._scores(X, reference, params, "score_samples")
 
-    @snapshot
     def report(
         self, X: PerformancesLike, reference: PerformancesLike | None = None, **params: Any
     ) -> pd.DataFrame:
@@ -358,65 +367,51 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
         tags.input_tags.allow_nan = takes_gaps(self.estimator)
         return tags
 
-    def _check_steps(self):
-        """The name of the model's groups in the ``fit`` of the clone."""
-        steps = steps_to_fit(self.estimator_)
-        prefix, last = steps[-1] if steps else ("", None)
-        matching = any(hasattr(step, "match") for _, step in steps)
-        if not isinstance(last, ActionModel) or not matching:
-            raise ValueError(
-                "ActionDetector needs a pipeline that ends in an ActionModel and has a "
-                "synchronizer before it, such as make_pipeline(DenseSynchronizer(), "
-                f"ActionModel()); got the steps {[type(step).__name__ for _, step in steps]}."
-            )
-        if not get_config()["enable_metadata_routing"]:
-            return f"{prefix}groups"
-        last.set_fit_request(groups=True)
-        return "groups"
-
-    def _learn(self, X, params, groups):
-        """Estimate all tests from training performances."""
+    def _learn(self, pipeline, X, params, groups):
+        """All tests, by the training performances of a fitted pipeline."""
         caller = "ActionDetector.fit"
-        reached = route_to_synchronizer(self.estimator_, X, params, caller)
+        reached = route_to_synchronizer(pipeline, X, params, caller)
         performances, synchronizer = reached.performances, reached.synchronizer
         codes, _ = encode_groups(groups, len(performances), at_least=2)
         coverage = 1 - (1 - self.coverage) / (4 if self.duration else 3)
-        curves = curves_of(self.estimator_, X, params, caller)
-        self._columns = _seen_columns(curves.whole, codes)
-        whole, on_clock = curves.whole[..., self._columns], synchronizer.normalize(performances)
-        self._aligned = ActionModel(coverage=coverage).fit(whole, groups=codes)
-        self._unaligned = ActionModel(coverage=coverage).fit(on_clock, groups=codes)
-        models = {"movement": self._aligned, "course": self._unaligned}
-        self.borders_ = {name: (0.0, model.threshold_) for name, model in models.items()}
+        curves = curves_of(pipeline, X, params, caller)
+        columns = _seen_columns(curves.whole, codes)
+        whole, on_clock = curves.whole[..., columns], synchronizer.normalize(performances)
+        aligned = ActionModel(coverage=coverage).fit(whole, groups=codes)
+        unaligned = ActionModel(coverage=coverage).fit(on_clock, groups=codes)
         measures = {"duration": _durations(performances)} if self.duration else {}
-        measures["energy"], self._energy_floor = movement_energies(on_clock)
-        self._intervals = {
+        measures["energy"], energy_floor = movement_energies(on_clock)
+        intervals = {
             name: LogPredictionInterval(values, codes, coverage)
             for name, values in measures.items()
         }
-        self.borders_ |= {name: (i.lower, i.upper) for name, i in self._intervals.items()}
-        # The ends of an interval, in standard deviations.
         n = len(whole)
-        self._end = student.ppf((1 + coverage) / 2, n + 2) * np.sqrt(1 + 1 / n)
+        end = student.ppf((1 + coverage) / 2, n + 2) * np.sqrt(1 + 1 / n)
         tails = {
-            name: log_tails(standardised_logs(model.dissimilarities_), len(whole))
-            for name, model in models.items()
+            name: log_tails(standardised_logs(model.dissimilarities_), n)
+            for name, model in (("movement", aligned), ("course", unaligned))
         }
-        for name, interval in self._intervals.items():
-            tails[name] = log_tails(self._end * interval.deviations, len(whole), two_sided=True)
-        self._acceptance = Acceptance(tails, codes, self.coverage)
-        self._contrasts = self._learn_contrasts(whole, curves.names, codes)
-        self.images_ = [name for name in _REASONS if name in self._contrasts]
-        # Those that a reference is judged by, at most 64.
-        stream = PerformanceStream.starting_at(whole[0])
-        stream, _, is_kept = stream.extend(whole, codes)
-        self._stream, self._kept_tails = stream, {k: v[is_kept] for k, v in tails.items()}
-        self.offset_ = -1.0
+        for name, interval in intervals.items():
+            tails[name] = log_tails(end * interval.deviations, n, two_sided=True)
+        names = [curves.names[k] for k in columns]
+        stream, _, is_kept = PerformanceStream.starting_at(whole[0]).extend(whole, codes)
+        return _Tests(
+            columns,
+            aligned,
+            unaligned,
+            intervals,
+            end,
+            energy_floor,
+            Acceptance(tails, codes, self.coverage),
+            self._learn_contrasts(whole, aligned.mean_, names, codes),
+            stream,
+            {name: values[is_kept] for name, values in tails.items()},
+        )
 
-    def _learn_contrasts(self, whole, names, codes):
-        """Contrasts to images of the action that count."""
+    def _learn_contrasts(self, whole, mean, names, codes):
+        """Contrasts to images of the action that count, by their names."""
         exchanges = {"reversal": _reversed}
-        cosines = names_of_cosines(whole, [names[k] for k in self._columns])
+        cosines = names_of_cosines(whole, names)
         if self.sides is not False and cosines is not None:
             arms = [limb for part in ("left arm", "right arm") for limb in PARTS[part]]
             for name, limbs in (("mirror", None), ("arms", arms)):
@@ -428,7 +423,7 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
                 "sides=True needs limbs with a left and a right: put a DirectionCosines before the "
                 f"synchronizer. The features are {', '.join(names[:4])}, ..."
             )
-        filled = fill_with_mean(whole, self._aligned.mean_)
+        filled = fill_with_mean(whole, mean)
         found = {name: Contrast(filled, e, codes) for name, e in exchanges.items()}
         always = () if self.sides == "auto" else ("mirror", "arms")
         return {
@@ -438,54 +433,53 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
     def _test(self, X, reference, params, method):
         """All statistics of performances, and their scores."""
         check_is_fitted(self)
-        caller = f"ActionDetector.{method}"
+        tests, caller = self._tests, f"ActionDetector.{method}"
         try:
             reached = route_to_synchronizer(self.estimator_, X, params, caller, uses=("transform",))
             curves = curves_of(self.estimator_, X, params, caller)
             own = None
             if reference is not None:
-                own = curves_of(self.estimator_, reference, {}, caller).whole[..., self._columns]
-                own = fill_with_mean(own, self._aligned.mean_)
+                own = curves_of(self.estimator_, reference, {}, caller).whole[..., tests.columns]
+                own = fill_with_mean(own, tests.aligned.mean_)
         except MissingMetadata as error:
             reason, name, _ = error.args
             raise MissingMetadata(reason, name, f"{caller}(X, {{name}}=[...])") from error
-        performances, whole = reached.performances, curves.whole[..., self._columns]
+        performances, whole = reached.performances, curves.whole[..., tests.columns]
         on_clock = reached.synchronizer.normalize(performances)
-        statistics, tails = {}, {}
-        acceptance = self._acceptance
+        statistics, tails, acceptance = {}, {}, tests.acceptance
 
         def compare(name, dissimilarity, held_out, limit):
             statistics[name] = dissimilarity / limit
             tails[name] = log_tails(standardised_logs(held_out, dissimilarity), len(held_out))
 
-        model = self._aligned
+        model = tests.aligned
         compare("movement", model.dissimilarity(whole), model.dissimilarities_, model.threshold_)
         if own is not None:
-            stream = self._stream
+            stream = tests.stream
             kept, own = (x.astype(np.float64) for x in (stream.kept, own))
             person = PersonalReference(kept, stream.groups, stream.mean, own)
             known = np.isfinite(person.held_out)
             held_out, found = person.held_out[known], person.dissimilarity(whole)
             compare("own", found, held_out, person.limit(model.coverage))
-            held = {name: values[known] for name, values in self._kept_tails.items()}
+            held = {name: values[known] for name, values in tests.kept_tails.items()}
             held["own"] = log_tails(standardised_logs(held_out), len(held_out))
             acceptance = Acceptance(held, stream.groups[known], self.coverage, main="own")
-        model = self._unaligned
+        model = tests.unaligned
         compare("course", model.dissimilarity(on_clock), model.dissimilarities_, model.threshold_)
         measures = {
             "duration": _durations(performances),
-            "energy": movement_energies(on_clock, self._energy_floor)[0],
+            "energy": movement_energies(on_clock, tests.energy_floor)[0],
         }
         n = len(model.dissimilarities_)
-        for name, interval in self._intervals.items():
+        for name, interval in tests.intervals.items():
             statistics[name] = interval.standardize(measures[name])
-            tails[name] = log_tails(self._end * statistics[name], n, two_sided=True)
+            tails[name] = log_tails(tests.end * statistics[name], n, two_sided=True)
         scores = acceptance.scores(tails)
         # A person may differ from others, but not from the reference.
         alone = [values for name, values in statistics.items() if own is None or name != "movement"]
         far = np.abs(alone).max(axis=0) / _ALONE
-        filled = fill_with_mean(whole, self._aligned.mean_)
-        for name, contrast in self._contrasts.items():
+        filled = fill_with_mean(whole, tests.aligned.mean_)
+        for name, contrast in tests.contrasts.items():
             if own is not None and contrast.standardize(own).mean() > 1:
                 # The person does it the other way.
                 continue
@@ -497,6 +491,59 @@ class ActionDetector(DocumentedMixin, LongWorkMixin, MetaEstimatorMixin, BaseEst
 
     def _scores(self, X, reference, params, method):
         return self._test(X, reference, params, method).scores
+
+
+def _check_steps(pipeline):
+    """The name of the model's groups in the ``fit`` of a pipeline, which requests them."""
+    steps = steps_to_fit(pipeline)
+    prefix, last = steps[-1] if steps else ("", None)
+    matching = any(hasattr(step, "match") for _, step in steps)
+    if not isinstance(last, ActionModel) or not matching:
+        raise ValueError(
+            "ActionDetector needs a pipeline that ends in an ActionModel and has a "
+            "synchronizer before it, such as make_pipeline(DenseSynchronizer(), "
+            f"ActionModel()); got the steps {[type(step).__name__ for _, step in steps]}."
+        )
+    if not get_config()["enable_metadata_routing"]:
+        return f"{prefix}groups"
+    last.set_fit_request(groups=True)
+    return "groups"
+
+
+class _Tests(NamedTuple):
+    """What is learnt of training performances, for the tests of others.
+
+    Attributes
+    ----------
+    columns : ndarray of int
+        The features that are compared.
+    aligned, unaligned : ActionModel
+        Of performances after alignment, and after linear normalisation alone.
+    intervals : dict of str to LogPredictionInterval
+        Of durations, if they count, and energies.
+    end : float
+        The ends of an interval, in standard deviations.
+    energy_floor : float
+        The energy of standing still.
+    acceptance : Acceptance
+    contrasts : dict of str to Contrast
+        To the images that count.
+    stream : PerformanceStream
+        Those that a reference is judged by, at most 64.
+    kept_tails : dict of str to ndarray (n_kept,)
+        Their log-probabilities in each test.
+    """
+
+    columns: np.ndarray
+    aligned: ActionModel
+    unaligned: ActionModel
+    intervals: dict
+    end: float
+    energy_floor: float
+    acceptance: Acceptance
+    contrasts: dict
+    stream: PerformanceStream
+    kept_tails: dict
 
 
 class _Tested(NamedTuple):
@@ -551,7 +598,7 @@ def _reasons(found):
         beyond = [name for name in beyond if name in _TWO_SIDED or values[name] > 1]
         if not beyond:
             # No test alone: the one that adds most.
-            beyond = [found.names[int(found.shares[i].argmax())]]
+            beyond = [found.names[first_largest(found.shares[i])]]
         if "movement" in beyond:
             # Another movement has another course.
             beyond = [name for name in beyond if name != "course"]

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..matching.counting import first_largest
 from .similarity import t_prediction_limit
 from .variation import predictive_variance, within_variance
 
@@ -216,7 +217,7 @@ class Expectation:
             return np.zeros(len(self.parts)), np.zeros(len(self.parts))
         sums = np.einsum("lpf,pf->lf", self._shifts, weighed, optimize=True) @ self._belongs
         gains = 2 * sums - self._shift_norms
-        best = gains.argmax(axis=0)
+        best = first_largest(gains, axis=0)
         largest = gains[best, np.arange(len(self.parts))]
         return np.maximum(largest, 0), np.where(largest > 0, self.lags[best], 0)
 
@@ -333,10 +334,10 @@ class FaultFinder:
         of_late = None if later is None else self._evidence(self._late, later)
         total = self._total(evidence, of_late)
         total = np.where(is_open, total, -1)
-        part = int(total.argmax())
+        part = first_largest(total)
         if not total[part] > 0:
             return None, None
-        window = int(evidence.windows[:, part].argmax())
+        window = first_largest(evidence.windows[:, part])
         off = max(evidence.windows[window, part], _SMALLEST)
         # By how much of what a window explains a lag, or another amplitude, explains it.
         share, lag = evidence.lag_gains[part] / off, evidence.lags[part]

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from ..matching.gaps import fill_with_mean
 from ..utils.groups import mean_of_others, sums_of_groups
-from .hidden import fill_with_mean
 from .similarity import LogMoments, Neighbours, learn_weights, log_moments
 from .variation import within_variance
 

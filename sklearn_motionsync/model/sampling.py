@@ -5,6 +5,7 @@ from scipy.special import ndtr, ndtri
 
 from ..body.limbs import unit_vectors
 from ..body.sphere import exp_map, log_map, mean_direction
+from ..matching.counting import first_smallest
 
 __all__ = ["PERFORMANCE", "POSTURE", "sample_performances", "sample_postures"]
 
@@ -93,7 +94,7 @@ def sample_performances(
     known = space.coordinates
     of_known = dissimilarity(space.performances(known))
     inside = np.flatnonzero(of_known <= threshold)
-    centers = inside if len(inside) else np.array([np.argmin(of_known)])
+    centers = inside if len(inside) else np.array([first_smallest(of_known)])
     own = centers[random_state.randint(len(centers), size=n)]
     weights = _mixtures(own, len(known), *shares, random_state)
     drawn = np.tensordot(weights, known - known.mean(axis=0), axes=1)

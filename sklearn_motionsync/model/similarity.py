@@ -7,10 +7,10 @@ import numpy as np
 from scipy.stats import t as student
 
 from ..matching.filters import smooth
+from ..matching.gaps import fill_with_mean, is_gappy
 from ..matching.warps import even_slices
 from ..utils.groups import encode_groups
-from ..utils.threads import on_one_thread
-from .hidden import fill_with_mean, is_gappy
+from ..utils.parallel import one_blas_thread
 
 __all__ = [
     "DIFFERENCES",
@@ -73,7 +73,8 @@ def _distances_by_products(a, b):
     tiles = np.zeros((-(-len(a) // _TILE), _TILE, a.shape[1]))
     tiles.reshape(-1, a.shape[1])[: len(a)] = a
     # Products of eight rows are too small to be shared by threads.
-    products = on_one_thread(np.matmul, tiles, b.T).reshape(-1, len(b))[: len(a)]
+    with one_blas_thread():
+        products = (tiles @ b.T).reshape(-1, len(b))[: len(a)]
     return np.maximum(squares - 2 * products, 0)
 
 

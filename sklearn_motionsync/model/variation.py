@@ -7,8 +7,8 @@ Performances of one person resemble each other, so all is estimated from how peo
 import numpy as np
 from sklearn.utils import check_random_state
 
-from ..utils.groups import mean_of_others, sums_of_groups
-from .hidden import group_counts, is_gappy, mean_of_other_groups
+from ..matching.gaps import is_gappy
+from ..utils.groups import group_counts, mean_of_other_groups, mean_of_others, sums_of_groups
 from .similarity import t_prediction_limit
 
 __all__ = [

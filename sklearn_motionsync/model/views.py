@@ -13,6 +13,7 @@ from ..body.limbs import LIMB_NAMES, limb_indices, unit_vectors
 from ..inputs.collections import as_collection
 from ..inputs.features import as_features, names_of_features
 from ..inputs.validation import check_performances, labels_of_input
+from ..matching.counting import first_largest
 from ..transformers.aspace import ASpace
 from ..utils.pipelines import (
     accepted_params,
@@ -415,7 +416,7 @@ def models_of_classes(estimator, X, params, caller, only=None):
     chosen = np.arange(len(performances))
     if only is not None:
         chosen = chosen[[only(len(performances))]]
-    columns = classifier.predict_proba(performances.take(chosen)).argmax(axis=1)
+    columns = first_largest(classifier.predict_proba(performances.take(chosen)), axis=1)
     collection, all_labels = as_collection(X), labels_of_input(X, performances)[0]
     steps, models = [] if before is None else before.steps, []
     for column in dict.fromkeys(columns.tolist()):

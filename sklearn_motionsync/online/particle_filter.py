@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..matching.counting import ROUNDING
 from ..matching.warps import at_times
 from .kalman import DeviationFilter, squared_norms, whitening
 from .state_space import CausalSlopes, exponential_average
@@ -253,7 +254,7 @@ def systematic_resampling(weights, start, n):
 
 
 def weighted_median(values, weights):
-    """The smallest value up to which half of the weight lies."""
+    """The smallest value up to which half of the weight lies, but for rounding."""
     order = np.argsort(values, kind="stable")
     edges = np.cumsum(weights[order])
-    return float(values[order[np.searchsorted(edges, 0.5 * edges[-1])]])
+    return float(values[order[np.searchsorted(edges, (0.5 - ROUNDING) * edges[-1])]])

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ..inputs.numbers import LARGEST, SMALLEST, as_numbers, check_finite, check_names
-from ..matching.causal import CausalDerivative
+from .causal import CausalDerivative
 
 __all__ = ["LivePhase", "Session", "Streams", "check_observations", "check_times", "time_left"]
 

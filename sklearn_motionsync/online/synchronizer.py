@@ -17,7 +17,6 @@ from ..inputs.numbers import check_magnitude
 from ..inputs.types import Indexed, NumbersLike, PerformancesLike, SupportsArray, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, check_performances, names_of_input
 from ..inputs.wording import counted
-from ..matching.causal import CausalTrellis, causal_velocity
 from ..matching.costs import step_table
 from ..matching.filters import SMOOTHING
 from ..matching.matcher import cost_features
@@ -27,10 +26,10 @@ from ..matching.warps import normalise
 from ..matching.warps import sample as sample_at
 from ..synchronizers.base import Synchronizer
 from ..synchronizers.dense import DenseSynchronizer
-from ..utils.atomic import atomic_fit
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
+from .causal import CausalTrellis, causal_velocity
 from .stream import (
     LivePhase,
     Session,
@@ -199,7 +198,6 @@ class OnlineSynchronizer(
         self.max_rate = max_rate
         self.cyclic = cyclic
 
-    @atomic_fit
     @validated_with_nested
     def fit(
         self,
@@ -231,27 +229,35 @@ class OnlineSynchronizer(
         """
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
         performances = self._check_training_set(X)
-        given = {} if keyframes is None else {"keyframes": keyframes}
+        metadata = {} if keyframes is None else {"keyframes": keyframes}
         with self._progress(fits=True) as progress:
             with progress.fitting(sync, "synchronizing"):
-                self.synchronizer_ = sync.fit(X, y, **given)
-            match = sync.match(X, **given)
+                sync.fit(X, y, **metadata)
+            match = sync.match(X, **metadata)
             warped = match.warp(performances)
-            self.n_frames_ = sync.n_frames_
             if self.cyclic:
                 check_cycles(sync.features_.unit(warped.mean(axis=0)))
                 performances, warped = list(map(closed, performances)), closed(warped)
-            self.mean_ = warped.mean(axis=0)
-            self.duration_ = float(np.mean([len(x) for x in performances]) - 1)
-            settings = self.duration_, self.smoothness, self.velocity_smoothing, self.max_rate
+            mean = warped.mean(axis=0)
+            duration = float(np.mean([len(x) for x in performances]) - 1)
 
             def reference_of(mean, *calibration):
-                return Reference(sync.features_, mean, *settings, *calibration, cyclic=self.cyclic)
+                return Reference(
+                    sync.features_,
+                    mean,
+                    duration,
+                    self.smoothness,
+                    self.velocity_smoothing,
+                    self.max_rate,
+                    *calibration,
+                    cyclic=self.cyclic,
+                )
 
             calibration = calibrate(reference_of, performances, warped, match.times, progress)
-            restart_cost = _RESTART * calibration[0]
-            self._reference = reference_of(self.mean_, *calibration, restart_cost)
-            self._session = None
+            reference = reference_of(mean, *calibration, _RESTART * calibration[0])
+        self.synchronizer_, self.n_frames_ = sync, sync.n_frames_
+        self.mean_, self.duration_ = mean, duration
+        self._reference, self._session = reference, None
         return self
 
     def step(self, frame: NumbersLike, time: float | None = None) -> LivePhase:
@@ -280,7 +286,7 @@ class OnlineSynchronizer(
             frames. The performance then goes on as if the frame had not been given.
         """
         if "_session" not in vars(self):
-            check_is_fitted(self)
+            check_is_fitted(self, "mean_")
         width = self.mean_.shape[1]
         frame = check_observations(frame, "The frame", names_of_input(self), width, (1, 2))
         largest = np.abs(frame).max(initial=0.0, where=~np.isnan(frame))
@@ -301,7 +307,7 @@ class OnlineSynchronizer(
             Of several performances those that end, while the others go on. None: all of
             them, and time begins again, too.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "mean_")
         if stream is None:
             self._session = None
             return
@@ -329,7 +335,7 @@ class OnlineSynchronizer(
         float, or ndarray of shape (n_streams,)
             Seconds if there is a ``frame_rate``, else frames of the training performances.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "mean_")
         session = self._session
         left = self._reference.duration if session is None else session.time_left()
         return left if self.frame_rate is None else left / self.frame_rate
@@ -340,7 +346,7 @@ class OnlineSynchronizer(
 
         Of a long stream these are the last 100,000 frames.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "mean_")
         if self._session is None:
             return stack_phases([])
         return stack_phases(self._session.history)
@@ -369,7 +375,7 @@ class OnlineSynchronizer(
         ValueError
             As from ``step``; or if there are not as many times as performances.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "mean_")
         performances = check_performances(
             self,
             X,

@@ -21,12 +21,10 @@ from ..inputs.types import Indexed, Labels, NumbersLike, PerformancesLike, Rando
 from ..inputs.validation import SequenceLevelMixin, names_of_input
 from ..synchronizers.dense import DenseSynchronizer
 from ..synchronizers.match import check_match
-from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import encode_groups
-from ..utils.parallel import LongWorkMixin
+from ..utils.parallel import LongWorkMixin, one_blas_thread
 from ..utils.parameters import validated
-from ..utils.threads import on_one_thread
 from .members import RunningTake, Track, filter_take, smooth_take, stack_frames
 from .observations import Observer, check_projection
 from .state_space import Clock, TrackerModel
@@ -183,7 +181,6 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         self.frame_rate = frame_rate
         self.random_state = random_state
 
-    @atomic_fit
     @validated
     def fit(self, X: PerformancesLike, y: object = None, groups: Labels | None = None) -> Self:
         """Learn the mean, the deviations of people, and their rates.
@@ -219,31 +216,32 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         sync = DenseSynchronizer() if self.synchronizer is None else clone(self.synchronizer)
         with self._progress(fits=True) as progress:
             with progress.fitting(sync, "synchronizing"):
-                self.synchronizer_ = sync.fit(X)
+                sync.fit(X)
             match = sync.match(X)
             check_match(match, n, sync.n_frames_, type(sync).__name__)
             warped = match.warp(performances)
             durations = np.array([len(x) for x in performances], dtype=np.float64) - 1
-            self.n_frames_, self.duration_ = int(sync.n_frames_), float(durations.mean())
-            clock = Clock(self.n_frames_ - 1.0, self.duration_)
+            clock = Clock(int(sync.n_frames_) - 1.0, float(durations.mean()))
             rates = clock.duration / durations[:, np.newaxis] / match.rates
             warped = warped.astype(np.float64)
             noise = self._noise_of(warped.mean(axis=0))
-            settings = noise, self.tempering, self.n_particles
-            given = warped, rates, codes, clock
-            learnt = progress.stage("learning how people vary", 1)
-            self._model = on_one_thread(TrackerModel.learn, *given, *settings)
-            learnt()
-            self.mean_ = self._model.mean.astype(performances[0].dtype)
-            self.covariance_ = self._model.process.covariance
-            self.length_scale_ = float(np.sqrt(3) / self._model.process.decay)
-            self.rate_spread_, self.rate_memory_ = self._model.rates
-            self.surprise_limit_, self.departure_limit_ = map(float, self._model.nis_limits)
-            self._seed = int(check_random_state(self.random_state).randint(2**31 - 1))
-            self._running = None
+            step = progress.stage("learning how people vary", 1)
+            with one_blas_thread():
+                model = TrackerModel.learn(
+                    warped, rates, codes, clock, noise, self.tempering, self.n_particles
+                )
+            step()
+        seed = int(check_random_state(self.random_state).randint(2**31 - 1))
+        self.synchronizer_, self.n_frames_ = sync, int(sync.n_frames_)
+        self.duration_ = clock.duration
+        self.mean_ = model.mean.astype(performances[0].dtype)
+        self.covariance_ = model.process.covariance
+        self.length_scale_ = float(np.sqrt(3) / model.process.decay)
+        self.rate_spread_, self.rate_memory_ = model.rates
+        self.surprise_limit_, self.departure_limit_ = map(float, model.nis_limits)
+        self._model, self._seed, self._running = model, seed, None
         return self
 
-    @snapshot
     def track(
         self,
         X: PerformancesLike,
@@ -276,7 +274,6 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         """
         return self._estimate(filter_take, X, times, projection)
 
-    @snapshot
     def smooth(
         self,
         X: PerformancesLike,
@@ -313,7 +310,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
 
     def reset(self) -> None:
         """End the running take: the next observation of ``step`` is the first of another."""
-        check_is_fitted(self)
+        check_is_fitted(self, "mean_")
         self._running = None
 
     def step(
@@ -344,7 +341,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         ValueError
             As from ``track``, or if time does not increase. The take is then as it was before.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "mean_")
         names = names_of_input(self) if projection is None else None
         observer, offset = self._observer(projection)
         what = "The observation"
@@ -353,7 +350,8 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         time = float(check_times(time, 1, self.frame_rate, what, last)[0])
         if self._running is None:
             self._running = RunningTake(self._model, self._seed, time, len(offset))
-        frame = on_one_thread(self._running.step, values - offset, time, observer)
+        with one_blas_thread():
+            frame = self._running.step(values - offset, time, observer)
         return Track(*(part[0] for part in stack_frames([frame], self.mean_.dtype)))
 
     def __sklearn_tags__(self):
@@ -377,7 +375,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
         return Observer(matrix, deviation**2 * np.eye(len(matrix))), offset
 
     def _estimate(self, method, X, times, projection):
-        check_is_fitted(self)
+        check_is_fitted(self, "mean_")
         names = names_of_input(self) if projection is None else None
         observer, offset = self._observer(projection)
         sequences = as_collection(X)
@@ -405,7 +403,7 @@ class MotionTracker(DocumentedMixin, LongWorkMixin, SequenceLevelMixin, BaseEsti
             values = check_observations(x, what, names, len(offset), (2,))
             t = check_times(t, len(values), self.frame_rate, what)
             # The matrices are small: several threads would wait for each other.
-            take = values - offset, t, observer
-            frames = on_one_thread(method, self._model, self._seed, *take)
+            with one_blas_thread():
+                frames = method(self._model, self._seed, values - offset, t, observer)
             tracks.append(stack_frames(frames, self.mean_.dtype))
         return tracks[0] if single else tracks

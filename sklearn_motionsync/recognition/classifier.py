@@ -19,16 +19,16 @@ from sklearn.utils.validation import check_is_fitted
 from ..inputs.types import Cost, Labels, PerformancesLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin
 from ..matching.costs import COSTS
-from ..matching.pairwise import PairwiseDistance
+from ..matching.counting import first_largest
 from ..model.action_model import ActionModel
 from ..synchronizers.dense import DenseSynchronizer
-from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.groups import add_unknown_label, encode_classes, encode_groups
 from ..utils.parallel import LongWorkMixin, run
 from ..utils.parameters import validated
 from .distances import SETTINGS
 from .kernel import MotionKernel
+from .pairwise import PairwiseDistance
 from .regression import assign_folds, decision_values, fit_regression
 
 __all__ = ["ActionClassifier"]
@@ -206,7 +206,6 @@ class ActionClassifier(
         self.n_jobs = n_jobs
         self.verbose = verbose
 
-    @atomic_fit
     @validated
     def fit(self, X: PerformancesLike, y: Labels, groups: Labels | None = None) -> Self:
         """Fit the kernel, the regression and the temperature.
@@ -235,24 +234,26 @@ class ActionClassifier(
             self._comparisons(), self.gamma, self.summaries, n_frames=int(self.n_frames)
         )
         performances = self._check_training_set(X)
-        self.classes_, codes = encode_classes(y, performances, type(self).__name__)
+        classes, codes = encode_classes(y, performances, type(self).__name__)
         if groups is not None:
             groups, _ = encode_groups(groups, len(performances), at_least=2)
-        self.landmarks_ = choose_landmarks(codes, groups, self.n_landmarks)
+        landmarks = choose_landmarks(codes, groups, self.n_landmarks)
         with self._progress(fits=True) as progress:
-            jobs = {"n_jobs": self.n_jobs, "progress": progress}
-            matrix = kernel.fit(performances, self.landmarks_, codes, groups, **jobs)
+            matrix = kernel.fit(
+                performances, landmarks, codes, groups, n_jobs=self.n_jobs, progress=progress
+            )
             folds = assign_folds(codes, groups)
-            fit_in_portion = partial(fit_regression, self.C, folds, self.landmarks_)
-            (found,) = run(fit_in_portion, [(matrix, codes)], step=progress.stage("regression", 1))
-        self._regression, self.temperature_ = found.regression, found.temperature
-        self.held_out_, self.held_out_gain_ = found.held_out, found.gain
+            fit_in_portion = partial(fit_regression, self.C, folds, landmarks)
+            step = progress.stage("regression", 1)
+            (result,) = run(fit_in_portion, [(matrix, codes)], step=step)
+        self.classes_, self.landmarks_ = classes, landmarks
+        self._regression, self.temperature_ = result.regression, result.temperature
+        self.held_out_, self.held_out_gain_ = result.held_out, result.gain
         self._kernel, self.weights_ = kernel, kernel.weights
         # Copies, which do not change with the user's arrays.
         self._training = [np.array(x) for x in performances], codes, groups
         return self
 
-    @snapshot
     def predict(self, X: PerformancesLike) -> np.ndarray:
         """The class of each performance.
 
@@ -268,7 +269,7 @@ class ActionClassifier(
             None, the dtype holds both: with classes of 8 bits without sign, and -1, it is int64.
         """
         decisions = self._decisions(X)
-        codes = decisions.argmax(axis=1)
+        codes = first_largest(decisions, axis=1)
         threshold = self.reject_below
         if threshold is None:
             return self.classes_[codes]
@@ -298,7 +299,6 @@ class ActionClassifier(
         """
         return float(super().score(X, y, sample_weight))
 
-    @snapshot
     def predict_proba(self, X: PerformancesLike) -> np.ndarray:
         """The probability of each class, given that a performance is one of them.
 
@@ -315,7 +315,6 @@ class ActionClassifier(
         decisions = self._decisions(X)
         return softmax(self.temperature_ * decisions, axis=1)
 
-    @snapshot
     def decision_function(self, X: PerformancesLike) -> np.ndarray:
         """Decision values of the classes.
 
@@ -332,7 +331,6 @@ class ActionClassifier(
         decisions = self._decisions(X)
         return decisions if len(self.classes_) > 2 else decisions[:, 1] - decisions[:, 0]
 
-    @snapshot
     def score_samples(self, X: PerformancesLike) -> np.ndarray:
         """The largest decision value of performances: their similarity to any class.
 
@@ -348,7 +346,6 @@ class ActionClassifier(
         """
         return self._decisions(X).max(axis=1)
 
-    @snapshot
     def threshold_at(self, coverage: float) -> float:
         """The ``reject_below`` that keeps a share of performances of the known actions.
 
@@ -368,7 +365,7 @@ class ActionClassifier(
         ValueError
             If it is no share, or no performance could be held out.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "classes_")
         if not (isinstance(coverage, Real) and 0 < coverage < 1):
             raise ValueError(f"coverage must be a share between 0 and 1, got {coverage!r}.")
         known = self.held_out_[np.isfinite(self.held_out_)]
@@ -379,7 +376,6 @@ class ActionClassifier(
             )
         return float(np.quantile(known, 1 - coverage) + self.held_out_gain_)
 
-    @snapshot
     def model_of(self, label: Hashable) -> Pipeline:
         """Fit a model of a class, to explain a prediction.
 
@@ -401,7 +397,7 @@ class ActionClassifier(
         ValueError
             If there is no such class, or it has one performance only.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "classes_")
         performances, codes, groups = self._training
         match = np.flatnonzero(self.classes_ == label)
         if not len(match):
@@ -452,6 +448,7 @@ class ActionClassifier(
 
     def _decisions(self, X):
         """Decision values of performances: (n_sequences, n_classes)."""
+        check_is_fitted(self, "classes_")
         performances = self.check_performances(X)
         with self._progress(fits=False) as progress:
             kernel = self._kernel(performances, n_jobs=self.n_jobs, progress=progress)

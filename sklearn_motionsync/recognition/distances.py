@@ -12,10 +12,10 @@ from ..inputs.types import Cost, PerformancesLike
 from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..inputs.wording import counted
 from ..matching.costs import COSTS
-from ..matching.pairwise import PairwiseDistance, blocks_of_pairs
 from ..matching.warps import normalise
 from ..utils.parallel import Progress, SharedArgument, run
 from ..utils.parameters import validated_function
+from .pairwise import PairwiseDistance, blocks_of_pairs
 
 __all__ = ["SETTINGS", "normalise_time", "pairwise_distances", "synchronization_distances"]
 

@@ -44,7 +44,7 @@ def draw_signals(trials, shown, params):
         aligned.match.times,
         feature_names=[trials.signals[i] for i in shown],
         pattern=None if template is None else aligned.curves[template][:, shown],
-        groups=trials.known.get("group"),
+        groups=trials.design.get("group"),
         unit=aligned.unit,
         frame_rate=clock_rate(aligned.clock),
         pattern_keyframes=named_keyframes(aligned.reached.synchronizer, params.get("keyframes")),
@@ -62,7 +62,7 @@ def draw_offsets(trials, params):
     offsets, clock = aligned.offsets, aligned.clock
     axis_of_time = TimeAxis(aligned.unit, len(clock), None, clock_rate(clock))
     figure, (axis,) = panels(None, [(0, 0)], 1, 1, (WIDTH, 3.4))
-    names = list(trials.known.get("group", [""] * len(offsets)))
+    names = list(trials.design.get("group", [""] * len(offsets)))
     styles = group_styles(names)
     colors = [styles[name][0] for name in names]
     curves(axis, [clock] * len(offsets), offsets, colors=colors, linewidths=0.9, alpha=0.4)
@@ -77,6 +77,6 @@ def draw_offsets(trials, params):
     keyframes = named_keyframes(aligned.reached.synchronizer, params.get("keyframes"))
     if keyframes is not None:
         draw_keyframes(axis, axis_of_time.convert(keyframes.to_numpy()), keyframes.index)
-    labels = [f"mean of {name}" for name in styles] if "group" in trials.known else ["their mean"]
+    labels = [f"mean of {name}" for name in styles] if "group" in trials.design else ["their mean"]
     legend_above([axis], means, labels)
     return figure

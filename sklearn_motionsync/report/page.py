@@ -13,6 +13,7 @@ from string import Template
 import numpy as np
 
 from ..display.drawing import pyplot
+from ..matching.counting import whole
 
 __all__ = [
     "Page",
@@ -177,7 +178,7 @@ def number(value, largest=None):
     if np.isnan(value):
         return ""
     size = abs(value if largest is None else largest)
-    digits = int(np.clip(2 - np.floor(np.log10(size)), 0, 6)) if size > 0 else 0
+    digits = min(max(2 - whole(np.log10(size), "down"), 0), 6) if size > 0 else 0
     # The sum makes 0 of -0.
     return f"{round(value, digits) + 0:.{digits}f}"
 

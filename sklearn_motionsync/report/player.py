@@ -117,15 +117,16 @@ def write_player(
     '<!DOCTYPE html>'
     """
     path = check_path(path, "player")
-    given, X = X, as_performances(X)
-    n = len(X)
+    performances = as_performances(X)
+    n = len(performances)
     if n > MOST_SHOWN:
         raise ValueError(
             f"X has {n} performances, and a player shows {MOST_SHOWN} side by side at most: choose "
             f"some of them, such as X[:{MOST_SHOWN}]."
         )
-    names = as_names(labels_as_text(X) if names is None else names, n, "names", "performances")
-    bodies = [_points(x, skeleton, i) for i, x in enumerate(X)]
+    names = labels_as_text(performances) if names is None else names
+    names = as_names(names, n, "names", "performances")
+    bodies = [_points(x, skeleton, i) for i, x in enumerate(performances)]
     for i, (points, _, _) in enumerate(bodies):
         if len(points) < 2:
             raise ValueError(
@@ -136,10 +137,10 @@ def write_player(
                 f"Performance {i} has {points.shape[1:]} points and axes, and performance 0 "
                 f"{bodies[0][0].shape[1:]}; all must have the same."
             )
-    lengths, rates = np.array([len(points) for points, _, _ in bodies]), rates_of(given, frame_rate)
+    lengths, rates = np.array([len(points) for points, _, _ in bodies]), rates_of(X, frame_rate)
     seconds = None if rates is None else (lengths - 1) / np.ravel(as_frame_rates(rates, n))
     if match is not None and not isinstance(match, Match):
-        match = Match.from_estimator(match, given)
+        match = Match.from_estimator(match, X)
     if match is not None and len(match.times) != n:
         raise ValueError(
             f"match must be of the {counted(n, 'performance')} of X, got one of "
@@ -166,18 +167,18 @@ def _marks(keyframes, lengths, times):
             f"Key-frame {k} of performance {i} is {frames[i, k]:g}, and its frames are from 0 to "
             f"{lengths[i] - 1}: give frames of each performance."
         )
-    for k, own in enumerate(shares.T):
+    for k, of_trials in enumerate(shares.T):
         clock = None
-        if times is not None and np.isfinite(own).any():
+        if times is not None and np.isfinite(of_trials).any():
             last = times.shape[1] - 1
             places = [
                 np.interp(x * last, tau, np.arange(last + 1))
-                for x, tau in zip(own, times, strict=True)
+                for x, tau in zip(of_trials, times, strict=True)
             ]
             clock = float(np.nanmedian(places)) / last
-        known = [None if np.isnan(x) else float(x) for x in own]
+        of_trials = [None if np.isnan(x) else float(x) for x in of_trials]
         name = names[k] if names else f"key-frame {k}"
-        out.append({"name": name, "own": known, "clock": clock})
+        out.append({"name": name, "own": of_trials, "clock": clock})
     return out
 
 
@@ -194,13 +195,13 @@ def bodies_of(estimator, X, params):
     before, synchronizer = find_synchronizer(estimator)
     steps = [] if before is None else flat_steps(before)
     for k, step in enumerate(steps):
-        for part in union_transformers(step):
-            if isinstance(part, PositionsTransformer):
+        for transformer in union_transformers(step):
+            if isinstance(transformer, PositionsTransformer):
                 earlier = make_pipeline(*steps[:k]) if k else None
                 # Later ones take the other params.
                 also = [*(later.transform for later in steps[k:]), synchronizer.match]
                 X = transform_through(earlier, X, params, "write_report", also=also)
-                return X, part.skeleton
+                return X, transformer.skeleton
     return X, None
 
 
@@ -252,14 +253,14 @@ def data_of_bodies(bodies, names, seconds=None, times=None, keyframes=()):
     bones, dots = bodies[0][1:]
     lengths = np.array([len(points) for points, _, _ in bodies])
     width = int(np.prod(bodies[0][0].shape[1:]))
-    longest, kept = _longest(lengths, max(MOST_COORDINATES // width, 2 * len(bodies))), []
+    longest, positions = _longest(lengths, max(MOST_COORDINATES // width, 2 * len(bodies))), []
     for points, _, _ in bodies:
         if len(points) > longest:
             even = match_of_times([np.arange(float(longest))], 1)
             flat = points.reshape(len(points), -1)
             points = even.warp([flat])[0].reshape(longest, *points.shape[1:])
-        kept.append(points)
-    every = np.concatenate(kept)
+        positions.append(points)
+    every = np.concatenate(positions)
     scale = np.nanmax(np.abs(every)) / _LARGEST or 1.0
     durations = lengths - 1.0 if seconds is None else seconds
     middle = float(np.median(durations))
@@ -273,7 +274,7 @@ def data_of_bodies(bodies, names, seconds=None, times=None, keyframes=()):
         "lengths": lengths.tolist(),
         "median": middle,
         "pace": 1.0 if seconds is not None else _UNKNOWN / middle,
-        "counts": [len(x) for x in kept],
+        "counts": [len(points) for points in positions],
         "points": every.shape[1],
         "dims": every.shape[2],
         "positions": _packed(np.where(np.isnan(every), _MISSING, every / scale), "<i2"),

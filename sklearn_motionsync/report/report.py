@@ -152,21 +152,37 @@ def write_report(
             f"{{'trial 7': 'the marker fell off'}}, or None; got {left_out!r:.80}."
         )
     with own_figures():
-        given = {"signals": signals, "features": features, "unit": unit, "frame_rate": frame_rate}
-        aligned = AlignedCurves.of(estimator, X, params, "write_report", **given)
-        found = figure = None
+        aligned = AlignedCurves.of(
+            estimator,
+            X,
+            params,
+            "write_report",
+            signals=signals,
+            features=features,
+            unit=unit,
+            frame_rate=frame_rate,
+        )
+        comparison = figure = None
         if groups is not None or covariate is not None or paired:
-            design = {"people": people, "paired": paired, "covariate": covariate}
-            found = compare_aligned(aligned, groups, **design, random_state=random_state)
-            drawn = display_of_groups(aligned, groups, people, found, params, features=features)
-            figure = drawn.plot().figure_
+            comparison = compare_aligned(
+                aligned,
+                groups,
+                covariate=covariate,
+                people=people,
+                paired=paired,
+                random_state=random_state,
+            )
+            display = display_of_groups(
+                aligned, groups, people, comparison, params, features=features
+            )
+            figure = display.plot().figure_
         trials = TrialSet.of(X, aligned, frame_rate, groups, people, covariate)
         page = Page()
         _add_set(page, trials, estimator, left_out)
         _add_signals(page, trials, features, params)
         _add_timing(page, trials, params)
-        if found is not None:
-            _add_test(page, found, figure, groups is not None)
+        if comparison is not None:
+            _add_test(page, comparison, figure, groups is not None)
         _add_doubtful(page, trials)
         bodies = X
         if skeleton is None:
@@ -181,10 +197,10 @@ def write_report(
 
 def _add_set(page, trials, estimator, left_out):
     text = counted(len(trials.names), "trial")
-    if "person" in trials.known:
-        n_people = trials.known["person"].nunique()
+    if "person" in trials.design:
+        n_people = trials.design["person"].nunique()
         text += f" of {n_people} {'person' if n_people == 1 else 'people'}"
-    if "group" in trials.known:
+    if "group" in trials.design:
         text += f" in {counted(len(trials.of_groups.labels), 'group')}"
     template = "The template is none of these trials."
     if trials.template is not None:
@@ -212,10 +228,10 @@ def _add_signals(page, trials, features, params):
         shown = choose_features(None, trials.signals)
         note = f"The figure shows {len(shown)} of {len(trials.signals)} signals."
     spread = trials.spread()
-    left, finding = spread["left (%)"].dropna(), ""
-    if len(left):
-        share = f"{left.min():.0f}"
-        share += f" to {left.max():.0f}" if f"{left.max():.0f}" != share else ""
+    shares, finding = spread["left (%)"].dropna(), ""
+    if len(shares):
+        share = f"{shares.min():.0f}"
+        share += f" to {shares.max():.0f}" if f"{shares.max():.0f}" != share else ""
         finding = (
             f"Of the standard deviation between time-normalised trials, {share} % is left after "
             "alignment."
@@ -231,7 +247,7 @@ def _add_signals(page, trials, features, params):
         ),
         paragraph(note),
         table_of(spread, "Standard deviation between trials", ("time-normalised", "aligned"))
-        if len(left)
+        if len(shares)
         else "",
         page.offer(aligned_curves=curves),
         paragraph(_of_frames(trials)),
@@ -249,7 +265,7 @@ def _add_timing(page, trials, params):
     )
     if offset == 0:
         finding = "No trial is later or earlier than the template."
-    columns = [name for name in table if name not in ("covariate", "template", "doubtful", "mode")]
+    columns = [name for name in table if name not in ("covariate", "template", "doubtful")]
     timing, _ = trials.by_frame()
     page.add(
         "Timing",
@@ -262,7 +278,7 @@ def _add_timing(page, trials, params):
             draw_offsets(trials, params),
             f"Offsets of {counted(len(trials.names), 'trial')} along the template. {finding}",
         ),
-        table_of(trials.timing(), "Offsets of groups") if "group" in trials.known else "",
+        table_of(trials.timing(), "Offsets of groups") if "group" in trials.design else "",
         table_of(table[columns], "Offsets of trials"),
         page.offer(trials=table, timing=timing),
         paragraph(_of_frames(trials)),
@@ -276,8 +292,8 @@ def _of_frames(trials):
     return f"To keep this file small, its table has one of every {trials.step} frames."
 
 
-def _add_test(page, found, figure, is_of_groups):
-    clusters, unit = found.clusters, UNITS[found.unit]
+def _add_test(page, comparison, figure, is_of_groups):
+    clusters, unit = comparison.clusters, UNITS[comparison.unit]
     shown = clusters[["what", "feature"]].set_axis(["differs in", "signal"], axis=1)
     ends = [f"{number(a)} to {number(b)}" for a, b in clusters[["start", "end"]].to_numpy(float)]
     shown[f"from, to ({unit})"] = ends
@@ -290,12 +306,12 @@ def _add_test(page, found, figure, is_of_groups):
         f"{number(low)} to {number(high)}" for low, high in sizes[:, 1:]
     ]
     shown["p"] = clusters["p"].map("{:.3f}".format)
-    p_values = found.to_frame().reset_index()
-    none = "" if len(clusters) else f"No stretch of frames differs at p = {found.level:g}."
+    p_values = comparison.to_frame().reset_index()
+    none = "" if len(clusters) else f"No stretch of frames differs at p = {comparison.level:g}."
     page.add(
         "Groups" if is_of_groups else "Covariate",
-        paragraph(found.describe(), "finding"),
-        picture(figure, f"Means, bands, and where they differ. {found.describe()}"),
+        paragraph(comparison.describe(), "finding"),
+        picture(figure, f"Means, bands, and where they differ. {comparison.describe()}"),
         table_of(shown, "Where they differ"),
         paragraph(none),
         table_of(

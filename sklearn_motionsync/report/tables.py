@@ -12,6 +12,7 @@ from ..comparison.study import GroupsOfPeople
 from ..display.arguments import labels_of_signals
 from ..inputs.resampling import as_frame_rates
 from ..inputs.validation import labels_of_input
+from ..matching.counting import first_largest
 from ..synchronizers.match import UNITS, rates_of
 from ..utils.groups import names_of_groups
 from ..utils.pipelines import index_of_pattern
@@ -36,7 +37,7 @@ class TrialSet(NamedTuple):
     names : list of str
     template : int or None
         Its index, if it is one of the trials.
-    known : DataFrame
+    design : DataFrame
         What was given of each trial: ``group``, ``person``, ``covariate``.
     of_groups : GroupsOfPeople
     frames : ndarray of int, shape (n_sequences,)
@@ -50,7 +51,7 @@ class TrialSet(NamedTuple):
     aligned: AlignedCurves
     names: list
     template: int | None
-    known: pd.DataFrame
+    design: pd.DataFrame
     of_groups: GroupsOfPeople
     frames: np.ndarray
     seconds: np.ndarray | None
@@ -61,13 +62,13 @@ class TrialSet(NamedTuple):
         """Those of the arguments of `write_report`."""
         reached, n = aligned.reached, len(aligned.curves)
         of_groups = GroupsOfPeople.of(groups, people, n)
-        known = {}
+        design = {}
         if groups is not None:
-            known["group"] = names_of_groups(groups, n)
+            design["group"] = names_of_groups(groups, n)
         if people is not None:
-            known["person"] = names_of_groups(people, n, name="people")
+            design["person"] = names_of_groups(people, n, name="people")
         if covariate is not None:
-            known["covariate"] = np.asarray(covariate, dtype=float)
+            design["covariate"] = np.asarray(covariate, dtype=float)
         frames = np.array([len(x) for x in reached.performances])
         rates = rates_of(X, frame_rate)
         units = dict(zip(aligned.names, aligned.units, strict=True))
@@ -75,7 +76,7 @@ class TrialSet(NamedTuple):
             aligned,
             list(map(as_text, labels_of_input(X, reached.performances)[0])),
             index_of_pattern(reached.synchronizer, reached.performances),
-            pd.DataFrame(known, index=range(n)),
+            pd.DataFrame(design, index=range(n)),
             of_groups,
             frames,
             None if rates is None else (frames - 1) / np.ravel(as_frame_rates(rates, n)),
@@ -101,17 +102,15 @@ class TrialSet(NamedTuple):
 
     def table(self):
         """A row a trial: what is known of it, its length and its timing."""
-        table = self.known.copy()
+        table = self.design.copy()
         table.insert(0, "trial", self.names)
         table["frames"] = self.frames
         if self.seconds is not None:
             table["seconds"] = self.seconds
         offsets, (mean, largest, place) = self.aligned.offsets, self.columns
-        at = np.abs(offsets).argmax(axis=1)
+        at = first_largest(np.abs(offsets), axis=1)
         table[mean] = np.abs(offsets).mean(axis=1)
         table[largest], table[place] = offsets[np.arange(len(offsets)), at], self.aligned.clock[at]
-        if self.aligned.match.mode.any():
-            table["mode"] = self.aligned.match.mode
         table["template"] = np.arange(len(table)) == self.template
         if self.reasons is not None:
             table["doubtful"] = self.aligned.match.doubtful
@@ -120,7 +119,7 @@ class TrialSet(NamedTuple):
     def _members(self):
         """For each group the beginning of its row in a table, its people, and its trials."""
         for label, maker in zip(self.of_groups.labels, self.of_groups.makers, strict=True):
-            yield {"group": label} if "group" in self.known else {}, maker, maker.any(axis=0)
+            yield {"group": label} if "group" in self.design else {}, maker, maker.any(axis=0)
 
     def groups(self):
         """A row a group: its people, its trials, and how long these are."""
@@ -128,20 +127,20 @@ class TrialSet(NamedTuple):
         unit = "frames" if self.seconds is None else "seconds"
         rows = []
         for row, maker, members in self._members():
-            if "person" in self.known:
+            if "person" in self.design:
                 row["people"] = len(maker)
-            row["trials"], own = members.sum(), lengths[members]
-            spread = own.std(ddof=1) if len(own) > 1 else np.nan
-            rows.append(row | {f"{unit}, mean": own.mean(), f"{unit}, SD": spread})
+            row["trials"], of_group = members.sum(), lengths[members]
+            spread = of_group.std(ddof=1) if len(of_group) > 1 else np.nan
+            rows.append(row | {f"{unit}, mean": of_group.mean(), f"{unit}, SD": spread})
         return pd.DataFrame(rows)
 
     def timing(self):
         """A row a group: the offsets of its trials."""
         table, rows, (mean, largest, at) = self.table(), [], self.columns
         for row, _, members in self._members():
-            own = table[members]
-            first = own.loc[own[largest].abs().idxmax()]
-            row |= {mean: own[mean].mean(), largest: first[largest], at: first[at]}
+            of_group = table[members]
+            first = of_group.loc[of_group[largest].abs().idxmax()]
+            row |= {mean: of_group[mean].mean(), largest: first[largest], at: first[at]}
             rows.append(row | {"of trial": first["trial"]})
         return pd.DataFrame(rows)
 
@@ -151,8 +150,8 @@ class TrialSet(NamedTuple):
             np.sqrt(x.var(axis=0).mean(axis=0)) for x in (self.aligned.even, self.aligned.curves)
         )
         table = {"signal": self.headings, "time-normalised": even, "aligned": curves}
-        left = 100 * np.divide(curves, even, out=np.full_like(even, np.nan), where=even > 0)
-        return pd.DataFrame(table | {"left (%)": left})
+        shares = 100 * np.divide(curves, even, out=np.full_like(even, np.nan), where=even > 0)
+        return pd.DataFrame(table | {"left (%)": shares})
 
     @property
     def step(self):
@@ -163,16 +162,16 @@ class TrialSet(NamedTuple):
     def by_frame(self):
         """Two tables with a row a trial and frame: the timing, and the aligned curves."""
         match, clock = self.aligned.match, self.aligned.clock
-        kept = np.arange(0, len(clock), self.step)
+        frames = np.arange(0, len(clock), self.step)
         n, unit = len(match.times), UNITS[self.aligned.unit]
-        index = self.known.loc[np.repeat(range(n), len(kept))].reset_index(drop=True)
-        index.insert(0, "trial", np.repeat(self.names, len(kept)))
-        index["frame of the template"] = np.tile(kept, n)
+        index = self.design.loc[np.repeat(range(n), len(frames))].reset_index(drop=True)
+        index.insert(0, "trial", np.repeat(self.names, len(frames)))
+        index["frame of the template"] = np.tile(frames, n)
         if self.aligned.unit != "frames":
-            index[f"time of the template ({unit})"] = np.tile(clock[kept], n)
+            index[f"time of the template ({unit})"] = np.tile(clock[frames], n)
         timing = index.copy()
-        timing[f"offset ({unit})"] = self.aligned.offsets[:, kept].ravel()
-        timing["frame of the trial"] = match.frames(self.frames)[:, kept].ravel()
-        timing["rate"] = match.rates[:, kept].ravel()
-        curves = self.aligned.curves[:, kept].reshape(n * len(kept), -1)
+        timing[f"offset ({unit})"] = self.aligned.offsets[:, frames].ravel()
+        timing["frame of the trial"] = match.frames(self.frames)[:, frames].ravel()
+        timing["rate"] = match.rates[:, frames].ravel()
+        curves = self.aligned.curves[:, frames].reshape(n * len(frames), -1)
         return timing, pd.concat([index, pd.DataFrame(curves, columns=self.headings)], axis=1)

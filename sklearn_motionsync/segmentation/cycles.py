@@ -24,7 +24,7 @@ from ..inputs.facts import TIMELESS
 from ..inputs.features import choose_features, names_of_features
 from ..inputs.types import PerformancesLike, ValuesLike
 from ..inputs.validation import check_performances, names_of_input, warn_of_clocks
-from ..utils.atomic import atomic_fit, snapshot
+from ..matching.counting import first_largest, whole
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
@@ -207,7 +207,6 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         self.period = period
         self.frame_rate = frame_rate
 
-    @atomic_fit
     @validated
     def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Learn one cycle, and where it begins.
@@ -258,19 +257,19 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             kept = sorted({i for i, _ in stretches})
             takes_of = [kept.index(i) for i, _ in stretches]
             if strikes is not None:
-                own = [strikes[i] for i, _ in stretches]
-                self.start_, start = self.start, _phase_of(self.start, own, sampled, phases)
+                frames = [strikes[i] for i, _ in stretches]
+                name, start = self.start, _phase_of(self.start, frames, sampled, phases)
             else:
                 curves = start_curves(self, [given[i] for i in kept], [features[i] for i in kept])
-                self.start_, start = self._find_start(curves, sampled, takes_of, phases)
-            self.template_ = average_cycle([t.values for t in sampled], [p - start for p in phases])
-            self.periods_ = np.full(len(takes), np.nan)
+                name, start = self._find_start(curves, sampled, takes_of, phases)
+            template = average_cycle([t.values for t in sampled], [p - start for p in phases])
+            periods = np.full(len(takes), np.nan)
             for i in kept:
-                own = summary_of([stretch for k, stretch in stretches if k == i])
-                self.periods_[i] = own.found.period
+                summary = summary_of([stretch for k, stretch in stretches if k == i])
+                periods[i] = summary.found.period
+        self.start_, self.template_, self.periods_ = name, template, periods
         return self
 
-    @snapshot
     def segment(self, X: PerformancesLike) -> tuple[list[Any], pd.DataFrame]:
         """Cut takes into cycles.
 
@@ -310,7 +309,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             may hold several repetitions, or a rest; a short one may be a part of a repetition. A
             take in which several cycles fit has the warning of ``fit`` instead.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "template_")
         given, takes = check_takes(self, X, reset=False)
         rows, periods = [], []
         for i, number, stretch, sampled, phases in self._phases(given, takes):
@@ -324,7 +323,6 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
         _warn_of_lengths(takes, table, np.array(periods))
         return cut_takes(given, takes, table)
 
-    @snapshot
     def phases(self, X: PerformancesLike) -> list[np.ndarray]:
         """The phase of every frame.
 
@@ -340,7 +338,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             first stretch; the next stretch goes on with the next number. NaN outside the stretches,
             and for takes that are skipped.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "template_")
         given, takes = check_takes(self, X, reset=False)
         out = [np.full(len(take), np.nan) for take in takes]
         for i, _, stretch, sampled, phases in self._phases(given, takes):
@@ -407,7 +405,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                 "takes. Give period=(least, largest), in frames, to choose; report(X)['periods'] "
                 "lists what fits.",
                 UserWarning,
-                stacklevel=5,
+                stacklevel=4,
             )
         return kept
 
@@ -427,8 +425,8 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
                 phases = align(self.template_, sampled)
                 if strikes is not None:
                     phases = move_to_events(sampled.times, phases, strikes[i])
-                phases += first - np.floor(phases[0])
-                first = np.ceil(phases[-1])
+                phases = np.maximum(phases + first - whole(phases[0], "down"), first)
+                first = whole(phases[-1], "up")
                 yield i, number, stretch, sampled, phases
 
     def _learn_phases(self, sampled, progress):
@@ -455,7 +453,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             mean = average_cycle(values, phases)
             repeats = np.square(mean).mean(axis=0)
             moves = np.square(np.concatenate(values)).mean(axis=0)
-            best = int(np.argmax(repeats / np.where(moves > 0, moves, np.inf)))
+            best = first_largest(repeats / np.where(moves > 0, moves, np.inf))
             return compared_names(self)[best], circular_peak(mean[:, best]) / PHASES
         cycles = {
             name: average_cycle(
@@ -467,7 +465,7 @@ class CycleSegmenter(DocumentedMixin, LongWorkMixin, BaseEstimator):
             )[:, 0]
             for name, of_all in curves.items()
         }
-        name = max(cycles, key=lambda name: cycles[name].max())
+        name = list(cycles)[first_largest([cycle.max() for cycle in cycles.values()])]
         return name, circular_peak(cycles[name]) / PHASES
 
 
@@ -630,5 +628,5 @@ def _warn_of_lengths(takes, table, periods):
         f"holds for {len(odd)} of {len(shares)} whole cycles. Look at the cuts with CycleDisplay, "
         "leave such cycles out by 'start' and 'stop' of the table, or cut by other features.",
         UserWarning,
-        stacklevel=4,
+        stacklevel=3,
     )

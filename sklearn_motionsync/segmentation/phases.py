@@ -6,6 +6,7 @@ import numpy as np
 from scipy.fft import irfft, rfft
 
 from ..matching.costs import StepTable, step_table
+from ..matching.counting import first_largest, whole
 from ..matching.filters import smooth
 from ..matching.trellis import Trellis
 from ..matching.warps import normalise
@@ -70,7 +71,7 @@ class SampledStretch:
         inside = features[self._inside]
         self.begins, self.ends = start > 0, stop < len(features)
         last = len(inside) - 1
-        n_samples = max(round(last / period * PHASES), 1) + 1
+        n_samples = max(whole(last / period * PHASES), 1) + 1
         self.times = np.linspace(start, start + last, n_samples)
         self.mean_phases = (self.times - start) / period
         postures = self._sample(smooth(inside[np.newaxis], period / PHASES / 2)[0])
@@ -100,12 +101,12 @@ def average_cycle(many_values, many_phases):
     counts = np.zeros(PHASES)
     for values, phases in zip(many_values, many_phases, strict=True):
         places = PHASES * phases
-        wanted = np.arange(np.ceil(places[0]), np.floor(places[-1]) + 1)
+        wanted = np.arange(whole(places[0], "up"), whole(places[-1], "down") + 1)
         after = np.clip(np.searchsorted(places, wanted), 1, len(places) - 1)
         gaps = places[after] - places[after - 1]
         share = ((wanted - places[after - 1]) / np.where(gaps > 0, gaps, 1))[:, np.newaxis]
         found = (1 - share) * values[after - 1] + share * values[after]
-        at = wanted.astype(int) % PHASES
+        at = wanted % PHASES
         np.add.at(sums, at, found)
         counts += np.bincount(at, minlength=PHASES)
     return sums / np.maximum(counts, 1)[:, np.newaxis]
@@ -116,7 +117,7 @@ def constant_phases(template, take):
     own = average_cycle([take.values], [take.mean_phases])
     products = rfft(template, axis=0) * rfft(own, axis=0).conj()
     correlation = irfft(products.sum(axis=1), PHASES)
-    return take.mean_phases + correlation.argmax() / PHASES
+    return take.mean_phases + first_largest(correlation) / PHASES
 
 
 def match_phases(template, take):
@@ -126,10 +127,10 @@ def match_phases(template, take):
     The phases of a portion end in the middle of the overlap with the next one.
     """
     values, cycle = take.values, _upsample(template)
-    whole, overlap = _PORTION * PHASES, _OVERLAP * PHASES
-    phases = _match_portion(cycle, values[: whole + overlap])
-    for start in range(whole, len(values) - overlap, whole):
-        portion = _match_portion(cycle, values[start : start + whole + overlap])
+    size, overlap = _PORTION * PHASES, _OVERLAP * PHASES
+    phases = _match_portion(cycle, values[: size + overlap])
+    for start in range(size, len(values) - overlap, size):
+        portion = _match_portion(cycle, values[start : start + size + overlap])
         middle = overlap // 2
         portion += np.round(phases[start + middle] - portion[middle])
         phases = np.concatenate([phases[: start + middle], portion[middle:]])
@@ -158,7 +159,7 @@ def _upsample(template):
 
 def circular_peak(curve):
     """Where a closed curve has its maximum, between samples, by a parabola."""
-    k = int(curve.argmax())
+    k = first_largest(curve)
     before, here, after = (curve[(k + j) % len(curve)] for j in (-1, 0, 1))
     bend = before - 2 * here + after
     return k + ((before - after) / (2 * bend) if bend < 0 else 0.0)
@@ -176,14 +177,14 @@ def move_to_events(times, phases, events):
     """
     inside = events[(events >= times[0]) & (events <= times[-1])]
     at = np.interp(inside, times, phases)
-    whole = np.round(at)
-    near = np.abs(at - whole) < _NEAR
+    nearest = np.round(at)
+    near = np.abs(at - nearest) < _NEAR
     # Of two events at the same beginning none is sure.
-    values, counts = np.unique(whole[near], return_counts=True)
-    near &= np.isin(whole, values[counts == 1])
+    values, counts = np.unique(nearest[near], return_counts=True)
+    near &= np.isin(nearest, values[counts == 1])
     if not near.any():
         return phases
-    return np.maximum.accumulate(phases + np.interp(phases, at[near], (whole - at)[near]))
+    return np.maximum.accumulate(phases + np.interp(phases, at[near], (nearest - at)[near]))
 
 
 def locate_cycles(take, phases, template, incomplete):
@@ -192,23 +193,23 @@ def locate_cycles(take, phases, template, incomplete):
     A cycle is complete if it is whole, and similar to the template; others are left out, or
     ``incomplete``.
     """
-    whole = np.arange(np.ceil(phases[0]), np.floor(phases[-1]) + 1)
+    begins = np.arange(whole(phases[0], "up"), whole(phases[-1], "down") + 1)
     # np.interp needs phases that rise.
     rising = phases + np.linspace(0, 1e-9, len(phases))
-    frames = np.round(np.interp(whole, rising, take.times)).astype(int)
+    frames = whole(np.interp(begins, rising, take.times))
     outer = [(take.begins, slice(1, None), 0, _OUTER), (take.ends, slice(-1), -1, -_OUTER)]
     for within, others, k, share in outer:
-        if within and len(whole):
-            first, last = sorted([whole[k], whole[k] + share])
+        if within and len(begins):
+            first, last = sorted([begins[k], begins[k] + share])
             if not _keeps_pace(template, take, phases, first, last):
-                whole, frames = whole[others], frames[others]
-    ends = list(zip(whole, frames.tolist(), strict=True))
+                begins, frames = begins[others], frames[others]
+    ends = list(zip(begins, frames.tolist(), strict=True))
     if incomplete:
         ends = [(phases[0], int(take.times[0])), *ends, (phases[-1], int(take.times[-1]))]
     for (first, start), (following, stop) in pairwise(ends):
         if stop > start:
             score = similarity(template, take, phases, first, following)
-            complete = {first, following} <= set(whole) and score >= FOLLOWS
+            complete = {first, following} <= set(begins) and score >= FOLLOWS
             if complete or incomplete:
                 yield start, stop + 1, complete, score
 
@@ -225,7 +226,7 @@ def _between(template, take, phases, first, last):
     """Samples of a stretch from one phase to another, and the same of the template."""
     inside = (phases >= first) & (phases < last)
     cycle = _upsample(template)
-    places = np.round(phases[inside] * len(cycle)).astype(int)
+    places = whole(phases[inside] * len(cycle))
     return take.values[inside], cycle[places % len(cycle)]
 
 

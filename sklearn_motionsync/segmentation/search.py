@@ -23,6 +23,7 @@ from ..inputs.tables import FRAME, as_pandas
 from ..inputs.types import Labels, PerformanceLike, PerformancesLike, ValuesLike
 from ..inputs.validation import SequenceLevelMixin, check_performances
 from ..inputs.wording import counted, within
+from ..matching.counting import first_largest, whole
 from ..matching.matcher import Features
 from ..matching.trellis import Trellis
 from ..matching.warps import at_times, even_slices
@@ -60,6 +61,8 @@ _FIRST_MOVE = 1 / 8
 _MOVES = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)])
 # A window of more than so many times the dissimilarity of the threshold is not refined.
 _HOPELESS = 2
+# Dissimilarities that differ by less are equal: of exact copies they are the roots of rounding.
+_EQUAL = 1e-6
 # Scores are above it, whatever the dissimilarity.
 _NO_SCORE = 1e-300
 
@@ -310,7 +313,7 @@ def _frame_rate_of(pattern):
 
 def _resample(x, array, pace, rate):
     """A take, a table or an array, at another frame rate."""
-    n_steps = max(int((len(array) - 1) / pace + 1e-6), 1)
+    n_steps = max(whole((len(array) - 1) / pace, "down"), 1)
     times = np.arange(n_steps + 1) * pace
     values = at_times(array, times).astype(array.dtype, copy=False)
     if not isinstance(x, pd.DataFrame):
@@ -337,8 +340,8 @@ def in_frames_given(hits, pace, n_frames, durations=None):
     if pace == 1 or not hits:
         return hits
     shortest, longest = durations or (1, n_frames)
-    starts = [round(start * pace) for start, _, _ in hits]
-    sizes = [round((stop - 1 - start) * pace) + 1 for start, stop, _ in hits]
+    starts = [whole(start * pace) for start, _, _ in hits]
+    sizes = [whole((stop - 1 - start) * pace) + 1 for start, stop, _ in hits]
     # Hits that touch may share a frame of a take of a lower rate.
     return [
         (start, min(start + min(max(size, shortest), longest), limit), score)
@@ -367,8 +370,15 @@ class Hit(NamedTuple):
 
 def best_hits(hits, threshold, count):
     """Start, stop and score of the best hits that reach a threshold, in order of time."""
-    found = sorted((h for h in hits if h.score >= threshold), key=lambda hit: -hit.score)
+    found = [hit for hit in hits if hit.score >= threshold]
+    found = [found[k] for k in _best_first([hit.score for hit in found])]
     return sorted(hit[:3] for hit in found[:count])
+
+
+def _best_first(scores):
+    """Indices of scores, the best first; equally good ones in their order."""
+    dissimilarity = -np.log(np.maximum(scores, _NO_SCORE))
+    return np.argsort(whole(dissimilarity / _EQUAL), kind="stable")
 
 
 class WindowSearch:
@@ -385,8 +395,8 @@ class WindowSearch:
         it overlaps, whatever the threshold is, so that this selects among hits and changes none.
         """
         scores = np.exp(-self._dissimilarity(self._take, windows))
-        order = np.argsort(-scores, kind="stable")
-        order = order[: np.count_nonzero(scores >= lowest)]
+        order = _best_first(scores)
+        order = order[scores[order] >= lowest]
         due = np.diff(np.linspace(0, n_steps, max(len(order), 1) + 1).astype(int))
         refined = []
         for i, k in enumerate(order):
@@ -416,8 +426,8 @@ class WindowSearch:
             inside = (some[:, 0] >= first) & (some[:, 1] <= last)
             some = some[inside & (sizes >= self._shortest) & (sizes <= self._longest)]
             scores = np.exp(-self._dissimilarity(self._take, some))
-            if scores.max(initial=0) > score:
-                window, score = some[scores.argmax()], scores.max()
+            if scores.max(initial=0) > score * (1 + _EQUAL):
+                window, score = some[first_largest(scores, _EQUAL * score)], scores.max()
             else:
                 move //= 2
         return Hit(int(window[0]), int(window[1]), float(score), proposed)
@@ -494,18 +504,19 @@ def _check_durations(synchronizer, durations, pace):
     if durations is None:
         known = synchronizer.lengths_
         margin = _MARGIN if len(known) > 1 else _MARGIN_OF_ONE
-        return max(_SHORTEST, int(known.min() / margin)), int(np.ceil(known.max() * margin))
+        shortest = max(_SHORTEST, whole(known.min() / margin, "down"))
+        return shortest, whole(known.max() * margin, "up")
     pair = tuple(durations) if isinstance(durations, (tuple, list, np.ndarray)) else ()
-    whole = len(pair) == 2 and all(isinstance(n, Integral) for n in pair)
-    if not (whole and 2 <= pair[0] <= pair[1]):
+    is_pair = len(pair) == 2 and all(isinstance(n, Integral) for n in pair)
+    if not (is_pair and 2 <= pair[0] <= pair[1]):
         raise ValueError(
             "durations must be two whole numbers of frames, the smallest, at least 2, and the "
             f"largest; got {reprlib.repr(durations)}."
         )
     # Both ends are frames of the window.
     shortest, longest = ((n - 1) / pace + 1 for n in pair)
-    shortest = max(2, int(np.ceil(shortest)))
-    return shortest, max(shortest, int(longest))
+    shortest = max(2, whole(shortest, "up"))
+    return shortest, max(shortest, whole(longest, "down"))
 
 
 # -- proposals: windows of a take that may hold the action, by matching with free ends ------
@@ -549,7 +560,7 @@ class Proposer(NamedTuple):
     def of(cls, synchronizer, shortest, longest):
         """The proposer of the pattern of a synchronizer, for windows of so many frames."""
         n_frames = min(synchronizer.n_frames_, _CLOCK_FRAMES)
-        features = synchronizer.features_.at_pace(1)
+        features = synchronizer.features_
         pattern = synchronizer.pattern_.astype(np.float64)
         base = features(features.positions([pattern], n_frames))
         how = {"max_offset": _SHARE, "max_rate": _MAX_RATE, "free": True}
@@ -557,7 +568,7 @@ class Proposer(NamedTuple):
         trellis = Trellis.on_clock(features.cost, n_frames, mu, **how)
         # The filter of velocities is as wide in a portion as in the pattern.
         share = (n_frames - 1) / (n_frames - 1 + 2 * trellis.width)
-        features = features.at_pace(1, share * features.velocity_smoothing)
+        features = features.replace(velocity_smoothing=share * features.velocity_smoothing)
         return cls(features, base, trellis, scales(shortest, longest), shortest, longest)
 
     def __call__(self, take, step=None):
@@ -577,7 +588,7 @@ class Proposer(NamedTuple):
     def _starts(self, n_frames, length):
         """Where the portions of a take begin, for a pattern of about this number of frames."""
         pace = (length - 1) / (self.base.shape[1] - 1)
-        count = int(np.ceil((n_frames - length) / max(self.trellis.width * pace, 1.0))) + 1
+        count = whole((n_frames - length) / max(self.trellis.width * pace, 1.0), "up") + 1
         return np.linspace(0, n_frames - length, count)
 
     def _at_scale(self, take, length, step):
@@ -592,7 +603,7 @@ class Proposer(NamedTuple):
             paths = self.trellis.paths(self.base, moving)[0]
             first, last = starts[some] + paths[:, 0] * pace, starts[some] + length - 1
             window = np.stack([first, last + paths[:, -1] * pace + 1], axis=1)
-            found.append(np.clip(np.round(window).astype(np.intp), 0, len(take)))
+            found.append(np.clip(whole(window), 0, len(take)))
             if step is not None:
                 step()
         return np.concatenate(found)
@@ -600,5 +611,5 @@ class Proposer(NamedTuple):
 
 def scales(shortest, longest):
     """Numbers of frames from the shortest to the longest, by a constant ratio of at most 1.6."""
-    count = int(np.ceil(np.log(longest / shortest) / np.log(_RATIO))) + 1
-    return np.unique(np.round(np.geomspace(shortest, longest, count)).astype(np.intp))
+    count = whole(np.log(longest / shortest) / np.log(_RATIO), "up") + 1
+    return np.unique(whole(np.geomspace(shortest, longest, count)))

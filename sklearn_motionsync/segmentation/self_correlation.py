@@ -14,6 +14,7 @@ from ..inputs.collections import as_collection, check_members
 from ..inputs.tables import as_pandas
 from ..inputs.types import PerformanceLike
 from ..inputs.wording import counted
+from ..matching.counting import whole
 from ..matching.filters import smooth
 
 __all__ = [
@@ -211,7 +212,7 @@ def _are_shown(n_frames, lags, strong):
     Others count, too, unless one that is strong is far shorter.
     """
     far = lags > _FAR * (lags[strong][0] if strong.any() else np.inf)
-    return (n_frames >= 2 * lags) | ~far
+    return (n_frames >= whole(2 * lags, "up")) | ~far
 
 
 def _distinct_periods(lags, values, period):
@@ -246,8 +247,8 @@ def rejection_reason(found, threshold):
     required = required_strength(found.n_cycles, found.breadth, threshold)
     if not found.n_cycles or found.strength < required:
         return "not cyclic"
-    enough = found.n_cycles >= LEAST_CYCLES
-    return "" if enough else f"holds {np.floor(100 * found.n_cycles) / 100:.2f} cycles"
+    hundredths = whole(100 * found.n_cycles, "down")
+    return "" if hundredths >= 100 * LEAST_CYCLES else f"holds {hundredths / 100:.2f} cycles"
 
 
 def breadth_of(x):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ..matching.counting import whole
 from ..matching.filters import smooth
 from .self_correlation import (
     LEAST_CYCLES,
@@ -112,7 +113,7 @@ def _join(take, stretches, threshold):
     joined = stretches[:1]
     for stretch in stretches[1:]:
         before, (a, b) = joined[-1], (joined[-1].found, stretch.found)
-        near = stretch.start - before.stop <= _BETWEEN * min(a.period, b.period)
+        near = stretch.start - before.stop <= whole(_BETWEEN * min(a.period, b.period), "down")
         if near and _ratio(a.period, b.period) <= _SAME_PACE:
             start, stop = before.start, stretch.stop
             found = correlate(take.x[start:stop], take.limits)
@@ -160,8 +161,8 @@ def _ratio(one, other):
 def _are_same(one, other):
     """Whether proposals are of about the same lag and place."""
     together = min(one[1], other[1]) - max(one[0], other[0])
-    whole = max(one[1], other[1]) - min(one[0], other[0])
-    return _ratio(one[2], other[2]) < _SAME_LAG and together > _SAME_PLACE * whole
+    both = max(one[1], other[1]) - min(one[0], other[0])
+    return _ratio(one[2], other[2]) < _SAME_LAG and together > _SAME_PLACE * both
 
 
 class _Take:
@@ -197,18 +198,19 @@ class _Take:
 
     def ends(self, period, inside, part):
         """Start and stop of an interval at its period, within a part; None if it is too short."""
-        lag = round(period)
+        lag = whole(period)
         first, last = (max(part[0], inside[0] - 2 * lag), min(part[1], inside[1] + 2 * lag))
         core = slice(inside[0] - first, inside[1] - first)
         signals = signals_at(self.x[first:last], lag, self.noise)
         evidence = evidence_at(lag, signals, [energy[core].mean() for _, energy in signals])
         _, start, stop = _best_interval(evidence, _PAUSE * lag)
         start, stop = first + start, first + stop + lag
-        if start < _NEAR_END * period:
+        near = whole(_NEAR_END * period, "up")
+        if start < near:
             start = 0
-        if len(self.x) - stop < _NEAR_END * period:
+        if len(self.x) - stop < near:
             stop = len(self.x)
-        return (start, stop) if stop - start >= _LEAST_PROPOSED * period else None
+        return (start, stop) if stop - start >= whole(_LEAST_PROPOSED * period, "up") else None
 
     def required(self, found, places, threshold):
         """The strength that is required of one of several places of as much movement.

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import norm
 
+from ..matching.counting import first_largest
 from ..matching.filters import SMOOTHING, smooth
 from ..matching.warps import even_slices, normalise
 from ..model.similarity import (
@@ -142,7 +143,7 @@ class WindowDissimilarity:
         costs /= max(n_frames / (_LONG_TAKE * self._typical_length), 1)
         gains = norm.cdf(log_moments(self.known).standardize(_BY_ENDS * levels)) - costs
         # Of equally good ones the highest.
-        return float(levels[gains.argmax()])
+        return float(levels[first_largest(gains)])
 
     def __call__(self, take, windows):
         """The dissimilarity of windows (n_windows, 2), start and stop, of a take."""
@@ -154,9 +155,8 @@ class WindowDissimilarity:
 
     def _set_clock(self, features, n_frames):
         """The number of positions of a window, and the features at this pace."""
-        self._n_positions = min((n_frames - 1) * features.subframes + 1, _MAX_POSITIONS)
-        by_frame = (self._n_positions - 1) / (n_frames - 1)
-        self._features = features.at_pace(by_frame)
+        self._n_positions = min(n_frames, _MAX_POSITIONS)
+        self._features = features.replace(pace=(self._n_positions - 1) / (n_frames - 1))
 
     def _random_limit(self):
         """A low quantile of the dissimilarity of random movements."""

@@ -16,10 +16,10 @@ from ..inputs.types import (
     Transformed,
     ValuesLike,
 )
-from ..utils.atomic import atomic_fit, snapshot
 from ..utils.parameters import validated
 from .base import Synchronizer
 from .match import Match
+from .training import TrainingSet
 
 __all__ = ["AnchoredSynchronizer"]
 
@@ -27,9 +27,9 @@ __all__ = ["AnchoredSynchronizer"]
 class AnchoredSynchronizer(Synchronizer):
     """Base class of synchronizers whose methods take key-frames.
 
-    A subclass defines ``_learn(performances, progress, keyframes)``, with key-frames as shares of
-    the performances, (n_sequences, n_keyframes), or None; and ``_match(performances, keyframes,
-    frame_rate)``, which calls ``_shares`` for the same.
+    A subclass defines ``_learn(training, progress)``, as `Synchronizer`, with the key-frames of the
+    training set; and ``_match(performances, keyframes, frame_rate)``, which calls ``_shares`` for
+    the same.
     """
 
     keyframes_: np.ndarray | None
@@ -37,8 +37,6 @@ class AnchoredSynchronizer(Synchronizer):
     # Whether every key-frame of every performance has to be known.
     _needs_all = False
 
-    @atomic_fit
-    @validated
     def fit(
         self,
         X: PerformancesLike,
@@ -79,15 +77,27 @@ class AnchoredSynchronizer(Synchronizer):
             performance has one of them; or if performances have events whose frames are not their
             rows.
         """
-        with self._progress(fits=True) as progress:
-            given = {} if confidence is None else self._given(X, None, None, confidence)
-            performances = self._check_training_set(X, **given)
-            known = self._known(performances, X, keyframes, frame_rate)
-            self._learn(performances, progress, known)
-            self._number_as_given()
+        self._fit(X, keyframes, frame_rate, confidence)
         return self
 
-    @atomic_fit
+    @validated
+    def _fit(self, X, keyframes, frame_rate, confidence):
+        """Fit, and return the `TrainingSet`."""
+        with self._progress(fits=True) as progress:
+            if confidence is not None:
+                self._refuse_confidence()
+            training = self._read_training_set(X, confidence=confidence)
+            if keyframes is not None:
+                refuse_moved_events(X)
+                rows = Keyframes(keyframes, training.population, frame_rate)
+                shares = rows.known(training.trials, complete=self._needs_all)
+                training = TrainingSet(
+                    training.trials, training.filler, training.population, shares
+                )
+            learnt = self._learn(training, progress)
+        vars(self).update(learnt)
+        return training
+
     def fit_transform(
         self,
         X: PerformancesLike,
@@ -116,8 +126,8 @@ class AnchoredSynchronizer(Synchronizer):
         ndarray, shape (n_sequences, P, n_features)
             As from ``transform``.
         """
-        given = {"keyframes": keyframes, "frame_rate": frame_rate, "confidence": confidence}
-        return self.fit(X, y, **given).transform(X, **given)
+        params = {"keyframes": keyframes, "frame_rate": frame_rate, "confidence": confidence}
+        return self.fit(X, y, **params).transform(X, **params)
 
     def transform(
         self,
@@ -154,7 +164,6 @@ class AnchoredSynchronizer(Synchronizer):
         """
         return self._warp(X, fill, **self._given(X, keyframes, frame_rate, confidence))
 
-    @snapshot
     def match(
         self,
         X: PerformancesLike,
@@ -182,37 +191,30 @@ class AnchoredSynchronizer(Synchronizer):
             ``offsets`` Delta(p) and ``times`` tau(p), shape (n_sequences, P), in frames of
             the pattern; ``distances``, shape (n_sequences,).
         """
-        given = self._given(X, keyframes, frame_rate, confidence)
-        if not given:
+        params = self._given(X, keyframes, frame_rate, confidence)
+        if not params:
             return self._match_in_parts(X)
-        return self._match(self.check_performances(X), **given)
+        return self._match(self.check_performances(X), **params)
 
     def _given(self, X, keyframes, frame_rate, confidence=None) -> dict[str, Any]:
         """What is given, as arguments of ``_match`` and ``_warp_part``."""
-        given: dict[str, Any] = {}
+        params: dict[str, Any] = {}
         if keyframes is not None:
             refuse_moved_events(X)
-            given |= {"keyframes": keyframes, "frame_rate": frame_rate}
+            params |= {"keyframes": keyframes, "frame_rate": frame_rate}
         if confidence is not None:
-            if self._finite is True:
-                name = type(self).__name__
-                raise ValueError(
-                    f"{name} takes no gaps, and so no confidence=. DenseSynchronizer takes both, "
-                    "and key-frames."
-                )
-            given["confidence"] = confidence
-        return given
+            self._refuse_confidence()
+            params["confidence"] = confidence
+        return params
 
-    def _known(self, performances, X, keyframes, frame_rate):
-        """Key-frames of a training set as shares of the performances; None if none are given."""
-        if not self._given(X, keyframes, frame_rate):
-            return None
-        given = Keyframes(keyframes, self._n_given(performances), frame_rate)
-        return given.known(performances, complete=self._needs_all)
-
-    def _n_given(self, performances):
-        """How many performances were given to ``fit``, of which these may be a sample."""
-        return len(performances)
+    def _refuse_confidence(self):
+        """Refuse confidence where gaps are refused."""
+        if self._finite is True:
+            name = type(self).__name__
+            raise ValueError(
+                f"{name} takes no gaps, and so no confidence=. DenseSynchronizer takes both, "
+                "and key-frames."
+            )
 
     def _shares(self, performances, keyframes, frame_rate):
         """Key-frames of performances as shares of them, by those of the fit; None if none are."""
@@ -223,5 +225,5 @@ class AnchoredSynchronizer(Synchronizer):
                 f"Key-frames are given, and this {type(self).__name__} was fitted without any, so "
                 "it does not know where they are in the pattern. Fit it with keyframes=[...], too."
             )
-        given = Keyframes(keyframes, len(performances), frame_rate)
-        return given.shares(performances, len(self.keyframes_), complete=self._needs_all)
+        rows = Keyframes(keyframes, len(performances), frame_rate)
+        return rows.shares(performances, len(self.keyframes_), complete=self._needs_all)

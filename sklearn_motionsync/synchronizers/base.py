@@ -2,36 +2,34 @@
 
 from __future__ import annotations
 
+from copy import copy
 from numbers import Integral
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from types import MethodType
+from typing import Any, Literal, Self
 
 import numpy as np
 from sklearn.base import (
     BaseEstimator,
     OneToOneFeatureMixin,
-    TransformerMixin,
 )
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.collections import Performances, as_source
 from ..inputs.features import check_input_features
-from ..inputs.numbers import as_numbers, check_finite, check_magnitude, check_names
-from ..inputs.types import FitTransform, NamesLike, PerformanceLike, PerformancesLike, Transformed
+from ..inputs.types import NamesLike, PerformanceLike, PerformancesLike, Transformed
 from ..inputs.validation import (
+    PerformanceTransformerMixin,
     SequenceLevelMixin,
     labels_of_parts,
     names_of_input,
     read_source,
     restore,
 )
-from ..inputs.wording import counted
 from ..matching.filters import SMOOTHING
 from ..matching.matcher import Features
 from ..matching.median import Median, linear_median
-from ..matching.units import Unit
 from ..matching.warps import normalise
-from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
@@ -45,37 +43,13 @@ from .gaps import (
 )
 from .intervals import Intervals, joined
 from .match import Match, check_match
+from .training import TrainingSet, check_pattern, pattern_of, put_on_clock
 
-__all__ = ["Synchronizer", "TrainingSet"]
-
-# Most bytes of a training set on the clock; a fit holds several copies.
-MOST_BYTES = 4 * 2**30
-# Most performances in ``examples_``.
-_MOST_EXAMPLES = 64
-
-
-class TrainingSet(NamedTuple):
-    """A training set, as given and on the common clock.
-
-    Attributes
-    ----------
-    performances : Performances
-    unit : Unit
-        Their centre and scale.
-    scaled : ndarray, shape (n_sequences, P, n_features)
-        Linearly normalised (Eq. 7), in this unit.
-    given : ndarray, shape (n_frames, n_features), or None
-        The pattern, if it was given as an array.
-    """
-
-    performances: Performances
-    unit: Unit
-    scaled: np.ndarray
-    given: np.ndarray | None
+__all__ = ["Synchronizer"]
 
 
 class Synchronizer(
-    DocumentedMixin, LongWorkMixin, SequenceLevelMixin, TransformerMixin, BaseEstimator
+    DocumentedMixin, LongWorkMixin, SequenceLevelMixin, PerformanceTransformerMixin, BaseEstimator
 ):
     """Base class of all synchronizers: a subclass defines ``match``.
 
@@ -165,7 +139,6 @@ class Synchronizer(
         self.n_frames = n_frames
         self.pattern = pattern
 
-    @atomic_fit
     @validated
     def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Choose the pattern, the performance to whose clock all others are warped.
@@ -188,11 +161,9 @@ class Synchronizer(
             If the input breaks the contract, or the pattern does not exist or fit.
         """
         with self._progress(fits=True) as progress:
-            self._learn(self._check_training_set(X), progress)
-            self._number_as_given()
+            learnt = self._learn(self._read_training_set(X), progress)
+        vars(self).update(learnt)
         return self
-
-    fit_transform: ClassVar[FitTransform] = whole_fit_transform
 
     def transform(self, X: PerformancesLike, fill: Literal["model"] | None = None) -> Transformed:
         """Warp performances onto the clock of the pattern (Eq. 18).
@@ -241,7 +212,6 @@ class Synchronizer(
             f"{type(self).__name__} does not define match(self, X), which returns a Match."
         )
 
-    @snapshot
     def normalize(self, X: PerformancesLike) -> np.ndarray:
         """Normalise performances linearly to the clock of the pattern, without matching (Eq. 7).
 
@@ -277,6 +247,9 @@ class Synchronizer(
             names = [f"{type(self).__name__.lower()}{p}" for p in range(self.n_frames_)]
         return np.asarray(names, dtype=object)
 
+    def __sklearn_is_fitted__(self):
+        return hasattr(self, "pattern_")
+
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.input_tags.three_d_array = True
@@ -290,21 +263,23 @@ class Synchronizer(
         pattern = state.get("pattern")
         return {**state, "pattern": pattern.to_numpy()} if hasattr(pattern, "columns") else state
 
-    def _learn(self, performances, progress):
-        """Learn from checked performances."""
-        training = self._set_clock(performances)
-        self._set_pattern(training, self._plain_median(training.scaled))
+    def _learn(self, training, progress):
+        """What a fit learns from a `TrainingSet`, by the names of attributes."""
+        pattern = check_pattern(self.pattern, training.trials, names_of_input(self))
+        clock = self._put_on_clock(training, pattern)
+        return self._learnt(training, clock, pattern, clock.poses)
 
-    @snapshot
     def _warp(self, X, fill=None, **params):
-        check_fill(fill)
+        if fill is not None:
+            check_fill(fill)
         # Further parameters are given for all performances at once.
-        read = None if params else self._read_in_parts(X)
-        if read is None:
+        source = None if params else self._read_in_parts(X)
+        if source is None:
             performances = self.check_performances(X)
             out = self._warp_part(performances, **params)
         else:
-            performances, out = self._warp_parts(*read)
+            n_trials, portions = source
+            performances, out = self._warp_parts(n_trials, portions)
         if fill == "model" and np.isnan(out.sum()):
             fill_warped(out, self._warp_part(self._checked_examples()))
         if performances.kind == "rows":
@@ -324,20 +299,20 @@ class Synchronizer(
         check_match(match, len(performances), self.n_frames_, type(self).__name__)
         return match
 
-    def _warp_parts(self, n_sequences, parts):
-        """Labels of performances that are read in parts, and these warped."""
+    def _warp_parts(self, n_sequences, portions):
+        """Labels of performances that are read in portions, and these warped."""
         out, labels, levels = None, [], set()
-        for part in parts:
-            warped, start = self._warp_part(part), len(labels)
+        for trials in portions:
+            warped, start = self._warp_part(trials), len(labels)
             if out is None:
                 out = np.empty((n_sequences, *warped.shape[1:]), warped.dtype)
-            labels += part.labels
-            levels.add(part.levels)
+            labels += trials.labels
+            levels.add(trials.levels)
             out[start : len(labels)] = warped
-        return labels_of_parts(labels, levels, part.names), out
+        return labels_of_parts(labels, levels, trials.names), out
 
     def _read_in_parts(self, X):
-        """The number of performances, and checked parts of them; None if all are in memory."""
+        """The number of performances, and checked portions of them; None if all are in memory."""
         source = None if isinstance(X, Performances) else as_source(X)
         if source is None or len(source) == 0:
             return None
@@ -345,22 +320,27 @@ class Synchronizer(
 
     def _match_in_parts(self, X):
         """The match of performances, which may be read in parts."""
-        read = self._read_in_parts(X)
-        if read is None:
+        source = self._read_in_parts(X)
+        if source is None:
             return self._match(self.check_performances(X))
-        parts, tells = [], False
-        for part in read[1]:
-            match = self._match(part)
+        matches, tells = [], False
+        for trials in source[1]:
+            match = self._match(trials)
             tells = match.intervals is not None
-            parts.append((match.times, match.distances, match.mode))
-        match = Match(*map(np.concatenate, zip(*parts, strict=True)))
+            matches.append((match.times, match.distances))
+        times, distances = map(np.concatenate, zip(*matches, strict=True))
+        intervals = None
         if tells:
-            match.intervals = Intervals(match.times, lambda: self._measured_in_parts(X))
-        return match
+            # Of this fit, also after another one.
+            measured = MethodType(self._measured_in_parts.__func__, copy(self))
+            intervals = Intervals(times, lambda: measured(X))
+        return Match(times, distances, intervals)
 
     def _measured_in_parts(self, X):
         """What the intervals of performances need, which are read and matched once more."""
-        return joined(self._match(part).intervals.measured() for part in self._read_in_parts(X)[1])
+        return joined(
+            self._match(trials).intervals.measured() for trials in self._read_in_parts(X)[1]
+        )
 
     def _without_gaps(self, performances):
         """Checked performances, filled where they are NaN."""
@@ -371,91 +351,40 @@ class Synchronizer(
 
     # -- steps of a fit ---------------------------------------------------------------------
 
-    def _check_training_set(self, X, numbers=None, confidence=None):
-        performances, self._filler = super()._check_training_set(X, numbers), None
-        performances = with_confidence(performances, confidence)
-        if hold_gaps(performances):
-            self._filler = learn_filler(performances, names_of_input(self))
-        return self._without_gaps(performances)
+    def _read_training_set(self, X, numbers=None, population=None, confidence=None):
+        """Check the input of ``fit``, and fill gaps: a `TrainingSet`.
 
-    def _number_as_given(self):
-        """Number performances as given, if the fit is to a sample."""
-
-    def _set_clock(self, performances, subframes=1):
-        """Set the number of frames of the clock; the performances on it.
-
-        A subclass may need ``subframes`` positions a frame.
+        ``numbers`` are the indices of a sample of so large a population.
         """
-        given = self._given_pattern(performances)
-        self.lengths_ = np.array([len(x) for x in performances])
-        if self.n_frames is not None:
-            self.n_frames_ = int(self.n_frames)
-        else:
-            self.n_frames_ = int(np.median(self.lengths_)) if given is None else len(given)
-        n, width = len(performances), performances[0].shape[1]
-        n_bytes = 8 * n * ((self.n_frames_ - 1) * subframes + 1) * width
-        if n_bytes > MOST_BYTES:
-            positions = f" and subframes = {subframes}" if subframes > 1 else ""
-            raise ValueError(
-                f"{counted(n, 'performance')} at n_frames = {self.n_frames_}{positions} take "
-                f"{n_bytes / 2**30:.0f} GB several times over; {MOST_BYTES / 2**30:.0f} GB is the "
-                f"limit. Use {self._SMALLER}."
-            )
-        on_clock = normalise(performances, self.n_frames_)
-        unit = Unit.of(on_clock)
-        some = np.unique(np.linspace(0, n - 1, _MOST_EXAMPLES).round().astype(np.intp))
-        self.examples_ = on_clock[some]
-        self.features_ = Features("velocity", 1, SMOOTHING, unit)
-        return TrainingSet(performances, unit, unit(on_clock, out=on_clock), given)
+        trials = with_confidence(self._check_training_set(X, numbers), confidence)
+        filler = None
+        if hold_gaps(trials):
+            filler = learn_filler(trials, names_of_input(self))
+            trials = fill_performances(filler, trials)
+        return TrainingSet(trials, filler, population or len(trials))
 
-    def _given_pattern(self, performances):
-        """The pattern as an array, if that is what was given; indices are checked."""
-        pattern = self.pattern
-        if isinstance(pattern, str):
-            return None
-        if isinstance(pattern, bool):
-            raise ValueError(f"pattern must be 'median', an index or an array, got {pattern}.")
-        if isinstance(pattern, Integral):
-            if pattern not in performances.numbers:
-                raise ValueError(
-                    f"pattern={pattern} is out of range: there are {len(performances)} "
-                    f"performances, the last has index {len(performances) - 1}."
-                )
-            return None
-        check_names(pattern, names_of_input(self), "The pattern")
-        pattern = as_numbers(pattern, "The pattern", dtype=performances[0].dtype)
-        pattern = pattern[:, np.newaxis] if pattern.ndim == 1 else pattern
-        width = performances[0].shape[1]
-        if pattern.ndim != 2 or len(pattern) < 2 or pattern.shape[1] != width:
-            raise ValueError(
-                f"A pattern given as an array must have shape (n_frames, {width}) with at least 2 "
-                f"frames, like the performances; got {pattern.shape}."
-            )
-        check_finite(pattern, "The pattern, frame", names_of_input(self))
-        check_magnitude(float(np.abs(pattern).max()), "The pattern", training=True)
-        return pattern
+    def _put_on_clock(self, training, pattern, keyframe_std=0.0):
+        """The `CommonClock` of a training set."""
+        array = pattern if isinstance(pattern, np.ndarray) else None
+        return put_on_clock(training, self.n_frames, array, self._SMALLER, keyframe_std)
 
-    @property
-    def _wants_median(self):
-        return isinstance(self.pattern, str)
+    def _learnt(self, training, clock, pattern, comparable):
+        """Fitted attributes by their names.
 
-    def _plain_median(self, sequences):
-        """The median (Eq. 19) of scaled sequences without matching, if it is wanted."""
-        if not self._wants_median:
-            return Median.unknown(len(sequences))
-        return linear_median(sequences)
-
-    def _set_pattern(self, training, median, degree=2):
-        """Set the pattern: the median, or as given. Returns it at its own pace.
-
-        Distances are in the unit of the training set to this degree.
+        The median, if it is wanted, is that of sequences that are comparable without matching, in
+        the unit of the clock.
         """
-        self.global_distances_ = median.distances * training.unit.size**degree
-        self.pattern_index_ = median.index if self._wants_median else None
-        if not self._wants_median and training.given is None:
-            self.pattern_index_ = list(training.performances.numbers).index(self.pattern)
-        source = training.given
-        if source is None:
-            source = training.performances[self.pattern_index_]
-        self.pattern_ = normalise([source], self.n_frames_)[0]
-        return source
+        median = linear_median(comparable) if isinstance(pattern, str) else None
+        if median is not None:
+            median = Median(median.index, median.distances * clock.unit.size**2)
+        chosen = pattern_of(training, pattern, median)
+        return {
+            "pattern_": normalise([chosen.array], clock.n_frames)[0],
+            "pattern_index_": chosen.index,
+            "n_frames_": clock.n_frames,
+            "global_distances_": chosen.distances,
+            "lengths_": clock.lengths,
+            "examples_": clock.examples,
+            "features_": Features("velocity", SMOOTHING, clock.unit),
+            "_filler": training.filler,
+        }

@@ -22,15 +22,13 @@ from ..inputs.recorded import SAME_RATE, timeless
 from ..inputs.tables import FRAME, labels_of
 from ..inputs.types import NumbersLike, PerformancesLike
 from ..inputs.wording import counted
+from ..matching.counting import ROUNDING, whole
+from ..matching.sizes import EQUAL
 from ..utils.pipelines import flat_steps, route_to_synchronizer, union_transformers
 from .match import Match
 
 __all__ = ["blend_performances"]
 
-# Largest deviation of the sum of weights from 1: rounding in single precision.
-_ROUNDING = 1e-5
-# Largest deviation of a frame from a whole number, as a share of all frames, that is rounding.
-_WHOLE = 1e-11
 # Smallest pace of an extrapolated blend, by that of the slowest performance.
 _SLOWEST = 0.5
 # Largest number of frames of a blend, by that of the longest performance.
@@ -143,7 +141,7 @@ def blend_performances(
     >>> pipe = make_pipeline(DirectionCosines(bunch.skeleton), ASpace(), DenseSynchronizer())
     >>> between = blend_performances(pipe.fit(bunch.data), bunch.data, {0: 0.5, 3: 0.5})
     >>> len(bunch.data[0]), len(between), len(bunch.data[3])
-    (101, 104, 108)
+    (101, 105, 108)
 
     The movement of the first at the pace of the fourth:
 
@@ -199,9 +197,9 @@ def _skeleton_of(estimator, skeleton):
         )
     if isinstance(estimator, Match):
         return None
-    parts = [part for step in flat_steps(estimator) for part in union_transformers(step)]
-    found = [part.skeleton for part in parts if isinstance(part, PositionsTransformer)]
-    return found[0] if found else None
+    steps = [each for step in flat_steps(estimator) for each in union_transformers(step)]
+    skeletons = [step.skeleton for step in steps if isinstance(step, PositionsTransformer)]
+    return skeletons[0] if skeletons else None
 
 
 def _check(sequences, arrays, skeleton):
@@ -241,7 +239,7 @@ def _weights(given, labels, n_frames, what):
         )
     check_finite(rows, f"{what}, row")
     total = rows.sum(axis=1)
-    wrong = np.abs(total - 1) > _ROUNDING
+    wrong = np.abs(total - 1) > EQUAL[np.dtype(np.float32)]
     if wrong.any():
         i = int(wrong.argmax())
         where = f", row {i}," if len(rows) > 1 else ""
@@ -283,10 +281,12 @@ def _blend_pace(warps, timing):
     """
     between = (timing[1:] + timing[:-1]).T / 2
     used = between.any(axis=1)
-    own = np.diff(warps[used], axis=1)
-    steps = np.maximum((between[used] * own).sum(axis=0), _SLOWEST * own.min(axis=0))
+    steps_of_trials = np.diff(warps[used], axis=1)
+    steps = np.maximum(
+        (between[used] * steps_of_trials).sum(axis=0), _SLOWEST * steps_of_trials.min(axis=0)
+    )
     elapsed = np.concatenate([[0], np.cumsum(steps)])
-    last = int(np.rint(elapsed[-1]))
+    last = whole(elapsed[-1])
     if not 1 <= last <= _LONGEST * warps.max():
         raise ValueError(
             f"Weights beyond 0 and 1 give a blend of {last + 1} frames; the longest performance "
@@ -295,8 +295,8 @@ def _blend_pace(warps, timing):
     clock = np.arange(warps.shape[1])
     at = np.interp(np.linspace(0, elapsed[-1], last + 1), elapsed, clock)
     frames = np.stack([np.interp(at, clock, x) for x in warps])
-    whole = np.rint(frames)
-    return np.where(np.abs(frames - whole) < _WHOLE * warps.max(), whole, frames), at
+    exact = np.rint(frames)
+    return np.where(np.abs(frames - exact) < ROUNDING * warps.max(), exact, frames), at
 
 
 def _blend(arrays, frames, weights, skeleton, owner):

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
 from numbers import Integral, Real
 from typing import Any, Literal, Self
 
 import numpy as np
-from sklearn.utils import Bunch, check_random_state
+from sklearn.utils import Bunch
 from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted
 
@@ -21,44 +20,28 @@ from ..inputs.types import (
     SupportsArray,
     ValuesLike,
 )
-from ..matching.anchors import KeyframeColumns, add_ramps, first_meeting, pin
+from ..inputs.validation import names_of_input
+from ..matching.anchors import add_ramps, pin
 from ..matching.costs import COSTS
 from ..matching.gaps import add_weights
-from ..matching.matcher import (
-    LinearWarper,
-    Matcher,
-    RefinedWarper,
-    SharpenedWarper,
-    Warper,
-)
-from ..matching.median import (
-    Median,
-    estimate_distances,
-    exhaustive_median,
-    rounding_bound,
-    sampled_median,
-)
-from ..matching.modes import DistanceTable, ModalWarper, Modes
+from ..matching.sharpening import Sharpener
 from ..matching.warps import normalise, sample
-from ..utils.atomic import atomic_partial_fit, snapshot
-from ..utils.threads import on_one_thread
+from ..utils.parallel import one_blas_thread
 from .anchored import AnchoredSynchronizer
-from .balance import warn_of_one_feature
-from .evidence import MOST_LEARNT, learn_features
 from .gaps import with_confidence
 from .intervals import calibrated_factor, intervals_of
+from .learning import (
+    choose_pattern,
+    finish_warps,
+    learn_metric,
+    let_exemplars_vote,
+    match_pairs,
+)
 from .match import Match
-from .portions import FeatureStore, TrainingPortions, warp_in_portions
-from .refinement import decide_on_refinement
-from .subsamples import subsample, typical_share
+from .portions import warp_in_portions
+from .training import check_pattern, draw_sample
 
 __all__ = ["DenseSynchronizer"]
-
-# max_offset="auto". A wide band leads paths astray without a learnt metric; with one, gestures
-# need it: docs/design.md.
-_NARROW, _WIDE = 0.25, 0.4
-# Most performances for an exhaustive search: see docs/scaling.md.
-_EXHAUSTIVE = 100
 
 
 class DenseSynchronizer(AnchoredSynchronizer):
@@ -87,7 +70,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     >>> trials[2][20:30] = np.nan
     >>> int(np.isnan(sync.transform(trials)[2]).sum())
-    8
+    7
 
     One of which nothing was seen is refused:
 
@@ -110,10 +93,11 @@ class DenseSynchronizer(AnchoredSynchronizer):
         The template: the most typical trial, a trial by its index, or an array. Set it if new
         trials are to be aligned to a template that you have.
     refine : "auto" or bool, default="auto"
-        Whether to place every moment to a fraction of a frame. Set it to True for repeated trials
-        of a single source, which differ by noise and gain only. For counts, such as spikes, it
-        harms. With ``"auto"`` a test on the trials decides (see ``refinement_``). A single signal,
-        or correlated ones, cannot be tested, and without a vote there is no test.
+        Whether to place every moment to a fraction of a frame by the poses themselves. That helps
+        with repeated trials of a single source, which differ by noise and gain only, and harms with
+        different people, and with counts such as spikes. With ``"auto"`` one number decides: trials
+        are refined if ``unexplained_variance_`` is below 0.025. Without a vote (``consensus=0``)
+        only True refines.
     max_offset : "auto" or float, default="auto"
         Largest time shift, as a share of ``n_frames``, in [0, 1]. Lower it for long trials of
         nearly the same pace: that saves time and memory. ``"auto"`` is 0.4 with a learnt metric,
@@ -121,15 +105,16 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     Other Parameters
     ----------------
-    velocity_smoothing : "auto" or float, default="auto"
-        Standard deviation of the Gaussian that smooths velocities, as a share of the trial. So it
-        does not depend on the frame rate. Beyond its ends a trial is continued by its point
-        reflection. ``"auto"`` is 0.02 with a learnt metric, which gives noise less weight, and 0.03
-        without. Velocities that sharpen warps then have 0.01 to 0.04, as their noise asks for.
-    sharpen : bool, default=True
-        Whether a last local match places the moments of every warp, by velocities as sharp as their
-        noise allows. It counts as far as trials agree (see ``sharpening_``). It needs a learnt
-        metric, and leaves refined warps alone.
+    cost : {"velocity", "elastic", "posture"}, default="velocity"
+        What is compared. ``"velocity"``: velocities; at the local rate rho, ``v_n`` with ``(0.8 +
+        0.2 rho) v_m``. ``"elastic"``: velocities divided by the square root of the speed. Its
+        weights make the distance, of Fisher and Rao, independent of the timing of either trial.
+        ``"posture"``: poses, as in the paper.
+    smoothness : float, default=0.003
+        Weight of changes of pace, a pure number. ``mu`` of Eq. 12 is ``smoothness`` times the mean
+        squared norm of what is compared.
+    max_rate : float, default=4
+        Largest local rate of a path; 2 in Eq. 13. What follows the match may exceed it.
     metric : "learned" or None, default="learned"
         How signals are weighted by the velocity cost. ``"learned"``: compressed velocities, and
         poses less their own mean, count by how well trials agree at the same moment. ``fit`` learns
@@ -138,42 +123,18 @@ class DenseSynchronizer(AnchoredSynchronizer):
     consensus : int, default=8
         Number of typical trials that vote on a warp. 0 takes the direct path, as in the paper,
         which is not smoothed, and refined only by ``refine=True``.
-    warp_smoothing : float, default=0.02
-        Standard deviation of the Gaussian that smooths time shifts after the vote, as a share of
-        the trial. What sharpening changes is smoothed half as much. More gives smoother movements,
-        and less accurate key moments.
-    cost : {"velocity", "elastic", "posture"}, default="velocity"
-        What is compared. ``"velocity"``: velocities; at the local rate rho, ``v_n`` with ``(0.8 +
-        0.2 rho) v_m``. ``"elastic"``: velocities divided by the square root of the speed. Its
-        weights make the distance, of Fisher and Rao, independent of the timing of either trial.
-        ``"posture"``: poses, as in the paper.
-    smoothness : float, default=0.003
-        Weight of changes of pace, a pure number. ``mu`` is ``smoothness`` times the mean squared
-        norm of what is compared.
-    max_rate : float, default=4
-        Largest local rate of a path; 2 in Eq. 13. What follows the match may exceed it.
-    subframes : int, default=1
-        Positions a frame at which a path may stand. More than 1 serves direct paths
-        (``consensus=0``); vote, smoothing and refinement are finer anyway.
-    unsupported : {"linear", "warp"}, default="linear"
-        What becomes of ten or more trials that do not support their warps. ``"linear"``: there is a
-        warning, and if ``evidence_.harmful``, they are linearly normalised. ``"warp"``: they are
-        warped, without a warning. Set it if you know that they show one movement in loud noise.
     keyframe_std : float, default=0
         Standard deviation of key-frames that are given, in frames of the clock. 0: they are exact,
         and warps go through them. Above: they draw softly, as labels have errors, and a label that
-        contradicts the movement by far counts little. See Notes.
-    search : {"auto", "exhaustive", "sampled"}, default="auto"
-        The search for the most typical trial: by all matches, or by a sequential test on matches
-        with random references (see ``search_``). ``"auto"``: by all, for up to 100 trials.
+        contradicts the movement by far counts little; only ``refine=True`` refines.
     max_fit : int, default=None
         Size, at least 2, of a random sample from which ``fit`` learns everything. The other trials
         are not checked. They are not even read if ``X`` gives trials by index, so time and memory
         of a fit do not grow with their number. A template given by its index is in the sample.
-        None takes all trials. See ``typical_share_``.
+        None takes all trials.
     random_state : int, RandomState instance or None, default=0
-        Draws the references of a sampled search, and the sample of ``max_fit``. With the default,
-        equal input gives equal results.
+        Draws the sample of ``max_fit``, and the trials that all are compared with where there are
+        more than 100. With the default, equal input gives equal results.
     n_jobs : int, default=None
         Number of parallel jobs in ``fit``, ``transform`` and ``match``. None means 1 unless in a
         ``joblib.parallel_config`` context, -1 all cores. Results are the same to the last bit.
@@ -189,30 +150,16 @@ class DenseSynchronizer(AnchoredSynchronizer):
     n_frames_ : int
         ``P``.
     global_distances_ : ndarray, shape (n_sequences,)
-        ``C_n`` of Eq. 19 by all matches. After an exhaustive search every trial has one, after a
-        sampled one the best few; the others are NaN. With a learnt metric the search may compare
-        fewer frames, in single precision, and scales the sums to ``P``. So they differ a little
-        from sums of the ``distances`` of `match`.
-    certified_ : bool
-        Whether the template is the median of Eq. 19: by all matches, or because paired tests
-        rejected every other trial, with a family-wise error rate of 1 %. False if the template was
-        given, or a search has spent its 150 matches a trial. After a fit to a sample: whether no
-        other trial of the sample may be more typical of all.
-    n_matches_ : int
-        Number of matches to choose the template and the trials that vote.
-    search_ : Bunch
-        ``n_matches`` and ``certified``, as above. ``in_doubt``: the number of others that no test
-        rejected. ``excess``: the template's ``C_n`` is at most ``1 + excess`` times the smallest,
-        with a probability of 99 %. If the template was given, all are in doubt and the excess is
-        NaN.
+        ``C_n`` of Eq. 19, the sum of the distances of each trial to all others. Of more than 100
+        trials it is estimated from the distances to 100 of them, drawn at random: its standard
+        error is 4 to 8 % of it, and in six sets of 180 to 300 trials the template's own sum was at
+        most 2 % above the smallest. With a learnt metric the distances may be those of fewer
+        frames, in single precision, scaled to ``P``, so they differ a little from sums of the
+        ``distances`` of `match`. NaN if the template was given, and for trials outside of the
+        sample.
     sample_ : ndarray of int
-        Indices of the training trials: all, or ``max_fit`` of them. ``global_distances_`` are sums
-        over these, and NaN for all others; ``lengths_`` and ``examples_`` are theirs.
-    typical_share_ : float
-        Upper bound of the share of all trials that are more typical than the template, by the
-        metric of this fit. 0 if the template is the certified median of all. After a fit to a
-        random sample its confidence is 95 %, beside the 1 % of the search. NaN if the template was
-        given.
+        Indices of the training trials: all, or ``max_fit`` of them. ``lengths_`` and ``examples_``
+        are theirs.
     metric_ : Bunch or None
         The learnt metric, in single precision; None without one. ``share``: the share of every
         signal in what is compared, about 0 for noise. ``energy``: its share in the velocities,
@@ -222,31 +169,22 @@ class DenseSynchronizer(AnchoredSynchronizer):
         Whether the trials that the metric is learnt from support their warps. ``remaining``: the
         share of their differences that matching leaves. ``inconsistency``: how far, on average, the
         warp by way of a third trial is from the warp itself, over the mean time shift. It is small
-        for one movement, and about 1 for noise. Ten or more trials with more than 0.7 and 0.45 are
-        warned of. ``harmful``: whether the inconsistency is above 1, too. NaN without a metric, and
-        for time shifts below 1 % of a trial.
+        for one movement, and about 1 for noise. ``weak``: whether there are ten or more trials with
+        more than 0.7 and 0.4; a `SynchronizationWarning` says so. NaN without a metric, and for
+        time shifts below 1 % of a trial.
     mu_ : float
-        Absolute weight of the changes of pace, by the frames that the search compares.
+        Absolute weight of the changes of pace (Eq. 12).
     exemplars_ : ndarray of int
-        Indices of the trials that vote: up to ``consensus``, and so many of each of several modes.
-        If only some trials have key-frames, they are the exemplars.
+        Indices of the trials that vote, at most ``consensus``. If only some trials have key-frames,
+        they are the exemplars.
     keyframes_ : ndarray, shape (n_keyframes,), or None
         Key-frames of the template, in frames of the clock: its own, or learnt from the trials that
         have them. None if none were given.
-    modes_ : Bunch
-        The ways of doing the movement that the training set holds, such as one stroke or two.
-        ``labels``: the mode of each training trial, 0 being the most frequent; -1 if ``max_fit``
-        left it out. ``shares``: the share of each mode, ``[1.]`` if there is a single one. At least
-        6 trials and a learnt metric are needed to find several, and 3 trials of each.
-    misfit_ : float
-        Median share of the variance of the template in the smoothed residuals of matched poses;
-        NaN unless ``refine="auto"`` finds that refining may help.
-    refinement_ : Bunch
-        The test of ``refine="auto"``, by signals that had no part in the warps. ``ratio``: their
-        misfit after refining by the other signals, to that after matching by the others alone.
-        ``p_value``: of a t test that refining does not help. Both are of the first pass if that
-        rejects refining. ``ratio_to_all``: to the misfit after matching by all signals. NaN where
-        there is no test.
+    unexplained_variance_ : float
+        The variance that is left after matching, less what white noise explains, as a share of the
+        template's: the median over 20 trials, evenly spaced. Copies of one source have at most
+        0.02, at any noise; people and their forces 0.03 and more. NaN unless ``refine="auto"``
+        asks for it, and without trials that have no gaps.
     refines_ : bool
         Whether warps are refined.
     sharpening_ : Bunch or None
@@ -278,27 +216,31 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     Notes
     -----
-    A fit has six steps. Those of the paper are 1, 3 and 4, and `paper` has its settings.
+    A fit has six steps, a function each in ``sklearn_motionsync.synchronizers``. Those of the paper
+    are 1, 3 and 4, and `paper` has its settings.
 
-    1. All trials are linearly normalised to ``P`` frames (Eq. 7).
-    2. The metric is learnt: how well each signal, and combinations of them, tell the moments of the
-       movement (see ``metric``).
-    3. Pairs of trials are matched. Dynamic programming finds the time shifts Delta(p) with the
+    1. ``training.put_on_clock``: all trials are linearly normalised to ``P`` frames (Eq. 7).
+    2. ``learning.learn_metric``: how well each signal, and combinations of them, tell the moments
+       of the movement (see ``metric``). Velocities are smoothed by a Gaussian of 2 % of the trial,
+       of 3 % without a metric; beyond its ends a trial is continued by its point reflection.
+    3. ``learning.match_pairs``: dynamic programming finds the time shifts Delta(p) with the
        smallest distance ``D_{n,m}`` (Eqs. 12-17)::
 
            sum_p |x_n(p) - x_m(p + Delta(p))|^2 + mu sum_p phi(rate)
 
        Both ends are pinned, and the local rate is between 0 and ``max_rate``. The points x are
-       velocities and poses in the metric (see ``cost``).
-    4. The template is the trial with the smallest sum ``C_n = sum_m D_{n,m}`` (Eq. 19), the
-       "median".
-    5. Some typical trials, the exemplars, vote. The template is matched to a trial directly, and by
-       way of each exemplar. The weighted median of these paths outvotes a path that went astray. It
-       is then smoothed. If the distances fall into several modes, exemplars vote within their mode
-       only. A trial of another mode than the template is warped to the most typical one of its
-       mode, and one warp joins that to the template.
-    6. Trials are matched once more, near their warps and by sharper velocities. If refining helps,
-       Gauss-Newton steps on the poses take the place of that.
+       velocities and poses in the metric (see ``cost``). All pairs are matched, or of more than 100
+       trials each with 100 drawn ones.
+    4. ``learning.choose_pattern``: the template is the trial with the smallest sum ``C_n = sum_m
+       D_{n,m}`` (Eq. 19), the "median".
+    5. ``learning.let_exemplars_vote``: some typical trials, the exemplars, vote. The template is
+       matched to a trial directly, and by way of each exemplar. The median of these paths outvotes
+       a path that went astray. Its time shifts are smoothed by a Gaussian of 2 % of the trial.
+    6. ``learning.finish_warps``: trials are matched once more, near their warps and by velocities
+       as sharp as their noise allows (see ``sharpening_``). If refining helps, Gauss-Newton steps
+       on the poses take the place of that. Without a metric a warp stays as it is.
+
+    ``match`` and ``transform`` take new trials through the steps 1, 3, 5 and 6.
 
     ``transform`` samples a trial at ``tau(p) = p + Delta(p)`` (Eq. 18).
 
@@ -327,20 +269,14 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     _parameter_constraints: dict = {
         **AnchoredSynchronizer._parameter_constraints,
-        "velocity_smoothing": [StrOptions({"auto"}), Interval(Real, 0, 1, closed="both")],
         "refine": [StrOptions({"auto"}), "boolean"],
         "max_offset": [StrOptions({"auto"}), Interval(Real, 0, 1, closed="both")],
-        "sharpen": ["boolean"],
-        "metric": [StrOptions({"learned"}), None],
-        "consensus": [Interval(Integral, 0, None, closed="left")],
-        "warp_smoothing": [Interval(Real, 0, 1, closed="both")],
         "cost": [StrOptions(set(COSTS))],
         "smoothness": [Interval(Real, 0, None, closed="left")],
         "max_rate": [Interval(Real, 1, None, closed="left")],
-        "subframes": [Interval(Integral, 1, None, closed="left")],
-        "unsupported": [StrOptions({"linear", "warp"})],
+        "metric": [StrOptions({"learned"}), None],
+        "consensus": [Interval(Integral, 0, None, closed="left")],
         "keyframe_std": [Interval(Real, 0, None, closed="left")],
-        "search": [StrOptions({"auto", "exhaustive", "sampled"})],
         "max_fit": [Interval(Integral, 2, None, closed="left"), None],
         "random_state": ["random_state"],
         "n_jobs": [Integral, None],
@@ -349,27 +285,21 @@ class DenseSynchronizer(AnchoredSynchronizer):
 
     metric_: Any
     _finite = "allow-nan"
-    _SMALLER = "fewer frames, subframes or performances. Or learn from some: max_fit=1000"
+    _SMALLER = "fewer frames or performances. Or learn from some: max_fit=1000"
 
     def __init__(
         self,
         n_frames: int | None = None,
         pattern: PerformanceLike | int | Literal["median"] = "median",
         *,
-        velocity_smoothing: float | Literal["auto"] = "auto",
         refine: bool | Literal["auto"] = "auto",
         max_offset: float | Literal["auto"] = "auto",
-        sharpen: bool = True,
-        metric: Literal["learned"] | None = "learned",
-        consensus: int = 8,
-        warp_smoothing: float = 0.02,
         cost: Cost = "velocity",
         smoothness: float = 0.003,
         max_rate: float = 4,
-        subframes: int = 1,
-        unsupported: Literal["linear", "warp"] = "linear",
+        metric: Literal["learned"] | None = "learned",
+        consensus: int = 8,
         keyframe_std: float = 0,
-        search: Literal["auto", "exhaustive", "sampled"] = "auto",
         max_fit: int | None = None,
         random_state: RandomState = 0,
         n_jobs: int | None = None,
@@ -377,20 +307,14 @@ class DenseSynchronizer(AnchoredSynchronizer):
     ) -> None:
         self.n_frames = n_frames
         self.pattern = pattern
-        self.velocity_smoothing = velocity_smoothing
         self.refine = refine
         self.max_offset = max_offset
-        self.sharpen = sharpen
-        self.metric = metric
-        self.consensus = consensus
-        self.warp_smoothing = warp_smoothing
         self.cost = cost
         self.smoothness = smoothness
         self.max_rate = max_rate
-        self.subframes = subframes
-        self.unsupported = unsupported
+        self.metric = metric
+        self.consensus = consensus
         self.keyframe_std = keyframe_std
-        self.search = search
         self.max_fit = max_fit
         self.random_state = random_state
         self.n_jobs = n_jobs
@@ -420,18 +344,86 @@ class DenseSynchronizer(AnchoredSynchronizer):
         """
         return cls(**{"cost": "posture", "max_rate": 2, "consensus": 0} | params)
 
-    def _match(self, performances, keyframes=None, frame_rate=None, confidence=None):
-        performances = with_confidence(performances, confidence)
-        arrays, shares = self._with_keyframes(performances, keyframes, frame_rate)
-        distances, times = self._distances_and_times(arrays, shares)
-        distances, mode = self._warper.matcher.features.back(distances), None
-        if len(self.modes_.shares) > 1:
-            mode = on_one_thread(self._warper.modes_of, arrays)
-        match = Match(times, distances, mode)
-        match.intervals = intervals_of(self, self._warper, arrays, match, shares)
-        return match
+    def _read_training_set(self, X, confidence=None):
+        sample, numbers, population = draw_sample(X, self.max_fit, self.pattern, self.random_state)
+        return super()._read_training_set(sample, numbers, population, confidence)
 
-    @atomic_partial_fit
+    def _learn(self, training, progress):
+        trials, names = training.trials, names_of_input(self)
+        pattern = check_pattern(self.pattern, trials, names)
+        with one_blas_thread():
+            # 1. All trials are linearly normalised (Eq. 7).
+            clock = self._put_on_clock(training, pattern, self.keyframe_std)
+            # 2. The metric is learnt.
+            compared = learn_metric(
+                clock,
+                cost=self.cost,
+                metric=self.metric,
+                consensus=self.consensus,
+                smoothness=self.smoothness,
+                max_offset=self.max_offset,
+                max_rate=self.max_rate,
+            )
+            # 3. All pairs are matched (Eqs. 12-17), if the pattern or the exemplars need that.
+            needed = isinstance(pattern, str) or 0 < self.consensus < len(trials)
+            pairs = match_pairs(
+                clock,
+                compared,
+                needed,
+                trials=trials,
+                names=names,
+                random_state=self.random_state,
+                n_jobs=self.n_jobs,
+                progress=progress,
+            )
+            # 4. The trial with the smallest sum of distances is the pattern (Eq. 19).
+            chosen = choose_pattern(training, pattern, pairs)
+            # 5. Exemplars vote.
+            vote = let_exemplars_vote(clock, training, chosen, pairs, self.consensus)
+            # 6. Warps are sharpened or refined.
+            final = finish_warps(clock, training, chosen, vote, self.refine)
+        numbers = np.array(trials.numbers)
+        features, finish = pairs.matcher.features, final.warper.finish
+        distances = np.full(training.population, np.nan)
+        distances[numbers] = chosen.distances
+        metric, keyframes = compared.metric, vote.keyframes
+        return {
+            "pattern_": normalise([chosen.array], clock.n_frames)[0],
+            "pattern_index_": None if chosen.index is None else int(numbers[chosen.index]),
+            "n_frames_": clock.n_frames,
+            "global_distances_": distances,
+            "sample_": numbers,
+            "metric_": metric and Bunch(**metric | {"performances": numbers[metric.performances]}),
+            "evidence_": compared.evidence,
+            "mu_": float(features.back(pairs.matcher.trellis.mu)),
+            "exemplars_": numbers[vote.exemplars],
+            "keyframes_": None if keyframes is None else keyframes * (clock.n_frames - 1),
+            "unexplained_variance_": final.unexplained,
+            "refines_": final.refines,
+            "sharpening_": _described(finish, clock.poses.shape[2]),
+            "interval_factor_": 1.0,
+            "lengths_": clock.lengths,
+            "examples_": clock.examples,
+            "features_": features.replace(anchors=None, weighs=False),
+            "_filler": training.filler,
+            "_settings": compared.settings,
+            "_warper": final.warper,
+        }
+
+    def _match(self, performances, keyframes=None, frame_rate=None, confidence=None):
+        if confidence is not None:
+            performances = with_confidence(performances, confidence)
+        arrays, shares = self._for_warper(performances, keyframes, frame_rate)
+        distances, times = self._distances_and_times(arrays, shares)
+        distances = self._warper.matcher.features.back(distances)
+        pinned = None
+        if shares is not None and self.keyframe_std == 0:
+            pinned = self.keyframes_, np.isfinite(shares)
+        intervals = intervals_of(
+            self._warper, arrays, times, self.interval_factor_, self.evidence_, pinned
+        )
+        return Match(times, distances, intervals)
+
     def calibrate(
         self,
         X: PerformancesLike,
@@ -465,43 +457,43 @@ class DenseSynchronizer(AnchoredSynchronizer):
         """
         check_is_fitted(self)
         performances = self.check_performances(X)
-        given = Keyframes(keyframes, len(performances), frame_rate)
+        keyframe_rows = Keyframes(keyframes, len(performances), frame_rate)
         count = None if self.keyframes_ is None else len(self.keyframes_)
-        known = given.shares(performances, count) * (self.n_frames_ - 1)
+        frames = keyframe_rows.shares(performances, count) * (self.n_frames_ - 1)
         match = self._match(performances)
-        self.interval_factor_ *= calibrated_factor(match, self.keyframes_, known)
+        self.interval_factor_ *= calibrated_factor(match, self.keyframes_, frames)
         return self
 
     def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
-        performances = with_confidence(performances, confidence)
-        given = self._with_keyframes(performances, keyframes, frame_rate)
-        times = np.maximum.accumulate(self._distances_and_times(*given)[1], axis=1)
+        if confidence is not None:
+            performances = with_confidence(performances, confidence)
+        arrays, shares = self._for_warper(performances, keyframes, frame_rate)
+        times = np.maximum.accumulate(self._distances_and_times(arrays, shares)[1], axis=1)
         return sample(performances, times, self.n_frames_)
 
-    def _with_keyframes(self, performances, keyframes=None, frame_rate=None):
-        """Performances as the warper takes them, and their key-frames as shares, or None."""
-        shares = self._shares(performances, keyframes, frame_rate)
-        performances = self._without_gaps(performances)
-        arrays = performances
+    def _for_warper(self, trials, keyframes=None, frame_rate=None):
+        """Trials as the warper takes them, and their key-frames as shares, or None."""
+        shares = None
+        if keyframes is not None:
+            shares = self._shares(trials, keyframes, frame_rate)
+        trials = self._without_gaps(trials)
+        arrays = trials
         if self._warper.matcher.features.weighs:
-            arrays = add_weights(performances, performances.weights)
+            arrays = add_weights(trials, trials.weights)
         if self.keyframes_ is None:
             return arrays, None
         if shares is None:
-            shares = np.full((len(performances), len(self.keyframes_)), np.nan)
+            shares = np.full((len(trials), len(self.keyframes_)), np.nan)
         return add_ramps(arrays, shares), shares
 
     def _distances_and_times(self, arrays, shares):
-        with self._progress(fits=False) as progress:
-            portions = {"n_jobs": self.n_jobs, "progress": progress, "name": "warping"}
-            distances, times = warp_in_portions(self._warper, arrays, **portions)
+        distances, times = warp_in_portions(
+            self._warper, arrays, n_jobs=self.n_jobs, begin=self._progress, name="warping"
+        )
         if shares is None or self.keyframe_std > 0:
             return distances, times
-        # Linear warps go straight from one key-frame to the next.
-        reach = {"reach": np.inf} if isinstance(self._warper, LinearWarper) else {}
-        return distances, pin(times, self.keyframes_, shares * (self.n_frames_ - 1), **reach)
+        return distances, pin(times, self.keyframes_, shares * (self.n_frames_ - 1))
 
-    @snapshot
     def disparity_space(
         self,
         X: PerformancesLike,
@@ -541,192 +533,16 @@ class DenseSynchronizer(AnchoredSynchronizer):
                 f"performances, 0 to {len(performances) - 1}."
             )
         warper = self._warper
-        arrays, _ = self._with_keyframes(performances, keyframes, frame_rate)
+        arrays, _ = self._for_warper(performances, keyframes, frame_rate)
         positions = warper.positions([arrays[performance]])
         frames, offsets, costs, path = warper.disparity_space(positions)
         costs = warper.matcher.features.back(costs)
         return Bunch(frames=frames, offsets=offsets, costs=costs, path=path)
 
-    # -- steps of a fit ---------------------------------------------------------------------
 
-    def _check_training_set(self, X, confidence=None):
-        some, sample, population = subsample(X, self.max_fit, self.pattern, self.random_state)
-        numbers = None if sample is None else sample.tolist()
-        performances = super()._check_training_set(some, numbers, confidence)
-        n = len(performances)
-        self.sample_ = np.arange(n) if sample is None else sample
-        self._population = n if sample is None else population
-        return performances
-
-    def _number_as_given(self):
-        sample, distances = self.sample_, np.full(self._population, np.nan)
-        distances[sample] = self.global_distances_
-        self.global_distances_, self.exemplars_ = distances, sample[self.exemplars_]
-        labels = np.full(self._population, -1)
-        labels[sample] = self.modes_.labels
-        self.modes_.labels = labels
-        if self.pattern_index_ is not None:
-            self.pattern_index_ = int(sample[self.pattern_index_])
-        if self.metric_ is not None:
-            self.metric_.performances = sample[self.metric_.performances]
-
-    def _n_given(self, performances):
-        return self._population
-
-    def _learn(self, performances, progress, keyframes):
-        training = self._set_clock(performances, self.subframes)
-        positions, arrays, columns = training.scaled, list(performances), None
-        n_features, weights = positions.shape[2], performances.weights
-        if weights:
-            arrays = add_weights(arrays, weights)
-        if keyframes is not None:
-            arrays = add_ramps(arrays, keyframes)
-            std = self.keyframe_std / (self.n_frames_ - 1)
-            columns = KeyframeColumns(keyframes.shape[1], std)
-        if self.subframes > 1 or arrays[0].shape[1] > n_features:
-            positions = normalise(arrays, self.n_frames_, self.subframes)
-            training.unit(positions, out=positions)
-        beside = {"anchors": columns, "weighs": weights is not None}
-        features = learn_features(self, training.unit, positions, beside, self._settings)
-        settings = self._settings()
-        searched = features.for_search(self.n_frames_, settings["max_offset"])
-        store = FeatureStore(searched, positions)
-        warn_of_one_feature(self, performances, store)
-        searcher, shared, median, modes = self._search(searched, store, positions, progress)
-        matcher = searcher
-        if searched is not features:
-            reach = {name: settings[name] for name in ("max_offset", "max_rate")}
-            matcher = searcher.on_clock(features, self.n_frames_, **reach)
-        self.features_ = features.replace(anchors=None, weighs=False)
-        self.mu_ = float(features.back(matcher.trellis.mu))
-        source = self._set_pattern(training, median, features.degree)
-        if weights is not None:
-            own = self.pattern_index_
-            (source,) = add_weights([source], None if own is None else [weights[own]])
-        # Sums over fewer frames, scaled to all.
-        self.global_distances_ *= self.n_frames_ / (searched.frames or self.n_frames_)
-        chosen = self._choose_exemplars(median.estimates, modes, keyframes)
-        source = self._set_keyframes(keyframes, source, arrays, matcher, chosen[0])
-        warpers = [self._warper_by(x, arrays, matcher, source) for x in chosen]
-        home = modes.home(self.pattern_index_, warpers)
-        tested = warpers[home], source, shared, self._settings(learnt=False), progress
-        warper = decide_on_refinement(self, training, *tested)
-        self.sharpening_, self.interval_factor_ = None, 1.0
-        if modes.are_several and not isinstance(warper, LinearWarper):
-            warpers[home] = warper
-            finish = partial(self._sharpened, positions)
-            settings = warpers, home, arrays, chosen, modes.signs(), finish
-            warper = on_one_thread(ModalWarper.of, *settings)
-            final = warper.warpers[home]
-        else:
-            warper = final = on_one_thread(self._sharpened, positions, warper, chosen[home])
-        if isinstance(final, SharpenedWarper):
-            self.sharpening_ = Bunch(**final.sharpener.found(n_features))
-        self._warper = warper
-
-    def _settings(self, learnt=None):
-        """The settings of `Matcher.learn`, for a learnt metric or none; by default as fitted."""
-        learnt = self.metric_ is not None if learnt is None else learnt
-        max_offset = self.max_offset
-        if max_offset == "auto":
-            max_offset = _WIDE if learnt else _NARROW
-        settings = {"smoothness": self.smoothness, "max_rate": self.max_rate}
-        return {**settings, "max_offset": max_offset}
-
-    def _search(self, features, store, positions, progress):
-        """The matcher that searches, the portions of the training set, the median, and modes."""
-        energy = store.energy()
-        shape = len(positions), *store.template.shape[1:]
-        matcher = Matcher.of_energy(features, shape, energy, **self._settings())
-        portions = TrainingPortions(matcher, positions, store)
-        rounding = rounding_bound(store.template.dtype, energy)
-        table = DistanceTable(partial(portions.compare, n_jobs=self.n_jobs, progress=progress))
-        median = self._choose_median(table, len(positions), rounding)
-        is_rounded = features.single and positions.dtype != store.template.dtype
-        if not is_rounded or not median.is_blurred(rounding):
-            return matcher, portions, median, self._find_modes(table, store, len(positions))
-        # Nearly equal trials: single precision does not tell them apart.
-        features = features.replace(single=False)
-        return self._search(features, FeatureStore(features, positions), positions, progress)
-
-    def _find_modes(self, table, store, n):
-        """The modes of n performances; without a learnt metric too many sets seem to have some."""
-        modes = Modes.single(n)
-        if self.metric_ is not None:
-            modes = table.modes(n, store)
-        self.modes_ = Bunch(labels=modes.labels, shares=modes.shares)
-        return modes
-
-    def _choose_median(self, compare, n, rounding):
-        """The median (Eq. 19), by all matches or some; or only what chooses the exemplars."""
-        wanted, population = isinstance(self.pattern, str), self._population
-        if not wanted and (self.consensus == 0 or n <= self.consensus):
-            # None or all of the performances are exemplars.
-            median = Median.unknown(n)
-        elif self.search == "exhaustive" or (self.search == "auto" and n <= _EXHAUSTIVE):
-            median = exhaustive_median(compare, n, rounding, population)
-        elif wanted:
-            random_state = check_random_state(self.random_state)
-            median = sampled_median(compare, n, rounding, random_state, population)
-        else:
-            median = estimate_distances(compare, n, check_random_state(self.random_state))
-        known = median if wanted else Median.unknown(n, median.n_matches)
-        names = "n_matches", "certified", "in_doubt", "excess"
-        self.search_ = Bunch(**{name: getattr(known, name) for name in names})
-        self.n_matches_, self.certified_ = known.n_matches, known.certified
-        self.typical_share_ = typical_share(known.in_doubt, n, population) if wanted else np.nan
-        return median
-
-    def _choose_exemplars(self, estimates, modes, keyframes):
-        """Choose the exemplars: those of every mode, a list.
-
-        If some performances have key-frames and others none, those that have.
-        """
-        chosen = [np.empty(0, dtype=np.intp)] * len(modes.shares)
-        if self.consensus > 0:
-            known = None if keyframes is None else np.isfinite(keyframes).any(axis=1)
-            chosen = modes.exemplars(estimates, self.consensus, self.pattern_index_, known)
-        self.exemplars_ = np.concatenate(chosen)
-        return chosen
-
-    def _set_keyframes(self, keyframes, source, arrays, matcher, exemplars):
-        """Set the key-frames of the pattern, which may have to be learnt; the pattern with them."""
-        self.keyframes_ = None
-        if keyframes is None:
-            return source
-        own = np.full(keyframes.shape[1], np.nan)
-        if self.pattern_index_ is not None:
-            own = keyframes[self.pattern_index_]
-        last, unknown = self.n_frames_ - 1, np.isnan(own)
-        if unknown.any():
-            some = np.flatnonzero(np.isfinite(keyframes[:, unknown]).any(axis=1))[:MOST_LEARNT]
-            (pattern,) = add_ramps([source], own[np.newaxis])
-            warper = self._warper_by(exemplars, arrays, matcher, pattern)
-            positions = warper.positions([arrays[k] for k in some])
-            _, times = on_one_thread(warper.warps, positions)
-            met = first_meeting(times, keyframes[some] * last) / last
-            own = np.maximum.accumulate(np.where(unknown, np.nanmedian(met, axis=0), own))
-        self.keyframes_ = own * last
-        (pattern,) = add_ramps([source], own[np.newaxis])
-        return pattern
-
-    def _warper_by(self, exemplars, arrays, matcher, source):
-        """The warper to the pattern by way of exemplars."""
-        # In double precision, as all performances that are warped.
-        both = source, *(arrays[k] for k in exemplars.tolist())
-        chosen = [x.astype(np.float64, copy=False) for x in both]
-        positions = matcher.features.positions(chosen, self.n_frames_)
-        pattern = matcher.features.plain(positions)[0, :: self.subframes]
-        linear = self.evidence_.harmful and self.unsupported == "linear"
-        made = LinearWarper if linear else Warper
-        given = pattern, positions, self.consensus > 0, self.warp_smoothing
-        return on_one_thread(made.to_pattern, matcher, *given)
-
-    def _sharpened(self, positions, warper, exemplars):
-        """The warper that also sharpens, with a metric; the same if it refines or does not warp."""
-        is_final = isinstance(warper, (LinearWarper, RefinedWarper))
-        if not self.sharpen or self.metric_ is None or is_final:
-            return warper
-        width = None if self.velocity_smoothing == "auto" else self.velocity_smoothing
-        chosen = positions[exemplars].astype(np.float64, copy=False)
-        return SharpenedWarper.of(warper, chosen, width) or warper
+def _described(finish, n_features):
+    """What sharpens warps, as ``sharpening_``; None if nothing does."""
+    if not isinstance(finish, Sharpener):
+        return None
+    agreement = finish.agreement_of_all(n_features)
+    return Bunch(agreement=agreement, width=finish.width, trust=finish.trust)

@@ -50,7 +50,7 @@ def with_confidence(performances, confidence):
             f"confidence must be a list of {n} arrays, (n_frames,) or (n_frames, n_features), one "
             f"a performance; got {confidence!r:.200}."
         )
-    arrays, kept = [], []
+    arrays, confidences = [], []
     for i, x in zip(performances.numbers, performances, strict=True):
         sure = as_numbers(confidence[i], f"Performance {i}: confidence", dtype=np.float64)
         if sure.shape not in (x.shape, x.shape[:1]):
@@ -66,9 +66,9 @@ def with_confidence(performances, confidence):
                 f"{sure.min():g} to {sure.max():g}. Divide it by its largest value."
             )
         arrays.append(np.where(sure < _SURE, x.dtype.type(np.nan), x))
-        kept.append(sure)
+        confidences.append(sure)
     out = performances.replace(arrays)
-    out.confidence = kept
+    out.confidence = confidences
     return out
 
 

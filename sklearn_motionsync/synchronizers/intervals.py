@@ -1,6 +1,5 @@
 """How sure a match is: intervals of its times, and which performances are doubtful."""
 
-import math
 import threading
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
@@ -9,14 +8,14 @@ import numpy as np
 
 from ..inputs.wording import counted
 from ..matching.anchors import first_meeting
-from ..matching.uncertainty import tail_factor
+from ..matching.counting import whole
+from ..matching.sizes import BATCH
+from ..matching.uncertainty import coverage_factor
 from ..matching.warps import even_slices
-from ..utils.threads import on_one_thread
+from ..utils.parallel import one_blas_thread
 
 __all__ = ["Intervals", "calibrated_factor", "intervals_of", "joined"]
 
-# Performances whose uncertainty is computed at a time.
-_PORTION = 64
 # A performance is doubtful if the share of its movement that no path explains, times the widest
 # interval of 90 %, as a share of the clip, is larger: docs/design.md.
 _DOUBTFUL = 0.2
@@ -29,14 +28,14 @@ class Measured(NamedTuple):
     ----------
     widths : ndarray, shape (n_sequences, P)
         Half-widths of 90 %, in frames; 0 where a warp is pinned.
-    tails : ndarray, shape (n_sequences,)
+    is_normal : ndarray of bool, shape (n_sequences,)
         As of `Uncertainty`.
     reasons : list of str or None
         Why each performance is doubtful.
     """
 
     widths: np.ndarray
-    tails: np.ndarray
+    is_normal: np.ndarray
     reasons: list[str | None]
 
 
@@ -71,8 +70,9 @@ class Intervals:
 
     def bounds(self, coverage: float) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper times, (n_sequences, P) each, non-decreasing and inside the clip."""
-        widths, tails, _ = self.measured()
-        half, last = widths * tail_factor(coverage, tails)[:, np.newaxis], self.times.shape[1] - 1
+        widths, is_normal, _ = self.measured()
+        half = widths * coverage_factor(coverage, is_normal)[:, np.newaxis]
+        last = self.times.shape[1] - 1
         lower, upper = np.maximum(self.times - half, 0), np.minimum(self.times + half, last)
         # A warp does not decrease: it is above what it was above before.
         lower = np.maximum.accumulate(lower, axis=1)
@@ -81,40 +81,48 @@ class Intervals:
 
 def joined(parts: Iterable[Measured]) -> Measured:
     """What was measured of performances that were matched in parts."""
-    *columns, reasons = zip(*parts, strict=True)
-    return Measured(*map(np.concatenate, columns), [why for part in reasons for why in part])
+    measured = list(parts)
+    return Measured(
+        np.concatenate([each.widths for each in measured]),
+        np.concatenate([each.is_normal for each in measured]),
+        [reason for each in measured for reason in each.reasons],
+    )
 
 
-def intervals_of(sync, warper, arrays, match, shares=None):
-    """The intervals of a match of a `DenseSynchronizer`.
+def intervals_of(warper, arrays, times, factor, evidence, pinned=None):
+    """The intervals of the times of a match of a `DenseSynchronizer`.
 
     Parameters
     ----------
-    sync : DenseSynchronizer
-        Fitted.
     warper : Warper
-        Its own.
     arrays : list of ndarray (n_frames_i, n_columns)
-        Performances as the warper takes them.
-    match : Match
-    shares : ndarray, shape (n_sequences, n_keyframes), default=None
-        Key-frames that were given.
+        Trials as the warper takes them.
+    times : ndarray, shape (n_trials, P)
+        Their warps.
+    factor : float
+        By which half-widths are multiplied.
+    evidence : Bunch
+        As ``evidence_``.
+    pinned : tuple of ndarray (n_keyframes,) and of bool (n_trials, n_keyframes), default=None
+        Key-frames of the pattern, in frames, and those that were given for each trial: warps go
+        through them.
     """
-    times, mode, home = match.times, match.mode, getattr(warper, "home", 0)
-    factor, evidence, pinned = sync.interval_factor_, sync.evidence_, sync.keyframes_
-    pins = shares is not None and sync.keyframe_std == 0
 
     def measure():
-        parts = [
-            on_one_thread(warper.uncertainty, warper.positions(arrays[rows]), times[rows])
-            for rows in even_slices(len(times), _PORTION)
-        ]
-        widths, tails, unlike, widest = map(np.concatenate, zip(*parts, strict=True))
+        with one_blas_thread():
+            batches = [
+                warper.uncertainty(warper.positions(arrays[rows]), times[rows])
+                for rows in even_slices(len(times), BATCH)
+            ]
+        widths, is_normal, unlike, widest = (
+            np.concatenate(values) for values in zip(*batches, strict=True)
+        )
         widths[:, [0, -1]] = 0
-        if pins:
-            for frames in (np.floor(pinned), np.ceil(pinned)):
-                widths[:, frames.astype(np.intp)] *= np.isnan(shares)
-        return Measured(widths * factor, tails, _reasons(unlike, widest, mode, home, evidence))
+        if pinned is not None:
+            keyframes, is_known = pinned
+            for way in ("down", "up"):
+                widths[:, whole(keyframes, way)] *= ~is_known
+        return Measured(widths * factor, is_normal, _reasons(unlike, widest, evidence))
 
     return Intervals(times, measure)
 
@@ -146,7 +154,7 @@ def calibrated_factor(match, pattern, known):
     widths = np.maximum(at_keyframes(match.intervals.measured().widths), np.finfo(np.float64).tiny)
     # As many as hold 90 % of new ones, too (split conformal prediction).
     n = len(errors)
-    rank = math.ceil(0.9 * (n + 1))
+    rank = whole(0.9 * (n + 1), "up")
     if rank > n:
         raise ValueError(
             f"{counted(n, 'key-frame')} of the performances do not tell 90 %: at least 9 are "
@@ -155,18 +163,16 @@ def calibrated_factor(match, pattern, known):
     return float(np.sort(errors / widths)[rank - 1])
 
 
-def _reasons(shares, widest, modes, home, evidence):
+def _reasons(shares, widest, evidence):
     """Why performances are doubtful; None for those that are not."""
     reasons = []
-    for share, width, mode in zip(shares, widest, modes, strict=True):
+    for share, width in zip(shares, widest, strict=True):
         why = None
         if share * width > _DOUBTFUL:
             why = (
                 f"no warp explains {share:.0%} of its movement, and an interval of 90 % holds "
                 f"{width:.0%} of the clip: it may be cut off, repeated or another movement"
             )
-        elif mode != home:
-            why = f"it shows mode {mode} of the movement, and the template mode {home} (modes_)"
         elif evidence.weak:
             why = (
                 f"matching leaves {evidence.remaining:.0%} of the differences in the training set, "

@@ -8,22 +8,18 @@ from typing import Literal
 import numpy as np
 from sklearn.utils._param_validation import Interval
 
-from ..inputs.types import (
-    PerformanceLike,
-)
+from ..inputs.types import PerformanceLike
+from ..inputs.validation import names_of_input
 from ..matching.filters import SMOOTHING, smooth
+from ..matching.sizes import BATCH, EQUAL
 from ..matching.units import Unit
 from ..matching.warps import even_slices, sample
 from ..utils.pipelines import MissingMetadata
 from .anchored import AnchoredSynchronizer
 from .match import Match
+from .training import check_pattern
 
 __all__ = ["KeyframeSynchronizer"]
-
-# Performances that are warped together, which bounds the memory.
-_BATCH = 256
-# Weight of the distance in time, which decides between equal postures.
-_TIE = 1e-9
 
 
 class KeyframeSynchronizer(AnchoredSynchronizer):
@@ -116,39 +112,50 @@ class KeyframeSynchronizer(AnchoredSynchronizer):
             )
         shares = self._shares(performances, keyframes, frame_rate)
         distances, times = np.empty(len(performances)), []
-        for rows in even_slices(len(performances), _BATCH):
-            some = performances.take(rows)
+        for rows in even_slices(len(performances), BATCH):
+            batch = performances.take(rows)
             if shares is None:
-                on_clock = self.normalize(some)
-                own = [match_keyframes(self.pattern_, self.keyframes_, x) for x in on_clock]
+                on_clock = self.normalize(batch)
+                knots = [match_keyframes(self.pattern_, self.keyframes_, x) for x in on_clock]
             else:
-                own = shares[rows] * (self.n_frames_ - 1)
-            times.append(self._interpolate(self.keyframes_, own))
-            synchronised = sample(some, times[-1], self.n_frames_)
+                knots = shares[rows] * (self.n_frames_ - 1)
+            times.append(piecewise_linear(self.keyframes_, knots, self.n_frames_))
+            synchronised = sample(batch, times[-1], self.n_frames_)
             differences = np.square(synchronised - self.pattern_)
             distances[rows] = differences.sum(axis=(1, 2), dtype=np.float64)
         return Match(np.concatenate(times), distances)
 
-    def _learn(self, performances, progress, keyframes):
-        self._needs_keyframes = keyframes is not None
-        training = self._set_clock(performances)
-        comparable = training.scaled
-        if self._needs_keyframes:
-            knots = keyframes * (self.n_frames_ - 1)
+    def _learn(self, training, progress):
+        pattern = check_pattern(self.pattern, training.trials, names_of_input(self))
+        clock, keyframes = self._put_on_clock(training, pattern), None
+        comparable, last = clock.poses, clock.n_frames - 1
+        if training.keyframes is not None:
+            keyframes = training.keyframes * last
             # On the mean key-frames all performances are comparable, as on one clock.
-            times = self._interpolate(knots.mean(axis=0), knots)
-            comparable = training.unit(sample(performances, times, self.n_frames_))
-        self._set_pattern(training, self._plain_median(comparable))
-        if self._needs_keyframes and self.pattern_index_ is not None:
-            self.keyframes_ = knots[self.pattern_index_]
+            times = piecewise_linear(keyframes.mean(axis=0), keyframes, clock.n_frames)
+            comparable = clock.unit(sample(training.trials, times, clock.n_frames))
+        learnt = self._learnt(training, clock, pattern, comparable)
+        if keyframes is not None and learnt["pattern_index_"] is not None:
+            learnt["keyframes_"] = keyframes[learnt["pattern_index_"]]
         else:
-            count = knots.shape[1] if self._needs_keyframes else self.n_keyframes
-            self.keyframes_ = curvature_keyframes(self.pattern_, count)
+            count = self.n_keyframes if keyframes is None else keyframes.shape[1]
+            learnt["keyframes_"] = curvature_keyframes(learnt["pattern_"], count)
+        return learnt | {"_needs_keyframes": keyframes is not None}
 
-    def _interpolate(self, knots, others):
-        """tau(p): piecewise linear through the ends and the key-frames."""
-        p, last = np.arange(self.n_frames_), self.n_frames_ - 1
-        return np.stack([np.interp(p, [0, *knots, last], [0, *other, last]) for other in others])
+
+def piecewise_linear(knots, shifted, n_frames):
+    """tau(p): piecewise linear through the ends and the key-frames, (n_trials, P).
+
+    Parameters
+    ----------
+    knots : ndarray, shape (n_keyframes,)
+        Of the pattern, in frames.
+    shifted : sequence of ndarray (n_keyframes,)
+        Of the trials.
+    n_frames : int
+    """
+    p, last = np.arange(n_frames), n_frames - 1
+    return np.stack([np.interp(p, [0, *knots, last], [0, *times, last]) for times in shifted])
 
 
 # -- automatic key-frames: frames of large curvature (Figs. 1c and 3c) ---------------------
@@ -176,8 +183,8 @@ def curvature_keyframes(on_clock, count):
     chosen = []
     for near in (gap, 0):
         for frame in order:
-            others = [0, n_frames - 1, *chosen]
-            if len(chosen) < count and min(abs(frame - other) for other in others) > near:
+            taken_frames = [0, n_frames - 1, *chosen]
+            if len(chosen) < count and min(abs(frame - other) for other in taken_frames) > near:
                 chosen.append(int(frame))
     return np.sort(np.array(chosen, dtype=np.float64))
 
@@ -203,23 +210,24 @@ def match_keyframes(pattern, keyframes, on_clock):
     curvature = _curvature(on_clock)
     inner = curvature[1:-1]
     peaks = 1 + np.flatnonzero((inner >= curvature[:-2]) & (inner > curvature[2:]))
-    own = curvature_keyframes(on_clock, len(keyframes)).astype(np.intp)
-    peaks = np.union1d(peaks, own)
+    candidates_by_rank = curvature_keyframes(on_clock, len(keyframes)).astype(np.intp)
+    peaks = np.union1d(peaks, candidates_by_rank)
     unit = Unit.of(pattern[np.newaxis])
     expected, candidates = unit(pattern[keyframes.astype(np.intp)]), unit(on_clock[peaks])
     costs = np.square(expected[:, np.newaxis] - candidates).sum(axis=2, dtype=np.float64)
-    costs += _TIE * np.square((keyframes[:, np.newaxis] - peaks) / n_frames)
+    # The distance in time decides between equal postures.
+    costs += EQUAL[costs.dtype] * np.square((keyframes[:, np.newaxis] - peaks) / n_frames)
     best, choices = np.zeros(len(peaks)), []
     for cost in costs:
         # best[j]: the smallest cost of the key-frames so far, all of them before peak j.
         total = best + cost
         choices.append(np.concatenate([[-1], _running_argmin(total)]))
         best = np.concatenate([[np.inf], np.minimum.accumulate(total)[:-1]])
-    found, end = [], len(peaks)
+    frames, end = [], len(peaks)
     for choice in choices[::-1]:
         end = choice[end]
-        found.append(peaks[end])
-    return np.array(found[::-1], dtype=np.float64)
+        frames.append(peaks[end])
+    return np.array(frames[::-1], dtype=np.float64)
 
 
 def _running_argmin(values):
@@ -236,7 +244,7 @@ def _curvature(on_clock):
     scaled = Unit.of(on_clock)(on_clock)
     v, a = (smooth(scaled, sigma, order)[0].astype(np.float64) for order in (1, 2))
     vv, aa, va = np.square(v).sum(1), np.square(a).sum(1), (v * a).sum(1)
-    rest = 0.1 * vv.mean()
-    if rest == 0:
+    at_rest = 0.1 * vv.mean()
+    if at_rest == 0:
         return np.zeros_like(vv)
-    return np.sqrt(np.maximum(vv * aa - va**2, 0)) / (vv + rest) ** 1.5
+    return np.sqrt(np.maximum(vv * aa - va**2, 0)) / (vv + at_rest) ** 1.5

@@ -10,6 +10,7 @@ from scipy.stats import t as student
 
 from ..inputs.types import Unit
 from ..inputs.wording import counted
+from ..matching.counting import whole
 from .match import timing_table
 
 __all__ = ["Lags", "common_delay", "share_apart"]
@@ -124,15 +125,15 @@ class Lags(NamedTuple):
             mean, sd, n = values.mean(axis=0), _sd(values), len(values)
             return {"mean": mean, "sd": sd, **_interval(mean, sd, n)}
         counts = np.bincount(self.groups)
-        own = np.stack([values[self.groups == g].mean(axis=0) for g in range(len(counts))])
-        mean = own.mean(axis=0)
-        within, between = _components(values, own, self.groups, counts)
+        means = np.stack([values[self.groups == g].mean(axis=0) for g in range(len(counts))])
+        mean = means.mean(axis=0)
+        within, between = _components(values, means, self.groups, counts)
         with np.errstate(invalid="ignore"):
             icc = between / (between + within)
         return {
             "mean": mean,
             "sd": _sd(values),
-            **_interval(mean, _sd(own), len(own)),
+            **_interval(mean, _sd(means), len(means)),
             "sd_within": np.sqrt(within),
             "sd_between": np.sqrt(between),
             "icc": icc,
@@ -160,7 +161,7 @@ def common_delay(offsets, apart):
     if not offsets:
         return 0.0
     count = len(offsets)
-    agree = max(int(np.ceil((1 + apart) / 2 * count - 1e-9)), count // 2 + 1)
+    agree = max(whole((1 + apart) / 2 * count, "up"), count // 2 + 1)
     ranked = np.sort(offsets, axis=0)
     return np.maximum(ranked[count - agree], 0) + np.minimum(ranked[agree - 1], 0)
 

@@ -5,15 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..inputs.types import PerformancesLike
+from ..matching.sizes import BATCH
 from ..matching.warps import normalise
-from ..utils.atomic import snapshot
 from .base import Synchronizer
 from .match import Match
 
 __all__ = ["LinearSynchronizer"]
-
-# Performances processed at a time: bounds the memory of intermediate arrays.
-_BATCH = 256
 
 
 class LinearSynchronizer(Synchronizer):
@@ -67,7 +64,6 @@ class LinearSynchronizer(Synchronizer):
 
     _finite = "allow-nan"
 
-    @snapshot
     def match(self, X: PerformancesLike) -> Match:
         """Match performances to the pattern without any warp.
 
@@ -85,8 +81,8 @@ class LinearSynchronizer(Synchronizer):
 
     def _match(self, performances):
         arrays, distances = list(self._without_gaps(performances)), np.empty(len(performances))
-        for start in range(0, len(arrays), _BATCH):
-            rows = slice(start, start + _BATCH)
+        for start in range(0, len(arrays), BATCH):
+            rows = slice(start, start + BATCH)
             differences = normalise(arrays[rows], self.n_frames_) - self.pattern_
             distances[rows] = np.square(differences).sum(axis=(1, 2), dtype=np.float64)
         clock = np.arange(self.n_frames_, dtype=np.float64)

@@ -27,6 +27,7 @@ from ..inputs.types import (
 )
 from ..inputs.validation import read_collection
 from ..inputs.wording import counted
+from ..matching.counting import ROUNDING, first_largest
 from ..matching.warps import sample
 from ..utils.pipelines import route_to_synchronizer
 from .intervals import Intervals
@@ -47,8 +48,6 @@ __all__ = [
 STANDARD = 0.6827
 # Units of time of the clock of the pattern, and their symbols.
 UNITS = {"frames": "frames", "percent": "%", "seconds": "s"}
-# Times may decrease by rounding errors, by this share of the clock.
-_ROUNDING = 1e-9
 # Performances in the table for notebooks.
 _SHOWN = 10
 # The smallest rate, so that logarithms are finite.
@@ -67,8 +66,6 @@ class Match:
         performances that are linearly normalised to its length.
     distances : array-like, shape (n_sequences,), default=None
         Distance of each performance from the pattern; NaN by default.
-    mode : array-like of int, shape (n_sequences,), default=None
-        The mode of each performance; 0 by default.
     intervals : Intervals, default=None
         What `DenseSynchronizer` gives for ``interval`` and ``doubtful``.
 
@@ -80,10 +77,6 @@ class Match:
     distances : ndarray, shape (n_sequences,)
         From a `DenseSynchronizer` the synchronisation distance ``D_{n,m}`` of Eq. 12, of the path
         straight to the base; from others the squared distance to the pattern.
-    mode : ndarray of int, shape (n_sequences,)
-        Which of several ways of doing the movement each performance shows: a label of
-        ``DenseSynchronizer.modes_``. 0 everywhere if there is a single one, and from other
-        synchronizers.
     intervals : Intervals or None
         As given; ``interval`` asks it.
 
@@ -91,7 +84,7 @@ class Match:
     ------
     ValueError
         If times are not of shape (n_sequences, P) with at least two frames, decrease, or are not
-        within the clock; or if there is not one distance and one mode a performance.
+        within the clock; or if there is not one distance a performance.
 
     Notes
     -----
@@ -122,13 +115,12 @@ class Match:
     [[2.0, 1.5, 0.75, 0.5, 0.5]]
     """
 
-    __slots__ = ("distances", "intervals", "mode", "times")
+    __slots__ = ("distances", "intervals", "times")
 
     def __init__(
         self,
         times: NumbersLike,
         distances: ValuesLike | None = None,
-        mode: ValuesLike | None = None,
         intervals: Intervals | None = None,
     ) -> None:
         times = np.array(as_numbers(times, "times", dtype=np.float64))
@@ -145,7 +137,7 @@ class Match:
                 f"Performance {i}: times must be from 0 to P - 1 = {n_frames - 1}, in frames of "
                 f"the pattern, got {times[i].min():g} to {times[i].max():g}."
             )
-        back = np.diff(times) < -_ROUNDING * n_frames
+        back = np.diff(times) < -ROUNDING * n_frames
         if back.any():
             i, p = np.argwhere(back)[0]
             raise ValueError(
@@ -161,15 +153,7 @@ class Match:
                 f"distances must be one for each of the {counted(n_sequences, 'performance')}, got "
                 f"shape {distances.shape}."
             )
-        if mode is None:
-            mode = np.zeros(n_sequences)
-        mode = np.array(as_numbers(mode, "mode"))
-        if mode.shape != (n_sequences,) or not (mode == np.floor(mode)).all():
-            raise ValueError(
-                f"mode must be one whole number for each of the "
-                f"{counted(n_sequences, 'performance')}, got shape {mode.shape}."
-            )
-        self.times, self.distances, self.mode = times, distances, mode.astype(np.intp)
+        self.times, self.distances = times, distances
         self.intervals = intervals
 
     @property
@@ -256,8 +240,8 @@ class Match:
         """Which performances to look at before their warps are used, bool: (n_sequences,).
 
         Those with much movement that no warp explains and a wide interval: cut off, repeated, or
-        another movement. Those of another mode than the pattern. And all performances if the
-        training set did not support its warps. ``reasons`` says which. Raises as ``interval``.
+        another movement. And all performances if the training set did not support its warps.
+        ``reasons`` says which. Raises as ``interval``.
         """
         return np.array([reason is not None for reason in self.reasons], dtype=bool)
 
@@ -342,8 +326,8 @@ class Match:
         DataFrame
             Indexed by the label of the performance and the frame of the pattern. Columns:
             ``time``, tau(p) in the unit, from the beginning of each performance; ``offset``;
-            ``rate``; ``mode``, if there are several; and with a coverage ``lower`` and ``upper``,
-            between which the time lies, and ``doubtful``.
+            ``rate``; and with a coverage ``lower`` and ``upper``, between which the time lies, and
+            ``doubtful``.
 
         Raises
         ------
@@ -365,19 +349,18 @@ class Match:
         4      100.0     0.0   0.5
         >>> csv = match.to_frame("percent", labels=["ann"]).to_csv()
         """
-        clock = unit, X, frame_rate
-        columns = {"time": self._in_unit(self.times, *clock), "offset": self.offsets_in(*clock)}
-        columns["rate"] = self.rates
+        columns = {
+            "time": self._in_unit(self.times, unit, X, frame_rate),
+            "offset": self.offsets_in(unit, X, frame_rate),
+            "rate": self.rates,
+        }
         if labels is not None:
             self._check_count(labels, "label")
         if coverage is not None:
-            columns["lower"], columns["upper"] = self.interval(coverage, *clock)
+            columns["lower"], columns["upper"] = self.interval(coverage, unit, X, frame_rate)
         table = timing_table(columns, X, labels)
-        n_frames = self.times.shape[1]
-        if self.mode.any():
-            table["mode"] = np.repeat(self.mode, n_frames)
         if coverage is not None:
-            table["doubtful"] = np.repeat(self.doubtful, n_frames)
+            table["doubtful"] = np.repeat(self.doubtful, self.times.shape[1])
         return table
 
     @classmethod
@@ -543,23 +526,20 @@ class Match:
 
     def __repr__(self):
         n_sequences, n_frames = self.times.shape
-        modes = ""
-        if self.mode.any():
-            counts = np.unique(self.mode, return_counts=True)
-            parts = [f"{count} in mode {mode}" for mode, count in zip(*counts, strict=True)]
-            modes = f", several ways of doing it: {', '.join(parts)}"
-        return f"Match({counted(n_sequences, 'performance')} on {n_frames} frames{modes})"
+        return f"Match({counted(n_sequences, 'performance')} on {n_frames} frames)"
 
     def _repr_html_(self):
         """A table for notebooks: how late each of the first performances is, and when."""
         percent = 100 * self.offsets / (self.times.shape[1] - 1)
         largest = max(np.abs(percent).max(initial=0), 1e-9)
         rows = []
-        for i, own in enumerate(percent[:_SHOWN]):
-            at = int(np.abs(own).argmax())
-            word = "late" if own[at] > 0 else "early"
-            when = f"{abs(own[at]):.1f} % {word}, at {100 * at / (len(own) - 1):.0f} %"
-            rows.append(f"<tr><td>{i}</td><td>{when}</td><td>{_sparkline(own, largest)}</td></tr>")
+        for i, offsets in enumerate(percent[:_SHOWN]):
+            at = first_largest(np.abs(offsets))
+            word = "late" if offsets[at] > 0 else "early"
+            when = f"{abs(offsets[at]):.1f} % {word}, at {100 * at / (len(offsets) - 1):.0f} %"
+            rows.append(
+                f"<tr><td>{i}</td><td>{when}</td><td>{_sparkline(offsets, largest)}</td></tr>"
+            )
         more = len(percent) - len(rows)
         tail = f"<p>and {counted(more, 'performance')} more</p>" if more else ""
         return (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import reprlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import NamedTuple, Self
 
@@ -28,18 +28,20 @@ from ..inputs.types import (
 )
 from ..inputs.validation import names_of_input
 from ..matching.anchors import add_ramps
+from ..matching.consensus import smooth_warps, vote
 from ..matching.gaps import add_weights
-from ..matching.matcher import Matcher, Warper
+from ..matching.matcher import Matcher, Warper, times_of
+from ..matching.tile import Bases
 from ..matching.trellis import Coupling
 from ..matching.warps import evaluate_warps, normalise
-from ..utils.atomic import atomic_fit, snapshot
 from ..utils.groups import encode_groups
-from ..utils.parallel import Progress, run
-from ..utils.parameters import validated, validated_with_nested
+from ..utils.parallel import Progress, one_blas_thread, run
+from ..utils.parameters import validated_with_nested
 from .anchored import AnchoredSynchronizer
 from .dense import DenseSynchronizer
 from .gaps import with_confidence
 from .lags import Lags, common_delay, share_apart
+from .learning import MOST_LEARNT
 from .match import Match, rates_of
 from .portions import warp_in_portions
 
@@ -47,8 +49,6 @@ __all__ = ["PartSynchronizer"]
 
 # What a part can be compared with besides another part; no part may have such a name.
 _REST, _BODY = _REFERENCES = ("rest", "body")
-# Most training performances, evenly spaced, whose mean warps are those of people.
-_MOST_OF_MEAN = 32
 # Fitted attributes of the synchronizer of the whole body that are also those of the parts.
 _SHARED = (
     "pattern_",
@@ -161,7 +161,7 @@ class PartSynchronizer(AnchoredSynchronizer):
     >>> lags = sync.lags([X[5], last], unit="percent")
     >>> change = lags.values[1] - lags.values[0]
     >>> dict(zip(lags.parts, change.max(axis=1).round(1).tolist()))
-    {'left arm': 0.0, 'right arm': 5.1, 'left leg': 0.0, 'right leg': 0.0, 'trunk': 0.0}
+    {'left arm': 0.0, 'right arm': 5.3, 'left leg': 0.0, 'right leg': 0.0, 'trunk': 0.0}
     """
 
     _parameter_constraints: dict = {
@@ -182,7 +182,6 @@ class PartSynchronizer(AnchoredSynchronizer):
         self.coupling = coupling
         self.synchronizer = synchronizer
 
-    @atomic_fit
     @validated_with_nested
     def fit(
         self,
@@ -221,19 +220,22 @@ class PartSynchronizer(AnchoredSynchronizer):
             such parts.
         """
         body = clone(DenseSynchronizer() if self.synchronizer is None else self.synchronizer)
-        with (
-            self._progress(fits=True) as progress,
-            progress.fitting(body, "learning the body and its parts"),
-        ):
-            given = self.parts, self.coupling, keyframes, frame_rate, confidence
-            self.parts_, self._warpers, self._people = fit_body_and_parts(body, X, *given)
-        self.synchronizer_ = body
-        for name in _SHARED:
-            if hasattr(body, name):
-                setattr(self, name, getattr(body, name))
+        with self._progress(fits=True) as progress:
+            with progress.fitting(body, "learning the body"):
+                training = fit_body(body, X, keyframes, frame_rate, confidence)
+            parts = choose_parts(self.parts, training.trials, names_of_input(body))
+            learnt = learn_parts(body, training, parts, self.coupling, progress)
+        shared = {name: value for name, value in vars(body).items() if name in _SHARED}
+        vars(self).pop("feature_names_in_", None)
+        vars(self).update(
+            shared,
+            synchronizer_=body,
+            parts_=parts,
+            _warpers=learnt.warpers,
+            _people=learnt.people,
+        )
         return self
 
-    @snapshot
     def match(
         self,
         X: PerformancesLike,
@@ -262,7 +264,6 @@ class PartSynchronizer(AnchoredSynchronizer):
         check_is_fitted(self)
         return self.synchronizer_.match(X, keyframes, frame_rate, confidence)
 
-    @snapshot
     def match_parts(
         self,
         X: PerformancesLike,
@@ -290,7 +291,6 @@ class PartSynchronizer(AnchoredSynchronizer):
         body = self.match(performances, **self._given(X, keyframes, frame_rate))
         return self._match_parts(performances, body, self.parts_)
 
-    @snapshot
     def lags(
         self,
         X: PerformancesLike,
@@ -347,11 +347,11 @@ class PartSynchronizer(AnchoredSynchronizer):
             groups, people = encode_groups(groups, len(performances))
         body = self.match(performances, **self._given(X, keyframes, None))
         matches = self._match_parts(performances, body, self._warpers, free=True) | {_BODY: body}
-        clock = unit, [len(x) for x in performances], rates_of(X, frame_rate, unit)
-        offsets = {
-            name: match.offsets_in(*clock) - self._usual(name, match).offsets_in(*clock)
-            for name, match in matches.items()
-        }
+        lengths, rates = [len(x) for x in performances], rates_of(X, frame_rate, unit)
+        offsets = {}
+        for name, match in matches.items():
+            usual = self._usual(name, match).offsets_in(unit, lengths, rates)
+            offsets[name] = match.offsets_in(unit, lengths, rates) - usual
         names = [name for name in self.parts_ if name != against]
         if against == _REST:
             moving = [name for name, warper in self._warpers.items() if warper is not None]
@@ -364,8 +364,8 @@ class PartSynchronizer(AnchoredSynchronizer):
             ]
         else:
             references = [offsets[against]] * len(names)
-        own = (offsets[name] for name in names)
-        values = np.stack([x - y for x, y in zip(own, references, strict=True)], axis=1)
+        lags = [offsets[name] - x for name, x in zip(names, references, strict=True)]
+        values = np.stack(lags, axis=1)
         return Lags(values, names, against, unit, groups, people, performances.labels)
 
     def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
@@ -386,19 +386,23 @@ class PartSynchronizer(AnchoredSynchronizer):
 
         What does not move has the warp of the body.
         """
-        found, sync = {}, self.synchronizer_
+        matches, sync = {}, self.synchronizer_
         performances = self._without_gaps(performances)
-        with Progress(self, sync.verbose) as progress:
-            for name in names:
-                warper = self._warpers[name]
-                if warper is None:
-                    found[name] = Match(body.times)
-                    continue
-                warper = replace(warper, weight=0.0) if free else warper
-                portions = {"n_jobs": sync.n_jobs, "progress": progress, "name": f"warping {name}"}
-                distances, times = warp_in_portions(warper, performances, body.times, **portions)
-                found[name] = Match(times, warper.matcher.features.back(distances))
-        return found
+        for name in names:
+            warper = self._warpers[name]
+            if warper is None:
+                matches[name] = Match(body.times)
+                continue
+            distances, times = warp_in_portions(
+                replace(warper, weight=0.0) if free else warper,
+                performances,
+                body.times,
+                n_jobs=sync.n_jobs,
+                begin=lambda fits: Progress(self, sync.verbose),
+                name=f"warping {name}",
+            )
+            matches[name] = Match(times, warper.matcher.features.back(distances))
+        return matches
 
     def _check_reference(self, against):
         if not self.parts_:
@@ -411,78 +415,6 @@ class PartSynchronizer(AnchoredSynchronizer):
             raise ValueError(f"against must be one of {known}, got {reprlib.repr(against)}.")
         if [against] == [*self.parts_]:
             raise ValueError(f"{against!r} is the only part: use against='rest' or 'body'.")
-
-
-@atomic_fit
-@validated
-def fit_body_and_parts(self, X, parts, coupling, keyframes=None, frame_rate=None, confidence=None):
-    """A ``fit`` of the synchronizer of the whole body, which also learns the parts.
-
-    Parameters
-    ----------
-    self : DenseSynchronizer
-        Of the whole body.
-    X : as for ``PartSynchronizer.fit``
-    parts, coupling : parameters of `PartSynchronizer`
-    keyframes, frame_rate, confidence : as for ``PartSynchronizer.fit``
-
-    Returns
-    -------
-    parts : dict of str to ndarray of int
-        Indices of the features of every part.
-    warpers : dict of str to PartWarper or None
-        Of every part by name, and of all features of no part as ``"rest"``, if there are any. None
-        for what does not move, and for an infinite coupling.
-    people : PartsOfPeople
-    """
-    performances = self._check_training_set(X, confidence)
-    parts = choose_parts(parts, performances, names_of_input(self))
-    with self._progress(fits=True) as progress:
-        known = self._known(performances, X, keyframes, frame_rate)
-        self._learn(performances, progress, known)
-        source = self._given_pattern(performances)
-        if source is None:
-            source = performances[self.pattern_index_]
-        some = np.linspace(0, len(performances) - 1, min(len(performances), _MOST_OF_MEAN))
-        chosen = [*self.exemplars_, *some.round().astype(np.intp)]
-        arrays = [source, *(performances[k] for k in chosen)]
-        # In double precision, as all that is warped.
-        given = arrays = [x.astype(np.float64, copy=False) for x in arrays]
-        if performances.weights is not None:
-            index = self.pattern_index_
-            own = np.ones(len(source)) if index is None else performances.weights[index]
-            given = add_weights(given, [own, *(performances.weights[k] for k in chosen)])
-        if known is not None:
-            given = add_ramps(given, [self.keyframes_ / (self.n_frames_ - 1), *known[chosen]])
-        sizes = self.n_frames_, self.subframes
-        arrays, given = normalise(arrays, *sizes), normalise(given, *sizes)
-        (times,) = run(_warps_of_body, [(self._warper, given)])
-        # The pattern keeps its own pace.
-        times[0] = np.arange(self.n_frames_)
-        (bases, body), (arrays, people) = (
-            np.split(x, [1 + len(self.exemplars_)]) for x in (times, arrays)
-        )
-        columns, everything = dict(parts), np.arange(performances[0].shape[1])
-        others = np.setdiff1d(everything, np.concatenate([*parts.values(), []]))
-        if len(others):
-            columns[_REST] = others
-        warpers, warps = dict.fromkeys(columns), dict.fromkeys([*columns, _BODY], body)
-        if coupling < math.inf:
-            training = normalise(performances, *sizes)
-            common = self._warper, bases, training, arrays, coupling, self._settings()
-            portions = [(own, *common) for own in columns.values()]
-            how = {"n_jobs": self.n_jobs, "prefer": "threads"}
-            how["step"] = progress.stage("learning parts", len(portions))
-            warpers = dict(zip(columns, run(PartWarper.of, portions, **how), strict=True))
-            moving = [name for name in columns if warpers[name] is not None]
-            portions = [(replace(warpers[name], weight=0.0), people, body) for name in moving]
-            how["step"] = progress.stage("warping parts", len(portions))
-            warps |= dict(zip(moving, run(_warps_of_part, portions, **how), strict=True))
-        mean = {name: each.mean(axis=0) for name, each in warps.items()}
-        own = [warps[name] - mean[name] for name in columns if warpers[name] is not None]
-        people = PartsOfPeople(mean, share_apart(np.stack(own)) if own else 1.0)
-        self._number_as_given()
-    return parts, warpers, people
 
 
 class PartsOfPeople(NamedTuple):
@@ -500,6 +432,94 @@ class PartsOfPeople(NamedTuple):
     apart: float
 
 
+class LearntParts(NamedTuple):
+    """What is learnt of parts.
+
+    Attributes
+    ----------
+    warpers : dict of str to PartWarper or None
+        Of every part by name, and of all features of no part as ``"rest"``, if there are any. None
+        for what does not move, and for an infinite coupling.
+    people : PartsOfPeople
+    """
+
+    warpers: dict
+    people: PartsOfPeople
+
+
+def fit_body(self, X, keyframes, frame_rate, confidence):
+    """Fit the synchronizer of the whole body, a `DenseSynchronizer`: its `TrainingSet`."""
+    return self._fit(X, keyframes, frame_rate, confidence)
+
+
+def learn_parts(self, training, parts, coupling, progress):
+    """Learn the warpers of parts, and how parts of the training trials move.
+
+    Parameters
+    ----------
+    self : DenseSynchronizer
+        Of the whole body, fitted.
+    training : TrainingSet
+        That it was fitted on.
+    parts : dict of str to ndarray of int
+        Indices of the features of every part.
+    coupling : float
+    progress : Progress
+
+    Returns
+    -------
+    LearntParts
+    """
+    trials, warper, n_frames = training.trials, self._warper, self.n_frames_
+    n_exemplars = len(warper.to_exemplars)
+    place = {number: row for row, number in enumerate(trials.numbers)}
+    rows = [place[number] for number in self.exemplars_.tolist()]
+    evenly = np.linspace(0, len(trials) - 1, min(len(trials), MOST_LEARNT))
+    rows += evenly.round().astype(np.intp).tolist()
+    index = None if self.pattern_index_ is None else place[self.pattern_index_]
+    source = self.pattern_ if index is None else trials[index]
+    # In double precision, as all that is warped.
+    arrays = [x.astype(np.float64, copy=False) for x in [source, *(trials[k] for k in rows)]]
+    columns = arrays
+    if trials.weights is not None:
+        weights = np.ones(len(source)) if index is None else trials.weights[index]
+        columns = add_weights(columns, [weights, *(trials.weights[k] for k in rows)])
+    if training.keyframes is not None:
+        shares = self.keyframes_ / (n_frames - 1)
+        columns = add_ramps(columns, [shares, *training.keyframes[rows]])
+    with one_blas_thread():
+        times = warper.warps(warper.positions(columns))[1]
+    # The pattern keeps its own pace.
+    times[0] = np.arange(n_frames)
+    from_bases, body_times = np.split(times, [1 + n_exemplars])
+    chosen, people = np.split(normalise(arrays, n_frames), [1 + n_exemplars])
+    features_of = dict(parts)
+    everything = np.arange(trials[0].shape[1])
+    of_no_part = np.setdiff1d(everything, np.concatenate([*parts.values(), []]))
+    if len(of_no_part):
+        features_of[_REST] = of_no_part
+    warpers = dict.fromkeys(features_of)
+    warps = dict.fromkeys([*features_of, _BODY], body_times)
+    if coupling < math.inf:
+        on_clock = normalise(trials, n_frames)
+        portions = [
+            (features, warper, from_bases, on_clock, chosen, coupling, self._settings)
+            for features in features_of.values()
+        ]
+        step = progress.stage("learning parts", len(portions))
+        learnt = run(PartWarper.of, portions, n_jobs=self.n_jobs, prefer="threads", step=step)
+        warpers = dict(zip(features_of, learnt, strict=True))
+        moving = [name for name in features_of if warpers[name] is not None]
+        portions = [(replace(warpers[name], weight=0.0), people, body_times) for name in moving]
+        step = progress.stage("warping parts", len(portions))
+        warped = run(_warps_of_part, portions, n_jobs=self.n_jobs, prefer="threads", step=step)
+        warps |= dict(zip(moving, warped, strict=True))
+    mean = {name: each.mean(axis=0) for name, each in warps.items()}
+    apart = [warps[name] - mean[name] for name in features_of if warpers[name] is not None]
+    share = share_apart(np.stack(apart)) if apart else 1.0
+    return LearntParts(warpers, PartsOfPeople(mean, share))
+
+
 def choose_parts(parts, performances, names):
     """Indices of the features of every part, by its name.
 
@@ -512,8 +532,8 @@ def choose_parts(parts, performances, names):
         Of their features.
     """
     if parts is None:
-        found = parts_of_postures(performances) if names is None else parts_of_names(names)
-        return {name: np.array(features) for name, features in found.items()}
+        recognised = parts_of_postures(performances) if names is None else parts_of_names(names)
+        return {name: np.array(features) for name, features in recognised.items()}
     names = [f"x{i}" for i in range(performances[0].shape[1])] if names is None else [*names]
     chosen, owner = {}, {}
     for part, features in parts.items():
@@ -543,10 +563,6 @@ def choose_parts(parts, performances, names):
 _RIGID = 1e6
 
 
-def _warps_of_body(warper, given):
-    return warper.warps(warper.matcher.features.unit(given))[1]
-
-
 def _warps_of_part(warper, positions, body):
     return warper.warps(positions, body)[1]
 
@@ -566,9 +582,9 @@ class PartWarper(Warper):
         meets.
     """
 
-    columns: np.ndarray
-    weight: float
-    back: np.ndarray
+    columns: np.ndarray = field(kw_only=True)
+    weight: float = field(kw_only=True)
+    back: np.ndarray = field(kw_only=True)
 
     @classmethod
     def of(cls, columns, body, times, on_clock, chosen, coupling, settings):
@@ -582,62 +598,98 @@ class PartWarper(Warper):
             Of the whole body.
         times : ndarray, shape (1 + n_exemplars, P)
             The body's warps of the pattern and its exemplars.
-        on_clock, chosen : ndarray, shape (n_sequences, Q, n_features)
-            The training set, and the pattern and its exemplars in double precision: whole, at all
-            positions, not in the unit.
+        on_clock, chosen : ndarray, shape (n_trials, P, n_features)
+            The training set, and the pattern and its exemplars in double precision: whole, not in
+            the unit.
         coupling : float
             ``lambda``, in mean squared features of the part, per squared per cent of the clock.
-        settings : dict
-            As `Matcher.learn` takes them.
+        settings : PathSettings
         """
         features = body.matcher.features.part(columns, on_clock)
         if features is None:
             return None
-        positions = features.unit(on_clock[:, :, columns])
-        matcher, compared = Matcher.learn(features, positions, **settings)
-        n_frames = len(body.pattern)
+        compared = features(features.unit(on_clock[:, :, columns]))
+        matcher, n_frames = Matcher.of(features, compared, settings), len(body.pattern)
         energy = np.square(compared).sum(axis=2, dtype=np.float64).mean()
         weight = float(min(coupling, _RIGID) * energy * (100 / (n_frames - 1)) ** 2)
-        frames = np.arange(n_frames)
-        own = features.unit(chosen[:, :, columns])
-        return cls.to_pattern(
+        frames, positions = np.arange(n_frames), features.unit(chosen[:, :, columns])
+        bases = Bases(matcher.trellis, features(positions))
+        to_exemplars = Coupling(weight, times[np.newaxis, 1:] - frames) if weight else None
+        disparities = matcher.trellis.paths(
+            bases.sequences[:1], bases.sequences[1:], coupling=to_exemplars
+        )
+        return cls(
             matcher,
-            own[0, :: features.subframes],
-            own,
-            body.votes,
-            body.warp_smoothing,
-            Coupling(weight, times[np.newaxis, 1:] - frames) if weight else None,
+            features.plain(positions)[0],
+            bases,
+            _towards(bases, times_of(disparities), to_exemplars)[0],
+            body.smoothing,
             columns=columns,
             weight=weight,
             back=np.stack([np.interp(frames, t, frames) for t in times]),
         )
 
     def positions(self, arrays):
-        """Whole performances at all positions, in double precision, not in the unit."""
+        """Whole trials on the clock, in double precision, not in the unit."""
         arrays = [x.astype(np.float64, copy=False) for x in arrays]
-        return normalise(arrays, len(self.pattern), self.matcher.features.subframes)
+        return normalise(arrays, len(self.pattern))
 
-    def warps(self, positions, body):
-        """Distances of the direct paths to the pattern, and times ``tau``, of some performances.
+    def warps(self, positions, body_times):
+        """Distances of the direct paths to the pattern, and times ``tau``, of some trials.
+
+        The coupling draws the paths. Its costs do not count for the distances.
 
         Parameters
         ----------
-        positions : ndarray, shape (n_sequences, Q, n_features)
-            Whole performances at all positions, in double precision, not in the unit.
-        body : ndarray, shape (n_sequences, P)
+        positions : ndarray, shape (n_trials, P, n_features)
+            Whole trials on the clock, in double precision, not in the unit.
+        body_times : ndarray, shape (n_trials, P)
             The warps of the whole bodies.
         """
-        own = self.matcher.features.unit(positions[:, :, self.columns])
-        return super().warps(own, self._coupling(body))
+        trellis, bases = self.matcher.trellis, self.bases
+        coupling = self._coupling(body_times)
+        if coupling is None:
+            return super().warps(self.matcher.features.unit(positions[:, :, self.columns]))
+        moving = self.matcher.features(self.matcher.features.unit(positions[:, :, self.columns]))
+        disparities = trellis.paths(bases, moving, coupling=coupling)
+        distances = trellis.costs(bases.sequences[0], moving, disparities[0])
+        routes = _towards(bases, times_of(disparities), coupling)
+        if self.smoothing is None:
+            return distances, routes[0]
+        voted = vote(routes[0], self.to_exemplars[:, np.newaxis], routes[1:])
+        share, offsets = _share(bases, coupling), coupling.offsets[0]
+        times = smooth_warps(voted, trellis.reach, self.smoothing, share * offsets)
+        # A strong coupling leaves nothing, also where the given warp is steeper than a path.
+        times += share**2 * (offsets + np.arange(times.shape[1]) - times)
+        # A path without any distance is right: the pattern keeps its own pace.
+        rounding = 64 * np.finfo(positions.dtype).eps * bases.energy[0]
+        return distances, np.where((distances <= rounding)[:, np.newaxis], routes[0], times)
 
-    def _coupling(self, body):
-        """The coupling of the paths from all bases.
+    def _coupling(self, body_times):
+        """The coupling of the paths from all bases; None if there is none.
 
         A path from the pattern is coupled to the body's warp, and one from an exemplar to the
         body's warp from there.
         """
         if not self.weight:
             return None
-        at = np.broadcast_to(self.back[:, np.newaxis], (len(self.back), *body.shape))
-        from_bases = evaluate_warps(np.broadcast_to(body, at.shape), at)
-        return Coupling(self.weight, from_bases - np.arange(body.shape[1]))
+        at = np.broadcast_to(self.back[:, np.newaxis], (len(self.back), *body_times.shape))
+        from_bases = evaluate_warps(np.broadcast_to(body_times, at.shape), at)
+        return Coupling(self.weight, from_bases - np.arange(body_times.shape[1]))
+
+
+def _towards(bases, times, coupling):
+    """Times (n_bases, n_trials, P) of coupled paths, between the steps of the trellis.
+
+    Of the distance to the given offsets, half a step at most, they go the share of the coupling.
+    """
+    if coupling is None:
+        return times
+    distance = coupling.offsets + np.arange(times.shape[-1]) - times
+    return times + _share(bases, coupling) * np.clip(distance, -0.5, 0.5)
+
+
+def _share(bases, coupling):
+    """The share w / (w + c) of a coupling of weight w, for features of mean squared slope c."""
+    slope = np.square(np.diff(bases.sequences, axis=1)).sum(axis=2).mean(dtype=np.float64)
+    return coupling.weight / (coupling.weight + slope)

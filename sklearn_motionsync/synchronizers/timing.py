@@ -20,7 +20,6 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.types import NamesLike, PerformancesLike, Transformed, Unit
 from ..inputs.validation import restore
-from ..utils.atomic import atomic_fit, snapshot
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
@@ -144,7 +143,6 @@ class TimingChannel(
         self.frame_rate = frame_rate
         self.errors = errors
 
-    @atomic_fit
     @validated_with_nested
     def fit(self, X: PerformancesLike, y: object = None, **params: Any) -> Self:
         """Fit a clone of the synchronizer.
@@ -191,12 +189,20 @@ class TimingChannel(
                 what = "channel" if name == self.channel else "errors"
                 raise ValueError(f"A feature of X has the name of the {what}, {name!r}: rename it.")
         self.synchronizer_ = sync
-        for name in ("n_frames_", "n_features_in_", "feature_names_in_", "_fitted_on_rows"):
-            if hasattr(sync, name):
-                setattr(self, name, getattr(sync, name))
+        for name in ("n_frames_", "_fitted_on_rows"):
+            setattr(self, name, getattr(sync, name))
         return self
 
-    @atomic_fit
+    @property
+    def n_features_in_(self) -> int:
+        """Features of a frame (columns, for 2-D input)."""
+        return self.synchronizer_.n_features_in_
+
+    @property
+    def feature_names_in_(self) -> np.ndarray:
+        """Names of the features; only if the input had names."""
+        return self.synchronizer_.feature_names_in_
+
     def fit_transform(self, X: PerformancesLike, y: object = None, **params: Any) -> Transformed:
         """Fit, and transform the same performances.
 
@@ -222,7 +228,6 @@ class TimingChannel(
         to_fit = {name: params[name] for name in params if name in fits or name not in warps}
         return self.fit(X, y, **to_fit).transform(X, **{name: params[name] for name in warps})
 
-    @snapshot
     def transform(self, X: PerformancesLike, **params: Any) -> Transformed:
         """Warp performances onto the clock of the pattern, and append the channel.
 

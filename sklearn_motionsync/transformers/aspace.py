@@ -4,27 +4,29 @@ from __future__ import annotations
 
 import warnings
 from numbers import Integral
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
-from sklearn.base import (
-    BaseEstimator,
-    ClassNamePrefixFeaturesOutMixin,
-    TransformerMixin,
-)
+from sklearn.base import BaseEstimator, ClassNamePrefixFeaturesOutMixin
 from sklearn.decomposition import PCA
 from sklearn.utils._param_validation import Interval, RealNotInt
+from sklearn.utils.extmath import svd_flip
 from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
-from ..inputs.types import FitTransform, NamesLike, PerformancesLike, Transformed
-from ..inputs.validation import check_performances, check_transformed, restore
+from ..inputs.types import NamesLike, PerformancesLike, Transformed
+from ..inputs.validation import (
+    PerformanceTransformerMixin,
+    check_performances,
+    check_transformed,
+    restore,
+)
 from ..inputs.wording import counted
-from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
+from ..matching.counting import ROUNDING
+from ..matching.gaps import Filler, moments_of_seen
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
-from .expectation import HiddenNormal, components_of_seen
 
 __all__ = ["ASpace"]
 
@@ -33,7 +35,7 @@ class ASpace(
     DocumentedMixin,
     LongWorkMixin,
     ClassNamePrefixFeaturesOutMixin,
-    TransformerMixin,
+    PerformanceTransformerMixin,
     BaseEstimator,
 ):
     """Principal components of all poses of a movement: few numbers instead of many.
@@ -93,16 +95,16 @@ class ASpace(
     ``b`` eigenvectors are kept, the fewest that reach the share of the variance (Eq. 4). Poses are
     projected onto them (Eq. 5).
 
-    **Gaps.** NaN is what was not seen. ``fit`` estimates mean and covariance from what was seen, by
-    expectation and maximisation: hidden features are expected given the seen ones of the same pose,
-    and the moments are estimated again, until hidden values change by less than 0.0001 standard
-    deviations. ``transform`` projects the conditional expectation of a pose given all that was seen
-    of its trial. There poses are normal, and frames t apart are correlated by
-    ``exp(-t / correlation_time_)``. So a hidden arm follows the other limbs, and joins the frames
-    before and after the gap. Features that predict others are taken to have noise, a tenth of their
+    **Gaps.** NaN is what was not seen. ``fit`` takes the mean of a feature over the poses that show
+    it, and the covariance of two over those that show both. ``transform`` interpolates short gaps
+    over time, those of one frame at least, and projects the conditional expectation of a pose given
+    all that was seen of its trial. There poses are normal, and over time they are autoregressions
+    of second order: they forget their values in ``correlation_time_``, and their velocities in a
+    time of their own. So a hidden arm follows the other limbs, and joins smoothly the frames before
+    and after the gap. Features that predict others are taken to have noise, a fifth of their
     variance, as few people show them together.
     Rows of a 2-D array are poses without order, each expected by itself. A pose of which nothing
-    was seen becomes NaN: its neighbours in time know more of it than the mean pose.
+    was seen becomes NaN.
 
     Without any gap nothing of this is computed, but for ``correlation_time_``.
 
@@ -134,7 +136,6 @@ class ASpace(
     def __init__(self, n_components: float = 0.95) -> None:
         self.n_components = n_components
 
-    @atomic_fit
     @validated
     def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Find the components.
@@ -168,9 +169,11 @@ class ASpace(
         has_gaps = bool(np.isnan(postures.sum()))
         if len(postures) < 2:
             raise ValueError("ASpace needs at least 2 postures, got n_samples=1.")
-        self.missing_ = np.zeros(postures.shape[1])
+        missing = np.zeros(postures.shape[1])
         if has_gaps:
-            postures = postures[self._check_seen(postures)]
+            hidden = np.isnan(postures)
+            self._check_seen(hidden)
+            missing, postures = hidden.mean(axis=0), postures[~hidden.all(axis=1)]
         most = min(postures.shape)
         if isinstance(self.n_components, Integral) and self.n_components > most:
             raise ValueError(
@@ -179,9 +182,10 @@ class ASpace(
                 f"can span; use at most {most}, or a share of the variance such as 0.95."
             )
         with self._progress(fits=True):
-            estimate = components_of_seen if has_gaps else _components
+            estimate = _components_of_seen if has_gaps else _components
             mean, components, variance, covariance = estimate(postures)
         b = self._count(variance)
+        filler = Filler.of(mean, covariance, [] if arrays.kind == "rows" else arrays)
         self.components_ = np.ascontiguousarray(components[:b])
         self.mean_ = mean
         self.explained_variance_ = variance[:b]
@@ -189,14 +193,11 @@ class ASpace(
         self.residual_variance_ = float(variance[b:].sum())
         self.left_out_variance_ = variance[b:] @ np.square(components[b:])
         self.n_components_ = b
-        timed = [] if arrays.kind == "rows" else arrays
-        self._expected = HiddenNormal.of(mean, covariance, timed)
-        self.correlation_time_ = self._expected.tau
+        self.missing_ = missing
+        self._filler = filler
+        self.correlation_time_ = filler.times[0]
         return self
 
-    fit_transform: ClassVar[FitTransform] = whole_fit_transform
-
-    @snapshot
     def transform(self, X: PerformancesLike) -> Transformed:
         """Project postures into the aSpace (Eq. 5).
 
@@ -211,16 +212,15 @@ class ASpace(
             Points of the aSpace, of the same kind as ``X``; a ``(performance, frame)`` frame under
             ``set_output(transform="pandas")``. NaN where nothing of a posture was seen.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "components_")
         performances = check_performances(self, X, reset=False, level="posture", finite="allow-nan")
         components, timed = self.components_.T, performances.kind != "rows"
         arrays = []
         for a in performances:
-            whole = self._expected.fill(a, timed) if np.isnan(a.sum()) else a
+            whole = self._filled(a, timed) if np.isnan(a.sum()) else a
             arrays.append(((whole - self.mean_) @ components).astype(a.dtype, copy=False))
         return restore(self, performances, arrays)
 
-    @snapshot
     def inverse_transform(self, X: PerformancesLike) -> Transformed:
         """Reconstruct postures from points of the aSpace; exact if all components were kept.
 
@@ -234,7 +234,7 @@ class ASpace(
         list of ndarray (n_frames_i, n_features), or ndarray
             Postures, of the same kind as ``X``; NaN where a coordinate is NaN.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "components_")
         names = self.get_feature_names_out()
         performances = check_transformed(self, X, names, finite="allow-nan")
         arrays = [
@@ -270,10 +270,14 @@ class ASpace(
     def _n_features_out(self):
         return self.n_components_
 
-    def _check_seen(self, postures):
-        """Which postures (n_postures,) show anything; an error if a feature was never seen."""
-        hidden = np.isnan(postures)
-        self.missing_ = hidden.mean(axis=0)
+    def _filled(self, array, timed):
+        """An array without gaps, but for postures of which nothing was seen."""
+        whole = self._filler.expect(array, timed)
+        whole[np.isnan(array).all(axis=1)] = np.nan
+        return whole
+
+    def _check_seen(self, hidden):
+        """Refuse features that were never seen, by what is hidden (n_postures, n_features)."""
         seen, n_features = len(hidden) - hidden.sum(axis=0), hidden.shape[1]
         names = getattr(self, "feature_names_in_", None)
         called = [f"{k}" if names is None else f"{k} ({names[k]!r})" for k in range(n_features)]
@@ -295,14 +299,13 @@ class ASpace(
                 UserWarning,
                 stacklevel=2,
             )
-        return ~hidden.all(axis=1)
 
     def _count(self, variance):
         """The smallest number of eigenvalues that reach the share to be kept (Eq. 4)."""
         if isinstance(self.n_components, Integral):
             return int(self.n_components)
         share = np.cumsum(variance)
-        reached = share >= self.n_components * share[-1]
+        reached = share >= self.n_components * share[-1] * (1 - ROUNDING)
         return int(np.argmax(reached)) + 1
 
 
@@ -313,3 +316,15 @@ def _components(postures):
         pca = PCA().set_output(transform="default").fit(postures)
     variance, components = pca.explained_variance_, pca.components_
     return pca.mean_, components, variance, (components.T * variance) @ components
+
+
+def _components_of_seen(postures):
+    """The same of postures with gaps, by what was seen of them."""
+    mean, covariance = moments_of_seen([postures])
+    covariance *= len(postures) / (len(postures) - 1)
+    variance, vectors = np.linalg.eigh(covariance)
+    largest = slice(None, -1 - min(postures.shape), -1)
+    _, components = svd_flip(None, vectors.T[largest], u_based_decision=False)
+    variance = np.maximum(variance[largest], 0)
+    mean, components, variance = (x.astype(postures.dtype) for x in (mean, components, variance))
+    return mean, components, variance, covariance

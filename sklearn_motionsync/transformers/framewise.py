@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 import pandas as pd
 from scipy.sparse import issparse
-from sklearn.base import BaseEstimator, TransformerMixin, clone
+from sklearn.base import BaseEstimator, clone
 from sklearn.utils import get_tags
 from sklearn.utils._param_validation import HasMethods
 from sklearn.utils.metaestimators import available_if
@@ -15,9 +15,13 @@ from sklearn.utils.validation import check_is_fitted
 
 from ..inputs.features import check_input_features
 from ..inputs.numbers import as_numbers, column_names
-from ..inputs.types import FitTransform, NamesLike, PerformancesLike, Transformed
-from ..inputs.validation import check_performances, check_transformed, restore
-from ..utils.atomic import atomic_fit, snapshot, whole_fit_transform
+from ..inputs.types import NamesLike, PerformancesLike, Transformed
+from ..inputs.validation import (
+    PerformanceTransformerMixin,
+    check_performances,
+    check_transformed,
+    restore,
+)
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated_with_nested
@@ -31,7 +35,7 @@ def _goes_back(self):
     return vars(self).get("_inverts", hasattr(self.transformer, "inverse_transform"))
 
 
-class FrameWise(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator):
+class FrameWise(DocumentedMixin, LongWorkMixin, PerformanceTransformerMixin, BaseEstimator):
     """Apply a transformer of rows, such as ``StandardScaler``, to the frames of performances.
 
     The transformer is fitted on the pooled frames of all performances. A scaler therefore scales a
@@ -85,7 +89,6 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator)
     def __init__(self, transformer: BaseEstimator) -> None:
         self.transformer = transformer
 
-    @atomic_fit
     @validated_with_nested
     def fit(self, X: PerformancesLike, y: object = None) -> Self:
         """Fit a clone of the transformer on all frames.
@@ -111,20 +114,19 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator)
         performances = check_performances(
             self, X, reset=True, level="posture", finite=self._finite()
         )
-        self.transformer_ = clone(self.transformer)
-        name = "fitting the transformer"
-        with self._progress(fits=True) as progress, progress.fitting(self.transformer_, name):
-            self.transformer_.fit(self._named(np.concatenate(performances)))
-        rows = self.transformer_.transform(self._named(performances[0]))
+        transformer, name = clone(self.transformer), "fitting the transformer"
+        with self._progress(fits=True) as progress, progress.fitting(transformer, name):
+            transformer.fit(self._named(np.concatenate(performances)))
+        table = transformer.transform(self._named(performances[0]))
+        rows = self._as_rows(table, performances, 0)
+        inverts = _inverts(transformer, rows[:1])
+        self.transformer_ = transformer
         # The names of FunctionTransformer are those of the table that it returns.
-        self._names_out = column_names(rows)
-        rows = self._as_rows(rows, performances, 0)
-        self._n_features_out, self._inverts = rows.shape[1], _inverts(self.transformer_, rows[:1])
+        self._names_out = column_names(table)
+        self._n_features_out = rows.shape[1]
+        self._inverts = inverts
         return self
 
-    fit_transform: ClassVar[FitTransform] = whole_fit_transform
-
-    @snapshot
     def transform(self, X: PerformancesLike) -> Transformed:
         """Transform the frames of performances.
 
@@ -139,7 +141,7 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator)
             Transformed frames, of the same kind as ``X``; a ``(performance, frame)`` frame under
             ``set_output(transform="pandas")``.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "transformer_")
         performances = check_performances(
             self, X, reset=False, level="posture", finite=self._finite()
         )
@@ -150,7 +152,6 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator)
         return restore(self, performances, arrays)
 
     @available_if(_goes_back)
-    @snapshot
     def inverse_transform(self, X: PerformancesLike) -> Transformed:
         """Invert the transform of frames, if the transformer can.
 
@@ -164,7 +165,7 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator)
         list of ndarray (n_frames_i, n_features), or ndarray
             Frames with the features before the transformer, of the same kind as ``X``.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "transformer_")
         names = self.get_feature_names_out()
         performances = check_transformed(self, X, names, finite=self._finite())
         arrays = [
@@ -188,7 +189,7 @@ class FrameWise(DocumentedMixin, LongWorkMixin, TransformerMixin, BaseEstimator)
             Those that the transformer gives, or the table it makes; framewise0, framewise1, ... if
             there are none.
         """
-        check_is_fitted(self)
+        check_is_fitted(self, "transformer_")
         check_input_features(self, input_features)
         if hasattr(self.transformer_, "get_feature_names_out"):
             if input_features is None:

@@ -1,1 +1,1 @@
-"""What all estimators share beside movement: jobs, atomic fits, pipelines."""
+"""What all estimators share beside movement: jobs, pipelines, parameters, groups."""

@@ -13,6 +13,8 @@ __all__ = [
     "add_unknown_label",
     "encode_classes",
     "encode_groups",
+    "group_counts",
+    "mean_of_other_groups",
     "mean_of_others",
     "names_of_groups",
     "sums_of_groups",
@@ -210,6 +212,21 @@ def mean_of_others(values, codes):
     """For each of the values (n, ...), the mean of those of all other groups."""
     sums, counts = sums_of_groups(values, codes)
     return ((sums.sum(axis=0) - sums) / (len(values) - counts))[codes]
+
+
+def group_counts(performances, codes):
+    """How many performances of each group show each value: (n_groups, P, n_features)."""
+    return sums_of_groups(~np.isnan(performances), codes)[0]
+
+
+def mean_of_other_groups(performances, codes):
+    """For each performance with gaps, the mean of what those of all other groups show, or NaN."""
+    counts = group_counts(performances, codes)
+    sums, _ = sums_of_groups(np.nan_to_num(performances), codes)
+    counts = counts.sum(axis=0) - counts
+    means = np.full(sums.shape, np.nan)
+    np.divide(sums.sum(axis=0) - sums, counts, out=means, where=counts > 0)
+    return means[codes]
 
 
 def _check_held(column, labels):

@@ -6,6 +6,8 @@ portions are shared out.
 """
 
 import contextlib
+import functools
+import os
 import sys
 import threading
 import time
@@ -15,10 +17,9 @@ from collections import deque
 from joblib import Parallel, delayed, effective_n_jobs
 from joblib.parallel import get_active_backend
 from sklearn import config_context, get_config
+from threadpoolctl import ThreadpoolController
 
-from .threads import on_one_thread
-
-__all__ = ["LongWorkMixin", "Progress", "SharedArgument", "on_cluster", "run"]
+__all__ = ["LongWorkMixin", "Progress", "SharedArgument", "on_cluster", "one_blas_thread", "run"]
 
 try:
     from sklearn.callback import CallbackSupportMixin
@@ -74,11 +75,11 @@ def run(function, portions, *, common=(), n_jobs=None, prefer=None, step=None):
 def _results(function, portions, common, n_jobs, prefer, running):
     values = [argument.value for argument in common]
     if len(portions) < 2 or effective_n_jobs(n_jobs) == 1:
-        return (on_one_thread(function, *values, *portion) for portion in portions)
+        return (_call_portion(function, *values, *portion) for portion in portions)
     backend, _ = get_active_backend(prefer=prefer)
     call = running.call
     if not getattr(backend, "supports_sharedmem", False):
-        call, values = on_one_thread, [argument.send_to(backend) for argument in common]
+        call, values = _call_portion, [argument.send_to(backend) for argument in common]
     # scikit-learn's own Parallel has threads that restore each other's warning filters. Other
     # threads have a configuration of their own, so each call is given that of this thread.
     config = get_config()
@@ -100,6 +101,11 @@ def _call_configured(config, call, *arguments):
         return call(*arguments)
 
 
+def _call_portion(function, *arguments):
+    with one_blas_thread():
+        return function(*arguments)
+
+
 class _RunningCalls:
     """The calls that other threads have begun, which go on after an interruption."""
 
@@ -117,7 +123,7 @@ class _RunningCalls:
                 if self._closed:
                     return None
                 self._threads.add(thread)
-            return on_one_thread(function, *arguments)
+            return _call_portion(function, *arguments)
         finally:
             with self._lock:
                 self._threads.discard(thread)
@@ -158,6 +164,68 @@ class SharedArgument:
 def on_cluster():
     """Whether portions go to a Dask cluster, whose workers are sent all they need."""
     return _client_of(get_active_backend()[0]) is not None
+
+
+# -- linear algebra on one thread --------------------------------------------------------
+
+# A thread that holds the lock may collect garbage that leaves a context, and takes it again.
+_blas_lock = threading.RLock()
+# One object for every context that has not ended, and the limit that the first of them set.
+_blas_contexts, _blas_limits = set(), []
+
+
+@contextlib.contextmanager
+def one_blas_thread():
+    """A context in which the linear algebra of the whole process runs on one thread.
+
+    Contexts of several threads may overlap: the first one sets the limit, and the last one to end
+    restores what was before.
+    """
+    context = object()
+    try:
+        with _blas_lock:
+            if not _blas_contexts:
+                _allow_any_thread()
+                _blas_limits.append(_blas().limit(limits=1))
+            _blas_contexts.add(context)
+        yield
+    finally:
+        with _blas_lock:
+            _blas_contexts.discard(context)
+            if not _blas_contexts:
+                _restore_blas()
+
+
+def _restore_blas():
+    while _blas_limits:
+        _allow_any_thread()
+        _blas_limits.pop().restore_original_limits()
+        _allow_any_thread()
+
+
+@functools.cache
+def _blas():
+    """The libraries that compute the linear algebra of NumPy and SciPy."""
+    return ThreadpoolController().select(user_api="blas")
+
+
+def _allow_any_thread():
+    """Let any thread set limits: since 3.8 threadpoolctl ignores all but the first that did."""
+    for library in _blas().lib_controllers:
+        if hasattr(library, "clear_controlling_thread"):
+            library.clear_controlling_thread(force=True)
+
+
+def _forget_parent():
+    """A child process has none of the threads of its parent, whose contexts never end here."""
+    global _blas_lock
+    _blas_lock = threading.RLock()
+    _blas_contexts.clear()
+    _restore_blas()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_parent)
 
 
 # -- progress ----------------------------------------------------------------------------

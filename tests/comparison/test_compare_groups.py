@@ -212,6 +212,7 @@ def bumps(heights, delays):
     return list((np.asarray(heights)[:, np.newaxis] * bump + noise)[:, :, np.newaxis])
 
 
+@pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 @pytest.mark.parametrize("design", ["paired", "between", "within", "three"])
 def test_designs_find_a_later_bump_and_a_higher_one(design):
     rng, n = np.random.default_rng(5), 12
@@ -234,7 +235,7 @@ def test_designs_find_a_later_bump_and_a_higher_one(design):
         heights = 1 + own + (0.5 * by if what == "shape" else 0)
         delays = 0.2 * own + (0.08 * by if what == "timing" else 0)
         X = bumps(heights, delays)
-        sync = DenseSynchronizer(60, unsupported="warp").fit(X)
+        sync = DenseSynchronizer(60).fit(X)
         found = compare_groups(sync, X, **given)
         assert found.clusters.iloc[0]["what"] == what, (what, found)
         assert found.n_units == n

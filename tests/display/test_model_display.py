@@ -319,28 +319,3 @@ def test_plotting_again_keeps_the_height_of_the_axes(bunch, pipe):
     height = ax.get_position().height
     display.plot(ax)
     np.testing.assert_allclose(ax.get_position().height, height)
-
-
-def test_bands_by_mode():
-    """Mean and band of each way of doing it, by the labels of the synchronizer."""
-    rng, t = np.random.default_rng(0), np.linspace(0, 1, 60)
-    X = []
-    for i in range(15):
-        peaks = np.array([0.3, 0.7] if i % 3 == 1 else [0.5]) + rng.uniform(-0.08, 0.08)
-        lift = [np.exp(-(((t[:, np.newaxis] + [0, 0.03] - p) / 0.07) ** 2)) for p in peaks]
-        X.append(sum(lift) + 0.02 * rng.standard_normal((60, 2)))
-    pipe = make_pipeline(DenseSynchronizer(P), ActionModel()).fit(X)
-    labels = ["mode 1" if i % 3 == 1 else "mode 0" for i in range(15)]
-    display = ActionModelDisplay.from_estimator(pipe, X, groups="mode", features=0)
-    assert display.groups.labels == labels
-    warped = pipe[0].transform(X)
-    members = np.array(labels) == "mode 1"
-    np.testing.assert_allclose(display.mean_[1].get_ydata(), warped[members, :, 0].mean(axis=0))
-    assert {"mode 0: 10 trials", "mode 1: 5 trials"} < set(texts(display.axes_[0]))
-    expected = ActionModelDisplay.from_estimator(pipe, X, groups=labels, features=0)
-    np.testing.assert_array_equal(display.upper, expected.upper)
-    both = SynchronizationDisplay.from_estimator(pipe, X, groups="mode", features=0)
-    assert both.groups == labels
-    with pytest.raises(ValueError, match="groups must be a list"):
-        ActionModelDisplay.from_estimator(pipe, X, groups="modes")
-    plt.close("all")

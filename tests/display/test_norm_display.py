@@ -51,11 +51,12 @@ def test_lines_and_bands_are_those_of_the_comparison(found):
     assert title == found.describe(subject)
 
 
+@pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 def test_signals_with_departures_are_shown_first():
     rng = np.random.default_rng(0)
     X = rng.standard_normal((20, 30, 6)) + np.sin(np.linspace(0, 3, 30))[:, np.newaxis]
     X[19, 10:14, 5] += 30
-    sync = DenseSynchronizer(30, unsupported="warp").fit(X[:19])
+    sync = DenseSynchronizer(30).fit(X[:19])
     found = compare_to_norm(sync, X, ["n"] * 18 + ["p"] * 2, norm="n")
     display = NormDisplay.from_comparison(found, 19)
     assert display.labels[:-1] == ["x0", "x1", "x2", "x5"]

@@ -8,43 +8,39 @@ from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
 from sklearn_motionsync.display import TrellisDisplay
 
 
-def reachable(n_frames, width, steps, sub):
+def reachable(n_frames, width, steps):
     """The (p, d) that pinned paths within the band pass, by enumeration."""
     forward = [{0}]
     for _ in range(n_frames - 1):
-        forward.append(
-            {d + s - sub for d in forward[-1] for s in steps if abs(d + s - sub) <= width}
-        )
+        forward.append({d + s - 1 for d in forward[-1] for s in steps if abs(d + s - 1) <= width})
     passed = [{0}]
     for before in forward[-2::-1]:
-        passed.append({d for d in before if any(d + s - sub in passed[-1] for s in steps)})
+        passed.append({d for d in before if any(d + s - 1 in passed[-1] for s in steps)})
     return passed[::-1]
 
 
-@pytest.mark.parametrize(("max_rate", "sub"), [(2, 1), (3, 1), (2, 2)])
-def test_disparity_space_agrees_with_brute_force(bunch, pipe, max_rate, sub):
+@pytest.mark.parametrize("max_rate", [2, 3])
+def test_disparity_space_agrees_with_brute_force(bunch, pipe, max_rate):
     points = pipe[:2].transform(bunch.data)
-    dense = DenseSynchronizer(
-        16, cost="posture", max_rate=max_rate, subframes=sub, consensus=0, pattern=2
-    ).fit(points)
+    dense = DenseSynchronizer.paper(n_frames=16, max_rate=max_rate, pattern=2).fit(points)
     display = TrellisDisplay.from_estimator(dense, points, performance=5)
-    grid = np.arange((16 - 1) * sub + 1) / sub
+    grid = np.arange(16)
     base, moving = (
         np.array([np.interp(grid, np.linspace(0, 15, len(x)), k) for k in x.T]).T
         for x in (points[2], points[5])
     )
-    passed = reachable(16, 4 * sub, range(max_rate * sub + 1), sub)
-    expected = np.full((16, 8 * sub + 1), np.nan)
+    passed = reachable(16, 4, range(max_rate + 1))
+    expected = np.full((16, 9), np.nan)
     for p, offsets in enumerate(passed):
         for d in offsets:
-            difference = base[p * sub] - moving[p * sub + d]
-            expected[p, d + 4 * sub] = difference @ difference
+            difference = base[p] - moving[p + d]
+            expected[p, d + 4] = difference @ difference
     np.testing.assert_allclose(display.costs, expected, atol=1e-12)
-    np.testing.assert_array_equal(display.offsets, np.arange(-4 * sub, 4 * sub + 1) / sub)
+    np.testing.assert_array_equal(display.offsets, np.arange(-4, 5))
     # The image is the space, the best path its cheapest way through, as match tells.
     np.testing.assert_array_equal(display.image_.get_array().T.filled(np.nan), display.costs)
     path = display.path_.get_ydata()
-    at = ((path + 4) * sub).round().astype(int)
+    at = (path + 4).round().astype(int)
     rates = np.diff(np.arange(16) + path)
     total = display.costs[np.arange(16), at].sum() + dense.mu_ * np.abs(rates - 1).sum()
     match = dense.match([points[5]])
@@ -78,7 +74,7 @@ def test_trellis_of_the_second_synchronizer(bunch):
 def test_disparity_space_of_long_takes_is_subsampled(bunch, pipe, monkeypatch):
     points = pipe[:2].transform(bunch.data)
     whole = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
-    monkeypatch.setattr("sklearn_motionsync.matching.matcher.DRAWN_CELLS", whole.costs.size // 7)
+    monkeypatch.setattr("sklearn_motionsync.matching.matcher.BATCH_NUMBERS", whole.costs.size // 7)
     thin = TrellisDisplay.from_estimator(pipe[2], points, performance=1)
     np.testing.assert_array_equal(thin.frames, np.arange(0, 30, 3))
     np.testing.assert_array_equal(thin.offsets, np.arange(-12, 13, 3))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from sklearn_motionsync.matching import trellis as module
+from sklearn_motionsync.matching import tile as module
 from sklearn_motionsync.matching.anchors import (
     Anchors,
     KeyframeColumns,

@@ -1,11 +1,18 @@
 """Gaps in the trellis against all admissible paths, and what fills them against slow versions."""
 
 import numpy as np
+import pandas as pd
 import pytest
-from sklearn_motionsync.matching import trellis as module
+from sklearn_motionsync.matching import tile as module
 from sklearn_motionsync.matching.anchors import KeyframeColumns, add_ramps
 from sklearn_motionsync.matching.costs import COSTS, step_table
-from sklearn_motionsync.matching.gaps import Filler, add_weights
+from sklearn_motionsync.matching.gaps import (
+    SHRINKAGE,
+    Filler,
+    add_weights,
+    interpolate_gaps,
+    moments_of_seen,
+)
 from sklearn_motionsync.matching.trellis import Trellis
 
 from oracle import known_paths, step_costs
@@ -196,19 +203,144 @@ def test_weights_fall_with_the_length_of_a_gap():
     assert found[-1] < 0.2
 
 
-def test_regression_equals_the_inverse_of_the_covariance():
-    X = [np.cumsum(np.random.default_rng(i).standard_normal((90, 5)), axis=0) for i in range(8)]
-    filler = Filler.learn(X)
-    seen, hidden = np.array([True, False, True, True, False]), [1, 4]
-    for reach, factor in filler.factors.items():
-        covariance, ridge = factor @ factor.T, filler.ridge[reach]
-        inner = covariance[np.ix_(seen, seen)] + ridge * np.eye(3)
-        across = covariance[np.ix_(seen, hidden)]
-        slopes = np.linalg.inv(inner) @ across
-        left = np.diag(covariance[np.ix_(hidden, hidden)] - across.T @ slopes)
-        found = filler.regression(reach, seen, hidden)
-        np.testing.assert_allclose(found[0], slopes, atol=1e-10)
-        np.testing.assert_allclose(found[1], left, atol=1e-10 * covariance.max())
+def correlations(n_frames, value_time, velocity_time):
+    """Of the frames of an autoregression of second order, by the roots of its polynomial."""
+    p, q = np.exp(-1 / value_time), np.exp(-1 / velocity_time)
+    lags = np.abs(np.subtract.outer(np.arange(n_frames), np.arange(n_frames)))
+    of_p, of_q = p ** (lags + 1) * (1 - q**2), q ** (lags + 1) * (1 - p**2)
+    return (of_p - of_q) / ((p - q) * (1 + p * q))
+
+
+def of_times(value_time, velocity_time):
+    learnt = Filler.learn(curves())
+    times = value_time, velocity_time
+    return Filler(learnt.mean, learnt.scale, learnt.precision, learnt.variance, times)
+
+
+@pytest.mark.parametrize("velocity_time", [0.3, 1.9])
+def test_hidden_values_are_the_conditional_expectation_of_all_their_values(velocity_time):
+    """Against one covariance of all values of a performance: frames times features."""
+    filler = of_times(12.0, velocity_time)
+    array, rng = curves(1, 30, seed=7)[0], np.random.default_rng(2)
+    hidden = np.zeros(array.shape, dtype=bool)
+    for feature in range(5):
+        for first in rng.integers(1, 24, 2):
+            # Gaps of one frame are interpolated.
+            hidden[first : first + rng.integers(2, 6), feature] = True
+    hidden[:9, 1], hidden[25:, 2], hidden[14:16] = True, True, True
+    hidden[:, 4] |= ~hidden[:, 4] & np.roll(hidden[:, 4], 1)
+    array[hidden] = np.nan
+    covariance = np.kron(correlations(30, 12.0, velocity_time), np.linalg.inv(filler.precision))
+    z, gone = ((array - filler.mean) / filler.scale).ravel(), hidden.ravel()
+    across = covariance[np.ix_(gone, ~gone)]
+    z[gone] = across @ np.linalg.solve(covariance[np.ix_(~gone, ~gone)], z[~gone])
+    expected = z.reshape(array.shape) * filler.scale + filler.mean
+    np.testing.assert_allclose(filler.expect(array), expected, atol=1e-7)
+    np.testing.assert_array_equal(filler(array)[0], filler.expect(array))
+
+
+def test_weights_are_what_is_known_of_a_step_in_the_middle_of_a_gap():
+    """Against the covariance of all values of a performance, given what was seen."""
+    filler = of_times(12.0, 3.0)
+    array = curves(1, 30, seed=7)[0]
+    gaps = {(8, 15): [1, 3], (20, 29): [0], (3, 3): [2]}
+    for (first, last), features in gaps.items():
+        array[first : last + 1, features] = np.nan
+    in_time, covariance = correlations(30, 12.0, 3.0), np.linalg.inv(filler.precision)
+    unknown = np.zeros((30, 5))
+    for (first, last), features in gaps.items():
+        gone, seen = np.arange(first, last + 1), np.delete(np.arange(30), range(first, last + 1))
+        # Of a feature that is hidden at these frames alone, given it at all others.
+        across = in_time[np.ix_(gone, seen)]
+        left = np.zeros((30, 30))
+        left[np.ix_(gone, gone)] = in_time[np.ix_(gone, gone)] - across @ np.linalg.solve(
+            in_time[np.ix_(seen, seen)], across.T
+        )
+        # The trellis smooths by a frame of thirty.
+        step = np.zeros(30)
+        middle = (first + last + 1) // 2
+        step[[middle - 1, middle + 1]] = -1, 1
+        others = np.setdiff1d(range(5), features)
+        across = covariance[np.ix_(features, others)]
+        share = covariance[np.ix_(features, features)] - across @ np.linalg.solve(
+            covariance[np.ix_(others, others)], across.T
+        )
+        # The noise of a feature is no movement.
+        share = share.diagonal() - SHRINKAGE
+        unknown[first : last + 1, features] = share * (step @ left @ step) / (step @ in_time @ step)
+    expected = 1 - unknown @ filler.variance / filler.variance.sum()
+    np.testing.assert_allclose(filler(array)[1], expected, atol=1e-9)
+    assert expected[3] == 1 > expected[[8, 20]].max()
+
+
+def test_moments_are_those_of_the_postures_that_show_them():
+    rng = np.random.default_rng(3)
+    arrays = [rng.standard_normal((n, 4)).cumsum(axis=0) for n in (30, 50)]
+    for array in arrays:
+        array[rng.random(array.shape) < 0.2] = np.nan
+    mean, covariance = moments_of_seen(arrays)
+    rows = np.concatenate(arrays)
+    np.testing.assert_allclose(mean, np.nanmean(rows, axis=0), rtol=1e-12)
+    slow = np.empty((4, 4))
+    for i in range(4):
+        for j in range(4):
+            slow[i, j] = np.nanmean((rows[:, i] - mean[i]) * (rows[:, j] - mean[j]))
+    assert np.linalg.eigvalsh(slow).min() > 0
+    np.testing.assert_allclose(covariance, slow, rtol=1e-10)
+
+
+def test_moments_have_no_negative_variance():
+    """Three features, no two of which are seen together but in ways that exclude each other."""
+    a = np.array([1.0, -1.0, 2.0, -2.0])
+    nothing = np.full(4, np.nan)
+    pairs = [[a, a, nothing], [a, nothing, a], [nothing, a, -a]]
+    _, covariance = moments_of_seen([np.stack(columns, axis=1) for columns in pairs])
+    expected = 2.5 * np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1]])
+    values, vectors = np.linalg.eigh(expected)
+    assert values[0] < 0
+    np.testing.assert_allclose(covariance, (vectors * np.abs(values)) @ vectors.T)
+
+
+# -- interpolation ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("straight", [False, True])
+def test_gaps_are_interpolated_column_by_column(straight):
+    """Against pandas, which calls SciPy's Akima polynomials, or NumPy's lines."""
+    rng = np.random.default_rng(0)
+    values = rng.standard_normal((60, 6)).cumsum(axis=0)
+    values[rng.random(values.shape) < 0.4] = np.nan
+    values[:, 4], values[3:, 5], values[:3, 5] = np.nan, np.nan, [1, np.nan, 2]
+    before = values.copy()
+    times = np.cumsum(rng.integers(1, 3, 60)).astype(float)
+    table = pd.DataFrame(values, index=times)
+    expected = pd.DataFrame(index=times, columns=table.columns, dtype=float)
+    for k in range(6):
+        straight_column = straight or table[k].count() < 3
+        way = "index" if straight_column else "akima"
+        column = table[k].interpolate(way, limit_area="inside") if table[k].count() else table[k]
+        expected[k] = column
+    filled = interpolate_gaps(values, times=times, straight=straight)
+    np.testing.assert_allclose(filled, expected, rtol=1e-12)
+    held = interpolate_gaps(values, times=times, held=True, straight=straight)
+    np.testing.assert_allclose(held, expected.ffill().bfill(), rtol=1e-12)
+    np.testing.assert_array_equal(values, before)
+
+
+def test_longer_gaps_stay_hidden():
+    values = np.arange(20.0)[:, np.newaxis] * [1, 2]
+    values[4:6, 0] = values[9:12, 0] = values[:2, 1] = values[17:, 1] = np.nan
+    hidden = np.isnan(interpolate_gaps(values, 2))
+    assert np.flatnonzero(hidden[:, 0]).tolist() == [9, 10, 11]
+    assert np.flatnonzero(hidden[:, 1]).tolist() == [0, 1, 17, 18, 19]
+    held = interpolate_gaps(values, 2, held=True)
+    np.testing.assert_array_equal(held[:2, 1], [4, 4])
+    assert np.isnan(held[17:, 1]).all()
+    # Frames that were dropped count.
+    times = np.where(np.arange(20) < 5, 0, 1) + np.arange(20)
+    assert np.isnan(interpolate_gaps(values, 2, times)[4:6, 0]).all()
+    filled = interpolate_gaps(values, 3, times, straight=True)
+    np.testing.assert_allclose(filled[4:6, 0], [3 + 3 / 4, 3 + 9 / 4])
 
 
 def test_ends_are_held_and_a_feature_never_seen_has_its_mean():

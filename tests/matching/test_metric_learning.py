@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync.matching.metric import Evidence, Metric, learn_metric, metric_matrix
+from sklearn_motionsync.matching.metric import Evidence, Metric, metric_matrix, metric_of_matches
 
 P = 24
 
@@ -89,7 +89,7 @@ def test_metric_equals_loops_over_pairs_and_frames(curves):
         assert sorted(map(sorted, pairs_of(others))) == sorted(map(list, combinations(range(5), 2)))
         return fixed_match(times)(features, others)
 
-    metric, evidence = learn_metric(match, positions, velocity)
+    metric, evidence = metric_of_matches(match, positions, velocity)
     fast = slow_compressed(velocity)
     unmatched = np.broadcast_to(np.arange(P, dtype=float), times.shape)
     first = slow_matrix(fast, slow_differences(fast, unmatched, 0))
@@ -144,8 +144,8 @@ def test_metric_matrix_of_unreliable_features_is_zero():
 
 def test_constant_performances_give_no_metric():
     still = np.ones((4, P, 2))
-    assert learn_metric(None, still - 1, 0 * still) is None
-    assert learn_metric(None, np.random.default_rng(0).normal(size=(1, P, 2)), still) is None
+    assert metric_of_matches(None, still - 1, 0 * still) is None
+    assert metric_of_matches(None, np.random.default_rng(0).normal(size=(1, P, 2)), still) is None
 
 
 def test_metric_does_not_depend_on_the_axes(curves):
@@ -153,7 +153,7 @@ def test_metric_does_not_depend_on_the_axes(curves):
     times = some_times(len(positions))
     turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
     one, other = (
-        learn_metric(fixed_match(times), positions @ a, velocity @ a)[0](
+        metric_of_matches(fixed_match(times), positions @ a, velocity @ a)[0](
             velocity @ a, positions @ a
         )
         for a in (np.eye(3), turn)
@@ -163,7 +163,7 @@ def test_metric_does_not_depend_on_the_axes(curves):
 
 def test_shares_add_up_to_one(curves):
     positions, velocity = curves
-    metric, _ = learn_metric(fixed_match(some_times(5)), positions, velocity)
+    metric, _ = metric_of_matches(fixed_match(some_times(5)), positions, velocity)
     shares = metric.shares(velocity, positions)
     assert shares.sum() == pytest.approx(1)
     first = metric.velocity * [[1], [0], [0]], 0 * metric.posture
@@ -175,9 +175,9 @@ def test_loud_noise_is_left_out(curves):
     positions, velocity = curves
     rng, times = np.random.default_rng(0), some_times(5)
     noise = 100 * rng.standard_normal((2, 5, P, 4))
-    alone, _ = learn_metric(fixed_match(times), positions, velocity)
+    alone, _ = metric_of_matches(fixed_match(times), positions, velocity)
     loud, fast = (np.concatenate(x, axis=2) for x in zip(noise, (positions, velocity), strict=True))
-    found, _ = learn_metric(fixed_match(times), loud, fast)
+    found, _ = metric_of_matches(fixed_match(times), loud, fast)
     np.testing.assert_array_equal(found.features, alone.features + 4)
     np.testing.assert_allclose(found(fast, loud), alone(velocity, positions), atol=1e-9)
     np.testing.assert_array_equal(found.shares(fast, loud)[:4], 0)
@@ -196,8 +196,8 @@ def test_feature_that_agrees_once_matched_is_used():
     times = 59 * np.array([[np.interp(p, q, t) for q in phases] for p in phases])
     velocity = np.gradient(x, axis=1)
     even = np.broadcast_to(np.arange(60.0), times.shape)
-    assert learn_metric(fixed_match(even), x, velocity)[0].features.tolist() == [0]
-    assert learn_metric(fixed_match(times), x, velocity)[0].features.tolist() == [0, 1]
+    assert metric_of_matches(fixed_match(even), x, velocity)[0].features.tolist() == [0]
+    assert metric_of_matches(fixed_match(times), x, velocity)[0].features.tolist() == [0, 1]
 
 
 # -- what warps tell of themselves --------------------------------------------------------

@@ -4,7 +4,8 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from sklearn_motionsync.matching import trellis as module
+from sklearn_motionsync.matching import tile as module
+from sklearn_motionsync.matching import trellis as trellis_module
 from sklearn_motionsync.matching.costs import COSTS, step_table
 from sklearn_motionsync.matching.trellis import Coupling, Trellis
 
@@ -171,11 +172,11 @@ def test_tile_sizes_change_no_result(n_bases, table, monkeypatch):
     trellis = Trellis(table, 0.5, 8)
     whole = trellis.distances(bases, moving)
     paths = trellis.paths(bases, moving)
-    monkeypatch.setattr(module, "TILE_PRODUCT", 1)
-    monkeypatch.setattr(module, "TILE_BASES", 2)
-    monkeypatch.setattr(module, "LONG_ROW", 1)
+    monkeypatch.setattr(trellis_module, "TILE_PRODUCT", 1)
+    monkeypatch.setattr(trellis_module, "TILE_BASES", 2)
+    monkeypatch.setattr(trellis_module, "LONG_ROW", 1)
     monkeypatch.setattr(module, "PRODUCT_ROWS", 3)
-    monkeypatch.setattr(module, "CHOICE_BYTES", 1)
+    monkeypatch.setattr(trellis_module, "ROW_BYTES", 1)
     monkeypatch.setattr(module, "SMALL_BYTES", [0, 0])
     np.testing.assert_allclose(trellis.distances(bases, moving), whole, rtol=1e-12)
     np.testing.assert_array_equal(trellis.paths(bases, moving), paths)

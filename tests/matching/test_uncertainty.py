@@ -7,7 +7,7 @@ from sklearn_motionsync.matching.filters import smooth
 from sklearn_motionsync.matching.matcher import Features, Matcher
 from sklearn_motionsync.matching.refinement import refine_warps, standard_errors
 from sklearn_motionsync.matching.trellis import Trellis
-from sklearn_motionsync.matching.uncertainty import tail_factor, uncertainty_of_paths
+from sklearn_motionsync.matching.uncertainty import coverage_factor, uncertainty_of_paths
 
 from oracle import all_paths, path_cost, step_costs
 
@@ -67,12 +67,12 @@ def test_equal_sequences_are_certain():
 
 
 def test_half_widths_grow_with_the_coverage():
-    tails = np.array([0.7, 1.2])
-    np.testing.assert_allclose(tail_factor(0.9, tails), 1)
-    normal = tail_factor(0.8, tails)[0], tail_factor(0.95, tails)[0]
-    np.testing.assert_allclose(normal, [1.2816 / 1.6449, 1.96 / 1.6449], rtol=0.02)
-    assert (tail_factor(0.5, tails) < 1).all()
-    assert (tail_factor(0.99, tails) > tail_factor(0.95, tails)).all()
+    is_normal = np.array([True, False])
+    np.testing.assert_allclose(coverage_factor(0.9, is_normal), 1)
+    normal = coverage_factor(0.8, is_normal)[0], coverage_factor(0.95, is_normal)[0]
+    np.testing.assert_allclose(normal, [1.2816 / 1.6449, 1.96 / 1.6449], rtol=1e-4)
+    assert (coverage_factor(0.5, is_normal) < 1).all()
+    assert (coverage_factor(0.99, is_normal) > coverage_factor(0.95, is_normal)).all()
 
 
 @pytest.mark.parametrize(("noise", "width"), [(0.02, 0.0), (0.3, 0.0), (0.3, 1.5)])

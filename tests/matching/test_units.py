@@ -54,7 +54,7 @@ def test_batches_give_the_same_unit(sequences, monkeypatch):
     X = sequences[:, :, [0, 1, 0, 2, 3]]
     X[3, 7, 4] = 40
     whole = Unit.of(X)
-    monkeypatch.setattr(units, "BATCH_SIZE", 200)
+    monkeypatch.setattr(units, "BATCH_NUMBERS", 200)
     unit = Unit.of(X)
     assert unit.size == whole.size
     np.testing.assert_allclose(unit.centre, whole.centre, rtol=1e-13)

@@ -104,8 +104,7 @@ def test_holdout_score_does_not_reward_over_warping():
     """Of pure noise: warping lowers the spread of the features that were matched alone."""
     rng = np.random.default_rng(0)
     X = [rng.standard_normal((60, 6)) for _ in range(8)]
-    loose = {"smoothness": 0, "max_rate": 2, "subframes": 1, "consensus": 0}
-    sync = DenseSynchronizer(cost="posture", **loose).fit(X)
+    sync = DenseSynchronizer.paper(smoothness=0).fit(X)
     assert SpreadScorer()(sync, X) > -0.8
     assert FeatureHoldoutScorer()(sync, X) < -0.95
 

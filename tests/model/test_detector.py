@@ -168,7 +168,7 @@ WRONG = {
     "too short": wave(30),
     "too weak": wave(size=0.54),
     "too strong": wave(size=2),
-    "another course": wave(middle=0.82),
+    "another course": wave(middle=0.828),
     "too short, too weak": wave(20, size=0.54),
     "another movement": wave()[:, ::-1],
     "another movement, the other way": wave()[::-1],

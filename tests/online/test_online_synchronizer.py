@@ -18,9 +18,9 @@ from sklearn_motionsync import (
     OnlineSynchronizer,
 )
 from sklearn_motionsync.datasets import load_performances
-from sklearn_motionsync.matching.causal import CausalDerivative
 from sklearn_motionsync.matching.matcher import Features
 from sklearn_motionsync.matching.units import Unit
+from sklearn_motionsync.online.causal import CausalDerivative
 from sklearn_motionsync.online.stream import Resampler, Streams, check_times
 from sklearn_motionsync.online.synchronizer import Reference, calibrate
 from sklearn_motionsync.utils.parallel import Progress
@@ -130,7 +130,7 @@ def test_track_equals_step_and_does_not_look_ahead(fitted, live):
 def test_costs_at_the_end_equal_offline_trellis_to_the_last_bit():
     mean, x = movement(np.linspace(0, 1, P)), performance(75, 0.4, 0.05)[0]
     unit = Unit.of(mean[np.newaxis])
-    reference = Reference(Features("velocity", 1, 0.03, unit), mean, P - 1, 0.1, 0.03, 3)
+    reference = Reference(Features("velocity", 0.03, unit), mean, P - 1, 0.1, 0.03, 3)
     streams = Streams(reference, 1, 3)
     for frame in x:
         streams.update(frame[np.newaxis])

@@ -9,9 +9,9 @@ from joblib import parallel_config
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn_motionsync import DirectionCosines, synchronization_distances, to_frame
 from sklearn_motionsync.datasets import load_performances
-from sklearn_motionsync.matching.pairwise import BLOCK, PairwiseDistance, blocks_of_pairs
 from sklearn_motionsync.recognition import distances
 from sklearn_motionsync.recognition.distances import normalise_time
+from sklearn_motionsync.recognition.pairwise import BLOCK, PairwiseDistance, blocks_of_pairs
 from sklearn_motionsync.utils.parallel import run
 
 import oracle

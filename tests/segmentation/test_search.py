@@ -239,6 +239,7 @@ def test_proposals_are_the_best_paths_of_their_portions():
     assert {tuple(window) for window in proposer(take).tolist()} == expected
 
 
+@pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 def test_sitting_down_is_found_in_recordings_of_a_new_actor(real_data):
     bunch = load_performances(real_data / "utkinect" / "utkinect_positions.npz")
     file = np.load(real_data / "utkinect" / "utkinect_takes.npz")
@@ -246,7 +247,7 @@ def test_sitting_down_is_found_in_recordings_of_a_new_actor(real_data):
     pipe = make_pipeline(
         DirectionCosines(bunch.skeleton),
         ASpace(),
-        DenseSynchronizer(50, unsupported="warp"),
+        DenseSynchronizer(50),
         ActionModel(),
     ).fit([bunch.data[i] for i in teach], actionmodel__groups=bunch.actor[teach])
     searched = np.flatnonzero(np.isin(file["actor"], ["s10"]))
@@ -462,6 +463,7 @@ def test_threshold_max_hits_and_durations_select_hits(pipe):
     assert (locations["stop"] - locations["start"]).between(20, 57).all()
 
 
+@pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 def test_auto_threshold_falls_with_coverage():
     rng = np.random.default_rng(0)
     noisy = [x + 0.3 * rng.standard_normal(x.shape) for x in TRAINING]
@@ -542,6 +544,7 @@ def test_action_that_is_repeated_without_end_is_found_throughout(pipe):
     assert len(locations) >= 76
 
 
+@pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 def test_threshold_of_a_take_is_that_of_the_take():
     rng = np.random.default_rng(0)
     pipe = DenseSynchronizer(40).fit([x + 0.3 * rng.standard_normal(x.shape) for x in TRAINING])

@@ -6,13 +6,12 @@ from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.matching.costs import COSTS, step_table
 from sklearn_motionsync.matching.trellis import Trellis
 
-PAPER = {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0}
+PAPER = {"cost": "posture", "max_rate": 2, "consensus": 0}
 SETTINGS = {
     "no metric": {"metric": None},
     "paper": PAPER,
     "paper, free changes of pace": {**PAPER, "smoothness": 0},
     **{cost: {"cost": cost} for cost in COSTS},
-    "half frames": {"subframes": 2, "max_rate": 3},
     "refined": {"refine": True},
 }
 
@@ -54,7 +53,7 @@ def performances(request):
 def test_match_has_equal_bits_alone_and_in_groups(performances, ties, settings, dtype):
     """Six alone, three, thirteen, and all: tiles of different shapes."""
     X = [x.astype(dtype) for x in TIES[ties](performances)]
-    n_frames = 40 if ties != "as they are" or settings == "half frames" else None
+    n_frames = 40 if ties != "as they are" else None
     sync = DenseSynchronizer(n_frames, **SETTINGS[settings]).fit(X)
     together = sync.match(X)
     assert together.distances.dtype == np.float64

@@ -36,7 +36,7 @@ def at_keyframes(sync, match):
     return np.array([np.interp(sync.keyframes_, frames, t) for t in match.times]) / frames[-1]
 
 
-@pytest.mark.parametrize("params", [{}, {"refine": True}, {"metric": None}, {"subframes": 2}])
+@pytest.mark.parametrize("params", [{}, {"refine": True}, {"metric": None}])
 def test_exact_keyframes_are_met(bunch, params):
     K = bunch.keyframes[:, [1, 3]]
     sync = DenseSynchronizer(P, **params).fit(bunch.data, keyframes=K)

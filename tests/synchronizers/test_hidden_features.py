@@ -24,7 +24,6 @@ SYNCHRONIZERS = {
     "dense": DENSE,
     "paper": DenseSynchronizer.paper(n_frames=P),
     "elastic": DenseSynchronizer(P, cost="elastic", refine=False),
-    "subframes": DenseSynchronizer(P, subframes=2),
     "refined": DenseSynchronizer(P, refine=True),
     "parts": PartSynchronizer({"one": [0, 1, 2], "two": [5, 6]}, synchronizer=DENSE),
     "timing": TimingChannel(DENSE),
@@ -311,7 +310,7 @@ def test_what_is_less_sure_counts_less():
     for x in WHOLE:
         confidence = np.ones(len(x))
         confidence[len(x) // 3 : len(x) // 2] = 0.5
-        noise = rng.standard_normal(x.shape).cumsum(axis=0) * 0.02
+        noise = rng.standard_normal(x.shape).cumsum(axis=0) * 0.3
         noisy.append(x + noise * (confidence < 1)[:, np.newaxis])
         sure.append(confidence)
     expected = DenseSynchronizer(P, pattern=0).fit(WHOLE).match(WHOLE).times

@@ -197,7 +197,7 @@ def test_coverage_of_made_bendings(noise):
         for nominal, shares in found.items():
             shares.append(coverage(match, truth, nominal))
     for nominal, shares in found.items():
-        assert -0.05 < np.mean(shares) - nominal < 0.1, (nominal, shares)
+        assert -0.05 < np.mean(shares) - nominal < 0.125, (nominal, shares)
 
 
 @pytest.mark.parametrize("noise", [0.005, 0.05, 0.2])
@@ -261,8 +261,8 @@ def test_performances_that_are_repeated_cut_off_or_still_are_doubtful(fitted, be
         assert "it may be cut off, repeated or another movement" in match.reasons[0]
 
 
-def test_trials_of_another_mode_are_doubtful():
-    """A hammer that falls once or twice; and twice among trials that all fall once."""
+def test_trials_of_another_movement_are_doubtful():
+    """A hammer that falls twice, where it falls once in the training set."""
     rng, t = np.random.default_rng(0), np.linspace(0, 1, 101)
 
     def trial(strokes):
@@ -271,14 +271,7 @@ def test_trials_of_another_mode_are_doubtful():
         height = sum(np.exp(-(((swing - moment) / 0.07) ** 2)) for moment in moments)
         return rng.uniform(0.9, 1.1) * height + 0.02 * rng.standard_normal((101, 2))
 
-    both = [trial(n) for n in [1, 2, 1] * 6]
-    match = DenseSynchronizer().fit(both).match(both)
-    np.testing.assert_array_equal(match.doubtful, match.mode == 1)
-    assert "mode 1 of the movement, and the template mode 0" in " ".join(
-        filter(None, match.reasons)
-    )
-    once = [trial(1) for _ in range(12)]
-    sync = DenseSynchronizer().fit(once)
+    sync = DenseSynchronizer().fit([trial(1) for _ in range(12)])
     assert not sync.match([trial(1) for _ in range(8)]).doubtful.any()
     assert sync.match([trial(2) for _ in range(8)]).doubtful.mean() > 0.6
 
@@ -311,7 +304,7 @@ def test_trials_of_a_set_without_support_are_doubtful(action, kept, real_data):
 
 def test_exact_keyframes_pin_the_interval(bending, bending_aspace):
     X, keyframes = bending_aspace[:10], bending.keyframes[:10]
-    sync = DenseSynchronizer(P).fit(X, keyframes=keyframes)
+    sync = DenseSynchronizer(P, refine=True).fit(X, keyframes=keyframes)
     match = sync.match(X[:4], keyframes=keyframes[:4])
     lower, upper = match.interval()
     for k in sync.keyframes_:

@@ -18,8 +18,7 @@ from sklearn_motionsync import (
     to_frame,
 )
 from sklearn_motionsync.inputs import validation as reading
-from sklearn_motionsync.synchronizers import portions
-from sklearn_motionsync.synchronizers.subsamples import typical_share
+from sklearn_motionsync.synchronizers import portions, training
 
 from shift_synchronizer import ShiftSynchronizer
 
@@ -96,26 +95,26 @@ def peak_of(call):
 def test_paths_of_long_performances_take_little_memory(cost):
     """24 of 250 to 540 frames, 0.5 MB, whose rows of the trellis would take 180."""
     X = [np.cumsum(walks(1, n)[0], axis=0) for n in np.linspace(250, 540, 24).astype(int)]
-    sync = DenseSynchronizer(cost=cost, unsupported="warp").fit(X)
+    sync = DenseSynchronizer(cost=cost).fit(X)
     assert peak_of(lambda: sync.transform(X)) < 30e6
 
 
-@pytest.mark.parametrize("settings", [{}, {"pattern": 3}, {"search": "exhaustive"}, PAPER])
+@pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
+@pytest.mark.parametrize("settings", [{}, {"pattern": 3}, PAPER])
 @pytest.mark.parametrize("n_jobs", [None, 2])
-def test_features_in_portions_change_nothing(monkeypatch, settings, n_jobs):
+def test_portions_change_nothing(monkeypatch, settings, n_jobs):
     X = walks(110, 20, dtype=np.float32)
-    kept = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
-    monkeypatch.setattr(portions, "CACHE_BYTES", 1000)
-    made = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
-    assert made.pattern_index_ == kept.pattern_index_
-    assert made.mu_ == pytest.approx(kept.mu_, rel=1e-12)
-    np.testing.assert_allclose(made.global_distances_, kept.global_distances_, rtol=1e-5)
-    np.testing.assert_array_equal(made.exemplars_, kept.exemplars_)
-    np.testing.assert_array_equal(made.match(X[:9]).times, kept.match(X[:9]).times)
+    expected = DenseSynchronizer(**settings).fit(X)
+    monkeypatch.setattr(portions, "PORTION_CELLS", 20_000)
+    sync = DenseSynchronizer(n_jobs=n_jobs, **settings).fit(X)
+    assert sync.pattern_index_ == expected.pattern_index_
+    assert sync.mu_ == expected.mu_
+    np.testing.assert_array_equal(sync.global_distances_, expected.global_distances_)
+    np.testing.assert_array_equal(sync.exemplars_, expected.exemplars_)
+    np.testing.assert_array_equal(sync.match(X[:9]).times, expected.match(X[:9]).times)
 
 
-def test_memory_of_fit_and_transform_is_bounded(monkeypatch):
-    monkeypatch.setattr(portions, "CACHE_BYTES", 1 << 20)
+def test_memory_of_fit_and_transform_is_bounded():
     X = walks(4000, 20, 32, dtype=np.float32)
     sync = DenseSynchronizer(pattern=0, metric=None, refine=False, max_offset=0.05, consensus=1)
     assert peak_of(lambda: sync.fit(X)) < 2.6 * X.nbytes
@@ -235,7 +234,6 @@ def test_fit_to_a_sample_equals_a_fit_to_these_performances(settings):
         assert sync.pattern_index_ == sample[expected.pattern_index_]
         assert sync.pattern_.tobytes() == X[sync.pattern_index_].tobytes()
         np.testing.assert_array_equal(expected.sample_, np.arange(9))
-        assert 0 < sync.typical_share_ < 1
     if expected.metric_:
         learnt = sample[expected.metric_.performances]
         np.testing.assert_array_equal(sync.metric_.performances, learnt)
@@ -255,7 +253,6 @@ def test_sample_does_not_depend_on_the_kind_of_input():
         np.testing.assert_array_equal(sync.sample_, expected.sample_)
     whole = DenseSynchronizer(max_fit=16).fit(X)
     assert whole.pattern_.tobytes() == DenseSynchronizer().fit(X).pattern_.tobytes()
-    assert whole.typical_share_ == 0
     other = DenseSynchronizer(max_fit=9, random_state=1).fit(X)
     assert set(other.sample_) != set(expected.sample_)
 
@@ -265,7 +262,6 @@ def test_given_pattern_is_in_the_sample(pattern):
     sync = DenseSynchronizer(max_fit=5, pattern=pattern).fit(X)
     assert (sync.pattern_index_, len(sync.sample_)) == (pattern, 5)
     assert sync.pattern_.tobytes() == X[pattern].tobytes()
-    assert np.isnan(sync.typical_share_)
     with pytest.raises(ValueError, match="pattern=16 is out of range: there are 16 performances"):
         DenseSynchronizer(max_fit=5, pattern=16).fit(X)
 
@@ -287,33 +283,9 @@ def test_only_the_sample_is_checked():
 
 
 def test_memory_limit_names_max_fit(monkeypatch):
-    from sklearn_motionsync.synchronizers import base
-
-    monkeypatch.setattr(base, "MOST_BYTES", 6 * X.size)
+    monkeypatch.setattr(training, "MOST_BYTES", 6 * X.size)
     with pytest.raises(ValueError, match="Or learn from some: max_fit=1000"):
         DenseSynchronizer().fit(X)
     with pytest.raises(ValueError, match=r"or performances\.$"):
         LinearSynchronizer().fit(X)
     DenseSynchronizer(max_fit=9).fit(X)
-
-
-@pytest.mark.parametrize(("n", "in_doubt"), [(20, 0), (20, 4), (200, 10), (5, 4)])
-def test_typical_share_equals_simulation(n, in_doubt):
-    drawn = np.sort(np.random.default_rng(0).random((20_000, n)), axis=1)[:, in_doubt]
-    share = typical_share(in_doubt, n, 10**9)
-    assert (drawn <= share).mean() == pytest.approx(0.95, abs=0.006)
-    assert typical_share(3, 12, 12) == 0.25
-
-
-def test_typical_share_holds_for_samples():
-    """Every performance is a number times one curve: the typical ones are next to the mean."""
-    curve, held, shares = np.sin(np.linspace(0, 3, 5))[:, np.newaxis], [], []
-    for seed in range(30):
-        numbers = np.random.default_rng(seed).standard_normal(2000)
-        sync = DenseSynchronizer(**PAPER, max_fit=200, random_state=seed)
-        sync.set_params(max_offset=0).fit(numbers[:, np.newaxis, np.newaxis] * curve)
-        far = np.abs(numbers - numbers.mean())
-        held.append((far < far[sync.pattern_index_]).mean() <= sync.typical_share_)
-        shares.append(sync.typical_share_)
-    assert np.mean(held) >= 0.95
-    assert np.median(shares) < 0.7

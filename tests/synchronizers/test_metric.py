@@ -165,17 +165,3 @@ def test_errors_of_noisy_recordings_are_smaller_with_a_metric(standing_up):
     learnt, plain = errors_of(X, moments), errors_of(X, moments, metric=None)
     assert learnt.mean() < 0.6 * plain.mean()
     assert np.median(learnt) < 0.6 * np.median(plain)
-
-
-@pytest.mark.parametrize("noise", [1e-3, 1e-6])
-def test_median_of_nearly_equal_trials_is_found(noise):
-    """Also where single precision does not tell them apart."""
-    t, rng = np.linspace(0, 1, 80), np.random.default_rng(0)
-    source = np.column_stack([np.cos(4 * t), np.sin(4 * t), t**2])
-    noises = noise * (1 + (3 * np.arange(10) + 2) % 10)
-    X = [source + sigma * rng.standard_normal(source.shape) for sigma in noises]
-    sync = DenseSynchronizer(refine=False).fit(X)
-    assert sync.certified_
-    assert sync.pattern_index_ == noises.argmin() == 6
-    exact = sync.match(X).distances.sum()
-    assert sync.global_distances_[6] == pytest.approx(exact, rel=0.2)

@@ -1,56 +1,178 @@
-"""The refinement test of a fit: its first pass, and its size."""
+"""Refinement: one number tells copies of one source from people; and what refining brings."""
+
+import math
 
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter1d
-from sklearn_motionsync import DenseSynchronizer
-from sklearn_motionsync.matching.refinement_test import RefinementTest
+from sklearn_motionsync import ASpace, DenseSynchronizer, DirectionCosines
+from sklearn_motionsync.datasets import load_performances, make_gait
+from sklearn_motionsync.matching.filters import white_noise
+from sklearn_motionsync.matching.refinement import SAME_SOURCE, curvature, unexplained_variance
+
+P = 100
 
 
-@pytest.fixture
-def calls(monkeypatch):
-    """Numbers of performances that are refined, and of steps, call by call."""
-    seen, misfits = [], RefinementTest.misfits
+@pytest.fixture(scope="module")
+def known_warps(benchmark):
+    """Copies of a random movement with gains and known warps, of rates from 0.5 to 2."""
 
-    def recorded(self, positions, *steps):
-        seen.append((len(positions), *steps))
-        return misfits(self, positions, *steps)
+    def make(seed, noise, n_features=16, n=8):
+        return benchmark("accuracy").known_warps(seed, 0.5, 2.0, noise, n=n, n_features=n_features)
 
-    monkeypatch.setattr(RefinementTest, "misfits", recorded)
-    return seen
+    return make
 
 
-def one_source(n, noise=0.01):
-    """Trials of one source of four features, at different paces."""
-    rng, t = np.random.default_rng(0), np.linspace(0, 1, 60)
-    curves = gaussian_filter1d(rng.standard_normal((300, 4)), 15, axis=0)
-    curves /= curves.std()
-    at = [t + b * np.sin(2 * np.pi * t) for b in rng.uniform(-0.05, 0.05, n)]
-    frames = np.linspace(0, 1, 300)
-    X = [np.column_stack([np.interp(s, frames, c) for c in curves.T]) for s in at]
-    return [x + noise * rng.standard_normal(x.shape) for x in X]
+def error(X, truth, **params):
+    sync = DenseSynchronizer(P, pattern=0, **params).fit(X)
+    return np.abs(sync.match(X).times - truth)[1:].mean()
 
 
-def test_hopeless_refinement_ends_after_the_first_pass(calls):
-    """Unrelated walks; every second one of ten others."""
+# -- copies of one source -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("noise", [0.005, 0.05, 0.2])
+@pytest.mark.parametrize("n_features", [1, 2, 4, 16])
+def test_copies_of_one_source_are_refined(n_features, noise, known_warps):
+    """At any noise, and refining them is right."""
+    for seed in range(3):
+        X, truth = known_warps(seed, noise, n_features)
+        sync = DenseSynchronizer(P, pattern=0).fit(X)
+        assert sync.refines_
+        assert 0 <= sync.unexplained_variance_ < SAME_SOURCE
+        found = np.abs(sync.match(X).times - truth)[1:].mean()
+        assert found == error(X, truth, refine=True)
+        assert found < 0.85 * error(X, truth, refine=False)
+
+
+@pytest.mark.parametrize(("noise", "most"), [(0.005, 0.03), (0.05, 0.12), (0.2, 0.35)])
+def test_refined_warps_have_small_errors(noise, most, known_warps):
+    cases = [known_warps(seed, noise) for seed in range(3)]
+    assert np.mean([error(X, truth) for X, truth in cases]) < most
+
+
+# -- the number -----------------------------------------------------------------------------
+
+
+def test_number_equals_its_formula(known_warps):
+    X, _ = known_warps(0, 0.05, 3)
+    sync = DenseSynchronizer(80, metric=None).fit(X)
+    voted = DenseSynchronizer(80, metric=None, refine=False).fit(X)
+    others = np.delete(np.arange(len(X)), sync.pattern_index_)
+    weights = [(-1) ** k * math.comb(6, k) for k in range(7)]
+
+    def white(x):
+        differences = [sum(w * x[i + k] for k, w in enumerate(weights)) for i in range(len(x) - 6)]
+        return np.square(differences).mean(axis=0) / math.comb(12, 6)
+
+    noise = np.mean([white(X[k]) for k in (sync.pattern_index_, *others)], axis=0)
+    aligned, left = voted.transform([X[k] for k in others]), []
+    for warped in aligned:
+        variance = np.square(warped - sync.pattern_).mean(axis=0) - (1 + 2 / 3) * noise
+        left.append(np.maximum(variance, 0).sum())
+    moving = np.maximum(sync.pattern_.var(axis=0) - noise, 0).sum()
+    expected = np.median(left) / moving
+    measured = white_noise([X[k] for k in (sync.pattern_index_, *others)])
+    assert unexplained_variance(sync.pattern_, aligned, measured) == pytest.approx(expected)
+    # Direct paths tell as much as voted ones.
+    assert sync.unexplained_variance_ == pytest.approx(expected, rel=0.3)
+    assert sync.refines_ == (sync.unexplained_variance_ < 0.025)
+
+
+@pytest.mark.parametrize("params", [{"refine": True}, {"refine": False}, {"consensus": 0}], ids=str)
+def test_there_is_no_number_unless_it_decides(params, known_warps):
+    sync = DenseSynchronizer(P, **params).fit(known_warps(0, 0.05)[0])
+    assert np.isnan(sync.unexplained_variance_)
+    assert sync.refines_ == (params == {"refine": True})
+
+
+def test_there_is_no_number_of_one_trial_and_of_gaps_everywhere(known_warps):
+    X, _ = known_warps(0, 0.05)
+    holes = [x.copy() for x in X]
+    for i, x in enumerate(holes):
+        x[10 + i : 40 + i] = np.nan
+    for trials in (X[:1], holes):
+        sync = DenseSynchronizer(P, pattern=0).fit(trials)
+        assert np.isnan(sync.unexplained_variance_)
+        assert not sync.refines_
+    # Those without gaps decide.
+    some = DenseSynchronizer(P, pattern=7).fit([*holes[:5], *X[5:]])
+    assert some.refines_
+
+
+def test_trials_too_short_for_their_noise_are_not_refined():
+    X = [np.sin(np.linspace(0, 3, n))[:, np.newaxis] for n in (4, 5, 6, 5)]
+    assert not DenseSynchronizer().fit(X).refines_
+
+
+def test_equal_trials_are_copies(known_warps):
+    sync = DenseSynchronizer(P).fit([known_warps(0, 0.0)[0][0]] * 3)
+    assert sync.unexplained_variance_ == 0
+    assert sync.refines_
+
+
+@pytest.mark.parametrize("n_frames", [5, 6, 30])
+def test_curvature_equals_the_sum_of_squared_second_differences(n_frames):
+    """With pinned ends: tau' A tau + 2 b' tau + a constant, A as an upper band."""
+    band, border = curvature(n_frames)
+    inner = np.zeros((n_frames - 2, n_frames - 2))
+    for k in range(min(3, n_frames - 2)):
+        diagonal = np.diag(band[2 - k, k:], k)
+        inner += diagonal + (diagonal.T if k else 0)
     rng = np.random.default_rng(0)
-    sync = DenseSynchronizer(60).fit(np.cumsum(rng.standard_normal((11, 60, 4)), axis=1))
-    assert calls == [(5, 3)]
+    values = []
+    for free in rng.standard_normal((2, n_frames - 2)):
+        tau = np.concatenate([[0], free, [n_frames - 1]])
+        whole = np.square(np.diff(tau, 2)).sum()
+        values.append(whole - free @ inner @ free - 2 * border @ free)
+    np.testing.assert_allclose(values[0], values[1])
+
+
+# -- people ---------------------------------------------------------------------------------
+
+
+def assert_not_refined(X):
+    sync = DenseSynchronizer(P).fit(X)
     assert not sync.refines_
-    assert sync.refinement_.p_value > 0.1
-    assert np.isnan([sync.misfit_, sync.refinement_.ratio_to_all]).all()
+    assert sync.unexplained_variance_ > SAME_SOURCE
+
+
+def assert_not_refined_whatever_the_features(postures, counts=(None, 3, 2, 1)):
+    points = ASpace().fit_transform(postures)
+    for n_features in counts:
+        assert_not_refined([x[:, :n_features] for x in points])
+
+
+def test_made_gait_is_not_refined():
+    assert_not_refined(make_gait(random_state=0).data)
+
+
+@pytest.mark.parametrize("file", ["Besier2009-vastus", "Pataky2014-mediolateral"])
+def test_forces_of_people_are_not_refined(file, real_data):
+    curves = np.loadtxt(real_data / "nlreg1d" / f"{file}.csv", delimiter=",")[:, 1:]
+    assert_not_refined(list(curves[:, :, np.newaxis]))
+
+
+@pytest.mark.parametrize("action", ["depositFloorR", "sneak2StepsLStart", "grabHighR"])
+def test_people_are_not_refined(action, real_data):
+    """All actors and each by himself, all features and the first few: refining misleads there.
+
+    A single curve of one actor may be as alike as copies are.
+    """
+    bunch = load_performances(real_data / "hdm05" / "hdm05_positions.npz")
+    chosen = np.flatnonzero(bunch.target == action)
+    postures = DirectionCosines(bunch.skeleton).fit_transform([bunch.data[i] for i in chosen])
+    for actor in (None, "bd", "bk", "dg", "tr"):
+        mine = [x for x, i in zip(postures, chosen, strict=True) if actor in (None, bunch.actor[i])]
+        counts = (None, 3, 2, 1) if actor is None else (None, 3, 2)
+        assert_not_refined_whatever_the_features(mine, counts)
 
 
 @pytest.mark.parametrize(
-    ("n", "expected"), [(11, [(5, 3), (10,)]), (5, [(4, 3), (4,)]), (4, [(3, 3), (3,)])]
+    ("archive", "action"), [("utkinect", "pull"), ("utkinect", "waveHands"), ("cmu07_walk", None)]
 )
-def test_promising_refinement_is_tested_on_all(n, expected, calls):
-    sync = DenseSynchronizer(60).fit(one_source(n))
-    assert calls == expected
-    assert sync.refines_
-    assert sync.refinement_.ratio < 0.5
-
-
-def test_few_performances_have_no_first_pass(calls):
-    DenseSynchronizer(60).fit(one_source(3))
-    assert calls == [(2,)]
+def test_people_of_other_data_sets_are_not_refined(archive, action, real_data):
+    """One subject walks, each time anew."""
+    bunch = load_performances(real_data / archive / f"{archive}_positions.npz")
+    X = [x for x, t in zip(bunch.data, bunch.target, strict=True) if action in (None, t)]
+    X = [x for x in X if len(x) >= 8]
+    assert_not_refined_whatever_the_features(DirectionCosines(bunch.skeleton).fit_transform(X))

@@ -270,4 +270,4 @@ def test_recorded_walks_stand_as_they_do_themselves(real_data):
             slips += [drift(found, f"{side}_ankle", skeleton, f) for f in frames]
     assert len(slips) > 20
     assert np.mean(slips) < 1.05 * np.mean(own)
-    assert max(slips) < 2.5
+    assert max(slips) < 2.8

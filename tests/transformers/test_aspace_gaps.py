@@ -6,17 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.decomposition import PCA
-from sklearn.exceptions import ConvergenceWarning
 from sklearn.model_selection import GridSearchCV, GroupKFold
 from sklearn.pipeline import make_pipeline
 from sklearn_motionsync import ASpace, DirectionCosines, LinearSynchronizer, to_frame
-from sklearn_motionsync.transformers import expectation
-from sklearn_motionsync.transformers.expectation import (
-    SHRINKAGE,
-    HiddenNormal,
-    components_of_seen,
-    estimate_moments,
-)
+from sklearn_motionsync.matching.gaps import SHRINKAGE, Filler
 
 
 def low_rank(n_performances, n_frames=60, rank=2, n_features=6, noise=0.01, seed=0):
@@ -61,59 +54,47 @@ def conditional(x, mean, covariance):
     return x, left
 
 
-def maximise_slowly(Z, n_rounds=100):
-    """Mean and covariance by expectation and maximisation, row by row."""
-    mean, covariance = np.nanmean(Z, axis=0), np.diag(np.nanvar(Z, axis=0))
-    for _ in range(n_rounds):
-        found = [conditional(z, mean, shrunk(covariance)) for z in Z]
-        whole = np.array([x for x, _ in found])
-        left = sum(left for _, left in found)
-        # What is unknown of a hidden feature is unknown of it without noise.
-        left -= SHRINKAGE * np.diag(np.isnan(Z).sum(axis=0) * np.diag(covariance))
-        mean = whole.mean(axis=0)
-        covariance = np.cov(whole.T, bias=True) + left / len(Z)
-    return mean, covariance
-
-
 # -- the moments --------------------------------------------------------------------------
 
 
-def test_moments_are_those_of_slow_expectation_and_maximisation(monkeypatch):
-    monkeypatch.setattr(expectation, "TOLERANCE", 1e-12)
-    Z = np.concatenate(hide(low_rank(3, n_frames=40, n_features=5), 0.2))
-    Z = Z[~np.isnan(Z).all(axis=1)]
-    mean, covariance = estimate_moments(Z)
-    slow_mean, slow_covariance = maximise_slowly(Z)
-    np.testing.assert_allclose(mean, slow_mean, rtol=1e-8)
-    np.testing.assert_allclose(covariance, slow_covariance, rtol=1e-6, atol=1e-8)
+def test_components_are_those_of_the_covariance_of_what_was_seen():
+    """Every covariance is that of the postures that show both features, by pandas."""
+    X = hide(low_rank(3, n_features=5, noise=0.3), 0.2)
+    rows = np.concatenate(X)
+    aspace = ASpace(1.0).fit(X)
+    np.testing.assert_allclose(aspace.mean_, np.nanmean(rows, axis=0), rtol=1e-12)
+    covariance = (aspace.components_.T * aspace.explained_variance_) @ aspace.components_
+    centred = rows - aspace.mean_
+    both = np.isfinite(rows)
+    slow = np.empty((5, 5))
+    for i in range(5):
+        for j in range(5):
+            shown = both[:, i] & both[:, j]
+            slow[i, j] = (centred[shown, i] * centred[shown, j]).mean()
+    seen = both.any(axis=1).sum()
+    values, vectors = np.linalg.eigh(slow * seen / (seen - 1))
+    slow = (vectors * np.abs(values)) @ vectors.T
+    np.testing.assert_allclose(covariance, slow, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("batch", [1, 50])
-def test_moments_and_expectations_do_not_depend_on_batches(batch, monkeypatch):
-    X = hide(low_rank(3), 0.3)
-    whole = ASpace(2).fit(X)
-    monkeypatch.setattr(expectation, "BATCH", batch)
-    parts = ASpace(2).fit(X)
-    np.testing.assert_allclose(parts.components_, whole.components_, rtol=1e-10)
-    np.testing.assert_allclose(parts.transform(X[0]), whole.transform(X[0]), rtol=1e-9, atol=1e-9)
-
-
-def test_with_nothing_missing_both_ways_agree():
-    """The estimate from what was seen is that of scikit-learn's PCA."""
-    postures = np.concatenate(low_rank(3, noise=0.3))
-    mean, components, variance, covariance = components_of_seen(postures)
-    pca = PCA().fit(postures)
-    np.testing.assert_allclose(mean, pca.mean_, rtol=1e-12)
-    np.testing.assert_allclose(components, pca.components_, atol=1e-9)
-    np.testing.assert_allclose(variance, pca.explained_variance_, rtol=1e-9)
-    np.testing.assert_allclose(covariance, np.cov(postures.T), rtol=1e-9)
-    single = components_of_seen(postures.astype("f4"))
-    assert [x.dtype for x in single[:3]] == ["f4"] * 3
+@pytest.mark.parametrize("dtype", ["f8", "f4"])
+def test_with_nearly_nothing_missing_the_components_are_those_of_pca(dtype):
+    """A value that is nearly the mean of its feature is hidden."""
+    X = low_rank(3, noise=0.3)
+    X[1][7, 2] = np.concatenate(X)[:, 2].mean()
+    pca, gaps = PCA().fit(np.concatenate(X)), [x.astype(dtype) for x in X]
+    gaps[1][7, 2] = np.nan
+    aspace = ASpace(1.0).fit(gaps)
+    np.testing.assert_allclose(aspace.mean_, pca.mean_, rtol=1e-3)
+    # The others are of noise alone, and near each other.
+    np.testing.assert_allclose(aspace.components_[:2], pca.components_[:2], atol=0.005)
+    np.testing.assert_allclose(aspace.explained_variance_, pca.explained_variance_, rtol=0.02)
+    assert aspace.components_.dtype == aspace.explained_variance_.dtype == dtype
 
 
 def test_without_gaps_nothing_is_estimated_otherwise(monkeypatch):
-    monkeypatch.delattr("sklearn_motionsync.transformers.aspace.components_of_seen")
-    monkeypatch.delattr(HiddenNormal, "fill")
+    monkeypatch.delattr("sklearn_motionsync.transformers.aspace.moments_of_seen")
+    monkeypatch.delattr(Filler, "expect")
     X = low_rank(3)
     aspace, pca = ASpace(3).fit(X), PCA(svd_solver="auto").fit(np.concatenate(X))
     np.testing.assert_array_equal(aspace.components_, pca.components_[:3])
@@ -141,26 +122,6 @@ def test_rows_are_the_conditional_expectation_of_each_posture(fitted_on):
             continue
         whole, _ = conditional(x, aspace.mean_, shrunk(covariance))
         np.testing.assert_allclose(point, aspace.components_ @ (whole - aspace.mean_), atol=1e-9)
-
-
-@pytest.mark.parametrize("run", [1, 8])
-def test_performances_are_the_conditional_expectation_of_all_their_values(run):
-    """Against one covariance of all values of a performance: frames times features."""
-    X = low_rank(4, n_frames=30, n_features=4)
-    aspace = ASpace(1.0).fit(hide(X, 0.1))
-    covariance = (aspace.components_.T * aspace.explained_variance_) @ aspace.components_
-    (x,) = hide(low_rank(1, n_frames=30, n_features=4, seed=7), 0.5, seed=2, run=run)
-    x[11] = np.nan
-    nothing = np.isnan(x).all(axis=1)
-    t = np.arange(len(x))
-    in_time = np.exp(-np.abs(t - t[:, np.newaxis]) / aspace.correlation_time_)
-    of_all = np.kron(in_time, shrunk(covariance))
-    whole, _ = conditional(x.ravel(), np.tile(aspace.mean_, len(x)), of_all)
-    expected = (whole.reshape(x.shape) - aspace.mean_) @ aspace.components_.T
-    (points,) = aspace.transform([x])
-    assert nothing.sum() >= 1
-    assert np.isnan(points[nothing]).all()
-    np.testing.assert_allclose(points[~nothing], expected[~nothing], atol=1e-8)
 
 
 def test_correlation_time_is_where_the_autocorrelation_falls_to_one_over_e():
@@ -273,19 +234,14 @@ def test_a_feature_that_was_hardly_ever_seen_is_warned_of():
     ASpace().fit(X)
 
 
-def test_an_estimate_that_does_not_settle_is_warned_of(monkeypatch):
-    monkeypatch.setattr(expectation, "MAX_ROUNDS", 2)
-    with pytest.warns(ConvergenceWarning, match="still changes after 2 rounds: 28% of all"):
-        ASpace().fit(hide(low_rank(3), 0.3))
-
-
 def test_variances_of_what_is_hidden_at_random_are_not_biased():
     """Of independent features nothing is learnt about hidden values: they change no variance."""
     rng = np.random.default_rng(0)
     Z = rng.standard_normal((4000, 3)) * [1, 2, 3]
     Z[rng.random(Z.shape) < [0, 0.5, 0.95]] = np.nan
-    _, covariance = estimate_moments(Z)
-    np.testing.assert_allclose(np.diag(covariance), np.nanvar(Z, axis=0), rtol=0.02)
+    aspace = ASpace(1.0).fit(Z)
+    variances = aspace.explained_variance_ @ np.square(aspace.components_)
+    np.testing.assert_allclose(variances, np.nanvar(Z, axis=0), rtol=0.02)
 
 
 def test_infinity_is_refused():

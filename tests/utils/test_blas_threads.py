@@ -7,14 +7,11 @@ import signal
 import sys
 import threading
 import time
-import types
 import warnings
 
 import pytest
 import threadpoolctl
-from sklearn_motionsync.utils import threads as blas
-from sklearn_motionsync.utils.parallel import run
-from sklearn_motionsync.utils.threads import Limit, on_one_thread
+from sklearn_motionsync.utils.parallel import one_blas_thread, run
 
 
 def blas_threads():
@@ -42,7 +39,7 @@ def found():
 
 
 class Holder(threading.Thread):
-    """A thread that stays in a portion until its end is called."""
+    """A thread that stays in the context until its end is called."""
 
     def __init__(self):
         super().__init__()
@@ -51,11 +48,9 @@ class Holder(threading.Thread):
         assert self.inside.wait(10)
 
     def run(self):
-        on_one_thread(self.hold)
-
-    def hold(self):
-        self.inside.set()
-        self.ended.wait(10)
+        with one_blas_thread():
+            self.inside.set()
+            self.ended.wait(10)
 
     def end(self):
         self.ended.set()
@@ -63,7 +58,7 @@ class Holder(threading.Thread):
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
-def test_last_holder_restores_threads(found, order):
+def test_the_last_of_several_threads_restores_the_limit(found, order):
     holders = [Holder() for _ in range(3)]
     for i in order:
         assert set(blas_threads().values()) == {1}
@@ -71,79 +66,47 @@ def test_last_holder_restores_threads(found, order):
     assert blas_threads() == found
 
 
-def test_nested_calls_keep_one_thread(found):
-    inner = []
-    on_one_thread(lambda: inner.append(on_one_thread(blas_threads)) or inner.append(blas_threads()))
-    assert [set(threads.values()) for threads in inner] == [{1}, {1}]
+def test_the_first_thread_may_still_run_when_the_last_restores_the_limit(found):
+    with one_blas_thread():
+        holder = Holder()
+    assert set(blas_threads().values()) == {1}
+    holder.end()
+    assert blas_threads() == found
+
+
+def test_contexts_may_be_nested(found):
+    with one_blas_thread():
+        with one_blas_thread():
+            assert set(blas_threads().values()) == {1}
+        assert set(blas_threads().values()) == {1}
+    assert blas_threads() == found
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+def test_an_error_restores_the_limit(found, error):
+    with pytest.raises(error), one_blas_thread():
+        raise error
     assert blas_threads() == found
 
 
 def test_portions_run_on_one_thread_under_limits_of_the_user(found):
     with threadpoolctl.threadpool_limits(limits=3, user_api="blas"):
         seen = []
-        in_thread(on_one_thread, lambda: seen.append(blas_threads()))
+        in_thread(lambda: seen.extend(run(blas_threads, [()])))
         seen += run(blas_threads, [()] * 6, n_jobs=2, prefer="threads")
         assert set(blas_threads().values()) == {3}
     assert {n for threads in seen for n in threads.values()} == {1}
     assert blas_threads() == found
 
 
-def test_changes_by_others_meanwhile_stay(found):
-    in_thread(on_one_thread, threadpoolctl.threadpool_limits, 3, "blas")
-    assert set(blas_threads().values()) == {3}
-    # A limit that began before and ends before restores the number before both.
-    entered, leave = threading.Event(), threading.Event()
-
-    def limit():
-        with threadpoolctl.threadpool_limits(limits=1, user_api="blas"):
-            entered.set()
-            leave.wait(10)
-
-    other = threading.Thread(target=limit)
-    other.start()
-    assert entered.wait(10)
-    holder = Holder()
-    leave.set()
-    other.join()
-    holder.end()
-    assert set(blas_threads().values()) == {3}
-
-
 def test_other_threads_can_set_threads_afterwards(found):
-    on_one_thread(int)
+    with one_blas_thread():
+        pass
     in_thread(threadpoolctl.threadpool_limits, 3, "blas")
     assert set(blas_threads().values()) == {3}
 
 
 # -- interruption -----------------------------------------------------------------------------
-
-
-# Python ignores an interruption while an object is deleted.
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="signals of POSIX")
-@pytest.mark.parametrize("others", [False, True])
-def test_ctrl_c_at_any_moment_restores_threads(found, others):
-    """Most interruptions come while the limit is acquired or released."""
-    pools = threadpoolctl.ThreadpoolController().select(user_api="blas")
-    holder, inside = (Holder(), 1) if others else (None, 2)
-    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
-    interrupted = 0
-    try:
-        for i in range(1000):
-            try:
-                signal.setitimer(signal.ITIMER_REAL, 1e-5 + 1e-7 * i)
-                for _ in range(1000):
-                    on_one_thread(int)
-            except KeyboardInterrupt:
-                interrupted += 1
-            assert {pool["num_threads"] for pool in pools.info()} == {inside}
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
-    assert interrupted > 900
-    if others:
-        holder.end()
-    assert blas_threads() == found
 
 
 @pytest.mark.parametrize("n_jobs", [1, 2])
@@ -203,7 +166,7 @@ def test_closed_generator_restores_threads(found, n_jobs, leave):
     assert len(begun) < 10
 
 
-# -- forks, and libraries of other kinds ------------------------------------------------------
+# -- forks ----------------------------------------------------------------------------------
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks")
@@ -222,89 +185,7 @@ def test_forked_child_does_not_inherit_the_limit(found):
 
 
 def answer_of_child(answer):
-    threads = blas_threads(), on_one_thread(blas_threads), blas_threads()
-    answer.put([set(t.values()) for t in threads])
-
-
-class Library:
-    """A stand-in for a threadpoolctl.LibController."""
-
-    user_api, filepath, threading_layer = "blas", "libblas.so", "pthreads"
-
-    def __init__(self):
-        self.num_threads, self.calls = 4, []
-
-    def set_num_threads(self, n):
-        self.calls.append(n)
-        self.num_threads = n
-
-
-class LibraryOnOpenMP(threading.local, Library):
-    """A library with a setting for each thread."""
-
-    threading_layer = "openmp"
-
-
-def test_after_fork_does_not_wait_for_locks_of_other_threads():
-    entered, go_on = threading.Event(), threading.Event()
-
-    class Slow(Library):
-        def set_num_threads(self, n):
-            super().set_num_threads(n)
-            if threading.current_thread() is not threading.main_thread():
-                entered.set()
-                go_on.wait()
-
-    limit = Limit(Slow())
-    thread = threading.Thread(target=limit.acquire, args=("holder",), daemon=True)
-    thread.start()
-    assert entered.wait(10)
-    limit.after_fork()
-    limit.acquire("child")
-    limit.release("child")
-    assert not go_on.is_set()
-    go_on.set()
-    thread.join()
-
-
-def test_openmp_limits_are_of_each_thread():
-    library = LibraryOnOpenMP()
-    limit, seen = Limit(library), []
-
-    def visit():
-        limit.acquire("other")
-        seen.append(library.num_threads)
-        limit.release("other")
-        seen.append(library.num_threads)
-
-    limit.acquire("first")
-    thread = threading.Thread(target=visit)
-    thread.start()
-    thread.join()
-    assert seen == [1, 4]
-    assert library.num_threads == 1
-    limit.release("first")
-    assert library.num_threads == 4
-
-
-def test_release_without_acquire_changes_nothing():
-    library = Library()
-    limit = Limit(library)
-    limit.release("other")
-    assert library.calls == []
-    limit.acquire("holder")
-    limit.release("other")
-    assert library.num_threads == 1
-    limit.release("holder")
-    limit.release("holder")
-    assert library.calls == [1, 4]
-
-
-def test_libraries_loaded_later_are_limited(monkeypatch):
-    library = Library()
-    on_one_thread(int)
-    known = types.SimpleNamespace(lib_controllers=[library])
-    monkeypatch.setattr(blas, "ThreadpoolController", lambda: known)
-    monkeypatch.setitem(sys.modules, "module_with_another_blas", types.ModuleType("another"))
-    assert on_one_thread(lambda: library.num_threads) == 1
-    assert library.num_threads == 4
+    threads = [blas_threads()]
+    with one_blas_thread():
+        threads.append(blas_threads())
+    answer.put([set(each.values()) for each in [*threads, blas_threads()]])

@@ -16,18 +16,15 @@ import pytest
 import sklearn
 import sklearn_motionsync
 import threadpoolctl
-from sklearn.exceptions import NotFittedError
-from sklearn.utils.validation import check_is_fitted
 from sklearn_motionsync import DenseSynchronizer, DirectionCosines
 from sklearn_motionsync.datasets import make_bending
-from sklearn_motionsync.matching.refinement_test import RefinementTest
 from sklearn_motionsync.matching.trellis import Trellis
 from sklearn_motionsync.utils.parallel import Progress, SharedArgument, run
 
 SETTINGS = {
-    "paper": {"cost": "posture", "max_rate": 2, "subframes": 1, "consensus": 0},
+    "paper": {"cost": "posture", "max_rate": 2, "consensus": 0},
     "defaults": {},
-    "refined": {"refine": True, "subframes": 2, "consensus": 3},
+    "refined": {"refine": True, "consensus": 3},
 }
 
 
@@ -62,6 +59,7 @@ CONTEXTS = {
 }
 
 
+@pytest.mark.filterwarnings("ignore::sklearn_motionsync.SynchronizationWarning")
 @pytest.mark.parametrize("name", CONTEXTS)
 def test_results_are_equal_to_the_last_bit_in_any_context(walks, reference, name):
     settings, expected = reference
@@ -135,14 +133,15 @@ def test_run_works_with_backends_without_generators():
 # -- progress -------------------------------------------------------------------------------
 
 
-def test_verbose_prints_the_progress_of_stages(walks, capsys):
+def test_verbose_prints_the_progress_of_stages(walks, capsys, monkeypatch):
+    # On a slow machine there are more lines, one a second.
+    monkeypatch.setattr(time, "perf_counter", lambda: 0.0)
     DenseSynchronizer().fit(walks).transform(walks)
     assert capsys.readouterr().out == ""
     DenseSynchronizer(verbose=1).fit(walks).transform(walks)
     lines = capsys.readouterr().out.splitlines()
     assert all(line.startswith("[DenseSynchronizer] ") for line in lines)
-    assert "comparing 300 with 32 performances: 100 %" in lines[0]
-    assert "first pass of the refinement test: 100 %" in lines[-2]
+    assert "comparing 300 with 100 performances: 100 %" in lines[-2]
     assert "warping: 100 %" in lines[-1]
 
 
@@ -183,7 +182,7 @@ def test_sklearn_callbacks_are_called_for_every_portion(walks):
     sync = DenseSynchronizer().set_callbacks(recorder).fit(walks)
     assert recorder.seen[0] == "setup"
     assert recorder.seen[-2:] == ["fit", "teardown"]
-    assert "comparing 300 with 32 performances" in recorder.seen
+    assert "comparing 300 with 100 performances" in recorder.seen
     assert recorder.seen.count("portion") >= 3
     assert recorder.open == []
     seen = len(recorder.seen)
@@ -203,21 +202,6 @@ def test_callbacks_see_at_most_a_hundred_tasks_of_a_stage(n_trials, n_tasks):
 # -- interruption -----------------------------------------------------------------------------
 
 
-def test_interrupted_fit_leaves_estimator_unfitted(walks, monkeypatch):
-    sync = DenseSynchronizer().fit(walks[:20])
-
-    def interrupted(self, *args):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(RefinementTest, "misfits", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        sync.fit(walks)
-    with pytest.raises(NotFittedError):
-        check_is_fitted(sync)
-    monkeypatch.undo()
-    assert sync.fit(walks[:20]).n_frames_ > 0
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("n_jobs", [1, 2])
 def test_ctrl_c_ends_a_long_fit(n_jobs):
@@ -230,7 +214,7 @@ def test_ctrl_c_ends_a_long_fit(n_jobs):
         from sklearn_motionsync import DenseSynchronizer
         signal.signal(signal.SIGINT, signal.default_int_handler)
         X = np.random.default_rng(0).standard_normal((3000, 200, 8))
-        sync = DenseSynchronizer(search="exhaustive", n_jobs={n_jobs})
+        sync = DenseSynchronizer(n_jobs={n_jobs})
         try:
             print("begin", flush=True)
             sync.fit(X)

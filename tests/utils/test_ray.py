@@ -148,12 +148,12 @@ def test_fit_stores_performances_once(ray):
     sync = DenseSynchronizer().fit(X)
     tasks = sum(reference.startswith("task") for reference in ray.stored)
     large = [v for r, v in ray.stored.items() if r.startswith("ref") and len(v) > X.nbytes / 2]
-    # All rounds of the search share the stored value, and tasks carry indices.
-    assert tasks > 10
+    # All portions share the stored value, and tasks carry indices.
+    assert tasks >= 5
     assert len(large) == 1
     with joblib.parallel_config(backend="sequential"):
         alone = DenseSynchronizer().fit(X)
-    for name in ("global_distances_", "pattern_", "exemplars_", "misfit_"):
+    for name in ("global_distances_", "pattern_", "exemplars_", "unexplained_variance_"):
         assert (
             np.asarray(getattr(sync, name)).tobytes() == np.asarray(getattr(alone, name)).tobytes()
         )

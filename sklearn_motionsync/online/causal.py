@@ -10,8 +10,7 @@ import math
 import numpy as np
 from scipy.signal import lfilter
 
-from .factors import Bases, right_factor
-from .trellis import TIE, Tile
+from ..matching.tile import TIE, Bases, Tile, right_factor
 
 __all__ = ["CausalDerivative", "CausalTrellis", "causal_velocity"]
 

@@ -9,20 +9,17 @@ import itertools
 
 import numpy as np
 
-from .factors import Bases, right_factor
-from .matcher import cost_features
-from .trellis import PRODUCT_ROWS, Tile, Trellis
-from .warps import even_slices
+from ..matching.matcher import cost_features
+from ..matching.sizes import CONSTANT, EQUAL
+from ..matching.tile import PRODUCT_ROWS, Bases, Tile, right_factor
+from ..matching.trellis import Trellis
+from ..matching.warps import even_slices
 
 __all__ = ["BLOCK", "PairwiseDistance", "blocks_of_pairs"]
 
 # Bases, and moving sequences, of a block; of few of the one there are more of the other. Of 50
 # frames 8 x 8 take 1.5 times as long a pair, 16 x 32 as long, 1 x 256 1.2 times.
 BLOCK = 16
-# A feature whose range is less than this share of its performance's magnitude is constant, and a
-# distance that is less than this share of both energies is 0: the rest is rounding.
-_CONSTANT = 2.0**-44
-_EQUAL = {np.dtype(np.float64): 2.0**-40, np.dtype(np.float32): 2.0**-18}
 
 
 class PairwiseDistance:
@@ -61,8 +58,9 @@ class PairwiseDistance:
     ):
         self.cost, self.normalize, self.smoothing = cost, normalize, velocity_smoothing
         self.n_frames, self.dtype = n_frames, dtype
-        reach = {"max_offset": max_offset, "max_rate": max_rate}
-        self.trellis = Trellis.on_clock(cost, n_frames, float(smoothness), **reach)
+        self.trellis = Trellis.on_clock(
+            cost, n_frames, float(smoothness), max_offset=max_offset, max_rate=max_rate
+        )
 
     def features(self, on_clock):
         """Features of performances (n, P, n_features) on the clock: (n, P, n_compared)."""
@@ -72,16 +70,16 @@ class PairwiseDistance:
             # The same bits in any unit: powers of two are taken out.
             exponents = np.frexp(size)[1]
             on_clock, size = np.ldexp(on_clock, -exponents), np.ldexp(size, -exponents)
-        is_constant = np.ptp(on_clock, axis=1, keepdims=True) <= _CONSTANT * size
+        is_constant = np.ptp(on_clock, axis=1, keepdims=True) <= CONSTANT * size
         on_clock = np.where(is_constant, on_clock[:, :1], on_clock)
         features = cost_features(on_clock, self.cost, smoothing=self.smoothing)
         if not self.normalize:
             return features.astype(self.dtype, copy=False)
         energy = _energies(features)[:, np.newaxis, np.newaxis] / self.n_frames
         # All energy of a performance that stands still is in a feature that is 0 in others.
-        rest = np.broadcast_to(energy == 0, (*features.shape[:2], 1))
+        residue = np.broadcast_to(energy == 0, (*features.shape[:2], 1))
         features /= np.sqrt(np.where(energy > 0, energy, 1))
-        return np.concatenate([features, rest], axis=2, dtype=self.dtype)
+        return np.concatenate([features, residue], axis=2, dtype=self.dtype)
 
     def block(self, bases, moving):
         """Distances of bases to moving sequences, not symmetric.
@@ -96,8 +94,8 @@ class PairwiseDistance:
         ndarray, shape (n_bases, n_moving)
         """
         distances = PairTile(self.trellis, bases, moving).ends()[:, :, 0]
-        both = _energies(bases)[:, np.newaxis] + _energies(moving)
-        return np.where(distances <= _EQUAL[distances.dtype] * both, 0, distances)
+        energies = _energies(bases)[:, np.newaxis] + _energies(moving)
+        return np.where(distances <= EQUAL[distances.dtype] * energies, 0, distances)
 
 
 def _energies(features):

@@ -1,0 +1,326 @@
+"""The training set of a fit: what was read, or a sample of it, and the common clock (Eq. 7)."""
+
+import warnings
+from numbers import Integral
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from sklearn.utils import check_random_state
+
+from ..inputs.collections import (
+    Performances,
+    as_collection,
+    as_source,
+    count_of,
+    gives_rows,
+    select,
+)
+from ..inputs.numbers import as_numbers, check_finite, check_magnitude, check_names
+from ..inputs.tables import as_pandas
+from ..inputs.wording import counted
+from ..matching.anchors import KeyframeColumns, add_ramps
+from ..matching.counting import first_largest
+from ..matching.gaps import Filler, add_weights
+from ..matching.sizes import BATCH, EQUAL
+from ..matching.units import Unit
+from ..matching.warps import even_slices, normalise
+
+__all__ = [
+    "CommonClock",
+    "Pattern",
+    "TrainingSet",
+    "check_pattern",
+    "draw_sample",
+    "pattern_of",
+    "put_on_clock",
+    "warn_of_one_feature",
+]
+
+# Most bytes of a training set on the clock; a fit holds several copies.
+MOST_BYTES = 4 * 2**30
+# Most trials in ``examples_``.
+_MOST_EXAMPLES = 64
+
+
+class TrainingSet(NamedTuple):
+    """What a fit learns from.
+
+    Attributes
+    ----------
+    trials : Performances
+        Without gaps.
+    filler : Filler or None
+        What filled their gaps.
+    population : int
+        How many trials were given, of which these may be a sample.
+    keyframes : ndarray, shape (n_trials, n_keyframes), or None
+        Known key-frames as shares of the trials; NaN for those that are not known.
+    """
+
+    trials: Performances
+    filler: Filler | None
+    population: int
+    keyframes: np.ndarray | None = None
+
+
+def draw_sample(X, size, pattern, random_state):
+    """A random sample of trials; the others are not read.
+
+    Parameters
+    ----------
+    X : trials of any kind
+    size : int or None
+        Size of the sample; None for all.
+    pattern : as of a synchronizer
+        A pattern given by its index is always in the sample.
+    random_state : as of a synchronizer
+
+    Returns
+    -------
+    X : trials of any kind
+        The sample.
+    numbers : list of int or None
+        Their indices, which increase; None if they are all.
+    population : int or None
+        How many trials were given; None if they are all.
+    """
+    if size is None:
+        return X, None, None
+    collection = _indexable(as_pandas(X))
+    population = 0 if collection is None else count_of(collection)
+    is_index = isinstance(pattern, Integral) and not isinstance(pattern, bool)
+    if size >= population or (is_index and pattern >= population):
+        return X if collection is None else collection, None, None
+    drawn = check_random_state(random_state).permutation(population)
+    if is_index:
+        drawn = np.concatenate([[pattern], drawn[drawn != pattern]])
+    numbers = np.sort(drawn[:size])
+    return select(collection, numbers), numbers.tolist(), population
+
+
+def _indexable(X):
+    """Trials, or rows, by index; None for input that has to be refused."""
+    source = as_source(X)
+    if source is not None:
+        return source
+    if isinstance(X, pd.DataFrame):
+        return X if X.index.nlevels == 1 else as_collection(X)
+    is_sequence = isinstance(X, (list, tuple)) or (isinstance(X, np.ndarray) and X.ndim > 0)
+    return X if is_sequence or gives_rows(X) else None
+
+
+# -- the clock, and the pattern on it ---------------------------------------------------------
+
+
+class CommonClock(NamedTuple):
+    """A training set on the common clock.
+
+    Attributes
+    ----------
+    n_frames : int
+    lengths : ndarray of int, shape (n_trials,)
+        Frames of the trials as recorded.
+    examples : ndarray, shape (min(n_trials, 64), P, n_features)
+        Trials linearly normalised, evenly spaced.
+    unit : Unit
+        Their centre and scale.
+    arrays : list of ndarray (n_frames_i, n_columns)
+        Trials as recorded, with columns of weights and key-frames.
+    positions : ndarray, shape (n_trials, P, n_columns)
+        The same, linearly normalised (Eq. 7) and in the unit.
+    anchors : KeyframeColumns or None
+        The columns of key-frames.
+    weighs : bool
+        Whether there is a column of weights.
+    """
+
+    n_frames: int
+    lengths: np.ndarray
+    examples: np.ndarray
+    unit: Unit
+    arrays: list
+    positions: np.ndarray
+    anchors: KeyframeColumns | None
+    weighs: bool
+
+    @property
+    def poses(self):
+        """Positions without columns of weights and key-frames."""
+        return self.positions[:, :, : len(self.unit.centre)]
+
+
+def put_on_clock(training, n_frames, pattern, advice, keyframe_std=0.0):
+    """Normalise a training set linearly (Eq. 7).
+
+    Parameters
+    ----------
+    training : TrainingSet
+    n_frames : int or None
+        None: as many as the pattern has, or the median length of the trials.
+    pattern : ndarray or None
+        If it was given as an array.
+    advice : str
+        What to use if the training set does not fit into memory.
+    keyframe_std : float, default=0.0
+        Standard deviation of key-frames, in frames of the clock.
+
+    Returns
+    -------
+    CommonClock
+    """
+    trials = training.trials
+    lengths = np.array([len(x) for x in trials])
+    if n_frames is None:
+        n_frames = int(np.median(lengths)) if pattern is None else len(pattern)
+    n_trials, n_features = len(trials), trials[0].shape[1]
+    n_bytes = 8 * n_trials * n_frames * n_features
+    if n_bytes > MOST_BYTES:
+        raise ValueError(
+            f"{counted(n_trials, 'performance')} at n_frames = {n_frames} take "
+            f"{n_bytes / 2**30:.0f} GB several times over; {MOST_BYTES / 2**30:.0f} GB is the "
+            f"limit. Use {advice}."
+        )
+    positions = normalise(trials, n_frames)
+    unit = Unit.of(positions)
+    evenly = np.unique(np.linspace(0, n_trials - 1, _MOST_EXAMPLES).round().astype(np.intp))
+    examples = positions[evenly]
+    arrays, anchors = list(trials), None
+    if trials.weights is not None:
+        arrays = add_weights(arrays, trials.weights)
+    if training.keyframes is not None:
+        arrays = add_ramps(arrays, training.keyframes)
+        anchors = KeyframeColumns(training.keyframes.shape[1], keyframe_std / (n_frames - 1))
+    if arrays[0].shape[1] > n_features:
+        positions = normalise(arrays, n_frames)
+    unit(positions, out=positions)
+    weighs = trials.weights is not None
+    return CommonClock(n_frames, lengths, examples, unit, arrays, positions, anchors, weighs)
+
+
+class Pattern(NamedTuple):
+    """The trial to whose clock all others are warped.
+
+    Attributes
+    ----------
+    index : int or None
+        In the training set; None if it was given as an array.
+    array : ndarray, shape (n_frames, n_features)
+        As recorded.
+    distances : ndarray, shape (n_trials,)
+        Global distances of the training set; NaN if there are none.
+    """
+
+    index: int | None
+    array: np.ndarray
+    distances: np.ndarray
+
+
+def pattern_of(training, pattern, median):
+    """The pattern: the median, or as given.
+
+    Parameters
+    ----------
+    training : TrainingSet
+    pattern : "median", int or ndarray
+        As of a synchronizer; an array is checked.
+    median : Median or None
+        None if the pattern was given.
+    """
+    trials = training.trials
+    unknown = np.full(len(trials), np.nan)
+    if isinstance(pattern, np.ndarray):
+        return Pattern(None, pattern, unknown)
+    if median is not None:
+        return Pattern(median.index, trials[median.index], median.distances)
+    index = list(trials.numbers).index(pattern)
+    return Pattern(index, trials[index], unknown)
+
+
+def check_pattern(pattern, trials, names):
+    """The pattern as a synchronizer uses it: "median", an index, or a checked array.
+
+    Parameters
+    ----------
+    pattern : as of a synchronizer
+    trials : Performances
+    names : sequence or None
+        Of the features.
+    """
+    if isinstance(pattern, str):
+        return pattern
+    if isinstance(pattern, bool):
+        raise ValueError(f"pattern must be 'median', an index or an array, got {pattern}.")
+    if isinstance(pattern, Integral):
+        if pattern not in trials.numbers:
+            raise ValueError(
+                f"pattern={pattern} is out of range: there are {len(trials)} "
+                f"performances, the last has index {len(trials) - 1}."
+            )
+        return int(pattern)
+    check_names(pattern, names, "The pattern")
+    array = as_numbers(pattern, "The pattern", dtype=trials[0].dtype)
+    array = array[:, np.newaxis] if array.ndim == 1 else array
+    width = trials[0].shape[1]
+    if array.ndim != 2 or len(array) < 2 or array.shape[1] != width:
+        raise ValueError(
+            f"A pattern given as an array must have shape (n_frames, {width}) with at least 2 "
+            f"frames, like the performances; got {array.shape}."
+        )
+    check_finite(array, "The pattern, frame", names)
+    check_magnitude(float(np.abs(array).max()), "The pattern", training=True)
+    return array
+
+
+# -- whether one of several features dominates what is compared, as with mixed units ----------
+
+# Of 112 sets of features of people, one action each, the largest share of velocities is 0.93:
+# positions, direction cosines, and their first components, two or more (HDM05, UTKinect).
+_DOMINANT = 0.95
+
+
+def warn_of_one_feature(shares, trials, names):
+    """Warn if one of several features has nearly all of the energy, as with mixed units.
+
+    Parameters
+    ----------
+    shares : ndarray, shape (n_features,)
+        Of the features in the energy that is compared without a metric.
+    trials : sequence of ndarray (n_frames_i, n_features)
+    names : sequence or None
+        Of the features.
+    """
+    if shares.max() <= _DOMINANT or (shares > EQUAL[shares.dtype] ** 2).sum() < 2:
+        return
+    if _are_principal_components(trials):
+        return
+    k = first_largest(shares)
+    name = k if names is None else repr(names[k])
+    warnings.warn(
+        f"Feature {name} holds {100 * shares[k]:.4g} % of the energy that is compared: of "
+        f"{len(shares)} features the others hardly count. If units differ, scale them: "
+        "make_pipeline(FrameWise(StandardScaler()), DenseSynchronizer()). If it alone shall tell "
+        "the moments, leave the others out, and warp them by Match.warp.",
+        UserWarning,
+        stacklevel=2,
+    )
+
+
+def _are_principal_components(trials):
+    """Whether features are uncorrelated, the largest first, as those of an aSpace are.
+
+    They have one unit, and the first has most of the variance by construction.
+    """
+    # From a pose near the mean, so that no digits are lost.
+    origin = trials[0].mean(axis=0, dtype=np.float64)
+    arrays, total, products, count = list(trials), 0, 0, 0
+    for rows in even_slices(len(arrays), BATCH):
+        frames = np.concatenate(arrays[rows]).astype(np.float64) - origin
+        total, products = total + frames.sum(axis=0), products + frames.T @ frames
+        count += len(frames)
+    covariance = products - np.outer(total, total) / count
+    variance = np.diag(covariance)
+    # Up to the rounding of single precision.
+    bound = 4 * EQUAL[np.dtype(np.float32)] * np.sqrt(np.outer(variance, variance))
+    off_diagonal = np.abs(covariance - np.diag(variance))
+    return bool((off_diagonal <= bound).all() and (np.diff(variance) <= 0).all())

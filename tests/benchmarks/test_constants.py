@@ -1,0 +1,154 @@
+"""What constants are worth: the table of constants, how they are switched, and what is printed."""
+
+import ast
+import inspect
+import re
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sklearn_motionsync import DenseSynchronizer
+
+PACKAGE = Path(__file__).resolve().parents[2] / "sklearn_motionsync"
+
+
+@pytest.fixture(scope="module")
+def constants(benchmark):
+    return benchmark("constants")
+
+
+@pytest.fixture(scope="module")
+def table(constants):
+    """The constants that stand in a module."""
+    return [one for one in constants.CONSTANTS if one.module != constants.PARAMETERS]
+
+
+def reads(node, name, runs=False):
+    """Yield, for each place that reads a name, whether it does so whenever a function runs."""
+    if isinstance(node, ast.Name) and node.id == name and isinstance(node.ctx, ast.Load):
+        yield runs
+    if isinstance(node, ast.FunctionDef):
+        once = any(re.search(r"\b(lru_)?cache\b", ast.unparse(d)) for d in node.decorator_list)
+        yield from reads(node.args, name, runs)
+        for statement in node.body:
+            yield from reads(statement, name, not once)
+        return
+    for child in ast.iter_child_nodes(node):
+        yield from reads(child, name, runs)
+
+
+def importers():
+    """{(module, name): modules that import the name from there}, by last parts of module names."""
+    importing = {}
+    for path in PACKAGE.rglob("*.py"):
+        importer = ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                for alias in node.names:
+                    key = node.module.split(".")[-1], alias.name
+                    importing.setdefault(key, set()).add(importer)
+    return importing
+
+
+def test_every_constant_exists_and_is_listed_once(constants):
+    assert len({str(one) for one in constants.CONSTANTS}) == len(constants.CONSTANTS)
+    for one in constants.CONSTANTS:
+        assert one.value is not None
+        for label, value in one.tried().items():
+            assert value != one.value, (str(one), label)
+            assert type(value) is type(one.value) or np.isscalar(value), (str(one), label)
+
+
+def test_constants_are_read_whenever_a_function_runs(table):
+    for one in table:
+        for module in one.modules:
+            read_late = list(reads(ast.parse(inspect.getsource(module)), one.name))
+            assert read_late, f"{module.__name__} does not read {one.name}"
+            assert all(read_late), f"{module.__name__} reads {one.name} only once"
+
+
+def test_modules_that_import_a_constant_are_named(table):
+    importing = importers()
+    for one in table:
+        key = one.module.split(".")[-1], one.name
+        assert importing.get(key, set()) == set(one.also), str(one)
+
+
+def test_constants_are_switched_and_come_back(constants):
+    for one in constants.CONSTANTS:
+        before = one.value
+        for value in one.tried().values():
+            with one.switched(value):
+                assert one.value == value
+            assert one.value == before
+
+
+def test_a_default_and_a_number_of_a_tuple_are_switched(constants):
+    one = constants.Constant(constants.PARAMETERS, "consensus", "")
+    with one.switched(3):
+        assert DenseSynchronizer().consensus == 3
+    assert DenseSynchronizer().consensus == 8
+    of_tuple = constants.Constant("matching.tile", "SMALL_BYTES", "", index=1)
+    (whole,) = [getattr(module, of_tuple.name) for module in of_tuple.modules]
+    with of_tuple.switched(0.5):
+        (now,) = [getattr(module, of_tuple.name) for module in of_tuple.modules]
+        assert now == (whole[0], 0.5, *whole[2:])
+
+
+def test_halves_and_doubles(constants):
+    assert constants.scaled(0.3, 0.5) == 0.15
+    assert [constants.scaled(n, 0.5) for n in (1, 7, 8)] == [1, 3, 4]
+    assert constants.scaled((0.25, 3), 2) == (0.5, 6)
+
+
+def test_a_switched_constant_changes_warps_and_leaves_nothing_behind(constants):
+    cells = {(0.05, 16): [constants.known_warps(0, 0.5, 2.0, 0.05, n_features=16)]}
+    one = constants.Constant(constants.PARAMETERS, "consensus", "", off=0)
+    of_columns = {"warps": partial(constants.missed_warps, cells)}
+    before = constants.judged(of_columns)
+    with one.switched(one.off):
+        switched = constants.judged(of_columns)
+    assert switched > 1.5 * before
+    assert constants.judged(of_columns) == before
+
+
+def test_constants_are_ranked_and_the_small_are_marked(constants, capsys):
+    chosen = [
+        one for one in constants.CONSTANTS if one.name in ("consensus", "smoothness", "max_rate")
+    ]
+    consensus, smoothness, max_rate = chosen
+    changes = {
+        consensus: {"half": np.array([0.0, 0.0])},
+        smoothness: {"half": np.array([0.6, -0.9]), "double": np.array([0.1, 0.0])},
+        max_rate: {"off": np.array([0.5, -30.0])},
+    }
+    constants.print_changes(changes, ["pairs", "warps"])
+    *rows, _, last = capsys.readouterr().out.splitlines()
+    assert [row.split("|")[-2].strip() for row in rows[-4:]] == [
+        "30.0",
+        "0.9, below 1",
+        "",
+        "no effect",
+    ]
+    assert rows[-4].startswith("| `parameters.max_rate` = 4 | largest rate of a path | off | 20 |")
+    assert last == (
+        "Worth less than 1 % in all columns: `parameters.smoothness`, `parameters.consensus`."
+    )
+
+
+def test_moments_of_unseen_actions_and_landmarks_are_read(constants, real_data):
+    unseen = constants.read_unseen(real_data / "events44" / "events44.npz")
+    assert len(unseen) == 23
+    assert sum(len(trials) for _, trials, _ in unseen) == 624
+    assert sum(len(moments) for *_, moments in unseen) == 46
+    for _, trials, moments in unseen:
+        assert len({x.shape[1] for x in trials}) == 1
+        for at in moments.values():
+            assert len(at) == len(trials)
+            assert np.nanmin(at) >= 0
+            assert np.nanmax(at) <= 99
+    for _, curves, landmarks in constants.read_landmarks(real_data / "nlreg1d"):
+        for at in landmarks.values():
+            assert np.isfinite(at).mean() > 0.9
+            assert len(at) == len(curves)

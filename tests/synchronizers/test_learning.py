@@ -1,0 +1,192 @@
+"""The six steps of a fit by hand, small sets, and what a fit that fails leaves."""
+
+import warnings
+
+import numpy as np
+import pytest
+from sklearn_motionsync import (
+    DenseSynchronizer,
+    KeyframeSynchronizer,
+    LinearSynchronizer,
+    PartSynchronizer,
+)
+from sklearn_motionsync.inputs.collections import Performances
+from sklearn_motionsync.synchronizers import learning
+from sklearn_motionsync.synchronizers.learning import (
+    choose_pattern,
+    finish_warps,
+    learn_metric,
+    let_exemplars_vote,
+    match_pairs,
+)
+from sklearn_motionsync.synchronizers.portions import warp_in_portions
+from sklearn_motionsync.synchronizers.training import TrainingSet, put_on_clock
+from sklearn_motionsync.utils.parallel import Progress
+
+
+def trials(n, style=0.3, n_features=2):
+    """One movement in several styles and at several paces."""
+    rng = np.random.default_rng(0)
+    X = []
+    for n_frames in rng.integers(40, 60, n):
+        t = np.linspace(0, 1, n_frames)[:, np.newaxis]
+        phase = t + rng.uniform(-0.1, 0.1) * np.sin(np.pi * t)
+        a, b = style * rng.standard_normal((2, n_features))
+        X.append(np.sin((4 + np.arange(n_features)) * phase + a) * (1 + b))
+    return X
+
+
+# -- the steps ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "params",
+    [
+        {},
+        {"style": 0.0},
+        {"pattern": 2, "consensus": 3},
+        {"metric": None, "consensus": 3},
+        {"cost": "posture", "max_rate": 2, "consensus": 0},
+    ],
+    ids=str,
+)
+def test_six_steps_by_hand_arrive_at_the_same_times(params):
+    """Copies of one source are refined, other trials sharpened, and those of the paper neither."""
+    params = dict(params)
+    X = trials(7, params.pop("style", 0.3))
+    sync = DenseSynchronizer(**params).fit(X)
+    settings = sync.get_params()
+    performances = Performances(X, "list", list(range(len(X))))
+    training = TrainingSet(performances, None, len(X))
+    names = "cost", "metric", "consensus", "smoothness", "max_offset", "max_rate"
+    with Progress(sync, 0) as progress:
+        clock = put_on_clock(training, None, None, "fewer frames")
+        step = learn_metric(clock, **{name: settings[name] for name in names})
+        jobs = {"random_state": 0, "n_jobs": None, "progress": progress}
+        pairs = match_pairs(clock, step, True, trials=performances, names=None, **jobs)
+        pattern = choose_pattern(training, sync.pattern, pairs)
+        vote = let_exemplars_vote(clock, training, pattern, pairs, sync.consensus)
+        final = finish_warps(clock, training, pattern, vote, "auto")
+        distances, times = warp_in_portions(
+            final.warper, X, n_jobs=None, begin=lambda fits: progress, name="warping"
+        )
+    assert pattern.index == sync.pattern_index_
+    np.testing.assert_array_equal(pattern.distances, sync.global_distances_)
+    np.testing.assert_array_equal(vote.exemplars, sync.exemplars_)
+    np.testing.assert_array_equal(final.unexplained, sync.unexplained_variance_)
+    assert final.refines == sync.refines_ == (params == {} and sync.unexplained_variance_ < 0.025)
+    match = sync.match(X)
+    np.testing.assert_array_equal(times, match.times)
+    back = pairs.matcher.features.back(distances)
+    np.testing.assert_array_equal(back, match.distances)
+
+
+def test_steps_change_nothing_that_they_are_given():
+    X = trials(6)
+    for x in X:
+        x.flags.writeable = False
+    training = TrainingSet(Performances(X, "list", list(range(6))), None, 6)
+    clock = put_on_clock(training, 50, None, "fewer frames")
+    clock.positions.flags.writeable = clock.examples.flags.writeable = False
+    before = clock.positions.copy()
+    settings = {"smoothness": 0.003, "max_offset": "auto", "max_rate": 4}
+    step = learn_metric(clock, cost="velocity", metric="learned", consensus=8, **settings)
+    with Progress(DenseSynchronizer(), 0) as progress:
+        jobs = {"random_state": 0, "n_jobs": None, "progress": progress}
+        pairs = match_pairs(clock, step, True, trials=training.trials, names=None, **jobs)
+    pattern = choose_pattern(training, "median", pairs)
+    vote = let_exemplars_vote(clock, training, pattern, pairs, 8)
+    first, again = (finish_warps(clock, training, pattern, vote, "auto") for _ in range(2))
+    assert first.unexplained == again.unexplained
+    assert vote.warper.finish is None
+    assert first.warper.finish is not None
+    np.testing.assert_array_equal(clock.positions, before)
+
+
+# -- small sets -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("n_features", [1, 2])
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_few_trials(n, n_features, dtype):
+    X = [x.astype(dtype) for x in trials(n, 0.0, n_features)]
+    sync = DenseSynchronizer().fit(X)
+    assert (sync.metric_ is None) == (n < 3)
+    assert sync.evidence_.weak is False
+    assert sync.global_distances_.shape == (n,)
+    assert sync.pattern_.dtype == dtype
+    assert len(sync.exemplars_) == n - 1
+    assert np.isnan(sync.unexplained_variance_) == (n == 1)
+    times = sync.match(X).times
+    np.testing.assert_array_equal(times[sync.pattern_index_], np.arange(sync.n_frames_))
+    assert (np.diff(times, axis=1) >= 0).all()
+    aligned = sync.transform(X)
+    assert aligned.dtype == dtype
+    before = LinearSynchronizer(pattern=sync.pattern_index_).fit_transform(X)
+    off, linear = (np.abs(x - sync.pattern_).mean() for x in (aligned, before))
+    assert off <= linear
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_constant_signals_count_for_nothing(dtype):
+    X = [x.astype(dtype) for x in trials(6)]
+    still = [np.concatenate([x, np.full((len(x), 2), [0.1, -3])], axis=1, dtype=dtype) for x in X]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sync, plain = DenseSynchronizer().fit(still), DenseSynchronizer().fit(X)
+    assert sync.pattern_index_ == plain.pattern_index_
+    np.testing.assert_array_equal(sync.metric_.share[2:], 0)
+    np.testing.assert_allclose(sync.match(still).times, plain.match(X).times, atol=0.1)
+    nothing = [x[:, 2:] for x in still]
+    sync = DenseSynchronizer().fit(nothing)
+    assert not sync.match(nothing).offsets.any()
+    assert not sync.refines_
+
+
+# -- a fit that fails -----------------------------------------------------------------------
+
+SYNCHRONIZERS = [
+    DenseSynchronizer(),
+    LinearSynchronizer(),
+    KeyframeSynchronizer(n_keyframes=2),
+    PartSynchronizer({"first": [0]}, synchronizer=DenseSynchronizer()),
+]
+
+
+@pytest.mark.parametrize("sync", SYNCHRONIZERS, ids=lambda sync: type(sync).__name__)
+def test_fit_that_fails_leaves_the_earlier_one_usable(sync):
+    X = trials(5)
+    expected = sync.fit(X).transform(X)
+    match = sync.match(X)
+    for wrong in ([X[0], X[1] * np.nan], [], [X[0], X[1][:, :1]]):
+        with pytest.raises(ValueError, match=r"(?i)performance"):
+            sync.fit(wrong)
+        np.testing.assert_array_equal(sync.transform(X), expected)
+        np.testing.assert_array_equal(sync.match(X).times, match.times)
+    name = "pattern" if "pattern" in sync.get_params() else "synchronizer__pattern"
+    with pytest.raises(ValueError, match="pattern=9 is out of range"):
+        sync.set_params(**{name: 9}).fit(X)
+    np.testing.assert_array_equal(sync.set_params(**{name: "median"}).transform(X), expected)
+    # Another fit takes the place of the first.
+    sync.fit([np.hstack([x, x]) for x in X])
+    assert sync.n_features_in_ == 4
+    with pytest.raises(ValueError, match="features"):
+        sync.transform(X)
+
+
+def test_fit_that_is_interrupted_leaves_the_earlier_one_usable(monkeypatch):
+    X = trials(5)
+    sync = DenseSynchronizer().fit(X)
+    expected, attributes = sync.transform(X), dict(vars(sync))
+
+    def interrupted(*arguments, **settings):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(learning, "sums_in_portions", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            sync.fit(X[:3])
+    np.testing.assert_array_equal(sync.transform(X), expected)
+    for name in ("pattern_", "metric_", "exemplars_", "global_distances_", "lengths_"):
+        assert getattr(sync, name) is attributes[name]
