@@ -309,10 +309,19 @@ def test_sizes_are_in_the_units_of_the_trials(late, capsys):
     assert set(found.clusters["unit"]) <= {"deg", "body weight", "%"}
     assert set(plain.clusters["unit"]) == {"", "%"}
     seconds = compare_groups(of_tables, tables, gait.group, **given, unit="seconds", frame_rate=100)
-    lasts = (np.median([len(x) for x in tables]) - 1) / 100
-    np.testing.assert_allclose(seconds.clusters["start"], found.clusters["start"] * lasts / 100)
-    timing = seconds.clusters["what"] == "timing"
-    assert set(seconds.clusters.loc[timing, "unit"]) == {"s"}
+    lasts = np.array([len(x) - 1 for x in tables]) / 100
+    # Curves have no unit of time: their stretches are the same, in seconds of the median trial.
+    starts = [x.clusters.loc[x.clusters["what"] == "shape", "start"] for x in (seconds, found)]
+    np.testing.assert_allclose(starts[0], starts[1] * np.median(lasts) / 100)
+    # A second is another share of each trial, so that a stretch of timing may have other ends.
+    (timing,) = seconds.clusters[seconds.clusters["what"] == "timing"].itertuples()
+    assert timing.unit == "s"
+    first, last = np.rint(np.array([timing.start, timing.end]) * (P - 1) / np.median(lasts))
+    scaler, sync = of_tables[0], of_tables[1]
+    frames = sync.match(scaler.transform(tables)).offsets[:, int(first) : int(last) + 1]
+    delays = pd.Series(frames.mean(axis=1) / (P - 1) * lasts)
+    of_people = delays.groupby([gait.group, gait.person]).mean().groupby(level=0).mean()
+    assert timing.size == pytest.approx(of_people["B"] - of_people["A"])
 
 
 def test_all_of_many_features_are_compared():
