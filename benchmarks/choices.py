@@ -22,7 +22,7 @@ import numpy as np
 from events import EVENTS, P
 from people import figures, geometric_means, read_people
 from sklearn_motionsync import DenseSynchronizer, LinearSynchronizer
-from sklearn_motionsync.matching import costs, matcher, metric
+from sklearn_motionsync.matching import consensus, costs, metric
 from sklearn_motionsync.synchronizers import learning
 
 CHOICES = {
@@ -54,15 +54,14 @@ def not_compressed(velocity, energy):
 
 # Not parameters: what is replaced, where, and by what.
 CONSTANTS = [
-    ("smoothing of velocities", "_SHARP", (learning,), [0.01, 0.03, 0.06, 0.1]),
-    ("smoothing of offsets", "WARP_SMOOTHING", (learning,), [0.0, 0.03, 0.05]),
+    ("smoothing of velocities and offsets", "FINE_SMOOTHING", (learning,), [0.0, 0.01, 0.03, 0.05]),
     ("weight w of the rate", "RATE_WEIGHT", (costs, metric), [0.0, 0.1, 0.3, 1.0]),
     ("power of the metric's eigenvalues", "_SHRINKAGE", (metric,), [0.3, 1.0]),
     ("standard errors to believe a feature", "_RELIABLE", (metric,), [-np.inf, 3.0]),
     ("speeds of the metric", "compressed", (metric,), [not_compressed]),
     ("largest offset while learning", "_LEARNING_OFFSET", (learning,), [0.12, 0.25]),
     ("performances the metric is learnt from", "MOST_LEARNT", (learning,), [12, 16]),
-    ("exemplars", "choose_exemplars", (learning, matcher), [most_typical, at_random]),
+    ("exemplars", "choose_exemplars", (learning, consensus), [most_typical, at_random]),
 ]
 
 

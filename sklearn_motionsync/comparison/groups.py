@@ -11,7 +11,7 @@ from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
 from ..inputs.types import Features, Labels, PerformancesLike, RandomState, Unit, ValuesLike
-from ..matching.counting import first_largest
+from ..matching.counting import first_largest, runs_of
 from ..synchronizers.match import UNITS
 from ..utils.parallel import Progress
 from .curves import AlignedCurves
@@ -315,8 +315,7 @@ def _clusters(what, family, values, names, units, study, least, level):
     # The share of permutations in which shape or timing has a p as small.
     p = share_at_most(least, family.shares(np.abs(family.found)))
     for k, feature in enumerate(names):
-        edges = np.flatnonzero(np.diff(p[:, k] <= level, prepend=False, append=False))
-        for first, end in edges.reshape(-1, 2).tolist():
+        for first, end in runs_of(p[:, k] <= level).tolist():
             stretch = slice(first, end)
             peak = first + first_largest(np.abs(family.found[stretch, k]))
             size = study.size(values[:, stretch, k].mean(axis=1), what)

@@ -117,12 +117,12 @@ def _heading_pair(skeleton):
 
 
 def _fill_gaps(track, what):
-    """A track (n_frames, n_dims) with its gaps interpolated."""
+    """A track (n_frames, n_dims) with straight lines across its gaps."""
     if np.isnan(track).any(axis=1).all():
         raise ValueError(
             f"No frame shows the {what}, so the place and the heading of the body are unknown."
         )
-    return interpolate_gaps(track, held=True)
+    return interpolate_gaps(track, held=True, straight=True)
 
 
 def project(x, skeleton, azimuth):

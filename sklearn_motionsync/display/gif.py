@@ -121,9 +121,9 @@ def _palette(pictures):
     drawn = np.concatenate([picture[picture != ground] for picture in sampled])
     colors, counts = np.unique(drawn, return_counts=True)
     order = np.argsort(-counts, kind="stable")
-    is_exact = order[: _N_COLORS - 1 if len(colors) < _N_COLORS else _N_EXACT - 1]
-    exact = _as_rgb(np.concatenate([[ground], colors[is_exact]]))
-    mixed = np.delete(np.arange(len(colors)), is_exact)
+    exact_colors = order[: _N_COLORS - 1 if len(colors) < _N_COLORS else _N_EXACT - 1]
+    exact = _as_rgb(np.concatenate([[ground], colors[exact_colors]]))
+    mixed = np.delete(np.arange(len(colors)), exact_colors)
     if len(mixed) == 0:
         return exact
     # By their roots frequent colours count more, and rare ones still count.

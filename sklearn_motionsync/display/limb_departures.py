@@ -215,5 +215,5 @@ def split_at_synchronizer(estimator):
 def _departs_outside_aspace(view, i, columns):
     """Whether limbs depart beyond what is rare, but not in the aSpace of the model."""
     in_aspace = (view.synchronised[i] - view.model.mean_) / view.predicted
-    largest, in_aspace = (np.abs(z[:, columns]).max() for z in (view.scores[i], in_aspace))
-    return largest > view.model.simultaneous_factor() >= in_aspace
+    largest, largest_in_aspace = (np.abs(z[:, columns]).max() for z in (view.scores[i], in_aspace))
+    return largest > view.model.simultaneous_factor() >= largest_in_aspace

@@ -156,8 +156,8 @@ class NormDisplay:
         i, signals = subjects.index(subject), comparison.features[:-1]
         if features is None:
             table = comparison.departures
-            is_shown = (table["subject"] == subject) & (table["what"] == "shape")
-            departing = map(signals.index, table[is_shown]["feature"])
+            is_departure = (table["subject"] == subject) & (table["what"] == "shape")
+            departing = map(signals.index, table[is_departure]["feature"])
             order = list(dict.fromkeys([*departing, *range(len(signals))]))
             chosen = sorted(order[: len(choose_features(None, signals))])
         else:

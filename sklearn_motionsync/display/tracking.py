@@ -20,6 +20,7 @@ from ..inputs.types import (
     ValuesLike,
 )
 from ..inputs.wording import counted
+from ..matching.counting import runs_of
 from ..online.members import Track
 from ..online.tracker import MotionTracker
 from .arguments import (
@@ -437,10 +438,9 @@ class TrackingDisplay:
 
     def _spans(self, mask):
         """The times of frames, up to the middle between frames, as (start, stop)."""
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
         middles = (self.times[1:] + self.times[:-1]) / 2
         bounds = np.concatenate([self.times[:1], middles, self.times[-1:]])
-        return bounds[edges.reshape(-1, 2)]
+        return bounds[runs_of(mask)]
 
     def _bodies(self, cosines):
         """The skeleton, the estimated bodies, and the true ones or None."""

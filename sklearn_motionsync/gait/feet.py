@@ -10,7 +10,7 @@ from ..body.formats import SIDES
 from ..body.landmarks import as_tuple, guess_feet
 from ..inputs.numbers import nanmean
 from ..inputs.wording import counted
-from ..matching.counting import whole
+from ..matching.counting import runs_of, whole
 from ..matching.filters import smooth
 from ..matching.gaps import interpolate_gaps
 
@@ -102,7 +102,8 @@ class Walk:
         self._points = to_y_up(
             positions.astype(np.float64).reshape(len(positions), -1, skeleton.n_dims), skeleton
         )
-        if len(positions) < max(_FEWEST, whole(_SHORTEST_PIECE * frame_rate, "up")):
+        self._fewest = max(_FEWEST, whole(_SHORTEST_PIECE * frame_rate, "up"))
+        if len(positions) < self._fewest:
             raise ValueError(
                 f"{called} has {counted(len(positions), 'frame')} at {frame_rate:g} a second; "
                 f"{_SHORTEST_PIECE:g} s and {_FEWEST} frames are the least. Leave it out."
@@ -181,10 +182,9 @@ class Walk:
         longest = whole(_LONGEST_GAP * self._frame_rate, "down")
         x = interpolate_gaps(self._mean(joints), longest)
         frames = np.arange(len(x))
-        fewest = max(_FEWEST, whole(_SHORTEST_PIECE * self._frame_rate, "up"))
         out = np.full((self.n_samples, x.shape[1]), np.nan)
         for piece in pieces(x):
-            if piece.stop - piece.start < fewest:
+            if piece.stop - piece.start < self._fewest:
                 continue
             samples = np.arange(piece.start * self.per_frame, (piece.stop - 1) * self.per_frame + 1)
             spline = CubicSpline(frames[piece], x[piece])
@@ -223,7 +223,7 @@ class Walk:
         return 1.0 if total >= 0 else -1.0
 
     def _unit(self, directions):
-        filled = interpolate_gaps(directions, held=True)
+        filled = interpolate_gaps(directions, held=True, straight=True)
         filled = smooth(filled[np.newaxis], _HEADING * self.rate)[0]
         size = np.linalg.norm(filled, axis=1, keepdims=True)
         return filled / np.where(size > 0, size, 1)
@@ -242,9 +242,7 @@ def _pelvis(skeleton, called):
 
 def pieces(x):
     """Slices of rows (n, n_columns) without NaN."""
-    known = ~np.isnan(x).any(axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8)))
-    return [slice(*edge) for edge in edges.reshape(-1, 2)]
+    return [slice(first, end) for first, end in runs_of(~np.isnan(x).any(axis=1)).tolist()]
 
 
 def horizontal(points):

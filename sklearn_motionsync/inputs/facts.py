@@ -120,7 +120,7 @@ def compare_facts(facts, called, which=None, reference=None, sources=None):
     for fact in (_WORDS if which is None else which) if any(facts) else ():
         values, source = list(compared.get(fact, ())), (sources or {}).get(fact)
         different = {}
-        for i, value in enumerate([performance.get(fact) for performance in facts]):
+        for i, value in enumerate([each.get(fact) for each in facts]):
             if value is None or any(_equal(value, other) for other in values):
                 continue
             if values:

@@ -2,12 +2,12 @@
 
 Sums and products differ in their last bits from processor to processor. A length of 104.5 frames
 may come out a little longer or shorter there, and of two equal values either one may be the larger.
-Whatever is counted or chosen is decided here, with a tolerance.
+So what is counted or chosen is decided here, with a tolerance.
 """
 
 import numpy as np
 
-__all__ = ["ROUNDING", "first_largest", "first_smallest", "whole"]
+__all__ = ["ROUNDING", "first_largest", "first_smallest", "runs_of", "whole"]
 
 # Values that differ by a smaller share are equal.
 ROUNDING = 1e-9
@@ -66,3 +66,13 @@ def first_smallest(values, rounding=None, axis=None):
 def first_largest(values, rounding=None, axis=None):
     """The first index whose value is within rounding of the largest, as `first_smallest`."""
     return first_smallest(np.negative(values), rounding, axis)
+
+
+def runs_of(mask):
+    """The runs of True in a mask (n,): the first index of each, and the one after its last.
+
+    Returns
+    -------
+    ndarray of int, shape (n_runs, 2)
+    """
+    return np.flatnonzero(np.diff(mask, prepend=False, append=False)).reshape(-1, 2)

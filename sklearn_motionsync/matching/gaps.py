@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 from scipy.linalg import solveh_banded
 
+from .counting import runs_of
 from .filters import SMOOTHING
 from .sizes import BATCH, CONSTANT
 
@@ -189,8 +190,7 @@ class Filler(NamedTuple):
         # Constant features have no unit, and predict nothing.
         noise = np.where(varies, SHRINKAGE, 1)
         precision = np.linalg.inv(covariance / np.outer(scale, scale) + np.diag(noise))
-        # Of many performances a few tell, evenly spread.
-        # So many tell how fast postures change.
+        # A few of many performances, evenly spread, tell how fast postures change.
         arrays = arrays[:: -(-len(arrays) // BATCH) or 1]
         standard = [(x - mean) / scale for x in arrays]
         velocities = [np.diff(z, axis=0) for z in standard]
@@ -216,8 +216,8 @@ class Filler(NamedTuple):
         hidden = np.isnan(array)
         unknown = np.where(hidden, 0, 1 - confidence)
         bands = _time_precision(len(array), *self.times)
-        for (first, last), columns in _gaps_of(hidden).items():
-            unknown[first : last + 1, columns] = _unknown_step(bands, first, last)
+        for (first, end), columns in _gaps_of(hidden).items():
+            unknown[first:end, columns] = _unknown_step(bands, first, end)
         for mask in np.unique(hidden[hidden.any(axis=1)], axis=0):
             rows = (hidden == mask).all(axis=1)
             left = np.linalg.inv(self.precision[np.ix_(mask, mask)]).diagonal() - SHRINKAGE
@@ -255,8 +255,8 @@ class Filler(NamedTuple):
         pulls = -pulls @ self.precision
         # Beyond so many frames that show all features nothing of a gap matters.
         near = np.convolve(hidden.any(axis=1), np.ones(len(bands) - 1))[: len(z)] > 0
-        for first, last in zip(*_runs(near), strict=True):
-            rows = slice(first, last + 1)
+        for first, end in runs_of(near).tolist():
+            rows = slice(first, end)
             z[rows][hidden[rows]] = _solve(
                 pulls[rows], hidden[rows], self.precision, bands[:, rows]
             )
@@ -289,18 +289,12 @@ def _along(times, values, at, straight):
     return Akima1DInterpolator(times, values)(at)
 
 
-def _runs(mask):
-    """First and last index of every run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
-    return edges[::2], edges[1::2] - 1
-
-
 def _gaps_of(hidden):
-    """The features of every gap, by its first and last frame."""
+    """The features of every gap, by its first frame and the one after its last."""
     gaps = {}
     for column in np.flatnonzero(hidden.any(axis=0)).tolist():
-        for gap in zip(*(x.tolist() for x in _runs(hidden[:, column])), strict=True):
-            gaps.setdefault(gap, []).append(column)
+        for first, end in runs_of(hidden[:, column]).tolist():
+            gaps.setdefault((first, end), []).append(column)
     return gaps
 
 
@@ -348,17 +342,17 @@ def _time_precision(n_frames, value_time, velocity_time):
     return bands
 
 
-def _unknown_step(bands, first, last):
+def _unknown_step(bands, first, end):
     """The share that is unknown of the variance of a step in the middle of a gap.
 
     It is as long as the trellis smooths velocities.
     """
     n_frames = bands.shape[1]
-    middle, reach = (first + last + 1) // 2, max(1, round(SMOOTHING * n_frames))
+    middle, reach = (first + end) // 2, max(1, round(SMOOTHING * n_frames))
     step = np.zeros(n_frames)
     step[[max(0, middle - reach), min(n_frames - 1, middle + reach)]] = -1, 1
     variances = []
-    for rows in (slice(first, last + 1), slice(None)):
+    for rows in (slice(first, end), slice(None)):
         part = bands[: len(step[rows]), rows]
         variances.append(step[rows] @ solveh_banded(part, step[rows], lower=True))
     return variances[0] / variances[1]

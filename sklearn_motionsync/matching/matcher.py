@@ -314,8 +314,8 @@ class LearntMetric(NamedTuple):
 def learn_features(features, positions, settings, n_exemplars, warp_smoothing):
     """Features with the metric of a training set.
 
-    At most 100 frames of each trial are used, which lose nothing under the
-    smoothing of velocities, a share of the clip; they are matched by as many as suffice.
+    At most 100 frames of each trial are used, which lose nothing under the smoothing of velocities,
+    a share of the clip; they are matched by as many as suffice.
 
     Parameters
     ----------

@@ -1,9 +1,8 @@
 """Metric: velocity and posture, weighted by how well they tell a moment of the action.
 
 Without a metric noisy directions of the features count as much as reliable ones.
-`metric_of_matches`
-estimates their reliability from the training set, `Metric` applies it. The distance of two
-moments stays that of two points, so the trellis is the same.
+`metric_of_matches` estimates their reliability from the training set, `Metric` applies it. The
+distance of two moments stays that of two points, so the trellis is the same.
 """
 
 from typing import NamedTuple

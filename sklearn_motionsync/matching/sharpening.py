@@ -110,14 +110,14 @@ class Sharpener(NamedTuple):
         weights = np.maximum(evidence, 0)
         if not weights.any():
             return None
-        slopes = np.gradient(np.concatenate([base[np.newaxis], moving]) * weights, axis=1)
+        compared = np.concatenate([base[np.newaxis], moving]) * weights
+        slopes = np.gradient(compared, axis=1)
         # Squared slopes without noise: those of the mean, less the share that differences explain.
         clear = np.square(slopes.mean(axis=0)) - slopes.var(axis=0, ddof=1) / len(slopes)
         noise = (np.square(weights) * disagreement).sum() or ridge
         precision = np.maximum(clear.sum(axis=1), 0) / noise * (n_frames / 100) ** 2
         trust = float(agreement.mean()) ** _TRUST
         gain = trust / (_smooth_along(precision) + _HALF)
-        compared = np.concatenate([base[np.newaxis], moving]) * weights
         axes = weights[:, np.newaxis] * _principal_axes(compared)
         pace = np.arange(n_frames, dtype=np.float64)[np.newaxis]
         base = _at_pace((base @ axes)[np.newaxis], pace, _grid(n_frames, 1))
@@ -207,7 +207,7 @@ def _at_pace(roots, times, at):
     out = np.empty((len(roots), len(at), roots.shape[2]))
     for curve, warp, warped in zip(roots, times, out, strict=True):
         tau = np.interp(at, frames, warp)
-        # Central differences, curve-sided at the ends.
+        # Central differences, one-sided at the ends.
         edges = np.concatenate([tau[:1], tau, tau[-1:]])
         rates = (edges[2:] - edges[:-2]) / (2 * step)
         rates[[0, -1]] *= 2

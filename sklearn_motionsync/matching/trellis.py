@@ -222,7 +222,7 @@ class Trellis:
         -------
         ndarray, shape (n_moving,)
         """
-        whole, all_columns = base, moving
+        with_weights, all_columns = base, moving
         base, moving = base[..., self.plain], moving[..., self.plain]
         out = np.empty(len(moving), dtype=moving.dtype)
         n_positions, n_features = moving.shape[1:]
@@ -241,7 +241,7 @@ class Trellis:
             if self.unseen is not None:
                 met = all_columns[rows].reshape(-1, all_columns.shape[2]).take(q, axis=0)
                 squares = np.vecdot(differences, differences)
-                costs = self.weighed(squares, whole, met, unseen).sum(axis=1)
+                costs = self.weighed(squares, with_weights, met, unseen).sum(axis=1)
                 out[rows] = costs + penalties
                 continue
             differences = differences.reshape(len(q), -1)

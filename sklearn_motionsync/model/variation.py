@@ -69,7 +69,7 @@ def predictive_variance(performances, groups, shrinkage=_SHRINKAGE):
     return np.maximum(_shrink(squares, n, shrinkage) * (1 + 1 / n), _floor(performances))
 
 
-def within_variance(performances, groups, shrinkage=_SHRINKAGE):
+def within_variance(performances, groups):
     """Variance of a person's postures about the mean of this person, pooled over the people.
 
     ``w = (d s^2 + k mean(s^2)) / (d + k)``, where ``s^2`` is the sum of the squared deviations from
@@ -84,8 +84,6 @@ def within_variance(performances, groups, shrinkage=_SHRINKAGE):
     groups : ndarray of int, shape (n,)
         In a feature that no group shows twice, the variance is 0.32 times `predictive_variance`:
         the geometric mean over eleven actions of HDM05 and UI-PRMD, where it is 0.09 to 0.76.
-    shrinkage : float, default=5
-        ``k``: the mean over the frames weighs as much as so many degrees of freedom.
 
     Returns
     -------
@@ -100,11 +98,11 @@ def within_variance(performances, groups, shrinkage=_SHRINKAGE):
     squares = np.nansum(np.square(performances - means[codes]), axis=0)
     squares = np.where(freedom > 0, squares / np.maximum(freedom, 1), np.nan)
     # The shrinkage counts performances, one more than degrees of freedom.
-    variance = np.maximum(_shrink(squares, freedom + 1, shrinkage), _floor(performances))
+    variance = np.maximum(_shrink(squares, freedom + 1, _SHRINKAGE), _floor(performances))
     unknown = ~freedom.any(axis=0)
     if unknown.any():
         some = performances[..., unknown]
-        variance[:, unknown] = _WITHIN_SHARE * predictive_variance(some, codes, shrinkage)
+        variance[:, unknown] = _WITHIN_SHARE * predictive_variance(some, codes)
     return variance
 
 

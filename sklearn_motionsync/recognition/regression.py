@@ -9,6 +9,8 @@ from scipy.special import log_softmax
 from sklearn.linear_model import LogisticRegression
 from sklearn.model_selection import GroupKFold
 
+from ..matching.counting import first_largest
+
 __all__ = [
     "Fitted",
     "KernelRegression",
@@ -182,7 +184,7 @@ def fold_gain(regression, kernel, codes, folds, decisions):
         0 with two folds, or if no fit without two of them knows two classes.
     """
     numbers = np.unique(folds)
-    right = decisions.argmax(axis=1) == codes
+    right = first_largest(decisions, axis=1) == codes
     losses = []
     for pair in zip(numbers, np.roll(numbers, -1), strict=True) if len(numbers) > 2 else ():
         out = np.isin(folds, pair)

@@ -175,8 +175,8 @@ def _texts(column, by_row):
 
 def number(value, largest=None):
     """A number as text; of this one, or of the largest of several, three digits are shown."""
-    if np.isnan(value):
-        return ""
+    if not np.isfinite(value):
+        return "" if np.isnan(value) else str(value)
     size = abs(value if largest is None else largest)
     digits = min(max(2 - whole(np.log10(size), "down"), 0), 6) if size > 0 else 0
     # The sum makes 0 of -0.

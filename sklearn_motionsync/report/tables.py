@@ -150,8 +150,8 @@ class TrialSet(NamedTuple):
             np.sqrt(x.var(axis=0).mean(axis=0)) for x in (self.aligned.even, self.aligned.curves)
         )
         table = {"signal": self.headings, "time-normalised": even, "aligned": curves}
-        shares = 100 * np.divide(curves, even, out=np.full_like(even, np.nan), where=even > 0)
-        return pd.DataFrame(table | {"left (%)": shares})
+        percents = 100 * np.divide(curves, even, out=np.full_like(even, np.nan), where=even > 0)
+        return pd.DataFrame(table | {"left (%)": percents})
 
     @property
     def step(self):

@@ -27,6 +27,7 @@ from ..inputs.validation import (
     restore,
 )
 from ..matching.filters import SMOOTHING
+from ..matching.gaps import is_gappy
 from ..matching.matcher import Features
 from ..matching.median import Median, linear_median
 from ..matching.warps import normalise
@@ -280,7 +281,7 @@ class Synchronizer(
         else:
             n_trials, portions = source
             performances, out = self._warp_parts(n_trials, portions)
-        if fill == "model" and np.isnan(out.sum()):
+        if fill == "model" and is_gappy(out):
             fill_warped(out, self._warp_part(self._checked_examples()))
         if performances.kind == "rows":
             return out[:, :, 0]

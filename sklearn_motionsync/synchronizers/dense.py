@@ -182,9 +182,10 @@ class DenseSynchronizer(AnchoredSynchronizer):
         have them. None if none were given.
     unexplained_variance_ : float
         The variance that is left after matching, less what white noise explains, as a share of the
-        template's: the median over 20 trials, evenly spaced. Copies of one source have at most
-        0.02, at any noise; people and their forces 0.03 and more. NaN unless ``refine="auto"``
-        asks for it, and without trials that have no gaps.
+        template's: the median over at most 20 trials, evenly spaced. Copies of one source have at
+        most 0.022 at any noise, whole movements of people 0.03 and more. Single signals of people
+        may have less, and are then refined by mistake: set ``refine=False``. NaN unless
+        ``refine="auto"`` asks for it, and without trials that have no gaps.
     refines_ : bool
         Whether warps are refined.
     sharpening_ : Bunch or None
@@ -237,8 +238,9 @@ class DenseSynchronizer(AnchoredSynchronizer):
        matched to a trial directly, and by way of each exemplar. The median of these paths outvotes
        a path that went astray. Its time shifts are smoothed by a Gaussian of 2 % of the trial.
     6. ``learning.finish_warps``: trials are matched once more, near their warps and by velocities
-       as sharp as their noise allows (see ``sharpening_``). If refining helps, Gauss-Newton steps
-       on the poses take the place of that. Without a metric a warp stays as it is.
+       as sharp as their noise allows (see ``sharpening_``). For trials of one source (see
+       ``refine``), Gauss-Newton steps on the poses take the place of that. Without a metric, warps
+       that are not refined stay as they are.
 
     ``match`` and ``transform`` take new trials through the steps 1, 3, 5 and 6.
 
@@ -411,8 +413,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
         }
 
     def _match(self, performances, keyframes=None, frame_rate=None, confidence=None):
-        if confidence is not None:
-            performances = with_confidence(performances, confidence)
+        performances = with_confidence(performances, confidence)
         arrays, shares = self._for_warper(performances, keyframes, frame_rate)
         distances, times = self._distances_and_times(arrays, shares)
         distances = self._warper.matcher.features.back(distances)
@@ -465,8 +466,7 @@ class DenseSynchronizer(AnchoredSynchronizer):
         return self
 
     def _warp_part(self, performances, keyframes=None, frame_rate=None, confidence=None):
-        if confidence is not None:
-            performances = with_confidence(performances, confidence)
+        performances = with_confidence(performances, confidence)
         arrays, shares = self._for_warper(performances, keyframes, frame_rate)
         times = np.maximum.accumulate(self._distances_and_times(arrays, shares)[1], axis=1)
         return sample(performances, times, self.n_frames_)

@@ -4,10 +4,7 @@ import numpy as np
 
 from ..inputs.numbers import as_numbers
 from ..inputs.wording import counted
-from ..matching.gaps import Filler
-
-# What is less sure is as not seen.
-_SURE = 0.5
+from ..matching.gaps import Filler, is_gappy
 
 __all__ = [
     "check_fill",
@@ -16,13 +13,16 @@ __all__ = [
     "hold_gaps",
     "known_whole",
     "learn_filler",
+    "with_confidence",
 ]
+
+# What is less sure is as not seen.
+_SURE = 0.5
 
 
 def hold_gaps(performances):
     """Whether anything of performances is NaN, or not sure; they hold no infinity."""
-    sums = [x.sum() for x in performances]
-    return performances.confidence is not None or bool(np.isnan(sums).any())
+    return performances.confidence is not None or any(map(is_gappy, performances))
 
 
 def with_confidence(performances, confidence):
@@ -116,7 +116,7 @@ def fill_performances(filler, performances):
         _refuse_padding(performances)
     for i, x in enumerate(performances):
         sure = 1.0 if performances.confidence is None else performances.confidence[i]
-        if not np.isnan(x.sum()) and np.all(sure == 1):
+        if not is_gappy(x) and np.all(sure == 1):
             filled.append((x, np.ones(len(x))))
             continue
         if np.isnan(x).all():
@@ -172,5 +172,5 @@ def fill_warped(warped, examples):
     mean = examples.mean(axis=0)
     filler = Filler.learn(list(examples - mean))
     for x in warped:
-        if np.isnan(x.sum()):
+        if is_gappy(x):
             np.copyto(x, filler(x - mean)[0] + mean, where=np.isnan(x))

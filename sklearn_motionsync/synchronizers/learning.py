@@ -27,6 +27,7 @@ from ..matching.refinement import SAME_SOURCE, Refiner, unexplained_variance
 from ..matching.sharpening import Sharpener
 from ..matching.warps import sample
 from .evidence import weigh_evidence
+from .gaps import known_whole
 from .portions import refuse_long_paths, sums_in_portions
 from .training import pattern_of, warn_of_one_feature
 
@@ -149,27 +150,28 @@ def match_pairs(clock, step, wanted, *, trials, names, random_state, n_jobs, pro
     """
     features, settings, positions = step.features, step.settings, clock.positions
     references = draw_references(len(positions), check_random_state(random_state))
-    searched = features.for_search(clock.n_frames)
-    compared = searched(positions[references])
-    shares = _energy_shares(searched, compared) if step.metric is None else step.metric.energy
-    warn_of_one_feature(shares, trials, names)
-    matcher = Matcher.of(searched, compared, settings)
-    median = None
-    if wanted:
+
+    def search(searched):
+        compared = searched(positions[references])
+        return searched, compared, Matcher.of(searched, compared, settings)
+
+    def sums_and_rounding(searched, compared, matcher):
         sums = sums_in_portions(
             matcher, positions, references, compared, n_jobs=n_jobs, progress=progress
         )
-        rounding = rounding_bound(compared.dtype, features_energy(searched, compared))
+        return sums, rounding_bound(compared.dtype, features_energy(searched, compared))
+
+    searched, compared, matcher = search(features.for_search(clock.n_frames))
+    shares = _energy_shares(searched, compared) if step.metric is None else step.metric.energy
+    warn_of_one_feature(shares, trials, names)
+    median = None
+    if wanted:
+        sums, rounding = sums_and_rounding(searched, compared, matcher)
         is_rounded = searched.single and positions.dtype != compared.dtype
         if is_rounded and rounding > _LARGEST_ROUNDING * sums.min():
             # Nearly equal trials: single precision does not tell them apart.
-            searched = searched.replace(single=False)
-            compared = searched(positions[references])
-            matcher = Matcher.of(searched, compared, settings)
-            sums = sums_in_portions(
-                matcher, positions, references, compared, n_jobs=n_jobs, progress=progress
-            )
-            rounding = rounding_bound(compared.dtype, features_energy(searched, compared))
+            searched, compared, matcher = search(searched.replace(single=False))
+            sums, rounding = sums_and_rounding(searched, compared, matcher)
         median = median_of_sums(sums, references, rounding)
     if searched is not features:
         matcher = matcher.on_clock(features, clock.n_frames, settings)
@@ -361,14 +363,7 @@ def _unexplained(clock, training, pattern, vote):
 
     NaN if there are none but the pattern, or no vote.
     """
-    weights = training.trials.weights
-    whole = np.array(
-        [
-            k
-            for k in range(len(training.trials))
-            if k != pattern.index and (weights is None or weights[k].min() == 1)
-        ]
-    )
+    whole = known_whole(training.trials, pattern.index)
     if not len(whole) or vote.warper.smoothing is None:
         return np.nan
     evenly = np.linspace(0, len(whole) - 1, min(len(whole), MOST_LEARNT))

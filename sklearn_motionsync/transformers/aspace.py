@@ -23,7 +23,7 @@ from ..inputs.validation import (
 )
 from ..inputs.wording import counted
 from ..matching.counting import ROUNDING
-from ..matching.gaps import Filler, moments_of_seen
+from ..matching.gaps import Filler, is_gappy, moments_of_seen
 from ..utils.doc_links import DocumentedMixin
 from ..utils.parallel import LongWorkMixin
 from ..utils.parameters import validated
@@ -106,7 +106,7 @@ class ASpace(
     Rows of a 2-D array are poses without order, each expected by itself. A pose of which nothing
     was seen becomes NaN.
 
-    Without any gap nothing of this is computed, but for ``correlation_time_``.
+    Without any gap ``transform`` computes nothing of this.
 
     An elbow is hidden for a while:
 
@@ -166,7 +166,7 @@ class ASpace(
         """
         arrays = check_performances(self, X, reset=True, level="posture", finite="allow-nan")
         postures = np.concatenate(arrays)
-        has_gaps = bool(np.isnan(postures.sum()))
+        has_gaps = is_gappy(postures)
         if len(postures) < 2:
             raise ValueError("ASpace needs at least 2 postures, got n_samples=1.")
         missing = np.zeros(postures.shape[1])
@@ -217,7 +217,7 @@ class ASpace(
         components, timed = self.components_.T, performances.kind != "rows"
         arrays = []
         for a in performances:
-            whole = self._filled(a, timed) if np.isnan(a.sum()) else a
+            whole = self._filled(a, timed) if is_gappy(a) else a
             arrays.append(((whole - self.mean_) @ components).astype(a.dtype, copy=False))
         return restore(self, performances, arrays)
 

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from sklearn_motionsync import DenseSynchronizer, Skeleton, gait_events
 from sklearn_motionsync.datasets import make_walk
+from sklearn_motionsync.gait.feet import Walk, joints_of_feet
 from sklearn_motionsync.io import cut_at_events, keyframes_from_events
 
 LABELS = ("Foot Strike", "Foot Off")
@@ -178,6 +179,18 @@ def test_gaps(walk, ruler):
     assert all(np.abs(left - at).min() < 3 for at in outside)
     right = [table[table["context"] == "Right"]["frame"].to_numpy() for table in (found, whole)]
     np.testing.assert_allclose(*right, atol=3)
+
+
+def test_heading_across_a_gap_of_the_hips(walk):
+    """Straight lines lead across it; curves that swing out would turn the body."""
+    x = walk.data[0].reshape(len(walk.data[0]), -1, 3).copy()
+    feet = joints_of_feet(walk.skeleton)
+    whole = Walk(x, walk.skeleton, feet, 100, "walk").forward
+    for side in ("left", "right"):
+        x[100:200, walk.skeleton.indices_of(f"{side}_hip")] = np.nan
+    hidden = Walk(x, walk.skeleton, feet, 100, "walk").forward
+    turned = np.degrees(np.arccos(np.clip((whole * hidden).sum(axis=1), -1, 1)))
+    assert turned.max() < 1
 
 
 def test_names_of_markers():

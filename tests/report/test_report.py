@@ -28,7 +28,7 @@ from sklearn_motionsync import (
 )
 from sklearn_motionsync.comparison.curves import AlignedCurves
 from sklearn_motionsync.datasets import make_bending, make_gait
-from sklearn_motionsync.report import player, tables
+from sklearn_motionsync.report import page, player, tables
 
 GAIT = make_gait(8, 2, timing=8, random_state=0)
 TRIALS = [pd.DataFrame(x, columns=GAIT.feature_names) for x in GAIT.data]
@@ -256,6 +256,14 @@ def test_a_player_without_bones_and_with_gaps(tmp_path):
 def aligned_of(sync, X):
     given = {"signals": None, "features": None, "unit": "percent", "frame_rate": None}
     return AlignedCurves.of(sync, X, {}, "write_report", **given)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(np.inf, "inf"), (-np.inf, "-inf"), (np.nan, ""), (-0.0, "0"), (2.5, "2.50")],
+)
+def test_numbers_of_the_page(value, text):
+    assert page.number(value) == text
 
 
 def test_sizes_are_limited_and_the_page_names_it(tmp_path, monkeypatch):
