@@ -255,8 +255,10 @@ def typical_energy(curves, independent=np.inf):
     tr(C^2)`` of their covariance C. The bias of ``tr(C^2)`` from few independent frames is
     removed.
     """
-    energy = np.square(curves).sum(axis=(1, 2))
-    together = np.square(np.matmul(curves.swapaxes(1, 2), curves)).sum(axis=(1, 2))
+    energy, turned = np.square(curves).sum(axis=(1, 2)), curves.swapaxes(1, 2)
+    # Of more features than frames: the squares of both products have one sum.
+    products = turned @ curves if curves.shape[2] < curves.shape[1] else curves @ turned
+    together = np.square(products).sum(axis=(1, 2))
     typical = together / np.where(energy > 0, energy, 1)
     unbiased = (typical - energy / independent) / (1 + 1 / independent)
     return np.maximum(unbiased, typical / 4)
@@ -271,7 +273,7 @@ def _fit_gain(base, matched):
     x, y = base - middle, matched - matched.mean(axis=1, keepdims=True)
     energy = np.square(y).sum(axis=1, keepdims=True)
     # Constant features and constant postures fit with any gain: it is 1.
-    ridge = EQUAL[y.dtype] * typical_energy(y)[:, np.newaxis, np.newaxis]
+    ridge = EQUAL[y.dtype] * energy.max(axis=2, keepdims=True)
     ridge[ridge == 0] = 1
     gain = ((x * y).sum(axis=1, keepdims=True) + ridge) / (energy + ridge)
     return gain * y + middle, gain
