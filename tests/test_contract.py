@@ -51,8 +51,11 @@ from shift_synchronizer import ShiftSynchronizer
 # One cost: the interface is that of all three, which take three times as long.
 WITH_ONE_COST = ActionClassifier(costs=["posture"], n_frames=4)
 # FrameWise is as wide as its transformer: tests/transformers/test_framewise.py checks several.
-OTHERWISE = [*BODY, *all_of("FrameWise", "ActionClassifier")]
+# The instances of TimingChannel have the same interface, of which one is enough.
+OTHERWISE = [*BODY, *all_of("FrameWise", "ActionClassifier"), *INSTANCES["TimingChannel"][1:]]
 ROW_ESTIMATORS = [e for e in ESTIMATORS if e not in OTHERWISE] + [WITH_ONE_COST]
+# What is checked in one place is tested whole on these two, one of rows and one of sequences.
+ROWS_AND_SEQUENCES = all_of("ASpace", "LinearSynchronizer")
 
 EXTRA_CHECKS = [
     "check_dataframe_column_names_consistency",
@@ -171,8 +174,16 @@ def expected_of(fit_once, performances):
     return expected
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("estimator", "kind"),
+    [
+        (estimator, kind)
+        for estimator in ESTIMATORS
+        for kind in KINDS
+        if estimator in ROWS_AND_SEQUENCES or kind in ("array", "frames", "multiindex", "read-only")
+    ],
+    ids=by_name,
+)
 def test_every_kind_of_collection_gives_equal_results(estimator, kind, performances, expected_of):
     expected = expected_of(estimator)
     X = KINDS[kind](performances)
@@ -239,6 +250,10 @@ def test_several_threads_may_use_one_fitted_estimator(estimator):
             assert_same(answers, expected)
 
 
+def through_pickle(estimator):
+    return pickle.loads(pickle.dumps(estimator))
+
+
 def through_joblib(estimator):
     file = io.BytesIO()
     joblib.dump(estimator, file)
@@ -254,19 +269,13 @@ def through_skops(estimator):
     return skops.io.loads(data, trusted=types)
 
 
-STORAGE = {
-    "pickle": lambda estimator: pickle.loads(pickle.dumps(estimator)),
-    "joblib": through_joblib,
-    "skops": through_skops,
-}
-
-
 @pytest.mark.parametrize("estimator", EVERY, ids=by_name)
-@pytest.mark.parametrize("storage", STORAGE)
-def test_a_stored_estimator_gives_equal_results(estimator, storage):
+def test_a_stored_estimator_gives_equal_results(estimator):
     X = data_for(estimator)
     fitted = clone(estimator).fit(X)
-    assert_same(outputs(STORAGE[storage](fitted), X), outputs(fitted, X))
+    expected = outputs(fitted, X)
+    for through_storage in (through_pickle, through_joblib, through_skops):
+        assert_same(outputs(through_storage(fitted), X), expected)
 
 
 @pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
@@ -306,26 +315,25 @@ def test_transform_returns_the_kind_of_its_input(estimator, performances, fit_on
 
 
 @pytest.mark.parametrize(
-    ("estimator", "given"),
+    ("estimator", "dtype"),
     [
-        (estimator, given)
+        (estimator, dtype)
         for estimator in ESTIMATORS
-        for given in ("float32", "float64", "float16", "int32", "bool")
-        # Coordinates that are 0 or 1 make limbs without length.
-        if not (given == "bool" and estimator in BODY)
+        for dtype in ("float32", "int32", "float64", "float16", "bool")
+        if estimator in ROWS_AND_SEQUENCES or dtype in ("float32", "int32")
     ],
     ids=by_name,
 )
-def test_float32_is_kept_and_other_types_become_float64(estimator, given, performances):
-    used = "float32" if given == "float32" else "float64"
-    X = [x > 0 if given == "bool" else (100 * x).astype(given) for x in performances]
+def test_float32_is_kept_and_other_types_become_float64(estimator, dtype, performances):
+    used = "float32" if dtype == "float32" else "float64"
+    X = [x > 0 if dtype == "bool" else (100 * x).astype(dtype) for x in performances]
     fitted = clone(estimator).fit(X)
     for name in ("components_", "mean_", "pattern_", "variance_", "limb_lengths_"):
         if hasattr(fitted, name):
             assert getattr(fitted, name).dtype == used, name
     if hasattr(fitted, "transform"):
         assert all(x.dtype == used for x in fitted.transform(X))
-    if given == "float32":
+    if dtype == "float32":
         double = clone(estimator).fit([x.astype(float) for x in X])
         single, double = outputs(fitted, X), outputs(double, [x.astype(float) for x in X])
         for a, b in zip(single, double, strict=True):
@@ -351,12 +359,11 @@ def test_pattern_matches_itself_by_the_identity(estimator, pattern, performances
 
 
 @pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
-@pytest.mark.parametrize("kind", ["list", "array", "frames", "multiindex"])
-@pytest.mark.parametrize("how", ["local", "global"])
-def test_pandas_output_of_collections(estimator, kind, how, performances, fit_once):
+@pytest.mark.parametrize(("kind", "setting"), [("list", "local"), ("multiindex", "global")])
+def test_pandas_output_of_collections(estimator, kind, setting, performances, fit_once):
     X = KINDS[kind](performances)
     plain, estimator = fit_once(estimator).transform(performances), clone(estimator)
-    if how == "local":
+    if setting == "local":
         out = estimator.set_output(transform="pandas").fit_transform(X)
     else:
         with config_context(transform_output="pandas"):
@@ -425,7 +432,7 @@ def test_pandas_through_a_pipeline(estimator, performances):
 @pytest.mark.parametrize("estimator", TRANSFORMERS, ids=by_name)
 def test_polars_output_of_a_collection_is_refused(estimator, performances):
     fitted = clone(estimator).fit(performances).set_output(transform="polars")
-    with pytest.raises(ValueError, match="pandas"):
+    with pytest.raises(ValueError, match=r"'polars'.*pl\.DataFrame\(.*'pandas'"):
         fitted.transform(performances)
 
 
@@ -446,23 +453,12 @@ def put(value):
     return change
 
 
+# What else is refused, tests/inputs/test_bad_inputs.py tries on an estimator of each kind.
 BAD = {
     "NaN": (put(np.nan), r"Performance 4, frame [23], feature 2 is NaN"),
     "infinity": (put(np.inf), r"Performance 4, frame 3, feature 2 is infinity"),
-    "empty": (lambda x: x[:0], r"Performance 4 has shape \(0, 45\), .* at least 2 frames"),
     "one frame": (lambda x: x[:1], r"Performance 4 has shape \(1, 45\), .* at least 2 frames"),
-    "no features": (lambda x: x[:, :0], r"Performance 4 has (shape|0 features)"),
     "wrong width": (lambda x: x[:, 1:], r"Performance 4 has 44 features .* performance 0 has 45"),
-    "one dimension": (lambda x: x[:, 0], r"Performance 4 has shape \(30,\), expected \(n_frames"),
-    "three dimensions": (lambda x: x[None], r"Performance 4 has shape \(1, 30, 45\), expected"),
-    "text": (lambda x: x.astype(str).astype(object) + "?", r"Performance 4 is not a numeric array"),
-    "complex": (lambda x: x + 1j, r"Performance 4: complex data"),
-    "None": (lambda x: None, r"Performance 4 "),
-    "masked": (lambda x: np.ma.masked_less(x, 0), r"Performance 4 has masked values"),
-    "other names": (
-        lambda x: pd.DataFrame(x, columns=NAMES[::-1]),
-        r"Performance 4 has the columns .* performance 0 has None",
-    ),
 }
 
 
@@ -491,23 +487,10 @@ def test_bad_performance_is_refused_by_its_index(estimator, fault, when, perform
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)
-@pytest.mark.parametrize(
-    ("X", "message"),
-    [
-        ([], "0 performances"),
-        (np.empty((0, 10, WIDTH)), "0 performances"),
-        ({"a": np.zeros((3, WIDTH))}, "got dict"),
-        ((x for x in [np.zeros((3, WIDTH))]), "got generator"),
-        (np.zeros((2, 3, 4, 5)), r"shape \(2, 3, 4, 5\)"),
-        ("performances", "got str"),
-        ([np.zeros(3), np.zeros(4)], r"x\[:, np.newaxis\]"),
-        (np.zeros(5), "[Ee]xpected 2D array"),
-    ],
-    ids=lambda value: value if isinstance(value, str) else type(value).__name__,
-)
-def test_other_kinds_of_input_are_refused(estimator, X, message):
-    with pytest.raises(ValueError, match=message):
-        clone(estimator).fit(X)
+def test_other_kinds_of_input_are_refused(estimator):
+    for X, message in (([], "0 performances"), ({"a": np.zeros((3, WIDTH))}, "got dict")):
+        with pytest.raises(ValueError, match=message):
+            clone(estimator).fit(X)
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=by_name)

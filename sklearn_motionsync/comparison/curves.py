@@ -16,7 +16,7 @@ from ..inputs.validation import read_collection
 from ..inputs.wording import counted
 from ..synchronizers.dense import DenseSynchronizer
 from ..synchronizers.match import Match, check_unit, match_of_times, rates_of
-from ..utils.pipelines import Routed, route_to_synchronizer
+from ..utils.pipelines import Routed, route_to_synchronizer, with_frame_rate
 
 __all__ = ["AlignedCurves"]
 
@@ -77,9 +77,10 @@ class AlignedCurves(NamedTuple):
         unit : {"frames", "percent", "seconds"}
             Of time.
         frame_rate : float, array-like or None
-            As in `Match.offsets_in`.
+            As in `Match.offsets_in`; key-frames among the params are then seconds.
         """
         check_unit(unit)
+        params = with_frame_rate(params, frame_rate)
         reached = route_to_synchronizer(estimator, X, params, caller)
         # As recorded: steps before the synchronizer may resample.
         lengths = [len(x) for x in as_collection(X) or reached.performances]

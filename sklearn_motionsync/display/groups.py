@@ -259,7 +259,6 @@ class GroupDisplay:
             groups,
             people,
             comparison,
-            params,
             features=features,
             statistic=statistic,
             coverage=coverage,
@@ -406,7 +405,6 @@ def display_of_groups(
     groups,
     people,
     comparison,
-    params,
     *,
     features=None,
     statistic="sd",
@@ -446,7 +444,7 @@ def display_of_groups(
         coverage=coverage,
         whom="trials" if people is None else "people",
         trials=[shown[maker.any(axis=0)] for maker in of_people.makers] if trials else None,
-        events=_events_on_clock(events, params, aligned, of_people),
+        events=_events_on_clock(events, aligned, of_people),
         clusters=clusters,
         level=0.05 if comparison is None else comparison.level,
         note=note,
@@ -456,10 +454,11 @@ def display_of_groups(
     )
 
 
-def _events_on_clock(events, params, aligned, of_people):
+def _events_on_clock(events, aligned, of_people):
     """Where the events of people are on the clock, in frames: a table; None without events."""
     rate, name = None, "events"
     if events is None:
+        params = aligned.reached.params
         events, rate, name = params.get("keyframes"), params.get("frame_rate"), "keyframes"
     if events is None:
         return None

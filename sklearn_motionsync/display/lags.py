@@ -112,7 +112,8 @@ class LagDisplay:
         colorbar : bool, default=True
             Whether to draw a scale of the map.
         **params : dict
-            Further arguments of the steps before the synchronizer.
+            Further arguments of the steps before the synchronizer. With key-frames call ``lags``
+            of the synchronizer, and draw what it returns by `from_predictions`.
 
         Returns
         -------
@@ -120,7 +121,9 @@ class LagDisplay:
             The display, drawn.
         """
         caller = f"{cls.__name__}.from_estimator"
-        reached = route_to_synchronizer(estimator, X, params, caller, kind=PartSynchronizer)
+        reached = route_to_synchronizer(
+            estimator, X, params, caller, kind=PartSynchronizer, uses=()
+        )
         lags = reached.synchronizer.lags(
             reached.performances,
             groups,

@@ -15,6 +15,7 @@ from ..inputs.wording import counted
 from ..model.views import view_of
 from ..synchronizers.match import rates_of
 from ..utils.groups import names_of_groups
+from ..utils.pipelines import with_frame_rate
 from .arguments import AxesLike
 from .drawing import (
     COLORS,
@@ -243,6 +244,7 @@ class ActionModelDisplay:
                 f"{caller} takes people along with groups only: a fitted model has learnt its "
                 "people by fit(X, groups=people)."
             )
+        params = with_frame_rate(params, frame_rate)
         view = view_of(estimator, X, params, caller, features=features)
         chosen = choose_features(features, view.names)
         shown = view.whole if band == "performances" else view.synchronised

@@ -25,7 +25,7 @@ from ..inputs.validation import read_collection
 from ..inputs.wording import counted
 from ..synchronizers.match import check_coverage, match_of_times, rates_of
 from ..utils.groups import names_of_groups
-from ..utils.pipelines import index_of_pattern, route_to_synchronizer
+from ..utils.pipelines import index_of_pattern, route_to_synchronizer, with_frame_rate
 from .arguments import AxesLike, as_names
 from .drawing import (
     COLORS,
@@ -226,6 +226,7 @@ class SynchronizationDisplay:
         """
         if coverage is not None:
             check_coverage(coverage)
+        params = with_frame_rate(params, frame_rate)
         reached = route_to_synchronizer(estimator, X, params, f"{cls.__name__}.from_estimator")
         before, synchronizer, performances = reached[:3]
         names = names_of_features(before, synchronizer, performances[0].shape[1])

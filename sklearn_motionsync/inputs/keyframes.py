@@ -105,7 +105,18 @@ class Keyframes:
 
     def _check_labels(self, labels, numbers):
         """Refuse rows of a table that are labelled otherwise than the performances."""
-        if self._labels is None or labels == list(range(len(labels))):
+        if self._labels is None:
+            return
+        in_order = list(range(len(self._labels)))
+        if labels == list(numbers):
+            # Of performances without labels only their numbers tell another order.
+            if self._labels != in_order and set(self._labels) == set(in_order):
+                raise ValueError(
+                    f"The rows of {self._name} are labelled {self._labels[:8]}: the numbers of the "
+                    f"performances, in another order. Give {self._name}.sort_index(), or, if "
+                    "they are in the order of the performances, "
+                    f"{self._name}.reset_index(drop=True)."
+                )
             return
         for place, (label, i) in enumerate(zip(labels, numbers, strict=True)):
             if self._labels[i] != label:

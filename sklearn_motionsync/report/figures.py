@@ -25,7 +25,12 @@ def own_figures():
             plt.close(number)
 
 
-def draw_signals(trials, shown, params):
+def _keyframes_of(aligned):
+    """The key-frames on the clock, by name; None if there are none."""
+    return named_keyframes(aligned.reached.synchronizer, aligned.reached.params.get("keyframes"))
+
+
+def draw_signals(trials, shown):
     """Signals time-normalised and aligned, side by side.
 
     Parameters
@@ -33,8 +38,6 @@ def draw_signals(trials, shown, params):
     trials : TrialSet
     shown : list of int
         The signals.
-    params : dict
-        As for ``match``, with key-frames.
     """
     aligned, template = trials.aligned, trials.template
     tells = trials.reasons is not None
@@ -47,7 +50,7 @@ def draw_signals(trials, shown, params):
         groups=trials.design.get("group"),
         unit=aligned.unit,
         frame_rate=clock_rate(aligned.clock),
-        pattern_keyframes=named_keyframes(aligned.reached.synchronizer, params.get("keyframes")),
+        pattern_keyframes=_keyframes_of(aligned),
         doubtful=aligned.match.doubtful if tells else None,
     ).plot(warps=False)
     left = display.axes_[0]
@@ -56,7 +59,7 @@ def draw_signals(trials, shown, params):
     return display.figure_
 
 
-def draw_offsets(trials, params):
+def draw_offsets(trials):
     """The offsets of all trials, and the mean of each group."""
     aligned = trials.aligned
     offsets, clock = aligned.offsets, aligned.clock
@@ -74,7 +77,7 @@ def draw_offsets(trials, params):
     axis.set_xlim(clock[0], clock[-1])
     axis.set_xlabel(axis_of_time.label)
     axis.set_ylabel(offset_label(aligned.unit))
-    keyframes = named_keyframes(aligned.reached.synchronizer, params.get("keyframes"))
+    keyframes = _keyframes_of(aligned)
     if keyframes is not None:
         draw_keyframes(axis, axis_of_time.convert(keyframes.to_numpy()), keyframes.index)
     labels = [f"mean of {name}" for name in styles] if "group" in trials.design else ["their mean"]

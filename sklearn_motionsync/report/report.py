@@ -172,15 +172,13 @@ def write_report(
                 paired=paired,
                 random_state=random_state,
             )
-            display = display_of_groups(
-                aligned, groups, people, comparison, params, features=features
-            )
+            display = display_of_groups(aligned, groups, people, comparison, features=features)
             figure = display.plot().figure_
         trials = TrialSet.of(X, aligned, frame_rate, groups, people, covariate)
         page = Page()
         _add_set(page, trials, estimator, left_out)
-        _add_signals(page, trials, features, params)
-        _add_timing(page, trials, params)
+        _add_signals(page, trials, features)
+        _add_timing(page, trials)
         if comparison is not None:
             _add_test(page, comparison, figure, groups is not None)
         _add_doubtful(page, trials)
@@ -222,7 +220,7 @@ def _add_set(page, trials, estimator, left_out):
     )
 
 
-def _add_signals(page, trials, features, params):
+def _add_signals(page, trials, features):
     shown, note = list(range(len(trials.signals))), ""
     if features is None and len(shown) > _MOST_SIGNALS:
         shown = choose_features(None, trials.signals)
@@ -241,7 +239,7 @@ def _add_signals(page, trials, features, params):
         "Before and after",
         paragraph(finding, "finding"),
         picture(
-            draw_signals(trials, shown, params),
+            draw_signals(trials, shown),
             f"Curves of {counted(len(trials.names), 'trial')}, on the left time-normalised, on the "
             f"right aligned. {finding}",
         ),
@@ -254,7 +252,7 @@ def _add_signals(page, trials, features, params):
     )
 
 
-def _add_timing(page, trials, params):
+def _add_timing(page, trials):
     table, (_, largest, at) = trials.table(), trials.columns
     where = table[largest].abs().idxmax()
     offset, unit = table.loc[where, largest], UNITS[trials.aligned.unit]
@@ -275,7 +273,7 @@ def _add_timing(page, trials, params):
             "All trials begin and end with the template: one that is slower throughout is not late."
         ),
         picture(
-            draw_offsets(trials, params),
+            draw_offsets(trials),
             f"Offsets of {counted(len(trials.names), 'trial')} along the template. {finding}",
         ),
         table_of(trials.timing(), "Offsets of groups") if "group" in trials.design else "",

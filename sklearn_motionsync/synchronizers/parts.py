@@ -328,7 +328,7 @@ class PartSynchronizer(AnchoredSynchronizer):
             Frames per second of X, for seconds; by default what tables tell, as in
             `Match.to_frame`.
         keyframes : list of arrays (n_keyframes,), 2-D array or DataFrame, default=None
-            Key-frames of the whole body, as for ``fit`` and in frames.
+            Key-frames of the whole body, as for ``fit``: in seconds with ``frame_rate``.
 
         Returns
         -------
@@ -345,7 +345,7 @@ class PartSynchronizer(AnchoredSynchronizer):
         people = None
         if groups is not None:
             groups, people = encode_groups(groups, len(performances))
-        body = self.match(performances, **self._given(X, keyframes, None))
+        body = self.match(performances, **self._given(X, keyframes, frame_rate))
         matches = self._match_parts(performances, body, self._warpers, free=True) | {_BODY: body}
         lengths, rates = [len(x) for x in performances], rates_of(X, frame_rate, unit)
         offsets = {}

@@ -25,6 +25,7 @@ __all__ = [
     "takes_gaps",
     "transform_through",
     "union_transformers",
+    "with_frame_rate",
 ]
 
 
@@ -142,6 +143,16 @@ def route_to_synchronizer(estimator, X, params, caller, *, kind=None, uses=("mat
     performances = synchronizer.check_performances(features)
     accepted = accepted_params(synchronizer.match, params)
     return Routed(before, synchronizer, performances, accepted, caller, hint)
+
+
+def with_frame_rate(params, frame_rate):
+    """Params of ``match``, by the frame rate that a caller needs for itself, too.
+
+    With a frame rate key-frames are seconds, in every function as in ``match``.
+    """
+    if frame_rate is None or params.get("keyframes") is None:
+        return params
+    return params | {"frame_rate": frame_rate}
 
 
 def transform_through(before, X, params, caller, *, hint="", also=()):

@@ -56,9 +56,15 @@ def tables(estimator, *facts):
     return frames
 
 
-@pytest.mark.parametrize(("other", "message"), RATES)
-# The cycles of a take have the clock of the take.
-@pytest.mark.parametrize("estimator", [e for e in EVERY if e not in OF_TAKES], ids=by_name)
+@pytest.mark.parametrize(
+    ("estimator", "other", "message"),
+    [
+        # The cycles of a take have the clock of the take.
+        *((estimator, *RATES[0]) for estimator in EVERY if estimator not in OF_TAKES),
+        (LinearSynchronizer(), *RATES[1]),
+    ],
+    ids=by_name,
+)
 def test_rates_that_differ_are_warned_of(estimator, other, message):
     last = len(data_for(estimator)) - 1
     with pytest.warns(UserWarning, match=f"Performance {last} {message}"):
@@ -68,8 +74,15 @@ def test_rates_that_differ_are_warned_of(estimator, other, message):
         outputs(fitted, tables(estimator, RATE, other))
 
 
-@pytest.mark.parametrize(("one", "other", "message"), DIFFERENT)
-@pytest.mark.parametrize("estimator", EVERY, ids=by_name)
+@pytest.mark.parametrize(
+    ("estimator", "one", "other", "message"),
+    [
+        *((estimator, *DIFFERENT[0]) for estimator in EVERY),
+        *((estimator, *DIFFERENT[3]) for estimator in EVERY),
+        *((LinearSynchronizer(), *different) for different in DIFFERENT[1:3]),
+    ],
+    ids=by_name,
+)
 def test_units_and_axes_that_differ_are_refused(estimator, one, other, message):
     if estimator in BODY and "units" in one:
         # Directions, and positions in units of the body.

@@ -236,8 +236,7 @@ def test_jitter_is_resampled_too(jitter):
     np.testing.assert_allclose(x["x"], 3 * x.index)
 
 
-@pytest.mark.parametrize("rate", [50, 60, 90, 100, 120])
-@pytest.mark.parametrize("unit", [1, 1000])
+@pytest.mark.parametrize(("rate", "unit"), [(60, 1), (90, 1), (120, 1000)])
 def test_rounded_times_are_even(rate, unit):
     """Of a recording whose times are written to the millisecond every number is kept."""
     time = unit * np.round(np.arange(400) / rate, 3)
@@ -403,7 +402,7 @@ def test_parts_of_a_recording_have_their_own_times(time):
     assert "first_frame" not in second.attrs
 
 
-@pytest.mark.parametrize("frame", [-7.0, -0.5, 0.0, 0.4, 1.5, 16.9, 38.5, 39.0, 39.3, 55.0])
+@pytest.mark.parametrize("frame", [-7.0, 0.0, 16.9, 39.0, 55.0])
 def test_events_stay_at_their_times_between_and_beyond_uneven_frames(frame):
     """On a straight line between frames, and at the mean step beyond them."""
     seconds = 2 + np.cumsum(np.random.default_rng(0).uniform(0.009, 0.016, 40))
@@ -732,8 +731,7 @@ def spikes_of(n_units, digits, whole=False):
     return df.assign(spike_time=(df["spike_time"] * 1000).astype(int)) if whole else df
 
 
-@pytest.mark.parametrize("n_units", [1, 24, 75, 150, 300])
-@pytest.mark.parametrize("whole", [False, True])
+@pytest.mark.parametrize(("n_units", "whole"), [(1, False), (24, True), (300, False)])
 @pytest.mark.parametrize(
     "given",
     [

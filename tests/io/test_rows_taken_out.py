@@ -11,7 +11,7 @@ from sklearn_motionsync.io import cut_at_events, fill_gaps, read_motion
 from motion_files import c3d, everything, put, texts
 
 RATE = 120.0
-SEEDS = range(100)
+SEEDS = range(10)
 
 
 def recording(rng):
@@ -119,12 +119,11 @@ def test_rows_that_were_dropped_are_not_bridged(seed):
         check_attrs(part, df)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize("kind", ["reversed", "shuffled"])
-def test_rows_in_another_order_are_refused(kind, seed):
-    rng = np.random.default_rng(seed)
+@pytest.mark.parametrize("order", ["reversed", "shuffled"])
+def test_rows_in_another_order_are_refused(order):
+    rng = np.random.default_rng(0)
     df = recording(rng)
-    other = df.iloc[::-1] if kind == "reversed" else df.iloc[rng.permutation(len(df))]
+    other = df.iloc[::-1] if order == "reversed" else df.iloc[rng.permutation(len(df))]
     with pytest.raises(ValueError, match=r"not in order of time: frame .*sort_index"):
         cut_at_events(other, "Strike")
     for x, y in zip(
@@ -206,7 +205,7 @@ def test_numbers_of_frames_in_the_trial_stay(tmp_path, group):
     assert part.attrs == same.attrs
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(4))
 def test_gaps_are_filled_where_frames_are_in_time(seed):
     rng = np.random.default_rng(seed)
     t = np.arange(200.0)

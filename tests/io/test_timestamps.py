@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from sklearn_motionsync.io.timestamps import describe_times, warn_of_other_rate
 
-RATES = [0.5, 10, 23.976, 29.97, 50, 59.94, 100, 120, 250, 1000]
 STEP = 0.02
 
 
@@ -17,9 +16,8 @@ def described(times, **params):
     return facts
 
 
-@pytest.mark.parametrize("rate", RATES)
-@pytest.mark.parametrize("n_frames", [2, 3, 40, 1000])
-@pytest.mark.parametrize("start", [0, -1, 417])
+@pytest.mark.parametrize("rate", [0.5, 23.976, 59.94, 120, 1000])
+@pytest.mark.parametrize(("n_frames", "start"), [(2, 417), (3, -1), (1000, 417)])
 def test_even_times_have_their_rate(rate, n_frames, start):
     times = start + np.arange(n_frames) / rate
     for decimals in (4, 6, 17):
@@ -34,7 +32,7 @@ def test_even_times_have_their_rate(rate, n_frames, start):
             assert facts["frame_rate"] == stated
 
 
-@pytest.mark.parametrize("share", [0.5, 0.8, 0.95, 0.98, 1.02, 1.05, 1.2, 2])
+@pytest.mark.parametrize("share", [0.5, 0.98, 1.02, 2])
 @pytest.mark.parametrize("n_frames", [2, 40])
 def test_exact_times_count_more_than_another_stated_rate(share, n_frames):
     times = np.arange(n_frames) * STEP

@@ -45,9 +45,14 @@ CASES = [
 
 
 @pytest.mark.parametrize("cost", COSTS)
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("whole", [False, True], ids=["reals", "ties"])
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize(
+    ("case", "whole", "dtype"),
+    [
+        *((case, True, np.float64) for case in CASES),
+        *((case, False, np.float64) for case in CASES[3:6]),
+        *((case, False, np.float32) for case in CASES[4:5]),
+    ],
+)
 def test_best_path_equals_all_admissible_paths(case, cost, whole, dtype, kept):
     n_frames, max_rate, subframes, reach, mu = case
     costs = step_costs(cost, max_rate, subframes)
@@ -166,7 +171,7 @@ TABLES = [step_table(), step_table("velocity", max_rate=4, subframes=2)]
 
 
 @pytest.mark.parametrize("table", TABLES, ids=["one group", "several"])
-@pytest.mark.parametrize("n_bases", [1, 2, 5])
+@pytest.mark.parametrize("n_bases", [1, 5])
 def test_tile_sizes_change_no_result(n_bases, table, monkeypatch):
     bases, moving = draw(np.random.default_rng(3), n_bases, 30, table.subframes, n_features=4)
     trellis = Trellis(table, 0.5, 8)

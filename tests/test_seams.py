@@ -1,0 +1,120 @@
+"""Functions that take a synchronizer and its arguments find what ``match`` finds with them."""
+
+import inspect
+import json
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+import sklearn_motionsync
+from sklearn.pipeline import make_pipeline
+from sklearn_motionsync import (
+    ActionModel,
+    DenseSynchronizer,
+    PartSynchronizer,
+    compare_groups,
+    compare_to_norm,
+    display,
+    write_report,
+)
+from sklearn_motionsync.datasets import make_gait
+
+GAIT = make_gait(8, timing=5, n_frames=60, random_state=0)
+X, GROUP, PERSON = GAIT.data, GAIT.group, GAIT.person
+K = GAIT.keyframes[:, 3:4]
+
+
+@pytest.fixture(scope="module")
+def sync():
+    return DenseSynchronizer(n_frames=51).fit(X, keyframes=K)
+
+
+@pytest.fixture(scope="module")
+def model(sync):
+    return make_pipeline(sync, ActionModel()).fit(X, densesynchronizer__keyframes=K)
+
+
+def report_of(estimator, trials, **params):
+    """The offsets of a report, as they are offered."""
+    path = write_report(params.pop("path"), estimator, trials, **params)
+    data = re.search(r'id="data">(.*?)</script>', path.read_text(encoding="utf-8"), re.DOTALL)
+    return json.loads(data[1])["files"]["timing.csv"]
+
+
+# What depends on the match, of every function that takes a synchronizer, its arguments, and a frame
+# rate of its own.
+FUNCTIONS = {
+    "compare_groups": lambda sync, _, path, **k: compare_groups(
+        sync, X, GROUP, people=PERSON, n_permutations=49, random_state=0, unit="frames", **k
+    ).to_frame(),
+    "compare_to_norm": lambda sync, _, path, **k: (
+        compare_to_norm(sync, X, GROUP, norm="A", people=PERSON, **k).verdicts
+    ),
+    "write_report": lambda sync, _, path, **k: report_of(sync, X, path=path, unit="frames", **k),
+    "ActionModelDisplay.from_estimator": lambda _, model, path, **k: (
+        display.ActionModelDisplay.from_estimator(model, X, **k).performances
+    ),
+    "GroupDisplay.from_estimator": lambda sync, _, path, **k: (
+        display.GroupDisplay.from_estimator(sync, X, GROUP, **k).offsets
+    ),
+    "SynchronizationDisplay.from_estimator": lambda sync, _, path, **k: (
+        display.SynchronizationDisplay.from_estimator(sync, X, **k).times
+    ),
+}
+# It refuses key-frames: see below.
+WITHOUT_KEYFRAMES = {"LagDisplay.from_estimator"}
+
+
+def test_every_function_has_its_row():
+    names = set()
+    for module in (sklearn_motionsync, display):
+        for name in module.__all__:
+            public = getattr(module, name)
+            methods = {name: public}
+            if inspect.isclass(public):
+                methods = {f"{name}.{m}": getattr(public, m) for m in dir(public) if m[0] != "_"}
+            for called, function in methods.items():
+                if not (inspect.isfunction(function) or inspect.ismethod(function)):
+                    continue
+                parameters = inspect.signature(function).parameters
+                takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
+                if takes_any and "frame_rate" in parameters:
+                    names.add(called)
+    assert names == set(FUNCTIONS) | WITHOUT_KEYFRAMES
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("rate", [12.0, 100.0])
+def test_seconds_are_frames(name, rate, sync, model, tmp_path):
+    path = tmp_path / "report.html"
+    frames = FUNCTIONS[name](sync, model, path, keyframes=K)
+    seconds = FUNCTIONS[name](sync, model, path, keyframes=K / rate, frame_rate=rate)
+    without = FUNCTIONS[name](sync, model, path)
+    if isinstance(frames, pd.DataFrame):
+        pd.testing.assert_frame_equal(seconds, frames)
+        assert not without.equals(frames)
+    elif isinstance(frames, str):
+        assert seconds == frames != without
+    else:
+        np.testing.assert_allclose(seconds, frames, rtol=0, atol=1e-9)
+        assert not np.allclose(without, frames)
+
+
+def test_lags_take_keyframes_in_seconds():
+    sync = PartSynchronizer({"leg": [0, 1]}, synchronizer=DenseSynchronizer(51)).fit(X, keyframes=K)
+    frames = sync.lags(X, keyframes=K)
+    seconds = sync.lags(X, keyframes=K / 25, frame_rate=25)
+    np.testing.assert_allclose(seconds.values, frames.values, rtol=0, atol=1e-9)
+    with pytest.raises(TypeError, match="LagDisplay.from_estimator got 'keyframes'"):
+        display.LagDisplay.from_estimator(sync, X, keyframes=K)
+
+
+@pytest.mark.parametrize("method", ["fit", "match", "transform"])
+def test_a_table_in_another_order_is_refused(method, sync):
+    table = pd.DataFrame(K)
+    np.testing.assert_array_equal(
+        sync.transform(X, keyframes=table), sync.transform(X, keyframes=K)
+    )
+    with pytest.raises(ValueError, match=r"rows of keyframes are labelled .* in another order"):
+        getattr(sync, method)(X, keyframes=table.sort_values(0, ascending=False))
