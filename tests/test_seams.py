@@ -13,6 +13,7 @@ from sklearn_motionsync import (
     ActionModel,
     DenseSynchronizer,
     PartSynchronizer,
+    compare_events,
     compare_groups,
     compare_to_norm,
     display,
@@ -106,7 +107,7 @@ def test_lags_take_keyframes_in_seconds():
     frames = sync.lags(X, keyframes=K)
     seconds = sync.lags(X, keyframes=K / 25, frame_rate=25)
     np.testing.assert_allclose(seconds.values, frames.values, rtol=0, atol=1e-9)
-    with pytest.raises(TypeError, match="LagDisplay.from_estimator got 'keyframes'"):
+    with pytest.raises(TypeError, match=r"LagDisplay\.from_estimator got 'keyframes'"):
         display.LagDisplay.from_estimator(sync, X, keyframes=K)
 
 
@@ -118,3 +119,31 @@ def test_a_table_in_another_order_is_refused(method, sync):
     )
     with pytest.raises(ValueError, match=r"rows of keyframes are labelled .* in another order"):
         getattr(sync, method)(X, keyframes=table.sort_values(0, ascending=False))
+
+
+@pytest.mark.parametrize("frame_rate", [True, -1, 0, np.nan, np.inf, "x", [100.0, -1.0]])
+def test_a_wrong_frame_rate_is_refused_where_it_does_not_matter(frame_rate, sync):
+    match = sync.match(X)
+    for call in (
+        lambda: sync.match(X, frame_rate=frame_rate),
+        lambda: DenseSynchronizer(51).fit(X, frame_rate=frame_rate),
+        lambda: match.offsets_in("percent", frame_rate=frame_rate),
+        lambda: compare_groups(sync, X, GROUP, frame_rate=frame_rate),
+        lambda: compare_events(X, GAIT.keyframes, unit="percent", frame_rate=frame_rate),
+        lambda: display.SynchronizationDisplay.from_estimator(sync, X, frame_rate=frame_rate),
+    ):
+        with pytest.raises(
+            ValueError, match=r"frame_rate (must be one number above 0|is not a numeric)"
+        ):
+            call()
+
+
+def test_a_keyframe_that_only_late_trials_know():
+    """Where it is in the pattern is learnt from those that know it, as many as of any other."""
+    trials, keyframes = X * 2, np.full((2 * len(X), 2), np.nan)
+    keyframes[1:, 0] = np.tile(GAIT.keyframes[:, 0], 2)[1:]
+    keyframes[-6:, 1] = GAIT.keyframes[-6:, 3]
+    sync = DenseSynchronizer(51, pattern=0).fit(trials, keyframes=keyframes)
+    alone = DenseSynchronizer(51, pattern=0).fit(trials, keyframes=keyframes[:, 1:])
+    assert len(trials) > 40
+    np.testing.assert_allclose(sync.keyframes_[1], alone.keyframes_[0], atol=1.5)

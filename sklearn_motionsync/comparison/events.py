@@ -131,10 +131,11 @@ def compare_events(
     n, last = len(trials), np.array([[len(x) - 1] for x in trials])
     frames = Keyframes(events, n, name="events").known(trials) * last
     scale = np.ones((n, 1))
+    rates = rates_of(X, frame_rate, unit)
     if unit == "percent":
         scale = 100 / last
     elif unit == "seconds":
-        if (rates := rates_of(X, frame_rate)) is None:
+        if rates is None:
             raise ValueError(
                 "unit='seconds' needs frame_rate, frames a second of the performances."
             )

@@ -175,7 +175,23 @@ class Walk:
         return not np.isnan(self._mean(joints)).any(axis=1).all()
 
     def _mean(self, joints):
-        return self._points[:, list(joints)].mean(axis=1)
+        """The mean of some joints: (n_frames, n_dims), NaN where none of them is seen.
+
+        A joint that is hidden while another is seen keeps its way from that one, on a straight line
+        across the gap. One that is never seen is left out.
+        """
+        points = self._points[:, list(joints)]
+        hidden = np.isnan(points).any(axis=2)
+        points, hidden = points[:, ~hidden.all(axis=0)], hidden[:, ~hidden.all(axis=0)]
+        if not hidden.any() or points.shape[1] < 2:
+            return nanmean(points, axis=1)
+        filled = points.copy()
+        for j in np.flatnonzero(hidden.any(axis=0)):
+            ways = (points[:, j, np.newaxis] - points).reshape(len(points), -1)
+            ways = interpolate_gaps(ways, held=True, straight=True).reshape(points.shape)
+            rows = hidden[:, j]
+            filled[rows, j] = nanmean((points + ways)[rows].swapaxes(0, 1), axis=0)
+        return filled.mean(axis=1)
 
     def _resample(self, joints):
         """Positions of the mean of some joints at the samples."""

@@ -15,6 +15,8 @@ __all__ = ["CONTEXTS", "FOOT_OFF", "FOOT_STRIKE", "Recordings"]
 
 # Frames beyond an end that are rounding.
 _MARGIN = 0.5
+# Least and largest frames a second.
+_RATES = 1.0, 10_000.0
 # Metres of the units of positions.
 _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 # Labels of events, and contexts, as C3D files have them.
@@ -155,12 +157,21 @@ class Recordings:
     def _find_rates(self, frame_rate):
         if frame_rate is not None:
             rates = as_frame_rates(frame_rate, len(self))
-            return np.broadcast_to(rates, (len(self), 1))[:, 0].tolist()
-        rates = [frame_rate_of_rows(x) for x in self._given]
+            rates = np.broadcast_to(rates, (len(self), 1))[:, 0].tolist()
+        else:
+            rates = [frame_rate_of_rows(x) for x in self._given]
         if None in rates:
             i = rates.index(None)
             raise ValueError(
                 f"The frame rate of {within(self.called(i))} is not known: give frame_rate=, or "
                 "tables whose attrs or index tell it."
             )
+        slowest, fastest = _RATES
+        for i, rate in enumerate(rates):
+            if not slowest <= rate <= fastest:
+                raise ValueError(
+                    f"{self.called(i)} has a frame rate of {rate:g}; recordings of people have "
+                    f"{slowest:g} to {fastest:g} frames a second. Give frame_rate= in frames a "
+                    "second, not the time between frames."
+                )
         return rates

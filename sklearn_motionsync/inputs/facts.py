@@ -178,4 +178,9 @@ def _spelled_units(x):
     units = x.attrs.get("units")
     units = units if isinstance(units, (list, tuple)) else [units]
     units = [unit.strip() if isinstance(unit, str) else "" for unit in units]
-    return [_UNITS.get(unit.lower().removesuffix("s"), unit) for unit in units]
+    singular = [unit.lower().removesuffix("s") for unit in units]
+    short = set(_UNITS.values())
+    return [
+        one if one in short else _UNITS.get(one, unit)
+        for one, unit in zip(singular, units, strict=True)
+    ]

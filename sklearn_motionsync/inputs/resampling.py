@@ -28,6 +28,11 @@ _UNEVEN = 0.35
 _ALIKE = 0.6
 # Times this share of a step from even ones are even.
 _EVEN = 1e-6
+# Rounding to digits of which a step has fewer than so many is no gap only where steps of both
+# lengths that it makes come often: so many, and this share of all.
+_DIGITS_IN_STEP, _OFTEN, _OFTEN_SHARE = 3, 3, 0.08
+# The straight line by least squares misses rounded times by so much more than the nearest one.
+_LEAST_SQUARES = 1.1
 # More than so many times the recorded frames come from a mistake in the unit.
 _MOST = 100
 
@@ -68,6 +73,8 @@ def find_time_gaps(times, max_gap_time=None):
         return []
     step = float(np.median(steps))
     longest = max(_GAP * step, (max_gap_time or 0) * (1 + _EVEN))
+    if steps.max() <= longest or is_even(times):
+        return []
     return [(times[i], times[i + 1], step) for i in np.flatnonzero(steps > longest)]
 
 
@@ -157,13 +164,27 @@ def _slack(times):
         slack = max(slack, 2 * float(np.spacing(np.abs(single).max())))
     for digits in range(-9, 10):
         quantum = 10.0**-digits
-        # A third: 30 frames a second with two digits.
-        if quantum > step / 3:
+        if quantum > step:
             continue
         ticks = (times - times[0]) / quantum
         if np.abs(ticks - np.round(ticks)).max() < 1e-3:
-            return max(slack, quantum)
+            is_fine = quantum <= step / _DIGITS_IN_STEP
+            return max(slack, quantum) if is_fine or _rounds_often(ticks) else slack
     return slack
+
+
+def _rounds_often(ticks):
+    """Whether steps of two neighbouring numbers of digits come often, as of rounded even times.
+
+    Of 60 frames a second with two digits a third of the steps are 0.01 and the others 0.02. A lost
+    frame or two would be a longer step now and then.
+    """
+    sizes, counts = np.unique(np.round(np.diff(ticks)), return_counts=True)
+    return (
+        len(sizes) == 2
+        and sizes[1] - sizes[0] == 1
+        and counts.min() >= max(_OFTEN, _OFTEN_SHARE * len(ticks))
+    )
 
 
 def is_even(times):
@@ -171,17 +192,22 @@ def is_even(times):
     frames = np.arange(len(times)) - (len(times) - 1) / 2
     slope = frames @ times / max(frames @ frames, 1e-300)
     # Rounding moves a time by half a digit up or down.
-    return np.ptp(times - slope * frames) < 0.999 * _slack(times)
+    return np.ptp(times - slope * frames) <= _LEAST_SQUARES * _slack(times)
 
 
-def as_frame_rates(frame_rate, n_sequences):
-    """Frames a second: one number, or a column of one number for each performance."""
+def as_frame_rates(frame_rate, n_sequences=None):
+    """Frames a second: one number, or a column of one number for each performance.
+
+    Without a number of performances any count is right.
+    """
     rate = as_numbers(frame_rate, "frame_rate", dtype=np.float64)
-    valid = (rate > 0) & np.isfinite(rate)
-    if rate.shape not in ((), (n_sequences,)) or not valid.all():
+    valid = (rate > 0) & np.isfinite(rate) & (np.asarray(frame_rate).dtype.kind != "b")
+    fits = rate.ndim < 2 if n_sequences is None else rate.shape in ((), (n_sequences,))
+    if not fits or not valid.all():
         which = f": performance {int(np.argmin(valid))}" if rate.ndim and not valid.all() else ""
+        each = "performances" if n_sequences is None else counted(n_sequences, "performance")
         raise ValueError(
             "frame_rate must be one number above 0, in frames a second, or one for each of the "
-            f"{counted(n_sequences, 'performance')}, got {reprlib.repr(frame_rate)}{which}."
+            f"{each}, got {reprlib.repr(frame_rate)}{which}."
         )
     return rate[..., np.newaxis]

@@ -19,7 +19,8 @@ _SHORTEST_STEP = 1e-9
 
 
 def check_frame_rate(frame_rate):
-    if frame_rate is not None and not (isinstance(frame_rate, Real) and 0 < frame_rate < math.inf):
+    is_number = isinstance(frame_rate, Real) and not isinstance(frame_rate, bool)
+    if frame_rate is not None and not (is_number and 0 < frame_rate < math.inf):
         raise ValueError(f"frame_rate must be frames a second, above 0, got {frame_rate!r}.")
 
 

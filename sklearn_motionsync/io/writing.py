@@ -10,12 +10,14 @@ import pandas as pd
 from ..body.axes import UP_AXES
 from ..body.skeleton import Skeleton
 from ..inputs.collections import check_members
-from ..inputs.numbers import as_numbers
+from ..inputs.facts import units_of_columns
+from ..inputs.numbers import as_numbers, check_finite
 from ..inputs.recorded import frame_rate_of_rows, start_of_rows
 from ..inputs.types import Path, PerformanceLike, Table
 from ..inputs.wording import counted
 from .motion import read_motion
 from .rig import Rig, add_middles, make_rig, solve_rig
+from .timestamps import check_frame_rate
 
 __all__ = ["write_motion"]
 
@@ -94,9 +96,10 @@ def write_motion(
         )
     if like is not None and ending != ".bvh":
         raise ValueError(f"like= goes with .bvh files only, got it with {path}.")
+    check_frame_rate(frame_rate)
     rate = frame_rate_of_rows(X) if frame_rate is None else frame_rate
-    if rate is None or not rate > 0:
-        raise ValueError(f"{path}: the frame rate is not known: give frame_rate=, got {rate!r}.")
+    if rate is None:
+        raise ValueError(f"{path}: the frame rate is not known: give frame_rate=.")
     start = start_of_rows(X)
     if ending in (".mot", ".sto"):
         text = _write_storage(X, rate, start, path)
@@ -244,7 +247,15 @@ def _write_storage(X, rate, start, path):
     if not isinstance(X, pd.DataFrame):
         raise ValueError(f"{path}: give a DataFrame, whose columns have names.")
     values = as_numbers(X, f"{path}: X", dtype=np.float64)
-    in_degrees = "no" if str(X.attrs.get("units", "deg")).lower() in ("rad", "radian") else "yes"
+    check_finite(values, f"{path}: frame", [str(name) for name in X.columns], allow_nan=True)
+    units = units_of_columns(X)
+    angles = {unit: name for name, unit in units.items() if unit in ("deg", "rad")}
+    if len(angles) > 1:
+        raise ValueError(
+            f"{path}: {angles['deg']!r} is in degrees and {angles['rad']!r} in radians; a file has "
+            "one of them. Convert, and set X.attrs['units']."
+        )
+    in_degrees = "no" if "rad" in angles else "yes"
     lines = [path.stem, "version=1", f"nRows={len(X)}", f"nColumns={1 + X.shape[1]}"]
     lines += [f"inDegrees={in_degrees}", "endheader", "\t".join(["time", *map(str, X.columns)])]
     times = start + np.arange(len(X)) / rate

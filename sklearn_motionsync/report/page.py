@@ -52,6 +52,7 @@ class Page:
         buttons = []
         for name, table in tables.items():
             file = f"{name}.csv"
+            table = table.rename(columns=_without_formula).map(_without_formula)
             self._files[file] = table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
             buttons.append(f'<button type="button" data-file="{file}">Save {file}</button>')
         return f"<p>{''.join(buttons)}</p>"
@@ -62,10 +63,15 @@ class Page:
         from .. import __version__
 
         text = self.render(str(title), __version__)
-        beside = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+        # The file that a link leads to is replaced, and keeps who may read it.
+        target = path.resolve()
+        beside = target.with_name(f".{uuid.uuid4().hex}")
         try:
+            beside.touch()
+            if target.exists():
+                beside.chmod(target.stat().st_mode & 0o777)
             beside.write_text(text, encoding="utf-8", newline="\n")
-            beside.replace(path)
+            beside.replace(target)
         finally:
             beside.unlink(missing_ok=True)
         return path
@@ -118,6 +124,12 @@ def check_path(path, what):
             "Path.mkdir(parents=True), or give the path of another file."
         )
     return path
+
+
+def _without_formula(value):
+    """Text that a spreadsheet would run as a formula, behind an apostrophe; or the value."""
+    is_formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
+    return f"'{value}" if is_formula else value
 
 
 def read_part(name):

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..inputs.keyframes import Keyframes
 from ..inputs.recorded import refuse_moved_events
+from ..inputs.resampling import as_frame_rates
 from ..inputs.types import (
     Indexed,
     NumbersLike,
@@ -94,6 +95,8 @@ class AnchoredSynchronizer(Synchronizer):
                 training = TrainingSet(
                     training.trials, training.filler, training.population, shares
                 )
+            elif frame_rate is not None:
+                as_frame_rates(frame_rate)
             learnt = self._learn(training, progress)
         vars(self).update(learnt)
         return training
@@ -202,6 +205,8 @@ class AnchoredSynchronizer(Synchronizer):
         if keyframes is not None:
             refuse_moved_events(X)
             params |= {"keyframes": keyframes, "frame_rate": frame_rate}
+        elif frame_rate is not None:
+            as_frame_rates(frame_rate)
         if confidence is not None:
             self._refuse_confidence()
             params["confidence"] = confidence

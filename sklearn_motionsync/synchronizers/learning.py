@@ -276,8 +276,9 @@ def let_exemplars_vote(clock, training, pattern, pairs, consensus):
         keyframes = training.keyframes[pattern.index]
     unknown = np.isnan(keyframes)
     if unknown.any():
-        has_some = np.isfinite(training.keyframes[:, unknown]).any(axis=1)
-        rows = np.flatnonzero(has_some)[:MOST_LEARNT]
+        # Of every one the first trials that know it.
+        known = np.isfinite(training.keyframes[:, unknown])
+        rows = np.flatnonzero((known & (known.cumsum(axis=0) <= MOST_LEARNT)).any(axis=1))
         warper = warper_to(add_ramps([source], keyframes[np.newaxis])[0])
         _, times = warper.warps(warper.positions([clock.arrays[k] for k in rows]))
         last = clock.n_frames - 1

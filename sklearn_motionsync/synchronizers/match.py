@@ -494,6 +494,7 @@ class Match:
                     "frame_rate."
                 )
             return self._in_seconds(frames, X, frame_rate)
+        rates_of(X, frame_rate, unit)
         if X is not None:
             self._check_count(_lengths(X), "length")
         return frames * (100 / (self.times.shape[1] - 1) if unit == "percent" else 1)
@@ -634,6 +635,8 @@ def rates_of(X, frame_rate=None, unit="seconds"):
     -------
     float, array-like of shape (n_sequences,), or None if one is not known
     """
+    if frame_rate is not None:
+        as_frame_rates(frame_rate)
     if frame_rate is not None or unit != "seconds" or X is None or _are_lengths(X):
         return frame_rate
     rates = [frame_rate_of_rows(x) for x in as_collection(X) or [None]]

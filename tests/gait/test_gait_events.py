@@ -193,6 +193,30 @@ def test_heading_across_a_gap_of_the_hips(walk):
     assert turned.max() < 1
 
 
+@pytest.mark.parametrize("hidden", [["front"], ["front", "back"], ["middle"]])
+def test_a_hidden_marker_of_the_pelvis(walk, hidden):
+    """The others carry it along; a marker that is never seen is left out."""
+    x = walk.data[0].reshape(len(walk.data[0]), -1, 3)
+    hips = [walk.skeleton.joints.index(f"{side}_hip") for side in ("left", "right")]
+    middle, across = x[:, hips].mean(axis=1), np.diff(x[:, hips], axis=1)[:, 0]
+    ahead = 0.7 * np.cross([0, 1, 0], across)
+    markers = {"front": middle + ahead + across / 2, "back": middle - ahead, "middle": middle}
+    n = len(x)
+    for name in hidden:
+        markers[name] = markers[name].copy()
+        markers[name][n // 3 : None if name == "middle" else 2 * n // 3] = np.nan
+        if name == "middle":
+            markers[name][:] = np.nan
+    points = np.concatenate([x, np.stack(list(markers.values()), axis=1)], axis=1)
+    joints = [*walk.skeleton.joints, *markers]
+    landmarks = dict(walk.skeleton.landmarks) | {"pelvis": tuple(markers)}
+    body = Skeleton(joints, [-1] * len(joints), landmarks)
+    found = gait_events([points.reshape(n, -1)], body, frame_rate=100)
+    whole = gait_events(walk.data[:1], walk.skeleton, frame_rate=100)
+    assert found[["label", "context"]].equals(whole[["label", "context"]])
+    np.testing.assert_allclose(found["time"], whole["time"], atol=0.03)
+
+
 def test_names_of_markers():
     """Of one subject among nameless points; a heel that is never seen leaves the ankle."""
     made = make_walk(1, random_state=0)
@@ -291,6 +315,11 @@ def test_rate_and_noise_hardly_matter_on_people(ruler, real_data):
         ({"skeleton": None}, "Arrays do not name their joints: give a skeleton"),
         ({"feet": {"heel": "left_heel"}}, "feet: 'heel' is none of left_heel, left_toe"),
         ({"feet": {"left_heel": "LHEE"}}, "feet: 'left_heel' is at 'LHEE', which is no joint"),
+        (
+            {"frame_rate": 0.01},
+            "Performance 0 has a frame rate of 0.01; recordings of people have 1",
+        ),
+        ({"frame_rate": 1e5}, "Give frame_rate= in frames a second"),
         ({"X": [np.zeros((20, 57))]}, "Performance 0 has 20 frames at 100 a second; 0.25 s and 4"),
         ({"X": [np.zeros((50, 6))]}, "Performance 0 has 6 features a frame, but the skeleton's 19"),
     ],

@@ -249,14 +249,29 @@ def test_rounded_times_are_even(rate, unit):
 
 @pytest.mark.parametrize(
     "time",
-    [np.round(np.arange(400) / 30, 2), (np.arange(6000) / 60).astype("f4")],
-    ids=["two digits", "single precision"],
+    [
+        np.round(np.arange(400) / 30, 2),
+        np.round(np.arange(48) / 24, 2),
+        np.round(np.arange(120) / 60, 2),
+        np.round(17.3 + np.arange(300) / 90, 2),
+        np.round(np.arange(480) / 240, 3),
+        (np.arange(6000) / 60).astype("f4"),
+    ],
+    ids=["30 Hz", "24 Hz", "60 Hz", "90 Hz", "240 Hz", "single precision"],
 )
 def test_coarse_times_are_even(time):
     df = pd.DataFrame({"t": time, "x": np.sin(time.astype(float))})
     (x,) = to_sequences(df, time="t")
     np.testing.assert_array_equal(x["x"], df["x"])
     assert not x.attrs["resampled"]
+
+
+@pytest.mark.parametrize("lost", [[30], [20, 40], [15, 30, 45]])
+@pytest.mark.parametrize(("rate", "digits"), [(60, 2), (100, 2), (240, 3)])
+def test_lost_frames_are_no_rounding(rate, digits, lost):
+    time = np.delete(np.round(np.arange(60) / rate, digits), lost)
+    (x,) = to_sequences(pd.DataFrame({"t": time, "x": time}), time="t", max_gap_time=3 / rate)
+    assert x.attrs["resampled"]
 
 
 @pytest.mark.parametrize(("rate", "n_frames"), [(25, 26), (100, 101), (30, 31)])

@@ -183,6 +183,24 @@ def test_tables_of_opensim_are_read_back(tmp_path, ending):
     assert found.attrs["units"] == "deg"
 
 
+@pytest.mark.parametrize("units", ["rad", "Radians", "rads", ["rad", "radian"], ["rad", "m"]])
+def test_radians_stay_radians(tmp_path, units):
+    angles = pd.DataFrame({"knee": [0.1, 0.2, 0.3], "hip": [1.0, 2.0, 3.0]})
+    angles.attrs["units"] = units
+    found = written(tmp_path, angles, name="out.sto", frame_rate=50)
+    assert found.attrs["units"] == "rad"
+    angles.attrs["units"] = ["rad", "deg"]
+    with pytest.raises(ValueError, match="'hip' is in degrees and 'knee' in radians"):
+        write_motion(tmp_path / "b.sto", angles, frame_rate=50)
+
+
+@pytest.mark.parametrize("frame_rate", [True, -1, 0, np.nan, np.inf, "x"])
+def test_no_frame_rate(tmp_path, frame_rate):
+    with pytest.raises(ValueError, match="frame_rate must be frames a second, above 0, got"):
+        write_motion(tmp_path / "a.sto", pd.DataFrame({"a": [1.0, 2.0]}), frame_rate=frame_rate)
+    assert not (tmp_path / "a.sto").exists()
+
+
 @pytest.mark.parametrize(
     ("how", "message"),
     [
@@ -193,6 +211,10 @@ def test_tables_of_opensim_are_read_back(tmp_path, ending):
         ({"X": np.zeros((4, 44))}, "X has 44 columns, and 15 joints need 45"),
         ({"name": "a.trc", "like": "b.bvh"}, "like= goes with .bvh files only"),
         ({"name": "a.mot"}, "give a DataFrame, whose columns have names"),
+        (
+            {"name": "a.sto", "X": pd.DataFrame({"a": [1.0, np.inf]})},
+            r"frame 1, feature 0 \('a'\) is infinity",
+        ),
     ],
 )
 def test_refused(tmp_path, how, message):

@@ -24,6 +24,7 @@ from sklearn_motionsync import (
     Match,
     Skeleton,
     compare_groups,
+    write_player,
     write_report,
 )
 from sklearn_motionsync.comparison.curves import AlignedCurves
@@ -392,6 +393,27 @@ def test_refused_paths(tmp_path):
     for path in (tmp_path, os.devnull):
         with pytest.raises(ValueError, match=r"path must be that of a file.* is a folder or"):
             write_report(path, SYNC, TRIALS)
+
+
+def test_a_file_is_replaced_where_a_link_leads_and_keeps_its_readers(tmp_path):
+    target, link = tmp_path / f"{'x' * 240}.html", tmp_path / "link.html"
+    target.write_text("old")
+    target.chmod(0o600)
+    link.symlink_to(target)
+    bends = make_bending(2, n_frames=20, random_state=0)
+    write_player(link, bends.data, bends.skeleton)
+    assert link.is_symlink()
+    assert target.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert target.stat().st_mode & 0o777 == 0o600
+    assert sorted(tmp_path.iterdir()) == sorted([target, link])
+
+
+def test_no_spreadsheet_runs_what_users_give(tmp_path):
+    """Names that begin as a formula stand behind an apostrophe in the files of the report."""
+    people = ['=HYPERLINK("http://x")', "+1", "@a", "-b"] * (len(TRIALS) // 4 + 1)
+    path = write_report(tmp_path / "a.html", SYNC, TRIALS, people=people[: len(TRIALS)])
+    table = pd.read_csv(io.StringIO(Text(path).data["files"]["trials.csv"]))
+    assert table["person"].tolist()[:4] == ['\'=HYPERLINK("http://x")', "'+1", "'@a", "'-b"]
 
 
 def test_a_missing_matplotlib_is_named(tmp_path, monkeypatch):
