@@ -277,7 +277,7 @@ def test_trials_of_another_movement_are_doubtful():
 
 
 def test_the_way_back_of_a_movement_that_is_alike_both_ways_is_not_doubted(bends):
-    """A bend backwards is a bend: docs/howto/uncertainty.md names it."""
+    """A bend backwards is a bend: docs/howto/timing.md names it."""
     X = make_pipeline(DirectionCosines(bends.skeleton), ASpace()).fit_transform(bends.data)
     sync = DenseSynchronizer(P).fit(X[:18])
     assert not sync.match(X[18:]).doubtful.any()
